@@ -1,0 +1,242 @@
+"""A run folder as vis reads it (docs/architecture.md): whatever is there, and a plain word for whatever is not."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["PHASES", "Run", "RunFolder", "Series", "Setting", "read_folder", "read_series"]
+
+PHASES = ("free", "in", "rest", "out")
+_COLUMNS = ("t_s", "depth_m", "velocity_m_s", "force_N", "phase")
+
+
+@dataclass(frozen=True)
+class Series:
+    """One penetration. All arrays have shape (n,); force is the ground's on the spike, positive upwards.
+
+    Attributes:
+        time: Time [s].
+        depth: Depth of the tip [m], positive downwards.
+        velocity: Downward velocity [m/s].
+        force: Force [N].
+        phase: One of `PHASES` per row.
+    """
+
+    time: NDArray[np.float64]
+    depth: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    force: NDArray[np.float64]
+    phase: NDArray[np.str_]
+
+    def part(self, *phases: str) -> Series:
+        """The rows in these phases."""
+        keep = np.isin(self.phase, phases)
+        return Series(self.time[keep], self.depth[keep], self.velocity[keep], self.force[keep], self.phase[keep])
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of the result: its id, kind ("driven", "drop", "set_down"), seed, speed [m/s], and both series."""
+
+    id: str
+    kind: str
+    seed: int | None
+    speed: float | None
+    bed: Series | None
+    model: Series | None
+    quantities: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One line of run.toml: table ("" at the top), key, value as written, and the comment (meaning and unit) that stands
+    above it or behind it."""
+
+    table: str
+    key: str
+    value: str
+    comment: str
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """What a run folder holds.
+
+    Attributes:
+        path: The folder.
+        result: result.json, `{}` where it is missing or unreadable.
+        runs: Its runs with their series.
+        settings: The lines of run.toml in order.
+        missing: Sentences on what is missing or unreadable.
+        status: "done", "stopped", "failed", "running" or "unknown".
+        reason: Why a run stopped or failed.
+    """
+
+    path: Path
+    result: dict[str, Any]
+    runs: list[Run]
+    settings: list[Setting]
+    missing: list[str]
+    status: str = "unknown"
+    reason: str = ""
+
+    def of_kind(self, kind: str) -> list[Run]:
+        """The runs of a kind, by speed and seed."""
+        chosen = [run for run in self.runs if run.kind == kind]
+        return sorted(chosen, key=lambda run: (run.speed or 0.0, run.seed or 0))
+
+    def speeds(self, kind: str) -> list[float]:
+        """The speeds [m/s] at which a kind was run, increasing."""
+        return sorted({run.speed for run in self.runs if run.kind == kind and run.speed is not None})
+
+
+def read_folder(folder: str | Path) -> RunFolder:
+    """Read a run folder; nothing in it is required.
+
+    Raises:
+        FileNotFoundError: there is no such folder.
+    """
+    path = Path(folder)
+    if not path.is_dir():
+        raise FileNotFoundError(f"{path} is no folder")
+    missing: list[str] = []
+    result = _read_result(path / "result.json", missing)
+    runs = []
+    for entry in _dicts(result.get("runs")):
+        name = str(entry.get("id", "unnamed"))
+        bed = _try_series(path, entry.get("series"), f"run {name}: the bed's series", missing)
+        model = _try_series(path, entry.get("model_series"), f"run {name}: the spring-damper's series", missing)
+        speed, seed = entry.get("speed"), entry.get("seed")
+        runs.append(
+            Run(
+                id=name,
+                kind=str(entry.get("kind", "")),
+                seed=int(seed) if isinstance(seed, int | float) else None,
+                speed=float(speed) if isinstance(speed, int | float) else None,
+                bed=bed,
+                model=model,
+                quantities=dict(entry.get("quantities") or {}),
+            )
+        )
+    if result and not runs:
+        missing.append("result.json lists no runs.")
+    status, reason = _read_status(path / "status.json")
+    if result.get("status"):
+        status = str(result["status"])
+    return RunFolder(path, result, runs, _read_settings(path / "run.toml", missing), missing, status, reason)
+
+
+def read_series(path: str | Path) -> Series:
+    """Read one series file.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ValueError: a column is missing, a number cannot be read, or it has no rows.
+    """
+    with Path(path).open(newline="", encoding="utf-8") as file:
+        reader = csv.DictReader(line for line in file if not line.startswith("#"))
+        absent = [name for name in _COLUMNS if name not in (reader.fieldnames or [])]
+        if absent:
+            raise ValueError(f"{path} has no column {', '.join(absent)}")
+        rows = list(reader)
+    if not rows:
+        raise ValueError(f"{path} has no rows")
+    try:
+        numbers = [np.array([float(row[name]) for row in rows]) for name in _COLUMNS[:4]]
+    except TypeError as error:
+        raise ValueError(f"{path} has a row that ends too early") from error
+    return Series(numbers[0], numbers[1], numbers[2], numbers[3], np.array([str(row["phase"]) for row in rows]))
+
+
+def _dicts(value: Any) -> list[dict[str, Any]]:
+    return [entry for entry in value if isinstance(entry, dict)] if isinstance(value, list) else []
+
+
+def _read_result(path: Path, missing: list[str]) -> dict[str, Any]:
+    if not path.exists():
+        missing.append("result.json is missing: the run stopped before it had a result.")
+        return {}
+    try:
+        result = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        missing.append(f"result.json cannot be read: {error}.")
+        return {}
+    if not isinstance(result, dict):
+        missing.append("result.json holds no object.")
+        return {}
+    return result
+
+
+def _read_status(path: Path) -> tuple[str, str]:
+    try:
+        status = json.loads(path.read_text(encoding="utf-8"))
+        return str(status["status"]), str(status.get("reason") or "")
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return "unknown", ""
+
+
+def _try_series(folder: Path, name: Any, what: str, missing: list[str]) -> Series | None:
+    if not name:
+        missing.append(f"{what} is not given.")
+        return None
+    try:
+        return read_series(folder / str(name))
+    except FileNotFoundError:
+        missing.append(f"{what} ({name}) is missing.")
+    except (OSError, ValueError) as error:
+        missing.append(f"{what} cannot be read: {error}.")
+    return None
+
+
+def _read_settings(path: Path, missing: list[str]) -> list[Setting]:
+    if not path.exists():
+        missing.append("run.toml is missing: the settings are not known.")
+        return []
+    try:
+        text = path.read_text(encoding="utf-8")
+        tomllib.loads(text)
+    except (OSError, ValueError) as error:
+        missing.append(f"run.toml cannot be read: {error}.")
+        return []
+    settings, table, above = [], "", []
+    for line in text.splitlines():
+        if absent := re.match(r"\s*#\s*([A-Za-z0-9_.-]+) is not set\s*$", line):
+            settings.append(Setting(table, absent.group(1), "not set", " ".join(above)))
+            above = []
+        elif line.lstrip().startswith("#"):
+            above.append(line.lstrip("# ").rstrip())
+        elif header := re.match(r"\s*\[+([^\]]+)\]+\s*(#.*)?$", line):
+            table, above = header.group(1).strip(), []
+        elif pair := re.match(r"\s*([A-Za-z0-9_.\"'-]+)\s*=\s*(.*)", line):
+            value, comment = _split_comment(pair.group(2))
+            if not table:
+                above = []  # what stands there is about the file
+            settings.append(Setting(table, pair.group(1).strip("\"'"), value, " ".join([*above, comment]).strip()))
+            above = []
+        else:
+            above = []
+    return settings
+
+
+def _split_comment(text: str) -> tuple[str, str]:
+    quote = ""
+    for index, letter in enumerate(text):
+        if quote:
+            quote = "" if letter == quote else quote
+        elif letter in "\"'":
+            quote = letter
+        elif letter == "#":
+            return text[:index].strip(), text[index + 1 :].strip()
+    return text.strip(), ""

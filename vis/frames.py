@@ -1,0 +1,345 @@
+"""Frames of a run for ParaView: VTU files and one PVD per run.
+
+    frames/driven-0.1-seed1.pvd               every part over time
+    frames/driven-0.1-seed1_grains_0000.vtu   grain centres as vertices, with their fields
+    frames/driven-0.1-seed1_spike_0000.vtu    a body as a triangle mesh in place
+
+The default name, "frames", has no prefix: `frames/frames.pvd`, `frames/grains_0000.vtu`. Reals are float32, blocks are
+zlib-compressed and appended raw. Every file is written beside its place and moved there, the PVD last, so a run that is
+killed leaves frames that open.
+"""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["GRAIN_FIELDS", "Frame", "FrameWriter", "Frames", "frame_names", "read_frames"]
+
+#: The fields of a grain that a frame keeps: name -> (components, meaning and unit).
+GRAIN_FIELDS: dict[str, tuple[int, str]] = {
+    "radius": (1, "radius [m]"),
+    "velocity": (3, "velocity [m/s]"),
+    "force": (3, "sum of the contact forces [N]"),
+    "coordination": (1, "contacts of the grain [1]"),
+    "displacement": (3, "displacement since the start of the run [m]"),
+    "id": (1, "number of the grain"),
+}
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*\Z")
+Body = tuple[ArrayLike, ArrayLike]
+_Part = tuple[str, NDArray[np.float32], dict[str, NDArray[Any]], NDArray[np.int64] | None]
+
+
+class FrameWriter:
+    """Writes the frames of one run.
+
+    Args:
+        folder: The run folder; frames go to its `frames/`.
+        name: The run's id, also the PVD's name.
+        resume: Continue an existing series; otherwise the old frames of this name are removed.
+        keep_until: With `resume`, frames later than this time [s] are removed and will be written again.
+
+    Raises:
+        ValueError: a name that is no plain file name; `keep_until` without `resume`; a PVD that cannot be read.
+    """
+
+    def __init__(
+        self, folder: str | Path, *, name: str = "frames", resume: bool = False, keep_until: float | None = None
+    ) -> None:
+        if not _NAME.match(name):
+            raise ValueError(f"name is {name!r}; a run is named with letters, digits and . _ + - only")
+        if keep_until is not None and not resume:
+            raise ValueError("keep_until is given without resume=True")
+        self.folder = Path(folder) / "frames"
+        self.name = name
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self._prefix = "" if name == "frames" else f"{name}_"
+        old = _read_pvd(self.path) if self.path.exists() else []
+        limit = -np.inf if not resume else np.inf if keep_until is None else keep_until
+        limit += 1e-9 * abs(limit) if np.isfinite(limit) else 0.0
+        self._entries = [entry for entry in old if entry.time <= limit]
+        if old:
+            self._write_pvd()  # first the list, then the files: no list ever names a file that is gone
+            kept = {entry.file for entry in self._entries}
+            for entry in old:
+                if entry.file not in kept:
+                    (self.folder / entry.file).unlink(missing_ok=True)
+
+    @property
+    def path(self) -> Path:
+        """The PVD file."""
+        return self.folder / f"{self.name}.pvd"
+
+    @property
+    def times(self) -> list[float]:
+        """Times of the frames written so far [s]."""
+        return sorted({entry.time for entry in self._entries})
+
+    def write(
+        self,
+        time: float,
+        grains: Mapping[str, ArrayLike],
+        bodies: Mapping[str, Body] | None = None,
+        *,
+        values: Mapping[str, float] | None = None,
+    ) -> Path:
+        """Write one frame.
+
+        Args:
+            time: Time [s], on the clock of the run's series, not before the last frame; a frame at the last frame's
+                time takes its place (a run resumed from a checkpoint may write that frame again).
+            grains: `position` [m], shape (n, 3), and any of `GRAIN_FIELDS`; a vector field may be given as its
+                magnitude, shape (n,).
+            bodies: Name -> (points [m], shape (n, 3), triangles, shape (m, 3)).
+            values: Scalars of this frame, such as depth [m] and force [N].
+
+        Returns:
+            The PVD file.
+
+        Raises:
+            ValueError: a time before the last frame's, arrays of unequal length or wrong shape, values
+                that are not finite, an unknown grain field.
+        """
+        time = float(time)
+        last = self._entries[-1].time if self._entries else -np.inf
+        again = abs(time - last) <= 1e-9 * abs(last) if self._entries else False
+        if not np.isfinite(time) or (time < last and not again):
+            raise ValueError(f"time is {time!r}; it must be finite and not before the last frame's, {last!r}")
+        scalars = {"TimeValue": time, **{key: float(value) for key, value in (values or {}).items()}}
+        before = [entry for entry in self._entries if not again or entry.time != last]
+        index = len({entry.time for entry in before})
+        parts: list[_Part] = [("grains", *_grain_arrays(grains), None)]
+        for body, (points, triangles) in (bodies or {}).items():
+            if body == "grains" or not _NAME.match(body):
+                raise ValueError(f"a body is named {body!r}; letters, digits and . _ + - only, and not 'grains'")
+            parts.append((body, *_body_arrays(body, points, triangles)))
+        fresh = []
+        for part, (name, positions, fields, faces) in enumerate(parts):
+            file = f"{self._prefix}{name}_{index:04d}.vtu"
+            _write_vtu(self.folder / file, positions, fields, faces, scalars)
+            fresh.append(_Entry(time, part, name, file))
+        self._entries = before + fresh
+        self._write_pvd()
+        return self.path
+
+    def _write_pvd(self) -> None:
+        root = ElementTree.Element("VTKFile", type="Collection", version="1.0", byte_order="LittleEndian")
+        collection = ElementTree.SubElement(root, "Collection")
+        for entry in self._entries:
+            ElementTree.SubElement(
+                collection,
+                "DataSet",
+                timestep=repr(entry.time),
+                group=self.name,
+                part=str(entry.part),
+                name=entry.name,
+                file=entry.file,
+            )
+        ElementTree.indent(root)
+        temporary = self.path.with_name(self.path.name + ".part")
+        temporary.write_text('<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n")
+        temporary.replace(self.path)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One frame of a run as it was written.
+
+    Attributes:
+        time: Time [s].
+        grains: `position` [m], shape (n, 3), and the fields of `GRAIN_FIELDS` that were written.
+        bodies: Name -> (points [m], shape (n, 3), triangles, shape (m, 3)).
+        values: Scalars of this frame (depth [m], force [N], ...).
+    """
+
+    time: float
+    grains: dict[str, NDArray[Any]]
+    bodies: dict[str, tuple[NDArray[np.float64], NDArray[np.int64]]]
+    values: dict[str, float]
+
+
+class Frames(Sequence[Frame]):
+    """The frames of one run; a frame is read from disk when it is asked for."""
+
+    def __init__(self, folder: Path, name: str) -> None:
+        self.folder = folder
+        self.name = name
+        self._by_time: dict[float, list[_Entry]] = {}
+        for entry in _read_pvd(folder / f"{name}.pvd"):
+            self._by_time.setdefault(entry.time, []).append(entry)
+        self.times = np.array(sorted(self._by_time))
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def __iter__(self) -> Iterator[Frame]:
+        return (self[index] for index in range(len(self)))
+
+    @overload
+    def __getitem__(self, index: int) -> Frame: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Frame]: ...
+    def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        time = float(self.times[index])
+        grains: dict[str, NDArray[Any]] = {"position": np.zeros((0, 3))}
+        bodies, values = {}, {}
+        for entry in self._by_time[time]:
+            points, triangles, fields, scalars = _read_vtu(self.folder / entry.file)
+            values.update(scalars)
+            if entry.name == "grains":
+                grains = {"position": points, **fields}
+            else:
+                bodies[entry.name] = (points, triangles)
+        values.pop("TimeValue", None)
+        return Frame(time, grains, bodies, values)
+
+
+def read_frames(folder: str | Path, name: str = "frames") -> Frames:
+    """Frames of the run `name` in a run folder, by increasing time.
+
+    Raises:
+        FileNotFoundError: the run has no frames.
+        ValueError: its PVD, or when a frame is asked for its VTU, cannot be read.
+    """
+    return Frames(Path(folder) / "frames", name)
+
+
+def frame_names(folder: str | Path) -> list[str]:
+    """Ids of the runs that have frames in a run folder, sorted."""
+    return sorted(path.stem for path in (Path(folder) / "frames").glob("*.pvd"))
+
+
+@dataclass(frozen=True)
+class _Entry:
+    time: float
+    part: int
+    name: str
+    file: str
+
+
+def _read_pvd(path: Path) -> list[_Entry]:
+    try:
+        sets = ElementTree.parse(path).getroot().iter("DataSet")
+        entries = [
+            _Entry(float(s.attrib["timestep"]), int(s.attrib["part"]), s.attrib.get("name", "grains"), s.attrib["file"])
+            for s in sets
+        ]
+    except (ElementTree.ParseError, KeyError, ValueError) as error:
+        raise ValueError(f"{path} is no PVD file of ours: {error}") from error
+    return sorted(entries, key=lambda entry: (entry.time, entry.part))
+
+
+def _grain_arrays(grains: Mapping[str, ArrayLike]) -> tuple[NDArray[np.float32], dict[str, NDArray[Any]]]:
+    if "position" not in grains:
+        raise ValueError("grains has no 'position'")
+    position = _checked("position", grains["position"], (3,))
+    fields: dict[str, NDArray[Any]] = {}
+    for key, given in grains.items():
+        if key in ("position", "spin"):  # spin is not kept: a sphere looks the same
+            continue
+        if key not in GRAIN_FIELDS:
+            raise ValueError(f"grains has the field {key!r}; a frame keeps {', '.join(GRAIN_FIELDS)}")
+        array = _checked(key, given, (1, GRAIN_FIELDS[key][0]))
+        if len(array) != len(position):
+            raise ValueError(f"grains[{key!r}] has {len(array)} rows for {len(position)} positions")
+        fields[key] = array.astype(np.int32) if key in ("id", "coordination") else array
+    return position, fields
+
+
+def _body_arrays(
+    body: str, points: ArrayLike, triangles: ArrayLike
+) -> tuple[NDArray[np.float32], dict[str, NDArray[Any]], NDArray[np.int64]]:
+    corners = _checked(body, points, (3,))
+    faces = np.ascontiguousarray(triangles, dtype=np.int64)
+    if faces.ndim != 2 or faces.shape[1] != 3:
+        raise ValueError(f"the triangles of {body!r} have shape {faces.shape}; it must be (m, 3)")
+    if faces.size and (faces.min() < 0 or faces.max() >= len(corners)):
+        raise ValueError(f"the triangles of {body!r} name points beyond its {len(corners)}")
+    return corners, {}, faces
+
+
+def _checked(name: str, given: ArrayLike, columns: tuple[int, ...]) -> NDArray[np.float32]:
+    array = np.ascontiguousarray(given, dtype=np.float32)
+    width = 1 if array.ndim == 1 else array.shape[1] if array.ndim == 2 else 0
+    if width not in columns:
+        raise ValueError(
+            f"{name!r} has shape {array.shape}; its rows must have {' or '.join(map(str, columns))} numbers"
+        )
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name!r} has values that are not finite")
+    return array
+
+
+def _write_vtu(
+    path: Path,
+    points: NDArray[np.float32],
+    fields: Mapping[str, NDArray[Any]],
+    triangles: NDArray[np.int64] | None,
+    values: Mapping[str, float],
+) -> None:
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+    from vtkmodules.vtkCommonCore import vtkPoints
+    from vtkmodules.vtkCommonDataModel import VTK_TRIANGLE, VTK_VERTEX, vtkCellArray, vtkUnstructuredGrid
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+
+    cells = np.arange(len(points), dtype=np.int64).reshape(-1, 1) if triangles is None else triangles
+    grid = vtkUnstructuredGrid()
+    vertices = vtkPoints()
+    vertices.SetData(numpy_to_vtk(points, deep=True))
+    grid.SetPoints(vertices)
+    array = vtkCellArray()
+    offsets = np.arange(len(cells) + 1, dtype=np.int32) * cells.shape[1]
+    array.SetData(numpy_to_vtk(offsets, deep=True), numpy_to_vtk(cells.astype(np.int32).ravel(), deep=True))
+    grid.SetCells(VTK_VERTEX if triangles is None else VTK_TRIANGLE, array)
+    for name, field in fields.items():
+        data = numpy_to_vtk(field, deep=True)
+        data.SetName(name)
+        grid.GetPointData().AddArray(data)
+    for name, value in values.items():
+        data = numpy_to_vtk(np.array([value]), deep=True)
+        data.SetName(name)
+        grid.GetFieldData().AddArray(data)
+    temporary = path.with_name(path.name + ".part")
+    writer = vtkXMLUnstructuredGridWriter()
+    writer.SetFileName(str(temporary))
+    writer.SetInputData(grid)
+    writer.SetDataModeToAppended()
+    writer.EncodeAppendedDataOff()
+    writer.SetCompressorTypeToZLib()
+    if not writer.Write():
+        raise OSError(f"{temporary} could not be written")
+    temporary.replace(path)
+
+
+def _read_vtu(
+    path: Path,
+) -> tuple[NDArray[np.float64], NDArray[np.int64], dict[str, NDArray[Any]], dict[str, float]]:
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
+
+    if not path.exists():
+        raise ValueError(f"{path} is missing though its PVD lists it")
+    reader = vtkXMLUnstructuredGridReader()
+    if not reader.CanReadFile(str(path)):
+        raise ValueError(f"{path} is no VTU file")
+    reader.SetFileName(str(path))
+    reader.Update()
+    grid = reader.GetOutput()
+    points = vtk_to_numpy(grid.GetPoints().GetData()).astype(np.float64)
+    connectivity = vtk_to_numpy(grid.GetCells().GetConnectivityArray()).astype(np.int64)
+    triangles = (
+        connectivity.reshape(-1, 3) if len(connectivity) == 3 * grid.GetNumberOfCells() else np.zeros((0, 3), int)
+    )
+    data, extra = grid.GetPointData(), grid.GetFieldData()
+    fields = {data.GetArrayName(i): vtk_to_numpy(data.GetArray(i)).copy() for i in range(data.GetNumberOfArrays())}
+    values = {extra.GetArrayName(i): float(extra.GetArray(i).GetTuple1(0)) for i in range(extra.GetNumberOfArrays())}
+    return points, triangles, fields, values

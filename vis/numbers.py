@@ -1,0 +1,112 @@
+"""Numbers as a person would quote them: sensible digits, units with a prefix that fits, uncertainties.
+
+quote(92.31, 4.2, "N/m") == "92 ± 4 N/m"
+quote(0.00215, 0.00012, "m") == "2.15 ± 0.12 mm"
+quote(0.231, 0.02, "%") == "23 ± 2 %"
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+__all__ = ["digits_for", "plain", "quantity", "quote"]
+
+_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+_SCALED = {"N", "J", "s", "Pa", "W", "kg"}
+_MINUS, _SPACE = "\N{MINUS SIGN}", "\N{NO-BREAK SPACE}"
+
+
+def digits_for(std: float) -> int:
+    """Decimals at which a number with this uncertainty is quoted: one digit of it, two where it starts with 1."""
+    exponent = math.floor(math.log10(std))
+    leading = std / 10.0**exponent
+    return -exponent + (1 if leading < 1.95 else 0)
+
+
+def plain(value: float, significant: int = 3) -> str:
+    """A number without a unit: `significant` digits, whole numbers from 1000 up with spaces between thousands."""
+    if not math.isfinite(value):
+        return "not a number" if math.isnan(value) else f"{_MINUS if value < 0 else ''}\N{INFINITY}"
+    if value == 0.0:
+        return "0"
+    exponent = math.floor(math.log10(abs(value)))
+    if exponent >= 9 or exponent < -4:
+        mantissa, power = f"{value:.{significant - 1}e}".split("e")
+        return f"{mantissa.replace('-', _MINUS)}\N{MULTIPLICATION SIGN}10{_superscript(int(power))}"
+    return _fixed(value, max(0, significant - 1 - exponent))
+
+
+def quote(value: float | None, std: float | None = None, unit: str = "1", *, significant: int = 3) -> str:
+    """A number with its uncertainty and unit.
+
+    Args:
+        value: The number in SI; None reads "unknown".
+        std: Its standard deviation; 0 for what is exact, None where unknown: both are left out.
+        unit: An SI unit; "1" for none, "%" for a share to be shown in per cent.
+        significant: Digits where the uncertainty does not set them.
+    """
+    if value is None:
+        return "unknown"
+    scale, shown = _scale(value, unit)
+    if unit == "1" and float(value).is_integer() and not std:
+        return _fixed(value, 0)
+    if std is None or std == 0.0 or not math.isfinite(std) or not math.isfinite(value):
+        text = plain(value / scale, significant)
+    else:
+        decimals = digits_for(std / scale)
+        text = f"{_fixed(value / scale, decimals)} ± {_fixed(std / scale, decimals)}"
+    return f"{text}{_SPACE}{shown}" if shown else text
+
+
+def quantity(entry: Any, *, unit: str | None = None, significant: int = 3) -> str:
+    """A quantity of result.json, `{"value", "std", "unit"}` or a bare number; "unknown" where it is missing.
+
+    Args:
+        entry: The quantity.
+        unit: In place of its own unit, such as "%" for a share.
+        significant: Digits where the uncertainty does not set them.
+    """
+    if isinstance(entry, Mapping):
+        value, std, own = entry.get("value"), entry.get("std"), str(entry.get("unit") or "1")
+    else:
+        value, std, own = entry, None, "1"
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return "unknown" if value is None else str(value)
+    return quote(value, std if isinstance(std, int | float) else None, unit or own, significant=significant)
+
+
+def _scale(value: float, unit: str) -> tuple[float, str]:
+    if unit == "1":
+        return 1.0, ""
+    if unit == "%":
+        return 0.01, "%"
+    if unit == "m":
+        return (1e-3, "mm") if abs(value) < 1.0 else (1.0, "m")
+    if unit in ("m/s2", "m/s^2"):
+        return 1.0, "m/s²"
+    if unit == "kg/m3":
+        return 1.0, "kg/m³"
+    if unit == "N s/m":
+        return 1.0, "N\N{NO-BREAK SPACE}s/m"
+    if unit not in _SCALED or value == 0.0 or not math.isfinite(value):
+        return 1.0, unit
+    if unit == "kg":
+        return (1e-3, "g") if abs(value) < 1.0 else (1.0, "kg")
+    for factor, prefix in _PREFIXES:
+        if abs(value) >= 0.9995 * factor:
+            return factor, prefix + unit
+    return 1.0, unit
+
+
+def _fixed(value: float, decimals: int) -> str:
+    rounded = round(value, decimals)
+    if rounded == 0.0:
+        rounded = 0.0  # no minus zero
+    text = f"{rounded:,.{max(0, decimals)}f}".replace("-", _MINUS)
+    return text.replace(",", _SPACE) if abs(rounded) >= 10000.0 else text.replace(",", "")
+
+
+def _superscript(power: int) -> str:
+    return str(power).translate(str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻"))
