@@ -1,0 +1,414 @@
+"""A spike that goes straight down into a ground: driven, dropped or set down.
+
+One macro step H is a whole number of the ground's own steps. Over it the spike moves at a constant velocity and the
+ground answers with its mean force F, so what passes between them is the exact impulse F H and the exact work
+F (velocity) H, whatever the ground does inside the step. A free spike of mass m under the load W is stepped
+
+    u     = v + (W - F_before) H / (2 m)       the velocity held during the step, a guess at its middle
+    z'    = z + u H
+    v'    = v + (W - F) H / m                  F: the mean force of the step just done
+
+which is explicit and staggered (the ground moves first), of second order in H, and exact in free fall. Time is 0 where
+the tip meets the undisturbed surface, depth 0; before that the spike is carried at its speed (phase "free"), from just
+clear of the grains that stick out.
+
+Each run is a stepper: `advance` once or `run` to the end, `state` and `restore` at any time between macro steps, the
+ground's memory included, so that a run taken up again gives the same bits.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from rigid import Spike
+
+from .bed_ground import BedGround
+from .ground import Ground
+from .trajectory import PHASES, Penetration
+
+__all__ = ["Drive", "Drop", "Run", "SetDown", "drive", "drop", "set_down"]
+
+SUBSTEPS = 10
+"""Steps of the ground in a macro step, by default."""
+FREE, IN, REST, OUT = range(4)
+
+
+class Run:
+    """Common to all three runs: the clock, the rows, the saved state. `advance` makes one macro step."""
+
+    kind = ""
+
+    def __init__(
+        self,
+        spike: Spike,
+        ground: Any,
+        *,
+        speed: float,
+        substeps: int = SUBSTEPS,
+        start_depth: float | None = None,
+        max_time: float = 10.0,
+    ) -> None:
+        self.spike = spike
+        self.ground: Ground = BedGround(ground, spike) if hasattr(ground, "add_body") else ground
+        for key, value in {"speed": speed, "substeps": substeps, "max_time": max_time}.items():
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"{key} is {value}: it must be above 0")
+        self.speed, self.max_time = float(speed), float(max_time)
+        self.macro_step = int(substeps) * self.ground.time_step
+        lift = -start_depth if start_depth is not None else self.ground.clearance
+        self._approach = max(0, math.ceil(lift / (self.speed * self.macro_step) - 1e-9))
+        """Macro steps before the surface; they end at depth 0 exactly."""
+        self.count = 0
+        """Macro steps done."""
+        self.depth = -self._approach * self.speed * self.macro_step
+        """Depth of the tip now [m]."""
+        self.velocity = self.speed
+        """Velocity now, positive downwards [m/s]."""
+        self.ended = ""
+        """Why it ended; empty while it goes on."""
+        self._rows: list[tuple[float, float, float, float]] = []
+        self._phases: list[int] = []
+        self._frames = 0
+
+    @property
+    def done(self) -> bool:
+        """Whether it has come to its end."""
+        return bool(self.ended)
+
+    @property
+    def time(self) -> float:
+        """Now [s]; 0 at the surface."""
+        return (self.count - self._approach) * self.macro_step
+
+    @property
+    def position(self) -> tuple[float, float, float]:
+        """Where the tip's lowest point is [m], world axes, z up."""
+        return (*self.ground.centre, self.ground.surface - self.depth)
+
+    @property
+    def fraction(self) -> float:
+        """How far along it is, from 0 to 1, as well as one can tell."""
+        return 1.0 if self.done else min(1.0, max(0.0, self.time / self.max_time))
+
+    def advance(self) -> None:
+        """Make one macro step; nothing once it has ended."""
+        if self.done:
+            return
+        approaching = self.count < self._approach
+        held = self.speed if approaching else self._held_velocity()
+        reaction = self.ground.step(self.position, (0.0, 0.0, -held), self.macro_step)
+        force = float(reaction.force[2])
+        before = self.depth
+        self.count += 1
+        # Counted down to the surface, so that the approach ends at depth 0 exactly.
+        steps_left = self._approach - self.count
+        self.depth = -steps_left * self.speed * self.macro_step if approaching else before + held * self.macro_step
+        middle = 0.5 * (before + self.depth)
+        self._rows.append((self.time - 0.5 * self.macro_step, middle, held, force))
+        self._phases.append(FREE if middle <= 0 else IN if held > 0 else OUT if held < 0 else REST)
+        if not approaching:
+            self._after(held, force)
+        if not self.done and self.time >= self.max_time - 0.5 * self.macro_step:
+            self.ended = "max_time"
+
+    def run(
+        self,
+        *,
+        on_step: Callable[[Run], None] | None = None,
+        on_frame: Callable[[Run], None] | None = None,
+        frame_interval: float | None = None,
+    ) -> Penetration:
+        """Go on to the end. `on_step` is called after every macro step, `on_frame` every `frame_interval` [s].
+
+        The first frame is taken before the first step. Frames already taken are part of the saved state.
+        """
+        while True:
+            elapsed = self.count * self.macro_step
+            if on_frame and frame_interval and elapsed >= self._frames * frame_interval - 0.5 * self.macro_step:
+                self._frames += 1
+                on_frame(self)
+            if self.done:
+                return self.result()
+            self.advance()
+            if on_step:
+                on_step(self)
+
+    def result(self) -> Penetration:
+        """The rows so far."""
+        rows = np.array(self._rows, dtype=float).reshape(-1, 4)
+        phases = np.array(PHASES)[np.array(self._phases, dtype=int)]
+        time, depth, velocity, force = (column.copy() for column in rows.T)
+        return Penetration(
+            kind=self.kind,
+            time=time,
+            depth=depth,
+            velocity=velocity,
+            force=force,
+            phase=phases,
+            macro_step=self.macro_step,
+            ended=self.ended or "unfinished",
+            settings=self.settings(),
+        )
+
+    def settings(self) -> dict[str, Any]:
+        """What was asked for, SI units."""
+        return {"ground": self.ground.name, "speed": self.speed, "start_depth": -self._approach_height()}
+
+    def state(self) -> dict[str, Any]:
+        """All that the rest of the run depends on: a flat dict of numpy arrays, the ground's under "ground.*"."""
+        own = {
+            "run.kind": np.array(self.kind),
+            "run.numbers": np.array([self.depth, self.velocity, *self._memory()], dtype=float),
+            "run.counts": np.array([self.count, self._approach, self._frames], dtype=np.int64),
+            "run.ended": np.array(self.ended),
+            "run.rows": np.array(self._rows, dtype=float).reshape(-1, 4),
+            "run.phases": np.array(self._phases, dtype=np.int8),
+        }
+        return own | {f"ground.{key}": value for key, value in self.ground.state().items()}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go back to what `state` gave. Raises ValueError for the state of another kind of run."""
+        if str(state["run.kind"]) != self.kind:
+            raise ValueError(f"the state is of a {state['run.kind']} run, this one is {self.kind}")
+        self.depth, self.velocity, *memory = (float(number) for number in state["run.numbers"])
+        self.count, self._approach, self._frames = (int(number) for number in state["run.counts"])
+        self._recall(memory)
+        self.ended = str(state["run.ended"])
+        self._rows = [tuple(row) for row in np.asarray(state["run.rows"]).tolist()]
+        self._phases = [int(code) for code in state["run.phases"]]
+        prefix = "ground."
+        self.ground.restore({key[len(prefix) :]: value for key, value in state.items() if key.startswith(prefix)})
+
+    def _approach_height(self) -> float:
+        return self._approach * self.speed * self.macro_step
+
+    def _held_velocity(self) -> float:
+        """Velocity of the step to come [m/s]."""
+        raise NotImplementedError
+
+    def _after(self, held: float, force: float) -> None:
+        """Take in what the step did: new velocity, the end."""
+        raise NotImplementedError
+
+    def _memory(self) -> list[float]:
+        return []
+
+    def _recall(self, memory: list[float]) -> None:
+        pass
+
+    def _last(self, seconds: float) -> np.ndarray | None:
+        """Rows of the last `seconds` [s], shape [n, 4]; None while fewer have passed since the surface."""
+        count = max(2, round(seconds / self.macro_step))
+        if self.count - self._approach < count:
+            return None
+        return np.array(self._rows[-count:])
+
+
+class Drive(Run):
+    """Straight down at `speed` to `depth`, held for `hold`, and pulled out at `retreat_speed` up to the surface."""
+
+    kind = "driven"
+
+    def __init__(
+        self,
+        spike: Spike,
+        ground: Any,
+        *,
+        speed: float,
+        depth: float,
+        hold: float = 0.02,
+        retreat: bool = True,
+        retreat_speed: float | None = None,
+        **common: Any,
+    ) -> None:
+        self.target, self.hold = float(depth), float(hold)
+        self.retreat_speed = float(retreat_speed if retreat_speed is not None else speed)
+        if not (math.isfinite(self.target) and self.target > 0):
+            raise ValueError(f"depth is {depth}: it must be above 0 (in m)")
+        if not (math.isfinite(self.hold) and self.hold >= 0):
+            raise ValueError(f"hold is {hold}: it must be 0 or more (in s)")
+        if not (math.isfinite(self.retreat_speed) and self.retreat_speed > 0):
+            raise ValueError(f"retreat_speed is {retreat_speed}: it must be above 0 (in m/s)")
+        total = self.target / float(speed) + self.hold + (self.target / self.retreat_speed if retreat else 0.0)
+        super().__init__(spike, ground, speed=speed, max_time=max(2 * total, 1e-9), **common)
+        self._total, self._retreat = total, retreat
+        reach = self.target / self.macro_step
+        self._in = max(1, math.ceil(reach / self.speed - 1e-9))
+        self._hold = round(self.hold / self.macro_step)
+        self._out = max(1, math.ceil(reach / self.retreat_speed - 1e-9)) if retreat else 0
+
+    @property
+    def fraction(self) -> float:
+        whole = self._approach + self._in + self._hold + self._out
+        return 1.0 if self.done else self.count / whole
+
+    def settings(self) -> dict[str, Any]:
+        return super().settings() | {
+            "depth": self.target, "hold": self.hold, "retreat": self._retreat, "retreat_speed": self.retreat_speed
+        }  # fmt: skip
+
+    def _held_velocity(self) -> float:
+        done = self.count - self._approach
+        if done < self._in:  # the last step of each way ends where it was to end
+            return self.speed if done < self._in - 1 else (self.target - self.depth) / self.macro_step
+        if done < self._in + self._hold:
+            return 0.0
+        left = self._in + self._hold + self._out - done
+        return -self.retreat_speed if left > 1 else -self.depth / self.macro_step
+
+    def _after(self, held: float, force: float) -> None:
+        self.velocity = held
+        if self.count - self._approach >= self._in + self._hold + self._out:
+            self.ended = "done"
+
+
+class Drop(Run):
+    """Let go at the surface with `speed` downwards, under the constant `load`, until it has come to rest.
+
+    It rests when over the last `rest_time` the depth stayed within `rest_tolerance` of the largest depth and the mean
+    force within 5 % of the load. The rows of that time get the phase "rest".
+    """
+
+    kind = "drop"
+
+    def __init__(
+        self,
+        spike: Spike,
+        ground: Any,
+        *,
+        speed: float,
+        mass: float | None = None,
+        load: float | None = None,
+        gravity: float = 9.80665,
+        rest_time: float = 0.04,
+        rest_tolerance: float = 0.005,
+        max_depth: float | None = None,
+        **common: Any,
+    ) -> None:
+        self.mass = float(spike.mass if mass is None else mass)
+        self.load = float(self.mass * gravity if load is None else load)
+        for key, value in {"mass": self.mass, "load": self.load}.items():
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"{key} is {value}: it must be above 0")
+        super().__init__(spike, ground, speed=speed, **common)
+        self.rest_time, self.rest_tolerance = float(rest_time), float(rest_tolerance)
+        self.max_depth = math.inf if max_depth is None else float(max_depth)
+        self._force = 0.0
+
+    def settings(self) -> dict[str, Any]:
+        return super().settings() | {
+            "mass": self.mass, "load": self.load, "rest_time": self.rest_time, "rest_tolerance": self.rest_tolerance,
+            "max_time": self.max_time,
+        }  # fmt: skip
+
+    def _held_velocity(self) -> float:
+        return self.velocity + 0.5 * self.macro_step * (self.load - self._force) / self.mass
+
+    def _after(self, held: float, force: float) -> None:
+        self.velocity += self.macro_step * (self.load - force) / self.mass
+        self._force = force
+        last = self._last(self.rest_time)
+        if self.depth > self.max_depth:
+            self.ended = "max_depth"
+        elif last is not None and self._rests(last):
+            self.ended = "rest"
+            self._phases[-len(last) :] = [REST] * len(last)
+
+    def _rests(self, last: np.ndarray) -> bool:
+        deepest = max(self.depth, float(last[:, 1].max()))
+        still = float(np.ptp(last[:, 1])) <= self.rest_tolerance * deepest
+        return still and abs(float(last[:, 3].mean()) - self.load) <= 0.05 * self.load
+
+    def _memory(self) -> list[float]:
+        return [self._force]
+
+    def _recall(self, memory: list[float]) -> None:
+        (self._force,) = memory
+
+
+class SetDown(Drop):
+    """Lowered as by a hand that lets go slowly: m dv/dt = W - F - c v with c = W / lowering_speed.
+
+    Free of the ground it sinks at `lowering_speed`; the hand bears whatever the ground does not, so the ground's force
+    rises to the load from below and the spike comes to rest where the bed first carries it. `mass` is what the hand
+    leaves the spike to feel; by default c times 2 ms, so light that the motion is damped beyond critical on any ground
+    softer than W / (8 ms lowering_speed) and cannot overshoot. It ends when over the last `rest_time` the mean speed is
+    below 1 % of the lowering speed and the mean force within 2 % of the load.
+    """
+
+    kind = "set_down"
+
+    def __init__(
+        self,
+        spike: Spike,
+        ground: Any,
+        *,
+        load: float,
+        lowering_speed: float = 0.03,
+        mass: float | None = None,
+        **common: Any,
+    ) -> None:
+        if not (math.isfinite(lowering_speed) and lowering_speed > 0):
+            raise ValueError(f"lowering_speed is {lowering_speed}: it must be above 0 (in m/s)")
+        self.hand = float(load) / lowering_speed
+        """c [N s/m]."""
+        super().__init__(
+            spike, ground, speed=lowering_speed, mass=self.hand * 0.002 if mass is None else mass, load=load, **common
+        )
+
+    def settings(self) -> dict[str, Any]:
+        return super().settings() | {"lowering_speed": self.speed}
+
+    def _held_velocity(self) -> float:
+        half = 0.5 * self.macro_step
+        # The hand's drag is taken implicitly, so that a light spike stays stable at any step.
+        return (self.mass * self.velocity + half * (self.load - self._force)) / (self.mass + half * self.hand)
+
+    def _after(self, held: float, force: float) -> None:
+        before = self.velocity
+        super()._after(held, force)
+        step = self.macro_step
+        self.velocity = (self.mass * before + step * (self.load - force)) / (self.mass + step * self.hand)
+
+    def _rests(self, last: np.ndarray) -> bool:
+        slow = abs(float(last[:, 2].mean())) <= 0.01 * self.speed
+        return slow and abs(float(last[:, 3].mean()) - self.load) <= 0.02 * self.load
+
+
+def drive(spike: Spike, *, into: Any, speed: float, depth: float, **options: Any) -> Penetration:
+    """Drive `spike` straight down `into` a ground (or a bed) at `speed` [m/s] to `depth` [m], hold it, pull it out.
+
+    Options: hold [s] (0.02), retreat (True), retreat_speed [m/s] (as speed), substeps of the ground in a macro step
+    (10), start_depth [m, negative] (just clear of the grains), and `on_step`, `on_frame`, `frame_interval` of
+    `Run.run`. Raises ValueError, naming key and value, for what cannot be; and what the ground raises.
+    """
+    hooks = _hooks(options)
+    return Drive(spike, into, speed=speed, depth=depth, **options).run(**hooks)
+
+
+def drop(spike: Spike, *, into: Any, speed: float, **options: Any) -> Penetration:
+    """Drop `spike` `into` a ground (or a bed): at the surface it has `speed` [m/s], and then it is left to itself.
+
+    Options: mass [kg] (the spike's), load [N] (mass * gravity), gravity [m/s2] (9.80665), rest_time [s],
+    rest_tolerance [1], max_depth [m], max_time [s], and those of `drive` that are not about the way out.
+    """
+    hooks = _hooks(options)
+    return Drop(spike, into, speed=speed, **options).run(**hooks)
+
+
+def set_down(spike: Spike, *, onto: Any, load: float, **options: Any) -> Penetration:
+    """Set `spike` down `onto` a ground (or a bed) under `load` [N], held back by a hand, to the resting sinkage.
+
+    Options: lowering_speed [m/s] (0.03), mass [kg] that the hand leaves it to feel, and those of `drop`.
+    """
+    hooks = _hooks(options)
+    return SetDown(spike, onto, load=load, **options).run(**hooks)
+
+
+def _hooks(options: dict[str, Any]) -> dict[str, Any]:
+    """Take the hooks of `Run.run` out of the options."""
+    return {key: options.pop(key) for key in ("on_step", "on_frame", "frame_interval") if key in options}

@@ -1,0 +1,156 @@
+"""What a penetration leaves behind: one row per macro step, and the numbers read off it."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import dataclass, field
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["PHASES", "Penetration"]
+
+PHASES = ("free", "in", "rest", "out")
+COLUMNS = ("t_s", "depth_m", "velocity_m_s", "force_N", "phase")
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Penetration:
+    """One run of a spike into a ground. Each row is one macro step: its mean force at its middle.
+
+    Depth and velocity are positive downwards, force is the ground's on the spike, positive upwards.
+    """
+
+    kind: str
+    """"driven", "drop" or "set_down"."""
+    time: Array
+    """Middle of each macro step [s], shape [n]; 0 where the tip meets the undisturbed surface."""
+    depth: Array
+    """Depth of the tip at the middle of the step [m], shape [n]."""
+    velocity: Array
+    """Velocity held during the step [m/s], shape [n]."""
+    force: Array
+    """Mean force during the step [N], shape [n]."""
+    phase: NDArray[np.str_]
+    """"free", "in", "rest" or "out", shape [n]."""
+    macro_step: float
+    """Length of a macro step [s]."""
+    ended: str = "done"
+    """Why it ended: "done", "rest", "max_depth" or "max_time"."""
+    settings: dict[str, Any] = field(default_factory=dict)
+    """What was asked for: speed, depth, load, mass and so on, SI units."""
+
+    @property
+    def way_in(self) -> NDArray[np.bool_]:
+        """Rows of the first way in, shape [n]: in the surface and going down, up to the first stop."""
+        inside = self.phase == "in"
+        if not inside.any():
+            return inside
+        first = int(np.argmax(inside))
+        rest = np.flatnonzero(~inside[first:])
+        last = first + int(rest[0]) if rest.size else len(inside)
+        rows = np.zeros(len(inside), dtype=bool)
+        rows[first:last] = True
+        return rows
+
+    @property
+    def work_in(self) -> float:
+        """Work of the spike on the ground while going down [J]."""
+        down = self.velocity > 0
+        return float(np.sum(self.force[down] * self.velocity[down]) * self.macro_step)
+
+    @property
+    def work_out(self) -> float:
+        """Work of the ground on the spike while going up [J]."""
+        up = self.velocity < 0
+        return float(-np.sum(self.force[up] * self.velocity[up]) * self.macro_step)
+
+    @property
+    def peak_force(self) -> float:
+        """Largest force of one macro step [N]."""
+        return float(self.force.max()) if self.force.size else 0.0
+
+    @property
+    def max_depth(self) -> float:
+        """Largest depth [m]."""
+        return float(self.depth.max()) if self.depth.size else 0.0
+
+    @property
+    def final_depth(self) -> float:
+        """Depth at the end, the mean over the last rows at rest [m]."""
+        rest = self.depth[self.phase == "rest"]
+        return float(rest.mean()) if rest.size else (float(self.depth[-1]) if self.depth.size else 0.0)
+
+    @property
+    def stop_time(self) -> float | None:
+        """Time from the surface to the first stop [s]; None where it never stopped."""
+        rows = np.flatnonzero(self.way_in)
+        if not rows.size or rows[-1] + 1 >= len(self.time):
+            return None
+        return float(self.time[rows[-1]] + 0.5 * self.macro_step)
+
+    def write_csv(self, path: str | Path) -> None:
+        """Write the rows with every digit, so that reading them back gives the same bits."""
+        with Path(path).open("w", newline="", encoding="utf-8") as stream:
+            writer = csv.writer(stream)
+            writer.writerow(COLUMNS)
+            columns = (self.time, self.depth, self.velocity, self.force)
+            for *numbers, phase in zip(*columns, self.phase, strict=True):
+                writer.writerow([*(repr(float(number)) for number in numbers), str(phase)])
+
+    @classmethod
+    def read_csv(cls, path: str | Path, *, kind: str, macro_step: float, **more: Any) -> Penetration:
+        """Read what `write_csv` wrote; `kind`, `macro_step` and the rest are not in the file."""
+        with Path(path).open(newline="", encoding="utf-8") as stream:
+            rows = list(csv.DictReader(stream))
+        numbers = {name: np.array([float(row[name]) for row in rows]) for name in COLUMNS[:4]}
+        phase = np.array([row["phase"] for row in rows], dtype="U4")
+        time, depth, velocity, force = (numbers[name] for name in COLUMNS[:4])
+        return cls(kind=kind, time=time, depth=depth, velocity=velocity, force=force, phase=phase,
+                   macro_step=macro_step, **more)  # fmt: skip
+
+    def quantities(self) -> dict[str, dict[str, Any]]:
+        """The numbers a person would quote, as in result.json: name -> value, std (unknown), unit."""
+        values = {
+            "peak_force": (self.peak_force, "N"),
+            "max_depth": (self.max_depth, "m"),
+            "final_depth": (self.final_depth, "m"),
+            "work_in": (self.work_in, "J"),
+            "work_out": (self.work_out, "J"),
+        }
+        if self.stop_time is not None:
+            values["stop_time"] = (self.stop_time, "s")
+        return {name: {"value": value, "std": None, "unit": unit} for name, (value, unit) in values.items()}
+
+    def save(self, folder: str | Path) -> Path:
+        """Write a run folder: run.toml, result.json and the series. Refuses a folder that holds a result already."""
+        folder = Path(folder)
+        if (folder / "result.json").exists():
+            raise FileExistsError(f"{folder} holds a result already: name another folder")
+        (folder / "series").mkdir(parents=True, exist_ok=True)
+        try:
+            version = metadata.version("hedgebed")
+        except metadata.PackageNotFoundError:
+            version = "unknown"
+        lines = [f'experiment = "{self.kind}"', f'version = "{version}"', f"macro_step = {self.macro_step!r}  # s"]
+        lines += [f"{key} = {json.dumps(value)}" for key, value in self.settings.items() if value is not None]
+        (folder / "run.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        series = f"series/{self.kind}.csv"
+        self.write_csv(folder / series)
+        result = {
+            "format": "hedgebed-result/1",
+            "experiment": self.kind,
+            "version": version,
+            "title": f"A {self.kind.replace('_', ' ')} spike",
+            "status": "done",
+            "quantities": self.quantities(),
+            "runs": [{"id": self.kind, "kind": self.kind, "speed": self.settings.get("speed"), "series": series}],
+            "warnings": [] if self.ended in ("done", "rest") else [f"ended at {self.ended}"],
+        }
+        (folder / "result.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+        return folder

@@ -1,0 +1,7 @@
+"""The platform and the surface laws of the paper's model; knows nothing of grains."""
+
+from .grounds import SpringDamper
+from .reaction import Contact, Reaction
+from .spike import Section, Spike
+
+__all__ = ["Contact", "Reaction", "Section", "SpringDamper", "Spike"]

@@ -1,0 +1,148 @@
+"""Driven, dropped, set down: closed forms on grounds whose law is known, order in H, and restart to the bit."""
+
+import math
+
+import numpy as np
+import pytest
+from fake_bed import FakeBed
+
+from coupling import Drive, Drop, Ground, SetDown, drive, drop, set_down
+from rigid import Spike, SpringDamper
+
+SPIKE = Spike(diameter=0.012, length=0.05, mass=0.5)
+
+
+def test_grounds_keep_the_contract():
+    from coupling import BedGround
+
+    assert isinstance(SpringDamper(stiffness=1.0), Ground)
+    assert isinstance(BedGround(FakeBed(), SPIKE), Ground)
+
+
+def test_driven_keeps_its_speeds_and_ends_where_told():
+    run = drive(SPIKE, into=FakeBed(), speed=0.1, depth=0.0101, hold=0.01, retreat_speed=0.2)
+    assert run.max_depth == pytest.approx(0.0101, rel=1e-12)
+    assert set(run.phase) == {"free", "in", "rest", "out"}
+    assert run.depth[-1] == pytest.approx(0.0, abs=2e-5)
+    inside = run.way_in
+    assert np.allclose(run.velocity[inside][:-1], 0.1)
+    assert np.allclose(run.force[inside], 100.0 * run.depth[inside], rtol=1e-9)
+    # t = 0 at the surface, exactly
+    first = int(np.argmax(inside))
+    assert run.time[first] == 0.5 * run.macro_step and run.depth[first] == 0.05 * run.macro_step
+
+
+def test_work_in_and_out():
+    """K z^2 / 2 in; out of the elastic line, F^2 / (2 unload)."""
+    run = drive(SPIKE, into=FakeBed(unload=5000.0), speed=0.1, depth=0.01)
+    assert run.work_in == pytest.approx(0.5 * 100.0 * 0.01**2, rel=1e-9)
+    assert run.work_out == pytest.approx(0.5 * 1.0**2 / 5000.0, rel=2e-2)
+
+
+def test_free_fall_is_exact():
+    ground = SpringDamper(stiffness=0.0, time_step=1e-3)
+    run = drop(SPIKE, into=ground, speed=0.1, max_time=0.1)
+    assert run.ended == "max_time"
+    end = Drop(SPIKE, ground, speed=0.1, max_time=0.1, substeps=1)
+    for _ in range(100):
+        end.advance()
+    assert end.depth == pytest.approx(0.1 * 0.1 + 0.5 * 9.80665 * 0.1**2, rel=1e-12)
+    assert run.max_depth > 0
+
+
+def _drop_error(step):
+    """A drop on a spring: z = v/w sin wt + W/K (1 - cos wt); error at a fixed time, and of the energy."""
+    stiffness, mass, load, speed = 500.0, 0.5, 2.0, 0.3
+    run = Drop(SPIKE, SpringDamper(stiffness=stiffness, time_step=step), speed=speed, mass=mass, load=load, substeps=1)
+    while run.time < 0.04 - 0.5 * step:
+        run.advance()
+    omega = math.sqrt(stiffness / mass)
+    exact = speed / omega * math.sin(omega * 0.04) + load / stiffness * (1 - math.cos(omega * 0.04))
+    energy = 0.5 * mass * run.velocity**2 + 0.5 * stiffness * run.depth**2 - load * run.depth
+    return abs(run.depth - exact), abs(energy - 0.5 * mass * speed**2)
+
+
+def test_second_order_in_the_macro_step():
+    coarse, fine = _drop_error(1e-3), _drop_error(1e-3 / 8)
+    for before, after in zip(coarse, fine, strict=True):
+        assert math.log(before / after, 8) > 1.85
+    assert fine[1] < 1e-4 * 0.5 * 0.5 * 0.3**2
+
+
+def test_a_drop_comes_to_rest_on_a_bed_that_keeps_what_it_takes():
+    bed = FakeBed(hardness=100.0, unload=8000.0, rate=1.0)
+    run = drop(SPIKE, into=bed, speed=0.06, mass=2.63, load=0.219, max_time=3.0)
+    stop = math.sqrt(2.63 / 100.0) * 0.5 * math.pi
+    assert run.stop_time == pytest.approx(stop, rel=0.3)
+    assert run.way_in.sum() * run.macro_step == pytest.approx(run.stop_time, rel=1e-9)
+
+
+def test_set_down_ends_at_the_sinkage_that_carries_the_load():
+    ground = SpringDamper(stiffness=100.0, time_step=1e-4)
+    run = set_down(SPIKE, onto=ground, load=0.2, lowering_speed=0.03)
+    assert run.ended == "rest"
+    assert run.final_depth == pytest.approx(0.2 / 100.0, rel=0.01)
+    assert run.max_depth < 0.2 / 100.0  # from above, without overshoot
+    run = set_down(SPIKE, onto=FakeBed(hardness=2e4, power=2.0), load=0.2, lowering_speed=0.03)
+    assert run.final_depth == pytest.approx(math.sqrt(0.2 / 2e4), rel=0.02)
+    assert run.max_depth < 1.002 * math.sqrt(0.2 / 2e4)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda bed: Drive(SPIKE, bed, speed=0.2, depth=0.004, hold=0.002),
+        lambda bed: Drop(SPIKE, bed, speed=0.1, mass=0.3, load=1.0, max_time=0.2),
+        lambda bed: SetDown(SPIKE, bed, load=0.3, max_time=0.2),
+    ],
+)
+def test_a_run_taken_up_again_gives_the_same_bits(make, tmp_path):
+    frames: list[float] = []
+    whole = make(FakeBed(rate=2.0)).run(on_frame=lambda run: frames.append(run.time), frame_interval=0.005)
+    broken = make(FakeBed(rate=2.0))
+    again: list[float] = []
+
+    def stop(run):
+        if run.count == 57:
+            raise InterruptedError
+
+    with pytest.raises(InterruptedError):
+        broken.run(on_step=stop, on_frame=lambda run: again.append(run.time), frame_interval=0.005)
+    np.savez(tmp_path / "state.npz", **broken.state())
+    with np.load(tmp_path / "state.npz") as state:
+        other = make(FakeBed(rate=2.0))
+        other.restore(dict(state))
+    rest = other.run(on_frame=lambda run: again.append(run.time), frame_interval=0.005)
+    for name in ("time", "depth", "velocity", "force", "phase"):
+        assert np.array_equal(getattr(whole, name), getattr(rest, name)), name
+    assert (whole.ended, frames) == (rest.ended, again)
+
+
+def test_a_state_of_another_kind_is_refused():
+    state = SetDown(SPIKE, FakeBed(), load=0.3).state()
+    with pytest.raises(ValueError, match="set_down"):
+        Drop(SPIKE, FakeBed(), speed=0.1).restore(state)
+
+
+@pytest.mark.parametrize("given", [{"speed": -0.1}, {"depth": 0.0}, {"hold": -1.0}, {"substeps": 0}])
+def test_what_cannot_be_is_refused_by_name(given):
+    with pytest.raises(ValueError, match=next(iter(given))):
+        Drive(SPIKE, FakeBed(), **({"speed": 0.1, "depth": 0.01} | given))
+
+
+def test_a_saved_run_is_a_run_folder(tmp_path):
+    import json
+    import tomllib
+
+    from coupling import Penetration
+
+    run = drive(SPIKE, into=FakeBed(), speed=0.2, depth=0.004)
+    folder = run.save(tmp_path / "first")
+    assert tomllib.loads((folder / "run.toml").read_text())["speed"] == 0.2
+    result = json.loads((folder / "result.json").read_text())
+    assert result["quantities"]["peak_force"]["value"] == run.peak_force
+    back = Penetration.read_csv(folder / result["runs"][0]["series"], kind="driven", macro_step=run.macro_step)
+    for name in ("time", "depth", "velocity", "force", "phase"):
+        assert np.array_equal(getattr(back, name), getattr(run, name))
+    with pytest.raises(FileExistsError):
+        run.save(folder)

@@ -1,0 +1,76 @@
+"""A stand-in for dem.Bed in tests above it: the same interface, a force law known in closed form.
+
+Going in beyond where the tip has been, F = hardness z^power + rate v; behind it, an elastic line of slope `unload` down
+to zero. The deepest point is its memory.
+"""
+
+import numpy as np
+
+__all__ = ["FakeBed"]
+
+
+class FakeBed:
+    """See the module. `size` [m], `surface` [m], `grain` diameter [m]."""
+
+    def __init__(self, *, size=(0.06, 0.06, 0.05), surface=0.045, grain=0.002, time_step=2e-5, seed=1,
+                 hardness=100.0, power=1.0, rate=0.0, unload=5000.0, gravity=9.80665):  # fmt: skip
+        self.size, self.surface, self.grain, self.time_step, self.seed = size, surface, grain, time_step, seed
+        self.hardness, self.power, self.rate, self.unload, self.gravity = hardness, power, rate, unload, gravity
+        self.time, self.max_overlap = 0.0, 0.0
+        self.grain_count, self.packing_fraction, self.coordination_number = 200, 0.6, 5.0
+        self.kinetic_energy, self.floor_force = 0.0, 1.0
+        self.young, self.poisson, self.precision, self.arch = 1e7, 0.25, "float64", "cpu"
+        rng = np.random.default_rng(seed)
+        self._grains = rng.uniform((0, 0, 0), (*size[:2], surface - grain), (200, 3))
+        self._pose, self._rate, self._deepest, self._force = np.zeros(3), np.zeros(3), 0.0, 0.0
+        self.bodies = 0
+
+    def add_body(self, shapes, *, position, friction=0.5, restitution=0.5):
+        self._pose, self.bodies = np.array(position, dtype=float), self.bodies + 1
+        return 0
+
+    def move_body(self, body, *, position=None, velocity=None):
+        if position is not None:
+            self._pose = np.array(position, dtype=float)
+        if velocity is not None:
+            self._rate = np.array(velocity, dtype=float)
+
+    def law(self, depth, sinking):
+        """Force [N] at `depth` [m], `sinking` [m/s], after all that was before."""
+        if depth <= 0:
+            return 0.0
+        if depth >= self._deepest:
+            return self.hardness * depth**self.power + self.rate * max(sinking, 0.0)
+        return max(0.0, self.hardness * self._deepest**self.power - self.unload * (self._deepest - depth))
+
+    def advance(self, steps):
+        total = 0.0
+        for _ in range(steps):
+            depth = self.surface - self._pose[2] - 0.5 * self._rate[2] * self.time_step
+            total += self.law(depth, -self._rate[2])
+            self._deepest = max(self._deepest, depth)
+            self._pose = self._pose + self._rate * self.time_step
+            self.time += self.time_step
+        self._force = total / steps
+
+    def reaction(self, body):
+        return np.array([0.0, 0.0, self._force]), np.zeros(3)
+
+    def body_position(self, body):
+        return self._pose
+
+    def grains(self):
+        count = len(self._grains)
+        return {
+            "id": np.arange(count), "position": self._grains.copy(), "radius": np.full(count, 0.5 * self.grain),
+            "velocity": np.zeros((count, 3)), "spin": np.zeros((count, 3)), "force": np.zeros((count, 3)),
+            "coordination": np.full(count, 5), "displacement": np.zeros((count, 3)),
+        }  # fmt: skip
+
+    def state(self):
+        return {"pose": self._pose.copy(), "rate": self._rate.copy(),
+                "memory": np.array([self._deepest, self._force, self.time])}  # fmt: skip
+
+    def restore(self, state):
+        self._pose, self._rate = np.array(state["pose"]), np.array(state["rate"])
+        self._deepest, self._force, self.time = (float(value) for value in state["memory"])
