@@ -1,0 +1,359 @@
+"""The command line: ``hedgebed <experiment> [case.toml] [--option value ...] [--out DIR]``.
+
+The options of an experiment are made from its settings class: same names (with hyphens), types, defaults and units.
+Exit status: 0 done, 1 failed (state saved, reason said), 2 bad input, 3 stopped (``hedgebed resume DIR`` finishes it).
+Results go to stdout, everything else to stderr.
+"""
+
+import inspect
+import json
+import os
+import shutil
+import signal
+import sys
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import Annotated, Any
+
+from cyclopts import App, CycloptsError, Parameter
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+from rich.console import Console
+from rich.table import Table
+
+from experiments import registry
+from experiments.progress import Progress, make_progress
+from experiments.reading import Layer, find_case, read_case, settings_from
+from experiments.registry import Experiment, find_experiment
+from experiments.runfolder import RunFolder, fresh_path, write_json
+from hedgebed import __version__
+
+__all__ = ["DONE", "FAILED", "BAD_INPUT", "STOPPED", "build_app", "main"]
+
+DONE, FAILED, BAD_INPUT, STOPPED = 0, 1, 2, 3
+
+
+def main(tokens: Sequence[str] | None = None) -> int:
+    """Run the command line on `tokens` (``sys.argv[1:]`` by default) and return the exit status."""
+    # Taichi greets on stdout and has a new version looked for: neither belongs here.
+    os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
+    os.environ.setdefault("TI_LOG_LEVEL", "warn")
+    os.environ.setdefault("TI_SKIP_VERSION_CHECK", "1")
+    try:
+        with _terminate_like_ctrl_c():
+            tokens = sys.argv[1:] if tokens is None else list(tokens)
+            return build_app()(tokens, exit_on_error=False, print_error=False) or DONE
+    except (CycloptsError, ValueError) as error:
+        if not isinstance(error, CycloptsError | _RefusedError):
+            traceback.print_exc()
+            return FAILED
+        _say(str(error))
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        _say("stopped")
+        return STOPPED
+    except BrokenPipeError:  # the reader of stdout has gone, as `| head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DONE
+
+
+class _RefusedError(ValueError):
+    """Bad input, found before any work."""
+
+
+def _say(text: str) -> None:
+    for line in text.splitlines():
+        print(f"hedgebed: {line}", file=sys.stderr, flush=True)
+
+
+@contextmanager
+def _terminate_like_ctrl_c() -> Iterator[None]:
+    """Within, SIGTERM raises KeyboardInterrupt, as Ctrl-C does."""
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    try:
+        before = signal.signal(signal.SIGTERM, interrupt)
+    except ValueError:  # not in the main thread: whoever runs us there deals with signals
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+@contextmanager
+def _refusing() -> Iterator[None]:
+    """Within, a ValueError is bad input."""
+    try:
+        yield
+    except ValueError as error:
+        raise _RefusedError(str(error)) from error
+
+
+@contextmanager
+def _stdout_to_stderr(really: bool) -> Iterator[None]:
+    """Within, what anyone writes to stdout, libraries in C included, goes to stderr."""
+    try:
+        number = sys.stdout.fileno()
+    except (OSError, ValueError):  # stdout is not a file, as under a test that captures it
+        really = False
+    if not really:
+        yield
+        return
+    sys.stdout.flush()
+    kept = os.dup(number)
+    os.dup2(sys.stderr.fileno(), number)
+    try:
+        yield
+    finally:
+        sys.stdout.flush()
+        os.dup2(kept, number)
+        os.close(kept)
+
+
+# Options from settings -----------------------------------------------------------------------------------------------
+
+_RESERVED = {
+    "case": (Path | None, None, "A TOML file of settings, or the name of a case that ships; options win over it."),
+    "out": (Path | None, None, "The run's folder; runs/<command>-<time> if not given."),
+    "json": (bool, False, "Print result.json on stdout and nothing else."),
+    "quiet": (bool, False, "Show no progress."),
+}
+
+
+def _shown(value: Any) -> str:
+    """A default, as one would type it."""
+    if isinstance(value, list | tuple):
+        return " ".join(map(str, value)) or "none"
+    return str(value)
+
+
+def _option(name: str, field: FieldInfo) -> inspect.Parameter:
+    """The command-line parameter of one setting."""
+    if name in _RESERVED:
+        raise TypeError(f"a setting cannot be called {name!r}: the command line has that already")
+    default = None if field.is_required() else field.get_default(call_default_factory=True)
+    shown: bool | Callable[[Any], str] = False if default is None or default is PydanticUndefined else _shown
+    is_flag = field.annotation is bool
+    annotation = Annotated[
+        field.annotation,  # type: ignore[name-defined]
+        Parameter(help=field.description, show_default=shown, consume_multiple=True, negative=None if is_flag else ""),
+    ]
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+
+
+def _reserved(name: str) -> inspect.Parameter:
+    hint, default, text = _RESERVED[name]
+    kind = inspect.Parameter.POSITIONAL_ONLY if name == "case" else inspect.Parameter.KEYWORD_ONLY
+    annotation = Annotated[hint, Parameter(help=text, negative="", show_default=False)]  # type: ignore[valid-type]
+    return inspect.Parameter(name, kind, default=default, annotation=annotation)
+
+
+def _experiment_command(experiment: Experiment) -> Callable[..., int]:
+    """The function behind ``hedgebed <experiment>``, with one parameter per setting.
+
+    Only what was typed arrives in `given`, so that a case file can lie between the defaults and the command line.
+    """
+    settings_class = experiment.settings_class()
+    presets = dict(experiment.presets)
+
+    def command(
+        case: Path | None = None, *, out: Path | None = None, json: bool = False, quiet: bool = False, **given: Any
+    ) -> int:
+        with _refusing():
+            layers = [read_case(registry.CASES / presets[name]) for name in presets if given.pop(name, False)]
+            layers += [read_case(find_case(case, registry.CASES))] if case is not None else []
+            settings = settings_from(settings_class, [*layers, Layer(None, given)])
+            with _stdout_to_stderr(json):
+                experiment.check(settings)
+            folder = RunFolder.create(out or fresh_path(experiment.name), experiment.name, settings)
+
+        def work(progress: Progress) -> dict[str, Any]:
+            return experiment.run(settings, folder.path, progress=progress)
+
+        return _carry_out(folder, work, as_json=json, quiet=quiet)
+
+    flags = [
+        inspect.Parameter(
+            name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=False,
+            annotation=Annotated[bool, Parameter(help=f"Start from the case {file}.", negative="", show_default=False)],
+        )
+        for name, file in experiment.presets
+    ]
+    parameters = [_reserved("case")]
+    parameters += [_option(name, field) for name, field in settings_class.model_fields.items()]
+    parameters += [*flags, _reserved("out"), _reserved("json"), _reserved("quiet")]
+    command.__signature__ = inspect.Signature(parameters, return_annotation=int)  # type: ignore[attr-defined]
+    command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    command.__name__ = experiment.name
+    return command
+
+
+# Carrying a run out --------------------------------------------------------------------------------------------------
+
+
+def _carry_out(folder: RunFolder, work: Callable[[Progress], dict[str, Any]], *, as_json: bool, quiet: bool) -> int:
+    """Do the `work` of a run whose folder is there; keep its status; show what came out."""
+    _say(f"run folder {folder.path}")
+    fresh = not folder.has_work
+    with _stdout_to_stderr(as_json):
+        try:
+            with folder.lock():
+                folder.set_status("running")
+                try:
+                    with make_progress(quiet=quiet) as progress:
+                        result = work(progress)
+                except KeyboardInterrupt:
+                    folder.set_status("stopped", "interrupted")
+                    raise
+                except BaseException as error:
+                    folder.set_status("failed", f"{type(error).__name__}: {error}")
+                    raise
+                if not (folder.path / "result.json").exists():
+                    folder.write_result(result)
+                folder.set_status("done")
+        except KeyboardInterrupt:
+            _say(f"stopped; `hedgebed resume {folder.path}` finishes it")
+            return STOPPED
+        except RuntimeError as error:
+            _say(f"failed: {error}")
+            _say(f"what there was is in {folder.path}; `hedgebed resume {folder.path}` takes it up there")
+            return FAILED
+        except ValueError as error:
+            if fresh and not folder.has_work:  # refused before any work: leave nothing behind
+                _discard(folder)
+                raise _RefusedError(str(error)) from error
+            traceback.print_exc()
+            return FAILED
+        except Exception:
+            traceback.print_exc()
+            _say(f"failed; what there was is in {folder.path}")
+            return FAILED
+    if as_json:
+        print(json.dumps(folder.read_result(), indent=2, ensure_ascii=False))
+    else:
+        _show_result(folder)
+    return DONE
+
+
+def _discard(folder: RunFolder) -> None:
+    """Remove a folder that holds nothing but what `RunFolder.create` has written."""
+    ours = {"run.toml", "status.json", "lock"}
+    if {item.name for item in folder.path.iterdir()} <= ours:
+        shutil.rmtree(folder.path)
+
+
+def _number(value: Any) -> str:
+    return "-" if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _show_result(folder: RunFolder) -> None:
+    """The numbers of result.json in a short table on stdout, the warnings, and where the report is."""
+    result = folder.read_result()
+    console = Console(file=sys.stdout, highlight=False)
+    table = Table(title=result.get("title"), title_justify="left", box=None, pad_edge=False)
+    table.add_column("quantity")
+    table.add_column("value", justify="right")
+    table.add_column("spread (std)", justify="right")
+    table.add_column("unit")
+    for name, quantity in result.get("quantities", {}).items():
+        unit = quantity.get("unit", "")
+        table.add_row(name, _number(quantity.get("value")), _number(quantity.get("std")), "" if unit == "1" else unit)
+    console.print(table, markup=False)
+    for sentence in result.get("departures", {}).get("sentences", []):
+        console.print(f"- {sentence}", markup=False)
+    for warning in result.get("warnings", []):
+        console.print(f"warning: {warning}", markup=False)
+    report = folder.path / "report.html"
+    print(f"{'report' if report.exists() else 'folder'}: {report if report.exists() else folder.path}")
+
+
+# Commands ------------------------------------------------------------------------------------------------------------
+
+_Json = Annotated[bool, Parameter(help="Print the result as JSON on stdout and nothing else.", negative="")]
+_Quiet = Annotated[bool, Parameter(help="Show no progress.", negative="")]
+
+
+def _resume(
+    folder: Annotated[Path, Parameter(help="The folder of a run that was stopped, failed or killed.")],
+    /,
+    *,
+    json: _Json = False,
+    quiet: _Quiet = False,
+) -> int:
+    """Finish a run that was stopped, failed or killed, from its last checkpoint."""
+    with _refusing():
+        run = RunFolder.open(folder)
+        experiment = find_experiment(run.command)
+        settings_from(experiment.settings_class(), [Layer(str(folder / "run.toml"), run.settings)])
+        with run.lock():
+            pass
+    if run.version != __version__:
+        _say(f"warning: the run was begun by version {run.version}, this is {__version__}")
+    return _carry_out(run, lambda progress: experiment.resume(run.path, progress=progress), as_json=json, quiet=quiet)
+
+
+def _bench(
+    what: Annotated[str, Parameter(help="What to measure: the name of a module in benchmarks/.")] = "bed",
+    /,
+    *,
+    out: Annotated[Path | None, Parameter(help="Folder for bench.json; runs/bench-<time> if not given.")] = None,
+    json: _Json = False,
+    quiet: _Quiet = False,
+) -> int:
+    """Measure how fast it is, beside LIGGGHTS and LAMMPS where they are installed (from a checkout)."""
+    from experiments.benching import load_benchmark
+
+    with _refusing():
+        run = load_benchmark(what)
+        out = out or fresh_path("bench")
+        if out.exists() and (not out.is_dir() or any(out.iterdir())):
+            raise ValueError(f"out = {str(out)!r} is in use: name a folder that is empty or does not exist yet")
+        out.mkdir(parents=True, exist_ok=True)
+    with _stdout_to_stderr(json):
+        try:
+            with make_progress(quiet=quiet) as progress:
+                result = run(out, progress=progress)
+        except RuntimeError as error:
+            _say(f"failed: {error}")
+            return FAILED
+        write_json(out / "bench.json", result)
+    if json:
+        print((out / "bench.json").read_text(encoding="utf-8"), end="")
+    else:
+        print(f"bench: {out / 'bench.json'}")
+    return DONE
+
+
+def _doctor(*, json: _Json = False) -> int:
+    """Say what this machine has and what to install where something lacks."""
+    from experiments.doctor import examine, show
+
+    findings = examine()
+    show(findings, as_json=json)
+    return DONE if all(finding.ok for finding in findings if finding.required) else FAILED
+
+
+def build_app() -> App:
+    """The command line as a cyclopts App; a command returns its exit status."""
+    app = App(
+        name="hedgebed",
+        help="A spike in a bed of grains, beside the spring-damper that stands in for it. SI units throughout.",
+        help_format="plaintext",
+        version=__version__,
+        result_action="return_value",
+    )
+    for experiment in registry.EXPERIMENTS.values():
+        app.command(_experiment_command(experiment), name=experiment.name, help=experiment.summary)
+    app.command(_resume, name="resume")
+    app.command(_bench, name="bench")
+    app.command(_doctor, name="doctor")
+    return app

@@ -1,0 +1,70 @@
+"""Which experiments there are. A further one is one line in `EXPERIMENTS`, one settings class and one module.
+
+The module of an experiment offers
+``run(settings, folder: Path, *, progress: Progress) -> dict`` (the result, as result.json has it) and
+``resume(folder: Path, *, progress: Progress) -> dict``;
+if it also has ``check(settings) -> None``, that is called before a folder is made and raises ValueError for what
+the settings class cannot see. Both names are text here so that help does not wait for Taichi.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+__all__ = ["EXPERIMENTS", "Experiment", "find_experiment"]
+
+CASES = Path(__file__).parent / "cases"
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One experiment: its name on the command line, one line of help, and where its settings and its code are."""
+
+    name: str
+    summary: str
+    settings: str  # "module:Class", a frozen pydantic model; every field with a description that gives the unit
+    module: str
+    presets: tuple[tuple[str, str], ...] = ()  # (option, case file in experiments/cases): --option lays it underneath
+
+    def settings_class(self) -> type[BaseModel]:
+        """The settings class. Quick: it imports no Taichi."""
+        module, _, name = self.settings.partition(":")
+        return getattr(import_module(module), name)
+
+    def run(self, settings: BaseModel, folder: Path, *, progress: Any) -> dict[str, Any]:
+        """Run it into `folder`; return the result."""
+        return import_module(self.module).run(settings, folder, progress=progress)
+
+    def resume(self, folder: Path, *, progress: Any) -> dict[str, Any]:
+        """Finish the run in `folder`; return the result."""
+        return import_module(self.module).resume(folder, progress=progress)
+
+    def check(self, settings: BaseModel) -> None:
+        """Raise ValueError for settings that cannot be run, before any work."""
+        check: Callable[[BaseModel], None] | None = getattr(import_module(self.module), "check", None)
+        if check is not None:
+            check(settings)
+
+
+EXPERIMENTS: dict[str, Experiment] = {
+    experiment.name: experiment
+    for experiment in [
+        Experiment(
+            "penetrate",
+            "How far a spike sinks into a bed, what the bed pushes back with, and how wrong the spring-damper is.",
+            settings="experiments.settings:PenetrateSettings",
+            module="experiments.penetrate",
+        ),
+    ]
+}
+
+
+def find_experiment(name: str) -> Experiment:
+    """The experiment called `name`. Raises ValueError naming those there are."""
+    if name not in EXPERIMENTS:
+        raise ValueError(f"there is no experiment {name!r}: there is {', '.join(EXPERIMENTS)}")
+    return EXPERIMENTS[name]
