@@ -1,0 +1,239 @@
+"""The command line: options from the settings class, precedence, what is refused and how, exit statuses."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import hedgebed
+from experiments.cli import main
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def settings_of(folder: Path) -> dict:
+    return tomllib.loads((folder / "run.toml").read_text())["settings"]
+
+
+def only_run() -> Path:
+    (folder,) = Path("runs").iterdir()
+    return folder
+
+
+# Settings
+
+
+def test_help_shows_units_and_defaults_and_every_setting(dig, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "160")
+    assert main(["dig", "--help"]) == 0
+    text = capsys.readouterr().out
+    for expected in (
+        "--spike-diameter",
+        "Diameter of the spike [m].",
+        "[default: 0.02]",
+        "[default: 0.1 0.2]",
+        "--full",
+    ):
+        assert expected in text
+
+
+def test_without_out_a_run_goes_to_a_fresh_folder_each_time(dig):
+    assert main(["dig"]) == main(["dig"]) == 0
+    assert len(list(Path("runs").glob("dig-*"))) == 2
+
+
+def test_command_line_wins_over_case_wins_over_preset_wins_over_default(dig):
+    Path("case.toml").write_text("steps = 5\nspike_diameter = 0.03\n")
+    assert main(["dig", "case.toml", "--full", "--spike-diameter", "0.04", "--drive-speeds", "1", "2", "3"]) == 0
+    settings = settings_of(only_run())
+    assert settings["deep"] is True  # the preset
+    assert settings["steps"] == 5  # the case, over the preset's 7
+    assert settings["spike_diameter"] == 0.04  # the command line, over the case
+    assert settings["drive_speeds"] == [1.0, 2.0, 3.0]
+    assert settings["grain"] == "sand"  # the default
+
+
+def test_a_case_that_ships_goes_by_its_name(dig):
+    assert main(["dig", "deep"]) == 0
+    assert settings_of(only_run())["steps"] == 7
+
+
+def test_the_run_toml_of_a_run_is_a_case(dig):
+    assert main(["dig", "--steps", "4", "--out", "a"]) == 0
+    assert main(["dig", "a/run.toml", "--out", "b"]) == 0
+    assert settings_of(Path("a")) == settings_of(Path("b"))
+
+
+# What is refused
+
+
+@pytest.mark.parametrize(
+    ("tokens", "said"),
+    [
+        (["--spike-diametre", "1"], ["--spike-diametre", "--spike-diameter"]),
+        (["--spike-diameter", "-1"], ["--spike-diameter = -1.0", "greater than 0", "[m]"]),
+        (["--spike-diameter", "thin"], ["--spike-diameter", "thin", "float"]),
+        (["--spike-diameter", "0.2"], ["spike_diameter = 0.2", "at most 0.1"]),
+        (["--grain", "snow"], ["--grain", "snow", "sand"]),
+        (["--size", "1"], ["--size", "3"]),
+        (["misspelt.toml"], ["misspelt.toml", "deep"]),
+        (["key.toml"], ["key.toml: spike_diametre = 0.1", "did you mean 'spike_diameter'"]),
+        (["hyphen.toml"], ["hyphen.toml: spike-diameter", "did you mean 'spike_diameter'"]),
+        (["value.toml"], ["value.toml: drive_speeds[1] = 'fast'", "valid number"]),
+        (["broken.toml"], ["broken.toml", "TOML"]),
+        (["--out", "key.toml"], ["key.toml", "file"]),
+        (["--out", "cases"], ["cases", "in use", "deep.toml"]),
+        (["--ending", "early"], ["time_step = 1 s", "at most 1e-5 s"]),
+    ],
+)
+def test_bad_input_is_refused_in_a_sentence_that_names_it(dig, capsys, tokens, said):
+    Path("key.toml").write_text("spike_diametre = 0.1\n")
+    Path("hyphen.toml").write_text("spike-diameter = 0.1\n")
+    Path("value.toml").write_text('drive_speeds = [0.1, "fast"]\n')
+    Path("broken.toml").write_text("steps = \n")
+    assert main(["dig", *tokens]) == 2
+    text = capsys.readouterr().err
+    assert all(words in text for words in said), text
+    assert "Traceback" not in text
+    assert not Path("runs").exists() or not list(Path("runs").iterdir())  # nothing is left behind
+
+
+def test_an_unknown_command_is_refused_with_the_nearest(dig, capsys):
+    assert main(["dg"]) == 2
+    assert '"dig"' in capsys.readouterr().err
+
+
+def test_a_check_of_the_experiment_refuses_before_a_folder_is_made(dig, capsys):
+    def check(settings):
+        raise ValueError("memory = 4 GiB is more than there is: at most 2 GiB")
+
+    dig.check = check
+    assert main(["dig", "--out", "a"]) == 2
+    assert "at most 2 GiB" in capsys.readouterr().err
+    assert not Path("a").exists()
+
+
+# How it ends
+
+
+def test_done_shows_the_numbers_and_the_folder(dig, capsys):
+    assert main(["dig", "--out", "a"]) == 0
+    out = capsys.readouterr().out
+    for expected in ("A hole", "depth", "0.02", "0.001", "The hole is [deep].", "warning: it is dark", "folder: a"):
+        assert expected in out
+    assert json.loads(Path("a/status.json").read_text())["status"] == "done"
+
+
+def test_stopped_says_how_to_resume_and_resume_finishes(dig, capsys):
+    assert main(["dig", "--ending", "KeyboardInterrupt", "--out", "a"]) == 3
+    assert "hedgebed resume a" in capsys.readouterr().err
+    assert json.loads(Path("a/status.json").read_text())["status"] == "stopped"
+    assert main(["resume", "a"]) == 0
+    assert json.loads(Path("a/status.json").read_text())["status"] == "done"
+    assert json.loads(Path("a/result.json").read_text())["quantities"]["count"]["std"] is None
+
+
+def test_failed_says_why_without_a_traceback(dig, capsys):
+    assert main(["dig", "--ending", "RuntimeError", "--out", "a"]) == 1
+    text = capsys.readouterr().err
+    assert "a grain was lost at t = 0.1 s" in text
+    assert "Traceback" not in text
+    status = json.loads(Path("a/status.json").read_text())
+    assert status["status"] == "failed"
+    assert "a grain was lost" in status["reason"]
+
+
+@pytest.mark.parametrize("ending", ["ZeroDivisionError", "ValueError"])
+def test_a_mistake_of_ours_shows_where(dig, capsys, ending):
+    assert main(["dig", "--ending", ending, "--out", "a"]) == 1
+    assert "Traceback" in capsys.readouterr().err
+    assert Path("a/series/dig.csv").exists()
+
+
+def test_sigterm_stops_as_ctrl_c_does(dig):
+    def work(settings, folder, *, progress):
+        threading.Timer(0.05, os.kill, (os.getpid(), signal.SIGTERM)).start()
+        threading.Event().wait(5)
+        raise AssertionError("was not interrupted")
+
+    dig.run = work
+    assert main(["dig", "--out", "a"]) == 3
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+
+
+def test_json_prints_the_result_and_nothing_else(dig, capfd):
+    assert main(["dig", "--json", "--out", "a"]) == 0
+    out, err = capfd.readouterr()
+    assert json.loads(out) == json.loads(Path("a/result.json").read_text())
+    assert "a library that writes to stdout" in err
+
+
+def test_quiet_shows_no_progress(dig, capsys):
+    assert main(["dig", "--quiet", "--out", "a"]) == 0
+    assert "[   0:00]" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("path", ["nowhere", "cases"])
+def test_resume_refuses_what_is_no_run(dig, capsys, path):
+    assert main(["resume", path]) == 2
+    assert path in capsys.readouterr().err
+
+
+def test_resume_refuses_settings_it_does_not_know(dig, capsys):
+    assert main(["dig", "--out", "a"]) == 0
+    text = Path("a/run.toml").read_text().replace("\nsteps =", "\nstepps =")
+    Path("a/run.toml").write_text(text)
+    assert main(["resume", "a"]) == 2
+    assert "did you mean 'steps'" in capsys.readouterr().err
+
+
+# Bench
+
+
+def test_bench_names_what_there_is(dig, capsys, monkeypatch):
+    import experiments.benching
+
+    Path("pyproject.toml").touch()
+    Path("benchmarks").mkdir()
+    Path("benchmarks/stones.py").write_text("def run(out, *, progress):\n    return {'what': 'stones'}\n")
+    monkeypatch.setattr(experiments.benching, "__file__", str(Path("experiments/benching.py").resolve()))
+    assert main(["bench", "stone"]) == 2
+    assert "did you mean 'stones'" in capsys.readouterr().err
+    monkeypatch.delitem(sys.modules, "benchmarks", raising=False)
+    monkeypatch.syspath_prepend(Path().resolve())
+    assert main(["bench", "stones", "--out", "b", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == json.loads(Path("b/bench.json").read_text()) == {"what": "stones"}
+    assert main(["bench", "stones", "--out", "b"]) == 2
+    assert "in use" in capsys.readouterr().err
+    sys.modules.pop("benchmarks.stones", None)
+    sys.modules.pop("benchmarks", None)
+
+
+def test_bench_without_a_checkout_says_so(dig, capsys, monkeypatch, tmp_path):
+    import experiments.benching
+
+    monkeypatch.setattr(experiments.benching, "__file__", str(tmp_path / "experiments" / "benching.py"))
+    assert main(["bench"]) == 2
+    assert "checkout" in capsys.readouterr().err
+
+
+# As a program
+
+
+def test_python_m_hedgebed_is_the_same_command():
+    done = subprocess.run([sys.executable, "-m", "hedgebed", "--version"], capture_output=True, text=True, cwd=ROOT)
+    assert (done.returncode, done.stdout.strip()) == (0, hedgebed.__version__)
+
+
+def test_help_does_not_wait_for_taichi():
+    code = (
+        "import sys; from experiments.cli import main; main(['penetrate', '--help']); sys.exit('taichi' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,119 @@
+"""Progress: fractions and times to go, and how lines and bars show them."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from experiments.progress import LineProgress, LiveProgress, Progress, duration, make_progress
+
+
+class Clock:
+    def __init__(self):
+        self.now = 100.0
+
+    def __call__(self):
+        return self.now
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(5, "0:05"), (750, "12:30"), (3750, "1:02:30"), (None, "?"), (-1, "0:00")]
+)
+def test_durations_as_a_person_reads_them(seconds, text):
+    assert duration(seconds) == text
+
+
+def test_the_stage_goes_on_at_the_rate_it_went(clock):
+    progress = Progress(clock=clock)
+    progress.stage("dig", total=200)
+    assert progress.stage_remaining() is None
+    clock.now += 10
+    progress.update(50)
+    assert progress.stage_fraction == 0.25
+    assert progress.stage_remaining() == pytest.approx(30)
+
+
+def test_the_whole_follows_from_the_costs_of_the_stages(clock):
+    progress = Progress(clock=clock)
+    assert progress.fraction is None
+    progress.plan({"dig": 30.0, "fill": 10.0})
+    progress.stage("dig", total=1)
+    clock.now += 30
+    progress.update(0.5)
+    assert progress.fraction == pytest.approx(15 / 40)
+    assert progress.remaining() == pytest.approx(50)
+    progress.stage("fill", total=4)
+    assert progress.fraction == pytest.approx(30 / 40)
+    progress.update(2)
+    assert progress.fraction == pytest.approx(35 / 40)
+    progress.close()
+    assert progress.fraction == 1.0
+    assert progress.remaining() == 0.0
+
+
+def test_a_new_plan_starts_the_reckoning_afresh(clock):
+    progress = Progress(clock=clock)
+    progress.plan({"prepare": 1.0})
+    progress.stage("prepare")
+    clock.now += 1000
+    progress.plan({"dig": 1.0})
+    progress.stage("dig", total=2)
+    clock.now += 5
+    progress.update(1)
+    assert progress.remaining() == pytest.approx(5)
+
+
+def test_a_cost_below_nothing_is_refused():
+    with pytest.raises(ValueError, match="less than nothing"):
+        Progress().plan({"dig": -1.0})
+
+
+def test_lines_come_when_a_stage_begins_and_then_rarely(clock):
+    stream = io.StringIO()
+    with LineProgress(stream, every=10, clock=clock) as progress:
+        progress.plan({"dig": 1.0, "fill": 1.0})
+        progress.stage("dig", total=100)
+        for done in range(1, 101):
+            clock.now += 0.25
+            progress.update(done)
+        progress.message("found [water]")
+        progress.stage("fill")
+    lines = stream.getvalue().splitlines()
+    assert lines == [
+        "[   0:00] dig (all 0 %)",
+        "[   0:10] dig: 40 %, 0:15 to go, all 20 %, 0:40 to go",
+        "[   0:20] dig: 80 %, 0:05 to go, all 40 %, 0:30 to go",
+        "[   0:25] found [water]",
+        "[   0:25] fill (all 50 %, 0:25 to go)",
+    ]
+
+
+def test_bars_show_the_stage_and_how_long_to_go(clock):
+    console = Console(file=io.StringIO(), force_terminal=True, width=100, color_system=None)
+    with LiveProgress(console, clock=clock) as progress:
+        progress.plan({"dig [deep]": 1.0, "fill": 1.0})
+        progress.stage("dig [deep]", total=100)
+        clock.now += 10
+        progress.update(50)
+        progress.message("found [water]")
+        clock.now += 10
+        progress.stage("fill", total=None)
+        progress.update(3)
+    text = console.file.getvalue()
+    for expected in ("dig [deep]: 0:20", "found [water]", "fill", "50 %", "0:20 to go"):
+        assert expected in text
+
+
+def test_the_kind_suits_the_stream():
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+    assert type(make_progress(io.StringIO())) is LineProgress
+    assert type(make_progress(Terminal())) is LiveProgress
+    assert type(make_progress(Terminal(), quiet=True)) is Progress
