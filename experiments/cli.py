@@ -15,8 +15,8 @@ import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from types import FrameType
-from typing import Annotated, Any
+from types import FrameType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from cyclopts import App, CycloptsError, Parameter
 from pydantic.fields import FieldInfo
@@ -134,6 +134,18 @@ def _shown(value: Any) -> str:
     return str(value)
 
 
+def _bare(hint: Any) -> Any:
+    """`hint` without its bounds: pydantic checks these, and its faults become sentences in `experiments.reading`."""
+    origin, inside = get_origin(hint), get_args(hint)
+    if origin is Annotated:
+        return _bare(inside[0])
+    if not inside or origin is Literal:
+        return hint
+    if origin in (Union, UnionType):
+        return Union[tuple(_bare(item) for item in inside)]
+    return origin[tuple(_bare(item) for item in inside)]
+
+
 def _option(name: str, field: FieldInfo) -> inspect.Parameter:
     """The command-line parameter of one setting."""
     if name in _RESERVED:
@@ -141,8 +153,9 @@ def _option(name: str, field: FieldInfo) -> inspect.Parameter:
     default = None if field.is_required() else field.get_default(call_default_factory=True)
     shown: bool | Callable[[Any], str] = False if default is None or default is PydanticUndefined else _shown
     is_flag = field.annotation is bool
+    hint = _bare(field.annotation)
     annotation = Annotated[
-        field.annotation,  # type: ignore[name-defined]
+        hint,
         Parameter(help=field.description, show_default=shown, consume_multiple=True, negative=None if is_flag else ""),
     ]
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)

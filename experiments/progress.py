@@ -215,7 +215,9 @@ class LiveProgress(Progress):
         super().stage(name, total)
         self._bars.start()
         if before:
-            self._bars.console.print(f"{before}: {duration(self._clock() - began)}", style="dim", highlight=False)
+            self._bars.console.print(
+                f"{before}: {duration(self._clock() - began)}", style="dim", markup=False, highlight=False
+            )
         if self._stage is not None:
             self._bars.remove_task(self._stage)
         self._stage = self._bars.add_task(name, total=None, percent="", rest="")

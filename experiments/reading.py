@@ -9,12 +9,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from experiments.runfolder import RUN_FORMAT
+from experiments.runfolder import RUN_FORMAT, settings_in
 
 __all__ = ["Layer", "find_case", "nearest", "option", "read_case", "settings_from"]
 
@@ -69,8 +69,8 @@ def read_case(path: Path) -> Layer:
         raise ValueError(f"case = {str(path)!r} cannot be read: {error.strerror}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f"case = {str(path)!r} is not TOML: {error}") from None
-    if table.get("format") == RUN_FORMAT:
-        table = table.get("settings", {})
+    if table.get("format") == RUN_FORMAT and isinstance(table.get("settings"), dict):
+        table = settings_in(table)
     return Layer(str(path), table)
 
 
@@ -78,7 +78,7 @@ def settings_from(settings_class: type[BaseModel], layers: Iterable[Layer]) -> B
     """The settings that the `layers` give, later ones over earlier ones, over the defaults.
 
     Raises ValueError, one sentence a line, for a name there is not (with the nearest there is) and for a value that
-    will not do (with what would).
+    will not do (with what would). TOML has no null: "none" unsets a setting that need not be set.
     """
     names = list(settings_class.model_fields)
     faults = []
@@ -89,7 +89,8 @@ def settings_from(settings_class: type[BaseModel], layers: Iterable[Layer]) -> B
             if name not in names:
                 faults.append(f"{layer.called(name)} = {value!r} is no setting; {nearest(name, names)}")
             else:
-                merged[name], origin[name] = value, layer
+                merged[name] = None if value == "none" and _may_be_unset(settings_class, name) else value
+                origin[name] = layer
     if faults:
         raise ValueError("\n".join(faults))
     try:
@@ -97,6 +98,11 @@ def settings_from(settings_class: type[BaseModel], layers: Iterable[Layer]) -> B
     except ValidationError as error:
         sentences = [_sentence(settings_class, detail, origin) for detail in error.errors()]
         raise ValueError("\n".join(dict.fromkeys(sentences))) from None
+
+
+def _may_be_unset(settings_class: type[BaseModel], name: str) -> bool:
+    """Whether None is among the values of the setting `name`."""
+    return type(None) in get_args(settings_class.model_fields[name].annotation)
 
 
 def _sentence(settings_class: type[BaseModel], detail: ErrorDetails, origin: Mapping[str, Layer]) -> str:

@@ -30,7 +30,18 @@ from pydantic import BaseModel
 
 from hedgebed import __version__
 
-__all__ = ["RunFolder", "Status", "fresh_path", "read_json", "read_series", "write_json", "write_series", "write_text"]
+__all__ = [
+    "RunFolder",
+    "Status",
+    "fresh_path",
+    "read_json",
+    "read_series",
+    "settings_in",
+    "settings_toml",
+    "write_json",
+    "write_series",
+    "write_text",
+]
 
 Status = Literal["running", "stopped", "failed", "done"]
 
@@ -148,6 +159,7 @@ def _toml(value: Any) -> str:
 
 def settings_toml(command: str, settings: BaseModel, version: str) -> str:
     """The text of run.toml: each field of `settings` with its description as a comment above it."""
+    values = settings.model_dump(mode="python")
     lines = [
         f"# hedgebed {command}: every setting of this run, as given or by default.",
         f"# `hedgebed {command} run.toml` does the same again.",
@@ -155,10 +167,10 @@ def settings_toml(command: str, settings: BaseModel, version: str) -> str:
         f"version = {_toml(version)}",
         f"command = {_toml(command)}",
         f"created = {_toml(_now())}",
+        f"not_set = {_toml([name for name, value in values.items() if value is None])}",
         "",
         "[settings]",
     ]
-    values = settings.model_dump(mode="python")
     for name, field in type(settings).model_fields.items():
         lines += [f"# {line}" for line in (field.description or "").splitlines()]
         value = values[name]
@@ -166,6 +178,11 @@ def settings_toml(command: str, settings: BaseModel, version: str) -> str:
             value = str(value)
         lines += [f"# {name} is not set" if value is None else f"{name} = {_toml(value)}"]
     return "\n".join(lines) + "\n"
+
+
+def settings_in(table: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings in `table`, a run.toml read: name -> value, None for what is not set."""
+    return {**dict.fromkeys(table.get("not_set", [])), **table["settings"]}
 
 
 # The folder ----------------------------------------------------------------------------------------------------------
@@ -198,7 +215,7 @@ class RunFolder:
         self.path = Path(path)
         self.command = command
         self.version = version
-        self.settings = settings  # as run.toml has them: name -> value
+        self.settings = settings  # as run.toml has them: name -> value, None for what is not set
 
     def __repr__(self) -> str:
         return f"RunFolder({str(self.path)!r}, command={self.command!r}, status={self.status!r})"
@@ -214,9 +231,10 @@ class RunFolder:
         """
         path = Path(path)
         text = settings_toml(command, settings, version)
-        read_back = type(settings)(**tomllib.loads(text)["settings"])
-        if read_back != settings:
-            raise ValueError(f"the settings of {command} do not survive run.toml: a value None needs a default of None")
+        if type(settings)(**settings_in(tomllib.loads(text))) != settings:
+            raise ValueError(
+                f"the settings of {command} cannot be kept: they do not read back from run.toml as they are"
+            )
         if path.exists():
             if not path.is_dir():
                 raise ValueError(f"out = {str(path)!r} is a file: name a folder that is empty or does not exist yet")
@@ -251,7 +269,7 @@ class RunFolder:
             raise ValueError(f"{str(path / 'run.toml')!r} cannot be read: {error}") from None
         if table.get("format") != RUN_FORMAT or not isinstance(table.get("settings"), dict):
             raise ValueError(f"{str(path / 'run.toml')!r} is not of the format {RUN_FORMAT}")
-        return cls(path, str(table.get("command")), str(table.get("version")), table["settings"])
+        return cls(path, str(table.get("command")), str(table.get("version")), settings_in(table))
 
     @classmethod
     def ensure(cls, path: Path, command: str, settings: BaseModel, version: str = __version__) -> "RunFolder":

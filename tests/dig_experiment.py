@@ -1,6 +1,6 @@
 """A small experiment to run the command line on: it needs neither Taichi nor a bed."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -15,9 +15,10 @@ class DigSettings(BaseModel):
     grain: Literal["sand", "glass"] = Field("sand", description="Material of the grains.")
     spike_diameter: float = Field(0.02, gt=0, description="Diameter of the spike [m].")
     drive_speeds: tuple[float, ...] = Field((0.1, 0.2), description="Speeds of the driven runs [m/s].")
+    seeds: tuple[Annotated[int, Field(ge=0)], ...] = Field((1,), description="Seeds [1].")
     size: tuple[float, float, float] = Field((0.1, 0.1, 0.05), description="Size of the bed [m].")
     steps: int = Field(3, ge=0, description="Steps to take [1].")
-    load: float | None = Field(None, description="Load on the spike [N]; its share of the platform's if not set.")
+    load: Annotated[float, Field(gt=0)] | None = Field(1.5, description="Load on the spike [N]; none if not set.")
     deep: bool = Field(False, description="Go deeper.")
     ending: str = Field("done", description='How it ends: "done", or the name of an error.')
 

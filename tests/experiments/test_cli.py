@@ -70,6 +70,14 @@ def test_the_run_toml_of_a_run_is_a_case(dig):
     assert settings_of(Path("a")) == settings_of(Path("b"))
 
 
+def test_none_unsets_what_need_not_be_set(dig):
+    Path("case.toml").write_text('load = "none"\n')
+    assert main(["dig", "case.toml", "--out", "a"]) == 0
+    assert main(["dig", "--load", "none", "--out", "b"]) == 0
+    assert main(["dig", "a/run.toml", "--out", "c"]) == 0
+    assert ["load" in settings_of(Path(name)) for name in "abc"] == [False, False, False]
+
+
 # What is refused
 
 
@@ -78,6 +86,8 @@ def test_the_run_toml_of_a_run_is_a_case(dig):
     [
         (["--spike-diametre", "1"], ["--spike-diametre", "--spike-diameter"]),
         (["--spike-diameter", "-1"], ["--spike-diameter = -1.0", "greater than 0", "[m]"]),
+        (["--load", "-1"], ["--load = -1.0", "greater than 0"]),
+        (["--seeds", "1", "-2"], ["--seeds[1] = -2", "greater than or equal to 0"]),
         (["--spike-diameter", "thin"], ["--spike-diameter", "thin", "float"]),
         (["--spike-diameter", "0.2"], ["spike_diameter = 0.2", "at most 0.1"]),
         (["--grain", "snow"], ["--grain", "snow", "sand"]),

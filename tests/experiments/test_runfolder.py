@@ -59,17 +59,26 @@ def test_settings_read_back_from_run_toml_to_the_bit(settings):
 def test_run_toml_says_what_each_setting_means_and_its_unit(folder):
     text = (folder.path / "run.toml").read_text()
     assert "# Diameter of the spike [m].\nspike_diameter = 0.02\n" in text
-    assert "# load is not set" in text
+    assert "load = 1.5" in text
     assert RunFolder.open(folder.path).command == "dig"
     assert DigSettings(**RunFolder.open(folder.path).settings) == DigSettings()
 
 
-def test_settings_that_would_not_read_back_are_refused(tmp_path):
-    class Lossy(BaseModel):
+def test_what_is_not_set_stays_so_whatever_the_default(tmp_path):
+    class Loaded(BaseModel):
         load: float | None = 1.0
 
-    with pytest.raises(ValueError, match="None"):
-        RunFolder.create(tmp_path / "a", "lossy", Lossy(load=None))
+    folder = RunFolder.create(tmp_path / "a", "load", Loaded(load=None))
+    assert "# load is not set" in (folder.path / "run.toml").read_text()
+    assert Loaded(**RunFolder.open(folder.path).settings).load is None
+
+
+def test_settings_that_would_not_read_back_are_refused(tmp_path):
+    class Lossy(BaseModel):
+        number: float = 0.0
+
+    with pytest.raises(ValueError, match="do not read back"):
+        RunFolder.create(tmp_path / "a", "lossy", Lossy(number=float("nan")))
     assert not (tmp_path / "a").exists()
 
 

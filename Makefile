@@ -1,0 +1,73 @@
+# hedgebed: `make run` and `make test` set themselves up; `make help` lists the rest.
+
+SHELL := /bin/bash
+VENV := .venv
+BIN := $(VENV)/bin
+ARGS ?=
+WHAT ?= bed
+
+.DEFAULT_GOAL := help
+.PHONY: help run test slow validate bench doctor format clean distclean
+
+help:  ## what there is
+	@grep -E '^[a-z]+:.*##' $(firstword $(MAKEFILE_LIST)) | sed -E 's/^([a-z]+):.*## */  make \1\t/' | expand -t 18
+
+run: $(VENV)/.installed  ## the shipped case of `hedgebed penetrate` into a fresh folder under runs/ (ARGS="--option value ...")
+	$(BIN)/hedgebed penetrate $(ARGS)
+
+test: $(VENV)/.installed-test  ## ruff, mypy and the tests, with coverage
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest --cov --cov-report=term $(ARGS)
+
+slow: $(VENV)/.installed-test  ## the tests that take longer: physics against closed forms, kill and resume
+	$(BIN)/python -m pytest -m slow $(ARGS)
+
+validate: slow  ## the same as slow
+
+bench: $(VENV)/.installed  ## race the bed against LIGGGHTS and LAMMPS, as far as they are installed (WHAT=bed)
+	$(BIN)/hedgebed bench $(WHAT) $(ARGS)
+
+doctor: $(VENV)/.installed  ## what this machine has, and what to install where something lacks
+	$(BIN)/hedgebed doctor
+
+format: $(VENV)/.installed-test  ## put imports and lines in order
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+clean:  ## remove what building and testing left; keep the environment and the runs
+	rm -rf build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis .coverage htmlcov
+	find . -path ./$(VENV) -prune -o -name __pycache__ -type d -exec rm -rf {} +
+
+distclean: clean  ## clean, and remove the environment too (never the runs)
+	rm -rf $(VENV)
+
+# The environment. Taichi has wheels for Python 3.11 to 3.13: take the first of these that is there and is one
+# (PYTHON=/path/to/python chooses another).
+$(VENV)/bin/python:
+	@found=""; \
+	for python in $(or $(PYTHON),python3 python3.11 python3.12 python3.13); do \
+	    version=$$($$python -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null) || continue; \
+	    case $$version in 3.11|3.12|3.13) chosen=$$python; break;; *) found="$$found $$python=$$version";; esac; \
+	done; \
+	if [ -z "$$chosen" ]; then \
+	    echo "hedgebed needs Python 3.11, 3.12 or 3.13 (Taichi has wheels for these); found:$${found:- none}." >&2; \
+	    echo "Install one, for example: apt install python3.11 python3.11-venv; or say PYTHON=/path/to/python." >&2; \
+	    exit 1; \
+	fi; \
+	echo "making $(VENV) with $$chosen (Python $$version)"; \
+	if ! $$chosen -m venv $(VENV); then \
+	    rm -rf $(VENV); \
+	    echo "" >&2; \
+	    echo "Python could not make a virtual environment. On Debian: apt install python3-venv" >&2; \
+	    exit 1; \
+	fi
+
+# Stamps: installed again only when pyproject.toml has changed. The package itself is installed in place (-e).
+$(VENV)/.installed: pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	@touch $@
+
+$(VENV)/.installed-test: pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[test]'
+	@touch $(VENV)/.installed $@
