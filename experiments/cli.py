@@ -155,7 +155,7 @@ def _option(name: str, field: FieldInfo) -> inspect.Parameter:
     is_flag = field.annotation is bool
     hint = _bare(field.annotation)
     annotation = Annotated[
-        hint,
+        hint,  # type: ignore[valid-type]
         Parameter(help=field.description, show_default=shown, consume_multiple=True, negative=None if is_flag else ""),
     ]
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
