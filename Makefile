@@ -7,6 +7,7 @@ ARGS ?=
 WHAT ?= bed
 
 .DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
 .PHONY: help run test slow validate bench doctor format clean distclean
 
 help:  ## what there is
@@ -52,7 +53,7 @@ $(VENV)/bin/python:
 	done; \
 	if [ -z "$$chosen" ]; then \
 	    echo "hedgebed needs Python 3.11, 3.12 or 3.13 (Taichi has wheels for these); found:$${found:- none}." >&2; \
-	    echo "Install one, for example: apt install python3.11 python3.11-venv; or say PYTHON=/path/to/python." >&2; \
+	    echo "Debian 12 and 13 have one: apt install python3 python3-venv. Elsewhere: make ... PYTHON=/path/to/python" >&2; \
 	    exit 1; \
 	fi; \
 	echo "making $(VENV) with $$chosen (Python $$version)"; \
@@ -65,9 +66,11 @@ $(VENV)/bin/python:
 
 # Stamps: installed again only when pyproject.toml has changed. The package itself is installed in place (-e).
 $(VENV)/.installed: pyproject.toml | $(VENV)/bin/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	@echo "installing hedgebed and what it needs into $(VENV) (the first time about 1.3 GB)"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
 	@touch $@
 
 $(VENV)/.installed-test: pyproject.toml | $(VENV)/bin/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[test]'
+	@echo "installing hedgebed, what it needs and what tests it into $(VENV) (the first time about 1.3 GB)"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[test]'
 	@touch $(VENV)/.installed $@
