@@ -1,0 +1,130 @@
+"""The contact law between two grains, or a grain and a body.
+
+Hertz's normal force, Mindlin's tangential spring with history and Coulomb sliding, and an elastic-plastic rolling
+spring-dashpot. All functions are Taichi functions that see one contact; they know nothing of lists or grids.
+
+Normal (Hertz; Thornton, Cummins & Cleary 2013, Powder Technology 233:30 for the damping):
+    F_n = max(0, 4/3 E* a d + c_n sqrt(m* S_n) d'),  a = sqrt(R* d),  S_n = 2 E* a,
+    d the overlap, with c_n from the restitution asked for (``damping_factor``).
+Tangential (Mindlin 1949, no-slip stiffness; total force bounded by Coulomb's law):
+    F_t = -(S_t u + c_n sqrt(S_t / S_n) sqrt(m* S_n) u'),  S_t = 8 G* a,  |F_t| <= mu F_n.
+Rolling (elastic-plastic spring-dashpot, Ai et al. 2011, Powder Technology 206:269, with the stiffness S_t R*^2 of the
+tangential spring at the rolling radius):
+    M = -(k_r q + c_r q'),  q' the relative rolling rate,  |M| <= mu_r R* F_n.
+"""
+
+import math
+
+import taichi as ti
+
+__all__ = ["contact_force", "damping_factor", "effective_moduli", "pair_parameters", "rolling_torque", "PAIR_WIDTH"]
+
+# Entries of a row of pair parameters.
+PAIR_WIDTH = 8
+_TWO_E, _EIGHT_G, _DAMPING, _FRICTION, _ROLLING, _TANGENTIAL_DAMPING, _ROLLING_DAMPING = range(7)
+
+# Thornton et al. 2013, eq. 15 and table: the damping that gives restitution e when the contact may not pull.
+_THORNTON = (-6.918798, -16.41105, 146.8049, -796.4559, 2928.711, -7206.864, 11494.29, -11342.18, 6276.757, -1489.915)
+_LEAST_RESTITUTION = 0.01
+
+
+def damping_factor(restitution: float, *, tensile: bool = False) -> float:
+    """The factor c_n of the normal damping force c_n sqrt(m* S_n) v that gives a restitution at any speed.
+
+    Args:
+        restitution: rebound over approach speed [1], 0.01 to 1.
+        tensile: True where the contact may pull at its end (Tsuji et al. 1992: 2 sqrt(5/6) |beta|); False where the
+            force is cut at zero (Thornton et al. 2013's fit).
+
+    Raises:
+        ValueError: a restitution outside 0.01 to 1.
+    """
+    if not _LEAST_RESTITUTION <= restitution <= 1:
+        raise ValueError(f"restitution = {restitution} must lie between {_LEAST_RESTITUTION} and 1")
+    if restitution == 1:
+        return 0.0
+    if tensile:
+        log = math.log(restitution)
+        return 2 * math.sqrt(5 / 6) * -log / math.hypot(log, math.pi)
+    polynomial = 0.0
+    for coefficient in reversed(_THORNTON):
+        polynomial = restitution * (coefficient + polynomial)
+    return 2 * math.sqrt(1 / (1 - (1 + restitution) ** 2 * math.exp(polynomial)) - 1)
+
+
+def effective_moduli(young_1: float, poisson_1: float, young_2: float, poisson_2: float) -> tuple[float, float]:
+    """E* and G* of two materials [Pa] (Johnson 1985, sections 4.2 and 7.3); an infinite modulus is a rigid body."""
+    compliance = (1 - poisson_1**2) / young_1 + (1 - poisson_2**2) / young_2
+    shear = 2 * (2 - poisson_1) * (1 + poisson_1) / young_1 + 2 * (2 - poisson_2) * (1 + poisson_2) / young_2
+    return 1 / compliance, 1 / shear
+
+
+def pair_parameters(
+    *,
+    effective_young: float,
+    effective_shear: float,
+    restitution: float,
+    friction: float,
+    rolling_friction: float = 0.0,
+    tensile: bool = False,
+) -> list[float]:
+    """One row of the table that the kernels read: everything of a pair that does not depend on the grains' sizes.
+
+    Args:
+        effective_young, effective_shear: E*, G* [Pa].
+        restitution, friction, rolling_friction: [1].
+
+    Raises:
+        ValueError: from ``damping_factor``; a negative friction.
+    """
+    if friction < 0 or rolling_friction < 0:
+        raise ValueError(f"friction = {friction} and rolling friction = {rolling_friction} must not be negative")
+    factor = damping_factor(restitution, tensile=tensile)
+    ratio = math.sqrt(8 * effective_shear / (2 * effective_young))
+    return [2 * effective_young, 8 * effective_shear, factor, friction, rolling_friction, factor * ratio, 0.3, 0.0]
+
+
+@ti.func
+def contact_force(p: ti.template(), n, v, overlap, radius, mass, dt, u: ti.template(), tensile: ti.template()):
+    """Force on the first of a pair, without rolling.
+
+    ``p`` the pair's parameters, ``n`` the unit normal towards the first, ``v`` the relative velocity of the first at
+    the contact point [m/s], ``overlap`` [m], ``radius``, ``mass`` the effective ones, ``u`` the tangential
+    displacement [m], updated in place. Returns (normal force [N], tangential force vector [N], tangential stiffness).
+    """
+    a = ti.sqrt(radius * overlap)
+    s_n = p[_TWO_E] * a
+    root = ti.sqrt(mass * s_n)
+    v_n = v.dot(n)
+    f_n = (2.0 / 3.0) * s_n * overlap - p[_DAMPING] * root * v_n
+    if ti.static(not tensile):
+        f_n = ti.max(f_n, 0.0)
+    k_t = p[_EIGHT_G] * a
+    c_t = p[_TANGENTIAL_DAMPING] * root
+    v_t = v - v_n * n
+    u += v_t * dt
+    u -= u.dot(n) * n
+    f_t = -(k_t * u + c_t * v_t)
+    bound = p[_FRICTION] * ti.abs(f_n)
+    square = f_t.norm_sqr()
+    if square > bound * bound:
+        f_t *= bound / ti.sqrt(square)
+        u = -(f_t + c_t * v_t) / k_t
+    return f_n, f_t, k_t
+
+
+@ti.func
+def rolling_torque(p: ti.template(), n, spin, f_n, k_t, radius, inertia, dt, q: ti.template()):
+    """Rolling torque on the first of a pair [N m]; ``spin`` the relative angular velocity, ``q`` the rolling angle."""
+    rate = spin - spin.dot(n) * n
+    k_r = k_t * radius * radius
+    c_r = p[_ROLLING_DAMPING] * 2.0 * ti.sqrt(inertia * k_r)
+    q += rate * dt
+    q -= q.dot(n) * n
+    m = -(k_r * q + c_r * rate)
+    bound = p[_ROLLING] * radius * ti.abs(f_n)
+    square = m.norm_sqr()
+    if square > bound * bound:
+        m *= bound / ti.sqrt(square)
+        q = -(m + c_r * rate) / k_r
+    return m

@@ -1,0 +1,83 @@
+"""Starts Taichi once, for every bed of the process.
+
+Contract: ``start`` may be called any number of times. With the settings that are in force it does nothing; with other
+settings it starts Taichi anew, which invalidates the fields of every earlier bed. Beds remember the generation they
+belong to and refuse to go on after it has ended.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+
+__all__ = ["Runtime", "generation", "start"]
+
+ARCHITECTURES = ("cpu", "cuda")
+PRECISIONS = {"float64": np.float64, "float32": np.float32}
+
+
+@dataclass(frozen=True)
+class Runtime:
+    """What Taichi runs on: architecture, number of threads, precision of the grains' numbers."""
+
+    arch: str
+    threads: int
+    precision: str
+
+    @property
+    def dtype(self):
+        """The numpy type of the grains' numbers."""
+        return PRECISIONS[self.precision]
+
+
+_current: Runtime | None = None
+_generation = 0
+
+
+def generation() -> int:
+    """The number of times that Taichi was started; a bed of an earlier generation is no longer valid."""
+    return _generation
+
+
+def start(*, arch: str = "cpu", threads: int | None = None, precision: str = "float64") -> Runtime:
+    """Start Taichi, or keep it if it already runs with these settings.
+
+    Args:
+        arch: "cpu" or "cuda".
+        threads: CPU threads; all that the machine has when None.
+        precision: "float64" or "float32".
+
+    Raises:
+        ValueError: an unknown architecture or precision, or a number of threads below one.
+        RuntimeError: the architecture is not available on this machine.
+    """
+    global _current, _generation
+    if arch not in ARCHITECTURES:
+        raise ValueError(f"arch = {arch!r} is unknown; use one of {', '.join(ARCHITECTURES)}")
+    if precision not in PRECISIONS:
+        raise ValueError(f"precision = {precision!r} is unknown; use one of {', '.join(PRECISIONS)}")
+    if threads is None:
+        threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+    if threads < 1:
+        raise ValueError(f"threads = {threads} must be at least 1")
+    wanted = Runtime(arch, threads, precision)
+    if wanted == _current:
+        return wanted
+    os.environ.setdefault("TI_LOG_LEVEL", "error")
+    os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
+    import taichi as ti
+
+    real = ti.f64 if precision == "float64" else ti.f32
+    options = dict(default_fp=real, default_ip=ti.i32, fast_math=False, log_level=ti.ERROR)
+    if arch == "cpu":
+        ti.init(arch=ti.cpu, cpu_max_num_threads=threads, **options)
+    else:
+        try:
+            ti.init(arch=ti.cuda, enable_fallback=False, **options)
+        except Exception as problem:
+            raise RuntimeError(f"arch = 'cuda' is not available on this machine ({problem}); use arch = 'cpu'") from None
+    _current = wanted
+    _generation += 1
+    return wanted

@@ -1,0 +1,188 @@
+"""Shapes that grains can touch, as distance functions.
+
+A body is a union of primitives in its own frame. A grain touches a body at most once: at the point of the union
+nearest to the grain's centre. Lengths in metres.
+
+Each primitive is stored as one row (kind, body, six numbers); ``nearest`` returns, for a point outside, the exact
+distance to the union, the outward unit normal there, and the curvature 1/R of a ball's surface (0 for the others,
+which meet a grain as a plane does).
+"""
+
+import math
+from dataclasses import dataclass
+
+import taichi as ti
+
+__all__ = ["Ball", "Cone", "Cylinder", "Plane", "Primitive", "distance_to"]
+
+PLANE, BALL, FRUSTUM = 0, 1, 2
+ROW_WIDTH = 6
+
+
+def _positive(kind: str, **values: float) -> None:
+    for name, value in values.items():
+        if not (math.isfinite(value) and value > 0):
+            raise ValueError(f"{kind}: {name} = {value} must be a positive length [m]")
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A plane through ``point`` with the outward ``normal`` (need not be of unit length); grains stay on its side."""
+
+    point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
+
+    def __post_init__(self):
+        if not math.hypot(*self.normal) > 0:
+            raise ValueError(f"Plane: normal = {self.normal} must not be zero")
+
+    kind = PLANE
+
+    def row(self) -> list[float]:
+        """The numbers that the kernels read."""
+        length = math.hypot(*self.normal)
+        return [*self.point, *(c / length for c in self.normal)]
+
+    def extent(self) -> float:
+        """Largest distance from the body's origin to the surface [m]; infinite."""
+        return math.inf
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A sphere. ``center`` in the body's frame [m], ``radius`` [m]."""
+
+    center: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    radius: float = 0.0
+
+    def __post_init__(self):
+        _positive("Ball", radius=self.radius)
+
+    kind = BALL
+
+    def row(self) -> list[float]:
+        """The numbers that the kernels read."""
+        return [*self.center, self.radius, 0.0, 0.0]
+
+    def extent(self) -> float:
+        """Largest distance from the body's origin to the surface [m]."""
+        return math.hypot(*self.center) + self.radius
+
+
+@dataclass(frozen=True)
+class Cone:
+    """A truncated cone about the body's z axis, from ``bottom`` to ``top`` [m]; a radius of 0 is an apex."""
+
+    bottom: float
+    top: float
+    bottom_radius: float
+    top_radius: float
+
+    def __post_init__(self):
+        if not self.top > self.bottom:
+            raise ValueError(f"Cone: top = {self.top} must lie above bottom = {self.bottom} [m]")
+        if self.bottom_radius < 0 or self.top_radius < 0 or self.bottom_radius + self.top_radius <= 0:
+            raise ValueError(f"Cone: radii {self.bottom_radius}, {self.top_radius} must be >= 0 and not both 0 [m]")
+
+    kind = FRUSTUM
+
+    def row(self) -> list[float]:
+        """The numbers that the kernels read."""
+        return [self.bottom, self.top, self.bottom_radius, self.top_radius, 0.0, 0.0]
+
+    def extent(self) -> float:
+        """Largest distance from the body's origin to the surface [m]."""
+        return max(math.hypot(self.bottom, self.bottom_radius), math.hypot(self.top, self.top_radius))
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """A cylinder about the body's z axis, from ``bottom`` to ``top`` [m]."""
+
+    bottom: float
+    top: float
+    radius: float
+
+    def __post_init__(self):
+        _positive("Cylinder", radius=self.radius)
+        if not self.top > self.bottom:
+            raise ValueError(f"Cylinder: top = {self.top} must lie above bottom = {self.bottom} [m]")
+
+    kind = FRUSTUM
+
+    def row(self) -> list[float]:
+        """The numbers that the kernels read."""
+        return [self.bottom, self.top, self.radius, self.radius, 0.0, 0.0]
+
+    def extent(self) -> float:
+        """Largest distance from the body's origin to the surface [m]."""
+        return math.hypot(max(abs(self.bottom), abs(self.top)), self.radius)
+
+
+Primitive = Plane | Ball | Cone | Cylinder
+
+
+@ti.func
+def _segment(px, pz, ax, az, bx, bz):
+    """Nearest point to (px, pz) on the segment a-b."""
+    ex, ez = bx - ax, bz - az
+    t = ti.min(1.0, ti.max(0.0, ((px - ax) * ex + (pz - az) * ez) / (ex * ex + ez * ez)))
+    return ax + t * ex, az + t * ez
+
+
+@ti.func
+def _frustum(row: ti.template(), p):
+    """Signed distance and outward normal of a truncated cone about z."""
+    rho = ti.sqrt(p.x * p.x + p.y * p.y)
+    z0, z1, r0, r1 = row[0], row[1], row[2], row[3]
+    # The profile's three edges: bottom face, side, top face.
+    qx, qz = _segment(rho, p.z, r0, z0, r1, z1)
+    nx, nz = z1 - z0, r0 - r1
+    best = (rho - qx) ** 2 + (p.z - qz) ** 2
+    bx = ti.min(rho, r0)
+    d_bottom = (rho - bx) ** 2 + (p.z - z0) ** 2
+    if d_bottom < best:
+        best = d_bottom
+        qx, qz = bx, z0
+        nx, nz = 0.0 * nx, -1.0 + 0.0 * nz
+    tx = ti.min(rho, r1)
+    d_top = (rho - tx) ** 2 + (p.z - z1) ** 2
+    if d_top < best:
+        best = d_top
+        qx, qz = tx, z1
+        nx, nz = 0.0 * nx, 1.0 + 0.0 * nz
+    inside = p.z > z0 and p.z < z1 and rho < r0 + (r1 - r0) * (p.z - z0) / (z1 - z0)
+    distance = ti.sqrt(best)
+    if distance > 1e-12:
+        nx, nz = (rho - qx) / distance, (p.z - qz) / distance
+        if inside:
+            nx, nz = -nx, -nz
+    else:
+        scale = 1.0 / ti.sqrt(nx * nx + nz * nz)
+        nx, nz = nx * scale, nz * scale
+    if inside:
+        distance = -distance
+    ux, uy = 1.0 + 0.0 * nx, 0.0 * nx
+    if rho > 1e-12:
+        ux, uy = p.x / rho, p.y / rho
+    return distance, ti.Vector([nx * ux, nx * uy, nz])
+
+
+@ti.func
+def distance_to(kind, row: ti.template(), p):
+    """Signed distance [m], outward unit normal and curvature [1/m] of one primitive at a point of the body's frame."""
+    distance = p.x * 0.0
+    normal = p * 0.0
+    curvature = p.x * 0.0
+    if kind == PLANE:
+        normal = ti.Vector([row[3], row[4], row[5]])
+        distance = normal.dot(p - ti.Vector([row[0], row[1], row[2]]))
+    elif kind == BALL:
+        offset = p - ti.Vector([row[0], row[1], row[2]])
+        length = ti.max(offset.norm(), 1e-30)
+        normal = offset / length
+        distance = length - row[3]
+        curvature = 1.0 / row[3]
+    else:
+        distance, normal = _frustum(row, p)
+    return distance, normal, curvature
