@@ -6,14 +6,13 @@ Results go to stdout, everything else to stderr.
 """
 
 import inspect
-import json
 import os
 import shutil
 import signal
 import sys
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from types import FrameType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -97,14 +96,13 @@ def _refusing() -> Iterator[None]:
 
 
 @contextmanager
-def _stdout_to_stderr(really: bool) -> Iterator[None]:
-    """Within, what anyone writes to stdout, libraries in C included, goes to stderr."""
+def _stdout_to_stderr() -> Iterator[None]:
+    """Within, what anyone writes to stdout, libraries in C included, goes to stderr: stdout is for results."""
     try:
         number = sys.stdout.fileno()
-    except (OSError, ValueError):  # stdout is not a file, as under a test that captures it
-        really = False
-    if not really:
-        yield
+    except (OSError, ValueError):  # stdout is not a file, as where a test captures it
+        with redirect_stdout(sys.stderr):
+            yield
         return
     sys.stdout.flush()
     kept = os.dup(number)
@@ -183,7 +181,7 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
             layers = [read_case(registry.CASES / presets[name]) for name in presets if given.pop(name, False)]
             layers += [read_case(find_case(case, registry.CASES))] if case is not None else []
             settings = settings_from(settings_class, [*layers, Layer(None, given)])
-            with _stdout_to_stderr(json):
+            with _stdout_to_stderr():
                 experiment.check(settings)
             folder = RunFolder.create(out or fresh_path(experiment.name), experiment.name, settings)
 
@@ -217,7 +215,7 @@ def _carry_out(folder: RunFolder, work: Callable[[Progress], dict[str, Any]], *,
     """Do the `work` of a run whose folder is there; keep its status; show what came out."""
     _say(f"run folder {folder.path}")
     fresh = not folder.has_work
-    with _stdout_to_stderr(as_json):
+    with _stdout_to_stderr():
         try:
             with folder.lock():
                 folder.set_status("running")
@@ -250,8 +248,12 @@ def _carry_out(folder: RunFolder, work: Callable[[Progress], dict[str, Any]], *,
             traceback.print_exc()
             _say(f"failed; what there was is in {folder.path}")
             return FAILED
+    return _show(folder, as_json=as_json)
+
+
+def _show(folder: RunFolder, *, as_json: bool) -> int:
     if as_json:
-        print(json.dumps(folder.read_result(), indent=2, ensure_ascii=False))
+        print((folder.path / "result.json").read_text(encoding="utf-8"), end="")
     else:
         _show_result(folder)
     return DONE
@@ -309,6 +311,9 @@ def _resume(
         settings_from(experiment.settings_class(), [Layer(str(folder / "run.toml"), run.settings)])
         with run.lock():
             pass
+    if run.status == "done" and (folder / "result.json").exists():
+        _say(f"the run in {folder} is done")
+        return _show(run, as_json=json)
     if run.version != __version__:
         _say(f"warning: the run was begun by version {run.version}, this is {__version__}")
     return _carry_out(run, lambda progress: experiment.resume(run.path, progress=progress), as_json=json, quiet=quiet)
@@ -331,7 +336,7 @@ def _bench(
         if out.exists() and (not out.is_dir() or any(out.iterdir())):
             raise ValueError(f"out = {str(out)!r} is in use: name a folder that is empty or does not exist yet")
         out.mkdir(parents=True, exist_ok=True)
-    with _stdout_to_stderr(json):
+    with _stdout_to_stderr():
         try:
             with make_progress(quiet=quiet) as progress:
                 result = run(out, progress=progress)

@@ -189,6 +189,28 @@ def test_quiet_shows_no_progress(dig, capsys):
     assert "[   0:00]" not in capsys.readouterr().err
 
 
+def test_resume_of_a_finished_run_shows_it_again(dig, capsys):
+    assert main(["dig", "--out", "a"]) == 0
+    before = Path("a/result.json").stat().st_mtime_ns
+    capsys.readouterr()
+    assert main(["resume", "a"]) == 0
+    out, err = capsys.readouterr()
+    assert "depth" in out
+    assert "is done" in err
+    assert Path("a/result.json").stat().st_mtime_ns == before
+
+
+def test_a_run_that_another_process_is_writing_is_left_alone(dig, capsys):
+    import fcntl
+
+    assert main(["dig", "--ending", "KeyboardInterrupt", "--out", "a"]) == 3
+    with Path("a/lock").open("w") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        assert main(["resume", "a"]) == 2
+    assert "is being written" in capsys.readouterr().err
+    assert json.loads(Path("a/status.json").read_text())["status"] == "stopped"
+
+
 @pytest.mark.parametrize("path", ["nowhere", "cases"])
 def test_resume_refuses_what_is_no_run(dig, capsys, path):
     assert main(["resume", path]) == 2
