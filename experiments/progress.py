@@ -44,6 +44,7 @@ class Progress:
         self._began = self._planned = self._stage_began = clock()
         self._costs: dict[str, float] = {}
         self._finished: set[str] = set()
+        self._open = ""  # the stage of the plan that is under way
         self.stage_name = ""
         self._total: float | None = None
         self._done = 0.0
@@ -57,11 +58,17 @@ class Progress:
             raise ValueError(f"a stage cannot cost less than nothing: {dict(costs)}")
         self._costs = dict(costs)
         self._finished = set()
+        self._open = self.stage_name if self.stage_name in self._costs else ""
         self._planned = self._clock()
 
     def stage(self, name: str, total: float | None = None) -> None:
-        """Begin the stage `name`, which ends at `total` (in whatever unit `update` counts; None if unknown)."""
-        self._end_stage()
+        """Begin the stage `name`, which ends at `total` (in whatever unit `update` counts; None if unknown).
+
+        A stage of the plan ends when the next one of the plan begins; others may come and go within it.
+        """
+        if name in self._costs:
+            self._end_stage()
+            self._open = name
         self.stage_name, self._total, self._done = name, total, 0.0
         self._stage_began = self._clock()
 
@@ -78,8 +85,9 @@ class Progress:
         self.stage_name = ""
 
     def _end_stage(self) -> None:
-        if self.stage_name:
-            self._finished.add(self.stage_name)
+        if self._open:
+            self._finished.add(self._open)
+        self._open = ""
 
     def __enter__(self) -> Self:
         return self
@@ -108,8 +116,8 @@ class Progress:
         if whole <= 0:
             return None
         done = sum(cost for name, cost in self._costs.items() if name in self._finished)
-        if self.stage_name not in self._finished:
-            done += self._costs.get(self.stage_name, 0.0) * (self.stage_fraction or 0.0)
+        if self.stage_name and self.stage_name == self._open:
+            done += self._costs[self._open] * (self.stage_fraction or 0.0)
         return min(done / whole, 1.0)
 
     def stage_remaining(self) -> float | None:

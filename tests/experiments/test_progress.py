@@ -68,6 +68,20 @@ def test_a_new_plan_starts_the_reckoning_afresh(clock):
     assert progress.remaining() == pytest.approx(5)
 
 
+def test_a_stage_outside_the_plan_belongs_to_the_one_it_comes_within(clock):
+    progress = Progress(clock=clock)
+    progress.plan({"prepare": 3.0, "dig": 1.0})
+    progress.stage("prepare")
+    progress.stage("rain", total=2)
+    progress.update(1)
+    assert progress.stage_fraction == 0.5
+    assert progress.fraction == 0.0
+    progress.stage("level", total=2)
+    assert progress.fraction == 0.0
+    progress.stage("dig", total=2)
+    assert progress.fraction == 0.75
+
+
 def test_a_cost_below_nothing_is_refused():
     with pytest.raises(ValueError, match="less than nothing"):
         Progress().plan({"dig": -1.0})
