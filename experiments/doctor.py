@@ -82,7 +82,7 @@ def _taichi(arch: str, answer: dict[str, Any]) -> Finding:
         "vulkan": "not needed",
     }
     version = f"Taichi {answer['version']}" if answer.get("version") else "Taichi"
-    detail = f"{version} runs a kernel" if answer["ok"] else answer["reason"]
+    detail = f"{version} runs a kernel" if answer["ok"] else f"does not run here ({answer['reason']})"
     return Finding(f"backend {arch}", answer["ok"], detail, remedies[arch], required=arch == "cpu")
 
 

@@ -1,0 +1,46 @@
+"""What every experiment owes the command line: described settings with units, cases that are valid."""
+
+from typing import get_args
+
+import pytest
+
+from experiments import registry
+from experiments.reading import read_case, settings_from
+from experiments.registry import EXPERIMENTS, find_experiment
+
+ALL = pytest.mark.parametrize("experiment", EXPERIMENTS.values(), ids=lambda experiment: experiment.name)
+
+
+@ALL
+def test_settings_are_frozen_closed_and_described(experiment):
+    settings_class = experiment.settings_class()
+    assert settings_class.model_config["frozen"] is True
+    assert settings_class.model_config["extra"] == "forbid"
+    for name, field in settings_class.model_fields.items():
+        assert field.description, f"{name} has no description"
+        kinds = {field.annotation, *get_args(field.annotation)}
+        if float in kinds:
+            assert "[" in field.description, f"{name} has no unit in its description: {field.description}"
+
+
+@ALL
+def test_the_defaults_are_valid(experiment):
+    settings_from(experiment.settings_class(), [])
+
+
+@ALL
+def test_the_presets_ship_and_are_valid(experiment):
+    for _, file in experiment.presets:
+        settings_from(experiment.settings_class(), [read_case(registry.CASES / file)])
+
+
+def test_every_case_that_ships_is_of_some_experiment():
+    for path in registry.CASES.glob("*.toml"):
+        case = read_case(path)
+        names = [set(experiment.settings_class().model_fields) for experiment in EXPERIMENTS.values()]
+        assert any(set(case.values) <= fields for fields in names), path.name
+
+
+def test_an_experiment_there_is_not_is_refused_by_name():
+    with pytest.raises(ValueError, match="'dig'.*penetrate"):
+        find_experiment("dig")
