@@ -61,8 +61,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Setting:
-    """One line of run.toml: table ("" at the top), key, value as written, and the comment (meaning and unit) that stands
-    above it or behind it."""
+    """A line of run.toml: table ("" at the top), key, value as written, the comment (meaning, unit) above or behind."""
 
     table: str
     key: str
@@ -210,7 +209,8 @@ def _read_settings(path: Path, missing: list[str]) -> list[Setting]:
     except (OSError, ValueError) as error:
         missing.append(f"run.toml cannot be read: {error}.")
         return []
-    settings, table, above = [], "", []
+    settings: list[Setting] = []
+    table, above = "", list[str]()
     for line in text.splitlines():
         if absent := re.match(r"\s*#\s*([A-Za-z0-9_.-]+) is not set\s*$", line):
             settings.append(Setting(table, absent.group(1), "not set", " ".join(above)))

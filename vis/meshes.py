@@ -23,7 +23,7 @@ def spike_profile(
     length: float,
     shaft_diameter: float | None = None,
     cone_angle: float = 60.0,
-    segments: int = 48,
+    segments: int = 72,
 ) -> NDArray[np.float64]:
     """Outline of a spike from its lowest point (0, 0) to the middle of its top.
 
@@ -76,7 +76,7 @@ def spike_profile(
     return profile[keep]
 
 
-def revolve(profile: ArrayLike, *, segments: int = 48) -> Mesh:
+def revolve(profile: ArrayLike, *, segments: int = 72) -> Mesh:
     """Closed surface of revolution of an outline about +z.
 
     Args:
@@ -121,7 +121,7 @@ def spike_mesh(
     length: float,
     shaft_diameter: float | None = None,
     cone_angle: float = 60.0,
-    segments: int = 48,
+    segments: int = 72,
 ) -> Mesh:
     """Closed mesh of a spike, its lowest point at the origin, its axis along +z; arguments as `spike_profile`.
 

@@ -1,0 +1,595 @@
+"""Plots of a run folder: each function takes a `RunFolder` and returns a `Plot`, or None where there is no data.
+
+The bed is blue and solid, the spring-damper orange and dashed, in every plot. Depth is in mm, positive downwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import TwoSlopeNorm
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from vis.folder import Run, RunFolder, Series
+from vis.numbers import plain
+from vis.style import BED, GREY, INK, MODEL, styled
+
+__all__ = [
+    "PLOTS",
+    "Plot",
+    "drag_plot",
+    "drop_peaks_plot",
+    "drops_plot",
+    "gap_plot",
+    "make_plots",
+    "set_down_plot",
+    "spread_plot",
+    "work_plot",
+]
+
+_WIDTH = 8.6  # inches; all plots are as wide as the report's column
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure with the name of its file (without ending), a title and a caption."""
+
+    name: str
+    title: str
+    caption: str
+    figure: Figure
+
+    def save(self, folder: Path) -> Path:
+        """Write `<folder>/<name>.png`."""
+        path = folder / f"{self.name}.png"
+        with styled():
+            self.figure.savefig(path)
+        return path
+
+
+def make_plots(run: RunFolder, folder: str | Path | None = None) -> tuple[list[tuple[Plot, Path]], list[str]]:
+    """Draw and write every plot the folder has data for.
+
+    Args:
+        run: The run folder.
+        folder: Where the PNGs go; by default the run's `figures/`.
+
+    Returns:
+        The plots with their files, and a sentence on each that could not be drawn.
+    """
+    target = Path(folder) if folder is not None else run.path / "figures"
+    target.mkdir(parents=True, exist_ok=True)
+    drawn: list[tuple[Plot, Path]] = []
+    missing: list[str] = []
+    for what, draw in PLOTS.items():
+        try:
+            plot = draw(run)
+        except (ValueError, TypeError, KeyError, IndexError, ZeroDivisionError, FloatingPointError) as error:
+            missing.append(f"{what}: could not be drawn ({type(error).__name__}: {error}).")
+            continue
+        if plot is None:
+            missing.append(f"{what}: no data.")
+        else:
+            drawn.append((plot, plot.save(target)))
+    return drawn, missing
+
+
+# ---- drag ----------------------------------------------------------------------------------------------------------
+
+
+def drag_plot(run: RunFolder) -> Plot | None:
+    """Drag against depth, one panel per speed; every seed of the bed, their mean and spread; the spring-damper."""
+    driven = [r for r in run.of_kind("driven") if r.bed is not None and r.speed is not None]
+    speeds = sorted({r.speed for r in driven if r.speed is not None})
+    if not speeds:
+        return None
+    with styled():
+        figure, axes = _panels(len(speeds), height=3.0, sharex=True, sharey=True)
+        for axis, speed in zip(axes, speeds, strict=True):
+            here = [r for r in driven if r.speed == speed]
+            seeds = len(here)
+            axis.set_title(f"{_speed(speed)}   ({seeds} bed{'s' if seeds > 1 else ''})")
+            for way, shade in (("in", 1.0), ("out", 0.45)):
+                parts = [_way(r.bed, way) for r in here]
+                _band(axis, parts, BED, alpha=shade, solid=way == "in")
+                models = [_way(r.model, way) for r in here if r.model is not None]
+                if models:
+                    grid, mean, _ = _mean_by_depth(models)
+                    style = (0, (4, 2)) if way == "in" else (0, (1, 1.5))
+                    axis.plot(1e3 * grid, mean, color=MODEL, ls=style, lw=1.8)
+            axis.axhline(0.0, color=GREY, lw=0.8)
+            axis.set_xlim(left=0.0)
+        _label(figure, axes, "depth of the tip [mm]", "force on the spike [N]")
+        _legend(
+            figure,
+            [
+                Line2D([], [], color=BED, lw=2.2, label="bed, way in"),
+                Line2D([], [], color=BED, lw=2.2, alpha=0.45, label="bed, way out"),
+                Line2D([], [], color=MODEL, ls=(0, (4, 2)), label="spring-damper, way in"),
+                Line2D([], [], color=MODEL, ls=(0, (1, 1.5)), label="spring-damper, way out"),
+            ],
+        )
+    many = any(sum(r.speed == s for r in driven) > 1 for s in speeds)
+    spread = "Thin lines: each bed; band: one standard deviation between beds. " if many else ""
+    return Plot(
+        "drag",
+        "Drag against depth",
+        f"The ground's force on the spike, upwards, while it is driven in and pulled out at constant speed. {spread}"
+        "Dashed: the fitted spring-damper in the same motion; its way out is predicted, not fitted.",
+        figure,
+    )
+
+
+def gap_plot(run: RunFolder) -> Plot | None:
+    """Spring-damper minus bed by depth and speed, as a map with the numbers written in."""
+    table = _gap_table(run)
+    if not table:
+        return None
+    speeds = sorted({row["speed"] for row in table})
+    depths = sorted({(row["depth_from"], row["depth_to"]) for row in table})
+    difference = np.full((len(depths), len(speeds)), np.nan)
+    share = np.full_like(difference, np.nan)
+    for row in table:
+        at = depths.index((row["depth_from"], row["depth_to"])), speeds.index(row["speed"])
+        difference[at] = row["model_force"] - row["bed_force"]
+        share[at] = difference[at] / row["bed_force"] if row["bed_force"] > 0 else np.nan
+    bound = float(np.nanmax(np.abs(difference))) or 1.0
+    with styled():
+        figure = Figure(figsize=(_WIDTH, max(2.6, 0.9 + 0.42 * len(depths))))
+        FigureCanvasAgg(figure)
+        axis = figure.add_subplot()
+        norm = TwoSlopeNorm(0.0, -bound, bound)
+        image = axis.imshow(difference, cmap="PuOr_r", norm=norm, aspect="auto")
+        axis.set_xticks(range(len(speeds)), [f"{s:.4g}" for s in speeds])
+        axis.set_yticks(range(len(depths)), [f"{1e3 * a:.3g} to {1e3 * b:.3g}" for a, b in depths])
+        axis.set_xlabel("speed [m/s]")
+        axis.set_ylabel("depth [mm]")
+        axis.grid(False)
+        axis.set_xticks(np.arange(len(speeds) + 1) - 0.5, minor=True)
+        axis.set_yticks(np.arange(len(depths) + 1) - 0.5, minor=True)
+        axis.grid(True, which="minor", color="white", lw=2.0)
+        axis.tick_params(which="both", length=0)
+        axis.spines[:].set_visible(False)
+        for (i, j), cell in np.ndenumerate(difference):
+            number = float(cell)
+            if not np.isfinite(number):
+                continue
+            text = f"{_signed(number)} N"
+            if np.isfinite(share[i, j]):
+                text += f"   ({_signed(100.0 * float(share[i, j]), 2)} %)"
+            dark = abs(number) > 0.62 * bound
+            axis.text(j, i, text, ha="center", va="center", fontsize=8.5, color="white" if dark else INK)
+        bar = figure.colorbar(image, ax=axis, pad=0.015, fraction=0.05)
+        bar.set_label("spring-damper − bed [N]")
+        bar.outline.set_visible(False)
+    return Plot(
+        "gap",
+        "Where the spring-damper departs",
+        "Mean drag of the spring-damper minus the bed's on the way in, by depth and speed; in brackets as a share of "
+        "the bed's. Orange: the spring-damper pushes back too hard; purple: too softly.",
+        figure,
+    )
+
+
+def work_plot(run: RunFolder) -> Plot | None:
+    """Work put in and got back, bed beside spring-damper, by speed."""
+    driven = [r for r in run.of_kind("driven") if r.speed is not None and _number(r.quantities, "work_in") is not None]
+    speeds = sorted({r.speed for r in driven if r.speed is not None})
+    if not speeds:
+        return None
+    with styled():
+        figure, axes = _panels(2, height=2.7)
+        for axis, key, title in zip(
+            axes, ("work_in", "work_out"), ("put in, way in", "got back, way out"), strict=True
+        ):
+            for shift, prefix, colour in ((-0.2, "", BED), (0.2, "model_", MODEL)):
+                mean, spread = _by_speed(driven, speeds, prefix + key, 1e3)
+                where = np.arange(len(speeds)) + shift
+                axis.bar(where, mean, 0.36, color=colour, hatch="///" if prefix else "", edgecolor="white", lw=0.6)
+                axis.errorbar(where, mean, spread, fmt="none", ecolor=INK, elinewidth=1.0, capsize=3)
+                for x, y, s in zip(where, mean, np.nan_to_num(spread), strict=True):
+                    if np.isfinite(y):
+                        _above(axis, x, max(y, 0.0) + s, plain(y))
+            axis.set_title(f"Work {title}")
+            axis.set_xticks(range(len(speeds)), [f"{s:.4g}" for s in speeds])
+            axis.grid(False, axis="x")
+            axis.margins(y=0.15)
+            axis.axhline(0.0, color=GREY, lw=0.8)
+        _label(figure, axes, "speed [m/s]", "work [mJ]", each=True)
+        _legend(figure, _pair(bars=True))
+    return Plot(
+        "work",
+        "Work in and out",
+        "Work done on the ground on the way in, and got back from it on the way out. A spring gives back what it took; "
+        "sand hardly anything." + _spread_words(driven),
+        figure,
+    )
+
+
+# ---- drops and rest ------------------------------------------------------------------------------------------------
+
+
+def drops_plot(run: RunFolder) -> Plot | None:
+    """Depth and force of each drop against time, one column per speed."""
+    drops = [r for r in run.of_kind("drop") if r.bed is not None and r.speed is not None]
+    speeds = sorted({r.speed for r in drops if r.speed is not None})
+    if not speeds:
+        return None
+    with styled():
+        figure = Figure(figsize=(_WIDTH, 4.6))
+        FigureCanvasAgg(figure)
+        axes = figure.subplots(2, len(speeds), sharex="col", sharey="row", squeeze=False)
+        for column, speed in enumerate(speeds):
+            above, below = axes[0, column], axes[1, column]
+            here = [r for r in drops if r.speed == speed]
+            end = max(_settled(r) for r in here)
+            for r in here:
+                for series, colour, style in ((r.bed, BED, "-"), (r.model, MODEL, (0, (4, 2)))):
+                    if series is None:
+                        continue
+                    start = _touch(series)
+                    shown = (series.time - start <= end) & (series.time - start >= -0.03 * end)
+                    time = 1e3 * (series.time[shown] - start)
+                    thin = len(here) > 1 and colour == BED
+                    above.plot(time, 1e3 * series.depth[shown], color=colour, ls=style, lw=1.1 if thin else 1.8)
+                    below.plot(time, series.force[shown], color=colour, ls=style, lw=1.1 if thin else 1.8)
+                    peak = int(np.argmax(series.force))
+                    below.plot(
+                        1e3 * (series.time[peak] - start), series.force[peak], "o" if colour == BED else "D",
+                        color=colour, ms=5, mec="white", mew=0.8, zorder=5,
+                    )  # fmt: skip
+            above.set_title(f"dropped at {_speed(speed)}")
+            above.axhline(0.0, color=GREY, lw=0.8)
+            below.set_xlabel("time since touch-down [ms]")
+        axes[0, 0].set_ylabel("depth of the tip [mm]")
+        axes[1, 0].set_ylabel("force on the spike [N]")
+        axes[0, 0].invert_yaxis()
+        _legend(figure, [*_pair(), Line2D([], [], color=GREY, marker="o", ls="", ms=5, label="peak force")])
+    return Plot(
+        "drops",
+        "Drops",
+        "Depth (downwards) and the ground's force against time since touch-down. The fit uses each drop up to its "
+        "first stop; what follows is predicted.",
+        figure,
+    )
+
+
+def drop_peaks_plot(run: RunFolder) -> Plot | None:
+    """Peak force, greatest depth and time to stop of the drops against speed, bed beside spring-damper."""
+    drops = [r for r in run.of_kind("drop") if r.speed is not None]
+    speeds = sorted({r.speed for r in drops if r.speed is not None})
+    columns = [
+        (key, title, unit, scale)
+        for key, title, unit, scale in (
+            ("peak_force", "Peak force", "N", 1.0),
+            ("max_depth", "Greatest depth", "mm", 1e3),
+            ("stop_time", "Time to first stop", "ms", 1e3),
+        )
+        if any(_number(r.quantities, key) is not None for r in drops)
+    ]
+    if not columns:
+        return None
+    with styled():
+        figure, axes = _panels(len(columns), height=2.6)
+        for axis, (key, title, unit, scale) in zip(axes, columns, strict=True):
+            for prefix, colour, style in (("", BED, "o-"), ("model_", MODEL, "D--")):
+                mean, spread = _by_speed(drops, speeds, prefix + key, scale)
+                axis.errorbar(speeds, mean, spread, fmt=style, color=colour, ms=5, mec="white", mew=0.8, capsize=3)
+            axis.set_title(title)
+            axis.set_ylabel(unit_label(title, unit))
+            axis.set_xlabel("speed at touch-down [m/s]")
+            axis.set_ylim(bottom=0.0)
+            axis.set_xlim(0.0, 1.12 * max(speeds) or 1.0)
+        _legend(figure, _pair(markers=True))
+    return Plot(
+        "drop_peaks",
+        "Peaks of the drops",
+        "Peak force, greatest depth and time from touch-down to the first stop." + _spread_words(drops),
+        figure,
+    )
+
+
+def set_down_plot(run: RunFolder) -> Plot | None:
+    """Depth against time of the spike set down under its load, to rest."""
+    sets = [r for r in run.of_kind("set_down") if r.bed is not None]
+    if not sets:
+        return None
+    with styled():
+        figure = Figure(figsize=(_WIDTH, 3.1))
+        FigureCanvasAgg(figure)
+        axis = figure.add_subplot()
+        end = 1.15 * max(_settled(r) for r in sets)
+        for r in sets:
+            for series, colour, style in ((r.bed, BED, "-"), (r.model, MODEL, (0, (4, 2)))):
+                if series is not None:
+                    time = series.time - series.time[0]
+                    shown = time <= end
+                    axis.plot(1e3 * time[shown], 1e3 * series.depth[shown], color=colour, ls=style, lw=1.4)
+        rests = []
+        for key, what, colour in (("sinkage", "bed", BED), ("model_sinkage", "spring-damper", MODEL)):
+            depths = [1e3 * n for r in sets if (n := _number(r.quantities, key)) is not None]
+            if depths:
+                rests.append(
+                    (float(np.mean(depths)), float(np.std(depths, ddof=1)) if len(depths) > 1 else 0.0, what, colour)
+                )
+        axis.invert_yaxis()
+        low, high = sorted(axis.get_ylim())
+        gap = 0.075 * (high - low)
+        last = -np.inf
+        for depth, spread, what, colour in sorted(rests):
+            axis.axhline(depth, color=colour, lw=0.8, alpha=0.6)
+            if spread:
+                axis.axhspan(depth - spread, depth + spread, color=colour, alpha=0.12, lw=0)
+            last = max(depth, last + gap)
+            number = f"{depth:.2f}" + (f" ± {spread:.2f}" if spread else "")
+            axis.text(
+                1.01, last, f"{what}: {number} mm", color=colour, va="center", transform=axis.get_yaxis_transform()
+            )
+        axis.set_xlim(0.0, 1e3 * end)
+        axis.set_xlabel("time since the spike was set down [ms]")
+        axis.set_ylabel("depth of the tip [mm]")
+        _legend(figure, _pair())
+    return Plot(
+        "set_down",
+        "Set down under its load",
+        f"Sinking to rest, {len(sets)} bed{'s' if len(sets) > 1 else ''}. Right: the depth at rest"
+        f"{' with the standard deviation between beds' if len(sets) > 1 else ''}. Rest is predicted by the "
+        "spring-damper, not fitted.",
+        figure,
+    )
+
+
+def spread_plot(run: RunFolder) -> Plot | None:
+    """K and C fitted to each seed of the bed, with their mean and spread."""
+    fits = [f for f in run.result.get("fits") or [] if isinstance(f, dict)]
+    panels = [
+        (key, title, unit)
+        for key, title, unit in (("stiffness", "Stiffness K", "N/m"), ("damping", "Damping C", "N s/m"))
+        if any(_number(f, key) is not None for f in fits)
+    ]
+    if not panels:
+        return None
+    with styled():
+        figure, axes = _panels(len(panels), height=2.5)
+        for axis, (key, title, unit) in zip(axes, panels, strict=True):
+            rows = [
+                (f.get("seed", i + 1), n, _std(f, key))
+                for i, f in enumerate(fits)
+                if (n := _number(f, key)) is not None
+            ]
+            values = np.array([value for _, value, _ in rows])
+            mean, spread = float(values.mean()), float(values.std(ddof=1)) if len(values) > 1 else 0.0
+            axis.axhline(mean, color=INK, lw=1.0)
+            if spread:
+                axis.axhspan(mean - spread, mean + spread, color=MODEL, alpha=0.15, lw=0)
+            axis.errorbar(
+                range(len(rows)),
+                values,
+                [std or 0.0 for *_, std in rows],
+                fmt="o",
+                color=MODEL,
+                ms=7,
+                mec="white",
+                capsize=3,
+            )
+            axis.set_xticks(range(len(rows)), [str(seed) for seed, *_ in rows])
+            axis.set_xlim(-0.6, len(rows) - 0.4)
+            axis.set_title(title)
+            axis.set_xlabel("seed of the bed")
+            axis.set_ylabel(f"{title.split()[1]} [{unit}]")
+            reach = max(2.2 * spread, 0.1 * abs(mean), 1e-12)
+            axis.set_ylim(min(mean - reach, *axis.get_ylim()), max(mean + reach, *axis.get_ylim()))
+            axis.grid(False, axis="x")
+    bars = "; bars: the fit's own uncertainty" if any(_std(f, "stiffness") for f in fits) else ""
+    return Plot(
+        "spread",
+        "Spread between beds",
+        f"The spring-damper fitted to each bed by itself{bars}. Line and band: mean and standard deviation between "
+        "beds.",
+        figure,
+    )
+
+
+#: What is drawn, in the report's order: name in words -> function.
+PLOTS: dict[str, Callable[[RunFolder], Plot | None]] = {
+    "Drag against depth": drag_plot,
+    "Where the spring-damper departs": gap_plot,
+    "Set down under its load": set_down_plot,
+    "Drops": drops_plot,
+    "Peaks of the drops": drop_peaks_plot,
+    "Work in and out": work_plot,
+    "Spread between beds": spread_plot,
+}
+
+
+# ---- parts ---------------------------------------------------------------------------------------------------------
+
+
+def unit_label(title: str, unit: str) -> str:
+    """The label of an axis: quantity and unit."""
+    return f"{title[0].lower()}{title[1:]} [{unit}]"
+
+
+def _panels(count: int, *, height: float, sharex: bool = False, sharey: bool = False) -> tuple[Figure, list[Axes]]:
+    rows = 1 if count <= 4 else -(-count // 4)
+    columns = -(-count // rows)
+    width = _WIDTH if count > 1 else 0.62 * _WIDTH
+    figure = Figure(figsize=(width, height * rows + 0.3))
+    FigureCanvasAgg(figure)
+    axes = list(figure.subplots(rows, columns, squeeze=False, sharex=sharex, sharey=sharey).ravel())
+    for spare in axes[count:]:
+        spare.set_visible(False)
+    return figure, axes[:count]
+
+
+def _label(figure: Figure, axes: list[Axes], x: str, y: str, *, each: bool = False) -> None:
+    for axis in axes:
+        place = axis.get_subplotspec()
+        axis.set_xlabel(x)
+        if each or place is None or place.is_first_col():
+            axis.set_ylabel(y)
+
+
+def _legend(figure: Figure, handles: list[Any]) -> None:
+    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), handlelength=2.6)
+
+
+def _pair(*, markers: bool = False, bars: bool = False) -> list[Any]:
+    if bars:
+        from matplotlib.patches import Patch
+
+        return [
+            Patch(facecolor=BED, edgecolor="white", label="bed"),
+            Patch(facecolor=MODEL, edgecolor="white", hatch="///", label="spring-damper"),
+        ]
+    marks = ("o", "D") if markers else ("", "")
+    return [
+        Line2D([], [], color=BED, marker=marks[0], label="bed"),
+        Line2D([], [], color=MODEL, ls=(0, (4, 2)), marker=marks[1], label="spring-damper"),
+    ]
+
+
+def _band(axis: Axes, parts: Iterable[Series | None], colour: str, *, alpha: float, solid: bool) -> None:
+    there = [part for part in parts if part is not None and len(part) > 1]
+    if not there:
+        return
+    grid, mean, spread = _mean_by_depth(there)
+    if len(there) > 1:
+        for part in there:
+            axis.plot(1e3 * part.depth, part.force, color=colour, lw=0.5, alpha=0.35 * alpha)
+        axis.fill_between(1e3 * grid, mean - spread, mean + spread, color=colour, alpha=0.2 * alpha, lw=0)
+    else:
+        axis.plot(1e3 * there[0].depth, there[0].force, color=colour, lw=0.5, alpha=0.4 * alpha)
+    axis.plot(1e3 * grid, mean, color=colour, alpha=alpha, lw=2.2 if solid else 1.8)
+
+
+def _way(series: Series | None, way: str) -> Series | None:
+    """The rows on the way in or out, in the ground."""
+    if series is None:
+        return None
+    part = series.part(way)
+    keep = part.depth >= 0.0
+    return Series(part.time[keep], part.depth[keep], part.velocity[keep], part.force[keep], part.phase[keep])
+
+
+def _mean_by_depth(
+    parts: Iterable[Series | None], bins: int = 40
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Depth [m], mean force [N] and its standard deviation between the parts [N], shape (bins,).
+
+    Each part is averaged within a bin first, so that noise within one bed is not taken for spread between beds.
+    """
+    there = [part for part in parts if part is not None and len(part) > 1]
+    if not there:
+        return np.zeros(0), np.zeros(0), np.zeros(0)
+    deepest = max(float(part.depth.max()) for part in there)
+    bins = int(np.clip(min(len(part) for part in there) // 3, 4, bins))
+    edges = np.linspace(0.0, max(deepest, 1e-12), bins + 1)
+    rows = np.full((len(there), bins), np.nan)
+    for row, part in zip(rows, there, strict=True):
+        which = np.clip(np.digitize(part.depth, edges) - 1, 0, bins - 1)
+        count = np.bincount(which, minlength=bins)
+        row[count > 0] = np.bincount(which, part.force, bins)[count > 0] / count[count > 0]
+    filled = np.isfinite(rows).any(axis=0)
+    rows = rows[:, filled]
+    spread = np.nanstd(rows, axis=0, ddof=0) * np.sqrt(_bessel(np.isfinite(rows).sum(axis=0)))
+    return (0.5 * (edges[1:] + edges[:-1]))[filled], np.nanmean(rows, axis=0), spread
+
+
+def _bessel(count: NDArray[np.int64]) -> NDArray[np.float64]:
+    return np.where(count > 1, count / np.maximum(count - 1, 1), 0.0)
+
+
+def _gap_table(run: RunFolder) -> list[dict[str, float]]:
+    """The table of departures as written, or else made from the driven series."""
+    names = ("speed", "depth_from", "depth_to", "bed_force", "model_force")
+    departures = run.result.get("departures")
+    given = departures.get("table") if isinstance(departures, dict) else None
+    rows = []
+    for row in given or []:
+        if isinstance(row, dict) and all(isinstance(row.get(name), int | float) for name in names):
+            rows.append({name: float(row[name]) for name in names})
+    if rows:
+        return rows
+    for speed in run.speeds("driven"):
+        here = [r for r in run.of_kind("driven") if r.speed == speed and r.bed is not None and r.model is not None]
+        beds, models = [_way(r.bed, "in") for r in here], [_way(r.model, "in") for r in here]
+        if not here:
+            continue
+        grid, bed, _ = _mean_by_depth(beds, bins=5)
+        grid2, model, _ = _mean_by_depth(models, bins=5)
+        if len(grid) == len(grid2) > 1:
+            half = 0.5 * (grid[1] - grid[0])
+            rows += [
+                dict(zip(names, (speed, d - half, d + half, b, m), strict=True))
+                for d, b, m in zip(grid.tolist(), bed.tolist(), model.tolist(), strict=True)
+            ]
+    return rows
+
+
+def _by_speed(
+    runs: list[Run], speeds: list[float], key: str, scale: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean and standard deviation between seeds of a quantity at each speed; NaN where unknown."""
+    mean, spread = np.full(len(speeds), np.nan), np.full(len(speeds), np.nan)
+    for i, speed in enumerate(speeds):
+        numbers = [n for r in runs if r.speed == speed and (n := _number(r.quantities, key)) is not None]
+        if numbers:
+            mean[i] = scale * float(np.mean(numbers))
+        if len(numbers) > 1:
+            spread[i] = scale * float(np.std(numbers, ddof=1))
+    return mean, spread
+
+
+def _number(quantities: Any, key: str) -> float | None:
+    entry = quantities.get(key) if isinstance(quantities, dict) else None
+    number = entry.get("value") if isinstance(entry, dict) else entry
+    return float(number) if isinstance(number, int | float) and np.isfinite(number) else None
+
+
+def _std(fit: dict[str, Any], key: str) -> float | None:
+    entry = fit.get(key)
+    number = entry.get("std") if isinstance(entry, dict) else fit.get(f"{key}_std")
+    return float(number) if isinstance(number, int | float) and np.isfinite(number) else None
+
+
+def _touch(series: Series) -> float:
+    inside = np.flatnonzero(series.depth >= 0.0)
+    return float(series.time[inside[0]] if len(inside) else series.time[0])
+
+
+def _settled(run: Run) -> float:
+    """Time [s] since touch-down after which nothing moves any more, of bed and spring-damper, with a margin."""
+    last = 0.0
+    for series in (run.bed, run.model):
+        if series is not None:
+            travel = max(float(np.ptp(series.depth)), 1e-12)
+            moving = np.flatnonzero(np.abs(series.depth - series.depth[-1]) > 0.03 * travel)
+            end = series.time[min(moving[-1] + 1, len(series) - 1)] if len(moving) else series.time[-1]
+            last = max(last, float(end) - _touch(series))
+    return 1.25 * last if last > 0.0 else 1.0
+
+
+def _above(axis: Axes, x: float, y: float, text: str) -> None:
+    axis.annotate(text, (x, y), xytext=(0, 3), textcoords="offset points", ha="center", fontsize=7.5, color=INK)
+
+
+def _speed(speed: float) -> str:
+    return f"{speed:.3g} m/s"
+
+
+def _signed(number: float, significant: int = 3) -> str:
+    return ("+" if number > 0 else "") + plain(number, significant)
+
+
+def _spread_words(runs: list[Run]) -> str:
+    speeds = [r.speed for r in runs]
+    return " Bars: standard deviation between beds, where there are several." if len(set(speeds)) < len(speeds) else ""
