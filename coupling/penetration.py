@@ -90,6 +90,11 @@ class Run:
         return (*self.ground.centre, self.ground.surface - self.depth)
 
     @property
+    def last_force(self) -> float:
+        """Mean force of the last macro step [N]; 0 before the first."""
+        return self._rows[-1][3] if self._rows else 0.0
+
+    @property
     def fraction(self) -> float:
         """How far along it is, from 0 to 1, as well as one can tell."""
         return 1.0 if self.done else min(1.0, max(0.0, self.time / self.max_time))

@@ -82,9 +82,8 @@ class Penetration:
 
     @property
     def final_depth(self) -> float:
-        """Depth at the end, the mean over the last rows at rest [m]."""
-        rest = self.depth[self.phase == "rest"]
-        return float(rest.mean()) if rest.size else (float(self.depth[-1]) if self.depth.size else 0.0)
+        """Depth at the end [m]."""
+        return float(self.depth[-1]) if self.depth.size else 0.0
 
     @property
     def stop_time(self) -> float | None:
@@ -119,11 +118,14 @@ class Penetration:
         values = {
             "peak_force": (self.peak_force, "N"),
             "max_depth": (self.max_depth, "m"),
-            "final_depth": (self.final_depth, "m"),
             "work_in": (self.work_in, "J"),
             "work_out": (self.work_out, "J"),
         }
-        if self.stop_time is not None:
+        if self.kind != "driven":
+            values["final_depth"] = (self.final_depth, "m")
+        if self.kind == "set_down":
+            values["sinkage"] = (self.final_depth, "m")
+        if self.kind == "drop" and self.stop_time is not None:
             values["stop_time"] = (self.stop_time, "s")
         return {name: {"value": value, "std": None, "unit": unit} for name, (value, unit) in values.items()}
 

@@ -1,0 +1,189 @@
+"""Where the spring-damper departs from the bed: by depth and by speed, in numbers and in words.
+
+All from the way in of driven runs, in bands of depth; runs of one speed on several seeds are averaged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from coupling import Penetration
+
+from .fit import Fit, fit_rows
+
+__all__ = ["departure_table", "departures", "depth_exponent", "sentences"]
+
+BANDS = 4
+"""Bands of depth between the surface and the deepest point."""
+
+
+def departures(
+    driven: Sequence[Penetration],
+    models: Mapping[str, Penetration],
+    beds: Mapping[str, Penetration],
+    fit: Fit,
+    *,
+    sinkage: tuple[float, float] | None = None,
+) -> dict[str, Any]:
+    """The entry "departures" of result.json: table, exponents, returned work and sentences.
+
+    `driven` are the bed's driven runs; `beds` and `models` all runs by id, in the bed and on the spring-damper;
+    `sinkage` the resting depth (bed, model) [m].
+    """
+    table = departure_table(driven, fit)
+    exponents = depth_exponent(driven)
+    pairs = [(beds[name], models[name]) for name in models]
+    ways_out = [(_returned(bed), _returned(model)) for bed, model in pairs if bed.kind == "driven"]
+    pull_out = [(mine, law) for mine, law in ways_out if mine is not None and law is not None]
+    returned = tuple(float(np.mean(values)) for values in zip(*pull_out, strict=True)) if pull_out else None
+    drops = [(bed, model) for bed, model in pairs if bed.kind == "drop"]
+    return {
+        "sentences": sentences(table, exponents, returned, drops, sinkage),
+        "table": table,
+        "exponents": [{"speed": speed, "exponent": value} for speed, value in exponents.items()],
+        "work_returned": None if returned is None else {"bed": returned[0], "model": returned[1]},
+    }
+
+
+def departure_table(driven: Sequence[Penetration], fit: Fit, bands: int = BANDS) -> list[dict[str, float]]:
+    """Mean force of the bed and of the law per speed and band of depth [N]; gap = (law - bed) / bed [1]."""
+    if not driven:
+        return []
+    deepest = max(run.max_depth for run in driven)
+    edges = np.linspace(0.0, deepest, bands + 1)
+    table = []
+    for speed, runs in _by_speed(driven).items():
+        for low, high in pairwise(edges):
+            means = []
+            for run in runs:
+                rows = fit_rows(run) & (run.depth > low) & (run.depth <= high)
+                if rows.any():
+                    law = fit.force(run.depth[rows], run.velocity[rows])
+                    means.append((run.force[rows].mean(), law.mean()))
+            if not means:
+                continue
+            bed, model = (float(value) for value in np.mean(means, axis=0))
+            gap = (model - bed) / bed if bed > 0 else None
+            table.append({"speed": speed, "depth_from": float(low), "depth_to": float(high),
+                          "bed_force": bed, "model_force": model, "gap": gap})  # fmt: skip
+    return table  # type: ignore[return-value]
+
+
+def depth_exponent(driven: Sequence[Penetration]) -> dict[float, float]:
+    """Exponent n of F ~ z^n on the way in, per speed, from the deeper three quarters: mean forces of 12 equal bands.
+
+    A straight line through log F against log z. Speeds at which fewer than four bands push back are left out.
+    """
+    found = {}
+    for speed, runs in _by_speed(driven).items():
+        depths, forces = [], []
+        for run in runs:
+            rows = fit_rows(run)
+            edges = np.linspace(0.25 * run.max_depth, run.max_depth, 13)
+            for low, high in pairwise(edges):
+                band = rows & (run.depth > low) & (run.depth <= high)
+                if band.any() and run.force[band].mean() > 0:
+                    depths.append(float(run.depth[band].mean()))
+                    forces.append(float(run.force[band].mean()))
+        if len(depths) >= 4:
+            found[speed] = float(np.polyfit(np.log(depths), np.log(forces), 1)[0])
+    return found
+
+
+def sentences(
+    table: Sequence[Mapping[str, Any]],
+    exponents: Mapping[float, float],
+    returned: tuple[float, ...] | None,
+    drops: Sequence[tuple[Penetration, Penetration]],
+    sinkage: tuple[float, float] | None,
+) -> list[str]:
+    """What the numbers say, one finding a sentence."""
+    said = [text for part in (_by_depth(table), _by_rate(table)) for text in part]
+    if exponents:
+        low, high = min(exponents.values()), max(exponents.values())
+        shown = f"{low:.2f}" if high - low < 0.005 else f"{low:.2f} to {high:.2f}"
+        said.append(f"Going in, the bed's force grows with depth to the power {shown}; the spring's to the power 1.")
+    if sinkage is not None:
+        bed, law = sinkage
+        side = "deeper" if law > bed else "less deep"
+        said.append(
+            f"Set down under its load the spike sinks {1e3 * bed:.2f} mm into the bed; the spring-damper says "
+            f"{1e3 * law:.2f} mm, {_percent(law / bed - 1)} {side}."
+        )
+    if returned is not None:
+        said.append(
+            f"Pulled out, the bed gives back {_percent(returned[0])} of the work put in, the spring-damper "
+            f"{_percent(returned[1])}."
+        )
+    if drops:
+        peak = float(np.mean([model.peak_force / bed.peak_force for bed, model in drops if bed.peak_force > 0] or [1]))
+        stop = float(np.mean([model.max_depth / bed.max_depth for bed, model in drops if bed.max_depth > 0] or [1]))
+        said.append(
+            f"In drops the spring-damper's peak force is {_percent(peak - 1)} {'above' if peak > 1 else 'below'} the "
+            f"bed's (largest mean of one macro step), and its deepest point {_percent(stop - 1)} "
+            f"{'deeper' if stop > 1 else 'less deep'}."
+        )
+    return said
+
+
+def _by_depth(table: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The shallowest and the deepest band, at the speed where the law is furthest off there."""
+    rows = [row for row in table if row["gap"] is not None]
+    if not rows:
+        return []
+    said = []
+    top, bottom = min(row["depth_to"] for row in rows), max(row["depth_from"] for row in rows)
+    shallow = [row for row in rows if row["depth_to"] == top]
+    deep = [row for row in rows if row["depth_from"] == bottom]
+    for where, band in ((f"Above {1e3 * top:.3g} mm", shallow), (f"Below {1e3 * bottom:.3g} mm", deep)):
+        worst = max(band, key=lambda row: abs(row["gap"]))
+        others = [row["gap"] for row in band]
+        said.append(
+            f"{where} the spring-damper pushes {_percent(worst['gap'])} too {_hard(worst['gap'])} at "
+            f"{worst['speed']:g} m/s ({worst['model_force']:.3g} N against {worst['bed_force']:.3g} N); over all "
+            f"speeds the gap there is {100 * min(others):+.0f} to {100 * max(others):+.0f} %."
+        )
+    return said
+
+
+def _by_rate(table: Sequence[Mapping[str, Any]]) -> list[str]:
+    """How the force changes from the slowest to the fastest run, in the bed and in the law, over all depths."""
+    speeds = sorted({row["speed"] for row in table})
+    if len(speeds) < 2:
+        return []
+    slow = [row for row in table if row["speed"] == speeds[0]]
+    fast = [row for row in table if row["speed"] == speeds[-1]]
+    ratio = {}
+    for side in ("bed_force", "model_force"):
+        before, after = sum(row[side] for row in slow), sum(row[side] for row in fast)
+        if before <= 0:
+            return []
+        ratio[side] = after / before
+    return [
+        f"From {speeds[0]:g} to {speeds[-1]:g} m/s the bed's drag changes by {100 * (ratio['bed_force'] - 1):+.0f} %, "
+        f"the spring-damper's by {100 * (ratio['model_force'] - 1):+.0f} %."
+    ]
+
+
+def _by_speed(driven: Sequence[Penetration]) -> dict[float, list[Penetration]]:
+    """Runs by the speed asked for, slow ones first."""
+    speeds = sorted({float(run.settings["speed"]) for run in driven})
+    return {speed: [run for run in driven if run.settings["speed"] == speed] for speed in speeds}
+
+
+def _returned(run: Penetration) -> float | None:
+    """Share of the work put in that the way out gives back [1]."""
+    return run.work_out / run.work_in if run.work_in > 0 and (run.phase == "out").any() else None
+
+
+def _percent(value: float) -> str:
+    size = abs(100 * value)
+    return f"{size:.0f} %" if size >= 9.5 else f"{size:.1f} %"
+
+
+def _hard(gap: float) -> str:
+    return "hard" if gap > 0 else "softly"

@@ -1,0 +1,249 @@
+"""From finished runs to the result: fits, the same runs on the spring-damper, departures, and what is said of the bed.
+
+Spread between seeds is that of the runs which every seed has (same kind, same speed), each seed fitted by itself; the
+value is fitted to all runs of all seeds. A quantity that no second seed has gets the std null, one that is exact 0.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from coupling import Penetration
+from rigid import SpringDamper
+
+from .departures import departures
+from .fit import Fit, drag_gap, fit_spring_damper, spread
+from .settings import PenetrateSettings
+from .softening import Softening
+from .units import Unit, make_run
+
+__all__ = ["Findings", "bed_entry", "bed_quantities", "compare_with", "model_run"]
+
+Runs = Mapping[str, Penetration]
+COMPARED = ("stiffness", "damping", "sinkage_dem", "sinkage_spring_damper", "drag_gap")
+
+
+class Findings:
+    """All that is read off the finished runs of one experiment.
+
+    `units` and `beds` are the runs and their series in the bed; `fit` is the law fitted to all of them, `seed_fits`
+    those of the seeds, `models` (id -> series) the same runs on the law.
+    """
+
+    def __init__(self, settings: PenetrateSettings, units: Sequence[Unit], beds: Runs, time_step: float) -> None:
+        self.settings, self.units, self.beds, self.time_step = settings, list(units), dict(beds), time_step
+        self.fit: Fit = fit_spring_damper(self.beds)
+        self.seed_fits: dict[int, Fit] = self._fit_seeds()
+        self.models: dict[str, Penetration] = {
+            unit.id: model_run(settings, unit, self.beds[unit.id], self.fit, time_step) for unit in self.units
+        }
+
+    def of(self, kind: str, seed: int | None = None) -> list[Penetration]:
+        """The bed's runs of a kind, of one seed or of all."""
+        return [self.beds[unit.id] for unit in self.units if unit.kind == kind and seed in (None, unit.seed)]
+
+    def shared_conditions(self) -> set[tuple[str, float]]:
+        """Kinds and speeds that every seed has."""
+        per_seed = [{unit.condition for unit in self.units if unit.seed == seed} for seed in self.seeds]
+        return set.intersection(*per_seed)
+
+    @property
+    def seeds(self) -> list[int]:
+        """The seeds in their order."""
+        return list(dict.fromkeys(unit.seed for unit in self.units))
+
+    def _fit_seeds(self) -> dict[int, Fit]:
+        """Each seed by itself, on the runs that every seed has."""
+        shared = self.shared_conditions()
+        fits = {}
+        for seed in self.seeds:
+            own = {u.id: self.beds[u.id] for u in self.units if u.seed == seed and u.condition in shared}
+            if any(run.kind != "set_down" for run in own.values()):
+                fits[seed] = fit_spring_damper(own)
+        return fits
+
+    def quantities(self) -> dict[str, dict[str, Any]]:
+        """The headline numbers: name -> value, std between seeds, unit, note."""
+        fits, load = list(self.seed_fits.values()), self.settings.weight
+        sunk = [run.final_depth for run in self.of("set_down")]
+        model_sunk = [self.models[unit.id].final_depth for unit in self.units if unit.kind == "set_down"]
+        gaps = [drag_gap(self.of("driven", seed), self.fit) for seed in self.seeds]
+        law_sinkages = [load / fit.stiffness if fit.stiffness > 0 else None for fit in fits]
+        shared = "spread: each seed fitted to the runs that all seeds have"
+        error = "standard error of the pooled fit, jackknife over runs"
+        return {
+            "stiffness": _quantity(self.fit.stiffness, spread([fit.stiffness for fit in fits]), "N/m", shared),
+            "damping": _quantity(self.fit.damping, spread([fit.damping for fit in fits]), "N s/m", shared),
+            "stiffness_error": _quantity(self.fit.stiffness_error, None, "N/m", error),
+            "damping_error": _quantity(self.fit.damping_error, None, "N s/m", error),
+            "sinkage_dem": _quantity(_mean(sunk), spread(sunk), "m", "depth at rest under the load"),
+            "sinkage_spring_damper": _quantity(_mean(model_sunk), spread(law_sinkages), "m", "the same on the law"),
+            "drag_gap": _quantity(
+                drag_gap(self.of("driven"), self.fit), spread(gaps), "1",
+                "rms difference over rms drag, way in, all driven runs",
+            ),
+            "work_returned_dem": self._work_returned(self.beds, "work of the way out over work in, driven runs"),
+            "work_returned_spring_damper": self._work_returned(self.models, "the same on the fitted law"),
+            "load": _quantity(load, 0.0, "N", "(m + m_b) g_sim / 4 unless set"),
+        }  # fmt: skip
+
+    def _work_returned(self, runs: Runs, note: str) -> dict[str, Any]:
+        """Mean share of the work put in that driven runs give back; spread between seeds over the speeds they share."""
+        shares = {
+            unit: runs[unit.id].work_out / runs[unit.id].work_in
+            for unit in self.units
+            if unit.kind == "driven" and runs[unit.id].work_in > 0
+        }
+        shared = self.shared_conditions()
+        by_seed = [
+            _mean([share for unit, share in shares.items() if unit.seed == seed and unit.condition in shared])
+            for seed in self.seeds
+        ]
+        return _quantity(_mean(list(shares.values())), spread(by_seed), "1", note)
+
+    def run_entries(self, notes: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
+        """The entry "runs": one per run, the model's numbers under model_*; `notes` are what was kept of each."""
+        entries = []
+        for unit in self.units:
+            bed, model = self.beds[unit.id], self.models[unit.id]
+            numbers = bed.quantities() | {f"model_{name}": value for name, value in model.quantities().items()}
+            entries.append(
+                {
+                    "id": unit.id,
+                    "kind": unit.kind,
+                    "seed": unit.seed,
+                    "speed": unit.speed,
+                    "series": f"series/{unit.id}.csv",
+                    "model_series": f"series/{unit.id}.model.csv",
+                    "ended": bed.ended,
+                    "max_overlap": notes.get(unit.id, {}).get("max_overlap"),
+                    "quantities": numbers,
+                }
+            )
+        return entries
+
+    def fit_entries(self) -> list[dict[str, Any]]:
+        """The entry "fits": each seed by itself, on the runs that all seeds have."""
+        entries = []
+        for seed, fit in self.seed_fits.items():
+            entries.append(
+                {
+                    "seed": seed,
+                    "stiffness": fit.stiffness,
+                    "damping": fit.damping,
+                    "stiffness_std": fit.stiffness_error,
+                    "damping_std": fit.damping_error,
+                    "drag_gap": drag_gap(self.of("driven", seed), fit),
+                    "runs": list(fit.runs),
+                }
+            )
+        return entries
+
+    def departures(self) -> dict[str, Any]:
+        """The entry "departures"."""
+        sunk = _mean([run.final_depth for run in self.of("set_down")])
+        law = _mean([self.models[unit.id].final_depth for unit in self.units if unit.kind == "set_down"])
+        pair = (sunk, law) if sunk and law is not None else None
+        return departures(self.of("driven"), self.models, self.beds, self.fit, sinkage=pair)
+
+    def warnings(self) -> list[str]:
+        """What a reader has to know: runs that did not end as they should, a law that came out at its bound."""
+        said = []
+        for unit in self.units:
+            ended = self.beds[unit.id].ended
+            if ended == "max_time":
+                said.append(f"{unit.title} had not come to rest when its time was over: its depth at rest is a bound")
+            elif ended == "max_depth":
+                said.append(f"{unit.title} went within one tip's diameter of the floor and was ended there")
+        if self.fit.damping == 0:
+            said.append("the damping fitted is 0, its bound: the bed shows no drag that grows with speed in these runs")
+        if self.fit.stiffness == 0:
+            said.append("the stiffness fitted is 0, its bound: the law has no resting sinkage")
+        return said
+
+
+def model_run(settings: PenetrateSettings, unit: Unit, bed: Penetration, fit: Fit, time_step: float) -> Penetration:
+    """The run of `unit` on the fitted spring-damper: same start, same steps; a drop lasts as long as in the bed."""
+    ground = SpringDamper(stiffness=fit.stiffness, damping=fit.damping, time_step=time_step)
+    long = float(bed.time[-1]) + 0.5 * bed.macro_step if len(bed.time) else settings.drop_time
+    start = bed.settings.get("start_depth")
+    return make_run(settings, unit, ground, start_depth=start, drop_time=max(long, bed.macro_step)).run()
+
+
+def bed_entry(facts: Sequence[Mapping[str, Any]], settings: PenetrateSettings, softening: Softening) -> dict[str, Any]:
+    """The entry "bed": what was prepared, seed by seed, and how soft it was made."""
+    return {
+        "material": settings.material,
+        "size": list(settings.bed_size),
+        "grain": settings.grain,
+        "spread": settings.spread,
+        "gravity": settings.gravity,
+        "softening": asdict(softening) | {"factor": softening.factor},
+        "seeds": [dict(entry) for entry in facts],
+    }
+
+
+def bed_quantities(facts: Sequence[Mapping[str, Any]], overlap: float | None) -> dict[str, dict[str, Any]]:
+    """Numbers of the beds, means over seeds; counts and settings that are exact get the std 0."""
+    found: dict[str, dict[str, Any]] = {}
+    for name, unit, note in (
+        ("grain_count", "1", ""),
+        ("packing_fraction", "1", "bulk, before the first run"),
+        ("coordination_number", "1", "before the first run"),
+        ("surface", "m", "height of the undisturbed surface above the floor"),
+        ("young", "Pa", "of the softened grains"),
+        ("time_step", "s", "of the grains"),
+    ):
+        values = [float(entry[name]) for entry in facts if entry.get(name) is not None]
+        if values:
+            exact = all(value == values[0] for value in values)
+            mean = values[0] if exact else float(np.mean(values))
+            found[name] = _quantity(mean, 0.0 if exact and name not in _MEASURED else spread(values), unit, note)
+    if overlap is not None:
+        found["max_overlap"] = _quantity(overlap, None, "1", "largest overlap of grains in any run, of a diameter")
+    return found
+
+
+_MEASURED = ("packing_fraction", "coordination_number", "surface")
+
+
+def compare_with(
+    reference: str | Path, quantities: Mapping[str, Mapping[str, Any]]
+) -> tuple[dict[str, Any], list[str]]:
+    """How far the numbers moved from those of another result.json: entries for "reference", and sentences.
+
+    Raises ValueError where the file is no result.
+    """
+    path = Path(reference)
+    try:
+        other = json.loads(path.read_text(encoding="utf-8"))
+        before = {name: other["quantities"][name]["value"] for name in COMPARED if name in other["quantities"]}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"reference = {str(reference)!r} is no result.json that can be read: {error}") from None
+    moved: dict[str, Any] = {}
+    said = []
+    for name, old in before.items():
+        new = quantities.get(name, {}).get("value")
+        if old is None or new is None:
+            continue
+        change = new / old - 1 if old else None
+        moved[name] = {"before": old, "now": new, "change": change, "unit": quantities[name]["unit"]}
+        percent = f" ({100 * change:+.1f} %)" if change is not None else ""
+        unit = "" if quantities[name]["unit"] == "1" else f" {quantities[name]['unit']}"
+        said.append(f"{name} moves from {old:.4g} to {new:.4g}{unit}{percent}.")
+    return moved, said
+
+
+def _quantity(value: float | None, std: float | None, unit: str, note: str = "") -> dict[str, Any]:
+    entry: dict[str, Any] = {"value": value, "std": std, "unit": unit}
+    return entry | {"note": note} if note else entry
+
+
+def _mean(values: Sequence[float]) -> float | None:
+    return float(np.mean(values)) if values else None

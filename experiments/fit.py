@@ -1,0 +1,109 @@
+"""Fits the spring-damper to runs in a bed: F = K z + C max(0, dz/dt) for z > 0, with K and C not below zero.
+
+Least squares on the measured force at the measured depth and speed. Driven runs count on their way in, drops up to
+their first stop; set-downs, rests and pull-outs do not count. Inside a run every macro step weighs the same (equal
+times, which at constant speed is equal depths), and every run weighs the same whatever its length:
+    minimise  sum over runs of  mean over its rows of  (F - K z - C max(0, dz/dt))^2.
+Standard errors come from leaving out one run at a time (jackknife): var = (n - 1)/n sum (theta_i - mean theta)^2. Rows
+of one run are far from independent, so that the scatter of rows would claim much too small an error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupling import Penetration
+
+__all__ = ["Fit", "drag_gap", "fit_rows", "fit_spring_damper", "spread"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted spring-damper."""
+
+    stiffness: float
+    """K [N/m]."""
+    damping: float
+    """C [N s/m]."""
+    stiffness_error: float | None
+    """Standard error of K by jackknife over runs [N/m]; None below three runs."""
+    damping_error: float | None
+    """Standard error of C by jackknife over runs [N s/m]; None below three runs."""
+    runs: tuple[str, ...]
+    """Ids of the runs that counted."""
+
+    def force(self, depth: Array, velocity: Array) -> Array:
+        """The law [N] at `depth` [m] and `velocity` [m/s], one shape."""
+        return np.where(depth > 0, self.stiffness * depth + self.damping * np.maximum(velocity, 0.0), 0.0)
+
+
+def fit_rows(run: Penetration) -> NDArray[np.bool_]:
+    """Rows of a run that are fitted, shape [n]: the first way in; none of a set-down."""
+    if run.kind == "set_down":
+        return np.zeros(len(run.time), dtype=bool)
+    return run.way_in & (run.depth > 0)
+
+
+def fit_spring_damper(runs: Mapping[str, Penetration]) -> Fit:
+    """Fit K and C to `runs` (id -> run). Raises ValueError where no run has a way in."""
+    parts = {name: _normal(run) for name, run in runs.items() if fit_rows(run).any()}
+    if not parts:
+        raise ValueError("no driven run and no drop to fit the spring-damper to")
+    matrix = sum((part[0] for part in parts.values()), np.zeros((2, 2)))
+    right = sum((part[1] for part in parts.values()), np.zeros(2))
+    stiffness, damping = _solve(matrix, right)
+    errors: tuple[float | None, float | None] = (None, None)
+    if len(parts) >= 3:
+        left_out = np.array([_solve(matrix - part[0], right - part[1]) for part in parts.values()])
+        count = len(parts)
+        variance = (count - 1) / count * ((left_out - left_out.mean(axis=0)) ** 2).sum(axis=0)
+        errors = (float(np.sqrt(variance[0])), float(np.sqrt(variance[1])))
+    return Fit(stiffness, damping, *errors, tuple(parts))
+
+
+def drag_gap(runs: Sequence[Penetration], fit: Fit) -> float | None:
+    """Rms difference of law and bed over the rms drag of the bed, way in of driven runs, every run of equal weight [1].
+
+    None where there is no driven run.
+    """
+    square, drag = 0.0, 0.0
+    for run in runs:
+        rows = fit_rows(run)
+        if run.kind != "driven" or not rows.any():
+            continue
+        square += float(np.mean((fit.force(run.depth[rows], run.velocity[rows]) - run.force[rows]) ** 2))
+        drag += float(np.mean(run.force[rows] ** 2))
+    return float(np.sqrt(square / drag)) if drag > 0 else None
+
+
+def spread(values: Sequence[float | None]) -> float | None:
+    """Standard deviation between seeds (n - 1); None with fewer than two."""
+    known = [value for value in values if value is not None]
+    return float(np.std(known, ddof=1)) if len(known) >= 2 else None
+
+
+def _normal(run: Penetration) -> tuple[Array, Array]:
+    """The normal equations of one run: matrix (2, 2) and right side (2,), means over its rows."""
+    rows = fit_rows(run)
+    columns = np.stack([run.depth[rows], np.maximum(run.velocity[rows], 0.0)])
+    return columns @ columns.T / rows.sum(), columns @ run.force[rows] / rows.sum()
+
+
+def _solve(matrix: Array, right: Array) -> tuple[float, float]:
+    """Least squares of the two columns with both coefficients >= 0: the best of the free and the two edge solutions."""
+    # Conditioned on columns of unit size: depths are mm where speeds are dm/s.
+    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    scaled, aim = matrix / np.outer(size, size), right / size
+    edges = [np.array([max(0.0, aim[0]), 0.0]), np.array([0.0, max(0.0, aim[1])])]
+    if np.linalg.cond(scaled) < 1e12:
+        free = np.linalg.solve(scaled, aim)
+        if (free >= 0).all():
+            edges.append(free)
+    best = min(edges, key=lambda x: float(x @ scaled @ x - 2 * x @ aim))
+    return float(best[0] / size[0]), float(best[1] / size[1])

@@ -1,0 +1,422 @@
+"""The main experiment: a spike driven into, dropped on and set down on beds of grains, beside the spring-damper.
+
+For each seed a bed is prepared (or taken from the cache), and every run starts from that same bed. A finished run is
+kept in the folder and never computed again; a run under way is kept every `checkpoint_interval`, the bed with its
+contacts included, so that a run that was stopped or killed goes on to the same bits. Then the spring-damper is fitted,
+the same runs are made on it, and the two are compared.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from coupling import BedGround, Penetration, Run
+from hedgebed import __version__
+
+from .findings import Findings, bed_entry, bed_quantities, compare_with
+from .progress import Progress
+from .runfolder import RunFolder
+from .settings import PenetrateSettings, expected_grain_count
+from .softening import Softening, bearing_gradient, contact_time, drop_depth, soften
+from .units import Unit, deepest, expected_time, make_run, make_spike, plan_units, shown_units
+
+__all__ = ["check", "choose_softness", "resume", "run"]
+
+BYTES_PER_GRAIN = 4000
+"""Memory of one grain with its lists and contact history, float64, measured generously [bytes]."""
+PREPARATION = 1.5
+"""What the preparation of a bed costs, in seconds of the bed's clock; from the cache next to nothing."""
+
+
+def run(settings: PenetrateSettings, folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
+    """Carry the experiment out into `folder` and return the result, as result.json has it.
+
+    Takes up what the folder already holds of the same settings. Raises ValueError for settings that will not do,
+    before any work; RuntimeError (the bed's) where a run cannot go on, its state saved in checkpoint/.
+    """
+    check(settings)
+    return _carry_out(settings, RunFolder.ensure(Path(folder), "penetrate", settings), progress or Progress())
+
+
+def resume(folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
+    """Finish the run in `folder`. Raises ValueError where there is none; otherwise as `run`."""
+    kept = RunFolder.open(Path(folder))
+    return _carry_out(PenetrateSettings(**kept.settings), kept, progress or Progress())
+
+
+def check(settings: PenetrateSettings) -> None:
+    """Raise ValueError, naming key, value and what would do, for what this machine or the material cannot serve."""
+    find_material(settings.material)
+    for seeds, speeds in ((settings.seeds[:1], settings.speeds), (settings.seeds[1:], settings.other_speeds)):
+        if seeds and not speeds:
+            raise ValueError("other_speeds is empty: at least one speed would do, so that every seed has a fit")
+    count = expected_grain_count(settings.bed_size, settings.grain, settings.spread)
+    need, there = count * BYTES_PER_GRAIN, _memory_there()
+    if need > 0.8 * there:
+        least = settings.grain * (need / (0.8 * there)) ** (1 / 3)
+        raise ValueError(
+            f"grain = {settings.grain:g} m makes about {count:.3g} grains, which take {need / 1e9:.3g} GB where "
+            f"{there / 1e9:.3g} GB are free: grains of {least:.2g} m or a smaller bed_size would do"
+        )
+    if settings.time_step is None:
+        found = settings.crossing(_expected_step(settings))
+        if found:
+            raise ValueError(found)
+    if settings.reference is not None:
+        compare_with(settings.reference, {})
+
+
+def choose_softness(settings: PenetrateSettings) -> Softening:
+    """The modulus of the grains for these runs (see `experiments.softening`), or the one that is set."""
+    material = find_material(settings.material)
+    bulk = 0.6 * material.density
+    area = math.pi * settings.tip_diameter**2 / 4
+    stiffness = bearing_gradient(bulk, settings.gravity, material.friction) * area
+    drops = [
+        drop_depth(speed, settings.moving_mass, settings.weight, stiffness)
+        for speed in (*settings.drop_speeds, *settings.other_drop_speeds)
+    ]
+    chosen = soften(
+        max_overlap=settings.max_overlap,
+        grain=settings.grain,
+        density=material.density,
+        poisson=material.poisson,
+        friction=material.friction,
+        real_young=material.young,
+        gravity=settings.gravity,
+        bed_height=settings.bed_size[2],
+        depth=min(deepest(settings), max(settings.depth, *drops) if drops else settings.depth),
+        speed=max(*settings.speeds, *settings.other_speeds, *settings.drop_speeds, settings.lowering_speed),
+        pressure=settings.weight / area,
+    )
+    if settings.young is None:
+        return chosen
+    return Softening(settings.young, chosen.pressure, chosen.speed, material.young)
+
+
+# What the bed's room offers; tests put a stand-in here ---------------------------------------------------------------
+
+
+def find_material(name: str) -> Any:
+    """The grain material called `name`. Raises ValueError naming those there are."""
+    from dem import materials
+
+    known = {key.lower(): value for key, value in vars(materials).items() if isinstance(value, materials.Material)}
+    if name.lower() not in known:
+        raise ValueError(f"material = {name!r} is no grain material: there is {', '.join(sorted(known))}")
+    return known[name.lower()]
+
+
+def prepare_bed(settings: PenetrateSettings, seed: int, young: float, progress: Progress) -> Any:
+    """The bed of one seed, prepared or from the cache."""
+    from dem import Bed
+
+    return Bed.prepare(
+        find_material(settings.material),
+        size=settings.bed_size,
+        grain=settings.grain,
+        spread=settings.spread,
+        packing=settings.packing,
+        gravity=settings.gravity,
+        seed=seed,
+        young=young,
+        time_step=settings.time_step,
+        precision=settings.precision,
+        arch=settings.arch,
+        threads=settings.threads,
+        cache=settings.cache,
+        progress=progress,
+    )
+
+
+def write_report(folder: Path) -> None:
+    """Pictures, plots and report.html of a run folder."""
+    from vis.report import write_report as write
+
+    write(folder)
+
+
+# Carrying it out ------------------------------------------------------------------------------------------------------
+
+
+def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
+    softening = choose_softness(settings)
+    units = plan_units(settings)
+    with folder.lock():
+        progress.message(
+            f"grains softened {softening.factor:.3g} times, to E = {softening.young:.3g} Pa, for overlaps of at most "
+            f"{100 * settings.max_overlap:.3g} % at {softening.pressure:.3g} Pa and {softening.speed:g} m/s; the load "
+            f"is {settings.weight:.4g} N, a dropped spike moves {settings.moving_mass:.4g} kg"
+        )
+        _plan(settings, units, folder, progress)
+        for seed in settings.seeds:
+            _run_seed(settings, seed, [unit for unit in units if unit.seed == seed], softening, folder, progress)
+        result = _conclude(settings, units, softening, folder, progress)
+        folder.write_result(result)
+        progress.stage("report")
+        write_report(folder.path)
+    return result
+
+
+def _plan(settings: PenetrateSettings, units: list[Unit], folder: RunFolder, progress: Progress) -> None:
+    """Tell the progress what is to come, in seconds of the bed's clock."""
+    stiffness = _expected_stiffness(settings)
+    costs: dict[str, float] = {}
+    for seed in settings.seeds:
+        todo = [unit for unit in units if unit.seed == seed and not folder.is_done(unit.id)]
+        if todo:
+            costs[_bed_stage(seed)] = PREPARATION
+        costs |= {unit.title: expected_time(settings, unit, stiffness) for unit in todo}
+    progress.plan(costs | {"spring-damper": 0.05, "report": 0.5})
+
+
+def _run_seed(
+    settings: PenetrateSettings,
+    seed: int,
+    units: list[Unit],
+    softening: Softening,
+    folder: RunFolder,
+    progress: Progress,
+) -> None:
+    """All runs of one seed that are not finished yet, each from the same bed."""
+    todo = [unit for unit in units if not folder.is_done(unit.id)]
+    if not todo and folder.is_done(f"bed-{seed}"):
+        return
+    progress.stage(_bed_stage(seed))
+    bed = prepare_bed(settings, seed, softening.young, progress)
+    facts = _bed_facts(bed, seed, softening)
+    ground = BedGround(bed, make_spike(settings))
+    start = ground.state()
+    folder.mark_done(f"bed-{seed}", facts)
+    progress.message(
+        f"seed {seed}: {facts['grain_count']} grains, packing {facts['packing_fraction']:.4f}, "
+        f"step {facts['time_step']:.3g} s"
+    )
+    for unit in todo:
+        ground.restore(start)
+        bed.max_overlap = 0.0
+        _run_unit(settings, unit, ground, folder, progress, shown=unit.id in shown_units(plan_units(settings)))
+
+
+def _run_unit(
+    settings: PenetrateSettings, unit: Unit, ground: BedGround, folder: RunFolder, progress: Progress, *, shown: bool
+) -> None:
+    """One run to its end, from its checkpoint where there is one."""
+    bed = ground.bed
+    stepper = make_run(settings, unit, ground)
+    kept = folder.load_checkpoint(unit.id)
+    if kept is not None:
+        bed.max_overlap = float(kept.pop("unit.max_overlap"))
+        overlap = bed.max_overlap
+        stepper.restore(kept)
+        bed.max_overlap = overlap
+        progress.message(f"{unit.title}: goes on at {stepper.time:.4g} s")
+    frames = _Frames(settings, unit, stepper, folder, resumed=kept is not None) if shown else None
+    progress.stage(unit.title, total=1.0)
+    saved = time.monotonic()
+
+    def keep(name: str) -> None:
+        folder.save_checkpoint(name, stepper.state() | {"unit.max_overlap": np.array(float(bed.max_overlap))})
+
+    def on_step(stepper: Run) -> None:
+        nonlocal saved
+        progress.update(stepper.fraction)
+        if time.monotonic() - saved >= settings.checkpoint_interval and not stepper.done:
+            keep(unit.id)
+            saved = time.monotonic()
+
+    try:
+        series = stepper.run(
+            on_step=on_step,
+            on_frame=frames.write if frames else None,
+            frame_interval=frames.interval if frames else None,
+        )
+    except RuntimeError:  # the bed's: a NaN, a grain lost, an overlap past its bound
+        keep(f"{unit.id}.failed")
+        raise
+    write_run(folder, unit.id, series)
+    folder.mark_done(
+        unit.id,
+        {
+            "kind": series.kind,
+            "macro_step": series.macro_step,
+            "ended": series.ended,
+            "settings": series.settings,
+            "max_overlap": float(bed.max_overlap),
+        },
+    )
+    folder.drop_checkpoint(unit.id)
+
+
+class _Frames:
+    """Writes the frames of one run."""
+
+    def __init__(
+        self, settings: PenetrateSettings, unit: Unit, stepper: Run, folder: RunFolder, *, resumed: bool
+    ) -> None:
+        from vis.frames import FrameWriter
+        from vis.meshes import spike_mesh
+
+        wanted = expected_time(settings, unit, _expected_stiffness(settings)) / max(1, settings.frame_count)
+        self.interval = max(wanted, stepper.macro_step) if settings.frame_count else None
+        self.limit = 2 * settings.frame_count
+        if resumed:
+            self.writer = FrameWriter(folder.path, name=unit.id, resume=True, keep_until=stepper.time)
+        else:
+            self.writer = FrameWriter(folder.path, name=unit.id)
+        spike = stepper.spike
+        self.points, self.triangles = spike_mesh(
+            spike.tip,
+            diameter=spike.diameter,
+            length=spike.length,
+            shaft_diameter=spike.shaft,
+            cone_angle=spike.cone_angle,
+        )
+
+    def write(self, stepper: Run) -> None:
+        """One frame of what the stepper is doing now."""
+        if len(self.writer.times) >= self.limit:
+            return
+        ground = stepper.ground
+        assert isinstance(ground, BedGround)
+        force = stepper.last_force
+        self.writer.write(
+            stepper.time,
+            ground.bed.grains(),
+            {"spike": (self.points + np.array(stepper.position), self.triangles)},
+            values={"depth": stepper.depth, "velocity": stepper.velocity, "force": force},
+        )
+
+
+def _conclude(
+    settings: PenetrateSettings, units: list[Unit], softening: Softening, folder: RunFolder, progress: Progress
+) -> dict[str, Any]:
+    """Fit, make the same runs on the law, compare; write the law's series; return the result."""
+    progress.stage("spring-damper", total=1.0)
+    notes = {unit.id: folder.done_data(unit.id) for unit in units}
+    beds = {unit.id: read_run(folder, unit.id, notes[unit.id]) for unit in units}
+    facts = [folder.done_data(f"bed-{seed}") for seed in settings.seeds]
+    findings = Findings(settings, units, beds, facts[0]["time_step"])
+    for name, series in findings.models.items():
+        write_run(folder, f"{name}.model", series)
+    overlaps = [note["max_overlap"] for note in notes.values() if note.get("max_overlap") is not None]
+    overlap = max(overlaps, default=None)
+    quantities = findings.quantities() | bed_quantities(facts, overlap)
+    warnings = findings.warnings()
+    if overlap is not None and overlap > settings.max_overlap:
+        warnings.append(
+            f"grains overlapped by up to {100 * overlap:.3g} % of a diameter, more than max_overlap = "
+            f"{100 * settings.max_overlap:.3g} %: a larger young would do"
+        )
+    if len(settings.seeds) < 3:
+        warnings.append("fewer than three seeds: the spread between beds is not known well")
+    departures = findings.departures()
+    result: dict[str, Any] = {
+        "format": "hedgebed-result/1",
+        "experiment": "penetrate",
+        "version": __version__,
+        "title": f"A {1e3 * settings.tip_diameter:g} mm spike in {settings.material}",
+        "status": "done",
+        "quantities": quantities,
+        "runs": findings.run_entries(notes),
+        "fits": findings.fit_entries(),
+        "departures": departures,
+        "bed": bed_entry(facts, settings, softening),
+        "spike": asdict(make_spike(settings)) | {"load": settings.weight},
+        "warnings": warnings,
+    }
+    if settings.reference is not None:
+        moved, said = compare_with(settings.reference, quantities)
+        result["reference"] = {"file": settings.reference, "moved": moved}
+        departures["sentences"] = [*departures["sentences"], *(f"Against the reference, {text}" for text in said)]
+    return result
+
+
+# Series of finished runs ----------------------------------------------------------------------------------------------
+
+
+def write_run(folder: RunFolder, name: str, series: Penetration) -> None:
+    """Keep a run's rows in series/<name>.csv."""
+    folder.write_series(
+        name,
+        {
+            "t_s": series.time,
+            "depth_m": series.depth,
+            "velocity_m_s": series.velocity,
+            "force_N": series.force,
+            "phase": series.phase,
+        },
+    )
+
+
+def read_run(folder: RunFolder, name: str, note: Mapping[str, Any]) -> Penetration:
+    """A finished run, from its rows and from what was noted of it, to the bit."""
+    columns = folder.read_series(name)
+    return Penetration(
+        kind=note["kind"],
+        time=columns["t_s"],
+        depth=columns["depth_m"],
+        velocity=columns["velocity_m_s"],
+        force=columns["force_N"],
+        phase=columns["phase"],
+        macro_step=note["macro_step"],
+        ended=note["ended"],
+        settings=dict(note["settings"]),
+    )
+
+
+def _bed_facts(bed: Any, seed: int, softening: Softening) -> dict[str, Any]:
+    """What the result says of one bed, taken before the first run."""
+    return {
+        "seed": seed,
+        "grain_count": int(bed.grain_count),
+        "packing_fraction": float(bed.packing_fraction),
+        "coordination_number": float(bed.coordination_number),
+        "surface": float(bed.surface),
+        "young": float(softening.young),
+        "time_step": float(bed.time_step),
+    }
+
+
+def _bed_stage(seed: int) -> str:
+    return f"bed of seed {seed}"
+
+
+def _expected_stiffness(settings: PenetrateSettings) -> float:
+    """A guess at the bed's stiffness under the tip [N/m], for progress and frames."""
+    material = find_material(settings.material)
+    area = math.pi * settings.tip_diameter**2 / 4
+    return bearing_gradient(0.6 * material.density, settings.gravity, material.friction) * area
+
+
+def _expected_step(settings: PenetrateSettings) -> float:
+    """About the step that the bed will choose [s]: a twentieth of a collision's time."""
+    material = find_material(settings.material)
+    soft = choose_softness(settings)
+    return (
+        contact_time(
+            grain=settings.grain * (1 - settings.spread),
+            density=material.density,
+            poisson=material.poisson,
+            young=soft.young,
+            speed=soft.speed,
+        )
+        / 20
+    )
+
+
+def _memory_there() -> float:
+    """Memory that is free [bytes]."""
+    try:
+        with Path("/proc/meminfo").open(encoding="ascii") as lines:
+            return next(1024 * float(line.split()[1]) for line in lines if line.startswith("MemAvailable"))
+    except (OSError, StopIteration):
+        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))

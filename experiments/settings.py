@@ -1,0 +1,211 @@
+"""Settings of the experiments: every option of the command line, every key of a case file, the same names.
+
+SI units. What is wrong in a single value or between two of them is refused here, before any work; what needs to look at
+the machine or the grains' material is refused by the experiment's `check`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+__all__ = ["STANDARD_GRAVITY", "PenetrateSettings", "expected_grain_count"]
+
+STANDARD_GRAVITY = 9.80665
+"""Unit of `rig` [m/s2]."""
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+SeedNumber = Annotated[int, Field(ge=0, lt=2**31)]
+
+
+def expected_grain_count(bed_size: tuple[float, float, float], grain: float, spread: float) -> float:
+    """About how many grains fill the bed, at a packing fraction of 0.6; diameters uniform within 1 +- spread."""
+    return 0.6 * math.prod(bed_size) / (math.pi / 6 * grain**3 * (1 + spread**2))
+
+
+class PenetrateSettings(BaseModel):
+    """A spike driven into, dropped on and set down on a bed of grains, beside the spring-damper fitted to it."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    # The bed
+    material: str = Field("sand", description="Grain material, by name.")
+    bed_size: tuple[Positive, Positive, Positive] = Field(
+        (0.072, 0.072, 0.05), description="Bed: both widths (periodic) and depth of grains [m]."
+    )
+    grain: Positive = Field(0.0024, description="Mean grain diameter [m].")
+    spread: float = Field(0.15, ge=0, le=0.5, description="Grain diameters are uniform within 1 +- this [1].")
+    packing: float | None = Field(
+        None, gt=0.5, lt=0.7, description="Packing fraction to prepare the bed to [1]; as it settles if not given."
+    )
+    gravity: Positive = Field(STANDARD_GRAVITY, description="Gravity of the grains [m/s2]; 1 g even in the rig.")
+    seeds: tuple[SeedNumber, ...] = Field((1, 2, 3), min_length=1, description="Seeds: one bed each.")
+
+    # The spike
+    tip: Literal["sphere", "cone", "flat"] = Field("sphere", description="Shape of the tip.")
+    tip_diameter: Positive = Field(0.012, description="Diameter of the tip [m].")
+    shaft_diameter: Positive | None = Field(None, description="Diameter of the shaft [m]; the tip's if not given.")
+    shaft_length: Positive = Field(0.06, description="Length of the shaft above the tip's widest point [m].")
+    cone_angle: float = Field(60.0, ge=1, lt=180, description="Full angle of a conical tip [degrees].")
+    spike_friction: NotNegative = Field(0.5, description="Friction coefficient of spike and grains [1].")
+    spike_restitution: float = Field(0.5, gt=0, le=1, description="Restitution of spike and grains [1].")
+
+    # What rests on it
+    platform_mass: Positive = Field(5.3, description="Mass of the platform [kg]; a spike carries a quarter.")
+    rig: NotNegative = Field(
+        0.0085, lt=1, description="Simulated gravity of the offloading rig [9.80665 m/s2]; 0: no rig, `gravity` rules."
+    )
+    load: Positive | None = Field(
+        None, description="Weight on the spike [N]; (m + m_b) g_sim / 4 of platform and counterweight if not given."
+    )
+    mass: Positive | None = Field(None, description="Mass that a dropped spike moves [kg]; (m + m_b) / 4 if not given.")
+
+    # What is done with it
+    speeds: tuple[Positive, ...] = Field((0.1, 0.2, 0.4), min_length=1, description="Speeds of driven runs [m/s].")
+    depth: Positive = Field(0.02, description="Depth of driven runs [m].")
+    hold: NotNegative = Field(0.02, description="How long a driven spike is held at depth [s].")
+    retreat_speed: Positive = Field(0.2, description="Speed of the pull-out [m/s].")
+    drop_speeds: tuple[Positive, ...] = Field(
+        (0.03, 0.06, 0.1), description="Speeds at the surface of dropped runs [m/s]."
+    )
+    drop_time: Positive = Field(1.5, description="A drop that has not come to rest ends after this [s].")
+    lowering_speed: Positive = Field(0.03, description="Speed at which a spike is lowered to be set down [m/s].")
+    rest_time: Positive = Field(0.04, description="For how long the signs of rest must hold [s].")
+    other_speeds: tuple[Positive, ...] = Field((0.2,), description="Speeds driven on the seeds after the first [m/s].")
+    other_drop_speeds: tuple[Positive, ...] = Field((0.06,), description="Drops on the seeds after the first [m/s].")
+
+    # How it is computed
+    max_overlap: float = Field(0.05, gt=0, le=0.1, description="Largest overlap of grains [of a diameter].")
+    young: Positive | None = Field(
+        None, description="Young's modulus of the grains [Pa]; softened to `max_overlap` if not given."
+    )
+    time_step: Positive | None = Field(None, description="Step of the grains [s]; from the contact time if not given.")
+    substeps: int = Field(10, ge=1, le=1000, description="Steps of the grains in one macro step of the spike [1].")
+    precision: Literal["float64", "float32"] = Field("float64", description="Arithmetic of the bed.")
+    arch: Literal["cpu", "cuda"] = Field("cpu", description="Where the bed is computed.")
+    threads: int | None = Field(None, ge=1, description="CPU threads; all there are if not given.")
+    allow_coarse: bool = Field(False, description="Take a tip of less than five grains across, for a quick look.")
+    cache: bool = Field(True, description="Keep prepared beds and use those kept.")
+
+    # What is kept
+    frame_count: int = Field(40, ge=0, le=2000, description="Frames of each shown run [1]; 0 for none.")
+    checkpoint_interval: Positive = Field(20.0, description="Time between checkpoints [s of waiting].")
+    reference: str | None = Field(
+        None, description="A result.json to compare stiffness, damping and sinkage with; none if not given."
+    )
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> PenetrateSettings:
+        for finding in (self._spike(), self._bed(), self._runs()):
+            if finding:
+                raise ValueError(finding)
+        return self
+
+    def _spike(self) -> str | None:
+        across = self.tip_diameter / self.grain
+        if across < 1:
+            return (
+                f"tip_diameter = {self.tip_diameter:g} m is thinner than the grains (grain = {self.grain:g} m): a tip "
+                f"of at least {5 * self.grain:g} m would do, or grains of at most {self.tip_diameter / 5:.3g} m"
+            )
+        if across < 4.999 and not self.allow_coarse:
+            return (
+                f"tip_diameter = {self.tip_diameter:g} m is only {across:.2g} grains across (grain = {self.grain:g} m):"
+                f" at least five are needed, so {5 * self.grain:g} m would do, or grains of {self.tip_diameter / 5:.3g}"
+                f" m, or allow_coarse for a quick look"
+            )
+        shaft = self.shaft_diameter
+        if shaft is not None and (shaft > self.tip_diameter or (self.tip == "flat" and shaft != self.tip_diameter)):
+            bound = "equal" if self.tip == "flat" else "be at most"
+            return f"shaft_diameter = {shaft:g} m must {bound} tip_diameter, {self.tip_diameter:g} m"
+        if shaft is not None and shaft < self.grain:
+            return (
+                f"shaft_diameter = {shaft:g} m is thinner than the grains (grain = {self.grain:g} m): at least "
+                f"{self.grain:g} m would do"
+            )
+        if self.tip_height + self.shaft_length <= self.depth:
+            return (
+                f"shaft_length = {self.shaft_length:g} m lets the whole spike sink below depth = {self.depth:g} m: "
+                f"more than {self.depth:g} m would do"
+            )
+        return None
+
+    def _bed(self) -> str | None:
+        width, height = min(self.bed_size[:2]), self.bed_size[2]
+        wide, deep = 4 * self.tip_diameter, self.depth + self.tip_diameter
+        if width < wide * (1 - 1e-9):
+            return (
+                f"bed_size = {_plain(self.bed_size)} m is too narrow for tip_diameter = {self.tip_diameter:g} m: at "
+                f"least four of them, {wide:.4g} m, would do both ways"
+            )
+        if height < deep * (1 - 1e-9):
+            return (
+                f"bed_size = {_plain(self.bed_size)} m is too shallow for depth = {self.depth:g} m: a third size of at "
+                f"least {deep:.4g} m would do, one tip below the deepest point"
+            )
+        if min(self.bed_size) < 5 * self.grain:
+            return (
+                f"bed_size = {_plain(self.bed_size)} m is less than five grains of grain = {self.grain:g} m: at least "
+                f"{5 * self.grain:.4g} m would do each way"
+            )
+        return None
+
+    def _runs(self) -> str | None:
+        for key in ("speeds", "drop_speeds", "other_speeds", "other_drop_speeds", "seeds"):
+            values = getattr(self, key)
+            if len(set(values)) < len(values):
+                return f"{key} = {_plain(values)} holds a value twice: each once would do"
+        if self.time_step is not None:
+            return self.crossing(self.time_step)
+        return None
+
+    def crossing(self, time_step: float) -> str | None:
+        """What is wrong where a speed is too great for a step of the grains [s]; None if nothing is."""
+        macro = self.substeps * time_step
+        limit = 0.5 * self.grain / macro
+        for key in ("speeds", "drop_speeds", "other_speeds", "other_drop_speeds", "retreat_speed", "lowering_speed"):
+            values = getattr(self, key)
+            for value in values if isinstance(values, tuple) else (values,):
+                if value > limit:
+                    return (
+                        f"{key} = {value:g} m/s takes the spike through {value * macro / self.grain:.2g} grains in one "
+                        f"step ({self.substeps} x {time_step:.3g} s): at most {limit:.3g} m/s would do"
+                    )
+        return None
+
+    @property
+    def tip_height(self) -> float:
+        """Height over which the tip widens to its full diameter [m]."""
+        if self.tip == "sphere":
+            return 0.5 * self.tip_diameter
+        if self.tip == "cone":
+            return 0.5 * self.tip_diameter / math.tan(math.radians(0.5 * self.cone_angle))
+        return 0.0
+
+    @property
+    def moving_mass(self) -> float:
+        """What a dropped spike moves [kg]: `mass`, or a quarter of platform and counterweight.
+
+        The counterweight that makes the pair fall at g_sim is m_b = m (g - g_sim) / (g + g_sim) (planar model, Atwood).
+        """
+        if self.mass is not None:
+            return self.mass
+        counterweight = self.platform_mass * (1 - self.rig) / (1 + self.rig) if self.rig else 0.0
+        return (self.platform_mass + counterweight) / 4
+
+    @property
+    def weight(self) -> float:
+        """What rests on the spike [N]: `load`, or (m + m_b) g_sim / 4."""
+        if self.load is not None:
+            return self.load
+        counterweight = self.platform_mass * (1 - self.rig) / (1 + self.rig) if self.rig else 0.0
+        simulated = self.rig * STANDARD_GRAVITY if self.rig else self.gravity
+        return (self.platform_mass + counterweight) * simulated / 4
+
+
+def _plain(values: tuple[float, ...]) -> str:
+    """The values as one would type them."""
+    return "[" + ", ".join(f"{value:g}" for value in values) + "]"

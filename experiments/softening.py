@@ -1,0 +1,100 @@
+"""How soft the grains may be: Young's modulus from the overlap that a run allows itself.
+
+The step of a DEM run goes with 1 / sqrt(E), so grains are made as soft as the largest overlap `max_overlap` (share of a
+grain's diameter) allows at the pressures and speeds of *this* run, and never stiffer than the real grains.
+
+1. Pressure under the tip, from 3D-RFT (Agarwal et al. 2023, arXiv 2205.14920), a flat plate going straight down:
+       p = 0.876 xi_n z + lambda rho_b v^2,   xi_n = rho_b g (894 mu^3 - 386 mu^2 + 89 mu), mu held to 0.3-0.9,
+   rho_b the bulk density, lambda = 1.1, plus the weight of the bed itself, rho_b g H, and at least load / area.
+2. Mean contact force from the stress of an assembly (Rothenburg), F = pi d^2 p / (Z phi), which is d^2 p within 5 % at
+   Z = 5, phi = 0.6. Forces in a loaded bed fall off exponentially from the mean, so that the largest of some hundred
+   loaded contacts is `CHAIN` = 6 times the mean (ln 400 = 6).
+3. Hertz between two grains, F = (2/3) E* d^2 (delta/d)^1.5, E* = E / (2 (1 - nu^2)), so
+       delta/d = (1.5 CHAIN p / E*)^(2/3).
+4. Apart from that, a grain of mass m hit by the spike at speed v, and a grain of the bed falling onto another at the
+   same speed: delta = (5 m v^2 / 4 k)^(2/5), k = (4/3) E* sqrt(R), E* = E / (1 - nu^2) against a rigid spike.
+
+The estimate is a choice made beforehand; the bed measures its largest overlap, and the result states it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+__all__ = ["CHAIN", "Softening", "bearing_gradient", "contact_time", "drop_depth", "soften"]
+
+CHAIN = 6.0
+"""Largest over mean contact force [1]."""
+INERTIA = 1.1
+"""lambda: dynamic pressure over rho v^2 [1] (Agarwal et al. 2023)."""
+
+
+@dataclass(frozen=True)
+class Softening:
+    """What was chosen and why."""
+
+    young: float
+    """Young's modulus of the softened grains [Pa]."""
+    pressure: float
+    """Largest pressure expected under the tip [Pa]."""
+    speed: float
+    """Largest speed of the spike [m/s]."""
+    real: float
+    """Young's modulus of the real grains [Pa]."""
+
+    @property
+    def factor(self) -> float:
+        """How many times softer than the real grains."""
+        return self.real / self.young
+
+
+def bearing_gradient(bulk_density: float, gravity: float, friction: float) -> float:
+    """Growth of the pressure under a flat plate going straight down [Pa/m] (3D-RFT, see the module)."""
+    mu = min(0.9, max(0.3, friction))
+    return 0.876 * bulk_density * gravity * (894 * mu**3 - 386 * mu**2 + 89 * mu)
+
+
+def drop_depth(speed: float, mass: float, load: float, stiffness: float) -> float:
+    """Where a drop stops on a spring: K z^2 / 2 - W z = m v^2 / 2 [m]."""
+    return (load + math.sqrt(load**2 + stiffness * mass * speed**2)) / stiffness
+
+
+def soften(
+    *,
+    max_overlap: float,
+    grain: float,
+    density: float,
+    poisson: float,
+    friction: float,
+    real_young: float,
+    gravity: float,
+    bed_height: float,
+    depth: float,
+    speed: float,
+    pressure: float = 0.0,
+    packing: float = 0.6,
+) -> Softening:
+    """Young's modulus that keeps overlaps below `max_overlap` (see the module). All SI; `grain` is the mean diameter.
+
+    `depth` is the deepest the tip goes, `speed` its fastest, `pressure` what the load alone presses with. Raises
+    ValueError for an overlap that is no share of a diameter.
+    """
+    if not 0 < max_overlap <= 0.2:
+        raise ValueError(f"max_overlap is {max_overlap}: it must be above 0 and at most 0.2 of a diameter")
+    bulk = packing * density
+    under_tip = bearing_gradient(bulk, gravity, friction) * depth + INERTIA * bulk * speed**2
+    highest = max(under_tip, pressure) + bulk * gravity * bed_height
+    pair = 1.5 * CHAIN * highest / max_overlap**1.5
+    static = 2 * (1 - poisson**2) * pair
+    mass = density * math.pi * grain**3 / 6
+    stiffness = 1.25 * mass * speed**2 / (max_overlap * grain) ** 2.5
+    impact = 0.75 * stiffness / math.sqrt(0.5 * grain) * (1 - poisson**2)
+    return Softening(min(real_young, max(static, impact)), highest, speed, real_young)
+
+
+def contact_time(*, grain: float, density: float, poisson: float, young: float, speed: float) -> float:
+    """How long two grains of diameter `grain` touch in a collision at `speed` [s]: Hertz, 2.943275 delta / v."""
+    mass = density * math.pi * grain**3 / 12  # of the pair
+    stiffness = 4 / 3 * young / (2 * (1 - poisson**2)) * math.sqrt(0.25 * grain)
+    return 2.943275 * (1.25 * mass * speed**2 / stiffness) ** 0.4 / speed

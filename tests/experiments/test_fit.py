@@ -1,0 +1,84 @@
+"""K and C come back from runs whose law is known; every run weighs the same; what is found is said."""
+
+import numpy as np
+import pytest
+from fake_bed import FakeBed
+
+from coupling import drive, drop
+from experiments.departures import departure_table, departures, depth_exponent
+from experiments.fit import Fit, drag_gap, fit_rows, fit_spring_damper, spread
+from rigid import Spike, SpringDamper
+
+SPIKE = Spike(diameter=0.012, length=0.05)
+
+
+def runs_on(make_ground, speeds=(0.1, 0.2, 0.4)):
+    driven = {f"d{v}": drive(SPIKE, into=make_ground(), speed=v, depth=0.01) for v in speeds}
+    return driven | {"drop": drop(SPIKE, into=make_ground(), speed=0.05, mass=2.0, load=0.2, max_time=0.6)}
+
+
+def test_an_exact_spring_damper_is_recovered():
+    fit = fit_spring_damper(runs_on(lambda: SpringDamper(stiffness=123.0, damping=1.5, time_step=2e-5)))
+    assert fit.stiffness == pytest.approx(123.0, rel=1e-9)
+    assert fit.damping == pytest.approx(1.5, rel=1e-9)
+    assert fit.stiffness_error == pytest.approx(0.0, abs=1e-6)
+    runs = runs_on(lambda: SpringDamper(stiffness=123.0, damping=1.5, time_step=2e-5))
+    assert drag_gap(list(runs.values()), fit) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_bed_with_a_memory_gives_its_way_in():
+    fit = fit_spring_damper(runs_on(lambda: FakeBed(hardness=90.0, rate=0.8, unload=6000.0)))
+    assert fit.stiffness == pytest.approx(90.0, rel=1e-9) and fit.damping == pytest.approx(0.8, rel=1e-9)
+
+
+def test_coefficients_stay_at_or_above_zero():
+    """A drag that falls with speed would want C < 0."""
+    fit = fit_spring_damper(runs_on(lambda: FakeBed(hardness=90.0, rate=-0.5)))
+    assert fit.damping == 0.0 and fit.stiffness > 0
+
+
+def test_every_run_weighs_the_same_whatever_its_length():
+    stiff = drive(SPIKE, into=SpringDamper(stiffness=200.0, time_step=2e-5), speed=0.4, depth=0.01)
+    soft = drive(SPIKE, into=SpringDamper(stiffness=100.0, time_step=2e-6), speed=0.4, depth=0.01)
+    assert len(soft.time) > 5 * len(stiff.time)
+    fit = fit_spring_damper({"stiff": stiff, "soft": soft})
+    assert fit.force(np.array([0.01]), np.array([0.4]))[0] == pytest.approx(1.5, rel=0.01)
+
+
+def test_pull_out_and_rest_are_not_fitted():
+    run = drive(SPIKE, into=FakeBed(), speed=0.1, depth=0.01, hold=0.01)
+    rows = fit_rows(run)
+    assert set(run.phase[rows]) == {"in"} and (run.depth[rows] > 0).all()
+    dropped = drop(SPIKE, into=SpringDamper(stiffness=100.0, time_step=1e-4), speed=0.1, mass=0.2, load=0.1, max_time=1)
+    rows = np.flatnonzero(fit_rows(dropped))
+    assert (np.diff(rows) == 1).all() and (dropped.velocity[rows] > 0).all()
+    assert dropped.velocity[rows[-1] + 1] < 0  # it bounces later, and goes in again: those rows do not count
+
+
+def test_no_run_to_fit_is_refused():
+    with pytest.raises(ValueError, match="no driven run"):
+        fit_spring_damper({})
+
+
+def test_spread_needs_two():
+    assert spread([1.0]) is None and spread([1.0, None]) is None
+    assert spread([1.0, 3.0]) == pytest.approx(np.sqrt(2))
+
+
+def test_departures_are_said_by_depth_and_speed():
+    """The bed grows with z^2, the law with z: too hard above, too soft below."""
+    driven = [drive(SPIKE, into=FakeBed(hardness=1e4, power=2.0), speed=v, depth=0.02) for v in (0.1, 0.4)]
+    fit = fit_spring_damper({str(i): run for i, run in enumerate(driven)})
+    table = departure_table(driven, fit)
+    assert len(table) == 8 and table[0]["gap"] > 0 > table[3]["gap"]
+    assert table[0]["depth_to"] == pytest.approx(0.005)
+    for value in depth_exponent(driven).values():
+        assert value == pytest.approx(2.0, abs=0.02)
+    law = SpringDamper(stiffness=fit.stiffness, damping=fit.damping, time_step=2e-5)
+    models = {"a": drive(SPIKE, into=law, speed=0.1, depth=0.02)}
+    found = departures(driven, models, {"a": driven[0]}, fit, sinkage=(0.002, 0.003))
+    text = " ".join(found["sentences"])
+    assert "Above 5 mm the spring-damper pushes" in text and "too hard at" in text and "too softly at" in text
+    assert "sinks 2.00 mm into the bed; the spring-damper says 3.00 mm, 50 % deeper" in text
+    assert found["work_returned"]["bed"] < 0.2 < found["work_returned"]["model"]
+    assert departure_table([], Fit(1.0, 0.0, None, None, ())) == []

@@ -1,0 +1,201 @@
+"""The main experiment end to end on a stand-in bed: result, restart to the bit, and what is refused before any work."""
+
+import itertools
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from fake_bed import FakeBed
+from pydantic import ValidationError
+
+from experiments import penetrate
+from experiments.settings import PenetrateSettings
+from experiments.units import plan_units, shown_units
+from vis.frames import frame_names, read_frames
+
+SAND = SimpleNamespace(name="sand", density=2650.0, young=7e10, poisson=0.25, friction=0.5)
+QUICK = {
+    "seeds": (1, 2, 3),
+    "speeds": (0.2, 0.4),
+    "other_speeds": (0.4,),
+    "drop_speeds": (0.1,),
+    "other_drop_speeds": (0.1,),
+    "drop_time": 0.5,
+    "depth": 0.01,
+    "frame_count": 3,
+    "mass": 0.3,
+    "load": 0.4,
+    "lowering_speed": 0.1,
+    "substeps": 20,
+}
+
+
+def hard(seed):
+    return 100.0 + 10.0 * seed
+
+
+@pytest.fixture
+def fake(monkeypatch):
+    made = []
+
+    def prepare(settings, seed, young, progress):
+        made.append(seed)
+        return FakeBed(size=settings.bed_size, seed=seed, hardness=hard(seed), rate=0.5, unload=4000.0)
+
+    monkeypatch.setattr(penetrate, "prepare_bed", prepare)
+    monkeypatch.setattr(penetrate, "find_material", lambda name: SAND)
+    monkeypatch.setattr(penetrate, "write_report", lambda folder: None)
+    return made
+
+
+def test_the_result_says_what_the_bed_is_and_how_wrong_the_law(fake, tmp_path):
+    folder = tmp_path / "run"
+    penetrate.run(PenetrateSettings(**QUICK), folder)
+    result = json.loads((folder / "result.json").read_text())
+    assert (result["format"], result["experiment"]) == ("hedgebed-result/1", "penetrate")
+    assert fake == [1, 2, 3]
+    numbers = result["quantities"]
+    for name, unit in {
+        "stiffness": "N/m", "damping": "N s/m", "sinkage_dem": "m", "sinkage_spring_damper": "m", "drag_gap": "1",
+        "grain_count": "1", "packing_fraction": "1", "young": "Pa", "time_step": "s",
+    }.items():  # fmt: skip
+        assert numbers[name]["unit"] == unit and numbers[name]["value"] is not None, name
+    # K of the three beds is known: 110, 120, 130 N/m, with a spread of 10; C is 0.5 N s/m in all
+    assert [fit["stiffness"] for fit in result["fits"]] == pytest.approx([110, 120, 130], rel=1e-6)
+    assert numbers["stiffness"]["std"] == pytest.approx(10.0, rel=1e-6)
+    assert 110 < numbers["stiffness"]["value"] < 130
+    assert numbers["damping"]["value"] == pytest.approx(0.5, abs=0.1)
+    sinkages = [0.4 / hard(seed) for seed in (1, 2, 3)]
+    assert numbers["sinkage_dem"]["value"] == pytest.approx(np.mean(sinkages), rel=0.01)
+    assert numbers["sinkage_dem"]["std"] == pytest.approx(np.std(sinkages, ddof=1), rel=0.05)
+    assert numbers["sinkage_spring_damper"]["value"] == pytest.approx(0.4 / numbers["stiffness"]["value"], rel=0.02)
+    assert numbers["grain_count"]["std"] == 0
+    assert 0 < numbers["drag_gap"]["value"] < 0.15
+    assert numbers["work_returned_dem"]["value"] < numbers["work_returned_spring_damper"]["value"]
+    kinds = {(run["kind"], run["seed"]) for run in result["runs"]}
+    assert len(kinds) == 9 and len(result["runs"]) == 10
+    for run in result["runs"]:
+        for key in ("series", "model_series"):
+            header = (folder / run[key]).read_text().splitlines()[0]
+            assert header == "t_s,depth_m,velocity_m_s,force_N,phase"
+        assert run["quantities"]["peak_force"]["value"] > 0 and "model_peak_force" in run["quantities"]
+    assert result["departures"]["table"] and result["departures"]["sentences"]
+    assert frame_names(folder) == ["seed1-driven-0.2", "seed1-drop-0.1", "seed1-set-down"]
+    assert 3 <= len(read_frames(folder, "seed1-driven-0.2")) <= 7
+
+
+def test_a_run_that_died_goes_on_to_the_same_bits(fake, tmp_path, monkeypatch):
+    settings = PenetrateSettings(**(QUICK | {"seeds": (1, 2), "checkpoint_interval": 30.0}))
+    clock = itertools.count()  # every look at the clock takes a second
+    monkeypatch.setattr(penetrate, "time", SimpleNamespace(monotonic=lambda: float(next(clock))))
+    whole = tmp_path / "whole"
+    penetrate.run(settings, whole)
+    broken = tmp_path / "broken"
+    advance = FakeBed.advance
+    calls = {"left": 700}
+
+    def fragile(self, steps):
+        calls["left"] -= 1
+        if calls["left"] == 0:
+            raise KeyboardInterrupt
+        advance(self, steps)
+
+    monkeypatch.setattr(FakeBed, "advance", fragile)
+    with pytest.raises(KeyboardInterrupt):
+        penetrate.run(settings, broken)
+    assert list((broken / "checkpoint").glob("*.npz")), "died inside a run"
+    finished = sorted(path.name for path in (broken / "series").glob("*.csv"))
+    assert finished and not (broken / "result.json").exists()
+    fake.clear()
+    penetrate.resume(broken)
+    names = sorted(
+        str(path.relative_to(whole)) for path in whole.rglob("*") if path.suffix in (".csv", ".json", ".vtu")
+    )
+    assert len(names) > 20
+    for name in names:
+        if name != "status.json":
+            assert (whole / name).read_bytes() == (broken / name).read_bytes(), name
+    fake.clear()
+    penetrate.resume(broken)  # nothing is left to do: no bed is prepared
+    assert fake == []
+
+
+def test_a_failing_bed_leaves_its_state(fake, tmp_path, monkeypatch):
+    def fail(self, steps):
+        raise RuntimeError("a grain was lost")
+
+    monkeypatch.setattr(FakeBed, "advance", fail)
+    with pytest.raises(RuntimeError, match="lost"):
+        penetrate.run(PenetrateSettings(**QUICK), tmp_path / "run")
+    assert list((tmp_path / "run" / "checkpoint").glob("*.failed.npz"))
+
+
+def test_compared_with_a_reference(fake, tmp_path):
+    reference = tmp_path / "before.json"
+    reference.write_text(json.dumps({"quantities": {"stiffness": {"value": 60.0, "std": 1.0, "unit": "N/m"}}}))
+    settings = PenetrateSettings(**(QUICK | {"seeds": (1,), "reference": str(reference), "frame_count": 0}))
+    result = penetrate.run(settings, tmp_path / "run")
+    assert result["reference"]["moved"]["stiffness"]["change"] == pytest.approx(110 / 60 - 1, rel=1e-6)
+    assert any("stiffness moves from 60 to 110" in text for text in result["departures"]["sentences"])
+    assert result["quantities"]["stiffness"]["std"] is None  # one seed tells nothing of the spread
+    assert frame_names(tmp_path / "run") == []
+
+
+def test_every_run_is_made_on_the_first_seed_fewer_on_the_others():
+    units = plan_units(PenetrateSettings())
+    assert len([unit for unit in units if unit.seed == 1]) == 7
+    assert len([unit for unit in units if unit.seed == 2]) == 3
+    assert shown_units(units) == {"seed1-driven-0.1", "seed1-drop-0.1", "seed1-set-down"}
+
+
+def test_load_and_mass_are_the_platforms_share():
+    """Planar model: m_b = m (g - g_sim) / (g + g_sim), W = (m + m_b) g_sim / 4; free: m g / 4."""
+    rig = PenetrateSettings()
+    counterweight = 5.3 * (1 - 0.0085) / (1 + 0.0085)
+    assert rig.moving_mass == pytest.approx((5.3 + counterweight) / 4)
+    assert rig.weight == pytest.approx((5.3 + counterweight) * 0.0085 * 9.80665 / 4)
+    free = PenetrateSettings(rig=0, gravity=1e-3)
+    assert (free.moving_mass, free.weight) == pytest.approx((5.3 / 4, 5.3e-3 / 4))
+    assert PenetrateSettings(load=1.0, mass=2.0).weight == 1.0
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"tip_diameter": 0.001}, r"tip_diameter = 0.001 m is thinner than the grains .* 0.012 m would do"),
+        ({"tip_diameter": 0.006}, "tip_diameter = 0.006 m is only 2.5 grains across"),
+        ({"bed_size": (0.072, 0.072, 0.025)}, r"bed_size = .* too shallow for depth = 0.02 m: .* 0.032 m would do"),
+        ({"bed_size": (0.03, 0.072, 0.05)}, r"bed_size = .* too narrow .* 0.048 m, would do"),
+        ({"shaft_diameter": 0.02}, "shaft_diameter = 0.02 m must be at most"),
+        ({"shaft_length": 0.005}, "shaft_length = 0.005 m lets the whole spike sink"),
+        ({"seeds": (1, 1)}, r"seeds = \[1, 1\] holds a value twice"),
+        ({"speeds": (1000.0,), "time_step": 2e-5}, r"speeds = 1000 m/s takes the spike .* at most 6 m/s would do"),
+        ({"grain": -0.001}, "grain"),
+        ({"max_overlap": 0.5}, "max_overlap"),
+        ({"seeds": ()}, "seeds"),
+        ({"depht": 0.01}, "depht"),
+    ],
+)
+def test_bad_settings_are_refused_by_name(given, words):
+    with pytest.raises(ValidationError, match=words):
+        PenetrateSettings(**given)
+
+
+def test_coarse_tips_can_be_asked_for():
+    assert PenetrateSettings(tip_diameter=0.006, allow_coarse=True).tip_diameter == 0.006
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"grain": 2e-5, "tip_diameter": 0.012}, r"grain = 2e-05 m makes about .* GB are free: grains of"),
+        ({"speeds": (3000.0,)}, r"speeds = 3000 m/s takes the spike through"),
+        ({"other_speeds": ()}, "other_speeds is empty"),
+        ({"reference": "nowhere.json"}, r"reference = 'nowhere.json' is no result.json"),
+    ],
+)
+def test_what_the_machine_cannot_do_is_refused_before_any_work(fake, tmp_path, given, words):
+    with pytest.raises(ValueError, match=words):
+        penetrate.run(PenetrateSettings(**given), tmp_path / "run")
+    assert not (tmp_path / "run").exists() and fake == []

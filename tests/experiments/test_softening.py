@@ -1,0 +1,48 @@
+"""The modulus goes with pressure and overlap as Hertz says, and never above the real grains'."""
+
+import math
+
+import pytest
+
+from experiments.softening import bearing_gradient, contact_time, drop_depth, soften
+
+SAND = {"grain": 0.0024, "density": 2650.0, "poisson": 0.25, "friction": 0.5, "real_young": 7e10, "gravity": 9.81,
+        "bed_height": 0.05, "depth": 0.02, "speed": 0.1}  # fmt: skip
+
+
+def test_bearing_of_a_plate_as_published():
+    """3D-RFT at mu = 0.5: 894/8 - 386/4 + 89/2 = 59.75 times rho g, and 0.876 of that for a flat plate."""
+    assert bearing_gradient(1600.0, 9.81, 0.5) == pytest.approx(0.876 * 59.75 * 1600 * 9.81)
+    assert bearing_gradient(1600.0, 9.81, 5.0) == bearing_gradient(1600.0, 9.81, 0.9)
+
+
+def test_overlap_to_the_power_of_minus_three_halves():
+    """delta/d = (1.5 CHAIN p / E*)^(2/3)."""
+    soft, stiff = (soften(max_overlap=overlap, **SAND).young for overlap in (0.05, 0.0125))
+    assert stiff / soft == pytest.approx(8.0)
+
+
+def test_fast_spikes_need_stiffer_grains_and_real_grains_are_the_bound():
+    assert soften(max_overlap=0.05, **(SAND | {"speed": 20.0})).young > 40 * soften(max_overlap=0.05, **SAND).young
+    assert soften(max_overlap=1e-4, **(SAND | {"speed": 1000.0})).young == 7e10
+    with pytest.raises(ValueError, match="max_overlap"):
+        soften(max_overlap=0.0, **SAND)
+
+
+def test_small_gravity_makes_soft_grains():
+    light = soften(max_overlap=0.05, **(SAND | {"gravity": 1e-4, "speed": 1e-3}))
+    assert light.young < 1e-3 * soften(max_overlap=0.05, **SAND).young
+    assert light.factor == pytest.approx(7e10 / light.young)
+
+
+def test_a_drop_stops_where_the_energies_meet():
+    depth = drop_depth(0.1, 2.6, 0.2, 100.0)
+    assert 0.5 * 100 * depth**2 - 0.2 * depth == pytest.approx(0.5 * 2.6 * 0.1**2)
+    assert drop_depth(0.0, 2.6, 0.2, 100.0) == pytest.approx(2 * 0.2 / 100)
+
+
+def test_contact_time_of_hertz():
+    """Chung & Ooi 2011, test 1, glass: two spheres of 10 mm radius at 10 m/s each, 40.34 us."""
+    found = contact_time(grain=0.02, density=2800.0, poisson=0.2, young=48e9, speed=20.0)
+    assert found == pytest.approx(40.34e-6, rel=1e-3)
+    assert math.isfinite(found)
