@@ -172,13 +172,13 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
     Only what was typed arrives in `given`, so that a case file can lie between the defaults and the command line.
     """
     settings_class = experiment.settings_class()
-    presets = dict(experiment.presets)
+    presets = experiment.presets
 
     def command(
         case: Path | None = None, *, out: Path | None = None, json: bool = False, quiet: bool = False, **given: Any
     ) -> int:
         with _refusing():
-            layers = [read_case(registry.CASES / presets[name]) for name in presets if given.pop(name, False)]
+            layers = [read_case(registry.CASES / preset.case) for preset in presets if given.pop(preset.option, False)]
             layers += [read_case(find_case(case, registry.CASES))] if case is not None else []
             settings = settings_from(settings_class, [*layers, Layer(None, given)])
             with _stdout_to_stderr():
@@ -192,12 +192,12 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
 
     flags = [
         inspect.Parameter(
-            name,
+            preset.option,
             inspect.Parameter.KEYWORD_ONLY,
             default=False,
-            annotation=Annotated[bool, Parameter(help=f"Start from the case {file}.", negative="", show_default=False)],
+            annotation=Annotated[bool, Parameter(help=preset.summary, negative="", show_default=False)],
         )
-        for name, file in experiment.presets
+        for preset in presets
     ]
     parameters = [_reserved("case")]
     parameters += [_option(name, field) for name, field in settings_class.model_fields.items()]

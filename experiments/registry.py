@@ -15,9 +15,18 @@ from typing import Any
 
 from pydantic import BaseModel
 
-__all__ = ["EXPERIMENTS", "Experiment", "find_experiment"]
+__all__ = ["EXPERIMENTS", "Experiment", "Preset", "find_experiment"]
 
 CASES = Path(__file__).parent / "cases"
+
+
+@dataclass(frozen=True)
+class Preset:
+    """A case that has an option of its own: ``--<option>`` lays it under the case file and the command line."""
+
+    option: str
+    case: str  # a file in experiments/cases
+    summary: str
 
 
 @dataclass(frozen=True)
@@ -28,7 +37,7 @@ class Experiment:
     summary: str
     settings: str  # "module:Class", a frozen pydantic model; every field with a description that gives the unit
     module: str
-    presets: tuple[tuple[str, str], ...] = ()  # (option, case file in experiments/cases): --option lays it underneath
+    presets: tuple[Preset, ...] = ()
 
     def settings_class(self) -> type[BaseModel]:
         """The settings class. Quick: it imports no Taichi."""
@@ -58,6 +67,13 @@ EXPERIMENTS: dict[str, Experiment] = {
             "How far a spike sinks into a bed, what the bed pushes back with, and how wrong the spring-damper is.",
             settings="experiments.settings:PenetrateSettings",
             module="experiments.penetrate",
+            presets=(
+                Preset(
+                    "full",
+                    "penetrate-full.toml",
+                    "Start from the fine case: overlaps of at most 1 %, ten grains across, slower, every seed; hours.",
+                ),
+            ),
         ),
     ]
 }

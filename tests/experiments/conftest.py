@@ -27,7 +27,7 @@ def dig(monkeypatch, tmp_path):
         "Digs a hole.",
         settings="dig_settings:DigSettings",
         module="dig_module",
-        presets=(("full", "deep.toml"),),
+        presets=(registry.Preset("full", "deep.toml", "Deeper."),),
     )
     monkeypatch.setattr(registry, "EXPERIMENTS", {"dig": experiment})
     (tmp_path / "cases").mkdir()

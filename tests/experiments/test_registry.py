@@ -30,8 +30,15 @@ def test_the_defaults_are_valid(experiment):
 
 @ALL
 def test_the_presets_ship_and_are_valid(experiment):
-    for _, file in experiment.presets:
-        settings_from(experiment.settings_class(), [read_case(registry.CASES / file)])
+    for preset in experiment.presets:
+        settings_from(experiment.settings_class(), [read_case(registry.CASES / preset.case)])
+
+
+@ALL
+def test_the_case_that_ships_is_what_one_gets_without_a_case(experiment):
+    settings_class = experiment.settings_class()
+    shipped = settings_from(settings_class, [read_case(registry.CASES / f"{experiment.name}.toml")])
+    assert shipped == settings_from(settings_class, [])
 
 
 def test_every_case_that_ships_is_of_some_experiment():
@@ -42,5 +49,5 @@ def test_every_case_that_ships_is_of_some_experiment():
 
 
 def test_an_experiment_there_is_not_is_refused_by_name():
-    with pytest.raises(ValueError, match="'dig'.*penetrate"):
+    with pytest.raises(ValueError, match=r"'dig'.*penetrate"):
         find_experiment("dig")
