@@ -53,6 +53,11 @@ class BedGround:
         """The bed's own step [s]."""
         return float(self.bed.time_step)
 
+    @property
+    def depth_limit(self) -> float:
+        """How deep the tip may go [m]: half its diameter above the floor."""
+        return self.surface - 0.5 * self.spike.diameter
+
     def step(self, position: ArrayLike, velocity: ArrayLike, dt: float) -> Reaction:
         """Advance the grains by `dt` [s], a whole number of the bed's steps, under the moving spike.
 

@@ -39,6 +39,10 @@ class Ground(Protocol):
     def clearance(self) -> float:
         """How far above `surface` the body it was made for touches nothing yet [m]; grains stick out of a bed."""
 
+    @property
+    def depth_limit(self) -> float:
+        """How deep the body it was made for may go [m]; infinite where there is no floor."""
+
     def step(self, position: ArrayLike, velocity: ArrayLike, dt: float) -> Reaction:
         """Advance by `dt` [s] under a body at `position` [m] (at the start) that moves at constant `velocity` [m/s].
 

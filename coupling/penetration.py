@@ -238,9 +238,15 @@ class Drive(Run):
             raise ValueError(f"hold is {hold}: it must be 0 or more (in s)")
         if not (math.isfinite(self.retreat_speed) and self.retreat_speed > 0):
             raise ValueError(f"retreat_speed is {retreat_speed}: it must be above 0 (in m/s)")
-        total = self.target / float(speed) + self.hold + (self.target / self.retreat_speed if retreat else 0.0)
+        total = (
+            self.target / max(float(speed), 1e-9) + self.hold + (self.target / self.retreat_speed if retreat else 0.0)
+        )
         super().__init__(spike, ground, speed=speed, max_time=max(2 * total, 1e-9), **common)
-        self._total, self._retreat = total, retreat
+        if self.target > self.ground.depth_limit:
+            raise ValueError(
+                f"depth is {depth}: this ground takes the spike down to {self.ground.depth_limit:.4g} m at most"
+            )
+        self._retreat = retreat
         reach = self.target / self.macro_step
         self._in = max(1, math.ceil(reach / self.speed - 1e-9))
         self._hold = round(self.hold / self.macro_step)
@@ -301,7 +307,8 @@ class Drop(Run):
                 raise ValueError(f"{key} is {value}: it must be above 0")
         super().__init__(spike, ground, speed=speed, **common)
         self.rest_time, self.rest_tolerance = float(rest_time), float(rest_tolerance)
-        self.max_depth = math.inf if max_depth is None else float(max_depth)
+        limit = self.ground.depth_limit
+        self.max_depth = limit if max_depth is None else min(limit, float(max_depth))
         self._force = 0.0
 
     def settings(self) -> dict[str, Any]:

@@ -94,7 +94,9 @@ class PenetrateSettings(BaseModel):
     frame_count: int = Field(40, ge=0, le=2000, description="Frames of each shown run [1]; 0 for none.")
     checkpoint_interval: Positive = Field(20.0, description="Time between checkpoints [s of waiting].")
     reference: str | None = Field(
-        None, description="A result.json to compare stiffness, damping and sinkage with; none if not given."
+        None,
+        description="A result.json to compare stiffness, damping and sinkage with, or 'shipped' for that of the case "
+        "that ships; none if not given.",
     )
 
     @model_validator(mode="after")

@@ -47,6 +47,11 @@ class SpringDamper:
         """How far above `surface` a body touches nothing [m]: the surface is flat, so 0."""
         return 0.0
 
+    @property
+    def depth_limit(self) -> float:
+        """How deep a body may go [m]: there is no floor."""
+        return math.inf
+
     def __post_init__(self) -> None:
         for key in ("stiffness", "damping", "mu_s"):
             value = getattr(self, key)

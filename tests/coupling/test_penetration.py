@@ -118,6 +118,11 @@ def test_a_run_taken_up_again_gives_the_same_bits(make, tmp_path):
     assert (whole.ended, frames) == (rest.ended, again)
 
 
+def test_a_bed_too_shallow_for_the_depth_is_refused():
+    with pytest.raises(ValueError, match=r"depth is 0.05: this ground takes the spike down to 0.039 m"):
+        drive(SPIKE, into=FakeBed(surface=0.045), speed=0.1, depth=0.05)
+
+
 def test_a_state_of_another_kind_is_refused():
     state = SetDown(SPIKE, FakeBed(), load=0.3).state()
     with pytest.raises(ValueError, match="set_down"):

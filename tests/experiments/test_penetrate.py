@@ -2,6 +2,8 @@
 
 import itertools
 import json
+import tomllib
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +12,7 @@ from fake_bed import FakeBed
 from pydantic import ValidationError
 
 from experiments import penetrate
-from experiments.settings import PenetrateSettings
+from experiments.settings import PenetrateSettings, expected_grain_count
 from experiments.units import plan_units, shown_units
 from vis.frames import frame_names, read_frames
 
@@ -140,6 +142,26 @@ def test_compared_with_a_reference(fake, tmp_path):
     assert any("stiffness moves from 60 to 110" in text for text in result["departures"]["sentences"])
     assert result["quantities"]["stiffness"]["std"] is None  # one seed tells nothing of the spread
     assert frame_names(tmp_path / "run") == []
+
+
+def test_the_shipped_result_is_not_everywhere(fake, tmp_path, monkeypatch):
+    monkeypatch.setattr(penetrate, "SHIPPED_RESULT", tmp_path / "none.json")
+    settings = PenetrateSettings(**(QUICK | {"seeds": (1,), "reference": "shipped", "frame_count": 0}))
+    result = penetrate.run(settings, tmp_path / "run")
+    assert any("nothing compared" in text for text in result["warnings"]) and "reference" not in result
+
+
+def test_the_shipped_cases_are_settings():
+    cases = Path(penetrate.__file__).parent / "cases"
+    short, full = (
+        PenetrateSettings(**tomllib.loads((cases / name).read_text()))
+        for name in ("penetrate.toml", "penetrate-full.toml")
+    )
+    assert short == PenetrateSettings()  # the defaults are the shipped case
+    assert expected_grain_count(short.bed_size, short.grain, short.spread) > 20000
+    assert short.tip_diameter / short.grain >= 4.999 and short.max_overlap <= 0.05 and min(short.speeds) >= 0.1
+    assert full.tip_diameter / full.grain >= 9.999 and full.max_overlap <= 0.01 and min(full.speeds) < 0.1
+    assert len(full.seeds) >= 3 and full.other_speeds == full.speeds and full.other_drop_speeds == full.drop_speeds
 
 
 def test_every_run_is_made_on_the_first_seed_fewer_on_the_others():
