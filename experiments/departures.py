@@ -145,7 +145,7 @@ def _by_depth(table: Sequence[Mapping[str, Any]]) -> list[str]:
         said.append(
             f"{where} the spring-damper pushes {_percent(worst['gap'])} too {_hard(worst['gap'])} at "
             f"{worst['speed']:g} m/s ({worst['model_force']:.3g} N against {worst['bed_force']:.3g} N); over all "
-            f"speeds the gap there is {100 * min(others):+.0f} to {100 * max(others):+.0f} %."
+            f"speeds the gap there is {_signed(min(others))} to {_signed(max(others))} %."
         )
     return said
 
@@ -164,8 +164,8 @@ def _by_rate(table: Sequence[Mapping[str, Any]]) -> list[str]:
             return []
         ratio[side] = after / before
     return [
-        f"From {speeds[0]:g} to {speeds[-1]:g} m/s the bed's drag changes by {100 * (ratio['bed_force'] - 1):+.0f} %, "
-        f"the spring-damper's by {100 * (ratio['model_force'] - 1):+.0f} %."
+        f"From {speeds[0]:g} to {speeds[-1]:g} m/s the bed's drag changes by {_signed(ratio['bed_force'] - 1)} %, "
+        f"the spring-damper's by {_signed(ratio['model_force'] - 1)} %."
     ]
 
 
@@ -183,6 +183,11 @@ def _returned(run: Penetration) -> float | None:
 def _percent(value: float) -> str:
     size = abs(100 * value)
     return f"{size:.0f} %" if size >= 9.5 else f"{size:.1f} %"
+
+
+def _signed(share: float) -> str:
+    text = f"{100 * share:+.0f}"
+    return "0" if text in ("+0", "-0") else text
 
 
 def _hard(gap: float) -> str:
