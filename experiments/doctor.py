@@ -102,7 +102,7 @@ def _memory() -> Finding:
     limited = f", limited to {limit / GIB:.1f} GiB" if limit is not None and limit < total else ""
     ok = min(available, limit or available) >= 1 * GIB
     detail = f"{available / GIB:.1f} GiB available of {total / GIB:.1f} GiB{limited}"
-    return Finding("memory", ok, detail, "the case that ships wants about 1 GiB: close something")
+    return Finding("memory", ok, detail, "close something, or take a smaller bed_size or a larger grain")
 
 
 def _memory_limit() -> int | None:
