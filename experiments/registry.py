@@ -71,7 +71,7 @@ EXPERIMENTS: dict[str, Experiment] = {
                 Preset(
                     "full",
                     "penetrate-full.toml",
-                    "Start from the fine case: overlaps of at most 1 %, ten grains across, slower, every seed; takes far longer.",
+                    "Start from the fine case: overlaps of at most 1 %, ten grains across, slower speeds, all seeds.",
                 ),
             ),
         ),
