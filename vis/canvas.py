@@ -142,13 +142,14 @@ class Page:
             if draw is not None:
                 draw(axis)
             self._rulers(axis, place, section)
-            figure.text(0.03, 0.965, caption.title, fontsize=13, fontweight="bold", va="top")
-            figure.text(0.03, 0.915, caption.lines, fontsize=10.5, va="top", color="#444444", linespacing=1.35)
+            figure.text(0.03, 0.965, caption.title, fontsize=16, fontweight="bold", va="top")
+            figure.text(0.03, 0.905, caption.lines, fontsize=12.5, va="top", color="#444444", linespacing=1.35)
             if note:
-                figure.text(0.03, 0.018, note, fontsize=8, va="bottom", color="#666666")
-            bar_axis = figure.add_axes((0.895, 0.2, 0.018, 0.5))
+                figure.text(0.03, 0.018, note, fontsize=9.5, va="bottom", color="#666666")
+            bar_axis = figure.add_axes((0.885, 0.2, 0.018, 0.5))
             bar = figure.colorbar(ScalarMappable(self.norm, self.map), cax=bar_axis, extend="max", extendfrac=0.04)
-            bar.set_label(self.scale.label, fontsize=9.5)
+            bar.set_label(self.scale.label, fontsize=11.5)
+            bar.ax.tick_params(labelsize=11)
             bar.outline.set_visible(False)  # type: ignore[operator]
             canvas.draw()
             return np.asarray(canvas.buffer_rgba())[..., :3].copy()
@@ -170,16 +171,16 @@ class Page:
         for i in range(count + 1):
             z = surface - i * step
             ends = line([(x, y, z), (x - 0.5 * offset, y, z)], color=INK, lw=1.0)
-            axis.text(ends[1, 0] - 0.006, ends[1, 1], f"{1e3 * i * step:g}", ha="right", va="center", fontsize=9)
+            axis.text(ends[1, 0] - 0.006, ends[1, 1], f"{1e3 * i * step:g}", ha="right", va="center", fontsize=11)
         middle = place(np.array([[x - 0.5 * offset, y, 0.5 * (floor + surface)]]))[0]
         axis.text(
-            middle[0] - 0.05,
+            middle[0] - 0.06,
             middle[1],
             "depth below the surface [mm]",
             rotation=90,
             ha="center",
             va="center",
-            fontsize=9.5,
+            fontsize=11.5,
         )
         low = floor - 1.2 * offset
         tick = 0.25 * offset
@@ -191,7 +192,12 @@ class Page:
             ends = line([(a[0], y, a[1]), (b[0], y, b[1])], color=INK, lw=1.6)
             if a[1] == b[1]:
                 axis.text(
-                    ends[:, 0].mean(), ends[:, 1].min() - 0.012, f"{1e3 * step:g} mm", ha="center", va="top", fontsize=9
+                    ends[:, 0].mean(),
+                    ends[:, 1].min() - 0.012,
+                    f"{1e3 * step:g} mm",
+                    ha="center",
+                    va="top",
+                    fontsize=11,
                 )
 
 

@@ -8,10 +8,10 @@ quote(0.231, 0.02, "%") == "23 ± 2 %"
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-__all__ = ["digits_for", "plain", "quantity", "quote"]
+__all__ = ["column", "digits_for", "plain", "quantity", "quote", "short"]
 
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 _SCALED = {"N", "J", "s", "Pa", "W", "kg"}
@@ -38,12 +38,30 @@ def plain(value: float, significant: int = 3) -> str:
     return _fixed(value, max(0, significant - 1 - exponent))
 
 
+def short(value: float, significant: int = 4) -> str:
+    """A number that is exact, without zeros at its end: 3.6, 20, 0.072."""
+    return f"{value:.{significant}g}".replace("-", _MINUS) if math.isfinite(value) else plain(value)
+
+
+def column(values: Sequence[float | None], unit: str, *, significant: int = 3) -> tuple[str, list[str]]:
+    """Numbers of a table's column in one unit: the unit with the prefix that fits the largest, and the numbers.
+
+    What is None or not finite is shown as a dash.
+    """
+    known = [abs(value) for value in values if value is not None and math.isfinite(value)]
+    scale, shown = _scale(max(known, default=1.0), unit)
+    dash = "\N{EN DASH}"
+    return shown, [
+        dash if value is None or not math.isfinite(value) else plain(value / scale, significant) for value in values
+    ]
+
+
 def quote(value: float | None, std: float | None = None, unit: str = "1", *, significant: int = 3) -> str:
     """A number with its uncertainty and unit.
 
     Args:
         value: The number in SI; None reads "unknown".
-        std: Its standard deviation; 0 for what is exact, None where unknown: both are left out.
+        std: Its standard deviation; 0 for what is exact, None where unknown: neither is shown.
         unit: An SI unit; "1" for none, "%" for a share to be shown in per cent.
         significant: Digits where the uncertainty does not set them.
     """
@@ -52,11 +70,13 @@ def quote(value: float | None, std: float | None = None, unit: str = "1", *, sig
     scale, shown = _scale(value, unit)
     if unit == "1" and float(value).is_integer() and not std:
         return _fixed(value, 0)
-    if std is None or std == 0.0 or not math.isfinite(std) or not math.isfinite(value):
+    if std == 0.0 and math.isfinite(value) and abs(value / scale) < 1e4:
+        text = short(value / scale)
+    elif std is None or std == 0.0 or not math.isfinite(std) or not math.isfinite(value):
         text = plain(value / scale, significant)
     else:
         decimals = digits_for(std / scale)
-        text = f"{_fixed(value / scale, decimals)} ± {_fixed(std / scale, decimals)}"
+        text = f"{_fixed(value / scale, decimals)}{_SPACE}±{_SPACE}{_fixed(std / scale, decimals)}"
     return f"{text}{_SPACE}{shown}" if shown else text
 
 

@@ -90,7 +90,7 @@ def write_gif(path: Path, images: list[NDArray[np.uint8]], *, frame_ms: int = 80
     while True:
         samples = images[:: max(1, len(images) // 6)][:8]
         together = Image.fromarray(np.concatenate([image[::2, ::2] for image in samples], axis=0))
-        palette = _with_scale(together).quantize(colors=256, method=Image.Quantize.MEDIANCUT)
+        palette = _palette(_with_scale(together))
         pages = [Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
         times = [frame_ms] * len(pages)
         times[-1] = 1500
@@ -103,6 +103,14 @@ def write_gif(path: Path, images: list[NDArray[np.uint8]], *, frame_ms: int = 80
         else:
             width, height = int(0.8 * images[0].shape[1]), int(0.8 * images[0].shape[0])
             images = [np.asarray(Image.fromarray(i).resize((width, height), Image.Resampling.LANCZOS)) for i in images]
+
+
+def _palette(image: Image.Image) -> Image.Image:
+    """An image with the 256 colours that serve this one best; white is among them, as white."""
+    colours = image.quantize(colors=255, method=Image.Quantize.MEDIANCUT).getpalette() or []
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([*colours[: 3 * 255], *[255] * (3 * 256 - min(len(colours), 3 * 255))])
+    return palette
 
 
 def _with_scale(image: Image.Image) -> Image.Image:

@@ -105,7 +105,7 @@ class Scene:
 
     def _fit(self, points: NDArray[np.float64]) -> None:
         """Zoom and shift so that these points fill the page between the depth scale and the colour bar."""
-        left, right, foot, head = 0.125, 0.875, 0.075, 0.90
+        left, right, foot, head = 0.125, 0.865, 0.075, 0.90
         camera = self._plotter.camera
         low, high = (edge(self.place(points), axis=0) for edge in (np.min, np.max))
         zoom = min((right - left) / (high[0] - low[0]), (head - foot) / (high[1] - low[1]))

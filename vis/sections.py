@@ -38,7 +38,7 @@ class Section:
         cut: float,
         radius: float,
     ) -> None:
-        left, right, foot, head = 0.125, 0.875, 0.13, 0.90
+        left, right, foot, head = 0.125, 0.865, 0.13, 0.90
         self._low, self._high = low, high
         self._cut, self._depth = cut, 8.0 * radius
         height = 1.55 * (high[2] - low[2])

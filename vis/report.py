@@ -1,0 +1,97 @@
+"""`report.html` of a run folder: one file that opens from disk, without a network, scripts or fonts of its own."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+from PIL import Image
+
+from vis.folder import read_folder
+from vis.pictures import Picture, Pictures, make_pictures
+from vis.plots import Plot, make_plots
+from vis.summary import summarise
+
+__all__ = ["write_report"]
+
+
+def write_report(folder: str | Path, *, pictures: bool = True, progress: Callable[[float], None] | None = None) -> Path:
+    """Make every plot and picture of a run folder, and its `report.html`.
+
+    Parts that are missing (a run that was stopped, no frames, no OpenGL) are said in the report.
+
+    Args:
+        folder: The run folder; `figures/`, `animation.gif` and `report.html` are written into it.
+        pictures: Whether to draw pictures and the animation; otherwise the report says that they were not asked for.
+        progress: Called with the share that is done, 0 to 1.
+
+    Returns:
+        The report.
+
+    Raises:
+        FileNotFoundError: there is no such folder.
+        OSError: the folder cannot be written.
+    """
+    tell = progress if progress is not None else lambda done: None
+    run = read_folder(folder)
+    plots, undrawn = make_plots(run)
+    tell(0.1)
+    drawn = Pictures(notes=["Pictures were not asked for."])
+    if pictures:
+        try:
+            drawn = make_pictures(run.path, progress=lambda done: tell(0.1 + 0.85 * done))
+        except (ValueError, KeyError, IndexError, OSError) as error:
+            drawn = Pictures(notes=[f"Pictures could not be drawn ({type(error).__name__}: {error})."])
+    context = summarise(run)
+    context["missing"] = [*context["missing"], *undrawn]
+    context["plots"] = {plot.name: _figure(plot, path) for plot, path in plots}
+    context["pictures"] = [_picture(picture) for picture in drawn.stills if picture.file.exists()]
+    context["animation"] = _picture(drawn.animation) if drawn.animation and drawn.animation.file.exists() else None
+    context["method"] = drawn.method
+    context["picture_notes"] = drawn.notes
+    report = run.path / "report.html"
+    temporary = report.with_name("report.html.part")
+    temporary.write_text(_template().render(**context), encoding="utf-8")
+    temporary.replace(report)
+    tell(1.0)
+    return report
+
+
+def _template() -> Any:
+    environment = Environment(
+        loader=PackageLoader("vis"),
+        autoescape=select_autoescape(["html"]),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template("report.html")
+
+
+def _figure(plot: Plot, path: Path) -> dict[str, str]:
+    return {
+        "title": plot.title,
+        "caption": plot.caption,
+        "file": path.name,
+        "data": _data_url(path.read_bytes(), "png"),
+    }
+
+
+def _picture(picture: Picture) -> dict[str, str]:
+    """The picture for the page; stills as JPEG, a quarter of the PNG's size, while the PNG stays in the folder."""
+    if picture.file.suffix == ".gif":
+        data = _data_url(picture.file.read_bytes(), "gif")
+    else:
+        buffer = io.BytesIO()
+        with Image.open(picture.file) as image:
+            image.convert("RGB").save(buffer, "JPEG", quality=90, subsampling=0)
+        data = _data_url(buffer.getvalue(), "jpeg")
+    return {"title": picture.title, "caption": picture.caption, "file": picture.file.name, "data": data}
+
+
+def _data_url(data: bytes, kind: str) -> str:
+    return f"data:image/{kind};base64,{base64.b64encode(data).decode('ascii')}"
