@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +15,11 @@ from numpy.typing import ArrayLike
 from rigid import Contact, Reaction, Section, Spike
 
 __all__ = ["BedGround"]
+
+OUT_OF_REACH = 100.0
+"""How far above the surface a spike waits that is not in use [m]."""
+_placed: WeakKeyDictionary[Any, dict[Spike, int]] = WeakKeyDictionary()
+"""Bed -> spike -> number of its body."""
 
 
 class BedGround:
@@ -24,8 +30,8 @@ class BedGround:
     bed : dem.Bed (or whatever has its interface).
     at : (x, y) of the spike's axis [m]; None: the middle of the bed.
 
-    One bed carries one body here: make a new BedGround on a bed that already has one, and the old body stays where it
-    was. Raises ValueError where the bed is too narrow for the spike.
+    A spike that was in this bed before is taken up again, another one that is still in it is put out of reach. Raises
+    ValueError where the bed is too narrow for the spike.
     """
 
     name = "bed"
@@ -41,12 +47,20 @@ class BedGround:
         self.surface = float(bed.surface)
         self.clearance = _clear_height(bed.grains(), spike, self.centre, bed.size, self.surface) - self.surface
         start = (*self.centre, self.surface + self.clearance)
-        self.body = bed.add_body(
-            [_shape(section) for section in spike.sections],
-            position=start,
-            friction=spike.friction,
-            restitution=spike.restitution,
-        )
+        placed = _placed.setdefault(bed, {})
+        for other, body in placed.items():
+            if other != spike:
+                bed.move_body(body, position=(*self.centre, self.surface + OUT_OF_REACH), velocity=(0.0, 0.0, 0.0))
+        if spike in placed:
+            bed.move_body(placed[spike], position=start, velocity=(0.0, 0.0, 0.0))
+        else:
+            placed[spike] = bed.add_body(
+                [_shape(section) for section in spike.sections],
+                position=start,
+                friction=spike.friction,
+                restitution=spike.restitution,
+            )
+        self.body = placed[spike]
 
     @property
     def time_step(self) -> float:

@@ -25,7 +25,7 @@ from .findings import Findings, bed_entry, bed_quantities, compare_with
 from .progress import Progress
 from .runfolder import RunFolder
 from .settings import PenetrateSettings, expected_grain_count
-from .softening import Softening, bearing_gradient, contact_time, drop_depth, soften
+from .softening import Softening, bearing_gradient, drop_depth, soften
 from .units import Unit, deepest, expected_time, make_run, make_spike, plan_units, shown_units
 
 __all__ = ["check", "choose_softness", "resume", "run"]
@@ -68,10 +68,9 @@ def check(settings: PenetrateSettings) -> None:
             f"grain = {settings.grain:g} m makes about {count:.3g} grains, which take {need / 1e9:.3g} GB where "
             f"{there / 1e9:.3g} GB are free: grains of {least:.2g} m or a smaller bed_size would do"
         )
-    if settings.time_step is None:
-        found = settings.crossing(_expected_step(settings))
-        if found:
-            raise ValueError(found)
+    found = settings.crossing(bed_step(settings, choose_softness(settings).young))
+    if found:
+        raise ValueError(found)
     if settings.reference not in (None, "shipped"):
         compare_with(str(settings.reference), {})
 
@@ -109,12 +108,21 @@ def choose_softness(settings: PenetrateSettings) -> Softening:
 
 def find_material(name: str) -> Any:
     """The grain material called `name`. Raises ValueError naming those there are."""
-    from dem import materials
+    from dem.materials import material
 
-    known = {key.lower(): value for key, value in vars(materials).items() if isinstance(value, materials.Material)}
-    if name.lower() not in known:
-        raise ValueError(f"material = {name!r} is no grain material: there is {', '.join(sorted(known))}")
-    return known[name.lower()]
+    return material(name)
+
+
+def bed_step(settings: PenetrateSettings, young: float) -> float:
+    """The step that the bed will take [s]. Raises ValueError for one that is set and too long."""
+    from dem.timestep import time_step_for
+
+    return time_step_for(
+        find_material(settings.material).softened(young),
+        diameter=settings.grain * (1 - settings.spread),
+        max_overlap=settings.max_overlap,
+        wanted=settings.time_step,
+    )
 
 
 def prepare_bed(settings: PenetrateSettings, seed: int, young: float, progress: Progress) -> Any:
@@ -130,6 +138,7 @@ def prepare_bed(settings: PenetrateSettings, seed: int, young: float, progress: 
         gravity=settings.gravity,
         seed=seed,
         young=young,
+        max_overlap=settings.max_overlap,
         time_step=settings.time_step,
         precision=settings.precision,
         arch=settings.arch,
@@ -139,11 +148,11 @@ def prepare_bed(settings: PenetrateSettings, seed: int, young: float, progress: 
     )
 
 
-def write_report(folder: Path) -> None:
+def write_report(folder: Path, progress: Progress) -> None:
     """Pictures, plots and report.html of a run folder."""
     from vis.report import write_report as write
 
-    write(folder)
+    write(folder, progress=progress.update)
 
 
 # Carrying it out ------------------------------------------------------------------------------------------------------
@@ -163,8 +172,8 @@ def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progres
             _run_seed(settings, seed, [unit for unit in units if unit.seed == seed], softening, folder, progress)
         result = _conclude(settings, units, softening, folder, progress)
         folder.write_result(result)
-        progress.stage("report")
-        write_report(folder.path)
+        progress.stage("report", total=1.0)
+        write_report(folder.path, progress)
     return result
 
 
@@ -205,6 +214,7 @@ def _run_seed(
     for unit in todo:
         ground.restore(start)
         bed.max_overlap = 0.0
+        bed.mark_origin()
         _run_unit(settings, unit, ground, folder, progress, shown=unit.id in shown_units(plan_units(settings)))
 
 
@@ -216,17 +226,14 @@ def _run_unit(
     stepper = make_run(settings, unit, ground)
     kept = folder.load_checkpoint(unit.id)
     if kept is not None:
-        bed.max_overlap = float(kept.pop("unit.max_overlap"))
-        overlap = bed.max_overlap
         stepper.restore(kept)
-        bed.max_overlap = overlap
         progress.message(f"{unit.title}: goes on at {stepper.time:.4g} s")
     frames = _Frames(settings, unit, stepper, folder, resumed=kept is not None) if shown else None
     progress.stage(unit.title, total=1.0)
     saved = time.monotonic()
 
     def keep(name: str) -> None:
-        folder.save_checkpoint(name, stepper.state() | {"unit.max_overlap": np.array(float(bed.max_overlap))})
+        folder.save_checkpoint(name, stepper.state())
 
     def on_step(stepper: Run) -> None:
         nonlocal saved
@@ -264,12 +271,13 @@ class _Frames:
     def __init__(
         self, settings: PenetrateSettings, unit: Unit, stepper: Run, folder: RunFolder, *, resumed: bool
     ) -> None:
-        from vis.frames import FrameWriter
+        from vis.frames import GRAIN_FIELDS, FrameWriter
         from vis.meshes import spike_mesh
 
         wanted = expected_time(settings, unit, _expected_stiffness(settings)) / max(1, settings.frame_count)
         self.interval = max(wanted, stepper.macro_step) if settings.frame_count else None
         self.limit = 2 * settings.frame_count
+        self.fields = tuple(GRAIN_FIELDS)
         if resumed:
             self.writer = FrameWriter(folder.path, name=unit.id, resume=True, keep_until=stepper.time)
         else:
@@ -289,12 +297,12 @@ class _Frames:
             return
         ground = stepper.ground
         assert isinstance(ground, BedGround)
-        force = stepper.last_force
+        grains = ground.bed.grains()
         self.writer.write(
             stepper.time,
-            ground.bed.grains(),
+            {name: grains[name] for name in ("position", *self.fields)},
             {"spike": (self.points + np.array(stepper.position), self.triangles)},
-            values={"depth": stepper.depth, "velocity": stepper.velocity, "force": force},
+            values={"depth": stepper.depth, "velocity": stepper.velocity, "force": stepper.last_force},
         )
 
 
@@ -400,22 +408,6 @@ def _expected_stiffness(settings: PenetrateSettings) -> float:
     material = find_material(settings.material)
     area = math.pi * settings.tip_diameter**2 / 4
     return bearing_gradient(0.6 * material.density, settings.gravity, material.friction) * area
-
-
-def _expected_step(settings: PenetrateSettings) -> float:
-    """About the step that the bed will choose [s]: a twentieth of a collision's time."""
-    material = find_material(settings.material)
-    soft = choose_softness(settings)
-    return (
-        contact_time(
-            grain=settings.grain * (1 - settings.spread),
-            density=material.density,
-            poisson=material.poisson,
-            young=soft.young,
-            speed=soft.speed,
-        )
-        / 20
-    )
 
 
 def _memory_there() -> float:

@@ -53,6 +53,9 @@ class FakeBed:
             self.time += self.time_step
         self._force = total / steps
 
+    def mark_origin(self):
+        pass
+
     def reaction(self, body):
         return np.array([0.0, 0.0, self._force]), np.zeros(3)
 

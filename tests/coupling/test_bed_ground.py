@@ -36,6 +36,14 @@ def test_other_tips_start_clear_too(tip):
     assert 0 < ground.clearance < 0.0011
 
 
+def test_a_bed_used_again_takes_the_spike_up_again():
+    bed, spike = FakeBed(), Spike(diameter=0.012)
+    first, second = BedGround(bed, spike), BedGround(bed, Spike(diameter=0.012))
+    assert (first.body, second.body, bed.bodies) == (0, 0, 1)
+    BedGround(bed, Spike(diameter=0.01))
+    assert bed.bodies == 2
+
+
 def test_a_step_is_a_whole_number_of_the_beds():
     ground = BedGround(FakeBed(time_step=2e-5), Spike())
     ground.step((0, 0, 0.05), (0, 0, -0.1), 1e-4)
