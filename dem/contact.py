@@ -1,7 +1,7 @@
 """The contact law between two grains, or a grain and a body.
 
-Hertz's normal force, Mindlin's tangential spring with history and Coulomb sliding, and an elastic-plastic rolling
-spring-dashpot. All functions are Taichi functions that see one contact; they know nothing of lists or grids.
+Hertz's normal force, Mindlin's tangential spring with history and Coulomb sliding, and elastic-plastic
+spring-dashpots for rolling and twisting. All functions are Taichi functions that see one contact; they know nothing of lists or grids.
 
 Normal (Hertz; Thornton, Cummins & Cleary 2013, Powder Technology 233:30 for the damping):
     F_n = max(0, 4/3 E* a d + c_n sqrt(m* S_n) d'),  a = sqrt(R* d),  S_n = 2 E* a,
@@ -11,17 +11,23 @@ Tangential (Mindlin 1949, no-slip stiffness; total force bounded by Coulomb's la
 Rolling (elastic-plastic spring-dashpot, Ai et al. 2011, Powder Technology 206:269, with the stiffness S_t R*^2 of the
 tangential spring at the rolling radius):
     M = -(k_r q + c_r q'),  q' the relative rolling rate,  |M| <= mu_r R* F_n.
+Twisting, where there is rolling resistance: the same form about the normal, with Marshall's 2009 stiffness S_t a^2 / 2
+(J. Comput. Phys. 228:1541) and the torque of a fully sliding Hertzian contact as bound, 3 pi / 16 mu a F_n (Johnson
+1985, section 7.4), so that a grain does not spin on one contact for ever.
 """
 
 import math
 
 import taichi as ti
 
-__all__ = ["contact_force", "damping_factor", "effective_moduli", "pair_parameters", "rolling_torque", "PAIR_WIDTH"]
+__all__ = ["contact_force", "damping_factor", "effective_moduli", "pair_parameters", "turning_torque", "PAIR_WIDTH"]
 
 # Entries of a row of pair parameters.
 PAIR_WIDTH = 8
-_TWO_E, _EIGHT_G, _DAMPING, _FRICTION, _ROLLING, _TANGENTIAL_DAMPING, _ROLLING_DAMPING = range(7)
+_TWO_E, _EIGHT_G, _DAMPING, _FRICTION, _ROLLING, _TANGENTIAL_DAMPING, _TURNING_DAMPING = range(7)
+
+# Share of critical damping of the rolling and twisting springs (Ai et al. 2011 use 0.3).
+TURNING_DAMPING_RATIO = 0.3
 
 # Thornton et al. 2013, eq. 15 and table: the damping that gives restitution e when the contact may not pull.
 _THORNTON = (-6.918798, -16.41105, 146.8049, -796.4559, 2928.711, -7206.864, 11494.29, -11342.18, 6276.757, -1489.915)
@@ -81,7 +87,16 @@ def pair_parameters(
         raise ValueError(f"friction = {friction} and rolling friction = {rolling_friction} must not be negative")
     factor = damping_factor(restitution, tensile=tensile)
     ratio = math.sqrt(8 * effective_shear / (2 * effective_young))
-    return [2 * effective_young, 8 * effective_shear, factor, friction, rolling_friction, factor * ratio, 0.3, 0.0]
+    return [
+        2 * effective_young,
+        8 * effective_shear,
+        factor,
+        friction,
+        rolling_friction,
+        factor * ratio,
+        TURNING_DAMPING_RATIO,
+        0.0,
+    ]
 
 
 @ti.func
@@ -90,7 +105,7 @@ def contact_force(p: ti.template(), n, v, overlap, radius, mass, dt, u: ti.templ
 
     ``p`` the pair's parameters, ``n`` the unit normal towards the first, ``v`` the relative velocity of the first at
     the contact point [m/s], ``overlap`` [m], ``radius``, ``mass`` the effective ones, ``u`` the tangential
-    displacement [m], updated in place. Returns (normal force [N], tangential force vector [N], tangential stiffness).
+    displacement [m], updated in place. Returns (normal force [N], tangential force vector [N], tangential stiffness [N/m], contact radius [m]).
     """
     a = ti.sqrt(radius * overlap)
     s_n = p[_TWO_E] * a
@@ -110,21 +125,38 @@ def contact_force(p: ti.template(), n, v, overlap, radius, mass, dt, u: ti.templ
     if square > bound * bound:
         f_t *= bound / ti.sqrt(square)
         u = -(f_t + c_t * v_t) / k_t
-    return f_n, f_t, k_t
+    return f_n, f_t, k_t, a
 
 
 @ti.func
-def rolling_torque(p: ti.template(), n, spin, f_n, k_t, radius, inertia, dt, q: ti.template()):
-    """Rolling torque on the first of a pair [N m]; ``spin`` the relative angular velocity, ``q`` the rolling angle."""
-    rate = spin - spin.dot(n) * n
+def turning_torque(p: ti.template(), n, spin, f_n, k_t, a, radius, inertia, dt, q: ti.template()):
+    """Rolling and twisting torque on the first of a pair [N m].
+
+    ``spin`` the relative angular velocity, ``a`` the contact radius [m], ``inertia`` the effective one [kg m2], ``q``
+    the angle turned [rad], updated in place: its normal part is twisting, the rest rolling.
+    """
+    q += spin * dt
+    spin_n = spin.dot(n)
+    roll_rate = spin - spin_n * n
+    twist = q.dot(n)
+    roll = q - twist * n
+    force = ti.abs(f_n)
+
     k_r = k_t * radius * radius
-    c_r = p[_ROLLING_DAMPING] * 2.0 * ti.sqrt(inertia * k_r)
-    q += rate * dt
-    q -= q.dot(n) * n
-    m = -(k_r * q + c_r * rate)
-    bound = p[_ROLLING] * radius * ti.abs(f_n)
+    c_r = p[_TURNING_DAMPING] * 2.0 * ti.sqrt(inertia * k_r)
+    m = -(k_r * roll + c_r * roll_rate)
+    bound = p[_ROLLING] * radius * force
     square = m.norm_sqr()
     if square > bound * bound:
         m *= bound / ti.sqrt(square)
-        q = -(m + c_r * rate) / k_r
-    return m
+        roll = -(m + c_r * roll_rate) / k_r
+
+    k_w = 0.5 * k_t * a * a
+    c_w = p[_TURNING_DAMPING] * 2.0 * ti.sqrt(inertia * k_w)
+    m_n = -(k_w * twist + c_w * spin_n)
+    bound = 0.1875 * ti.math.pi * p[_FRICTION] * a * force
+    if ti.abs(m_n) > bound:
+        m_n = ti.select(m_n > 0.0, bound, -bound)
+        twist = -(m_n + c_w * spin_n) / k_w
+    q = roll + twist * n
+    return m + m_n * n

@@ -17,7 +17,7 @@ import math
 import numpy as np
 import taichi as ti
 
-from .contact import PAIR_WIDTH, contact_force, rolling_torque
+from .contact import PAIR_WIDTH, contact_force, turning_torque
 from .shapes import ROW_WIDTH, distance_to
 
 __all__ = ["Engine", "STEPS_PER_LAUNCH"]
@@ -71,6 +71,7 @@ class Engine:
     ):
         n = grain_count
         self.grain_count = n
+        self.index_mask = _INDEX_MASK
         self.real = real
         self.rolling = rolling
         self.tensile = tensile
@@ -293,7 +294,7 @@ class Engine:
                     arm_j = x_j.w - 0.5 * overlap
                     v = v_i.xyz - v_j.xyz - (arm_i * w_i.xyz + arm_j * w_j.xyz).cross(n)
                     u = self.slide[s]
-                    f_n, f_t, k_t = contact_force(p, n, v, overlap, radius, mass, dt, u, self.tensile)
+                    f_n, f_t, k_t, a = contact_force(p, n, v, overlap, radius, mass, dt, u, self.tensile)
                     self.slide[s] = u
                     f = f_n * n + f_t
                     t = f_t.cross(n)
@@ -303,7 +304,7 @@ class Engine:
                     if ti.static(self.rolling):
                         q = self.roll[s]
                         inertia = 0.4 * mass * radius * radius
-                        turn = rolling_torque(p, n, w_i.xyz - w_j.xyz, f_n, k_t, radius, inertia, dt, q)
+                        turn = turning_torque(p, n, w_i.xyz - w_j.xyz, f_n, k_t, a, radius, inertia, dt, q)
                         self.roll[s] = q
                         sum_t += turn
                     if ti.static(not self.gpu):
@@ -343,7 +344,7 @@ class Engine:
             radius = x.w / (1.0 + x.w * curvature)
             p = self.body_pair[b]
             u = self.near_slide[s]
-            f_n, f_t, k_t = contact_force(p, n, v, overlap, radius, v_i.w, dt, u, self.tensile)
+            f_n, f_t, k_t, a = contact_force(p, n, v, overlap, radius, v_i.w, dt, u, self.tensile)
             self.near_slide[s] = u
             f = f_n * n + f_t
             t = arm_i * f_t.cross(n)
@@ -351,7 +352,7 @@ class Engine:
             if ti.static(self.rolling):
                 q = self.near_roll[s]
                 inertia = 0.4 * v_i.w * radius * radius
-                turn = rolling_torque(p, n, w_i.xyz - body_spin, f_n, k_t, radius, inertia, dt, q)
+                turn = turning_torque(p, n, w_i.xyz - body_spin, f_n, k_t, a, radius, inertia, dt, q)
                 self.near_roll[s] = q
                 t += turn
                 t_body -= turn
@@ -667,6 +668,22 @@ class Engine:
             self.pushes[c, b] = ti.Vector.zero(self.real, 6)
 
     @ti.kernel
+    def mark_origin(self):
+        """Count displacements from here."""
+        for i in range(self.grain_count):
+            self.origin[i] = self.position[i].xyz
+
+    @ti.kernel
+    def shift_velocities(self, time: float):
+        """Kick all grains by the present forces for a time of either sign."""
+        for i in range(self.grain_count):
+            r = self.position[i].w
+            share = ti.cast(time, self.real) / self.velocity[i].w
+            for k in ti.static(range(3)):
+                self.velocity[i][k] = self.velocity[i][k] + self.force[i][k] * share
+                self.spin[i][k] = self.spin[i][k] + self.torque[i][k] * (2.5 * share / (r * r))
+
+    @ti.kernel
     def count_contacts(self, counts: ti.types.ndarray(dtype=ti.i32, ndim=1)):
         """Contacts of each grain, by id."""
         for i in range(self.grain_count):
@@ -681,6 +698,12 @@ class Engine:
                     ti.atomic_add(counts[self.id[i]], 1)
                     if j >= start and j < end:
                         ti.atomic_add(counts[self.id[j]], 1)
+        for c in range(self.chunk_count):
+            for s in range(c * self.near_room, self.near_end[c]):
+                i = self.near_grain[s]
+                distance, n, curvature, arm = self.nearest(self.near_body[s], self.position[i].xyz)
+                if distance < self.position[i].w:
+                    ti.atomic_add(counts[self.id[i]], 1)
 
     @ti.func
     def chunk_of(self, i):

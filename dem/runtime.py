@@ -7,6 +7,8 @@ belong to and refuse to go on after it has ended.
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 from dataclasses import dataclass
 
@@ -65,19 +67,20 @@ def start(*, arch: str = "cpu", threads: int | None = None, precision: str = "fl
     wanted = Runtime(arch, threads, precision)
     if wanted == _current:
         return wanted
-    os.environ.setdefault("TI_LOG_LEVEL", "error")
     os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
-    import taichi as ti
+    with contextlib.redirect_stdout(io.StringIO()):
+        import taichi as ti
 
     real = ti.f64 if precision == "float64" else ti.f32
     options = dict(default_fp=real, default_ip=ti.i32, fast_math=False, log_level=ti.ERROR)
-    if arch == "cpu":
-        ti.init(arch=ti.cpu, cpu_max_num_threads=threads, **options)
-    else:
-        try:
-            ti.init(arch=ti.cuda, enable_fallback=False, **options)
-        except Exception as problem:
-            raise RuntimeError(f"arch = 'cuda' is not available on this machine ({problem}); use arch = 'cpu'") from None
+    with contextlib.redirect_stdout(io.StringIO()):  # its greeting would spoil what a script prints
+        if arch == "cpu":
+            ti.init(arch=ti.cpu, cpu_max_num_threads=threads, **options)
+        else:
+            try:
+                ti.init(arch=ti.cuda, enable_fallback=False, **options)
+            except Exception as problem:
+                raise RuntimeError(f"arch = 'cuda' is not available here ({problem}); use arch = 'cpu'") from None
     _current = wanted
     _generation += 1
     return wanted

@@ -1,0 +1,29 @@
+"""The granular bed. Knows nothing of platforms or spikes.
+
+Names are looked up when they are first used, so that ``import dem`` does not start Taichi.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+__all__ = ["Ball", "Bed", "BedFailure", "Cone", "Cylinder", "MATERIALS", "Material", "Plane", "SAND", "material"]
+
+if TYPE_CHECKING:
+    from .bed import Bed, BedFailure
+    from .materials import MATERIALS, SAND, Material, material
+    from .shapes import Ball, Cone, Cylinder, Plane
+
+_ROOMS = {
+    "bed": ("Bed", "BedFailure"),
+    "materials": ("MATERIALS", "Material", "SAND", "material"),
+    "shapes": ("Ball", "Cone", "Cylinder", "Plane"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    for room, names in _ROOMS.items():
+        if name in names:
+            return getattr(importlib.import_module(f".{room}", __name__), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

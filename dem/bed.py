@@ -1,0 +1,843 @@
+"""The bed: grains, the bodies among them, and the clock. The one class a user meets."""
+
+from __future__ import annotations
+
+import math
+import os
+import tempfile
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import runtime
+from .contact import effective_moduli, pair_parameters
+from .engine import MOST_BODIES, MOST_PRIMITIVES, STEPS_PER_LAUNCH, Engine
+from .materials import Material, material as find_material
+from .measure import bulk_packing, surface_height
+from .shapes import Plane, Primitive
+from .timestep import time_step_for
+
+__all__ = ["Bed", "BedFailure", "STATE_FORMAT"]
+
+STATE_FORMAT = "hedgebed-bed/1"
+LAUNCHES_PER_LOOK = 5
+# Skin over mean diameter: first guess and bounds. It adapts to how often lists are made.
+_SKIN, _LEAST_SKIN, _LARGEST_SKIN = 0.06, 0.02, 0.15
+# A rebuild costs about as much as this many steps, and a skin of one diameter would add about this share to a step.
+_REBUILD_STEPS, _SKIN_COST = 4.0, 1.2
+FLOOR = 0
+
+
+class BedFailure(RuntimeError):
+    """The bed cannot go on: a number is not a number, a grain was lost, or an overlap went past its bound.
+
+    ``reason`` says which; the bed keeps the state in which it was found, so that it can be saved and looked at.
+    """
+
+    def __init__(self, reason: str):
+        super().__init__(reason)
+        self.reason = reason
+
+
+class Bed:
+    """Spherical grains on a floor at z = 0, periodic in x and y, open above.
+
+    Make one with ``Bed.prepare`` (rained, levelled, settled), ``Bed.from_grains`` (positions of one's own) or
+    ``Bed.load``. Lengths in m, times in s, z up. Positions and the like come in the order of grain ids.
+
+    Attributes:
+        max_overlap: largest overlap over mean diameter of the pair since the bed was made; set it to 0 to start anew.
+        overlap_limit: the bound on it; ``advance`` raises BedFailure past it.
+    """
+
+    @classmethod
+    def prepare(cls, material: str | Material, **options: Any) -> Bed:
+        """A bed rained in, levelled and settled; see ``dem.prepare.prepare_bed`` for the options."""
+        from .prepare import prepare_bed
+
+        return prepare_bed(material, **options)
+
+    @classmethod
+    def from_grains(
+        cls,
+        material: str | Material,
+        *,
+        positions: np.ndarray,
+        radii: np.ndarray,
+        size: Sequence[float],
+        velocities: np.ndarray | None = None,
+        spins: np.ndarray | None = None,
+        height: float | None = None,
+        gravity: float | Sequence[float] = 9.81,
+        young: float | None = None,
+        max_overlap: float = 0.05,
+        time_step: float | None = None,
+        floor: bool = True,
+        tensile: bool = False,
+        seed: int | None = None,
+        precision: str = "float64",
+        arch: str = "cpu",
+        threads: int | None = None,
+    ) -> Bed:
+        """A bed of given grains.
+
+        Args:
+            material: a name or a Material.
+            positions: centres [m], shape [grain_count, 3].
+            radii: [m], shape [grain_count].
+            size: lateral periods and nominal depth (x, y, z) [m].
+            velocities: [m/s], shape [grain_count, 3]; at rest when None.
+            spins: angular velocities [rad/s], shape [grain_count, 3].
+            height: top of the box [m]; a grain above it is lost. Twice the highest grain when None.
+            gravity: downwards [m/s2], or a vector.
+            young: Young's modulus of the (softened) grains [Pa]; the material's own when None.
+            max_overlap: bound on overlap over diameter; the time step is chosen for it.
+            time_step: [s]; a tenth of the contact time when None.
+            floor: whether there is a floor at z = 0.
+            tensile: whether the damping may pull at the end of a contact (as LIGGGHTS does by default).
+            precision, arch, threads: see ``dem.runtime.start``.
+
+        Raises:
+            ValueError: arrays of wrong shape, numbers that are not finite, a negative size, a step too long, a bed
+                narrower than three grains.
+        """
+        stuff = find_material(material)
+        if young is not None:
+            stuff = stuff.softened(float(young))
+        positions = np.asarray(positions, dtype=float)
+        radii = np.asarray(radii, dtype=float)
+        n = len(radii)
+        _check_array("radii", radii, (n,))
+        if n == 0 or not (radii > 0).all():
+            raise ValueError("radii must be positive and there must be at least one grain")
+        _check_array("positions", positions, (n, 3))
+        velocities = np.zeros((n, 3)) if velocities is None else np.asarray(velocities, dtype=float)
+        spins = np.zeros((n, 3)) if spins is None else np.asarray(spins, dtype=float)
+        _check_array("velocities", velocities, (n, 3))
+        _check_array("spins", spins, (n, 3))
+        if len(size) != 3 or not all(math.isfinite(s) and s > 0 for s in size):
+            raise ValueError(f"size = {tuple(size)} must be three positive lengths [m]")
+        if not 0 < max_overlap <= 0.2:
+            raise ValueError(f"max_overlap = {max_overlap} must be above 0 and at most 0.2 of a diameter")
+        dt = time_step_for(stuff, diameter=2 * float(radii.min()), max_overlap=max_overlap, wanted=time_step)
+        top = float((positions[:, 2] + radii).max())
+        settings = {
+            "material": stuff,
+            "size": tuple(float(s) for s in size),
+            "gravity": _vector(gravity),
+            "time_step": dt,
+            "max_overlap": float(max_overlap),
+            "height": float(height) if height is not None else 2 * top + 20 * float(radii.max()),
+            "tensile": bool(tensile),
+            "seed": seed,
+        }
+        if settings["height"] < top:
+            raise ValueError(f"height = {height} m is below the highest grain's top at {top:.4g} m")
+        bed = cls(settings, radii, precision=precision, arch=arch, threads=threads)
+        mass = stuff.density * 4 / 3 * math.pi * radii**3
+        bed._fill(positions, velocities, spins, radii, mass)
+        if floor:
+            bed._add([Plane()], (0.0, 0.0, 0.0), stuff.friction, stuff.restitution, stuff.rolling_friction, None)
+        bed._make_lists()
+        bed._push()
+        bed._start_clock()
+        bed.measure_surface()
+        return bed
+
+    def __init__(self, settings: dict[str, Any], radii: np.ndarray, *, precision: str, arch: str, threads: int | None):
+        """Not for users: ``from_grains`` and the like check what they pass."""
+        self._runtime = runtime.start(arch=arch, threads=threads, precision=precision)
+        self._generation = runtime.generation()
+        import taichi as ti
+
+        self._ti = ti
+        self._settings = settings
+        stuff: Material = settings["material"]
+        self.material = stuff
+        self.size = settings["size"]
+        self.gravity = settings["gravity"]
+        self.time_step = settings["time_step"]
+        self.overlap_limit = settings["max_overlap"]
+        self.seed = settings["seed"]
+        self.steps = 0
+        self.list_count = 0
+        self.grain_count = len(radii)
+        self._diameter = 2 * float(radii.mean())
+        self._skin = _SKIN * self._diameter
+        self._since_lists = 0
+        self._reaction_steps = 0
+        self._stale = False
+        self._has_floor = False
+        self.surface = math.nan
+        self.packing_fraction = math.nan
+        self._engine = Engine(
+            grain_count=self.grain_count,
+            period=self.size[:2],
+            bottom=-4 * float(radii.max()),
+            height=settings["height"],
+            largest_diameter=2 * float(radii.max()),
+            largest_skin=_LARGEST_SKIN * self._diameter,
+            rolling=stuff.rolling_friction > 0,
+            tensile=settings["tensile"],
+            real=ti.f64 if precision == "float64" else ti.f32,
+            gpu=arch == "cuda",
+            threads=self._runtime.threads,
+            neighbours_per_grain=_room(radii, self._diameter, gpu=arch == "cuda"),
+        )
+        young, shear = effective_moduli(stuff.young, stuff.poisson, stuff.young, stuff.poisson)
+        self._engine.grain_pair[None] = pair_parameters(
+            effective_young=young,
+            effective_shear=shear,
+            restitution=stuff.restitution,
+            friction=stuff.friction,
+            rolling_friction=stuff.rolling_friction,
+            tensile=settings["tensile"],
+        )
+        turn = np.zeros((MOST_BODIES, 4))
+        turn[:, 0] = 1
+        self._engine.body_turn.from_numpy(turn.astype(self._runtime.dtype))
+
+    # ------------------------------------------------------------------ bodies
+
+    def add_body(
+        self,
+        shape: Sequence[Primitive],
+        *,
+        position: Sequence[float],
+        friction: float | None = None,
+        restitution: float | None = None,
+        rolling_friction: float | None = None,
+        young: float | None = None,
+        poisson: float = 0.3,
+    ) -> int:
+        """Put a body among the grains and return its number. It moves as it is told; see ``move_body``.
+
+        Args:
+            shape: primitives of ``dem.shapes`` in the body's frame; their union is the body.
+            position: of the body's origin [m].
+            friction, restitution, rolling_friction: of a grain on the body; the grains' own when None.
+            young, poisson: of the body; rigid when None. [Pa], [1].
+
+        Raises:
+            ValueError: no shape, too many bodies, a grain already in contact by more than the overlap bound.
+        """
+        self._check_valid()
+        stuff = self.material
+        body = self._add(
+            shape,
+            position,
+            stuff.friction if friction is None else friction,
+            stuff.restitution if restitution is None else restitution,
+            stuff.rolling_friction if rolling_friction is None else rolling_friction,
+            young,
+            poisson,
+        )
+        kept = self.max_overlap
+        self._make_lists()
+        self.max_overlap = 0.0
+        self._push()
+        found = self.max_overlap
+        if found > self.overlap_limit:
+            self._engine.body_count[None] = body
+            self._make_lists()
+            self.max_overlap = kept
+            self._push()
+            raise ValueError(
+                f"the body at {tuple(position)} m starts in overlap with a grain by {100 * found:.2g} % of its diameter "
+                f"(the bound is {100 * self.overlap_limit:g} %); start it higher"
+            )
+        self.max_overlap = max(kept, found)
+        return body
+
+    def _add(self, shape, position, friction, restitution, rolling_friction, young, poisson=0.3) -> int:
+        e = self._engine
+        shape = list(shape)
+        body = int(e.body_count[None])
+        used = int(e.body_primitives[body - 1][1]) if body else 0
+        if not shape:
+            raise ValueError("shape is empty; a body needs at least one primitive")
+        if body >= MOST_BODIES or used + len(shape) > MOST_PRIMITIVES:
+            raise ValueError(f"a bed takes at most {MOST_BODIES} bodies of {MOST_PRIMITIVES} primitives in all")
+        stuff = self.material
+        star, shear = effective_moduli(
+            stuff.young,
+            stuff.poisson,
+            math.inf if young is None else young,
+            stuff.poisson if young is None else poisson,
+        )
+        e.body_pair[body] = pair_parameters(
+            effective_young=star,
+            effective_shear=shear,
+            restitution=restitution,
+            friction=friction,
+            rolling_friction=rolling_friction,
+            tensile=self._settings["tensile"],
+        )
+        for k, primitive in enumerate(shape):
+            e.primitive_kind[used + k] = primitive.kind
+            e.primitive_row[used + k] = primitive.row()
+        e.body_primitives[body] = [used, used + len(shape)]
+        e.body_extent[body] = min(1e35, max(p.extent() for p in shape))
+        e.body_position[body] = [float(p) for p in position]
+        e.body_velocity[body] = [0.0, 0.0, 0.0]
+        e.body_spin[body] = [0.0, 0.0, 0.0]
+        e.body_turn[body] = [1.0, 0.0, 0.0, 0.0]
+        e.body_count[None] = body + 1
+        if body == FLOOR and any(isinstance(p, Plane) for p in shape):
+            self._has_floor = True
+        return body
+
+    def move_body(
+        self,
+        body: int,
+        *,
+        position: Sequence[float] | None = None,
+        velocity: Sequence[float] | None = None,
+        turn: Sequence[float] | None = None,
+        spin: Sequence[float] | None = None,
+    ) -> None:
+        """Set a body's pose and the velocity that it holds while the bed advances.
+
+        Args:
+            position: of its origin [m]. velocity: [m/s].
+            turn: unit quaternion, scalar first. spin: angular velocity [rad/s].
+        """
+        self._check_body(body)
+        e = self._engine
+        for name, value, width in (
+            ("body_position", position, 3),
+            ("body_velocity", velocity, 3),
+            ("body_turn", turn, 4),
+            ("body_spin", spin, 3),
+        ):
+            if value is not None:
+                numbers = [float(v) for v in value]
+                if len(numbers) != width or not all(map(math.isfinite, numbers)):
+                    raise ValueError(f"{name[5:]} = {tuple(value)} must be {width} finite numbers")
+                getattr(e, name)[body] = numbers
+
+    def body_position(self, body: int) -> np.ndarray:
+        """Where a body's origin is [m], shape [3]."""
+        self._check_body(body)
+        return np.array(self._engine.body_position[body], dtype=float)
+
+    def reaction(self, body: int) -> tuple[np.ndarray, np.ndarray]:
+        """Force [N] and torque about the body's origin [N m] from the grains, each of shape [3].
+
+        The mean over the last ``advance``: the impulse divided by the time.
+        """
+        self._check_body(body)
+        rows = self._engine.pushes.to_numpy()[:, body, :].astype(float)
+        # cumsum adds in order whatever numpy's blocking, so the bits do not depend on it.
+        total = np.cumsum(rows, axis=0)[-1] / max(1, self._reaction_steps)
+        return total[:3], total[3:]
+
+    # ------------------------------------------------------------------ time
+
+    @property
+    def time(self) -> float:
+        """Time since the bed was made [s]."""
+        return self.steps * self.time_step
+
+    def advance(self, steps: int = 1) -> None:
+        """Advance by a number of time steps.
+
+        Raises:
+            BedFailure: a grain left the box, a number is not a number, or an overlap went past its bound.
+        """
+        self._check_valid()
+        e = self._engine
+        e.clear_pushes()
+        self._reaction_steps = steps
+        limit = 0.5 * self._skin
+        done = 0
+        while done < steps:
+            e.done[None] = 0
+            ahead = 0
+            for _ in range(LAUNCHES_PER_LOOK):
+                count = STEPS_PER_LAUNCH if steps - done - ahead >= STEPS_PER_LAUNCH else 1
+                if ahead + count > steps - done:
+                    break
+                e.run(self.time_step, limit, *self.gravity, count)
+                ahead += count
+            advanced = int(e.done[None])
+            halted = int(e.halted[None])
+            done += advanced
+            self.steps += advanced
+            self._since_lists += advanced
+            if halted:
+                self._adapt_skin()
+                self._make_lists()
+                self._push()
+                limit = 0.5 * self._skin
+                done += 1
+                self.steps += 1
+                self._since_lists += 1
+        overlap = self.max_overlap
+        if not overlap <= self.overlap_limit:
+            raise BedFailure(
+                f"an overlap of {100 * overlap:.3g} % of a diameter went past its bound of "
+                f"{100 * self.overlap_limit:g} % at t = {self.time:.6g} s; make the grains stiffer (young = "
+                f"{self.material.young:.3g} Pa now) or the bound larger"
+            )
+
+    def _adapt_skin(self) -> None:
+        """Towards the skin at which lists cost as much to make as their extra pairs cost to look at."""
+        steps = max(1, self._since_lists)
+        ratio = math.sqrt(_REBUILD_STEPS / (_SKIN_COST * self._skin / self._diameter * steps))
+        skin = self._skin * min(1.4, max(0.7, ratio))
+        self._skin = min(_LARGEST_SKIN * self._diameter, max(_LEAST_SKIN * self._diameter, skin))
+
+    def _make_lists(self) -> None:
+        e = self._engine
+        e.keep_lists()
+        e.sort(*self.gravity)
+        e.make_lists(self._skin)
+        self.list_count += 1
+        self._since_lists = 0
+        code, value = (int(v) for v in e.problem[None])
+        if code:
+            e.problem[None] = [0, 0]
+            raise BedFailure(self._explain(code, value))
+
+    def _explain(self, code: int, value: int) -> str:
+        e = self._engine
+        if code == 1:
+            position = e.position.to_numpy()
+            ids = e.id.to_numpy()
+            bad = ~np.isfinite(position).all(axis=1)
+            if bad.any():
+                return f"the position of grain {int(ids[bad].min())} is not a number at t = {self.time:.6g} s"
+            lost = (position[:, 2] > self._settings["height"]) | (position[:, 2] < e.bottom)
+            first = int(ids[lost].min()) if lost.any() else value
+            where = position[ids == first][0, :3]
+            return (
+                f"grain {first} left the box ({int(lost.sum())} in all) at t = {self.time:.6g} s: it is at "
+                f"({where[0]:.4g}, {where[1]:.4g}, {where[2]:.4g}) m, the box reaches from {e.bottom:.4g} to "
+                f"{self._settings['height']:.4g} m"
+            )
+        room = e.chunk_room if code == 2 else e.near_room
+        what = "pairs" if code == 2 else "grains near bodies"
+        return f"the lists have room for {room} {what} a chunk and {value} are needed; the grains overlap too much"
+
+    def _push(self) -> None:
+        self._engine.push_all(self.time_step)
+
+    def _start_clock(self) -> None:
+        """Put the velocities half a step behind the positions, where the leapfrog wants them."""
+        self._shift_velocities(-0.5)
+
+    def _shift_velocities(self, part: float) -> None:
+        self._engine.shift_velocities(part * self.time_step)
+
+    # ------------------------------------------------------------------ what a user reads
+
+    def grains(self) -> dict[str, np.ndarray]:
+        """What the grains are doing, in the order of ids.
+
+        Returns:
+            id; position, velocity, spin, force (gravity included), displacement (since the bed was made or
+            ``mark_origin``), each of shape [grain_count, 3]; radius, mass, coordination (contacts with grains and
+            bodies), each of shape [grain_count]. SI units.
+        """
+        self._check_valid()
+        e = self._engine
+        order = np.argsort(e.id.to_numpy())
+        position = e.position.to_numpy()[order].astype(float)
+        velocity = e.velocity.to_numpy()[order].astype(float)
+        spin = e.spin.to_numpy()[order, :3].astype(float)
+        force = e.force.to_numpy()[order].astype(float)
+        torque = e.torque.to_numpy()[order].astype(float)
+        origin = e.origin.to_numpy()[order].astype(float)
+        half = 0.5 * self.time_step
+        radius, mass = position[:, 3], velocity[:, 3]
+        return {
+            "id": np.arange(self.grain_count),
+            "position": position[:, :3],
+            "radius": radius,
+            "mass": mass,
+            "velocity": velocity[:, :3] + half * force / mass[:, None],
+            "spin": spin + half * torque * (2.5 / (mass * radius**2))[:, None],
+            "force": force,
+            "coordination": self.contact_counts(),
+            "displacement": position[:, :3] - origin,
+        }
+
+    def contact_counts(self) -> np.ndarray:
+        """Contacts of each grain with grains and bodies, by id, shape [grain_count]."""
+        counts = np.zeros(self.grain_count, dtype=np.int32)
+        self._engine.count_contacts(counts)
+        return counts
+
+    @property
+    def coordination_number(self) -> float:
+        """Mean number of contacts of a grain [1], those with bodies and the floor included."""
+        return float(self.contact_counts().mean())
+
+    @property
+    def kinetic_energy(self) -> float:
+        """Translation and rotation [J]."""
+        g = self.grains()
+        moving = 0.5 * g["mass"] @ (g["velocity"] ** 2).sum(axis=1)
+        turning = 0.2 * (g["mass"] * g["radius"] ** 2) @ (g["spin"] ** 2).sum(axis=1)
+        return float(moving + turning)
+
+    @property
+    def weight(self) -> float:
+        """Weight of all grains [N]."""
+        return float(self._engine.velocity.to_numpy()[:, 3].sum() * math.hypot(*self.gravity))
+
+    @property
+    def floor_force(self) -> float:
+        """What the grains press the floor with [N], mean over the last ``advance``."""
+        if not self._has_floor:
+            return 0.0
+        return float(-self.reaction(FLOOR)[0][2])
+
+    @property
+    def max_overlap(self) -> float:
+        """Largest overlap over mean diameter of the pair [1] since the bed was made or this was set."""
+        return float(self._engine.overlap.to_numpy().max())
+
+    @max_overlap.setter
+    def max_overlap(self, value: float) -> None:
+        self._engine.overlap.fill(value)
+
+    def mark_origin(self) -> None:
+        """Count displacements from here."""
+        self._engine.mark_origin()
+
+    def measure_surface(self) -> None:
+        """Take ``surface`` and ``packing_fraction`` anew from where the grains are now."""
+        position = self._engine.position.to_numpy().astype(float)
+        area = self.size[0] * self.size[1]
+        self.packing_fraction = bulk_packing(position[:, 2], position[:, 3], area)
+        self.surface = surface_height(position[:, 2], position[:, 3], area, bulk=self.packing_fraction)
+
+    def set_gravity(self, gravity: float | Sequence[float]) -> None:
+        """Change gravity [m/s2]: downwards, or a vector."""
+        self._shift_velocities(0.5)
+        self.gravity = _vector(gravity)
+        self._make_lists()
+        self._push()
+        self._shift_velocities(-0.5)
+
+    # ------------------------------------------------------------------ state
+
+    _GRAIN_FIELDS = ("position", "velocity", "spin", "force", "torque", "origin", "listed", "id")
+    _BODY_FIELDS = (
+        "body_position",
+        "body_velocity",
+        "body_spin",
+        "body_turn",
+        "body_listed",
+        "body_listed_turn",
+        "body_extent",
+        "body_primitives",
+        "body_pair",
+        "primitive_kind",
+        "primitive_row",
+        "overlap",
+        "pushes",
+    )
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Everything that the next step depends on, to the bit: a flat dict of numpy arrays."""
+        self._check_valid()
+        e = self._engine
+        state = {name: getattr(e, name).to_numpy() for name in (*self._GRAIN_FIELDS, *self._BODY_FIELDS)}
+        start, end = e.pair_start.to_numpy(), e.pair_end.to_numpy()
+        counts = end - start
+        rows = np.repeat(start - np.concatenate(([0], np.cumsum(counts)[:-1])), counts) + np.arange(counts.sum())
+        pair = e.pair.to_numpy()[rows]
+        touching = rows[pair < 0]
+        state |= {"pair_count": counts, "pair": pair, "slide": e.slide.to_numpy()[touching]}
+        near_end = e.near_end.to_numpy()
+        near_count = near_end - np.arange(e.chunk_count) * e.near_room
+        near = _near_rows(near_count, e.near_room)
+        state |= {"near_count": near_count}
+        for name in ("near_grain", "near_body", "near_slide", "near_roll"):
+            state[name] = getattr(e, name).to_numpy()[near]
+        if e.rolling:
+            state["roll"] = e.roll.to_numpy()[touching]
+        state["numbers"] = np.array(
+            [
+                self.steps,
+                int(e.body_count[None]),
+                self.list_count,
+                self._since_lists,
+                self._reaction_steps,
+                int(self._has_floor),
+            ]
+        )
+        state["reals"] = np.array(
+            [self.time_step, self._skin, *self.gravity, self.surface, self.packing_fraction, self.overlap_limit]
+        )
+        return state
+
+    def restore(self, state: dict[str, np.ndarray]) -> None:
+        """Go back to a state of this bed, or of one that was made with the same settings.
+
+        Raises:
+            ValueError: a state of another number of grains or of another layout.
+        """
+        self._check_valid()
+        e = self._engine
+        if len(state["id"]) != self.grain_count or len(state["near_count"]) != e.chunk_count:
+            raise ValueError(
+                f"this state has {len(state['id'])} grains in {len(state['near_count'])} chunks, the bed "
+                f"{self.grain_count} in {e.chunk_count}; it belongs to another bed"
+            )
+        if state["position"].dtype != self._runtime.dtype:
+            raise ValueError(f"this state is in {state['position'].dtype}, the bed in {self._runtime.precision}")
+        for name in (*self._GRAIN_FIELDS, *self._BODY_FIELDS):
+            getattr(e, name).from_numpy(np.ascontiguousarray(state[name]))
+        counts = state["pair_count"]
+        chunk = _chunk_starts(self.grain_count, e.chunk_count)
+        before = np.concatenate(([0], np.cumsum(counts)))
+        which = np.repeat(np.arange(e.chunk_count), np.diff(chunk))
+        start = (before[:-1] - before[chunk[which]] + which * e.chunk_room).astype(np.int32)
+        rows = np.repeat(start - before[:-1], counts) + np.arange(before[-1])
+        touching = rows[state["pair"] < 0]
+        e.pair_start.from_numpy(start)
+        e.pair_end.from_numpy((start + counts).astype(np.int32))
+        for name, at in (("pair", rows), ("slide", touching), *((("roll", touching),) if e.rolling else ())):
+            target = getattr(e, name)
+            array = np.zeros(target.to_numpy().shape, dtype=state[name].dtype)
+            array[at] = state[name]
+            target.from_numpy(array)
+        near = _near_rows(state["near_count"], e.near_room)
+        e.near_end.from_numpy((state["near_count"] + np.arange(e.chunk_count) * e.near_room).astype(np.int32))
+        for name in ("near_grain", "near_body", "near_slide", "near_roll"):
+            target = getattr(e, name)
+            array = np.zeros(target.to_numpy().shape, dtype=state[name].dtype)
+            array[near] = state[name]
+            target.from_numpy(array)
+        numbers = [int(v) for v in state["numbers"]]
+        self.steps, bodies, self.list_count, self._since_lists, self._reaction_steps, floor = numbers
+        self._has_floor = bool(floor)
+        e.body_count[None] = bodies
+        e.moved[None] = 0
+        e.halted[None] = 0
+        reals = [float(v) for v in state["reals"]]
+        self.time_step, self._skin = reals[:2]
+        self.gravity = tuple(reals[2:5])
+        self.surface, self.packing_fraction, self.overlap_limit = reals[5:]
+
+    def save(self, path: str | Path) -> Path:
+        """Write the bed to one file (.npz), whole or not at all. Returns the path."""
+        path = Path(path)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        stuff = self.material
+        about = {
+            "format": np.array(STATE_FORMAT),
+            "material": np.array(stuff.name),
+            "material_numbers": np.array(
+                [
+                    stuff.density,
+                    stuff.young,
+                    stuff.poisson,
+                    stuff.friction,
+                    stuff.restitution,
+                    stuff.rolling_friction,
+                ]
+            ),
+            "size": np.array(self.size),
+            "height": np.array(self._settings["height"]),
+            "tensile": np.array(self._settings["tensile"]),
+            "seed": np.array(-1 if self.seed is None else self.seed),
+            "precision": np.array(self._runtime.precision),
+        }
+        handle, name = tempfile.mkstemp(dir=path.parent, suffix=".npz")
+        try:
+            with os.fdopen(handle, "wb") as file:
+                np.savez(file, **about, **{f"state.{k}": v for k, v in self.state().items()})
+            os.replace(name, path)
+        except BaseException:
+            os.unlink(name)
+            raise
+        return path
+
+    @classmethod
+    def load(cls, path: str | Path, *, arch: str = "cpu", threads: int | None = None) -> Bed:
+        """Read a bed that ``save`` wrote; it goes on to the same bits on the same kind of processor.
+
+        Raises:
+            ValueError: the file is missing or is not a bed.
+        """
+        try:
+            with np.load(Path(path), allow_pickle=False) as file:
+                stored = {name: file[name] for name in file.files}
+        except FileNotFoundError:
+            raise ValueError(f"{path}: no such file; a bed saved by Bed.save was expected") from None
+        except (zipfile.BadZipFile, ValueError, OSError, EOFError) as problem:
+            raise ValueError(f"{path} is not a bed saved by hedgebed ({problem})") from None
+        if str(stored.get("format", "")) != STATE_FORMAT:
+            raise ValueError(f"{path}: format is {stored.get('format', 'missing')}, {STATE_FORMAT!r} was expected")
+        numbers = [float(v) for v in stored["material_numbers"]]
+        state = {name[6:]: value for name, value in stored.items() if name.startswith("state.")}
+        seed = int(stored["seed"])
+        settings = {
+            "material": Material(str(stored["material"]), *numbers),
+            "size": tuple(float(v) for v in stored["size"]),
+            "gravity": tuple(float(v) for v in state["reals"][2:5]),
+            "time_step": float(state["reals"][0]),
+            "max_overlap": float(state["reals"][7]),
+            "height": float(stored["height"]),
+            "tensile": bool(stored["tensile"]),
+            "seed": None if seed < 0 else seed,
+        }
+        radii = state["position"][:, 3].astype(float)
+        bed = cls(settings, radii, precision=str(stored["precision"]), arch=arch, threads=threads)
+        if len(state["near_count"]) == bed._engine.chunk_count:
+            bed.restore(state)
+        else:
+            bed._adopt(state)
+        return bed
+
+    # ------------------------------------------------------------------ other grains, same contacts
+
+    def without(self, remove: np.ndarray) -> Bed:
+        """A bed with some grains taken out; the others keep their contacts. Ids are counted anew, in order.
+
+        Args:
+            remove: by id, bool, shape [grain_count].
+        """
+        self._check_valid()
+        ids = self._engine.id.to_numpy()
+        order = np.argsort(ids)
+        keep = ~np.asarray(remove, dtype=bool)
+        if not keep.any():
+            raise ValueError("no grain would be left")
+        state = self.state()
+        radii = state["position"][order, 3][keep].astype(float)
+        bed = Bed(
+            self._settings | {"gravity": self.gravity},
+            radii,
+            precision=self._runtime.precision,
+            arch=self._runtime.arch,
+            threads=self._runtime.threads,
+        )
+        bed._adopt(state, keep=keep)
+        return bed
+
+    def _adopt(self, state: dict[str, np.ndarray], *, keep: np.ndarray | None = None) -> None:
+        """Take over the grains, contacts and bodies of a state whose layout is another."""
+        e = self._engine
+        ids = state["id"]
+        if keep is None:
+            keep = np.ones(len(ids), dtype=bool)
+        new_id = np.cumsum(keep) - 1
+        stay = keep[ids]
+        place = np.cumsum(stay) - 1  # row in the old order -> row in the new one
+        dtype = self._runtime.dtype
+        for name in ("position", "velocity", "spin", "origin"):
+            getattr(e, name).from_numpy(np.ascontiguousarray(state[name][stay], dtype=dtype))
+        e.id.from_numpy(new_id[ids[stay]].astype(np.int32))
+        # The contacts as one list a grain, each pair once, rows from 0: what make_lists takes over as history.
+        first = np.repeat(np.arange(len(ids)), state["pair_count"])[state["pair"] < 0]
+        second = (~state["pair"][state["pair"] < 0]) & e.index_mask
+        chosen = stay[first] & stay[second]
+        a, b = place[first[chosen]], place[second[chosen]]
+        counts = np.bincount(a, minlength=self.grain_count)
+        start = np.concatenate(([0], np.cumsum(counts)[:-1])).astype(np.int32)
+        e.pair_start.from_numpy(start)
+        e.pair_end.from_numpy((start + counts).astype(np.int32))
+        self._put("pair", ~b.astype(np.int32))
+        self._put("slide", state["slide"][chosen])
+        if e.rolling:
+            self._put("roll", state["roll"][chosen])
+        near = stay[state["near_grain"]]
+        grain = place[state["near_grain"][near]]
+        starts = _chunk_starts(self.grain_count, e.chunk_count)
+        chunk = np.searchsorted(starts, grain, side="right") - 1
+        near_count = np.bincount(chunk, minlength=e.chunk_count)
+        rows = _near_rows(near_count, e.near_room)
+        e.near_end.from_numpy((near_count + np.arange(e.chunk_count) * e.near_room).astype(np.int32))
+        self._put("near_grain", grain.astype(np.int32), rows)
+        for name in ("near_body", "near_slide", "near_roll"):
+            self._put(name, state[name][near], rows)
+        for name in self._BODY_FIELDS:
+            if name not in ("overlap", "pushes"):
+                getattr(e, name).from_numpy(np.ascontiguousarray(state[name]))
+        e.body_count[None] = int(state["numbers"][1])
+        self._has_floor = bool(state["numbers"][5])
+        self.steps = int(state["numbers"][0])
+        self._make_lists()
+        self._push()
+        self.measure_surface()
+
+    def _put(self, name: str, values: np.ndarray, rows: np.ndarray | None = None) -> None:
+        target = getattr(self._engine, name)
+        array = target.to_numpy()
+        array[: len(values) if rows is None else None][slice(None) if rows is None else rows] = values
+        target.from_numpy(array)
+
+    def _fill(self, positions, velocities, spins, radii, mass) -> None:
+        e = self._engine
+        dtype = self._runtime.dtype
+        n = self.grain_count
+        e.position.from_numpy(np.column_stack([positions, radii]).astype(dtype))
+        e.velocity.from_numpy(np.column_stack([velocities, mass]).astype(dtype))
+        e.spin.from_numpy(np.column_stack([spins, np.zeros(n)]).astype(dtype))
+        e.origin.from_numpy(positions.astype(dtype))
+        e.id.from_numpy(np.arange(n, dtype=np.int32))
+        e.near_end.from_numpy((np.arange(e.chunk_count) * e.near_room).astype(np.int32))
+
+    def _check_valid(self) -> None:
+        if self._generation != runtime.generation():
+            raise RuntimeError(
+                "this bed is no longer valid: Taichi was started anew with another precision, arch or number of threads"
+            )
+
+    def _check_body(self, body: int) -> None:
+        self._check_valid()
+        if not 0 <= body < int(self._engine.body_count[None]):
+            raise ValueError(f"body = {body}: there is no such body in the bed")
+
+
+def _vector(gravity: float | Sequence[float]) -> tuple[float, float, float]:
+    if isinstance(gravity, (int, float)):
+        down = float(gravity)
+        if not (math.isfinite(down) and down >= 0):
+            raise ValueError(f"gravity = {gravity} must be 0 or more, downwards [m/s2], or a vector")
+        return (0.0, 0.0, -down)
+    vector = tuple(float(g) for g in gravity)
+    if len(vector) != 3 or not all(map(math.isfinite, vector)):
+        raise ValueError(f"gravity = {gravity} must be a number, downwards [m/s2], or three of them")
+    return vector
+
+
+def _check_array(name: str, array: np.ndarray, shape: tuple[int, ...]) -> None:
+    if array.shape != shape:
+        raise ValueError(f"{name} has shape {array.shape}, {shape} was expected")
+    if not np.isfinite(array).all():
+        raise ValueError(
+            f"{name} holds a number that is not finite, in row {int(np.argwhere(~np.isfinite(array))[0][0])}"
+        )
+
+
+def _room(radii: np.ndarray, diameter: float, *, gpu: bool) -> int:
+    """Rows of the pair lists for a grain: the most that fit around it (on a GPU) or around a mean one, with spare."""
+    skin = _LARGEST_SKIN * diameter
+    small, large = float(radii.min()), float(radii.max())
+    # Caps of neighbours on a sphere: each takes a cone of half angle asin(r_s / (r_l + r_s + skin)).
+    half = math.asin(small / (large + small + skin))
+    most = math.ceil(2 / (1 - math.cos(half)))
+    return most + 4 if gpu else min(most + 4, 20)
+
+
+def _chunk_starts(grain_count: int, chunk_count: int) -> np.ndarray:
+    """First grain of each chunk and the end, shape [chunk_count + 1]; as ``Engine.chunk_range`` has it."""
+    base, rest = divmod(grain_count, chunk_count)
+    c = np.arange(chunk_count + 1)
+    return c * base + np.minimum(c, rest)
+
+
+def _near_rows(near_count: np.ndarray, room: int) -> np.ndarray:
+    """Rows of the near lists that are in use."""
+    before = np.concatenate(([0], np.cumsum(near_count)[:-1]))
+    return np.repeat(np.arange(len(near_count)) * room - before, near_count) + np.arange(int(near_count.sum()))
