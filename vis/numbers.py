@@ -31,7 +31,8 @@ def plain(value: float, significant: int = 3) -> str:
         return "not a number" if math.isnan(value) else f"{_MINUS if value < 0 else ''}\N{INFINITY}"
     if value == 0.0:
         return "0"
-    exponent = math.floor(math.log10(abs(value)))
+    rounded = float(f"{value:.{significant - 1}e}")  # 0.9997 has the digits of 1.00
+    exponent = math.floor(math.log10(abs(rounded)))
     if exponent >= 9 or exponent < -4:
         mantissa, power = f"{value:.{significant - 1}e}".split("e")
         return f"{mantissa.replace('-', _MINUS)}\N{MULTIPLICATION SIGN}10{_superscript(int(power))}"

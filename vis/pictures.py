@@ -163,7 +163,8 @@ def _render_apart(job: dict[str, Any], stall: float, step: Callable[[], None]) -
                 text=True,
             )
             lines: queue.SimpleQueue[str] = queue.SimpleQueue()
-            threading.Thread(target=_pass_on, args=(child, lines), daemon=True).start()
+            reader = threading.Thread(target=_pass_on, args=(child, lines), daemon=True)
+            reader.start()
             try:
                 while line := lines.get(timeout=stall):
                     if line.strip() == "done":
@@ -175,6 +176,9 @@ def _render_apart(job: dict[str, Any], stall: float, step: Callable[[], None]) -
                 if child.poll() is None:
                     child.kill()
                     child.wait()
+                reader.join(timeout=5.0)
+                if child.stdout is not None:
+                    child.stdout.close()
         if child.returncode == 0:
             return None
         said = log.read_text(errors="replace").strip().splitlines()
@@ -320,7 +324,7 @@ def _half_way(story: _Story) -> int:
     deepest = story.depth[end]
     if deepest is None or end == 0:
         return end // 2
-    way_in = [abs((d if d is not None else 0.0) - 0.5 * deepest) for d in story.depth[: end + 1]]
+    way_in = [abs((d if d is not None else 0.0) - 0.5 * deepest) for d in story.depth[:end]]
     return int(np.argmin(way_in))
 
 

@@ -91,7 +91,7 @@ def write_gif(path: Path, images: list[NDArray[np.uint8]], *, frame_ms: int = 80
         samples = images[:: max(1, len(images) // 6)][:8]
         together = Image.fromarray(np.concatenate([image[::2, ::2] for image in samples], axis=0))
         palette = _palette(_with_scale(together))
-        pages = [Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+        pages = [_indexed(image, palette) for image in images]
         times = [frame_ms] * len(pages)
         times[-1] = 1500
         pages[0].save(path, "GIF", save_all=True, append_images=pages[1:], duration=times, loop=0, optimize=False)
@@ -111,6 +111,15 @@ def _palette(image: Image.Image) -> Image.Image:
     palette = Image.new("P", (1, 1))
     palette.putpalette([*colours[: 3 * 255], *[255] * (3 * 256 - min(len(colours), 3 * 255))])
     return palette
+
+
+def _indexed(image: NDArray[np.uint8], palette: Image.Image) -> Image.Image:
+    page = Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.NONE)
+    index = np.asarray(page).copy()
+    index[(image == 255).all(axis=2)] = 255  # Pillow's search is coarse: white would come out as a light grey
+    exact = Image.frombytes("P", page.size, index.tobytes())
+    exact.putpalette(palette.getpalette() or [])
+    return exact
 
 
 def _with_scale(image: Image.Image) -> Image.Image:

@@ -339,24 +339,22 @@ def _runs(run: RunFolder) -> Table | None:
     columns = [
         ("depth", "max_depth", "m"),
         ("at rest", "sinkage", "m"),
-        ("spring-damper", "model_sinkage", "m"),
         ("peak force", "peak_force", "N"),
-        ("spring-damper", "model_peak_force", "N"),
         ("work in", "work_in", "J"),
-        ("spring-damper", "model_work_in", "J"),
         ("work out", "work_out", "J"),
-        ("spring-damper", "model_work_out", "J"),
         ("drag gap", "drag_gap", "%"),
     ]
     runs = [r for kind in ("driven", "drop", "set_down") for r in run.of_kind(kind)]
     runs += [r for r in run.runs if r not in runs]
     head, cells = ["run"], [[_run_words(r) for r in runs]]
     for title, key, unit in columns:
-        values = [_value(r.quantities, key) for r in runs]
-        if any(value is not None for value in values):
-            shown, texts = column(values, unit)
-            head.append(f"{title} [{shown}]")
-            cells.append(texts)
+        bed = [_value(r.quantities, key) for r in runs]
+        model = [_value(r.quantities, f"model_{key}") for r in runs]
+        shown, texts = column([*bed, *model], unit)  # one unit for both
+        for name, values, part in ((title, bed, texts[: len(runs)]), ("spring-damper", model, texts[len(runs) :])):
+            if any(value is not None for value in values):
+                head.append(f"{name} [{shown}]")
+                cells.append(part)
     return {"head": head, "rows": [list(row) for row in zip(*cells, strict=True)]} if runs else None
 
 

@@ -251,6 +251,12 @@ def falling(folder, name, kind, seed, speed, load):
 
 
 @pytest.fixture(scope="session")
+def make_run():
+    """`synthetic_run(folder, frames=6)`."""
+    return synthetic_run
+
+
+@pytest.fixture(scope="session")
 def made_once(tmp_path_factory):
     """A run folder that tests only read."""
     return synthetic_run(tmp_path_factory.mktemp("run"))

@@ -1,0 +1,49 @@
+"""Numbers are quoted to the digits that their uncertainty allows."""
+
+import math
+
+import pytest
+
+from vis.numbers import column, plain, quantity, quote
+
+SPACE = "\N{NO-BREAK SPACE}"
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ((92.31, 4.2, "N/m"), "92 ± 4 N/m"),
+        ((92.31, 1.4, "N/m"), "92.3 ± 1.4 N/m"),
+        ((0.00215, 0.00012, "m"), "2.15 ± 0.12 mm"),
+        ((0.231, 0.02, "%"), "23 ± 2 %"),
+        ((123456.7, 1200.0, "N/m"), "123 500 ± 1200 N/m"),
+        ((20480, 0, "1"), "20 480"),
+        ((9.80665, 0.0, "m/s2"), "9.807 m/s²"),
+        ((0.0036, 0.0, "m"), "3.6 mm"),
+        ((3.2e-4, None, "J"), "320 µJ"),
+        ((-1234567.0, None, "Pa"), "−1.23 MPa"),
+        ((0.9997, None, "N"), "1.00 N"),
+        ((0.0, 0.0, "m"), "0 mm"),
+        ((None, None, "m"), "unknown"),
+        ((math.nan, None, "N"), "not a number N"),
+    ],
+)
+def test_quote(given, words):
+    assert quote(*given).replace(SPACE, " ") == words
+
+
+def test_quantity_takes_what_result_json_holds():
+    assert quantity({"value": 4.21, "std": 0.35, "unit": "N s/m"}).replace(SPACE, " ") == "4.2 ± 0.3 N s/m"
+    assert quantity({"value": 0.284, "std": None, "unit": "1"}, unit="%").replace(SPACE, " ") == "28.4 %"
+    assert quantity({"value": None, "std": None, "unit": "m"}) == "unknown"
+    assert quantity(None) == "unknown"
+    assert quantity("sand") == "sand"
+
+
+def test_column_has_one_unit():
+    assert column([0.229, 0.888, 1.8, None], "N") == ("N", ["0.229", "0.888", "1.80", "–"])
+    assert column([0.04, 7e-4], "J") == ("mJ", ["40.0", "0.700"])
+
+
+def test_plain_keeps_to_its_digits():
+    assert [plain(x) for x in (1234.5, 0.00123, 1e-7, 0.0)] == ["1234", "0.00123", "1.00×10⁻⁷", "0"]

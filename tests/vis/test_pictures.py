@@ -1,0 +1,119 @@
+"""Pictures show something, and what they show depends on the data; without OpenGL sections stand in."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from vis import pictures
+from vis.canvas import colour_values, nice_above
+from vis.pictures import make_pictures, opengl_available
+from vis.render import write_gif
+
+SMALL = {"size": (400, 300), "animation_size": (200, 150)}
+
+
+@pytest.fixture
+def needs_opengl():
+    if not opengl_available():
+        pytest.skip("no OpenGL for off-screen pictures here (apt install libegl1 libgl1-mesa-dri)")
+
+
+def pixels(path):
+    return np.asarray(Image.open(path).convert("RGB")).astype(int)
+
+
+def check(made, folder):
+    """Every file is there and shows something: much that is not white, in many colours, sand and dark among them."""
+    assert len(made.stills) == 4  # deepest, speed, pulled out; the fastest run at its deepest
+    for picture in made.stills:
+        image = pixels(picture.file)
+        assert image.shape == (300, 400, 3)
+        bed = image[120:260, 60:330].reshape(-1, 3)
+        assert np.mean(bed.min(axis=1) < 240) > 0.5
+        assert len(np.unique(bed, axis=0)) > 100
+    with Image.open(folder / "animation.gif") as animation:
+        assert animation.n_frames == 5
+        assert animation.size == (200, 150)
+        first = np.asarray(animation.convert("RGB")).astype(int)
+        animation.seek(1)
+        second = np.asarray(animation.convert("RGB")).astype(int)
+    assert np.abs(first - second).max() > 60  # the spike moves
+    assert (first[-1, 0] == 255).all()
+
+
+def redness(path):
+    """Mean of red minus blue over the middle of the bed: it falls as pale sand turns violet."""
+    image = pixels(path)[120:260, 100:300]
+    image = image[image.min(axis=2) < 240]
+    return float((image[:, 0] - image[:, 2]).mean())
+
+
+def test_sections_stand_in_without_opengl(tmp_path, monkeypatch, make_run):
+    monkeypatch.setenv("HEDGEBED_NO_OPENGL", "1")
+    assert not opengl_available()
+    folder = make_run(tmp_path, frames=5)
+    done = []
+    made = make_pictures(folder, **SMALL, progress=done.append)
+    assert made.method == "sections"
+    assert any("OpenGL" in note for note in made.notes)
+    assert done == sorted(done)
+    assert done[-1] == 1.0
+    check(made, folder)
+    deepest, speed, end = (picture.file for picture in made.stills[:3])
+    assert np.abs(pixels(deepest) - pixels(end)).max() > 100
+    assert redness(speed) != pytest.approx(redness(deepest), abs=0.5)
+
+
+def test_rendered_with_opengl(tmp_path, needs_opengl, make_run):
+    folder = make_run(tmp_path, frames=5)
+    made = make_pictures(folder, **SMALL)
+    assert made.method == "opengl", made.notes
+    check(made, folder)
+    deepest, speed, end = (picture.file for picture in made.stills[:3])
+    assert np.abs(pixels(deepest) - pixels(end)).max() > 100
+    assert redness(speed) != pytest.approx(redness(deepest), abs=0.5)
+
+
+def test_a_renderer_that_dies_costs_no_pictures(tmp_path, monkeypatch, make_run):
+    monkeypatch.setattr(pictures, "opengl_available", lambda: True)
+    monkeypatch.setattr(pictures.sys, "executable", "/bin/false")
+    made = make_pictures(make_run(tmp_path, frames=2), **SMALL, animate=False)
+    assert made.method == "sections"
+    assert "exit status 1" in made.notes[0]
+    assert all(picture.file.exists() for picture in made.stills)
+
+
+def test_a_renderer_that_hangs_is_given_up(tmp_path, monkeypatch, make_run):
+    hang = tmp_path / "hang"
+    hang.write_text("#!/bin/sh\nexec sleep 60\n")
+    hang.chmod(0o755)
+    monkeypatch.setattr(pictures, "opengl_available", lambda: True)
+    monkeypatch.setattr(pictures.sys, "executable", str(hang))
+    made = make_pictures(make_run(tmp_path / "run", frames=2), **SMALL, animate=False, stall=0.3)
+    assert made.method == "sections"
+    assert "no picture within" in made.notes[0]
+
+
+def test_without_frames_there_are_no_pictures(tmp_path, make_run):
+    made = make_pictures(make_run(tmp_path, frames=0))
+    assert (made.method, made.stills, made.animation) == ("none", [], None)
+    assert "no frames" in made.notes[0]
+
+
+def test_colours_are_in_the_unit_of_their_label():
+    grains = {"displacement": np.array([[0.003, 0.004, 0.0]]), "velocity": np.array([[0.0, 0.0, -0.2]])}
+    assert colour_values(grains, "displacement") == pytest.approx([5.0])  # mm
+    assert colour_values(grains, "speed") == pytest.approx([200.0])  # mm/s
+    with pytest.raises(ValueError, match="force"):
+        colour_values(grains, "force")
+    assert [nice_above(x) for x in (0.0, 0.93, 1.0, 6.1, 12.0)] == [1.0, 1.0, 1.0, 8.0, 15.0]
+
+
+def test_gif_keeps_to_its_limit(tmp_path):
+    rng = np.random.default_rng(0)
+    images = [rng.integers(0, 256, (60, 80, 3), dtype=np.uint8) for _ in range(30)]
+    write_gif(tmp_path / "small.gif", images, limit=60_000)
+    assert (tmp_path / "small.gif").stat().st_size <= 60_000
+    write_gif(tmp_path / "large.gif", images, limit=10_000_000)
+    with Image.open(tmp_path / "large.gif") as animation:
+        assert animation.n_frames == 30
