@@ -207,8 +207,10 @@ class _Story:
 
     @property
     def deepest(self) -> int:
-        known = [d if d is not None else -np.inf for d in self.depth]
-        return int(np.argmax(known)) if np.isfinite(max(known)) else len(known) - 1
+        """The first frame within 2 % of the greatest depth: still on the way in, where one was written there."""
+        known = np.array([d if d is not None else -np.inf for d in self.depth])
+        top = known.max()
+        return int(np.argmax(known >= top - 0.02 * abs(top))) if np.isfinite(top) else len(known) - 1
 
     @property
     def kind(self) -> str:
@@ -223,7 +225,7 @@ class _Story:
         if self.run is None:
             return self.name
         speed = f" at {self.speed:.3g} m/s"
-        words = {"driven": f"Driven{speed}", "drop": f"Dropped{speed}", "set_down": "Set down under its load"}
+        words = {"driven": f"Driven{speed}", "drop": f"Dropped{speed}", "set_down": "Set down"}
         return words.get(self.kind, self.name)
 
     def line(self, index: int) -> str:

@@ -286,13 +286,13 @@ def drop_peaks_plot(run: RunFolder) -> Plot | None:
             axis.set_title(title)
             axis.set_ylabel(unit_label(title, unit))
             axis.set_xlabel("speed at touch-down [m/s]")
-            axis.set_ylim(bottom=0.0)
+            axis.set_ylim(0.0, 1.1 * axis.get_ylim()[1])
             axis.set_xlim(0.0, 1.12 * max(speeds) or 1.0)
         _legend(figure, _pair(markers=True))
     return Plot(
         "drop_peaks",
         "Peaks of the drops",
-        "Peak force, greatest depth and time from touch-down to the first stop." + _spread_words(drops),
+        f"{'; '.join(title for _, title, *_ in columns)}: by speed at touch-down." + _spread_words(drops),
         figure,
     )
 
@@ -355,7 +355,7 @@ def spread_plot(run: RunFolder) -> Plot | None:
         for key, title, unit in (("stiffness", "Stiffness K", "N/m"), ("damping", "Damping C", "N s/m"))
         if any(_number(f, key) is not None for f in fits)
     ]
-    if not panels:
+    if not panels or len(fits) < 2:
         return None
     with styled():
         figure, axes = _panels(len(panels), height=2.5)
@@ -421,8 +421,7 @@ def unit_label(title: str, unit: str) -> str:
 def _panels(count: int, *, height: float, sharex: bool = False, sharey: bool = False) -> tuple[Figure, list[Axes]]:
     rows = 1 if count <= 4 else -(-count // 4)
     columns = -(-count // rows)
-    width = _WIDTH if count > 1 else 0.62 * _WIDTH
-    figure = Figure(figsize=(width, height * rows + 0.3))
+    figure = Figure(figsize=(_WIDTH, height * rows + 0.3))
     FigureCanvasAgg(figure)
     axes = list(figure.subplots(rows, columns, squeeze=False, sharex=sharex, sharey=sharey).ravel())
     for spare in axes[count:]:

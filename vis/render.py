@@ -131,7 +131,7 @@ def _with_scale(image: Image.Image) -> Image.Image:
 
 
 def _write_png(image: NDArray[np.uint8], path: Path) -> None:
-    Image.fromarray(image).save(path, "PNG", compress_level=9)
+    Image.fromarray(image).save(path, "PNG")
 
 
 def _replace(path: Path, write: Callable[[Path], None]) -> None:

@@ -74,7 +74,7 @@ def summarise(run: RunFolder) -> dict[str, Any]:
 
     Returns:
         A dict with "title", "status", "banner", "lead" (facts under the title), "tiles", "answers", "fit",
-        "departures", "bed", "spike", "runs", "numbers", "settings", "warnings", "missing" and "reproduce".
+        "departures", "reference", "bed", "spike", "runs", "numbers", "settings", "warnings", "missing" and "reproduce".
     """
     result = run.result
     quantities = _mapping(result.get("quantities"))
@@ -90,6 +90,7 @@ def summarise(run: RunFolder) -> dict[str, Any]:
         "answers": _answers(run, quantities),
         "fit": _fit(result, quantities),
         "departures": _departures(result),
+        "reference": _reference(result),
         "bed": _bed(result, quantities),
         "spike": _facts(_mapping(result.get("spike"))),
         "runs": _runs(run),
@@ -169,8 +170,8 @@ def _push(run: RunFolder) -> dict[str, str] | None:
     to = f" to {quote(depth, unit='m')}" if depth is not None else ""
     (slow, low), (fast, high) = by_speed[0], by_speed[-1]
     if slow == fast:
-        return {"value": quote(*low, "N"), "note": f"at most, driven in{to} at {slow:g} m/s"}
-    note = f"at most, driven in{to} at {fast:g} m/s; {quote(*low, 'N')} at {slow:g} m/s"
+        return {"value": quote(*low, "N"), "note": f"at most, driven in{to} at {slow:g}{_NBSP}m/s"}
+    note = f"at most, driven in{to} at {fast:g}{_NBSP}m/s; {quote(*low, 'N')} at {slow:g}{_NBSP}m/s"
     return {"value": quote(*high, "N"), "note": note}
 
 
@@ -188,7 +189,7 @@ def _answers(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, st
         text = f"{push['value']} {push['note']}."
         drops = _peaks(run, "drop", "peak_force")
         if drops:
-            words = [f"{quote(*peak, 'N')} at {speed:g} m/s" for speed, peak in drops]
+            words = [f"{quote(*peak, 'N')} at {speed:g}{_NBSP}m/s" for speed, peak in drops]
             text += f" Dropped, its force peaks at {_and(words)}."
         if _value(quantities, "work_returned_dem") is not None:
             text += (
@@ -219,7 +220,7 @@ def _worst(result: Mapping[str, Any]) -> str:
     worst = max(rows, key=lambda row: abs(row["model_force"] - row["bed_force"]))
     difference = worst["model_force"] - worst["bed_force"]
     return (
-        f"It is farthest off at {worst['speed']:g} m/s between {short(1e3 * worst['depth_from'], 3)} and "
+        f"It is farthest off at {worst['speed']:g}{_NBSP}m/s between {short(1e3 * worst['depth_from'], 3)} and "
         f"{short(1e3 * worst['depth_to'], 3)}{_NBSP}mm: {quote(abs(difference), unit='N')} too "
         f"{'much' if difference > 0 else 'little'} ({_percent(abs(difference) / worst['bed_force'])})."
     )
@@ -311,6 +312,27 @@ def _departure_rows(result: Mapping[str, Any]) -> list[dict[str, float]]:
     return rows
 
 
+def _reference(result: Mapping[str, Any]) -> dict[str, Any] | None:
+    """By how much the numbers moved from those of another result, where it was compared with one."""
+    reference = _mapping(result.get("reference"))
+    rows = []
+    for key, entry in _mapping(reference.get("moved")).items():
+        moved = _mapping(entry)
+        unit = "%" if key in _SHARES else str(moved.get("unit") or "1")
+        change = _plain_value(moved.get("change"))
+        rows.append(
+            [
+                _label(key),
+                quote(_plain_value(moved.get("before")), None, unit),
+                quote(_plain_value(moved.get("now")), None, unit),
+                _signed_percent(change) if change is not None else "\N{EN DASH}",
+            ]
+        )
+    if not rows:
+        return None
+    return {"file": str(reference.get("file") or ""), "table": {"head": ["", "there", "here", "change"], "rows": rows}}
+
+
 def _bed(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> dict[str, Any]:
     bed = _mapping(result.get("bed"))
     listed = [_mapping(entry) for entry in _list(bed.get("seeds")) if isinstance(entry, Mapping)]
@@ -360,7 +382,7 @@ def _runs(run: RunFolder) -> Table | None:
 
 def _run_words(run: Run) -> str:
     words = {"driven": "driven", "drop": "dropped", "set_down": "set down"}.get(run.kind, run.id)
-    speed = f" at {run.speed:g} m/s" if run.speed and run.kind != "set_down" else ""
+    speed = f" at {run.speed:g}{_NBSP}m/s" if run.speed and run.kind != "set_down" else ""
     return f"{words}{speed}" + (f", bed {run.seed}" if run.seed is not None else "")
 
 
@@ -379,7 +401,7 @@ def _facts(entries: Mapping[str, Any]) -> Table | None:
 def _settings(settings: Iterable[Setting]) -> Table | None:
     rows = []
     for setting in settings:
-        if not setting.table and setting.key in ("format", "version", "command", "created"):
+        if not setting.table and setting.key in ("format", "version", "command", "created", "not_set"):
             continue
         units = re.findall(r"\[([^\[\]]+)\]", setting.comment)
         unit = units[-1] if units and units[-1] != "1" else ""

@@ -8,6 +8,7 @@ from html.parser import HTMLParser
 import pytest
 from PIL import Image
 
+from vis import style
 from vis.folder import read_folder, read_series
 from vis.plots import PLOTS, make_plots
 from vis.report import write_report
@@ -40,6 +41,12 @@ class Page(HTMLParser):
     @property
     def text(self):
         return re.sub(r"\s+", " ", " ".join(self.words))
+
+
+@pytest.fixture(autouse=True)
+def coarse_plots(monkeypatch):
+    """Plots of a test's own are small; those of the `report` fixture, which comes first, are as large as life."""
+    monkeypatch.setitem(style._STYLE, "savefig.dpi", 40)
 
 
 @pytest.fixture(scope="module")
@@ -128,6 +135,21 @@ def test_each_missing_part_is_said_and_the_rest_is_there(tmp_path, make_run):
     assert "Spread between beds: no data." in text
     assert (path.parent / "figures/gap.png").exists()  # made from the series where there is no table
     assert "unknown" in text
+
+
+def test_one_bed_has_no_spread_and_a_reference_is_compared_with(tmp_path, made_once):
+    shutil.copytree(made_once, tmp_path / "run", ignore=shutil.ignore_patterns("frames", "figures"))
+    path = tmp_path / "run/result.json"
+    result = json.loads(path.read_text())
+    result["runs"] = [run for run in result["runs"] if run["id"] in ("driven-0.1-seed1", "drop-0.1-seed1")]
+    result["fits"] = result["fits"][:1]
+    moved = {"stiffness": {"before": 200.0, "now": 231.4, "change": 0.157, "unit": "N/m"}}
+    result["reference"] = {"file": "earlier/result.json", "moved": moved}
+    path.write_text(json.dumps(result))
+    text = Page(write_report(tmp_path / "run", pictures=False).read_text()).text.replace("\N{NO-BREAK SPACE}", " ")
+    assert "There is one bed" in text
+    assert "Spread between beds: no data." in text
+    assert "200 N/m 231 N/m +16 %" in text
 
 
 @pytest.mark.parametrize("drop", ["runs", "quantities", "bed"])
