@@ -70,6 +70,8 @@ class Run:
         """Velocity now, positive downwards [m/s]."""
         self.ended = ""
         """Why it ended; empty while it goes on."""
+        self.expected_time = self.max_time
+        """How long it may well take [s], for those who show progress."""
         self._rows: list[tuple[float, float, float, float]] = []
         self._phases: list[int] = []
         self._frames = 0
@@ -97,7 +99,7 @@ class Run:
     @property
     def fraction(self) -> float:
         """How far along it is, from 0 to 1, as well as one can tell."""
-        return 1.0 if self.done else min(1.0, max(0.0, self.time / self.max_time))
+        return 1.0 if self.done else min(0.99, max(0.0, self.time / self.expected_time))
 
     def advance(self) -> None:
         """Make one macro step; nothing once it has ended."""

@@ -116,8 +116,8 @@ def sentences(
         )
     if returned is not None:
         said.append(
-            f"Pulled out, the bed gives back {_percent(returned[0])} of the work put in, the spring-damper "
-            f"{_percent(returned[1])}."
+            f"Pulled out, the bed gives back {_share(returned[0])} of the work put in, the spring-damper "
+            f"{_share(returned[1])}."
         )
     if drops:
         peak = float(np.mean([model.peak_force / bed.peak_force for bed, model in drops if bed.peak_force > 0] or [1]))
@@ -139,7 +139,7 @@ def _by_depth(table: Sequence[Mapping[str, Any]]) -> list[str]:
     top, bottom = min(row["depth_to"] for row in rows), max(row["depth_from"] for row in rows)
     shallow = [row for row in rows if row["depth_to"] == top]
     deep = [row for row in rows if row["depth_from"] == bottom]
-    for where, band in ((f"Above {1e3 * top:.3g} mm", shallow), (f"Below {1e3 * bottom:.3g} mm", deep)):
+    for where, band in ((f"In the top {1e3 * top:.3g} mm", shallow), (f"Below {1e3 * bottom:.3g} mm", deep)):
         worst = max(band, key=lambda row: abs(row["gap"]))
         others = [row["gap"] for row in band]
         said.append(
@@ -183,6 +183,10 @@ def _returned(run: Penetration) -> float | None:
 def _percent(value: float) -> str:
     size = abs(100 * value)
     return f"{size:.0f} %" if size >= 9.5 else f"{size:.1f} %"
+
+
+def _share(value: float) -> str:
+    return f"{100 * value:.0f} %" if abs(value) >= 0.095 else f"{100 * value:.1f} %"
 
 
 def _signed(share: float) -> str:

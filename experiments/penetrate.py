@@ -32,6 +32,8 @@ __all__ = ["check", "choose_softness", "resume", "run"]
 
 BYTES_PER_GRAIN = 4000
 """Memory of one grain with its lists and contact history, float64, measured generously [bytes]."""
+RAIN = 2.5
+"""Height of the loose column that a bed is rained from, over the bed's depth [1]."""
 SHIPPED_RESULT = Path(__file__).parent.parent / "docs" / "results" / "penetrate" / "result.json"
 """The result of the case that ships, in a checkout."""
 PREPARATION = 1.5
@@ -96,6 +98,7 @@ def choose_softness(settings: PenetrateSettings) -> Softening:
         bed_height=settings.bed_size[2],
         depth=min(deepest(settings), max(settings.depth, *drops) if drops else settings.depth),
         speed=max(*settings.speeds, *settings.other_speeds, *settings.drop_speeds, settings.lowering_speed),
+        fall=RAIN * settings.bed_size[2],
         pressure=settings.weight / area,
     )
     if settings.young is None:
@@ -144,8 +147,25 @@ def prepare_bed(settings: PenetrateSettings, seed: int, young: float, progress: 
         arch=settings.arch,
         threads=settings.threads,
         cache=settings.cache,
-        progress=progress,
+        progress=_OneStage(progress, f"bed of seed {seed}"),
     )
+
+
+class _OneStage:
+    """Shows the stages of a preparation, rain and settling, as one stage of the experiment."""
+
+    def __init__(self, progress: Progress, name: str, parts: int = 2) -> None:
+        self.progress, self.parts, self.part = progress, parts, -1
+        progress.stage(name, total=float(parts))
+
+    def stage(self, name: str, total: float | None = None) -> None:
+        """The next part begins."""
+        self.part = min(self.part + 1, self.parts - 1)
+        self.progress.update(self.part)
+
+    def update(self, done: float) -> None:
+        """`done` of this part, 0 to 1."""
+        self.progress.update(self.part + min(1.0, max(0.0, done)))
 
 
 def write_report(folder: Path, progress: Progress) -> None:
@@ -184,7 +204,7 @@ def _plan(settings: PenetrateSettings, units: list[Unit], folder: RunFolder, pro
     for seed in settings.seeds:
         todo = [unit for unit in units if unit.seed == seed and not folder.is_done(unit.id)]
         if todo:
-            costs[_bed_stage(seed)] = PREPARATION
+            costs[f"bed of seed {seed}"] = PREPARATION
         costs |= {unit.title: expected_time(settings, unit, stiffness) for unit in todo}
     progress.plan(costs | {"spring-damper": 0.05, "report": 0.5})
 
@@ -201,7 +221,6 @@ def _run_seed(
     todo = [unit for unit in units if not folder.is_done(unit.id)]
     if not todo and folder.is_done(f"bed-{seed}"):
         return
-    progress.stage(_bed_stage(seed))
     bed = prepare_bed(settings, seed, softening.young, progress)
     facts = _bed_facts(bed, seed, softening)
     ground = BedGround(bed, make_spike(settings))
@@ -224,6 +243,7 @@ def _run_unit(
     """One run to its end, from its checkpoint where there is one."""
     bed = ground.bed
     stepper = make_run(settings, unit, ground)
+    stepper.expected_time = expected_time(settings, unit, _expected_stiffness(settings))
     kept = folder.load_checkpoint(unit.id)
     if kept is not None:
         stepper.restore(kept)
@@ -397,10 +417,6 @@ def _bed_facts(bed: Any, seed: int, softening: Softening) -> dict[str, Any]:
         "young": float(softening.young),
         "time_step": float(bed.time_step),
     }
-
-
-def _bed_stage(seed: int) -> str:
-    return f"bed of seed {seed}"
 
 
 def _expected_stiffness(settings: PenetrateSettings) -> float:

@@ -11,8 +11,8 @@ grain's diameter) allows at the pressures and speeds of *this* run, and never st
    loaded contacts is `CHAIN` = 6 times the mean (ln 400 = 6).
 3. Hertz between two grains, F = (2/3) E* d^2 (delta/d)^1.5, E* = E / (2 (1 - nu^2)), so
        delta/d = (1.5 CHAIN p / E*)^(2/3).
-4. Apart from that, a grain of mass m hit by the spike at speed v, and a grain of the bed falling onto another at the
-   same speed: delta = (5 m v^2 / 4 k)^(2/5), k = (4/3) E* sqrt(R), E* = E / (1 - nu^2) against a rigid spike.
+4. Apart from that, a grain of mass m that hits something rigid, the spike at its speed or the floor after the fall in
+   which the bed was rained in, v^2 = 2 g h: delta = (5 m v^2 / 4 k)^(2/5), k = (4/3) E* sqrt(R), E* = E / (1 - nu^2).
 
 The estimate is a choice made beforehand; the bed measures its largest overlap, and the result states it.
 """
@@ -73,12 +73,13 @@ def soften(
     depth: float,
     speed: float,
     pressure: float = 0.0,
+    fall: float = 0.0,
     packing: float = 0.6,
 ) -> Softening:
     """Young's modulus that keeps overlaps below `max_overlap` (see the module). All SI; `grain` is the mean diameter.
 
-    `depth` is the deepest the tip goes, `speed` its fastest, `pressure` what the load alone presses with. Raises
-    ValueError for an overlap that is no share of a diameter.
+    `depth` is the deepest the tip goes, `speed` its fastest, `pressure` what the load alone presses with, `fall` how
+    deep a grain fell when the bed was made. Raises ValueError for an overlap that is no share of a diameter.
     """
     if not 0 < max_overlap <= 0.2:
         raise ValueError(f"max_overlap is {max_overlap}: it must be above 0 and at most 0.2 of a diameter")
@@ -88,7 +89,8 @@ def soften(
     pair = 1.5 * CHAIN * highest / max_overlap**1.5
     static = 2 * (1 - poisson**2) * pair
     mass = density * math.pi * grain**3 / 6
-    stiffness = 1.25 * mass * speed**2 / (max_overlap * grain) ** 2.5
+    squared = max(speed**2, 2 * gravity * fall)
+    stiffness = 1.25 * mass * squared / (max_overlap * grain) ** 2.5
     impact = 0.75 * stiffness / math.sqrt(0.5 * grain) * (1 - poisson**2)
     return Softening(min(real_young, max(static, impact)), highest, speed, real_young)
 

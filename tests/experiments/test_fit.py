@@ -78,7 +78,7 @@ def test_departures_are_said_by_depth_and_speed():
     models = {"a": drive(SPIKE, into=law, speed=0.1, depth=0.02)}
     found = departures(driven, models, {"a": driven[0]}, fit, sinkage=(0.002, 0.003))
     text = " ".join(found["sentences"])
-    assert "Above 5 mm the spring-damper pushes" in text and "too hard at" in text and "too softly at" in text
+    assert "In the top 5 mm the spring-damper pushes" in text and "too hard at" in text and "too softly at" in text
     assert "sinks 2.00 mm into the bed; the spring-damper says 3.00 mm, 50 % deeper" in text
     assert found["work_returned"]["bed"] < 0.2 < found["work_returned"]["model"]
     assert departure_table([], Fit(1.0, 0.0, None, None, ())) == []
