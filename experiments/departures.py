@@ -142,11 +142,13 @@ def _by_depth(table: Sequence[Mapping[str, Any]]) -> list[str]:
     for where, band in ((f"In the top {1e3 * top:.3g} mm", shallow), (f"Below {1e3 * bottom:.3g} mm", deep)):
         worst = max(band, key=lambda row: abs(row["gap"]))
         others = [row["gap"] for row in band]
-        said.append(
+        text = (
             f"{where} the spring-damper pushes {_percent(worst['gap'])} too {_hard(worst['gap'])} at "
-            f"{worst['speed']:g} m/s ({worst['model_force']:.3g} N against {worst['bed_force']:.3g} N); over all "
-            f"speeds the gap there is {_signed(min(others))} to {_signed(max(others))} %."
+            f"{worst['speed']:g} m/s ({worst['model_force']:.3g} N against {worst['bed_force']:.3g} N)"
         )
+        if len(others) > 1:
+            text += f"; over all speeds the gap there is {_signed(min(others))} to {_signed(max(others))} %"
+        said.append(f"{text}.")
     return said
 
 
