@@ -67,12 +67,12 @@ class PenetrateSettings(BaseModel):
     speeds: tuple[Positive, ...] = Field((0.1, 0.2, 0.4), min_length=1, description="Speeds of driven runs [m/s].")
     depth: Positive = Field(0.02, description="Depth of driven runs [m].")
     hold: NotNegative = Field(0.02, description="How long a driven spike is held at depth [s].")
-    retreat_speed: Positive = Field(0.2, description="Speed of the pull-out [m/s].")
+    retreat_speed: Positive = Field(0.4, description="Speed of the pull-out [m/s].")
     drop_speeds: tuple[Positive, ...] = Field(
         (0.02, 0.04, 0.06), description="Speeds at the surface of dropped runs [m/s]."
     )
-    drop_time: Positive = Field(1.5, description="A drop that has not come to rest ends after this [s].")
-    lowering_speed: Positive = Field(0.03, description="Speed at which a spike is lowered to be set down [m/s].")
+    drop_time: Positive = Field(0.8, description="A drop that has not come to rest ends after this [s].")
+    lowering_speed: Positive = Field(0.05, description="Speed at which a spike is lowered to be set down [m/s].")
     rest_time: Positive = Field(0.04, description="For how long the signs of rest must hold [s].")
     other_speeds: tuple[Positive, ...] = Field((0.2,), description="Speeds driven on the seeds after the first [m/s].")
     other_drop_speeds: tuple[Positive, ...] = Field((0.04,), description="Drops on the seeds after the first [m/s].")
