@@ -87,6 +87,7 @@ def pair_parameters(
         raise ValueError(f"friction = {friction} and rolling friction = {rolling_friction} must not be negative")
     factor = damping_factor(restitution, tensile=tensile)
     ratio = math.sqrt(8 * effective_shear / (2 * effective_young))
+    turning = 2 * TURNING_DAMPING_RATIO * math.sqrt(0.4) * ratio
     return [
         2 * effective_young,
         8 * effective_shear,
@@ -105,7 +106,8 @@ def contact_force(p: ti.template(), n, v, overlap, radius, mass, dt, u: ti.templ
 
     ``p`` the pair's parameters, ``n`` the unit normal towards the first, ``v`` the relative velocity of the first at
     the contact point [m/s], ``overlap`` [m], ``radius``, ``mass`` the effective ones, ``u`` the tangential
-    displacement [m], updated in place. Returns (normal force [N], tangential force vector [N], tangential stiffness [N/m], contact radius [m]).
+    displacement [m], updated in place. Returns (normal force [N], tangential force vector [N], tangential stiffness [N/m],
+    contact radius [m], sqrt(m* S_n)).
     """
     a = ti.sqrt(radius * overlap)
     s_n = p[_TWO_E] * a
@@ -125,15 +127,16 @@ def contact_force(p: ti.template(), n, v, overlap, radius, mass, dt, u: ti.templ
     if square > bound * bound:
         f_t *= bound / ti.sqrt(square)
         u = -(f_t + c_t * v_t) / k_t
-    return f_n, f_t, k_t, a
+    return f_n, f_t, k_t, a, root
 
 
 @ti.func
-def turning_torque(p: ti.template(), n, spin, f_n, k_t, a, radius, inertia, dt, q: ti.template()):
+def turning_torque(p: ti.template(), n, spin, f_n, k_t, a, radius, root, dt, q: ti.template()):
     """Rolling and twisting torque on the first of a pair [N m].
 
-    ``spin`` the relative angular velocity, ``a`` the contact radius [m], ``inertia`` the effective one [kg m2], ``q``
-    the angle turned [rad], updated in place: its normal part is twisting, the rest rolling.
+    ``spin`` the relative angular velocity, ``a`` the contact radius [m], ``root`` sqrt(m* S_n), ``q`` the angle turned
+    [rad], updated in place: its normal part is twisting, the rest rolling. The dampings are shares of the critical one
+    for the inertia 2/5 m* R*^2; as S_t is a fixed multiple of S_n, they come from ``root`` without another root.
     """
     q += spin * dt
     spin_n = spin.dot(n)
@@ -143,7 +146,7 @@ def turning_torque(p: ti.template(), n, spin, f_n, k_t, a, radius, inertia, dt, 
     force = ti.abs(f_n)
 
     k_r = k_t * radius * radius
-    c_r = p[_TURNING_DAMPING] * 2.0 * ti.sqrt(inertia * k_r)
+    c_r = p[_TURNING_DAMPING] * root * radius * radius
     m = -(k_r * roll + c_r * roll_rate)
     bound = p[_ROLLING] * radius * force
     square = m.norm_sqr()
@@ -152,7 +155,7 @@ def turning_torque(p: ti.template(), n, spin, f_n, k_t, a, radius, inertia, dt, 
         roll = -(m + c_r * roll_rate) / k_r
 
     k_w = 0.5 * k_t * a * a
-    c_w = p[_TURNING_DAMPING] * 2.0 * ti.sqrt(inertia * k_w)
+    c_w = 0.7071067811865476 * p[_TURNING_DAMPING] * root * radius * a
     m_n = -(k_w * twist + c_w * spin_n)
     bound = 0.1875 * ti.math.pi * p[_FRICTION] * a * force
     if ti.abs(m_n) > bound:

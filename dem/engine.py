@@ -294,7 +294,7 @@ class Engine:
                     arm_j = x_j.w - 0.5 * overlap
                     v = v_i.xyz - v_j.xyz - (arm_i * w_i.xyz + arm_j * w_j.xyz).cross(n)
                     u = self.slide[s]
-                    f_n, f_t, k_t, a = contact_force(p, n, v, overlap, radius, mass, dt, u, self.tensile)
+                    f_n, f_t, k_t, a, root = contact_force(p, n, v, overlap, radius, mass, dt, u, self.tensile)
                     self.slide[s] = u
                     f = f_n * n + f_t
                     t = f_t.cross(n)
@@ -303,8 +303,7 @@ class Engine:
                     turn = ti.Vector.zero(self.real, 3)
                     if ti.static(self.rolling):
                         q = self.roll[s]
-                        inertia = 0.4 * mass * radius * radius
-                        turn = turning_torque(p, n, w_i.xyz - w_j.xyz, f_n, k_t, a, radius, inertia, dt, q)
+                        turn = turning_torque(p, n, w_i.xyz - w_j.xyz, f_n, k_t, a, radius, root, dt, q)
                         self.roll[s] = q
                         sum_t += turn
                     if ti.static(not self.gpu):
@@ -344,15 +343,14 @@ class Engine:
             radius = x.w / (1.0 + x.w * curvature)
             p = self.body_pair[b]
             u = self.near_slide[s]
-            f_n, f_t, k_t, a = contact_force(p, n, v, overlap, radius, v_i.w, dt, u, self.tensile)
+            f_n, f_t, k_t, a, root = contact_force(p, n, v, overlap, radius, v_i.w, dt, u, self.tensile)
             self.near_slide[s] = u
             f = f_n * n + f_t
             t = arm_i * f_t.cross(n)
             t_body = -arm.cross(f)
             if ti.static(self.rolling):
                 q = self.near_roll[s]
-                inertia = 0.4 * v_i.w * radius * radius
-                turn = turning_torque(p, n, w_i.xyz - body_spin, f_n, k_t, a, radius, inertia, dt, q)
+                turn = turning_torque(p, n, w_i.xyz - body_spin, f_n, k_t, a, radius, root, dt, q)
                 self.near_roll[s] = q
                 t += turn
                 t_body -= turn
