@@ -342,14 +342,22 @@ class Bed:
         """Time since the bed was made [s]."""
         return self.steps * self.time_step
 
-    def advance(self, steps: int = 1) -> None:
+    def advance(self, steps: int = 1, *, drag_time: float = math.inf) -> None:
         """Advance by a number of time steps.
 
+        Args:
+            drag_time: the grains settle as in a fluid that takes their speed away with this time constant [s]; a tool
+                of preparation, off by default.
+
         Raises:
+            ValueError: a drag time shorter than two steps.
             BedFailure: a grain left the box, a number is not a number, or an overlap went past its bound.
         """
         self._check_valid()
         e = self._engine
+        if not drag_time >= 2 * self.time_step:
+            raise ValueError(f"drag_time = {drag_time} s must be at least two time steps of {self.time_step:.3g} s")
+        keep = 1 - self.time_step / drag_time
         e.clear_pushes()
         self._reaction_steps = steps
         limit = 0.5 * self._skin
@@ -361,7 +369,7 @@ class Bed:
                 count = STEPS_PER_LAUNCH if steps - done - ahead >= STEPS_PER_LAUNCH else 1
                 if ahead + count > steps - done:
                     break
-                e.run(self.time_step, limit, *self.gravity, count)
+                e.run(self.time_step, limit, *self.gravity, keep, count)
                 ahead += count
             advanced = int(e.done[None])
             halted = int(e.halted[None])

@@ -202,8 +202,11 @@ class Engine:
         return start, start + base + ti.select(c < rest, 1, 0)
 
     @ti.func
-    def move(self, c, dt, limit, gravity):
-        """Kick and drift the grains of a chunk; chunk 0 moves the bodies as well."""
+    def move(self, c, dt, limit, gravity, keep):
+        """Kick and drift the grains of a chunk; chunk 0 moves the bodies as well.
+
+        ``keep`` is the share of its speed that drag leaves a grain in a step; 1 without drag.
+        """
         if self.halted[None] == 0:
             start, end = self.chunk_range(c)
             far = 0
@@ -214,8 +217,8 @@ class Engine:
                 w = self.spin[i]
                 t = self.torque[i]
                 inverse = dt / v.w
-                v.xyz += f * inverse
-                w.xyz += t * (2.5 * inverse / (x.w * x.w))
+                v.xyz = keep * v.xyz + f * inverse
+                w.xyz = keep * w.xyz + t * (2.5 * inverse / (x.w * x.w))
                 x.xyz += v.xyz * dt
                 self.position[i] = x
                 self.velocity[i] = v
@@ -399,14 +402,15 @@ class Engine:
             self.halted[None] = 1
 
     @ti.kernel
-    def run(self, dt: float, limit: float, gx: float, gy: float, gz: float, steps: ti.template()):
+    def run(self, dt: float, limit: float, gx: float, gy: float, gz: float, keep: float, steps: ti.template()):
         """Up to ``steps`` steps; stops by itself where new lists are needed (halted = 1, the forces still to come)."""
         for _ in ti.static(range(steps)):
             for w in range(self.work_items):
                 self.ticket[1] = 0
                 c = self.next_chunk(w, 0, True)
                 while c < self.chunk_count:
-                    self.move(c, ti.cast(dt, self.real), ti.cast(limit, self.real), ti.Vector([gx, gy, gz]))
+                    gravity = ti.Vector([gx, gy, gz])
+                    self.move(c, ti.cast(dt, self.real), ti.cast(limit, self.real), gravity, ti.cast(keep, self.real))
                     c = self.next_chunk(w, 0, False)
             for w in range(self.work_items):
                 self.ticket[0] = 0

@@ -29,10 +29,11 @@ __all__ = ["cache_folder", "prepare_bed"]
 RECIPE = 1
 # More is rained in than is kept: this much higher, and at least this many diameters.
 _SURPLUS, _SURPLUS_DIAMETERS = 0.06, 2.0
-_LOOK_INTERVAL = 0.002  # of the time in which a grain falls a bed's depth... see _look
 # Settled: mean kinetic energy of a grain over m g d, and floor force over weight.
 ENERGY_RATIO, FLOOR_RATIO = 1e-5, 0.01
 _ROUGH_ENERGY_RATIO = 1e-2
+# Time constant of the drag while settling, in the time that a grain takes to fall the bed's depth.
+_DRAG = 0.1
 _LONGEST = 60.0  # settling gives up after this many fall times
 _MOST_TAPS = 40
 
@@ -79,7 +80,9 @@ def prepare_bed(
         cache: whether to look in the cache, and to leave the bed there.
         progress: anything with ``stage(name, total)`` and ``update(done)``, or None.
 
-    Settled means: mean kinetic energy of a grain below 1e-5 m g d, and floor force within 1 % of the weight.
+    The grains fall as a loose column from rest, come to rest in a drag that stands in for the long ringing of a soft
+    bed, lose what lies above the level, and settle again, at the end without drag. Settled means: mean kinetic energy of
+    a grain below 1e-5 m g d, and floor force within 1 % of the weight.
 
     Raises:
         ValueError: an unknown material, a size or grain that is not positive, grains too large for the bed, a spread
@@ -122,10 +125,11 @@ def prepare_bed(
     report = _Reporter(progress)
     bed = _rain(stuff, size, grain, spread, gravity, seed, young, max_overlap, time_step, precision, arch, threads)
     report.stage("rain", None)
-    _settle(bed, grain, _ROUGH_ENERGY_RATIO, report)
+    _fall(bed, grain, report)
+    _settle(bed, grain, _ROUGH_ENERGY_RATIO, report, drag=True)
     bed = _level(bed, size[2])
     report.stage("settle", None)
-    _settle(bed, grain, ENERGY_RATIO, report)
+    _settle(bed, grain, ENERGY_RATIO, report, drag=True)
     bed.measure_surface()
     if packing is not None:
         bed = _tap(bed, size[2], grain, packing, report)
@@ -184,27 +188,51 @@ def _rain(stuff, size, grain, spread, gravity, seed, young, max_overlap, time_st
     )
 
 
-def _settle(bed: Bed, grain: float, ratio: float, report: _Reporter) -> None:
-    """Advance until the bed is at rest by ``ratio`` and the floor carries the weight."""
+def _settle(bed: Bed, grain: float, ratio: float, report: _Reporter, *, drag: bool = False) -> None:
+    """Advance until the bed is at rest by ``ratio`` and the floor carries the weight.
+
+    Soft grains in a deep bed ring as one spring for long. With ``drag`` the grains settle as in a fluid until they are
+    at rest; then, without it, they must still be.
+    """
     g = math.hypot(*bed.gravity)
     unit = bed.weight / bed.grain_count * grain
     fall = math.sqrt(2 * bed.size[2] / g)
     steps = max(1, round(0.05 * fall / bed.time_step))
+    tolerance = FLOOR_RATIO if ratio == ENERGY_RATIO else 0.5
     began = bed.time
-    first = math.log(max(bed.kinetic_energy / bed.grain_count / unit, 1.0) / ratio) + 1e-9
+    first = None
     while True:
-        bed.advance(steps)
+        bed.advance(steps, drag_time=_DRAG * fall if drag else math.inf)
         energy = bed.kinetic_energy / bed.grain_count / unit
         floor = abs(bed.floor_force / bed.weight - 1)
-        report.tell(f"energy {energy:.1e} m g d, floor {100 * bed.floor_force / bed.weight:.1f} % of weight")
-        report.update(1 - min(1.0, max(0.0, math.log(max(energy, 1e-300) / ratio) / first)))
-        if energy < ratio and floor < (FLOOR_RATIO if ratio == ENERGY_RATIO else 0.1):
-            return
+        first = first or math.log(max(energy / ratio, math.e))
+        report.update(1 - min(1.0, max(0.0, math.log(max(energy / ratio, 1.0)) / first)))
+        if energy < ratio and floor < tolerance:
+            if not drag:
+                return
+            drag = False
         if bed.time - began > _LONGEST * fall:
             raise BedFailure(
                 f"the bed did not come to rest in {bed.time - began:.3g} s: energy {energy:.2g} m g d (below {ratio:g} "
                 f"was wanted), floor force off by {100 * floor:.2g} % of the weight"
             )
+
+
+def _fall(bed: Bed, grain: float, report: _Reporter) -> None:
+    """Advance until the rain is down: the grains' energy has passed its peak and is a tenth of m g d a grain."""
+    g = math.hypot(*bed.gravity)
+    unit = bed.weight / bed.grain_count * grain
+    top = bed.grains()["position"][:, 2].max()
+    fall = math.sqrt(2 * top / g)
+    steps = max(1, round(0.03 * fall / bed.time_step))
+    peak = 0.0
+    while True:
+        bed.advance(steps)
+        energy = bed.kinetic_energy / bed.grain_count / unit
+        peak = max(peak, energy)
+        report.update(min(1.0, bed.time / fall))
+        if (energy < 0.1 and energy < 0.5 * peak) or bed.time > _LONGEST * fall:
+            return
 
 
 def _level(bed: Bed, depth: float) -> Bed:
@@ -238,7 +266,7 @@ def _tap(bed: Bed, depth: float, grain: float, packing: float, report: _Reporter
             bed.set_gravity((0.0, 0.0, -g * (1 - 3 * math.sin(math.pi * (k + 0.5) / pieces))))
             bed.advance(max(1, round(length / pieces / bed.time_step)))
         bed.set_gravity(g)
-        _settle(bed, grain, ENERGY_RATIO, report)
+        _settle(bed, grain, ENERGY_RATIO, report, drag=True)
         bed.measure_surface()
         report.update((bed.packing_fraction - start) / max(1e-9, packing - start))
     raise ValueError(
@@ -268,6 +296,3 @@ class _Reporter:
     def update(self, done: float) -> None:
         if self._progress is not None:
             self._progress.update(done)
-
-    def tell(self, text: str) -> None:
-        """Kept for those who want to see the numbers; silent by default."""

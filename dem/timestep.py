@@ -12,7 +12,7 @@ from .materials import Material
 
 __all__ = ["choose_young", "contact_time", "time_step_for"]
 
-STEPS_PER_CONTACT = 10
+STEPS_PER_CONTACT = 8
 FEWEST_STEPS_PER_CONTACT = 5
 # Penetration resistance of sand grows with depth about sixty times as fast as its overburden (3D-RFT, Agarwal et al.
 # 2023: 0.9 MN/m3 at mu = 0.5 against 16 kN/m3), and the largest forces in a loaded bed are some six times the mean.
@@ -24,7 +24,8 @@ def contact_time(material: Material, *, diameter: float, max_overlap: float) -> 
     """Half a period of the stiffest contact that the overlap bound allows [s].
 
     pi sqrt(m* / S_n), S_n = 2 E* sqrt(R* delta) at delta = max_overlap d, for two grains and for a grain on a rigid
-    plane, whichever is shorter.
+    plane, whichever is shorter. A Hertzian collision that reaches this overlap lasts 1.28 times as long, and one that
+    reaches a tenth of it 2.3 times.
 
     Args:
         diameter: of the smallest grain [m].
@@ -43,7 +44,7 @@ def contact_time(material: Material, *, diameter: float, max_overlap: float) -> 
 
 
 def time_step_for(material: Material, *, diameter: float, max_overlap: float, wanted: float | None = None) -> float:
-    """The time step [s]: a tenth of the shortest contact time, or the one wanted if it is short enough.
+    """The time step [s]: an eighth of the shortest contact time, or the one wanted if it is short enough.
 
     Raises:
         ValueError: the step wanted is not positive, or longer than a fifth of the contact time.
