@@ -84,7 +84,7 @@ def choose_softness(settings: PenetrateSettings) -> Softening:
     area = math.pi * settings.tip_diameter**2 / 4
     stiffness = bearing_gradient(bulk, settings.gravity, material.friction) * area
     drops = [
-        drop_depth(speed, settings.moving_mass, settings.weight, stiffness)
+        drop_depth(speed, settings.mass, settings.weight, stiffness)
         for speed in (*settings.drop_speeds, *settings.other_drop_speeds)
     ]
     chosen = soften(
@@ -185,7 +185,7 @@ def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progres
         progress.message(
             f"grains softened {softening.factor:.3g} times, to E = {softening.young:.3g} Pa, for overlaps of at most "
             f"{100 * settings.max_overlap:.3g} % at {softening.pressure:.3g} Pa and {softening.speed:g} m/s; the load "
-            f"is {settings.weight:.4g} N, a dropped spike moves {settings.moving_mass:.4g} kg"
+            f"is {settings.weight:.4g} N, a dropped spike moves {settings.mass:.4g} kg"
         )
         _plan(settings, units, folder, progress)
         for seed in settings.seeds:

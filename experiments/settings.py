@@ -23,7 +23,7 @@ SeedNumber = Annotated[int, Field(ge=0, lt=2**31)]
 
 def expected_grain_count(bed_size: tuple[float, float, float], grain: float, spread: float) -> float:
     """About how many grains fill the bed, at a packing fraction of 0.6; diameters uniform within 1 +- spread."""
-    return 0.6 * math.prod(bed_size) / (math.pi / 6 * grain**3 * (1 + spread**2))
+    return 0.57 * math.prod(bed_size) / (math.pi / 6 * grain**3 * (1 + spread**2))
 
 
 class PenetrateSettings(BaseModel):
@@ -34,7 +34,7 @@ class PenetrateSettings(BaseModel):
     # The bed
     material: str = Field("sand", description="Grain material, by name.")
     bed_size: tuple[Positive, Positive, Positive] = Field(
-        (0.072, 0.072, 0.05), description="Bed: both widths (periodic) and depth of grains [m]."
+        (0.072, 0.072, 0.052), description="Bed: both widths (periodic) and depth of grains [m]."
     )
     grain: Positive = Field(0.0024, description="Mean grain diameter [m].")
     spread: float = Field(0.15, ge=0, le=0.5, description="Grain diameters are uniform within 1 +- this [1].")
@@ -61,21 +61,23 @@ class PenetrateSettings(BaseModel):
     load: Positive | None = Field(
         None, description="Weight on the spike [N]; (m + m_b) g_sim / 4 of platform and counterweight if not given."
     )
-    mass: Positive | None = Field(None, description="Mass that a dropped spike moves [kg]; (m + m_b) / 4 if not given.")
+    mass: Positive = Field(
+        0.5, description="Mass that a dropped spike moves [kg]; the platform's share in the rig, (m + m_b) / 4, is 2.63 kg."
+    )
 
     # What is done with it
     speeds: tuple[Positive, ...] = Field((0.1, 0.2, 0.4), min_length=1, description="Speeds of driven runs [m/s].")
-    depth: Positive = Field(0.02, description="Depth of driven runs [m].")
+    depth: Positive = Field(0.015, description="Depth of driven runs [m].")
     hold: NotNegative = Field(0.02, description="How long a driven spike is held at depth [s].")
     retreat_speed: Positive = Field(0.4, description="Speed of the pull-out [m/s].")
     drop_speeds: tuple[Positive, ...] = Field(
-        (0.02, 0.04, 0.06), description="Speeds at the surface of dropped runs [m/s]."
+        (0.05, 0.1, 0.15), description="Speeds at the surface of dropped runs [m/s]."
     )
     drop_time: Positive = Field(0.8, description="A drop that has not come to rest ends after this [s].")
     lowering_speed: Positive = Field(0.05, description="Speed at which a spike is lowered to be set down [m/s].")
     rest_time: Positive = Field(0.04, description="For how long the signs of rest must hold [s].")
     other_speeds: tuple[Positive, ...] = Field((0.2,), description="Speeds driven on the seeds after the first [m/s].")
-    other_drop_speeds: tuple[Positive, ...] = Field((0.04,), description="Drops on the seeds after the first [m/s].")
+    other_drop_speeds: tuple[Positive, ...] = Field((0.1,), description="Drops on the seeds after the first [m/s].")
 
     # How it is computed
     max_overlap: float = Field(0.05, gt=0, le=0.1, description="Largest overlap of grains [of a diameter].")
@@ -188,19 +190,11 @@ class PenetrateSettings(BaseModel):
         return 0.0
 
     @property
-    def moving_mass(self) -> float:
-        """What a dropped spike moves [kg]: `mass`, or a quarter of platform and counterweight.
+    def weight(self) -> float:
+        """What rests on the spike [N]: `load`, or (m + m_b) g_sim / 4.
 
         The counterweight that makes the pair fall at g_sim is m_b = m (g - g_sim) / (g + g_sim) (planar model, Atwood).
         """
-        if self.mass is not None:
-            return self.mass
-        counterweight = self.platform_mass * (1 - self.rig) / (1 + self.rig) if self.rig else 0.0
-        return (self.platform_mass + counterweight) / 4
-
-    @property
-    def weight(self) -> float:
-        """What rests on the spike [N]: `load`, or (m + m_b) g_sim / 4."""
         if self.load is not None:
             return self.load
         counterweight = self.platform_mass * (1 - self.rig) / (1 + self.rig) if self.rig else 0.0

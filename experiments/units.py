@@ -73,7 +73,7 @@ def make_spike(settings: PenetrateSettings) -> Spike:
         shaft_diameter=settings.shaft_diameter,
         length=settings.tip_height + settings.shaft_length,
         cone_angle=settings.cone_angle,
-        mass=settings.moving_mass,
+        mass=settings.mass,
         friction=settings.spike_friction,
         restitution=settings.spike_restitution,
     )
@@ -106,7 +106,7 @@ def make_run(
             spike,
             ground,
             speed=unit.speed,
-            mass=settings.moving_mass,
+            mass=settings.mass,
             max_time=settings.drop_time if drop_time is None else drop_time,
             **common,
         )
@@ -127,7 +127,7 @@ def expected_time(settings: PenetrateSettings, unit: Unit, stiffness: float) -> 
     if unit.kind == "driven":
         return settings.depth / unit.speed + settings.hold + settings.depth / settings.retreat_speed
     if unit.kind == "drop":
-        stop = 0.5 * math.pi * math.sqrt(settings.moving_mass / stiffness)
+        stop = 0.5 * math.pi * math.sqrt(settings.mass / stiffness)
         return min(settings.drop_time, 2 * stop + settings.rest_time)
     return 6 * settings.weight / stiffness / unit.speed + settings.rest_time
 
