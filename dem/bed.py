@@ -379,7 +379,7 @@ class Bed:
             if halted:
                 self._adapt_skin()
                 self._make_lists()
-                self._push()
+                self._push(self.time_step)
                 limit = 0.5 * self._skin
                 done += 1
                 self.steps += 1
@@ -431,8 +431,9 @@ class Bed:
         what = "pairs" if code == 2 else "grains near bodies"
         return f"the lists have room for {room} {what} a chunk and {value} are needed; the grains overlap too much"
 
-    def _push(self) -> None:
-        self._engine.push_all(self.time_step)
+    def _push(self, elapsed: float = 0.0) -> None:
+        """Forces where the grains are; ``elapsed`` is the time by which contacts have slid since they were computed."""
+        self._engine.push_all(elapsed)
 
     def _start_clock(self) -> None:
         """Put the velocities half a step behind the positions, where the leapfrog wants them."""
@@ -630,6 +631,7 @@ class Bed:
         e.body_count[None] = bodies
         e.moved[None] = 0
         e.halted[None] = 0
+        e.ticket[0] = e.ticket[1] = 0
         reals = [float(v) for v in state["reals"]]
         self.time_step, self._skin = reals[:2]
         self.gravity = tuple(reals[2:5])
