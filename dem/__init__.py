@@ -6,9 +6,14 @@ Names are looked up when they are first used, so that ``import dem`` does not st
 from __future__ import annotations
 
 import importlib
+import os
 from typing import TYPE_CHECKING, Any
 
 __all__ = ["Ball", "Bed", "BedFailure", "Cone", "Cylinder", "MATERIALS", "Material", "Plane", "SAND", "material"]
+
+# Taichi greets on stdout as it is imported; what a script prints is the script's.
+os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
+os.environ.setdefault("TI_LOG_LEVEL", "error")
 
 if TYPE_CHECKING:
     from .bed import Bed, BedFailure
