@@ -1,0 +1,336 @@
+"""The race of the bed: what peers' logs say, who counts, and a tiny race from end to end."""
+
+import json
+import math
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import benchmarks.bed as race
+from benchmarks import table
+from benchmarks.bed import Lane, Settings, pick_best
+from benchmarks.entrants import Entrant, Heat, Ours
+from benchmarks.grains import BENCH, DIAMETER, Grains, coordination, packing, prepare_grains, wrapped, write_data
+from benchmarks.peers import LIGGGHTS, PeerError, read_log, run_peer
+from experiments.cli import main
+from experiments.progress import Progress
+
+PROGRAMS = {"liggghts": ("liggghts",), "lammps": ("lmp", "lammps"), "openmpi-bin": ("mpirun",)}
+MISSING = [package for package, names in PROGRAMS.items() if not any(map(shutil.which, names))]
+
+LIGGGHTS_LOG = """LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0, compiled 2022-01-26 by someone, git commit unknown)
+units           si
+run             ${warm}
+    Step         KinEng             er             cn           zsum             Lx             Ly
+       0              0              0           4504            6.5          0.044          0.044
+    1000       1.75e-05        1.4e-06           4122            6.4          0.044          0.044
+Loop time of 3.5 on 2 procs for 1000 steps with 1000 atoms, finish time Sat Nov 21 12:17:51 2026
+
+Neighbor list builds = 4
+Dangerous builds = 0
+run             ${steps}
+    Step         KinEng             er             cn           zsum             Lx             Ly
+    1000       1.75e-05        1.4e-06           4122            6.4          0.044          0.044
+    1200       2.25e-05        2.5e-06           4036            6.5          0.044          0.044
+Loop time of 0.5 on 2 procs for 200 steps with 1000 atoms, finish time Sat Nov 21 12:17:52 2026
+
+Neighbor list builds = 3
+Dangerous builds = 1
+"""
+
+LAMMPS_LOG = """LAMMPS (29 Sep 2021 - Update 2)
+OMP_NUM_THREADS environment is not set.
+run             ${warm}
+Step KinEng
+       0            0
+    1000     1.75e-05
+Loop time of 3.5 on 2 procs for 1000 steps with 1000 atoms
+
+99.0% CPU use with 2 MPI tasks x 1 OpenMP threads
+Neighbor list builds = 4
+Dangerous builds = 0
+run             ${steps}
+Step KinEng c_turning c_touching c_heights Lx Ly
+    1000     1.75e-05      1.4e-06         4130          6.4        0.044        0.046
+    1200     2.25e-05      2.5e-06         4010          6.5        0.044        0.046
+Loop time of 0.25 on 2 procs for 200 steps with 1000 atoms
+
+99.0% CPU use with 2 MPI tasks x 1 OpenMP threads
+Neighbor list builds = 2
+Dangerous builds = 0
+Total wall time: 0:00:05
+"""
+
+
+def stack(across: int = 8, layers: int = 5) -> Grains:
+    """Equal grains in square layers, each in the hollows of the one below, all touching by a little."""
+    spacing = DIAMETER * (1 - 2e-4)
+    rise = spacing * math.sqrt(0.5)
+    i, j, k = (m.ravel() for m in np.meshgrid(np.arange(across), np.arange(across), np.arange(layers), indexing="ij"))
+    shift = 0.5 * (k % 2)
+    positions = np.column_stack([(i + shift) * spacing, (j + shift) * spacing, 0.4999 * DIAMETER + k * rise])
+    period = (across * spacing, across * spacing)
+    return Grains(wrapped(positions, period), np.full(len(positions), DIAMETER / 2), period)
+
+
+# What logs say
+
+
+def test_the_timed_run_is_read_from_a_log_of_liggghts():
+    outcome = read_log(LIGGGHTS_LOG)
+    assert outcome.version == "LIGGGHTS-PUBLIC 3.8.0"
+    assert (outcome.time, outcome.steps, outcome.grain_count) == (0.5, 200, 1000)
+    assert (outcome.list_count, outcome.missed) == (3, 1)
+    assert outcome.kinetic_energy == pytest.approx(2.5e-5)
+    assert outcome.coordination == 4.036
+    assert outcome.mean_height == 6.5e-3
+    assert outcome.period == (0.044, 0.044)
+
+
+def test_the_timed_run_is_read_from_a_log_of_lammps():
+    outcome = read_log(LAMMPS_LOG)
+    assert outcome.version == "29 Sep 2021 - Update 2"
+    assert (outcome.time, outcome.steps, outcome.list_count, outcome.missed) == (0.25, 200, 2, 0)
+    assert outcome.coordination == 4.010
+    assert outcome.period == (0.044, 0.046)
+
+
+@pytest.mark.parametrize(
+    ("log", "said"),
+    [
+        ("", "no timed run"),
+        (LAMMPS_LOG.partition("run             ${steps}")[0], "no timed run"),
+        (LAMMPS_LOG.replace("         4010", ""), "cannot be read"),
+        (LAMMPS_LOG.replace("         4010", "      garbled"), "cannot be read"),
+        (LAMMPS_LOG.replace("Neighbor list builds = 2", ""), "cannot be read"),
+    ],
+)
+def test_a_log_that_lacks_something_is_refused(log, said):
+    with pytest.raises(PeerError, match=said):
+        read_log(log)
+
+
+def test_a_peer_that_fails_is_quoted(tmp_path, monkeypatch):
+    for name, text in (("mpirun", "echo 'not enough slots'; exit 5"), ("liggghts", "exit 0")):
+        (tmp_path / name).write_text(f"#!/bin/sh\n{text}\n")
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(PeerError, match=r"LIGGGHTS failed \(exit status 5\): not enough slots"):
+        run_peer(LIGGGHTS, tmp_path, ranks=2, variables={"in": "bed.data"}, limit=10)
+
+
+def test_a_peer_that_hangs_is_ended(tmp_path, monkeypatch):
+    for name in ("mpirun", "liggghts"):
+        (tmp_path / name).write_text("#!/bin/sh\nexec /bin/sleep 60\n")
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(PeerError, match="was ended after 0 s"):
+        run_peer(LIGGGHTS, tmp_path, ranks=2, variables={}, limit=0.2)
+
+
+# What is measured
+
+
+def test_coordination_of_a_stack_counts_neighbours_across_the_periods_but_not_the_floor():
+    grains = stack(layers=2)
+    assert coordination(grains) == 8  # four beside, four above or below
+
+
+def test_packing_of_a_column_of_known_height():
+    assert packing(0.3, (1.0, 1.0), mean_height=0.25) == pytest.approx(0.6)
+
+
+def test_positions_are_wrapped_into_the_period():
+    inside = wrapped(np.array([[-1e-20, 1.5, -2.0], [1.0, 0.25, 3.0]]), (1.0, 1.0))
+    assert inside.tolist() == [[0.0, 0.5, -2.0], [0.0, 0.25, 3.0]]
+
+
+def test_a_data_file_holds_every_grain_in_a_box_that_takes_them(tmp_path):
+    grains = stack()
+    write_data(tmp_path / "bed.data", grains)
+    lines = (tmp_path / "bed.data").read_text().splitlines()
+    assert "320 atoms" in lines
+    assert f"0 {grains.period[0]:.12g} xlo xhi" in lines
+    rows = np.loadtxt(lines[lines.index("Atoms") + 1 :])
+    assert rows[:, 0].tolist() == list(range(1, 321))
+    assert rows[:, 2:4] == pytest.approx(np.tile([DIAMETER, BENCH.density], (320, 1)))
+    assert rows[:, 4:] == pytest.approx(grains.positions, rel=1e-11)
+    height = float(next(line for line in lines if line.endswith("zhi")).split()[1])
+    assert height > (grains.positions[:, 2] + grains.radii).max()
+
+
+# Who counts
+
+
+class Fake(Entrant):
+    def __init__(self, name, *, counted=True, skin=2e-4):
+        self.name, self.counted, self.skin, self.threads = name, counted, skin, 2
+
+    def heat(self, steps):
+        raise NotImplementedError
+
+
+def lane(name, *speeds, coordination=4.0, packing=0.58, missed=0, **options):
+    heats = [
+        Heat(
+            speed=speed,
+            list_count=1,
+            coordination=coordination,
+            packing=packing,
+            kinetic_energy=1e-5,
+            missed=missed,
+            version="1",
+        )
+        for speed in speeds
+    ]
+    return Lane(Fake(name, **options), heats)
+
+
+def test_the_best_peer_is_the_fastest_that_counts_and_did_the_same_work():
+    ours = lane("ours", 9.0, counted=False)
+    others = [
+        lane("slow", 4.0, 5.0, 6.0),
+        lane("best", 6.0, 7.0, 1.0, coordination=4.03),
+        lane("loose", 8.0, packing=0.5785),
+        lane("few", 8.0, coordination=3.95),
+        lane("blind", 8.0, coordination=math.nan),
+        lane("late", 8.0, missed=2),
+        lane("shown", 8.0, counted=False),
+        lane("fell"),
+    ]
+    others[-1].failure = "exit status 1"
+    race._check_work(ours, others)
+    best = pick_best([ours, *others])
+    assert best is not None and best.entrant.name == "best" and best.speed == 6.0
+    said = {other.entrant.name: other.other_work for other in others}
+    assert said == {
+        "slow": "",
+        "best": "",
+        "loose": "packing -0.26 %",
+        "few": "coordination -1.2 %",
+        "blind": "coordination +nan %",
+        "late": "2 lists came too late",
+        "shown": "",
+        "fell": "",
+    }
+    assert pick_best([ours, *others[2:]]) is None
+
+
+def test_each_peer_goes_on_with_its_fastest_skin_and_those_near_to_it():
+    lanes = [
+        lane("a", 10.0, skin=1e-4),
+        lane("a", 9.0, skin=2e-4),
+        lane("a", 8.0, skin=4e-4),
+        lane("b", 1.0, skin=1e-4),
+        lane("b", skin=2e-4),
+    ]
+    assert race._leaders(lanes) == [lanes[0], lanes[1], lanes[3]]
+
+
+def test_the_environment_sets_sizes_rounds_and_steps(monkeypatch):
+    assert Settings.from_environment() == Settings((20_000, 100_000), 5, None, True)
+    for name, value in {"SIZES": "300,400 500", "ROUNDS": "2", "STEPS": "20", "SHOWN": "0"}.items():
+        monkeypatch.setenv(f"HEDGEBED_BENCH_{name}", value)
+    assert Settings.from_environment() == Settings((300, 400, 500), 2, 20, False)
+    for name, value in {"SIZES": "many", "ROUNDS": "1 2", "STEPS": "0", "SHOWN": "no"}.items():
+        with monkeypatch.context() as wrong:
+            wrong.setenv(f"HEDGEBED_BENCH_{name}", value)
+            with pytest.raises(ValueError, match=f"HEDGEBED_BENCH_{name} = '{value}' must be"):
+                Settings.from_environment()
+
+
+# From end to end
+
+
+@pytest.fixture(scope="module")
+def ours():
+    """Our bed of the stack, for every race here: compiling it takes longer than all of them."""
+    return Ours(stack(), threads=len(os.sched_getaffinity(0)))
+
+
+@pytest.fixture
+def tiny(ours, tmp_path, monkeypatch):
+    """A race of 320 grains that need no preparation, 20 steps, two rounds."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(race, "prepare_grains", lambda count, **options: stack())
+    monkeypatch.setattr(race, "Ours", lambda grains, **options: ours)
+    monkeypatch.setattr(race, "SKINS", (2e-4,))
+    for name, value in {"SIZES": "320", "ROUNDS": "2", "STEPS": "20", "SHOWN": "0"}.items():
+        monkeypatch.setenv(f"HEDGEBED_BENCH_{name}", value)
+
+
+def test_coordination_from_positions_is_that_of_the_beds_own_lists(ours):
+    """The bed's has the floor's contacts as well."""
+    heat = ours.heat(20)
+    bed = ours._bed
+    grains = bed.grains()
+    floor = np.count_nonzero(grains["position"][:, 2] < grains["radius"])
+    assert heat.coordination > 6
+    assert bed.coordination_number == pytest.approx(heat.coordination + floor / bed.grain_count, rel=1e-12)
+
+
+def test_a_race_without_peers_has_null_ratios_and_says_who_was_missing(tiny, monkeypatch, capfd):
+    import experiments.benching
+
+    monkeypatch.setattr(experiments.benching, "load_benchmark", lambda what: race.run)
+    monkeypatch.setenv("PATH", "")
+    assert main(["bench", "bed", "--out", "b", "--quiet", "--json"]) == 0
+    shown = capfd.readouterr()
+    bench = json.loads(Path("b/bench.json").read_text())
+    assert json.loads(shown.out) == bench
+    assert (bench["format"], bench["what"], bench["ratios"]) == ("hedgebed-bench/1", "bed", {"320": None})
+    assert bench["peers"] == {"LIGGGHTS": None, "LAMMPS": None}
+    for name in ("LIGGGHTS", "LAMMPS"):
+        assert any(name in remark and "apt install" in remark for remark in bench["remarks"])
+        assert name in shown.err
+    (bed,) = bench["beds"]
+    (ours,) = bed["entrants"]
+    assert ours["speed"] > 0 and ours["ours"]
+    first, second = (heat["kinetic_energy"] for heat in ours["heats"])
+    assert first == second > 0  # every heat starts from the same state
+    assert bed["best_peer"] is None
+    assert [path.name for path in Path().iterdir()] == ["b"]
+    assert [path.name for path in Path("b").iterdir()] == ["bench.json"]
+    assert str(Path.cwd()) not in json.dumps(bench)
+
+
+@pytest.mark.skipif(bool(MISSING), reason=f"races against peers: apt install {' '.join(MISSING)}")
+def test_a_race_on_a_stack_finds_that_peers_do_the_same_work(tiny, tmp_path, monkeypatch, capfd):
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr("tempfile.tempdir", None)
+    if len(os.sched_getaffinity(0)) > 2:  # so few grains cannot be shared out among many
+        monkeypatch.setattr(race, "count_cores", lambda: 2)
+    bench = race.run(tmp_path / "b", progress=Progress())
+    (bed,) = bench["beds"]
+    assert [entrant["failure"] for entrant in bed["entrants"]] == ["", "", ""]
+    assert [entrant["other_work"] for entrant in bed["entrants"]] == ["", "", ""]
+    assert bench["ratios"]["320"] > 0
+    assert all(bench["peers"].values())
+    assert "best peer" in capfd.readouterr().out
+    assert list((tmp_path / "temporary").iterdir()) == []
+    assert not (tmp_path / "b").exists()
+    page = table.insert(f"before\n{table.MARKS[0]}\nold\n{table.MARKS[1]}\nafter\n", table.markdown(bench))
+    assert page.startswith("before\n") and page.endswith("after\n") and "old" not in page
+    rows = [line for line in page.splitlines() if line.startswith("| ")]
+    assert len(rows) == 1 + 3
+    assert len({row.count("|") for row in rows}) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(bool(MISSING), reason=f"races against peers: apt install {' '.join(MISSING)}")
+def test_a_race_on_a_prepared_bed_finds_that_peers_do_the_same_work(tmp_path, monkeypatch):
+    monkeypatch.setenv("HEDGEBED_CACHE", str(tmp_path))
+    grains = prepare_grains(2000)
+    assert grains.count == 2000
+    assert (grains.positions[:, :2] >= 0).all() and (grains.positions[:, :2] < grains.period).all()
+    again = prepare_grains(2000)  # from the cache
+    assert (again.positions == grains.positions).all()
+    monkeypatch.setattr(race, "prepare_grains", lambda count, **options: grains)
+    for name, value in {"SIZES": "2000", "ROUNDS": "1", "STEPS": "200", "SHOWN": "0"}.items():
+        monkeypatch.setenv(f"HEDGEBED_BENCH_{name}", value)
+    bench = race.run(tmp_path / "b", progress=Progress())
+    assert [entrant["other_work"] for entrant in bench["beds"][0]["entrants"]] == [""] * 7
