@@ -282,7 +282,8 @@ class Drive(Run):
 class Drop(Run):
     """Let go at the surface with `speed` downwards, under the constant `load`, until it has come to rest.
 
-    It rests when over the last `rest_time` the depth stayed within `rest_tolerance` of the largest depth and the mean
+    A bed of soft grains lets a spike that has stopped bob for long: the run ends `after_stop` [s] after the first stop
+    where that comes sooner. It rests when over the last `rest_time` the depth stayed within `rest_tolerance` of the largest depth and the mean
     force within 5 % of the load. The rows of that time get the phase "rest".
     """
 
@@ -299,6 +300,7 @@ class Drop(Run):
         gravity: float = 9.80665,
         rest_time: float = 0.04,
         rest_tolerance: float = 0.005,
+        after_stop: float = math.inf,
         max_depth: float | None = None,
         **common: Any,
     ) -> None:
@@ -311,12 +313,14 @@ class Drop(Run):
         self.rest_time, self.rest_tolerance = float(rest_time), float(rest_tolerance)
         limit = self.ground.depth_limit
         self.max_depth = limit if max_depth is None else min(limit, float(max_depth))
+        self.after_stop = float(after_stop)
         self._force = 0.0
+        self._stopped_at = math.inf
 
     def settings(self) -> dict[str, Any]:
         return super().settings() | {
             "mass": self.mass, "load": self.load, "rest_time": self.rest_time, "rest_tolerance": self.rest_tolerance,
-            "max_time": self.max_time,
+            "after_stop": self.after_stop if math.isfinite(self.after_stop) else None, "max_time": self.max_time,
         }  # fmt: skip
 
     def _held_velocity(self) -> float:
@@ -325,12 +329,16 @@ class Drop(Run):
     def _after(self, held: float, force: float) -> None:
         self.velocity += self.macro_step * (self.load - force) / self.mass
         self._force = force
+        if self.velocity <= 0:
+            self._stopped_at = min(self._stopped_at, self.time)
         last = self._last(self.rest_time)
         if self.depth > self.max_depth:
             self.ended = "max_depth"
         elif last is not None and self._rests(last):
             self.ended = "rest"
             self._phases[-len(last) :] = [REST] * len(last)
+        elif self.time - self._stopped_at >= self.after_stop:
+            self.ended = "stopped"
 
     def _rests(self, last: np.ndarray) -> bool:
         deepest = max(self.depth, float(last[:, 1].max()))
@@ -338,10 +346,10 @@ class Drop(Run):
         return still and abs(float(last[:, 3].mean()) - self.load) <= 0.05 * self.load
 
     def _memory(self) -> list[float]:
-        return [self._force]
+        return [self._force, self._stopped_at]
 
     def _recall(self, memory: list[float]) -> None:
-        (self._force,) = memory
+        self._force, self._stopped_at = memory
 
 
 class SetDown(Drop):

@@ -62,7 +62,7 @@ class PenetrateSettings(BaseModel):
         None, description="Weight on the spike [N]; (m + m_b) g_sim / 4 of platform and counterweight if not given."
     )
     mass: Positive = Field(
-        0.5, description="Mass that a dropped spike moves [kg]; the platform's share in the rig, (m + m_b) / 4, is 2.63 kg."
+        0.2, description="Mass that a dropped spike moves [kg]; the platform's share in the rig, (m + m_b) / 4, is 2.63 kg."
     )
 
     # What is done with it
@@ -71,13 +71,14 @@ class PenetrateSettings(BaseModel):
     hold: NotNegative = Field(0.02, description="How long a driven spike is held at depth [s].")
     retreat_speed: Positive = Field(0.4, description="Speed of the pull-out [m/s].")
     drop_speeds: tuple[Positive, ...] = Field(
-        (0.05, 0.1, 0.15), description="Speeds at the surface of dropped runs [m/s]."
+        (0.1, 0.15, 0.2), description="Speeds at the surface of dropped runs [m/s]."
     )
+    after_stop: Positive = Field(0.05, description="How long a drop is followed after its first stop [s].")
     drop_time: Positive = Field(0.8, description="A drop that has not come to rest ends after this [s].")
     lowering_speed: Positive = Field(0.05, description="Speed at which a spike is lowered to be set down [m/s].")
     rest_time: Positive = Field(0.04, description="For how long the signs of rest must hold [s].")
     other_speeds: tuple[Positive, ...] = Field((0.2,), description="Speeds driven on the seeds after the first [m/s].")
-    other_drop_speeds: tuple[Positive, ...] = Field((0.1,), description="Drops on the seeds after the first [m/s].")
+    other_drop_speeds: tuple[Positive, ...] = Field((0.15,), description="Drops on the seeds after the first [m/s].")
 
     # How it is computed
     max_overlap: float = Field(0.05, gt=0, le=0.1, description="Largest overlap of grains [of a diameter].")

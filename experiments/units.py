@@ -107,6 +107,7 @@ def make_run(
             ground,
             speed=unit.speed,
             mass=settings.mass,
+            after_stop=settings.after_stop if drop_time is None else math.inf,
             max_time=settings.drop_time if drop_time is None else drop_time,
             **common,
         )
@@ -121,14 +122,14 @@ def deepest(settings: PenetrateSettings) -> float:
 def expected_time(settings: PenetrateSettings, unit: Unit, stiffness: float) -> float:
     """About how long a run lasts on the bed's clock [s], `stiffness` [N/m] being a guess at the bed's.
 
-    A drop: down in a quarter of a period, and as long again to come to rest. A set-down: first order, with the hand's
+    A drop: down in a quarter of a period, and what it is followed for after that. A set-down: first order, with the hand's
     c / K = load / (lowering_speed K), five times that and the way down.
     """
     if unit.kind == "driven":
         return settings.depth / unit.speed + settings.hold + settings.depth / settings.retreat_speed
     if unit.kind == "drop":
         stop = 0.5 * math.pi * math.sqrt(settings.mass / stiffness)
-        return min(settings.drop_time, 2 * stop + settings.rest_time)
+        return min(settings.drop_time, stop + settings.after_stop)
     return 6 * settings.weight / stiffness / unit.speed + settings.rest_time
 
 

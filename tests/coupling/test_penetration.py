@@ -151,3 +151,13 @@ def test_a_saved_run_is_a_run_folder(tmp_path):
         assert np.array_equal(getattr(back, name), getattr(run, name))
     with pytest.raises(FileExistsError):
         run.save(folder)
+
+
+def test_a_drop_that_bobs_ends_a_set_time_after_its_first_stop():
+    """Undamped spring: it would bob for ever; the first stop is at (pi/2 + phi) sqrt(m/K), tan phi = W / (v sqrt(mK))."""
+    ground = SpringDamper(stiffness=100.0, damping=0.0, time_step=1e-5)
+    spike = Spike(diameter=0.012, length=0.06, mass=0.2)
+    series = drop(spike, into=ground, speed=0.1, load=0.2, after_stop=0.03, max_time=5.0)
+    stop = (0.5 * np.pi + np.arctan(0.2 / (0.1 * np.sqrt(0.2 * 100.0)))) * np.sqrt(0.2 / 100.0)
+    assert series.ended == "stopped"
+    assert series.time[-1] == pytest.approx(stop + 0.03, abs=5e-4)

@@ -169,7 +169,7 @@ def test_every_run_is_made_on_the_first_seed_fewer_on_the_others():
     units = plan_units(PenetrateSettings())
     assert len([unit for unit in units if unit.seed == 1]) == 7
     assert len([unit for unit in units if unit.seed == 2]) == 3
-    assert shown_units(units) == {"seed1-driven-0.1", "seed1-drop-0.15", "seed1-set-down"}
+    assert shown_units(units) == {"seed1-driven-0.1", "seed1-drop-0.2", "seed1-set-down"}
 
 
 def test_the_load_is_the_platforms_share():
