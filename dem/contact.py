@@ -101,7 +101,7 @@ def pair_parameters(
         friction,
         rolling_friction,
         factor * ratio,
-        TURNING_DAMPING_RATIO,
+        turning,
         0.0,
     ]
 
