@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 import math
-import os
-import tempfile
-import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from . import runtime
+from . import runtime, state
 from .contact import effective_moduli, pair_parameters
-from .engine import MOST_BODIES, MOST_PRIMITIVES, STEPS_PER_LAUNCH, Engine
-from .materials import Material, material as find_material
+from .engine import MOST_PRIMITIVES, STEPS_PER_LAUNCH, take_engine
+from .lists import MOST_BODIES
+from .materials import Material
+from .materials import material as find_material
 from .measure import bulk_packing, surface_height
 from .shapes import Plane, Primitive
 from .timestep import time_step_for
 
-__all__ = ["Bed", "BedFailure", "STATE_FORMAT"]
+__all__ = ["Bed", "BedFailure"]
 
-STATE_FORMAT = "hedgebed-bed/1"
 LAUNCHES_PER_LOOK = 5
 # Skin over mean diameter: first guess and bounds. It adapts to how often lists are made.
 _SKIN, _LEAST_SKIN, _LARGEST_SKIN = 0.06, 0.02, 0.15
@@ -31,7 +29,7 @@ _REBUILD_STEPS, _SKIN_COST = 4.0, 1.2
 FLOOR = 0
 
 
-class BedFailure(RuntimeError):
+class BedFailure(RuntimeError):  # noqa: N818 - the name in the architecture
     """The bed cannot go on: a number is not a number, a grain was lost, or an overlap went past its bound.
 
     ``reason`` says which; the bed keeps the state in which it was found, so that it can be saved and looked at.
@@ -173,7 +171,8 @@ class Bed:
         self._has_floor = False
         self.surface = math.nan
         self.packing_fraction = math.nan
-        self._engine = Engine(
+        self._engine = take_engine(
+            self,
             grain_count=self.grain_count,
             period=self.size[:2],
             bottom=-4 * float(radii.max()),
@@ -198,7 +197,7 @@ class Bed:
         )
         turn = np.zeros((MOST_BODIES, 4))
         turn[:, 0] = 1
-        self._engine.body_turn.from_numpy(turn.astype(self._runtime.dtype))
+        self._engine.write("body_turn", turn.astype(self._runtime.dtype))
 
     # ------------------------------------------------------------------ bodies
 
@@ -246,8 +245,8 @@ class Bed:
             self.max_overlap = kept
             self._push()
             raise ValueError(
-                f"the body at {tuple(position)} m starts in overlap with a grain by {100 * found:.2g} % of its diameter "
-                f"(the bound is {100 * self.overlap_limit:g} %); start it higher"
+                f"the body at {tuple(position)} m starts in overlap with a grain by {100 * found:.2g} % of its "
+                f"diameter (the bound is {100 * self.overlap_limit:g} %); start it higher"
             )
         self.max_overlap = max(kept, found)
         return body
@@ -330,7 +329,7 @@ class Bed:
         The mean over the last ``advance``: the impulse divided by the time.
         """
         self._check_body(body)
-        rows = self._engine.pushes.to_numpy()[:, body, :].astype(float)
+        rows = self._engine.read("pushes")[:, body, :].astype(float)
         # cumsum adds in order whatever numpy's blocking, so the bits do not depend on it.
         total = np.cumsum(rows, axis=0)[-1] / max(1, self._reaction_steps)
         return total[:3], total[3:]
@@ -414,8 +413,8 @@ class Bed:
     def _explain(self, code: int, value: int) -> str:
         e = self._engine
         if code == 1:
-            position = e.position.to_numpy()
-            ids = e.id.to_numpy()
+            position = e.read("position")
+            ids = e.read("id")
             bad = ~np.isfinite(position).all(axis=1)
             if bad.any():
                 return f"the position of grain {int(ids[bad].min())} is not a number at t = {self.time:.6g} s"
@@ -454,13 +453,13 @@ class Bed:
         """
         self._check_valid()
         e = self._engine
-        order = np.argsort(e.id.to_numpy())
-        position = e.position.to_numpy()[order].astype(float)
-        velocity = e.velocity.to_numpy()[order].astype(float)
-        spin = e.spin.to_numpy()[order, :3].astype(float)
-        force = e.force.to_numpy()[order].astype(float)
-        torque = e.torque.to_numpy()[order].astype(float)
-        origin = e.origin.to_numpy()[order].astype(float)
+        order = np.argsort(e.read("id"))
+        position = e.read("position")[order].astype(float)
+        velocity = e.read("velocity")[order].astype(float)
+        spin = e.read("spin")[order, :3].astype(float)
+        force = e.read("force")[order].astype(float)
+        torque = e.read("torque")[order].astype(float)
+        origin = e.read("origin")[order].astype(float)
         half = 0.5 * self.time_step
         radius, mass = position[:, 3], velocity[:, 3]
         return {
@@ -497,7 +496,7 @@ class Bed:
     @property
     def weight(self) -> float:
         """Weight of all grains [N]."""
-        return float(self._engine.velocity.to_numpy()[:, 3].sum() * math.hypot(*self.gravity))
+        return float(self._engine.read("velocity")[:, 3].sum() * math.hypot(*self.gravity))
 
     @property
     def floor_force(self) -> float:
@@ -509,7 +508,7 @@ class Bed:
     @property
     def max_overlap(self) -> float:
         """Largest overlap over mean diameter of the pair [1] since the bed was made or this was set."""
-        return float(self._engine.overlap.to_numpy().max())
+        return float(self._engine.read("overlap").max())
 
     @max_overlap.setter
     def max_overlap(self, value: float) -> None:
@@ -521,7 +520,7 @@ class Bed:
 
     def measure_surface(self) -> None:
         """Take ``surface`` and ``packing_fraction`` anew from where the grains are now."""
-        position = self._engine.position.to_numpy().astype(float)
+        position = self._engine.read("position").astype(float)
         area = self.size[0] * self.size[1]
         self.packing_fraction = bulk_packing(position[:, 2], position[:, 3], area)
         self.surface = surface_height(position[:, 2], position[:, 3], area, bulk=self.packing_fraction)
@@ -536,139 +535,25 @@ class Bed:
 
     # ------------------------------------------------------------------ state
 
-    _GRAIN_FIELDS = ("position", "velocity", "spin", "force", "torque", "origin", "listed", "id")
-    _BODY_FIELDS = (
-        "body_position",
-        "body_velocity",
-        "body_spin",
-        "body_turn",
-        "body_listed",
-        "body_listed_turn",
-        "body_extent",
-        "body_primitives",
-        "body_pair",
-        "primitive_kind",
-        "primitive_row",
-        "overlap",
-        "pushes",
-    )
-
     def state(self) -> dict[str, np.ndarray]:
         """Everything that the next step depends on, to the bit: a flat dict of numpy arrays."""
         self._check_valid()
-        e = self._engine
-        state = {name: getattr(e, name).to_numpy() for name in (*self._GRAIN_FIELDS, *self._BODY_FIELDS)}
-        start, end = e.pair_start.to_numpy(), e.pair_end.to_numpy()
-        counts = end - start
-        rows = np.repeat(start - np.concatenate(([0], np.cumsum(counts)[:-1])), counts) + np.arange(counts.sum())
-        pair = e.pair.to_numpy()[rows]
-        touching = rows[pair < 0]
-        state |= {"pair_count": counts, "pair": pair, "slide": e.slide.to_numpy()[touching]}
-        near_end = e.near_end.to_numpy()
-        near_count = near_end - np.arange(e.chunk_count) * e.near_room
-        near = _near_rows(near_count, e.near_room)
-        state |= {"near_count": near_count}
-        for name in ("near_grain", "near_body", "near_slide", "near_roll"):
-            state[name] = getattr(e, name).to_numpy()[near]
-        if e.rolling:
-            state["roll"] = e.roll.to_numpy()[touching]
-        state["numbers"] = np.array(
-            [
-                self.steps,
-                int(e.body_count[None]),
-                self.list_count,
-                self._since_lists,
-                self._reaction_steps,
-                int(self._has_floor),
-            ]
-        )
-        state["reals"] = np.array(
-            [self.time_step, self._skin, *self.gravity, self.surface, self.packing_fraction, self.overlap_limit]
-        )
-        return state
+        return state.take(self)
 
-    def restore(self, state: dict[str, np.ndarray]) -> None:
+    def restore(self, values: dict[str, np.ndarray]) -> None:
         """Go back to a state of this bed, or of one that was made with the same settings.
 
         Raises:
-            ValueError: a state of another number of grains or of another layout.
+            ValueError: a state of another number of grains, of another layout or precision.
         """
         self._check_valid()
-        e = self._engine
-        if len(state["id"]) != self.grain_count or len(state["near_count"]) != e.chunk_count:
-            raise ValueError(
-                f"this state has {len(state['id'])} grains in {len(state['near_count'])} chunks, the bed "
-                f"{self.grain_count} in {e.chunk_count}; it belongs to another bed"
-            )
-        if state["position"].dtype != self._runtime.dtype:
-            raise ValueError(f"this state is in {state['position'].dtype}, the bed in {self._runtime.precision}")
-        for name in (*self._GRAIN_FIELDS, *self._BODY_FIELDS):
-            getattr(e, name).from_numpy(np.ascontiguousarray(state[name]))
-        counts = state["pair_count"]
-        chunk = _chunk_starts(self.grain_count, e.chunk_count)
-        before = np.concatenate(([0], np.cumsum(counts)))
-        which = np.repeat(np.arange(e.chunk_count), np.diff(chunk))
-        start = (before[:-1] - before[chunk[which]] + which * e.chunk_room).astype(np.int32)
-        rows = np.repeat(start - before[:-1], counts) + np.arange(before[-1])
-        touching = rows[state["pair"] < 0]
-        e.pair_start.from_numpy(start)
-        e.pair_end.from_numpy((start + counts).astype(np.int32))
-        for name, at in (("pair", rows), ("slide", touching), *((("roll", touching),) if e.rolling else ())):
-            target = getattr(e, name)
-            array = np.zeros(target.to_numpy().shape, dtype=state[name].dtype)
-            array[at] = state[name]
-            target.from_numpy(array)
-        near = _near_rows(state["near_count"], e.near_room)
-        e.near_end.from_numpy((state["near_count"] + np.arange(e.chunk_count) * e.near_room).astype(np.int32))
-        for name in ("near_grain", "near_body", "near_slide", "near_roll"):
-            target = getattr(e, name)
-            array = np.zeros(target.to_numpy().shape, dtype=state[name].dtype)
-            array[near] = state[name]
-            target.from_numpy(array)
-        numbers = [int(v) for v in state["numbers"]]
-        self.steps, bodies, self.list_count, self._since_lists, self._reaction_steps, floor = numbers
-        self._has_floor = bool(floor)
-        e.body_count[None] = bodies
-        e.moved[None] = 0
-        e.halted[None] = 0
-        e.ticket[0] = e.ticket[1] = 0
-        reals = [float(v) for v in state["reals"]]
-        self.time_step, self._skin = reals[:2]
-        self.gravity = tuple(reals[2:5])
-        self.surface, self.packing_fraction, self.overlap_limit = reals[5:]
+        state.put_back(self, values)
 
     def save(self, path: str | Path) -> Path:
         """Write the bed to one file (.npz), whole or not at all. Returns the path."""
         path = Path(path)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        stuff = self.material
-        about = {
-            "format": np.array(STATE_FORMAT),
-            "material": np.array(stuff.name),
-            "material_numbers": np.array(
-                [
-                    stuff.density,
-                    stuff.young,
-                    stuff.poisson,
-                    stuff.friction,
-                    stuff.restitution,
-                    stuff.rolling_friction,
-                ]
-            ),
-            "size": np.array(self.size),
-            "height": np.array(self._settings["height"]),
-            "tensile": np.array(self._settings["tensile"]),
-            "seed": np.array(-1 if self.seed is None else self.seed),
-            "precision": np.array(self._runtime.precision),
-        }
-        handle, name = tempfile.mkstemp(dir=path.parent, suffix=".npz")
-        try:
-            with os.fdopen(handle, "wb") as file:
-                np.savez(file, **about, **{f"state.{k}": v for k, v in self.state().items()})
-            os.replace(name, path)
-        except BaseException:
-            os.unlink(name)
-            raise
+        self._check_valid()
+        state.write_file(self, path)
         return path
 
     @classmethod
@@ -678,37 +563,13 @@ class Bed:
         Raises:
             ValueError: the file is missing or is not a bed.
         """
-        try:
-            with np.load(Path(path), allow_pickle=False) as file:
-                stored = {name: file[name] for name in file.files}
-        except FileNotFoundError:
-            raise ValueError(f"{path}: no such file; a bed saved by Bed.save was expected") from None
-        except (zipfile.BadZipFile, ValueError, OSError, EOFError) as problem:
-            raise ValueError(f"{path} is not a bed saved by hedgebed ({problem})") from None
-        if str(stored.get("format", "")) != STATE_FORMAT:
-            raise ValueError(f"{path}: format is {stored.get('format', 'missing')}, {STATE_FORMAT!r} was expected")
-        numbers = [float(v) for v in stored["material_numbers"]]
-        state = {name[6:]: value for name, value in stored.items() if name.startswith("state.")}
-        seed = int(stored["seed"])
-        settings = {
-            "material": Material(str(stored["material"]), *numbers),
-            "size": tuple(float(v) for v in stored["size"]),
-            "gravity": tuple(float(v) for v in state["reals"][2:5]),
-            "time_step": float(state["reals"][0]),
-            "max_overlap": float(state["reals"][7]),
-            "height": float(stored["height"]),
-            "tensile": bool(stored["tensile"]),
-            "seed": None if seed < 0 else seed,
-        }
-        radii = state["position"][:, 3].astype(float)
-        bed = cls(settings, radii, precision=str(stored["precision"]), arch=arch, threads=threads)
-        if len(state["near_count"]) == bed._engine.chunk_count:
-            bed.restore(state)
+        settings, values, precision = state.read_file(Path(path))
+        bed = cls(settings, values["position"][:, 3].astype(float), precision=precision, arch=arch, threads=threads)
+        if len(values["near_count"]) == bed._engine.chunk_count:
+            bed.restore(values)
         else:
-            bed._adopt(state)
+            state.adopt(bed, values)
         return bed
-
-    # ------------------------------------------------------------------ other grains, same contacts
 
     def without(self, remove: np.ndarray) -> Bed:
         """A bed with some grains taken out; the others keep their contacts. Ids are counted anew, in order.
@@ -717,13 +578,13 @@ class Bed:
             remove: by id, bool, shape [grain_count].
         """
         self._check_valid()
-        ids = self._engine.id.to_numpy()
+        ids = self._engine.read("id")
         order = np.argsort(ids)
         keep = ~np.asarray(remove, dtype=bool)
         if not keep.any():
             raise ValueError("no grain would be left")
-        state = self.state()
-        radii = state["position"][order, 3][keep].astype(float)
+        values = self.state()
+        radii = values["position"][order, 3][keep].astype(float)
         bed = Bed(
             self._settings | {"gravity": self.gravity},
             radii,
@@ -731,71 +592,19 @@ class Bed:
             arch=self._runtime.arch,
             threads=self._runtime.threads,
         )
-        bed._adopt(state, keep=keep)
+        state.adopt(bed, values, keep=keep)
         return bed
-
-    def _adopt(self, state: dict[str, np.ndarray], *, keep: np.ndarray | None = None) -> None:
-        """Take over the grains, contacts and bodies of a state whose layout is another."""
-        e = self._engine
-        ids = state["id"]
-        if keep is None:
-            keep = np.ones(len(ids), dtype=bool)
-        new_id = np.cumsum(keep) - 1
-        stay = keep[ids]
-        place = np.cumsum(stay) - 1  # row in the old order -> row in the new one
-        dtype = self._runtime.dtype
-        for name in ("position", "velocity", "spin", "origin"):
-            getattr(e, name).from_numpy(np.ascontiguousarray(state[name][stay], dtype=dtype))
-        e.id.from_numpy(new_id[ids[stay]].astype(np.int32))
-        # The contacts as one list a grain, each pair once, rows from 0: what make_lists takes over as history.
-        first = np.repeat(np.arange(len(ids)), state["pair_count"])[state["pair"] < 0]
-        second = (~state["pair"][state["pair"] < 0]) & e.index_mask
-        chosen = stay[first] & stay[second]
-        a, b = place[first[chosen]], place[second[chosen]]
-        counts = np.bincount(a, minlength=self.grain_count)
-        start = np.concatenate(([0], np.cumsum(counts)[:-1])).astype(np.int32)
-        e.pair_start.from_numpy(start)
-        e.pair_end.from_numpy((start + counts).astype(np.int32))
-        self._put("pair", ~b.astype(np.int32))
-        self._put("slide", state["slide"][chosen])
-        if e.rolling:
-            self._put("roll", state["roll"][chosen])
-        near = stay[state["near_grain"]]
-        grain = place[state["near_grain"][near]]
-        starts = _chunk_starts(self.grain_count, e.chunk_count)
-        chunk = np.searchsorted(starts, grain, side="right") - 1
-        near_count = np.bincount(chunk, minlength=e.chunk_count)
-        rows = _near_rows(near_count, e.near_room)
-        e.near_end.from_numpy((near_count + np.arange(e.chunk_count) * e.near_room).astype(np.int32))
-        self._put("near_grain", grain.astype(np.int32), rows)
-        for name in ("near_body", "near_slide", "near_roll"):
-            self._put(name, state[name][near], rows)
-        for name in self._BODY_FIELDS:
-            if name not in ("overlap", "pushes"):
-                getattr(e, name).from_numpy(np.ascontiguousarray(state[name]))
-        e.body_count[None] = int(state["numbers"][1])
-        self._has_floor = bool(state["numbers"][5])
-        self.steps = int(state["numbers"][0])
-        self._make_lists()
-        self._push()
-        self.measure_surface()
-
-    def _put(self, name: str, values: np.ndarray, rows: np.ndarray | None = None) -> None:
-        target = getattr(self._engine, name)
-        array = target.to_numpy()
-        array[: len(values) if rows is None else None][slice(None) if rows is None else rows] = values
-        target.from_numpy(array)
 
     def _fill(self, positions, velocities, spins, radii, mass) -> None:
         e = self._engine
         dtype = self._runtime.dtype
         n = self.grain_count
-        e.position.from_numpy(np.column_stack([positions, radii]).astype(dtype))
-        e.velocity.from_numpy(np.column_stack([velocities, mass]).astype(dtype))
-        e.spin.from_numpy(np.column_stack([spins, np.zeros(n)]).astype(dtype))
-        e.origin.from_numpy(positions.astype(dtype))
-        e.id.from_numpy(np.arange(n, dtype=np.int32))
-        e.near_end.from_numpy((np.arange(e.chunk_count) * e.near_room).astype(np.int32))
+        e.write("position", np.column_stack([positions, radii]).astype(dtype))
+        e.write("velocity", np.column_stack([velocities, mass]).astype(dtype))
+        e.write("spin", np.column_stack([spins, np.zeros(n)]).astype(dtype))
+        e.write("origin", positions.astype(dtype))
+        e.write("id", np.arange(n, dtype=np.int32))
+        e.write("near_end", (np.arange(e.chunk_count) * e.near_room).astype(np.int32))
 
     def _check_valid(self) -> None:
         if self._generation != runtime.generation():
@@ -838,16 +647,3 @@ def _room(radii: np.ndarray, diameter: float, *, gpu: bool) -> int:
     half = math.asin(small / (large + small + skin))
     most = math.ceil(2 / (1 - math.cos(half)))
     return most + 4 if gpu else min(most + 4, 20)
-
-
-def _chunk_starts(grain_count: int, chunk_count: int) -> np.ndarray:
-    """First grain of each chunk and the end, shape [chunk_count + 1]; as ``Engine.chunk_range`` has it."""
-    base, rest = divmod(grain_count, chunk_count)
-    c = np.arange(chunk_count + 1)
-    return c * base + np.minimum(c, rest)
-
-
-def _near_rows(near_count: np.ndarray, room: int) -> np.ndarray:
-    """Rows of the near lists that are in use."""
-    before = np.concatenate(([0], np.cumsum(near_count)[:-1]))
-    return np.repeat(np.arange(len(near_count)) * room - before, near_count) + np.arange(int(near_count.sum()))

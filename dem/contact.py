@@ -1,7 +1,8 @@
 """The contact law between two grains, or a grain and a body.
 
 Hertz's normal force, Mindlin's tangential spring with history and Coulomb sliding, and elastic-plastic
-spring-dashpots for rolling and twisting. All functions are Taichi functions that see one contact; they know nothing of lists or grids.
+spring-dashpots for rolling and twisting. All functions are Taichi functions that see one contact; they know nothing of
+lists or grids.
 
 Normal (Hertz; Thornton, Cummins & Cleary 2013, Powder Technology 233:30 for the damping):
     F_n = max(0, 4/3 E* a d + c_n sqrt(m* S_n) d'),  a = sqrt(R* d),  S_n = 2 E* a,
@@ -112,8 +113,8 @@ def contact_force(p: ti.template(), n, v, overlap, radius, mass, dt, u: ti.templ
 
     ``p`` the pair's parameters, ``n`` the unit normal towards the first, ``v`` the relative velocity of the first at
     the contact point [m/s], ``overlap`` [m], ``radius``, ``mass`` the effective ones, ``u`` the tangential
-    displacement [m], updated in place. Returns (normal force [N], tangential force vector [N], tangential stiffness [N/m],
-    contact radius [m], sqrt(m* S_n)).
+    displacement [m], updated in place. Returns (normal force [N], tangential force vector [N], tangential stiffness
+    [N/m], contact radius [m], sqrt(m* S_n)).
     """
     a = ti.sqrt(radius * overlap)
     s_n = p[_TWO_E] * a

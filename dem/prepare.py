@@ -19,7 +19,8 @@ import numpy as np
 
 from . import runtime
 from .bed import Bed, BedFailure
-from .materials import Material, material as find_material
+from .materials import Material
+from .materials import material as find_material
 from .packing import draw_radii, rain_positions
 from .timestep import choose_young
 
@@ -81,8 +82,8 @@ def prepare_bed(
         progress: anything with ``stage(name, total)`` and ``update(done)``, or None.
 
     The grains fall as a loose column from rest, come to rest in a drag that stands in for the long ringing of a soft
-    bed, lose what lies above the level, and settle again, at the end without drag. Settled means: mean kinetic energy of
-    a grain below 1e-5 m g d, and floor force within 1 % of the weight.
+    bed, lose what lies above the level, and settle again, at the end without drag. Settled means: mean kinetic energy
+    of a grain below 1e-5 m g d, and floor force within 1 % of the weight.
 
     Raises:
         ValueError: an unknown material, a size or grain that is not positive, grains too large for the bed, a spread
@@ -159,7 +160,7 @@ def _check(size, grain, spread, packing, gravity) -> None:
     for name, length, least in (("x", size[0], 6), ("y", size[1], 6), ("z", size[2], 4)):
         if length < least * grain:
             raise ValueError(
-                f"size: {name} = {length} m is less than {least} grains of {grain} m; make it at least {least * grain:.4g} m"
+                f"size: {name} = {length} m is less than {least} grains of {grain} m; {least * grain:.4g} m would do"
             )
 
 

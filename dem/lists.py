@@ -1,0 +1,345 @@
+"""Who is near whom: sorting the grains by cell, pair lists, the grains near bodies, and the history carried over.
+
+Runs every hundred steps or so. The kernels belong to ``dem.engine.Engine``, whose fields they use.
+"""
+
+import math
+
+import numpy as np
+import taichi as ti
+
+from .shapes import distance_to
+
+__all__ = ["INDEX_BITS", "INDEX_MASK", "ITEMS_PER_THREAD", "Lists", "MOST_BODIES", "SAME_IMAGE", "curve_ranks"]
+
+ITEMS_PER_THREAD = 512
+MOST_BODIES = 8
+
+# A neighbour's code: its index, and in the upper bits which periodic image is meant. The sign says "touching".
+INDEX_BITS = 26
+INDEX_MASK = (1 << INDEX_BITS) - 1
+SAME_IMAGE = 1 + 3 * 1  # (0 + 1) + 3 * (0 + 1)
+
+# Places of the numbers in Engine.count and Engine.box.
+GRAINS, CHUNKS, CHUNK_ROOM, NEAR_ROOM, NX, NY, NZ, CELLS = range(8)
+PERIOD_X, PERIOD_Y, BOTTOM, TOP, CELL_X, CELL_Y, CELL_Z = range(7)
+
+
+@ti.data_oriented
+class Lists:
+    """The part of the engine that finds neighbours."""
+
+    @ti.func
+    def next_chunk(self, w, queue, first: ti.template()):
+        """The next chunk for work item w, or chunk_count where nothing is left.
+
+        Taichi gives a CPU thread at least 512 items of a loop, so each thread has that many and one of them works.
+        Which thread takes a chunk does not matter to the result.
+        """
+        c = self.count[CHUNKS]
+        if ti.static(self.gpu):
+            if ti.static(first):
+                c = w
+        elif w % ITEMS_PER_THREAD == 0:
+            c = ti.atomic_add(self.ticket[queue], 1)
+        return c
+
+    @ti.func
+    def chunk_range(self, c):
+        n = self.count[GRAINS]
+        m = self.count[CHUNKS]
+        if ti.static(self.gpu):
+            return c, c + 1
+        base = n // m
+        rest = n - base * m
+        start = c * base + ti.min(c, rest)
+        return start, start + base + ti.select(c < rest, 1, 0)
+
+    @ti.func
+    def chunk_of(self, i):
+        result = i
+        if ti.static(not self.gpu):
+            m = self.count[CHUNKS]
+            base = self.count[GRAINS] // m
+            rest = self.count[GRAINS] - base * m
+            wide = rest * (base + 1)
+            result = ti.select(i < wide, i // (base + 1), rest + (i - wide) // ti.max(base, 1))
+        return result
+
+    @ti.func
+    def nearest(self, b, x):
+        """Distance, normal and curvature of body b at a point, and the arm from its origin to the nearest point."""
+        d = x - self.body_position[b]
+        if self.body_extent[b] < 1e30:
+            d.x -= self.box[PERIOD_X] * ti.round(d.x / self.box[PERIOD_X])
+            d.y -= self.box[PERIOD_Y] * ti.round(d.y / self.box[PERIOD_Y])
+        q = self.body_turn[b]
+        local = rotate(ti.Vector([q[0], -q[1], -q[2], -q[3]]), d)
+        best = ti.cast(1e30, self.real)
+        normal = local * 0.0
+        curvature = best * 0.0
+        primitives = self.body_primitives[b]
+        for k in range(primitives[0], primitives[1]):
+            row = self.primitive_row[k]
+            distance, n_k, c_k = distance_to(self.primitive_kind[k], row, local)
+            if distance < best:
+                best = distance
+                normal = n_k
+                curvature = c_k
+        normal = rotate(q, normal)
+        return best, normal, curvature, d - best * normal
+
+    @ti.func
+    def cell_of(self, x):
+        """Cell of a position inside the box, as three integers."""
+        i = ti.min(self.count[NX] - 1, ti.max(0, ti.floor(x.x / self.box[CELL_X], ti.i32)))
+        j = ti.min(self.count[NY] - 1, ti.max(0, ti.floor(x.y / self.box[CELL_Y], ti.i32)))
+        k = ti.min(self.count[NZ] - 1, ti.max(0, ti.floor((x.z - self.box[BOTTOM]) / self.box[CELL_Z], ti.i32)))
+        return i, j, k
+
+    @ti.func
+    def cell_index(self, i, j, k):
+        return (k * self.count[NY] + j) * self.count[NX] + i
+
+    @ti.kernel
+    def sort(self, gx: float, gy: float, gz: float):
+        """Wrap the grains into the box and bring them into the order of the curve; ids break ties."""
+        for k in range(self.count[CELLS]):
+            self.cell_fill[k] = 0
+        for i in range(self.count[GRAINS]):
+            x = self.position[i]
+            inside = x.z >= self.box[BOTTOM] and x.z <= self.box[TOP]
+            inside = inside and ti.abs(x.x) < 1e6 * self.box[PERIOD_X] and ti.abs(x.y) < 1e6 * self.box[PERIOD_Y]
+            if not inside:
+                # Any of the lost ones will do; the host looks for the first id.
+                self.problem[None] = ti.Vector([1, self.id[i]])
+            else:
+                a = -ti.floor(x.x / self.box[PERIOD_X]) * self.box[PERIOD_X]
+                b = -ti.floor(x.y / self.box[PERIOD_Y]) * self.box[PERIOD_Y]
+                self.position[i].x += a
+                self.position[i].y += b
+                self.origin[i].x += a
+                self.origin[i].y += b
+            ci, cj, ck = self.cell_of(self.position[i])
+            r = self.rank[self.cell_index(ci, cj, ck)]
+            self.key[i] = r
+            ti.atomic_add(self.cell_fill[r], 1)
+        for _ in range(1):
+            total = 0
+            for r in range(self.count[CELLS]):
+                self.cell_start[r] = total
+                total += self.cell_fill[r]
+                self.cell_fill[r] = self.cell_start[r]
+            self.cell_start[self.count[CELLS]] = total
+        for i in range(self.count[GRAINS]):
+            slot = ti.atomic_add(self.cell_fill[self.key[i]], 1)
+            self.came_from[slot] = i
+        for r in range(self.count[CELLS]):
+            # Whatever thread came first, the order within a cell is that of the ids.
+            for a in range(self.cell_start[r] + 1, self.cell_start[r + 1]):
+                moving = self.came_from[a]
+                b = a - 1
+                while b >= self.cell_start[r] and self.id[self.came_from[b]] > self.id[moving]:
+                    self.came_from[b + 1] = self.came_from[b]
+                    b -= 1
+                self.came_from[b + 1] = moving
+        for i in range(self.count[GRAINS]):
+            o = self.came_from[i]
+            self.buffer4[0][i] = self.position[o]
+            self.buffer4[1][i] = self.velocity[o]
+            self.buffer4[2][i] = self.spin[o]
+            self.buffer3[i] = self.origin[o]
+            self.buffer_id[i] = self.id[o]
+        for i in range(self.count[GRAINS]):
+            self.position[i] = self.buffer4[0][i]
+            self.velocity[i] = self.buffer4[1][i]
+            self.spin[i] = self.buffer4[2][i]
+            self.origin[i] = self.buffer3[i]
+            self.id[i] = self.buffer_id[i]
+            self.listed[i] = self.buffer4[0][i].xyz
+            self.force[i] = self.buffer4[1][i].w * ti.Vector([gx, gy, gz])
+            self.torque[i] = ti.Vector.zero(self.real, 3)
+
+    @ti.kernel
+    def keep_lists(self):
+        """Put the lists aside, so that the new ones can take the history over."""
+        for _ in range(1):
+            self.ticket[0] = 0
+        for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
+            c = self.next_chunk(w, 0, True)
+            while c < self.count[CHUNKS]:
+                self.keep_chunk(c)
+                c = self.next_chunk(w, 0, False)
+
+    @ti.func
+    def keep_chunk(self, c):
+        start, end = self.chunk_range(c)
+        for i in range(start, end):
+            self.old_start[i] = self.pair_start[i]
+            self.old_end[i] = self.pair_end[i]
+            self.near_first[i] = -1
+            for s in range(self.pair_start[i], self.pair_end[i]):
+                code = self.pair[s]
+                self.old_pair[s] = code
+                if code < 0:
+                    self.old_slide[s] = self.slide[s]
+                    if ti.static(self.rolling):
+                        self.old_roll[s] = self.roll[s]
+        self.old_near_end[c] = self.near_end[c]
+        base = c * self.count[NEAR_ROOM]
+        for k in range(self.near_end[c] - base):
+            s = self.near_end[c] - 1 - k
+            i = self.near_grain[s]
+            self.near_first[i] = s
+            self.old_near_grain[s] = i
+            self.old_near_body[s] = self.near_body[s]
+            self.old_near_slide[s] = self.near_slide[s]
+            self.old_near_roll[s] = self.near_roll[s]
+
+    @ti.func
+    def find_old(self, i, j):
+        """Row of the old list that holds touching pair i, j (old indices), or -1."""
+        found = -1
+        for s in range(self.old_start[i], self.old_end[i]):
+            code = self.old_pair[s]
+            if code < 0 and ((~code) & INDEX_MASK) == j:
+                found = s
+        return found
+
+    @ti.kernel
+    def make_lists(self, skin: float):
+        """New pair and near lists for the sorted grains; history comes over from the lists put aside."""
+        for b in range(MOST_BODIES):
+            self.body_listed[b] = self.body_position[b]
+            self.body_listed_turn[b] = self.body_turn[b]
+        for _ in range(1):
+            self.ticket[0] = 0
+        for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
+            c = self.next_chunk(w, 0, True)
+            while c < self.count[CHUNKS]:
+                self.list_chunk(c, ti.cast(skin, self.real))
+                c = self.next_chunk(w, 0, False)
+        for _ in range(1):
+            self.moved[None] = 0
+            self.halted[None] = 0
+
+    @ti.func
+    def list_chunk(self, c, skin):
+        start, end = self.chunk_range(c)
+        base = c * self.count[CHUNK_ROOM]
+        s = base
+        for i in range(start, end):
+            x_i = self.position[i]
+            self.pair_start[i] = s
+            ci, cj, ck = self.cell_of(x_i)
+            for dk in range(-1, 2):
+                k = ck + dk
+                if k >= 0 and k < self.count[NZ]:
+                    for dj, di in ti.ndrange((-1, 2), (-1, 2)):
+                        # Stepping out on the left means the neighbour's image one period to the left.
+                        gi, gj = ci + di, cj + dj
+                        mi, mj = 0, 0
+                        if gi < 0:
+                            gi += self.count[NX]
+                            mi = 1
+                        elif gi >= self.count[NX]:
+                            gi -= self.count[NX]
+                            mi = -1
+                        if gj < 0:
+                            gj += self.count[NY]
+                            mj = 1
+                        elif gj >= self.count[NY]:
+                            gj -= self.count[NY]
+                            mj = -1
+                        r = self.rank[self.cell_index(gi, gj, k)]
+                        for j in range(self.cell_start[r], self.cell_start[r + 1]):
+                            own = j >= start and j < end
+                            if j != i and (j > i or not own):
+                                x_j = self.position[j]
+                                d = x_i.xyz - x_j.xyz
+                                d.x += ti.cast(mi, self.real) * self.box[PERIOD_X]
+                                d.y += ti.cast(mj, self.real) * self.box[PERIOD_Y]
+                                reach = x_i.w + x_j.w + skin
+                                if d.norm_sqr() < reach * reach:
+                                    if s < base + self.count[CHUNK_ROOM]:
+                                        self.list_pair(s, i, j, j | ((mi + 1 + 3 * (mj + 1)) << INDEX_BITS))
+                                    s += 1
+            self.pair_end[i] = ti.min(s, base + self.count[CHUNK_ROOM])
+        if s > base + self.count[CHUNK_ROOM]:
+            self.problem[None] = ti.Vector([2, s - base])
+        self.list_near(c, start, end, skin)
+
+    @ti.func
+    def list_pair(self, s, i, j, code):
+        oi, oj = self.came_from[i], self.came_from[j]
+        sign = ti.cast(1.0, self.real)
+        old = self.find_old(oi, oj)
+        if old < 0:
+            old = self.find_old(oj, oi)
+            sign = -sign
+        if old >= 0:
+            self.pair[s] = ~code
+            self.slide[s] = sign * self.old_slide[old]
+            if ti.static(self.rolling):
+                self.roll[s] = sign * self.old_roll[old]
+        else:
+            self.pair[s] = code
+            self.slide[s] = ti.Vector.zero(self.real, 3)
+            if ti.static(self.rolling):
+                self.roll[s] = ti.Vector.zero(self.real, 3)
+
+    @ti.func
+    def list_near(self, c, start, end, skin):
+        base = c * self.count[NEAR_ROOM]
+        s = base
+        for i in range(start, end):
+            x = self.position[i]
+            for b in range(self.body_count[None]):
+                distance, n, curvature, arm = self.nearest(b, x.xyz)
+                if distance < x.w + skin:
+                    if s < base + self.count[NEAR_ROOM]:
+                        self.near_grain[s] = i
+                        self.near_body[s] = b
+                        self.near_slide[s] = ti.Vector.zero(self.real, 3)
+                        self.near_roll[s] = ti.Vector.zero(self.real, 3)
+                        o = self.near_first[self.came_from[i]]
+                        while o >= 0:
+                            if self.old_near_grain[o] == self.came_from[i]:
+                                if self.old_near_body[o] == b:
+                                    self.near_slide[s] = self.old_near_slide[o]
+                                    self.near_roll[s] = self.old_near_roll[o]
+                                o += 1
+                                if o % self.count[NEAR_ROOM] == 0 or o >= self.old_near_end[o // self.count[NEAR_ROOM]]:
+                                    o = -1
+                            else:
+                                o = -1
+                    s += 1
+        self.near_end[c] = ti.min(s, base + self.count[NEAR_ROOM])
+        if s > base + self.count[NEAR_ROOM]:
+            self.problem[None] = ti.Vector([3, s - base])
+
+
+@ti.func
+def rotate(q, x):
+    """x turned by the unit quaternion q (scalar first)."""
+    axis = ti.Vector([q[1], q[2], q[3]])
+    t = 2.0 * axis.cross(x)
+    return x + q[0] * t + axis.cross(t)
+
+
+def curve_ranks(nx: int, ny: int, nz: int) -> np.ndarray:
+    """Rank of each cell on a Morton curve, shape [nx ny nz], x fastest."""
+    bits = max(1, math.ceil(math.log2(max(nx, ny, nz, 2))))
+
+    def spread(a):
+        result = np.zeros_like(a)
+        for bit in range(bits):
+            result |= ((a >> bit) & 1) << (3 * bit)
+        return result
+
+    k, j, i = np.meshgrid(np.arange(nz), np.arange(ny), np.arange(nx), indexing="ij")
+    code = spread(i.ravel().astype(np.int64)) | spread(j.ravel().astype(np.int64)) << 1
+    code |= spread(k.ravel().astype(np.int64)) << 2
+    rank = np.empty(code.size, dtype=np.int32)
+    rank[np.argsort(code, kind="stable")] = np.arange(code.size, dtype=np.int32)
+    return rank

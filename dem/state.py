@@ -1,0 +1,232 @@
+"""A bed's state as numpy arrays: taken, put back to the bit, kept in a file, taken over by a bed of another layout."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import zipfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .lists import INDEX_MASK
+from .materials import Material
+
+if TYPE_CHECKING:
+    from .bed import Bed
+
+__all__ = ["STATE_FORMAT", "adopt", "put_back", "read_file", "take", "write_file"]
+
+STATE_FORMAT = "hedgebed-bed/1"
+
+GRAIN_FIELDS = ("position", "velocity", "spin", "force", "torque", "origin", "listed", "id")
+BODY_FIELDS = (
+    "body_position",
+    "body_velocity",
+    "body_spin",
+    "body_turn",
+    "body_listed",
+    "body_listed_turn",
+    "body_extent",
+    "body_primitives",
+    "body_pair",
+    "primitive_kind",
+    "primitive_row",
+    "overlap",
+    "pushes",
+)
+
+
+def take(bed: Bed) -> dict[str, np.ndarray]:
+    """Everything that the next step depends on, to the bit."""
+    e = bed._engine
+    state = {name: e.read(name) for name in (*GRAIN_FIELDS, *BODY_FIELDS)}
+    start, end = e.read("pair_start"), e.read("pair_end")
+    counts = end - start
+    rows = np.repeat(start - np.concatenate(([0], np.cumsum(counts)[:-1])), counts) + np.arange(counts.sum())
+    pair = e.read("pair")[rows]
+    touching = rows[pair < 0]
+    state |= {"pair_count": counts, "pair": pair, "slide": e.read("slide")[touching]}
+    near_end = e.read("near_end")
+    near_count = near_end - np.arange(e.chunk_count) * e.near_room
+    near = _near_rows(near_count, e.near_room)
+    state |= {"near_count": near_count}
+    for name in ("near_grain", "near_body", "near_slide", "near_roll"):
+        state[name] = e.read(name)[near]
+    if e.rolling:
+        state["roll"] = e.read("roll")[touching]
+    state["numbers"] = np.array(
+        [
+            bed.steps,
+            int(e.body_count[None]),
+            bed.list_count,
+            bed._since_lists,
+            bed._reaction_steps,
+            int(bed._has_floor),
+        ]
+    )
+    state["reals"] = np.array(
+        [bed.time_step, bed._skin, *bed.gravity, bed.surface, bed.packing_fraction, bed.overlap_limit]
+    )
+    return state
+
+
+def put_back(bed: Bed, state: dict[str, np.ndarray]) -> None:
+    """Bring a bed of the same layout to a state. Raises ValueError for a state of another bed."""
+    e = bed._engine
+    if len(state["id"]) != bed.grain_count or len(state["near_count"]) != e.chunk_count:
+        raise ValueError(
+            f"this state has {len(state['id'])} grains in {len(state['near_count'])} chunks, the bed "
+            f"{bed.grain_count} in {e.chunk_count}; it belongs to another bed"
+        )
+    if state["position"].dtype != bed._runtime.dtype:
+        raise ValueError(f"this state is in {state['position'].dtype}, the bed in {bed._runtime.precision}")
+    for name in (*GRAIN_FIELDS, *BODY_FIELDS):
+        e.write(name, state[name])
+    counts = state["pair_count"]
+    chunk = _chunk_starts(bed.grain_count, e.chunk_count)
+    before = np.concatenate(([0], np.cumsum(counts)))
+    which = np.repeat(np.arange(e.chunk_count), np.diff(chunk))
+    start = (before[:-1] - before[chunk[which]] + which * e.chunk_room).astype(np.int32)
+    rows = np.repeat(start - before[:-1], counts) + np.arange(before[-1])
+    touching = rows[state["pair"] < 0]
+    e.write("pair_start", start)
+    e.write("pair_end", (start + counts).astype(np.int32))
+    for name, at in (("pair", rows), ("slide", touching), *((("roll", touching),) if e.rolling else ())):
+        e.write(name, state[name], at)
+    near = _near_rows(state["near_count"], e.near_room)
+    e.write("near_end", (state["near_count"] + np.arange(e.chunk_count) * e.near_room).astype(np.int32))
+    for name in ("near_grain", "near_body", "near_slide", "near_roll"):
+        e.write(name, state[name], near)
+    numbers = [int(v) for v in state["numbers"]]
+    bed.steps, bodies, bed.list_count, bed._since_lists, bed._reaction_steps, floor = numbers
+    bed._has_floor = bool(floor)
+    e.body_count[None] = bodies
+    e.moved[None] = 0
+    e.halted[None] = 0
+    e.ticket[0] = e.ticket[1] = 0
+    reals = [float(v) for v in state["reals"]]
+    bed.time_step, bed._skin = reals[:2]
+    bed.gravity = tuple(reals[2:5])
+    bed.surface, bed.packing_fraction, bed.overlap_limit = reals[5:]
+
+
+def write_file(bed: Bed, path: Path) -> None:
+    """Write a bed to an .npz file, whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    stuff = bed.material
+    about = {
+        "format": np.array(STATE_FORMAT),
+        "material": np.array(stuff.name),
+        "material_numbers": np.array(
+            [
+                stuff.density,
+                stuff.young,
+                stuff.poisson,
+                stuff.friction,
+                stuff.restitution,
+                stuff.rolling_friction,
+            ]
+        ),
+        "size": np.array(bed.size),
+        "height": np.array(bed._settings["height"]),
+        "tensile": np.array(bed._settings["tensile"]),
+        "seed": np.array(-1 if bed.seed is None else bed.seed),
+        "precision": np.array(bed._runtime.precision),
+    }
+    handle, name = tempfile.mkstemp(dir=path.parent, suffix=".npz")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            np.savez(file, **about, **{f"state.{k}": v for k, v in take(bed).items()})
+        Path(name).replace(path)
+    except BaseException:
+        Path(name).unlink()
+        raise
+
+
+def read_file(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray], str]:
+    """Settings, state and precision of a bed that ``write_file`` wrote. Raises ValueError where there is none."""
+    try:
+        with np.load(Path(path), allow_pickle=False) as file:
+            stored = {name: file[name] for name in file.files}
+    except FileNotFoundError:
+        raise ValueError(f"{path}: no such file; a bed saved by Bed.save was expected") from None
+    except (zipfile.BadZipFile, ValueError, OSError, EOFError) as problem:
+        raise ValueError(f"{path} is not a bed saved by hedgebed ({problem})") from None
+    if str(stored.get("format", "")) != STATE_FORMAT:
+        raise ValueError(f"{path}: format is {stored.get('format', 'missing')}, {STATE_FORMAT!r} was expected")
+    numbers = [float(v) for v in stored["material_numbers"]]
+    state = {name[6:]: value for name, value in stored.items() if name.startswith("state.")}
+    seed = int(stored["seed"])
+    settings = {
+        "material": Material(str(stored["material"]), *numbers),
+        "size": tuple(float(v) for v in stored["size"]),
+        "gravity": tuple(float(v) for v in state["reals"][2:5]),
+        "time_step": float(state["reals"][0]),
+        "max_overlap": float(state["reals"][7]),
+        "height": float(stored["height"]),
+        "tensile": bool(stored["tensile"]),
+        "seed": None if seed < 0 else seed,
+    }
+    return settings, state, str(stored["precision"])
+
+
+def adopt(bed: Bed, state: dict[str, np.ndarray], *, keep: np.ndarray | None = None) -> None:
+    """Take over the grains, contacts and bodies of a state whose layout is another; ``keep``: which grains, by id."""
+    e = bed._engine
+    ids = state["id"]
+    if keep is None:
+        keep = np.ones(len(ids), dtype=bool)
+    new_id = np.cumsum(keep) - 1
+    stay = keep[ids]
+    place = np.cumsum(stay) - 1  # row in the old order -> row in the new one
+    dtype = bed._runtime.dtype
+    for name in ("position", "velocity", "spin", "origin"):
+        e.write(name, state[name][stay].astype(dtype))
+    e.write("id", new_id[ids[stay]].astype(np.int32))
+    # The contacts as one list a grain, each pair once, rows from 0: what make_lists takes over as history.
+    first = np.repeat(np.arange(len(ids)), state["pair_count"])[state["pair"] < 0]
+    second = (~state["pair"][state["pair"] < 0]) & INDEX_MASK
+    chosen = stay[first] & stay[second]
+    a, b = place[first[chosen]], place[second[chosen]]
+    counts = np.bincount(a, minlength=bed.grain_count)
+    start = np.concatenate(([0], np.cumsum(counts)[:-1])).astype(np.int32)
+    e.write("pair_start", start)
+    e.write("pair_end", (start + counts).astype(np.int32))
+    e.write("pair", ~b.astype(np.int32))
+    e.write("slide", state["slide"][chosen])
+    if e.rolling:
+        e.write("roll", state["roll"][chosen])
+    near = stay[state["near_grain"]]
+    grain = place[state["near_grain"][near]]
+    starts = _chunk_starts(bed.grain_count, e.chunk_count)
+    chunk = np.searchsorted(starts, grain, side="right") - 1
+    near_count = np.bincount(chunk, minlength=e.chunk_count)
+    rows = _near_rows(near_count, e.near_room)
+    e.write("near_end", (near_count + np.arange(e.chunk_count) * e.near_room).astype(np.int32))
+    e.write("near_grain", grain.astype(np.int32), rows)
+    for name in ("near_body", "near_slide", "near_roll"):
+        e.write(name, state[name][near], rows)
+    for name in BODY_FIELDS:
+        if name not in ("overlap", "pushes"):
+            e.write(name, state[name])
+    e.body_count[None] = int(state["numbers"][1])
+    bed._has_floor = bool(state["numbers"][5])
+    bed.steps = int(state["numbers"][0])
+    bed._make_lists()
+    bed._push()
+    bed.measure_surface()
+
+
+def _chunk_starts(grain_count: int, chunk_count: int) -> np.ndarray:
+    """First grain of each chunk and the end, shape [chunk_count + 1]; as ``Engine.chunk_range`` has it."""
+    base, rest = divmod(grain_count, chunk_count)
+    c = np.arange(chunk_count + 1)
+    return c * base + np.minimum(c, rest)
+
+
+def _near_rows(near_count: np.ndarray, room: int) -> np.ndarray:
+    """Rows of the near lists that are in use."""
+    before = np.concatenate(([0], np.cumsum(near_count)[:-1]))
+    return np.repeat(np.arange(len(near_count)) * room - before, near_count) + np.arange(int(near_count.sum()))
