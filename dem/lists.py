@@ -4,6 +4,7 @@ Runs every hundred steps or so. The kernels belong to ``dem.engine.Engine``, who
 """
 
 import math
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import taichi as ti
@@ -28,6 +29,10 @@ PERIOD_X, PERIOD_Y, BOTTOM, TOP, CELL_X, CELL_Y, CELL_Z = range(7)
 @ti.data_oriented
 class Lists:
     """The part of the engine that finds neighbours."""
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any: ...
 
     @ti.func
     def next_chunk(self, w, queue, first: ti.template()):

@@ -20,6 +20,7 @@ __all__ = ["STATE_FORMAT", "adopt", "put_back", "read_file", "take", "write_file
 
 STATE_FORMAT = "hedgebed-bed/1"
 
+MATERIAL_NUMBERS = ("density", "young", "poisson", "friction", "restitution", "rolling_friction")
 GRAIN_FIELDS = ("position", "velocity", "spin", "force", "torque", "origin", "listed", "id")
 BODY_FIELDS = (
     "body_position",
@@ -116,29 +117,21 @@ def write_file(bed: Bed, path: Path) -> None:
     """Write a bed to an .npz file, whole or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
     stuff = bed.material
-    about = {
+    about: dict[str, Any] = {
         "format": np.array(STATE_FORMAT),
         "material": np.array(stuff.name),
-        "material_numbers": np.array(
-            [
-                stuff.density,
-                stuff.young,
-                stuff.poisson,
-                stuff.friction,
-                stuff.restitution,
-                stuff.rolling_friction,
-            ]
-        ),
+        "material_numbers": np.array([getattr(stuff, key) for key in MATERIAL_NUMBERS]),
         "size": np.array(bed.size),
         "height": np.array(bed._settings["height"]),
         "tensile": np.array(bed._settings["tensile"]),
         "seed": np.array(-1 if bed.seed is None else bed.seed),
         "precision": np.array(bed._runtime.precision),
     }
+    about |= {f"state.{key}": values for key, values in take(bed).items()}
     handle, name = tempfile.mkstemp(dir=path.parent, suffix=".npz")
     try:
         with os.fdopen(handle, "wb") as file:
-            np.savez(file, **about, **{f"state.{k}": v for k, v in take(bed).items()})
+            np.savez(file, **about)
         Path(name).replace(path)
     except BaseException:
         Path(name).unlink()
@@ -156,11 +149,11 @@ def read_file(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray], str]:
         raise ValueError(f"{path} is not a bed saved by hedgebed ({problem})") from None
     if str(stored.get("format", "")) != STATE_FORMAT:
         raise ValueError(f"{path}: format is {stored.get('format', 'missing')}, {STATE_FORMAT!r} was expected")
-    numbers = [float(v) for v in stored["material_numbers"]]
+    numbers: dict[str, Any] = dict(zip(MATERIAL_NUMBERS, map(float, stored["material_numbers"]), strict=True))
     state = {name[6:]: value for name, value in stored.items() if name.startswith("state.")}
     seed = int(stored["seed"])
     settings = {
-        "material": Material(str(stored["material"]), *numbers),
+        "material": Material(str(stored["material"]), **numbers),
         "size": tuple(float(v) for v in stored["size"]),
         "gravity": tuple(float(v) for v in state["reals"][2:5]),
         "time_step": float(state["reals"][0]),
