@@ -37,6 +37,9 @@ BODY_FIELDS = (
     "overlap",
     "pushes",
 )
+LIST_NAMES = ("pair_count", "pair", "slide", "near_count", "near_grain", "near_body", "near_slide", "near_roll")
+NAMES = (*GRAIN_FIELDS, *BODY_FIELDS, *LIST_NAMES, "numbers", "reals")
+ABOUT = ("material", "material_numbers", "size", "height", "tensile", "seed", "precision")
 
 
 def take(bed: Bed) -> dict[str, np.ndarray]:
@@ -141,7 +144,7 @@ def write_file(bed: Bed, path: Path) -> None:
 def read_file(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray], str]:
     """Settings, state and precision of a bed that ``write_file`` wrote. Raises ValueError where there is none."""
     try:
-        with np.load(Path(path), allow_pickle=False) as file:
+        with Path(path).open("rb") as opened, np.load(opened, allow_pickle=False) as file:
             stored = {name: file[name] for name in file.files}
     except FileNotFoundError:
         raise ValueError(f"{path}: no such file; a bed saved by Bed.save was expected") from None
@@ -149,6 +152,9 @@ def read_file(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray], str]:
         raise ValueError(f"{path} is not a bed saved by hedgebed ({problem})") from None
     if str(stored.get("format", "")) != STATE_FORMAT:
         raise ValueError(f"{path}: format is {stored.get('format', 'missing')}, {STATE_FORMAT!r} was expected")
+    lacking = [key for key in (*ABOUT, *(f"state.{name}" for name in NAMES)) if key not in stored]
+    if lacking:
+        raise ValueError(f"{path} is not a whole bed saved by hedgebed: it lacks {', '.join(lacking)}")
     numbers: dict[str, Any] = dict(zip(MATERIAL_NUMBERS, map(float, stored["material_numbers"]), strict=True))
     state = {name[6:]: value for name, value in stored.items() if name.startswith("state.")}
     seed = int(stored["seed"])
