@@ -1,4 +1,4 @@
-"""Engines from the pool, and a cache of one's own, for every test of the bed."""
+"""The bed may be asked for other layouts of its engine, and has a cache of its own, in every test of the bed."""
 
 import pytest
 from engine_pool import POOL

@@ -1,0 +1,72 @@
+"""A bed of 300 grains in eight chunks that falls onto its floor and a ball: for tests of bits, here and elsewhere.
+
+As a script, in a process of its own:  falling_bed.py WHAT FILE STEPS THREADS [EVERY]
+    fresh   makes the bed, advances it and saves it
+    resume  loads the bed and advances it to that many steps in all
+Saves every EVERY steps when given, and says the number of steps after each save.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import dem.engine
+from dem import Ball, Bed, Cylinder, Material
+
+GRAINS_PER_CHUNK = 37
+STUFF = Material("grain", 2600, 1e7, 0.25, 0.5, 0.6, 0.15)
+
+
+def make(threads=None, precision="float64"):
+    """The bed at time 0, with a ball-tipped cylinder that is pulled through it at a slant."""
+    dem.engine.GRAINS_PER_CHUNK = GRAINS_PER_CHUNK
+    rng = np.random.default_rng(7)
+    i = np.arange(300)
+    positions = np.column_stack([i % 8, i // 8 % 8, i // 64]) * [0.0044, 0.0044, 0.0042] + [0.001, 0.002, 0.0026]
+    positions += rng.uniform(-1, 1, (300, 3)) * 0.00015
+    bed = Bed.from_grains(
+        STUFF,
+        positions=positions,
+        radii=0.0019 * rng.uniform(0.85, 1.15, 300),
+        velocities=rng.normal(0, 0.1, (300, 3)),
+        size=(0.035, 0.035, 0.03),
+        height=0.2,
+        max_overlap=0.1,
+        threads=threads,
+        precision=precision,
+    )
+    body = bed.add_body(
+        [Ball(center=(0, 0, 0.004), radius=0.004), Cylinder(0.004, 0.04, 0.004)], position=(0.034, 0.018, 0.0228)
+    )
+    bed.move_body(body, velocity=(0.05, 0.02, -0.5), spin=(0.0, 0.0, 20.0))
+    return bed
+
+
+def digest(bed) -> str:
+    """Of everything that the next step depends on, and of what users read."""
+    total = hashlib.sha256()
+    for name, array in sorted((bed.state() | bed.grains()).items()):
+        total.update(name.encode() + np.ascontiguousarray(array).tobytes())
+    for body in (0, 1):
+        for array in bed.reaction(body):
+            total.update(array.tobytes())
+    return total.hexdigest()
+
+
+def main() -> None:
+    what, path, steps, threads = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])
+    every = int(sys.argv[5]) if len(sys.argv) > 5 else steps
+    dem.engine.GRAINS_PER_CHUNK = GRAINS_PER_CHUNK
+    bed = make(threads) if what == "fresh" else Bed.load(path, threads=threads)
+    while bed.steps < steps:
+        bed.advance(min(every, steps - bed.steps))
+        bed.save(path)
+        print(bed.steps, digest(bed), flush=True)
+
+
+if __name__ == "__main__":
+    main()

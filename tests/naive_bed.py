@@ -1,0 +1,136 @@
+"""The same physics written plainly: every pair and every periodic image looked at, in numpy, with a dict of histories.
+
+An oracle for the engine's lists, chunks, images and history, and for its arithmetic: it shares no code with it.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+
+
+class NaiveBed:
+    """Grains in a box periodic in x and y, over a floor at z = 0, with at most one moving ball among them.
+
+    ``ball``: dict of position, radius, velocity, spin. Damping factors are given, not computed.
+    """
+
+    def __init__(self, material, positions, radii, velocities, spins, period, gravity, dt, damping, ball=None):
+        self.stuff, self.r, self.period, self.g, self.dt, self.damping = material, radii, period, gravity, dt, damping
+        self.x, self.ball = positions.copy(), None
+        self.m = material.density * 4 / 3 * math.pi * radii**3
+        self.inertia = 0.4 * self.m * radii**2
+        self.history: dict = {}
+        self.v, self.w = velocities.copy(), spins.copy()
+        self.push(0.0)
+        self.v -= 0.5 * dt * self.f / self.m[:, None]
+        self.w -= 0.5 * dt * self.t / self.inertia[:, None]
+        if ball is not None:  # like a body that is added to a bed: forces anew, with the velocities half a step behind
+            self.ball = ball | {"velocity": np.zeros(3), "spin": np.zeros(3)}
+            self.push(0.0)
+            self.ball = ball
+
+    def contact(self, key, n, v, spin, overlap, radius, mass, rigid, dt):
+        """Force, and turning torque, on the first of the pair; the law as ``dem.contact``'s docstring states it."""
+        s = self.stuff
+        share = 1 if rigid else 2
+        young = s.young / (1 - s.poisson**2) / share
+        shear = s.young / (2 * (2 - s.poisson) * (1 + s.poisson)) / share
+        a = math.sqrt(radius * overlap)
+        s_n, s_t = 2 * young * a, 8 * shear * a
+        u, q = self.history.get(key, (np.zeros(3), np.zeros(3)))
+        f_n = max(0.0, 4 / 3 * young * a * overlap - self.damping * math.sqrt(mass * s_n) * (v @ n))
+        v_t = v - (v @ n) * n
+        u = u + v_t * dt
+        u = u - (u @ n) * n
+        u, f_t = capped(s_t, self.damping * math.sqrt(s_t / s_n) * math.sqrt(mass * s_n), u, v_t, s.friction * f_n)
+        q = q + spin * dt
+        inertia = 0.4 * mass * radius**2
+        k = s_t * radius**2
+        roll, rolling = capped(
+            k, 0.6 * math.sqrt(inertia * k), q - (q @ n) * n, spin - (spin @ n) * n, s.rolling_friction * radius * f_n
+        )
+        k = s_t * a * a / 2
+        bound = 3 * math.pi / 16 * s.friction * a * f_n
+        twist, twisting = capped(k, 0.6 * math.sqrt(inertia * k), (q @ n) * n, (spin @ n) * n, bound)
+        self.new[key] = (u, roll + twist)
+        return f_n * n + f_t, rolling + twisting
+
+    def push(self, dt):
+        n = len(self.r)
+        self.new = {}
+        self.f = self.m[:, None] * self.g
+        self.t = np.zeros((n, 3))
+        for i, j in itertools.combinations(range(n), 2):
+            for a, b in itertools.product((-1, 0, 1), repeat=2):
+                d = self.x[i] - self.x[j] + [a * self.period[0], b * self.period[1], 0.0]
+                length = np.linalg.norm(d)
+                overlap = self.r[i] + self.r[j] - length
+                if overlap > 0:
+                    normal = d / length
+                    arm_i, arm_j = self.r[i] - overlap / 2, self.r[j] - overlap / 2
+                    v = self.v[i] - self.v[j] - np.cross(arm_i * self.w[i] + arm_j * self.w[j], normal)
+                    radius = self.r[i] * self.r[j] / (self.r[i] + self.r[j])
+                    mass = self.m[i] * self.m[j] / (self.m[i] + self.m[j])
+                    spin = self.w[i] - self.w[j]
+                    f, turn = self.contact((i, j), normal, v, spin, overlap, radius, mass, False, dt)
+                    self.f[i] += f
+                    self.f[j] -= f
+                    self.t[i] += np.cross(-arm_i * normal, f) + turn
+                    self.t[j] += np.cross(arm_j * normal, -f) - turn
+        self.on_ball, self.torque_on_ball, self.on_floor = np.zeros(3), np.zeros(3), np.zeros(3)
+        for i in range(n):
+            self.meet_floor(i, dt)
+            if self.ball is not None:
+                self.meet_ball(i, dt)
+        self.history = self.new
+
+    def meet_floor(self, i, dt):
+        normal, overlap = np.array([0.0, 0.0, 1.0]), self.r[i] - self.x[i, 2]
+        if overlap > 0:
+            arm = self.r[i] - overlap
+            v = self.v[i] - np.cross(arm * self.w[i], normal)
+            f, turn = self.contact((i, "floor"), normal, v, self.w[i], overlap, self.r[i], self.m[i], True, dt)
+            self.f[i] += f
+            self.t[i] += np.cross(-arm * normal, f) + turn
+            self.on_floor -= f
+
+    def meet_ball(self, i, dt):
+        ball = self.ball
+        for a, b in itertools.product((-2, -1, 0, 1, 2), repeat=2):
+            d = self.x[i] - ball["position"] + [a * self.period[0], b * self.period[1], 0.0]
+            length = np.linalg.norm(d)
+            overlap = self.r[i] + ball["radius"] - length
+            if overlap > 0:
+                normal, arm = d / length, self.r[i] - overlap
+                lever = ball["radius"] * normal
+                at_ball = ball["velocity"] + np.cross(ball["spin"], lever)
+                v = self.v[i] - np.cross(arm * self.w[i], normal) - at_ball
+                radius = self.r[i] * ball["radius"] / (self.r[i] + ball["radius"])
+                spin = self.w[i] - ball["spin"]
+                f, turn = self.contact((i, "ball"), normal, v, spin, overlap, radius, self.m[i], True, dt)
+                self.f[i] += f
+                self.t[i] += np.cross(-arm * normal, f) + turn
+                self.on_ball -= f
+                self.torque_on_ball -= np.cross(lever, f) + turn
+
+    def advance(self, steps):
+        for _ in range(steps):
+            self.v += self.dt * self.f / self.m[:, None]
+            self.w += self.dt * self.t / self.inertia[:, None]
+            self.x += self.dt * self.v
+            if self.ball is not None:
+                self.ball["position"] = self.ball["position"] + self.dt * self.ball["velocity"]
+            self.push(self.dt)
+
+
+def capped(stiffness, damping, stretch, rate, bound):
+    """A spring and dashpot that slide at a bound: the spring's stretch afterwards, and the force."""
+    force = -(stiffness * stretch + damping * rate)
+    size = np.linalg.norm(force)
+    if size > bound:
+        force = force * (bound / size)
+        stretch = -(force + damping * rate) / stiffness
+    return stretch, force
