@@ -343,6 +343,9 @@ def _bench(
         except RuntimeError as error:
             _say(f"failed: {error}")
             return FAILED
+        except ValueError as error:  # what a benchmark reads from the environment
+            _say(str(error))
+            return BAD_INPUT
         write_json(out / "bench.json", result)
     if json:
         print((out / "bench.json").read_text(encoding="utf-8"), end="")
