@@ -93,7 +93,7 @@ class Bed:
             gravity: downwards [m/s2], or a vector.
             young: Young's modulus of the (softened) grains [Pa]; the material's own when None.
             max_overlap: bound on overlap over diameter; the time step is chosen for it.
-            time_step: [s]; a tenth of the contact time when None.
+            time_step: [s]; an eighth of the contact time when None.
             floor: whether there is a floor at z = 0.
             tensile: whether the damping may pull at the end of a contact (as LIGGGHTS does by default).
             precision, arch, threads: see ``dem.runtime.start``.

@@ -30,7 +30,7 @@ def packing_profile(heights: np.ndarray, radii: np.ndarray, area: float, edges: 
 
 
 def bulk_packing(heights: np.ndarray, radii: np.ndarray, area: float) -> float:
-    """Packing fraction between two mean diameters above the floor and three below the highest decile of grains [1].
+    """Packing fraction between two mean diameters above the floor and two below the highest decile of grains [1].
 
     A layer thinner than that is measured as a whole, from the floor to its highest grain.
     """

@@ -7,7 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-__all__ = ["draw_radii", "rain_positions"]
+__all__ = ["RAIN_COLUMN", "draw_radii", "rain_positions"]
+
+RAIN_COLUMN = 2.5
+"""Upper bound of the rain's column over the depth of the levelled bed [1]: what a grain can fall."""
 
 
 def draw_radii(rng: np.random.Generator, volume: float, grain: float, spread: float) -> np.ndarray:
@@ -29,8 +32,7 @@ def draw_radii(rng: np.random.Generator, volume: float, grain: float, spread: fl
 def rain_positions(rng: np.random.Generator, radii: np.ndarray, period: Sequence[float]) -> np.ndarray:
     """Centres of grains in a loose jittered column above z = 0, none touching, periodic in x and y.
 
-    Layers are stacked two and a half times as far apart as they need be, so that the grains fall as rain rather than
-    as a block.
+    Layers are one and a half of the largest diameters apart, so that the grains fall as rain rather than as a block.
 
     Args:
         radii: [m], shape [grain_count].

@@ -5,6 +5,7 @@ Prepared beds are kept in a cache, keyed by everything that shaped them, so nobo
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import math
@@ -21,13 +22,15 @@ from . import runtime
 from .bed import Bed, BedFailure
 from .materials import Material
 from .materials import material as find_material
-from .packing import draw_radii, rain_positions
+from .packing import RAIN_COLUMN, draw_radii, rain_positions
 from .timestep import choose_young
 
-__all__ = ["cache_folder", "prepare_bed"]
+__all__ = ["cache_folder", "fingerprint", "prepare_bed"]
 
-# Raised whenever the preparation changes in a way that gives other beds.
-RECIPE = 1
+_EXPECTED_PACKING = 0.57
+# Penetration resistance of sand grows with depth about sixty times as fast as its overburden (3D-RFT, Agarwal et al.
+# 2023: 0.9 MN/m3 at mu = 0.5 against 16 kN/m3); a bed is made for a tip that may go half its depth.
+_BEARING = 30.0
 # More is rained in than is kept: this much higher, and at least this many diameters.
 _SURPLUS, _SURPLUS_DIAMETERS = 0.06, 2.0
 # Settled: mean kinetic energy of a grain over m g d, and floor force over weight.
@@ -42,7 +45,18 @@ _MOST_TAPS = 40
 def cache_folder() -> Path:
     """Where prepared beds are kept: ``HEDGEBED_CACHE``, or ~/.cache/hedgebed."""
     given = os.environ.get("HEDGEBED_CACHE")
-    return Path(given) if given else Path.home() / ".cache" / "hedgebed"
+    return Path(given).expanduser() if given else Path.home() / ".cache" / "hedgebed"
+
+
+@functools.cache
+def fingerprint() -> str:
+    """A short digest of the code that computes beds and of Taichi's version: other code may give other bits."""
+    import taichi
+
+    digest = hashlib.sha256(repr(taichi.__version__).encode())
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def prepare_bed(
@@ -76,7 +90,7 @@ def prepare_bed(
         young: Young's modulus of the softened grains [Pa]; chosen from ``max_overlap`` when None
             (``dem.timestep.choose_young``).
         max_overlap: bound on overlap over diameter; also ends a later run that goes past it.
-        time_step: [s]; a tenth of the contact time when None.
+        time_step: [s]; an eighth of the contact time when None.
         precision: "float64" or "float32". arch: "cpu" or "cuda". threads: all when None.
         cache: whether to look in the cache, and to leave the bed there.
         progress: anything with ``stage(name, total)`` and ``update(done)``, or None.
@@ -91,14 +105,18 @@ def prepare_bed(
         BedFailure: the bed did not come to rest.
     """
     stuff = find_material(material)
-    _check(size, grain, spread, packing, gravity)
+    _check(size, grain, spread, packing, gravity, seed, max_overlap)
     size = tuple(float(s) for s in size)
     if young is None:
-        # The rain hits at the speed of a fall through the loose column.
-        speed = math.sqrt(2 * gravity * 2.5 * size[2])
-        young = choose_young(stuff, depth=size[2], gravity=gravity, speed=speed, max_overlap=max_overlap)
+        bulk = _EXPECTED_PACKING * stuff.density
+        young = choose_young(
+            stuff,
+            pressure=(1 + _BEARING) * bulk * gravity * size[2],
+            speed=math.sqrt(2 * gravity * RAIN_COLUMN * size[2]),
+            max_overlap=max_overlap,
+        )
     recipe = {
-        "recipe": RECIPE,
+        "code": fingerprint(),
         "material": {f.name: getattr(stuff, f.name) for f in fields(stuff) if f.name != "sources"},
         "size": size,
         "grain": float(grain),
@@ -125,15 +143,19 @@ def prepare_bed(
             return bed
     report = _Reporter(progress)
     bed = _rain(stuff, size, grain, spread, gravity, seed, young, max_overlap, time_step, precision, arch, threads)
-    report.stage("rain", None)
-    _fall(bed, grain, report)
-    _settle(bed, grain, _ROUGH_ENERGY_RATIO, report, drag=True)
-    bed = _level(bed, size[2])
-    report.stage("settle", None)
-    _settle(bed, grain, ENERGY_RATIO, report, drag=True)
-    bed.measure_surface()
-    if packing is not None:
-        bed = _tap(bed, size[2], grain, packing, report)
+    try:
+        report.stage("rain", None)
+        _fall(bed, grain, report)
+        _settle(bed, grain, _ROUGH_ENERGY_RATIO, report, drag=True)
+        bed = _level(bed, size[2])
+        report.stage("settle", None)
+        _settle(bed, grain, ENERGY_RATIO, report, drag=True)
+        bed.measure_surface()
+        if packing is not None:
+            bed = _tap(bed, grain, packing, report)
+    except BedFailure as failure:
+        kept = bed.save(cache_folder() / "failed" / path.name)
+        raise BedFailure(f"{failure.reason}; the bed as it was is in {kept}") from None
     bed = _reset(bed)
     if cache:
         try:
@@ -144,16 +166,20 @@ def prepare_bed(
     return bed
 
 
-def _check(size, grain, spread, packing, gravity) -> None:
+def _check(size, grain, spread, packing, gravity, seed, max_overlap) -> None:
+    if not 0 < max_overlap <= 0.2:
+        raise ValueError(f"max_overlap = {max_overlap} must be above 0 and at most 0.2 of a diameter")
+    if int(seed) != seed or seed < 0:
+        raise ValueError(f"seed = {seed} must be a whole number, 0 or more")
     if len(size) != 3 or not all(math.isfinite(s) and s > 0 for s in size):
         raise ValueError(f"size = {tuple(size)} must be three positive lengths [m]")
     if not (math.isfinite(grain) and grain > 0):
         raise ValueError(f"grain = {grain} must be a positive diameter [m]")
     if not 0 <= spread <= 0.5:
         raise ValueError(f"spread = {spread} must be between 0 and 0.5 of the mean diameter")
-    if packing is not None and not 0.4 < packing < 0.7:
+    if packing is not None and not 0.5 < packing <= 0.64:
         raise ValueError(
-            f"packing = {packing} is no packing fraction of grains at rest; leave it out or ask for 0.55 to 0.64"
+            f"packing = {packing} is no packing fraction of spheres at rest; leave it out or ask for 0.55 to 0.64"
         )
     if not (math.isfinite(gravity) and gravity > 0):
         raise ValueError(f"gravity = {gravity} must be positive [m/s2]; nothing settles without it")
@@ -232,8 +258,10 @@ def _fall(bed: Bed, grain: float, report: _Reporter) -> None:
         energy = bed.kinetic_energy / bed.grain_count / unit
         peak = max(peak, energy)
         report.update(min(1.0, bed.time / fall))
-        if (energy < 0.1 and energy < 0.5 * peak) or bed.time > _LONGEST * fall:
+        if energy < 0.1 and energy < 0.5 * peak:
             return
+        if bed.time > _LONGEST * fall:
+            raise BedFailure(f"the rain was not down after {bed.time:.3g} s: energy {energy:.2g} m g d a grain")
 
 
 def _level(bed: Bed, depth: float) -> Bed:
@@ -245,8 +273,8 @@ def _level(bed: Bed, depth: float) -> Bed:
     return bed.without(above)
 
 
-def _tap(bed: Bed, depth: float, grain: float, packing: float, report: _Reporter) -> Bed:
-    """Tap the bed until its packing fraction is reached, levelling as it sinks is not needed: it only gets lower.
+def _tap(bed: Bed, grain: float, packing: float, report: _Reporter) -> Bed:
+    """Tap the bed until its packing fraction is reached; its surface sinks as it gets denser and stays nearly level.
 
     A tap is half a sine of acceleration of the bed's frame, 3 g high, as long as a grain takes to fall its diameter.
     """
@@ -277,7 +305,7 @@ def _tap(bed: Bed, depth: float, grain: float, packing: float, report: _Reporter
 
 
 def _reset(bed: Bed) -> Bed:
-    """The prepared bed at time 0, with displacements counted from here and a box that is high enough to work in."""
+    """The prepared bed at time 0, with displacements counted from here."""
     bed.mark_origin()
     bed.max_overlap = 0.0
     bed.steps = 0

@@ -10,14 +10,12 @@ import math
 from .contact import effective_moduli
 from .materials import Material
 
-__all__ = ["choose_young", "contact_time", "time_step_for"]
+__all__ = ["CHAIN", "choose_young", "contact_time", "time_step_for"]
 
 STEPS_PER_CONTACT = 8
 FEWEST_STEPS_PER_CONTACT = 5
-# Penetration resistance of sand grows with depth about sixty times as fast as its overburden (3D-RFT, Agarwal et al.
-# 2023: 0.9 MN/m3 at mu = 0.5 against 16 kN/m3), and the largest forces in a loaded bed are some six times the mean.
-_BEARING = 60.0
-_CHAIN = 6.0
+# The largest of some hundred loaded contacts over their mean: a drive to 20 mm in sand measured 3.4.
+CHAIN = 4.0
 
 
 def contact_time(material: Material, *, diameter: float, max_overlap: float) -> float:
@@ -62,20 +60,18 @@ def time_step_for(material: Material, *, diameter: float, max_overlap: float, wa
     return wanted
 
 
-def choose_young(
-    material: Material, *, depth: float, gravity: float, speed: float, max_overlap: float, packing: float = 0.6
-) -> float:
+def choose_young(material: Material, *, pressure: float, speed: float, max_overlap: float) -> float:
     """The softest Young's modulus that keeps overlaps within the bound [Pa]; never above the material's own.
 
-    Two needs, the larger of which rules: a tip pressed in to the bed's depth (pressure p = 60 rho_b g depth, largest
-    contact force 6 p d^2, F = 2/3 E* d^2 (delta/d)^1.5), and a collision at ``speed``
+    Two needs, the larger of which rules: a bed under pressure, whose mean contact force is about p d^2 and its largest
+    ``CHAIN`` times that (F = 2/3 E* d^2 (delta/d)^1.5), and a collision of two grains
     ((delta/d)^2.5 = 15 pi / 96 rho v^2 / E*).
 
     Args:
-        depth: of the bed [m]. gravity: of the grains [m/s2]. speed: the fastest collision [m/s].
+        pressure: the largest on the grains [Pa]. speed: of the fastest collision [m/s].
+        max_overlap: the bound, over diameter [1].
     """
-    pressure = _BEARING * packing * material.density * gravity * depth
-    pressed = 1.5 * _CHAIN * pressure / max_overlap**1.5
+    pressed = 1.5 * CHAIN * pressure / max_overlap**1.5
     struck = 15 * math.pi / 96 * material.density * speed**2 / max_overlap**2.5
     effective = max(pressed, struck)
     return min(material.young, 2 * (1 - material.poisson**2) * effective)

@@ -24,7 +24,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-__all__ = ["CHAIN", "Softening", "bearing_gradient", "contact_time", "drop_depth", "soften"]
+__all__ = ["CHAIN", "Softening", "bearing_gradient", "drop_depth", "soften"]
 
 CHAIN = 4.0
 """Largest over mean contact force [1]."""
@@ -95,10 +95,3 @@ def soften(
     stiffness = 1.25 * mass * squared / (max_overlap * grain) ** 2.5
     impact = 0.75 * stiffness / math.sqrt(0.5 * grain) * (1 - poisson**2)
     return Softening(min(real_young, max(static, impact)), highest, speed, real_young)
-
-
-def contact_time(*, grain: float, density: float, poisson: float, young: float, speed: float) -> float:
-    """How long two grains of diameter `grain` touch in a collision at `speed` [s]: Hertz, 2.943275 delta / v."""
-    mass = density * math.pi * grain**3 / 12  # of the pair
-    stiffness = 4 / 3 * young / (2 * (1 - poisson**2)) * math.sqrt(0.25 * grain)
-    return 2.943275 * (1.25 * mass * speed**2 / stiffness) ** 0.4 / speed
