@@ -132,8 +132,8 @@ class Bed:
             "tensile": bool(tensile),
             "seed": seed,
         }
-        if settings["height"] < top:
-            raise ValueError(f"height = {height} m is below the highest grain's top at {top:.4g} m")
+        if not top <= settings["height"] < math.inf:
+            raise ValueError(f"height = {height} m is no length, or below the highest grain's top at {top:.4g} m")
         bed = cls(settings, radii, precision=precision, arch=arch, threads=threads)
         mass = stuff.density * 4 / 3 * math.pi * radii**3
         bed._fill(positions, velocities, spins, radii, mass)
@@ -258,6 +258,8 @@ class Bed:
         used = int(e.body_primitives[body - 1][1]) if body else 0
         if not shape:
             raise ValueError("shape is empty; a body needs at least one primitive")
+        if len(position) != 3 or not all(math.isfinite(p) for p in position):
+            raise ValueError(f"position = {tuple(position)} must be 3 finite numbers [m]")
         if body >= MOST_BODIES or used + len(shape) > MOST_PRIMITIVES:
             raise ValueError(f"a bed takes at most {MOST_BODIES} bodies of {MOST_PRIMITIVES} primitives in all")
         stuff = self.material

@@ -33,8 +33,8 @@ class Material:
         for key in ("density", "young"):
             if not getattr(self, key) > 0:
                 refuse(key, "positive")
-        if math.isinf(self.density):
-            refuse("density", "finite")
+            if math.isinf(getattr(self, key)):
+                refuse(key, "finite")
         if not 0 <= self.poisson < 0.5:
             refuse("poisson", "at least 0 and below 0.5")
         if not 0.01 <= self.restitution <= 1:
