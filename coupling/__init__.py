@@ -2,7 +2,19 @@
 
 from .bed_ground import BedGround
 from .ground import Ground
-from .penetration import Drive, Drop, Run, SetDown, drive, drop, set_down
+from .penetration import Drive, Drop, Run, SetDown, drive, drop, overdamped_below, set_down
 from .trajectory import Penetration
 
-__all__ = ["BedGround", "Drive", "Drop", "Ground", "Penetration", "Run", "SetDown", "drive", "drop", "set_down"]
+__all__ = [
+    "BedGround",
+    "Drive",
+    "Drop",
+    "Ground",
+    "Penetration",
+    "Run",
+    "SetDown",
+    "drive",
+    "drop",
+    "overdamped_below",
+    "set_down",
+]

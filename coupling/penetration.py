@@ -30,10 +30,14 @@ from .bed_ground import BedGround
 from .ground import Ground
 from .trajectory import PHASES, Penetration
 
-__all__ = ["Drive", "Drop", "Run", "SetDown", "drive", "drop", "set_down"]
+__all__ = ["Drive", "Drop", "Run", "SetDown", "drive", "drop", "overdamped_below", "set_down"]
 
 SUBSTEPS = 10
 """Steps of the ground in a macro step, by default."""
+HAND_TIME = 0.002
+"""Mass over drag of a spike that is set down [s]."""
+AT_REST = 0.003
+"""What a spike at rest may still lack of its load, and its mean speed over the lowering speed [1]."""
 FREE, IN, REST, OUT = range(4)
 
 
@@ -283,8 +287,8 @@ class Drop(Run):
     """Let go at the surface with `speed` downwards, under the constant `load`, until it has come to rest.
 
     A bed of soft grains lets a spike that has stopped bob for long: the run ends `after_stop` [s] after the first stop
-    where that comes sooner. It rests when over the last `rest_time` the depth stayed within `rest_tolerance` of the largest depth and the mean
-    force within 5 % of the load. The rows of that time get the phase "rest".
+    where that comes sooner. It rests when over the last `rest_time` the depth stayed within `rest_tolerance` of the
+    largest depth and the mean force within 5 % of the load. The rows of that time get the phase "rest".
     """
 
     kind = "drop"
@@ -358,8 +362,9 @@ class SetDown(Drop):
     Free of the ground it sinks at `lowering_speed`; the hand bears whatever the ground does not, so the ground's force
     rises to the load from below and the spike comes to rest where the bed first carries it. `mass` is what the hand
     leaves the spike to feel; by default c times 2 ms, so light that the motion is damped beyond critical on any ground
-    softer than W / (8 ms lowering_speed) and cannot overshoot. It ends when over the last `rest_time` the mean speed is
-    below 1 % of the lowering speed and the mean force within 2 % of the load.
+    softer than W / (8 ms lowering_speed) (`overdamped_below`) and cannot overshoot. It ends when over the last
+    `rest_time` the mean speed is below 0.3 % of the lowering speed and the mean force within 0.3 % of the load. What is
+    left of the way is not waited for: on a spring the sinkage comes out shallow by what the force lacks, 0.3 % at most.
     """
 
     kind = "set_down"
@@ -379,7 +384,12 @@ class SetDown(Drop):
         self.hand = float(load) / lowering_speed
         """c [N s/m]."""
         super().__init__(
-            spike, ground, speed=lowering_speed, mass=self.hand * 0.002 if mass is None else mass, load=load, **common
+            spike,
+            ground,
+            speed=lowering_speed,
+            mass=self.hand * HAND_TIME if mass is None else mass,
+            load=load,
+            **common,
         )
 
     def settings(self) -> dict[str, Any]:
@@ -397,8 +407,13 @@ class SetDown(Drop):
         self.velocity = (self.mass * before + step * (self.load - force)) / (self.mass + step * self.hand)
 
     def _rests(self, last: np.ndarray) -> bool:
-        slow = abs(float(last[:, 2].mean())) <= 0.01 * self.speed
-        return slow and abs(float(last[:, 3].mean()) - self.load) <= 0.02 * self.load
+        slow = abs(float(last[:, 2].mean())) <= AT_REST * self.speed
+        return slow and abs(float(last[:, 3].mean()) - self.load) <= AT_REST * self.load
+
+
+def overdamped_below(load: float, lowering_speed: float) -> float:
+    """Stiffness of a ground [N/m] up to which a spike set down by default is damped beyond critical."""
+    return load / (4 * HAND_TIME * lowering_speed)
 
 
 def drive(spike: Spike, *, into: Any, speed: float, depth: float, **options: Any) -> Penetration:

@@ -41,7 +41,12 @@ class Penetration:
     macro_step: float
     """Length of a macro step [s]."""
     ended: str = "done"
-    """Why it ended: "done", "rest", "max_depth" or "max_time"."""
+    """Why it ended.
+
+    "done": a driven run came to the end of its way. "rest": a drop or set-down came to rest. "stopped": a drop was
+    still bobbing `after_stop` after its first stop. "max_depth": it went as deep as it was allowed. "max_time": its
+    time was over. "unfinished": these are the rows of a run under way.
+    """
     settings: dict[str, Any] = field(default_factory=dict)
     """What was asked for: speed, depth, load, mass and so on, SI units."""
 
@@ -86,6 +91,11 @@ class Penetration:
         return float(self.depth[-1]) if self.depth.size else 0.0
 
     @property
+    def resting_depth(self) -> float | None:
+        """Depth at which it came to rest [m]; None where it did not (`ended` is not "rest")."""
+        return self.final_depth if self.ended == "rest" else None
+
+    @property
     def stop_time(self) -> float | None:
         """Time from the surface to the first stop [s]; None where it never stopped."""
         rows = np.flatnonzero(self.way_in)
@@ -121,10 +131,10 @@ class Penetration:
             "work_in": (self.work_in, "J"),
             "work_out": (self.work_out, "J"),
         }
-        if self.kind != "driven":
+        if self.ended == "rest":
             values["final_depth"] = (self.final_depth, "m")
-        if self.kind == "set_down":
-            values["sinkage"] = (self.final_depth, "m")
+            if self.kind == "set_down":
+                values["sinkage"] = (self.final_depth, "m")
         if self.kind == "drop" and self.stop_time is not None:
             values["stop_time"] = (self.stop_time, "s")
         return {name: {"value": value, "std": None, "unit": unit} for name, (value, unit) in values.items()}

@@ -17,6 +17,7 @@ from .fit import Fit, fit_rows
 
 __all__ = ["departure_table", "departures", "depth_exponent", "sentences"]
 
+_WHOSE = "the spring-damper's"
 BANDS = 4
 """Bands of depth between the surface and the deepest point."""
 
@@ -109,10 +110,9 @@ def sentences(
         said.append(f"Going in, the bed's force grows with depth to the power {shown}; the spring's to the power 1.")
     if sinkage is not None:
         bed, law = sinkage
-        side = "deeper" if law > bed else "less deep"
         said.append(
             f"Set down under its load the spike sinks {1e3 * bed:.2f} mm into the bed; the spring-damper says "
-            f"{1e3 * law:.2f} mm, {_percent(law / bed - 1)} {side}."
+            f"{1e3 * law:.2f} mm, {_compared(law / bed - 1, 'deeper', 'less deep', 'as deep')}."
         )
     if returned is not None:
         said.append(
@@ -120,13 +120,18 @@ def sentences(
             f"{_share(returned[1])}."
         )
     if drops:
-        peak = float(np.mean([model.peak_force / bed.peak_force for bed, model in drops if bed.peak_force > 0] or [1]))
-        stop = float(np.mean([model.max_depth / bed.max_depth for bed, model in drops if bed.max_depth > 0] or [1]))
-        said.append(
-            f"In drops the spring-damper's peak force is {_percent(peak - 1)} {'above' if peak > 1 else 'below'} the "
-            f"bed's (largest mean of one macro step), and its deepest point {_percent(stop - 1)} "
-            f"{'deeper' if stop > 1 else 'less deep'}."
-        )
+        peaks = [model.peak_force / bed.peak_force for bed, model in drops if bed.peak_force > 0]
+        # A drop that was ended near the floor, or by its time while still sinking, has no deepest point of its own.
+        stops = [model.max_depth / bed.max_depth for bed, model in drops if bed.stop_time and model.stop_time]
+        parts = []
+        if peaks:
+            gap = _compared(float(np.mean(peaks)) - 1, "above the bed's", "below the bed's", "as high as the bed's")
+            parts.append(f"the spring-damper's peak force is {gap} (largest mean of one macro step)")
+        if stops:
+            gap = _compared(float(np.mean(stops)) - 1, "deeper", "less deep", "as deep as the bed's")
+            parts.append(f"{'its' if peaks else _WHOSE} deepest point is {gap}")
+        if parts:
+            said.append(f"In drops {', and '.join(parts)}.")
     return said
 
 
@@ -142,8 +147,9 @@ def _by_depth(table: Sequence[Mapping[str, Any]]) -> list[str]:
     for where, band in ((f"In the top {1e3 * top:.3g} mm", shallow), (f"Below {1e3 * bottom:.3g} mm", deep)):
         worst = max(band, key=lambda row: abs(row["gap"]))
         others = [row["gap"] for row in band]
+        pushes = _compared(worst["gap"], "too hard", "too softly", "as hard as the bed")
         text = (
-            f"{where} the spring-damper pushes {_percent(worst['gap'])} too {_hard(worst['gap'])} at "
+            f"{where} the spring-damper pushes {pushes} at "
             f"{worst['speed']:g} m/s ({worst['model_force']:.3g} N against {worst['bed_force']:.3g} N)"
         )
         if len(others) > 1:
@@ -182,6 +188,13 @@ def _returned(run: Penetration) -> float | None:
     return run.work_out / run.work_in if run.work_in > 0 and (run.phase == "out").any() else None
 
 
+def _compared(share: float, more: str, less: str, same: str) -> str:
+    """``12 % deeper``, or `same` where the difference would be shown as nothing."""
+    if abs(share) < 0.0005:
+        return same
+    return f"{_percent(share)} {more if share > 0 else less}"
+
+
 def _percent(value: float) -> str:
     size = abs(100 * value)
     return f"{size:.0f} %" if size >= 9.5 else f"{size:.1f} %"
@@ -194,7 +207,3 @@ def _share(value: float) -> str:
 def _signed(share: float) -> str:
     text = f"{100 * share:+.0f}"
     return "0" if text in ("+0", "-0") else text
-
-
-def _hard(gap: float) -> str:
-    return "hard" if gap > 0 else "softly"

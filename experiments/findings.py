@@ -7,6 +7,7 @@ value is fitted to all runs of all seeds. A quantity that no second seed has get
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -14,16 +15,16 @@ from typing import Any
 
 import numpy as np
 
-from coupling import Penetration
+from coupling import Penetration, overdamped_below
 from rigid import SpringDamper
 
 from .departures import departures
-from .fit import Fit, drag_gap, fit_spring_damper, spread
-from .settings import PenetrateSettings
+from .fit import Fit, drag_gap, fit_rows, fit_spring_damper, spread
+from .settings import STANDARD_GRAVITY, PenetrateSettings
 from .softening import Softening
 from .units import Unit, make_run
 
-__all__ = ["Findings", "bed_entry", "bed_quantities", "compare_with", "model_run"]
+__all__ = ["Findings", "bed_entry", "bed_quantities", "compare_with", "model_run", "read_reference"]
 
 Runs = Mapping[str, Penetration]
 COMPARED = ("stiffness", "damping", "sinkage_dem", "sinkage_spring_damper", "drag_gap")
@@ -71,9 +72,12 @@ class Findings:
     def quantities(self) -> dict[str, dict[str, Any]]:
         """The headline numbers: name -> value, std between seeds, unit, note."""
         fits, load = list(self.seed_fits.values()), self.settings.weight
-        sunk = [run.final_depth for run in self.of("set_down")]
-        model_sunk = [self.models[unit.id].final_depth for unit in self.units if unit.kind == "set_down"]
-        gaps = [drag_gap(self.of("driven", seed), self.fit) for seed in self.seeds]
+        sunk, model_sunk = self.sinkages(self.beds), self.sinkages(self.models)
+        shared_runs = self.shared_conditions()
+        gaps = [
+            drag_gap([run for unit, run in self._runs("driven", seed) if unit.condition in shared_runs], self.fit)
+            for seed in self.seeds
+        ]
         law_sinkages = [load / fit.stiffness if fit.stiffness > 0 else None for fit in fits]
         shared = "spread: each seed fitted to the runs that all seeds have"
         error = "standard error of the pooled fit, jackknife over runs"
@@ -86,12 +90,28 @@ class Findings:
             "sinkage_spring_damper": _quantity(_mean(model_sunk), spread(law_sinkages), "m", "the same on the law"),
             "drag_gap": _quantity(
                 drag_gap(self.of("driven"), self.fit), spread(gaps), "1",
-                "rms difference over rms drag, way in, all driven runs",
+                "rms difference over rms drag, way in, all driven runs; spread over the speeds that all seeds have",
             ),
             "work_returned_dem": self._work_returned(self.beds, "work of the way out over work in, driven runs"),
             "work_returned_spring_damper": self._work_returned(self.models, "the same on the fitted law"),
-            "load": _quantity(load, 0.0, "N", "(m + m_b) g_sim / 4 unless set"),
+            "load": _quantity(load, 0.0, "N", "on the spike, set down and dropped; (m + m_b) g_sim / 4 unless set"),
+            "drop_mass": _quantity(self.settings.mass, 0.0, "kg", self.drop_note()),
         }  # fmt: skip
+
+    def drop_note(self) -> str:
+        """What a drop is, and what it is not."""
+        return (
+            f"a drop moves mass = {self.settings.mass:.4g} kg under load = {self.settings.weight:.4g} N; the "
+            f"platform's own share is {self.settings.share:.4g} kg, and a body that falls freely in the laboratory "
+            f"would have {self.settings.mass * STANDARD_GRAVITY:.4g} N on it"
+        )
+
+    def sinkages(self, runs: Runs) -> list[float | None]:
+        """Depth at rest of every set-down [m]; None where it did not come to rest."""
+        return [runs[unit.id].resting_depth for unit in self.units if unit.kind == "set_down"]
+
+    def _runs(self, kind: str, seed: int) -> list[tuple[Unit, Penetration]]:
+        return [(unit, self.beds[unit.id]) for unit in self.units if (unit.kind, unit.seed) == (kind, seed)]
 
     def _work_returned(self, runs: Runs, note: str) -> dict[str, Any]:
         """Mean share of the work put in that driven runs give back; spread between seeds over the speeds they share."""
@@ -137,8 +157,8 @@ class Findings:
                     "seed": seed,
                     "stiffness": fit.stiffness,
                     "damping": fit.damping,
-                    "stiffness_std": fit.stiffness_error,
-                    "damping_std": fit.damping_error,
+                    "stiffness_error": fit.stiffness_error,
+                    "damping_error": fit.damping_error,
                     "drag_gap": drag_gap(self.of("driven", seed), fit),
                     "runs": list(fit.runs),
                 }
@@ -147,20 +167,61 @@ class Findings:
 
     def departures(self) -> dict[str, Any]:
         """The entry "departures"."""
-        sunk = _mean([run.final_depth for run in self.of("set_down")])
-        law = _mean([self.models[unit.id].final_depth for unit in self.units if unit.kind == "set_down"])
+        sunk, law = _mean(self.sinkages(self.beds)), _mean(self.sinkages(self.models))
         pair = (sunk, law) if sunk and law is not None else None
-        return departures(self.of("driven"), self.models, self.beds, self.fit, sinkage=pair)
+        found = departures(self.of("driven"), self.models, self.beds, self.fit, sinkage=pair)
+        shallow = self._shallow()
+        found["sentences"] += [f"{shallow[:1].upper()}{shallow[1:]}."] if shallow else []
+        if self.of("drop"):
+            note = self.drop_note()
+            found["sentences"].append(f"{note[:1].upper()}{note[1:]}.")
+        return found
+
+    def _shallow(self) -> str | None:
+        """What to know of a sinkage that is hardly more than a grain."""
+        sunk = _mean(self.sinkages(self.beds))
+        if sunk is None or sunk >= 2 * self.settings.grain:
+            return None
+        return (
+            f"the sinkage, {1e3 * sunk:.2f} mm, is only {sunk / self.settings.grain:.2g} grains: it depends on which "
+            f"grain the tip met, so its spread between seeds is part of the answer"
+        )
 
     def warnings(self) -> list[str]:
         """What a reader has to know: runs that did not end as they should, a law that came out at its bound."""
         said = []
+        bobbing = []
         for unit in self.units:
             ended = self.beds[unit.id].ended
             if ended == "max_time":
-                said.append(f"{unit.title} had not come to rest when its time was over: its depth at rest is a bound")
+                said.append(f"{unit.title} had not come to rest when its time was over: it has no depth at rest")
             elif ended == "max_depth":
-                said.append(f"{unit.title} went within one tip's diameter of the floor and was ended there")
+                said.append(
+                    f"{unit.title} went within one tip's diameter of the floor and was ended there: it has no depth at "
+                    f"rest, and the spring-damper is not fitted to it"
+                )
+            elif ended == "stopped":
+                bobbing.append(unit)
+            elif ended == "unfinished":
+                said.append(f"{unit.title} is unfinished: it has no depth at rest")
+        if bobbing:
+            said.append(
+                f"{len(bobbing)} of {len(self.of('drop'))} drops were still bobbing after_stop = "
+                f"{self.settings.after_stop:g} s after their first stop and ended there: they have no depth at rest"
+            )
+        if _mean(self.sinkages(self.beds)) is None:
+            said.append("no set-down came to rest: there is no sinkage_dem")
+        if _mean(self.sinkages(self.models)) is None:
+            said.append("the spring-damper did not come to rest: there is no sinkage_spring_damper")
+        shallow = self._shallow()
+        if shallow:
+            said.append(shallow)
+        bound = overdamped_below(self.settings.weight, self.settings.lowering_speed)
+        if self.of("set_down") and self.fit.stiffness > bound:
+            said.append(
+                f"the stiffness fitted, {self.fit.stiffness:.3g} N/m, is above {bound:.3g} N/m, up to which a spike "
+                f"set down is damped beyond critical: it may have overshot; a lower lowering_speed would do"
+            )
         if self.fit.damping == 0:
             said.append("the damping fitted is 0, its bound: the bed shows no drag that grows with speed in these runs")
         if self.fit.stiffness == 0:
@@ -184,6 +245,7 @@ def bed_entry(facts: Sequence[Mapping[str, Any]], settings: PenetrateSettings, s
         "grain": settings.grain,
         "spread": settings.spread,
         "gravity": settings.gravity,
+        "max_overlap": settings.max_overlap,
         "softening": asdict(softening) | {"factor": softening.factor},
         "seeds": [dict(entry) for entry in facts],
     }
@@ -213,31 +275,86 @@ def bed_quantities(facts: Sequence[Mapping[str, Any]], overlap: float | None) ->
 _MEASURED = ("packing_fraction", "coordination_number", "surface")
 
 
-def compare_with(
-    reference: str | Path, quantities: Mapping[str, Mapping[str, Any]]
-) -> tuple[dict[str, Any], list[str]]:
-    """How far the numbers moved from those of another result.json: entries for "reference", and sentences.
-
-    Raises ValueError where the file is no result.
-    """
-    path = Path(reference)
+def read_reference(reference: str | Path) -> dict[str, Any]:
+    """The result.json to compare with. Raises ValueError where it is not the result of a penetrate run."""
     try:
-        other = json.loads(path.read_text(encoding="utf-8"))
-        before = {name: other["quantities"][name]["value"] for name in COMPARED if name in other["quantities"]}
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        other = json.loads(Path(reference).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
         raise ValueError(f"reference = {str(reference)!r} is no result.json that can be read: {error}") from None
+    kind = (other.get("format"), other.get("experiment")) if isinstance(other, dict) else (None, None)
+    if kind != ("hedgebed-result/1", "penetrate"):
+        raise ValueError(
+            f"reference = {str(reference)!r} is format {kind[0]!r}, experiment {kind[1]!r}: the result.json of a "
+            f"penetrate run, format 'hedgebed-result/1', would do"
+        )
+    if not isinstance(other.get("quantities"), dict) or not isinstance(other.get("runs"), list):
+        raise ValueError(
+            f"reference = {str(reference)!r} has no quantities or no runs: take a finished run's result.json"
+        )
+    return other
+
+
+def compare_with(
+    other: Mapping[str, Any], findings: Findings, result: Mapping[str, Any]
+) -> tuple[dict[str, Any], list[str]]:
+    """How far the numbers moved from those of `other`, another result.json: the entry "reference", and sentences.
+
+    Stiffness, damping and what follows from them are those of a fit to the runs whose kind and speed the other has
+    too, each condition weighing what it weighs there, so that runs at other speeds do not pass for a change of grain.
+    """
+    there: Counter[tuple[str, float]] = Counter(
+        (str(run.get("kind")), float(run["speed"])) for run in other["runs"] if run.get("speed") is not None
+    )
+    here = Counter(unit.condition for unit in findings.units)
+    common = {unit.id: unit for unit in findings.units if unit.condition in there}
+    fitted = {name: findings.beds[name] for name, unit in common.items() if unit.kind != "set_down"}
+    weights = {name: there[unit.condition] / here[unit.condition] for name, unit in common.items()}
+    now: dict[str, float | None] = dict.fromkeys(COMPARED)
+    if any(fit_rows(run).any() for run in fitted.values()):
+        law = fit_spring_damper(fitted, weights)
+        now["stiffness"], now["damping"] = law.stiffness, law.damping
+        now["drag_gap"] = drag_gap(list(fitted.values()), law, [weights[name] for name in fitted])
+        now["sinkage_spring_damper"] = findings.settings.weight / law.stiffness if law.stiffness > 0 else None
+    # How slowly it is lowered hardly matters to where it comes to rest.
+    now["sinkage_dem"] = _mean(findings.sinkages(findings.beds))
     moved: dict[str, Any] = {}
     said = []
-    for name, old in before.items():
-        new = quantities.get(name, {}).get("value")
+    for name in COMPARED:
+        entry = other["quantities"].get(name)
+        old, new = entry.get("value") if isinstance(entry, Mapping) else None, now[name]
         if old is None or new is None:
             continue
         change = new / old - 1 if old else None
-        moved[name] = {"before": old, "now": new, "change": change, "unit": quantities[name]["unit"]}
+        unit = result["quantities"][name]["unit"]
+        moved[name] = {"before": old, "now": new, "change": change, "unit": unit}
         percent = f" ({100 * change:+.1f} %)" if change is not None else ""
-        unit = "" if quantities[name]["unit"] == "1" else f" {quantities[name]['unit']}"
-        said.append(f"{name} moves from {old:.4g} to {new:.4g}{unit}{percent}.")
-    return moved, said
+        said.append(f"{name} moves from {old:.4g} to {new:.4g}{'' if unit == '1' else ' ' + unit}{percent}.")
+    differs = _differences(other, result)
+    missing = sorted({f"{kind} at {speed:g} m/s" for kind, speed in there if (kind, speed) not in here})
+    if moved and differs:
+        said.append(f"what differs: {', '.join(differs)}.")
+    if moved and missing:
+        said.append(f"it has runs that are not made here: {', '.join(missing)}.")
+    return {"moved": moved, "differs": differs, "runs": sorted(common)}, said
+
+
+def _differences(other: Mapping[str, Any], result: Mapping[str, Any]) -> list[str]:
+    """What was set otherwise there than here, as ``grain 0.0024 m there, 0.0012 m here``."""
+    found = []
+    for part, name, unit in (
+        ("bed", "material", ""), ("bed", "size", "m"), ("bed", "grain", "m"), ("bed", "spread", ""),
+        ("bed", "gravity", "m/s2"), ("bed", "max_overlap", "of a diameter"), ("spike", "tip", ""),
+        ("spike", "diameter", "m"), ("spike", "shaft_diameter", "m"), ("spike", "cone_angle", "degrees"),
+        ("spike", "mass", "kg"), ("spike", "friction", ""), ("spike", "restitution", ""), ("spike", "load", "N"),
+    ):  # fmt: skip
+        before, now = (
+            source[part].get(name) if isinstance(source.get(part), Mapping) else None for source in (other, result)
+        )
+        if before is None or now is None or before == now:
+            continue
+        shown = [f"{value:.4g}" if isinstance(value, float) else str(value) for value in (before, now)]
+        found.append(f"{name} {shown[0]} there, {shown[1]} here{f' [{unit}]' if unit else ''}")
+    return found
 
 
 def _quantity(value: float | None, std: float | None, unit: str, note: str = "") -> dict[str, Any]:
@@ -245,5 +362,6 @@ def _quantity(value: float | None, std: float | None, unit: str, note: str = "")
     return entry | {"note": note} if note else entry
 
 
-def _mean(values: Sequence[float]) -> float | None:
-    return float(np.mean(values)) if values else None
+def _mean(values: Sequence[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else None

@@ -44,15 +44,22 @@ class Fit:
 
 
 def fit_rows(run: Penetration) -> NDArray[np.bool_]:
-    """Rows of a run that are fitted, shape [n]: the first way in; none of a set-down."""
-    if run.kind == "set_down":
+    """Rows of a run that are fitted, shape [n]: the first way in; none of a set-down, nor of a drop that never stopped.
+
+    A drop ended at its largest depth was near the floor.
+    """
+    if run.kind == "set_down" or run.ended == "max_depth":
         return np.zeros(len(run.time), dtype=bool)
     return run.way_in & (run.depth > 0)
 
 
-def fit_spring_damper(runs: Mapping[str, Penetration]) -> Fit:
-    """Fit K and C to `runs` (id -> run). Raises ValueError where no run has a way in."""
-    parts = {name: _normal(run) for name, run in runs.items() if fit_rows(run).any()}
+def fit_spring_damper(runs: Mapping[str, Penetration], weights: Mapping[str, float] | None = None) -> Fit:
+    """Fit K and C to `runs` (id -> run), each of weight 1 or as given. Raises ValueError where no run has a way in."""
+    parts = {}
+    for name, run in runs.items():
+        if fit_rows(run).any():
+            weight = 1.0 if weights is None else weights[name]
+            parts[name] = tuple(weight * part for part in _normal(run))
     if not parts:
         raise ValueError("no driven run and no drop to fit the spring-damper to")
     matrix = sum((part[0] for part in parts.values()), np.zeros((2, 2)))
@@ -67,18 +74,18 @@ def fit_spring_damper(runs: Mapping[str, Penetration]) -> Fit:
     return Fit(stiffness, damping, *errors, tuple(parts))
 
 
-def drag_gap(runs: Sequence[Penetration], fit: Fit) -> float | None:
-    """Rms difference of law and bed over the rms drag of the bed, way in of driven runs, every run of equal weight [1].
+def drag_gap(runs: Sequence[Penetration], fit: Fit, weights: Sequence[float] | None = None) -> float | None:
+    """Rms difference of law and bed over the rms drag of the bed, way in of driven runs [1].
 
-    None where there is no driven run.
+    Every run weighs the same unless `weights` says otherwise. None where there is no driven run.
     """
     square, drag = 0.0, 0.0
-    for run in runs:
+    for run, weight in zip(runs, weights or [1.0] * len(runs), strict=True):
         rows = fit_rows(run)
         if run.kind != "driven" or not rows.any():
             continue
-        square += float(np.mean((fit.force(run.depth[rows], run.velocity[rows]) - run.force[rows]) ** 2))
-        drag += float(np.mean(run.force[rows] ** 2))
+        square += weight * float(np.mean((fit.force(run.depth[rows], run.velocity[rows]) - run.force[rows]) ** 2))
+        drag += weight * float(np.mean(run.force[rows] ** 2))
     return float(np.sqrt(square / drag)) if drag > 0 else None
 
 

@@ -62,7 +62,9 @@ class PenetrateSettings(BaseModel):
         None, description="Weight on the spike [N]; (m + m_b) g_sim / 4 of platform and counterweight if not given."
     )
     mass: Positive = Field(
-        0.2, description="Mass that a dropped spike moves [kg]; the platform's share in the rig, (m + m_b) / 4, is 2.63 kg."
+        0.2,
+        description="Mass that a drop moves, under `load` [kg]. The shipped 0.2 kg stops within a shallow bed; the "
+        "platform's own share in the rig, (m + m_b) / 4, is 2.63 kg, and a free drop in a laboratory has load = m g.",
     )
 
     # What is done with it
@@ -198,9 +200,13 @@ class PenetrateSettings(BaseModel):
         """
         if self.load is not None:
             return self.load
+        return self.share * (self.rig * STANDARD_GRAVITY if self.rig else self.gravity)
+
+    @property
+    def share(self) -> float:
+        """The mass that a spike's quarter of the platform moves [kg]: (m + m_b) / 4, without a rig m / 4."""
         counterweight = self.platform_mass * (1 - self.rig) / (1 + self.rig) if self.rig else 0.0
-        simulated = self.rig * STANDARD_GRAVITY if self.rig else self.gravity
-        return (self.platform_mass + counterweight) * simulated / 4
+        return (self.platform_mass + counterweight) / 4
 
 
 def _plain(values: tuple[float, ...]) -> str:

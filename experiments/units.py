@@ -122,8 +122,8 @@ def deepest(settings: PenetrateSettings) -> float:
 def expected_time(settings: PenetrateSettings, unit: Unit, stiffness: float) -> float:
     """About how long a run lasts on the bed's clock [s], `stiffness` [N/m] being a guess at the bed's.
 
-    A drop: down in a quarter of a period, and what it is followed for after that. A set-down: first order, with the hand's
-    c / K = load / (lowering_speed K), five times that and the way down.
+    A drop: down in a quarter of a period, and what it is followed for after that. A set-down: first order, with the
+    hand's c / K = load / (lowering_speed K), five times that and the way down.
     """
     if unit.kind == "driven":
         return settings.depth / unit.speed + settings.hold + settings.depth / settings.retreat_speed

@@ -81,7 +81,7 @@ def test_set_down_ends_at_the_sinkage_that_carries_the_load():
     ground = SpringDamper(stiffness=100.0, time_step=1e-4)
     run = set_down(SPIKE, onto=ground, load=0.2, lowering_speed=0.03)
     assert run.ended == "rest"
-    assert run.final_depth == pytest.approx(0.2 / 100.0, rel=0.01)
+    assert run.resting_depth == pytest.approx(0.2 / 100.0, rel=0.003)
     assert run.max_depth < 0.2 / 100.0  # from above, without overshoot
     run = set_down(SPIKE, onto=FakeBed(hardness=2e4, power=2.0), load=0.2, lowering_speed=0.03)
     assert run.final_depth == pytest.approx(math.sqrt(0.2 / 2e4), rel=0.02)
@@ -154,7 +154,7 @@ def test_a_saved_run_is_a_run_folder(tmp_path):
 
 
 def test_a_drop_that_bobs_ends_a_set_time_after_its_first_stop():
-    """Undamped spring: it would bob for ever; the first stop is at (pi/2 + phi) sqrt(m/K), tan phi = W / (v sqrt(mK))."""
+    """Undamped spring, it would bob for ever; first stop at (pi/2 + phi) sqrt(m/K), tan phi = W / (v sqrt(mK))."""
     ground = SpringDamper(stiffness=100.0, damping=0.0, time_step=1e-5)
     spike = Spike(diameter=0.012, length=0.06, mass=0.2)
     series = drop(spike, into=ground, speed=0.1, load=0.2, after_stop=0.03, max_time=5.0)

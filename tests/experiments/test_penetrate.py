@@ -11,7 +11,7 @@ import pytest
 from fake_bed import FakeBed
 from pydantic import ValidationError
 
-from experiments import penetrate
+from experiments import penetrate, units
 from experiments.settings import PenetrateSettings, expected_grain_count
 from experiments.units import plan_units, shown_units
 from vis.frames import frame_names, read_frames
@@ -136,13 +136,48 @@ def test_a_failing_bed_leaves_its_state(fake, tmp_path, monkeypatch):
 
 def test_compared_with_a_reference(fake, tmp_path):
     reference = tmp_path / "before.json"
-    reference.write_text(json.dumps({"quantities": {"stiffness": {"value": 60.0, "std": 1.0, "unit": "N/m"}}}))
+    before = {
+        "format": "hedgebed-result/1",
+        "experiment": "penetrate",
+        "quantities": {"stiffness": {"value": 60.0, "std": 1.0, "unit": "N/m"}},
+        "runs": [{"kind": "driven", "speed": 0.2}, {"kind": "driven", "speed": 0.05}],
+        "bed": {"grain": 0.0048, "max_overlap": 0.05},
+    }
+    reference.write_text(json.dumps(before))
     settings = PenetrateSettings(**(QUICK | {"seeds": (1,), "reference": str(reference), "frame_count": 0}))
     result = penetrate.run(settings, tmp_path / "run")
     assert result["reference"]["moved"]["stiffness"]["change"] == pytest.approx(110 / 60 - 1, rel=1e-6)
-    assert any("stiffness moves from 60 to 110" in text for text in result["departures"]["sentences"])
+    said = " ".join(result["departures"]["sentences"])
+    assert "stiffness moves from 60 to 110" in said and "grain 0.0048 there, 0.0024 here" in said
+    assert "driven at 0.05 m/s" in said and "max_overlap" not in said.split("what differs")[1]
+    assert result["reference"]["runs"] == ["seed1-driven-0.2"]
     assert result["quantities"]["stiffness"]["std"] is None  # one seed tells nothing of the spread
     assert frame_names(tmp_path / "run") == []
+
+
+def test_a_reference_of_another_kind_is_refused(fake, tmp_path):
+    reference = tmp_path / "bench.json"
+    reference.write_text(json.dumps({"format": "hedgebed-bench/1"}))
+    with pytest.raises(ValueError, match=r"reference = .*'hedgebed-bench/1'.*would do"):
+        penetrate.check(PenetrateSettings(reference=str(reference)))
+
+
+def test_only_what_rests_has_a_depth_at_rest(fake, tmp_path, monkeypatch):
+    monkeypatch.setattr(units, "_set_down_time", lambda settings, unit: 0.03)
+    settings = PenetrateSettings(**(QUICK | {"seeds": (1,), "frame_count": 0, "rest_time": 5.0, "after_stop": 0.02}))
+    result = penetrate.run(settings, tmp_path / "run")
+    assert result["quantities"]["sinkage_dem"]["value"] is None
+    assert all("final_depth" not in run["quantities"] for run in result["runs"])
+    said = " ".join(result["warnings"])
+    assert "1 of 1 drops were still bobbing" in said and "no set-down came to rest" in said
+
+
+def test_a_shallow_sinkage_and_what_a_drop_is_are_said(fake, tmp_path):
+    settings = PenetrateSettings(**(QUICK | {"seeds": (1,), "frame_count": 0}))
+    result = penetrate.run(settings, tmp_path / "run")
+    assert any("only 1.5 grains" in text for text in result["warnings"])
+    assert any("moves mass = 0.3 kg under load = 0.4 N" in text for text in result["departures"]["sentences"])
+    assert {"stiffness_error", "damping_error"} <= set(result["fits"][0]) and "stiffness_std" not in result["fits"][0]
 
 
 def test_the_shipped_result_is_not_everywhere(fake, tmp_path, monkeypatch):
@@ -162,14 +197,16 @@ def test_the_shipped_cases_are_settings():
     assert expected_grain_count(short.bed_size, short.grain, short.spread) > 20000
     assert short.tip_diameter / short.grain >= 4.999 and short.max_overlap <= 0.05 and min(short.speeds) >= 0.1
     assert full.tip_diameter / full.grain >= 9.999 and full.max_overlap <= 0.01 and min(full.speeds) < 0.1
+    finer = {"grain", "max_overlap", "speeds", "other_speeds", "other_drop_speeds", "reference"}
+    assert {name for name, value in full if value != getattr(short, name)} == finer
     assert len(full.seeds) >= 3 and full.other_speeds == full.speeds and full.other_drop_speeds == full.drop_speeds
 
 
 def test_every_run_is_made_on_the_first_seed_fewer_on_the_others():
-    units = plan_units(PenetrateSettings())
-    assert len([unit for unit in units if unit.seed == 1]) == 7
-    assert len([unit for unit in units if unit.seed == 2]) == 3
-    assert shown_units(units) == {"seed1-driven-0.1", "seed1-drop-0.2", "seed1-set-down"}
+    planned = plan_units(PenetrateSettings())
+    assert len([unit for unit in planned if unit.seed == 1]) == 7
+    assert len([unit for unit in planned if unit.seed == 2]) == 3
+    assert shown_units(planned) == {"seed1-driven-0.1", "seed1-drop-0.2", "seed1-set-down"}
 
 
 def test_the_load_is_the_platforms_share():

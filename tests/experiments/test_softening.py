@@ -1,6 +1,5 @@
 """The modulus goes with pressure and overlap as Hertz says, and never above the real grains'."""
 
-import math
 
 import pytest
 
