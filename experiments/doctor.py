@@ -16,6 +16,7 @@ from rich.console import Console
 from rich.table import Table
 
 from experiments import probes
+from experiments.memory import memory_there
 from hedgebed import __version__
 
 __all__ = ["Finding", "cache_folder", "examine", "show"]
@@ -92,25 +93,11 @@ def _threads() -> Finding:
 
 
 def _memory() -> Finding:
-    try:
-        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
-        kib = {line.split(":")[0]: int(line.split()[1]) for line in lines}
-        total, available = kib["MemTotal"] * 1024, kib["MemAvailable"] * 1024
-    except (OSError, KeyError, ValueError, IndexError):
-        return Finding("memory", True, "unknown")
-    limit = _memory_limit()
-    limited = f", limited to {limit / GIB:.1f} GiB" if limit is not None and limit < total else ""
-    ok = min(available, limit or available) >= 1 * GIB
-    detail = f"{available / GIB:.1f} GiB available of {total / GIB:.1f} GiB{limited}"
-    return Finding("memory", ok, detail, "close something, or take a smaller bed_size or a larger grain")
-
-
-def _memory_limit() -> int | None:
-    """The container's limit [byte], where there is one."""
-    try:
-        return int(Path("/sys/fs/cgroup/memory.max").read_text(encoding="ascii"))
-    except (OSError, ValueError):
-        return None
+    memory = memory_there()
+    limited = f", limited to {memory.limit / GIB:.1f} GiB" if memory.limit is not None else ""
+    detail = f"{memory.free / GIB:.1f} GiB available of {memory.total / GIB:.1f} GiB{limited}"
+    remedy = "close something, or take a smaller bed_size or a larger grain"
+    return Finding("memory", memory.free >= GIB, detail, remedy)
 
 
 def _cache() -> Finding:

@@ -9,7 +9,6 @@ the same runs are made on it, and the two are compared.
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -22,6 +21,7 @@ from coupling import BedGround, Penetration, Run
 from hedgebed import __version__
 
 from .findings import Findings, bed_entry, bed_quantities, compare_with, read_reference
+from .memory import memory_there
 from .progress import Progress
 from .runfolder import RunFolder
 from .settings import PenetrateSettings, expected_grain_count
@@ -32,6 +32,10 @@ __all__ = ["check", "choose_softness", "resume", "run"]
 
 BYTES_PER_GRAIN = 4000
 """Memory of one grain with its lists and contact history, float64, measured generously [bytes]."""
+MOST_GRAINS = 2**26
+"""More are refused."""
+MOST_STEPS = 1e9
+"""Of the grains, in all runs; more are refused."""
 RAIN = 2.5
 """Height of the loose column that a bed is rained from, over the bed's depth [1]."""
 SHIPPED_RESULT = Path(__file__).parent.parent / "docs" / "results" / "penetrate" / "result.json"
@@ -62,19 +66,115 @@ def check(settings: PenetrateSettings) -> None:
     for seeds, speeds in ((settings.seeds[:1], settings.speeds), (settings.seeds[1:], settings.other_speeds)):
         if seeds and not speeds:
             raise ValueError("other_speeds is empty: at least one speed would do, so that every seed has a fit")
+    _check_grain_count(settings)
+    _check_arch(settings)
+    _check_young(settings)
+    _check_reach(settings)
+    step = bed_step(settings, choose_softness(settings).young)
+    found = settings.crossing(step, find_material(settings.material).young)
+    if found:
+        raise ValueError(found)
+    _check_step_count(settings, step)
+    if settings.reference not in (None, "shipped"):
+        read_reference(str(settings.reference))
+
+
+def _check_grain_count(settings: PenetrateSettings) -> None:
     count = expected_grain_count(settings.bed_size, settings.grain, settings.spread)
-    need, there = count * BYTES_PER_GRAIN, _memory_there()
+    need, there = count * BYTES_PER_GRAIN, memory_there().free
     if need > 0.8 * there:
         least = settings.grain * (need / (0.8 * there)) ** (1 / 3)
         raise ValueError(
             f"grain = {settings.grain:g} m makes about {count:.3g} grains, which take {need / 1e9:.3g} GB where "
             f"{there / 1e9:.3g} GB are free: grains of {least:.2g} m or a smaller bed_size would do"
         )
-    found = settings.crossing(bed_step(settings, choose_softness(settings).young))
-    if found:
-        raise ValueError(found)
-    if settings.reference not in (None, "shipped"):
-        read_reference(str(settings.reference))
+    if count > MOST_GRAINS:
+        raise ValueError(
+            f"grain = {settings.grain:g} m makes about {count:.3g} grains: at most {MOST_GRAINS} can be counted, so "
+            f"grains of {settings.grain * (count / MOST_GRAINS) ** (1 / 3):.2g} m or a smaller bed_size would do"
+        )
+
+
+def _check_arch(settings: PenetrateSettings) -> None:
+    """Start what is not on every machine, so that it is missed before there is a folder."""
+    if settings.arch == "cpu":
+        return
+    from dem import runtime
+
+    try:
+        runtime.start(arch=settings.arch, threads=settings.threads, precision=settings.precision)
+    except RuntimeError as error:
+        said = " ".join(str(error).split())
+        raise ValueError(said if "arch" in said else f"arch = {settings.arch!r} does not run here: {said}") from None
+
+
+def _check_young(settings: PenetrateSettings) -> None:
+    if settings.young is None:
+        return
+    most = find_material(settings.material).young
+    chosen = choose_softness(settings.model_copy(update={"young": None})).young
+    if settings.young > most:
+        raise ValueError(
+            f"young = {settings.young:g} Pa is more than {settings.material} itself has: at most {most:g} Pa would do"
+        )
+    if settings.young < 0.1 * chosen:
+        raise ValueError(
+            f"young = {settings.young:g} Pa is so soft that grains would overlap far past max_overlap = "
+            f"{settings.max_overlap:g}: {chosen:.3g} Pa would do, which is what is chosen without it"
+        )
+
+
+def _check_reach(settings: PenetrateSettings) -> None:
+    """Refuse what would end near the floor."""
+    stiffness, floor = _expected_stiffness(settings), deepest(settings)
+    deeper = f"{floor:.3g} m, one tip's diameter above the floor"
+    rests = settings.weight / stiffness
+    if rests > floor:
+        key = "load" if settings.load is not None else "platform_mass"
+        value = f"{settings.load:g} N" if settings.load is not None else f"{settings.platform_mass:g} kg"
+        most = settings.weight * floor / rests
+        raise ValueError(
+            f"{key} = {value} puts {settings.weight:.3g} N on the spike, which would sink about {rests:.2g} m, deeper "
+            f"than {deeper}: a load of at most {most:.2g} N, a larger tip_diameter or a deeper bed_size would do"
+        )
+    for key in ("drop_speeds", "other_drop_speeds"):
+        for speed in getattr(settings, key):
+            depth = drop_depth(speed, settings.mass, settings.weight, stiffness)
+            if depth > floor:
+                room = stiffness * floor**2 - 2 * settings.weight * floor
+                slower = f"at most {math.sqrt(room / settings.mass):.2g} m/s" if room > 0 else "a smaller load"
+                raise ValueError(
+                    f"{key} = {speed:g} m/s with mass = {settings.mass:g} kg would go about {depth:.2g} m deep, deeper "
+                    f"than {deeper}: {slower}, a smaller mass or a deeper bed_size would do"
+                )
+
+
+def _check_step_count(settings: PenetrateSettings, step: float) -> None:
+    stiffness = _expected_stiffness(settings)
+    times = {unit: expected_time(settings, unit, stiffness) for unit in plan_units(settings)}
+    count = sum(times.values()) / step
+    if count <= MOST_STEPS:
+        return
+    unit = max(times, key=lambda unit: times[unit])
+    if unit.kind == "driven":
+        parts = {
+            f"speeds = {unit.speed:g} m/s": settings.depth / unit.speed,
+            f"hold = {settings.hold:g} s": settings.hold,
+            f"retreat_speed = {settings.retreat_speed:g} m/s": settings.depth / settings.retreat_speed,
+        }
+    elif unit.kind == "drop":
+        parts = {f"after_stop = {settings.after_stop:g} s": settings.after_stop, f"mass = {settings.mass:g} kg": 0.0}
+    else:
+        sinking = times[unit] - settings.rest_time
+        parts = {
+            f"lowering_speed = {unit.speed:g} m/s": sinking,
+            f"rest_time = {settings.rest_time:g} s": settings.rest_time,
+        }
+    key = max(parts, key=lambda part: parts[part])
+    raise ValueError(
+        f"{key} asks for {times[unit] / step:.2g} steps of {step:.2g} s, all runs for {count:.2g}: at most "
+        f"{MOST_STEPS:.0g} in all would do, by {key.split()[0]} or by larger grains (grain) or a longer time_step"
+    )
 
 
 def choose_softness(settings: PenetrateSettings) -> Softening:
@@ -97,7 +197,14 @@ def choose_softness(settings: PenetrateSettings) -> Softening:
         gravity=settings.gravity,
         bed_height=settings.bed_size[2],
         depth=min(deepest(settings), max(settings.depth, *drops) if drops else settings.depth),
-        speed=max(*settings.speeds, *settings.other_speeds, *settings.drop_speeds, settings.lowering_speed),
+        speed=max(
+            *settings.speeds,
+            *settings.other_speeds,
+            *settings.drop_speeds,
+            *settings.other_drop_speeds,
+            settings.retreat_speed,
+            settings.lowering_speed,
+        ),
         fall=RAIN * settings.bed_size[2],
         pressure=settings.weight / area,
     )
@@ -430,12 +537,3 @@ def _expected_stiffness(settings: PenetrateSettings) -> float:
     material = find_material(settings.material)
     area = math.pi * settings.tip_diameter**2 / 4
     return bearing_gradient(0.6 * material.density, settings.gravity, material.friction) * area
-
-
-def _memory_there() -> float:
-    """Memory that is free [bytes]."""
-    try:
-        with Path("/proc/meminfo").open(encoding="ascii") as lines:
-            return next(1024 * float(line.split()[1]) for line in lines if line.startswith("MemAvailable"))
-    except (OSError, StopIteration):
-        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))

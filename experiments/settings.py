@@ -7,9 +7,9 @@ the machine or the grains' material is refused by the experiment's `check`.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 __all__ = ["STANDARD_GRAVITY", "PenetrateSettings", "expected_grain_count"]
 
@@ -39,7 +39,7 @@ class PenetrateSettings(BaseModel):
     grain: Positive = Field(0.0024, description="Mean grain diameter [m].")
     spread: float = Field(0.15, ge=0, le=0.5, description="Grain diameters are uniform within 1 +- this [1].")
     packing: float | None = Field(
-        None, gt=0.5, lt=0.7, description="Packing fraction to prepare the bed to [1]; as it settles if not given."
+        None, gt=0.5, le=0.64, description="Packing fraction to prepare the bed to [1]; as it settles if not given."
     )
     gravity: Positive = Field(STANDARD_GRAVITY, description="Gravity of the grains [m/s2]; 1 g even in the rig.")
     seeds: tuple[SeedNumber, ...] = Field((1, 2, 3), min_length=1, description="Seeds: one bed each.")
@@ -51,7 +51,7 @@ class PenetrateSettings(BaseModel):
     shaft_length: Positive = Field(0.06, description="Length of the shaft above the tip's widest point [m].")
     cone_angle: float = Field(60.0, ge=1, lt=180, description="Full angle of a conical tip [degrees].")
     spike_friction: NotNegative = Field(0.5, description="Friction coefficient of spike and grains [1].")
-    spike_restitution: float = Field(0.5, gt=0, le=1, description="Restitution of spike and grains [1].")
+    spike_restitution: float = Field(0.5, ge=0.01, le=1, description="Restitution of spike and grains [1].")
 
     # What rests on it
     platform_mass: Positive = Field(5.3, description="Mass of the platform [kg]; a spike carries a quarter.")
@@ -91,7 +91,7 @@ class PenetrateSettings(BaseModel):
     substeps: int = Field(10, ge=1, le=1000, description="Steps of the grains in one macro step of the spike [1].")
     precision: Literal["float64", "float32"] = Field("float64", description="Arithmetic of the bed.")
     arch: Literal["cpu", "cuda"] = Field("cpu", description="Where the bed is computed.")
-    threads: int | None = Field(None, ge=1, description="CPU threads; all there are if not given.")
+    threads: int | None = Field(None, ge=1, le=1024, description="CPU threads; all there are if not given.")
     allow_coarse: bool = Field(False, description="Take a tip of less than five grains across, for a quick look.")
     cache: bool = Field(True, description="Keep prepared beds and use those kept.")
 
@@ -103,6 +103,26 @@ class PenetrateSettings(BaseModel):
         description="A result.json to compare stiffness, damping and sinkage with, or 'shipped' for that of the case "
         "that ships; none if not given.",
     )
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _of_its_kind(cls, value: Any, info: ValidationInfo) -> Any:
+        """Text is no number, true is not 1, and one number is no list of them."""
+        hint = cls.model_fields[str(info.field_name)].annotation
+        kinds = _kinds(hint)
+        if bool in kinds:
+            if not isinstance(value, bool):
+                raise ValueError("it must be true or false")
+        elif kinds & {int, float} and value is not None:
+            several = get_origin(hint) is tuple
+            if several and not isinstance(value, list | tuple):
+                raise ValueError(f"it must be a list such as [{value if _is_number(value) else 0.1}]")
+            if not several and isinstance(value, list | tuple):
+                raise ValueError("it must be one number, not a list")
+            for item in value if several else (value,):
+                if isinstance(item, bool | str):
+                    raise ValueError(f"{item!r} is not a valid number")
+        return value
 
     @model_validator(mode="after")
     def _fits_together(self) -> PenetrateSettings:
@@ -133,10 +153,21 @@ class PenetrateSettings(BaseModel):
                 f"shaft_diameter = {shaft:g} m is thinner than the grains (grain = {self.grain:g} m): at least "
                 f"{self.grain:g} m would do"
             )
-        if self.tip_height + self.shaft_length <= self.depth:
+        if self.tip == "cone":
+            there = 2 * self.depth * math.tan(math.radians(0.5 * self.cone_angle))
+            if there < self.grain:
+                least = 2 * math.degrees(math.atan(0.5 * self.grain / self.depth))
+                return (
+                    f"cone_angle = {self.cone_angle:g} degrees makes a tip that at depth = {self.depth:g} m is only "
+                    f"{there:.2g} m thick, thinner than the grains (grain = {self.grain:g} m): at least {least:.3g} "
+                    f"degrees would do, or finer grains"
+                )
+        # A drop or a set-down is ended one tip's diameter above the floor.
+        reach = max(self.depth, self.bed_size[2] - self.tip_diameter)
+        if self.tip_height + self.shaft_length < reach * (1 - 1e-9):
             return (
-                f"shaft_length = {self.shaft_length:g} m lets the whole spike sink below depth = {self.depth:g} m: "
-                f"more than {self.depth:g} m would do"
+                f"shaft_length = {self.shaft_length:g} m lets the whole spike sink where a drop may go, {reach:g} m "
+                f"deep (bed_size less tip_diameter): at least {reach - self.tip_height:.3g} m would do, or a shallower bed"
             )
         return None
 
@@ -147,6 +178,11 @@ class PenetrateSettings(BaseModel):
             return (
                 f"bed_size = {_plain(self.bed_size)} m is too narrow for tip_diameter = {self.tip_diameter:g} m: at "
                 f"least four of them, {wide:.4g} m, would do both ways"
+            )
+        if self.depth < self.grain:
+            return (
+                f"depth = {self.depth:g} m is less than a grain (grain = {self.grain:g} m): at least {self.grain:g} m "
+                f"would do"
             )
         if height < deep * (1 - 1e-9):
             return (
@@ -165,23 +201,42 @@ class PenetrateSettings(BaseModel):
             values = getattr(self, key)
             if len(set(values)) < len(values):
                 return f"{key} = {_plain(values)} holds a value twice: each once would do"
-        if self.time_step is not None:
-            return self.crossing(self.time_step)
         return None
 
-    def crossing(self, time_step: float) -> str | None:
-        """What is wrong where a speed is too great for a step of the grains [s]; None if nothing is."""
+    def crossing(self, time_step: float, stiffest: float = math.inf) -> str | None:
+        """What is wrong where a speed is too great for a step of the grains [s]; None if nothing is.
+
+        Blames what was set: time_step, young (up to `stiffest` [Pa]), substeps; else the speed.
+        """
         macro = self.substeps * time_step
         limit = 0.5 * self.grain / macro
-        for key in ("speeds", "drop_speeds", "other_speeds", "other_drop_speeds", "retreat_speed", "lowering_speed"):
-            values = getattr(self, key)
-            for value in values if isinstance(values, tuple) else (values,):
-                if value > limit:
-                    return (
-                        f"{key} = {value:g} m/s takes the spike through {value * macro / self.grain:.2g} grains in one "
-                        f"step ({self.substeps} x {time_step:.3g} s): at most {limit:.3g} m/s would do"
-                    )
-        return None
+        keys = ("speeds", "drop_speeds", "other_speeds", "other_drop_speeds", "retreat_speed", "lowering_speed")
+        listed = [(key, getattr(self, key)) for key in keys]
+        every = [(key, v) for key, value in listed for v in (value if isinstance(value, tuple) else (value,))]
+        key, value = max(every, key=lambda pair: pair[1])
+        if value <= limit:
+            return None
+        ratio = value / limit
+        passes = f"takes a spike at {key} = {value:g} m/s through {0.5 * ratio:.2g} grains in one step of the spike"
+        if self.time_step is not None:
+            return (
+                f"time_step = {time_step:g} s {passes} ({self.substeps} of the grains'): at most {time_step / ratio:.2g} "
+                f"s would do"
+            )
+        if self.young is not None and self.young * ratio**2 <= stiffest:
+            return (
+                f"young = {self.young:g} Pa {passes} ({self.substeps} x {time_step:.3g} s): at least "
+                f"{self.young * ratio**2:.3g} Pa would do"
+            )
+        if self.substeps > 10 and self.substeps / ratio >= 1:
+            return (
+                f"substeps = {self.substeps} {passes} ({self.substeps} x {time_step:.3g} s): at most "
+                f"{math.floor(self.substeps / ratio)} would do"
+            )
+        return (
+            f"{key} = {value:g} m/s takes the spike through {0.5 * ratio:.2g} grains in one step ({self.substeps} x "
+            f"{time_step:.3g} s): at most {limit:.3g} m/s would do"
+        )
 
     @property
     def tip_height(self) -> float:
@@ -207,6 +262,20 @@ class PenetrateSettings(BaseModel):
         """The mass that a spike's quarter of the platform moves [kg]: (m + m_b) / 4, without a rig m / 4."""
         counterweight = self.platform_mass * (1 - self.rig) / (1 + self.rig) if self.rig else 0.0
         return (self.platform_mass + counterweight) / 4
+
+
+def _kinds(hint: Any) -> set[type]:
+    """The plain types inside an annotation."""
+    inside = get_args(hint)
+    if get_origin(hint) is Literal or not inside:
+        return {hint} if isinstance(hint, type) else set()
+    if get_origin(hint) is Annotated:
+        return _kinds(inside[0])
+    return set().union(*(_kinds(item) for item in inside))
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _plain(values: tuple[float, ...]) -> str:

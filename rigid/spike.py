@@ -87,8 +87,8 @@ class Spike:
             raise ValueError(f"length is {self.length}: it must exceed the tip's own height, {self.tip_height:.6g} m")
         if not (math.isfinite(self.friction) and self.friction >= 0):
             raise ValueError(f"friction is {self.friction}: it must be 0 or more")
-        if not 0 < self.restitution <= 1:
-            raise ValueError(f"restitution is {self.restitution}: it must be above 0 and at most 1")
+        if not 0.01 <= self.restitution <= 1:
+            raise ValueError(f"restitution is {self.restitution}: it must be from 0.01 to 1")
 
     @property
     def shaft(self) -> float:

@@ -11,7 +11,7 @@ import pytest
 from fake_bed import FakeBed
 from pydantic import ValidationError
 
-from experiments import penetrate, units
+from experiments import memory, penetrate, units
 from experiments.settings import PenetrateSettings, expected_grain_count
 from experiments.units import plan_units, shown_units
 from vis.frames import frame_names, read_frames
@@ -229,7 +229,17 @@ def test_the_load_is_the_platforms_share():
         ({"shaft_diameter": 0.02}, "shaft_diameter = 0.02 m must be at most"),
         ({"shaft_length": 0.005}, "shaft_length = 0.005 m lets the whole spike sink"),
         ({"seeds": (1, 1)}, r"seeds = \[1, 1\] holds a value twice"),
-        ({"speeds": (1000.0,), "time_step": 2e-5}, r"speeds = 1000 m/s takes the spike .* at most 6 m/s would do"),
+        ({"tip": "cone", "cone_angle": 5.0}, r"cone_angle = 5 degrees .* at least 9.15 degrees would do"),
+        ({"depth": 0.001}, "depth = 0.001 m is less than a grain"),
+        ({"shaft_length": 0.02}, "shaft_length = 0.02 m .* at least 0.034 m would do"),
+        ({"depth": "0.01"}, "'0.01' is not a valid number"),
+        ({"grain": True}, "True is not a valid number"),
+        ({"speeds": 0.1}, r"it must be a list such as \[0.1\]"),
+        ({"speeds": (0.1, "fast")}, "'fast' is not a valid number"),
+        ({"cache": "yes"}, "it must be true or false"),
+        ({"spike_restitution": 0.001}, "spike_restitution"),
+        ({"packing": 0.66}, "packing"),
+        ({"threads": 2000}, "threads"),
         ({"grain": -0.001}, "grain"),
         ({"max_overlap": 0.5}, "max_overlap"),
         ({"seeds": ()}, "seeds"),
@@ -241,6 +251,26 @@ def test_bad_settings_are_refused_by_name(given, words):
         PenetrateSettings(**given)
 
 
+def test_a_card_that_is_not_there_is_refused_before_any_work(fake, monkeypatch):
+    from dem import runtime
+
+    def none(**asked):
+        raise RuntimeError("arch = 'cuda' is not available here\n(no driver); use arch = 'cpu'")
+
+    monkeypatch.setattr(runtime, "start", none)
+    with pytest.raises(ValueError, match=r"arch = 'cuda' is not available here \(no driver\)"):
+        penetrate.check(PenetrateSettings(arch="cuda"))
+
+
+def test_a_containers_limit_counts(tmp_path, monkeypatch):
+    (tmp_path / "memory.max").write_text("2000000000\n")
+    (tmp_path / "memory.current").write_text("1500000000\n")
+    (tmp_path / "memory.stat").write_text("anon 1\ninactive_file 500000000\n")
+    monkeypatch.setattr(memory, "_V2", tmp_path)
+    there = memory.memory_there()
+    assert there.limit == 2_000_000_000 and there.free <= 1_000_000_000
+
+
 def test_coarse_tips_can_be_asked_for():
     assert PenetrateSettings(tip_diameter=0.006, allow_coarse=True).tip_diameter == 0.006
 
@@ -250,6 +280,14 @@ def test_coarse_tips_can_be_asked_for():
     [
         ({"grain": 2e-5, "tip_diameter": 0.012}, r"grain = 2e-05 m makes about .* GB are free: grains of"),
         ({"speeds": (3000.0,)}, r"speeds = 3000 m/s takes the spike through"),
+        ({"speeds": (1000.0,), "time_step": 2e-5}, "time_step = 2e-05 s takes a spike at speeds = 1000 m/s"),
+        ({"young": 1e8, "substeps": 1000}, r"young = 1e.08 Pa takes a spike at .* would do"),
+        ({"substeps": 1000}, "substeps = 1000 takes a spike .* at most 150 would do"),
+        ({"young": 1e12}, r"young = 1e.12 Pa is more than sand itself has: at most 7e.10 Pa would do"),
+        ({"young": 1e4}, "young = 10000 Pa is so soft"),
+        ({"load": 10.0}, "load = 10 N puts .* would do"),
+        ({"drop_speeds": (2.0,)}, r"drop_speeds = 2 m/s with mass = 0.2 kg would go about .* at most .* m/s"),
+        ({"speeds": (1e-9,)}, r"speeds = 1e-09 m/s asks for .* at most 1e.09 in all"),
         ({"other_speeds": ()}, "other_speeds is empty"),
         ({"reference": "nowhere.json"}, r"reference = 'nowhere.json' is no result.json"),
     ],
