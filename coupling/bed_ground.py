@@ -72,6 +72,15 @@ class BedGround:
         """How deep the tip may go [m]: half its diameter above the floor."""
         return self.surface - 0.5 * self.spike.diameter
 
+    def describe(self) -> dict[str, Any]:
+        """What it is, in plain numbers, for run.toml."""
+        found: dict[str, Any] = {"material": getattr(getattr(self.bed, "material", None), "name", None)}
+        for name in ("size", "grain_count", "packing_fraction", "gravity", "surface", "seed", "time_step", "precision"):
+            value = getattr(self.bed, name, None)
+            if value is not None:
+                found[name] = value if isinstance(value, str) else np.asarray(value).tolist()
+        return {name: value for name, value in found.items() if value is not None}
+
     def step(self, position: ArrayLike, velocity: ArrayLike, dt: float) -> Reaction:
         """Advance the grains by `dt` [s], a whole number of the bed's steps, under the moving spike.
 

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -91,6 +92,16 @@ class Run:
         return (self.count - self._approach) * self.macro_step
 
     @property
+    def frames_taken(self) -> int:
+        """How many times `frame_interval` was up."""
+        return self._frames
+
+    @property
+    def at_bottom(self) -> bool:
+        """Whether the step just done ended the way in, at the deepest point."""
+        return False
+
+    @property
     def position(self) -> tuple[float, float, float]:
         """Where the tip's lowest point is [m], world axes, z up."""
         return (*self.ground.centre, self.ground.surface - self.depth)
@@ -135,13 +146,16 @@ class Run:
     ) -> Penetration:
         """Go on to the end. `on_step` is called after every macro step, `on_frame` every `frame_interval` [s].
 
-        The first frame is taken before the first step. Frames already taken are part of the saved state.
+        The first frame is taken before the first step, one at the deepest point and one at the end. Frames already
+        taken are part of the saved state.
         """
         while True:
             elapsed = self.count * self.macro_step
-            if on_frame and frame_interval and elapsed >= self._frames * frame_interval - 0.5 * self.macro_step:
-                self._frames += 1
-                on_frame(self)
+            if on_frame and frame_interval:
+                due = elapsed >= self._frames * frame_interval - 0.5 * self.macro_step
+                self._frames += due
+                if due or self.at_bottom or self.done:
+                    on_frame(self)
             if self.done:
                 return self.result()
             self.advance()
@@ -167,7 +181,14 @@ class Run:
 
     def settings(self) -> dict[str, Any]:
         """What was asked for, SI units."""
-        return {"ground": self.ground.name, "speed": self.speed, "start_depth": -self._approach_height()}
+        return {
+            "ground": self.ground.name,
+            "speed": self.speed,
+            "start_depth": -self._approach_height(),
+            "substeps": round(self.macro_step / self.ground.time_step),
+            "spike": asdict(self.spike),
+            "ground_settings": getattr(self.ground, "describe", dict)(),
+        }
 
     def state(self) -> dict[str, Any]:
         """All that the rest of the run depends on: a flat dict of numpy arrays, the ground's under "ground.*"."""
@@ -263,6 +284,10 @@ class Drive(Run):
         whole = self._approach + self._in + self._hold + self._out
         return 1.0 if self.done else self.count / whole
 
+    @property
+    def at_bottom(self) -> bool:
+        return self.count - self._approach == self._in
+
     def settings(self) -> dict[str, Any]:
         return super().settings() | {
             "depth": self.target, "hold": self.hold, "retreat": self._retreat, "retreat_speed": self.retreat_speed
@@ -320,6 +345,10 @@ class Drop(Run):
         self.after_stop = float(after_stop)
         self._force = 0.0
         self._stopped_at = math.inf
+
+    @property
+    def at_bottom(self) -> bool:
+        return self._stopped_at == self.time
 
     def settings(self) -> dict[str, Any]:
         return super().settings() | {
@@ -391,6 +420,10 @@ class SetDown(Drop):
             load=load,
             **common,
         )
+
+    @property
+    def at_bottom(self) -> bool:
+        return False  # its end is
 
     def settings(self) -> dict[str, Any]:
         return super().settings() | {"lowering_speed": self.speed}

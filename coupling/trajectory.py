@@ -140,29 +140,75 @@ class Penetration:
         return {name: {"value": value, "std": None, "unit": unit} for name, (value, unit) in values.items()}
 
     def save(self, folder: str | Path) -> Path:
-        """Write a run folder: run.toml, result.json and the series. Refuses a folder that holds a result already."""
+        """Write a run folder: run.toml, result.json and the series. Raises ValueError where the folder is in use."""
         folder = Path(folder)
-        if (folder / "result.json").exists():
-            raise FileExistsError(f"{folder} holds a result already: name another folder")
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise ValueError(f"{str(folder)!r} is in use: name a folder that is empty or does not exist yet")
         (folder / "series").mkdir(parents=True, exist_ok=True)
         try:
             version = metadata.version("hedgebed")
         except metadata.PackageNotFoundError:
             version = "unknown"
-        lines = [f'experiment = "{self.kind}"', f'version = "{version}"', f"macro_step = {self.macro_step!r}  # s"]
-        lines += [f"{key} = {json.dumps(value)}" for key, value in self.settings.items() if value is not None]
-        (folder / "run.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        (folder / "run.toml").write_text(self._toml(version), encoding="utf-8")
         series = f"series/{self.kind}.csv"
         self.write_csv(folder / series)
+        warnings = {
+            "max_time": "its time was over before it had come to rest",
+            "max_depth": "it went as deep as it was allowed and was ended there",
+            "stopped": "it was still bobbing when it was ended",
+            "unfinished": "these are the rows of a run under way",
+        }
         result = {
             "format": "hedgebed-result/1",
             "experiment": self.kind,
             "version": version,
             "title": f"A {self.kind.replace('_', ' ')} spike",
-            "status": "done",
+            "status": "stopped" if self.ended == "unfinished" else "done",
             "quantities": self.quantities(),
-            "runs": [{"id": self.kind, "kind": self.kind, "speed": self.settings.get("speed"), "series": series}],
-            "warnings": [] if self.ended in ("done", "rest") else [f"ended at {self.ended}"],
+            "runs": [
+                {
+                    "id": self.kind,
+                    "kind": self.kind,
+                    "speed": self.settings.get("speed"),
+                    "series": series,
+                    "ended": self.ended,
+                    "quantities": self.quantities(),
+                }
+            ],
+            "bed": self.settings.get("ground_settings", {}),
+            "spike": self.settings.get("spike", {}),
+            "warnings": [warnings[self.ended]] if self.ended in warnings else [],
         }
         (folder / "result.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
         return folder
+
+    def _toml(self, version: str) -> str:
+        """run.toml: what was run, on what, units in comments."""
+        tables = {key: value for key, value in self.settings.items() if isinstance(value, dict)}
+        plain = {key: value for key, value in self.settings.items() if key not in tables}
+        lines = [f"# A {self.kind.replace('_', ' ')} spike: what was run, SI units.", f'experiment = "{self.kind}"']
+        lines += [f'version = "{version}"', f'ended = "{self.ended}"']
+        lines += _toml_lines({"macro_step": self.macro_step} | plain)
+        for name, table in tables.items():
+            lines += ["", f"[{'bed' if name == 'ground_settings' else name}]", *_toml_lines(table)]
+        return "\n".join(lines) + "\n"
+
+
+UNITS = {
+    "macro_step": "s", "speed": "m/s", "start_depth": "m", "depth": "m", "hold": "s", "retreat_speed": "m/s",
+    "mass": "kg", "load": "N", "rest_time": "s", "rest_tolerance": "1", "after_stop": "s", "max_time": "s",
+    "lowering_speed": "m/s", "diameter": "m", "shaft_diameter": "m", "length": "m", "cone_angle": "degrees",
+    "size": "m", "surface": "m", "time_step": "s", "gravity": "m/s2", "packing_fraction": "1", "stiffness": "N/m",
+    "damping": "N s/m", "centre": "m",
+}  # fmt: skip
+"""Units of what run.toml holds."""
+
+
+def _toml_lines(values: dict[str, Any]) -> list[str]:
+    """One line each, with its unit; what is not set is left out."""
+    lines = []
+    for key, value in values.items():
+        if value is not None:
+            unit = f"  # {UNITS[key]}" if key in UNITS else ""
+            lines.append(f"{key} = {json.dumps(value)}{unit}")
+    return lines

@@ -27,7 +27,7 @@ from experiments import registry
 from experiments.progress import Progress, make_progress
 from experiments.reading import Layer, find_case, read_case, settings_from
 from experiments.registry import Experiment, find_experiment
-from experiments.runfolder import RunFolder, fresh_path, write_json
+from experiments.runfolder import RunFolder, fresh_path, write_json, write_text
 from hedgebed import __version__
 
 __all__ = ["DONE", "FAILED", "BAD_INPUT", "STOPPED", "build_app", "main"]
@@ -183,7 +183,8 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
             settings = settings_from(settings_class, [*layers, Layer(None, given)])
             with _stdout_to_stderr():
                 experiment.check(settings)
-            folder = RunFolder.create(out or fresh_path(experiment.name), experiment.name, settings)
+                code = experiment.code()
+            folder = RunFolder.create(out or fresh_path(experiment.name), experiment.name, settings, code=code)
 
         def work(progress: Progress) -> dict[str, Any]:
             return experiment.run(settings, folder.path, progress=progress)
@@ -236,13 +237,15 @@ def _carry_out(folder: RunFolder, work: Callable[[Progress], dict[str, Any]], *,
             return STOPPED
         except RuntimeError as error:
             _say(f"failed: {error}")
-            _say(f"what there was is in {folder.path}; `hedgebed resume {folder.path}` takes it up there")
+            _say(f"what was finished is kept in {folder.path}; the same settings would fail the same way again")
             return FAILED
         except ValueError as error:
             if fresh and not folder.has_work:  # refused before any work: leave nothing behind
                 _discard(folder)
                 raise _RefusedError(str(error)) from error
-            traceback.print_exc()
+            write_text(folder.path / "traceback.txt", traceback.format_exc())
+            _say(f"failed: {error}")
+            _say(f"what was finished is kept in {folder.path}, and where it failed in traceback.txt there")
             return FAILED
         except Exception:
             traceback.print_exc()

@@ -28,7 +28,7 @@ from .settings import PenetrateSettings, expected_grain_count
 from .softening import Softening, bearing_gradient, drop_depth, soften
 from .units import Unit, deepest, expected_time, make_run, make_spike, plan_units, shown_units
 
-__all__ = ["check", "choose_softness", "resume", "run"]
+__all__ = ["check", "choose_softness", "fingerprint", "resume", "run"]
 
 BYTES_PER_GRAIN = 4000
 """Memory of one grain with its lists and contact history, float64, measured generously [bytes]."""
@@ -51,7 +51,8 @@ def run(settings: PenetrateSettings, folder: str | Path, *, progress: Progress |
     before any work; RuntimeError (the bed's) where a run cannot go on, its state saved in checkpoint/.
     """
     check(settings)
-    return _carry_out(settings, RunFolder.ensure(Path(folder), "penetrate", settings), progress or Progress())
+    kept = RunFolder.ensure(Path(folder), "penetrate", settings, code=fingerprint())
+    return _carry_out(settings, kept, progress or Progress())
 
 
 def resume(folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
@@ -223,6 +224,13 @@ def find_material(name: str) -> Any:
     return material(name)
 
 
+def fingerprint() -> str:
+    """A digest of the code that computes beds: other code may give other bits."""
+    from dem.prepare import fingerprint as of_dem
+
+    return of_dem()
+
+
 def bed_step(settings: PenetrateSettings, young: float) -> float:
     """The step that the bed will take [s]. Raises ValueError for one that is set and too long."""
     from dem.timestep import time_step_for
@@ -328,7 +336,12 @@ def _run_seed(
     todo = [unit for unit in units if not folder.is_done(unit.id)]
     if not todo and folder.is_done(f"bed-{seed}"):
         return
-    bed = prepare_bed(settings, seed, softening.young, progress)
+    try:
+        bed = prepare_bed(settings, seed, softening.young, progress)
+    except ValueError as error:  # found while it was prepared, as a packing that cannot be reached
+        raise RuntimeError(f"the bed of seed {seed}: {error}") from error
+    except RuntimeError as error:
+        raise RuntimeError(f"the bed of seed {seed} could not be prepared: {error}; {_remedy(error)}") from error
     facts = _bed_facts(bed, seed, softening)
     ground = BedGround(bed, make_spike(settings))
     start = ground.state()
@@ -375,9 +388,11 @@ def _run_unit(
             on_frame=frames.write if frames else None,
             frame_interval=frames.interval if frames else None,
         )
-    except RuntimeError:  # the bed's: a NaN, a grain lost, an overlap past its bound
+    except RuntimeError as error:  # the bed's: a NaN, a grain lost, an overlap past its bound
         keep(f"{unit.id}.failed")
-        raise
+        raise RuntimeError(
+            f"{unit.title}: {error}; {_remedy(error)}; the state is in checkpoint/{unit.id}.failed.npz"
+        ) from error
     write_run(folder, unit.id, series)
     folder.mark_done(
         unit.id,
@@ -387,9 +402,19 @@ def _run_unit(
             "ended": series.ended,
             "settings": series.settings,
             "max_overlap": float(bed.max_overlap),
+            "code": fingerprint(),
         },
     )
     folder.drop_checkpoint(unit.id)
+
+
+def _remedy(error: RuntimeError) -> str:
+    """What to change where the bed has failed."""
+    if "overlap" in str(error):
+        return "change young (stiffer grains), the speeds or max_overlap"
+    if "rest" in str(error) or "rain" in str(error):
+        return "change gravity, bed_size or the seed"
+    return "change time_step (shorter), young or the speeds"
 
 
 class _Frames:
@@ -403,10 +428,12 @@ class _Frames:
 
         wanted = expected_time(settings, unit, _expected_stiffness(settings)) / max(1, settings.frame_count)
         self.interval = max(wanted, stepper.macro_step) if settings.frame_count else None
-        self.limit = 2 * settings.frame_count
+        self.limit = 2 * max(1, settings.frame_count)
         self.fields = tuple(GRAIN_FIELDS)
         if resumed:
-            self.writer = FrameWriter(folder.path, name=unit.id, resume=True, keep_until=stepper.time)
+            # The frame of the very step of the checkpoint was written after it, if at all: it comes again.
+            half = 0.5 * stepper.macro_step
+            self.writer = FrameWriter(folder.path, name=unit.id, resume=True, keep_until=stepper.time - half)
         else:
             self.writer = FrameWriter(folder.path, name=unit.id)
         spike = stepper.spike
@@ -419,8 +446,13 @@ class _Frames:
         )
 
     def write(self, stepper: Run) -> None:
-        """One frame of what the stepper is doing now."""
-        if len(self.writer.times) >= self.limit:
+        """One frame of what the stepper is doing now; of a run far longer than expected, ever fewer.
+
+        Past the limit every second is kept, past twice that every fourth and so on; the deepest point and the last
+        state always are.
+        """
+        late = max(0, stepper.frames_taken - 1)
+        if late % (1 << (late // self.limit).bit_length()) and not (stepper.done or stepper.at_bottom):
             return
         ground = stepper.ground
         assert isinstance(ground, BedGround)
@@ -455,11 +487,17 @@ def _conclude(
         )
     if len(settings.seeds) < 3:
         warnings.append("fewer than three seeds: the spread between beds is not known well")
+    codes = {note.get("code") for note in notes.values()} | {folder.code, fingerprint()}
+    if len(codes - {None, ""}) > 1:
+        warnings.append(
+            "parts of this run were computed by different versions of the code: it may not repeat to the bit"
+        )
     departures = findings.departures()
     result: dict[str, Any] = {
         "format": "hedgebed-result/1",
         "experiment": "penetrate",
         "version": __version__,
+        "code": fingerprint(),
         "title": f"A {1e3 * settings.tip_diameter:g} mm spike in {settings.material}",
         "status": "done",
         "quantities": quantities,

@@ -4,7 +4,8 @@ The module of an experiment offers
 ``run(settings, folder: Path, *, progress: Progress) -> dict`` (the result, as result.json has it) and
 ``resume(folder: Path, *, progress: Progress) -> dict``;
 if it also has ``check(settings) -> None``, that is called before a folder is made and raises ValueError for what
-the settings class cannot see. Both names are text here so that help does not wait for Taichi.
+the settings class cannot see; if it has ``fingerprint() -> str``, a digest of the code that computes, run.toml keeps it.
+Both names are text here so that help does not wait for Taichi.
 """
 
 from collections.abc import Callable
@@ -51,6 +52,11 @@ class Experiment:
     def resume(self, folder: Path, *, progress: Any) -> dict[str, Any]:
         """Finish the run in `folder`; return the result."""
         return import_module(self.module).resume(folder, progress=progress)
+
+    def code(self) -> str:
+        """The module's ``fingerprint()`` of the code that computes, empty where it has none."""
+        fingerprint: Callable[[], str] | None = getattr(import_module(self.module), "fingerprint", None)
+        return fingerprint() if fingerprint is not None else ""
 
     def check(self, settings: BaseModel) -> None:
         """Raise ValueError for settings that cannot be run, before any work."""

@@ -157,7 +157,7 @@ def _toml(value: Any) -> str:
     raise TypeError(f"a setting of type {type(value).__name__} cannot be written to run.toml: {value!r}")
 
 
-def settings_toml(command: str, settings: BaseModel, version: str) -> str:
+def settings_toml(command: str, settings: BaseModel, version: str, code: str = "") -> str:
     """The text of run.toml: each field of `settings` with its description as a comment above it."""
     values = settings.model_dump(mode="python")
     lines = [
@@ -165,6 +165,7 @@ def settings_toml(command: str, settings: BaseModel, version: str) -> str:
         f"# `hedgebed {command} run.toml` does the same again.",
         f"format = {_toml(RUN_FORMAT)}",
         f"version = {_toml(version)}",
+        *([f"code = {_toml(code)}  # digest of the code that computes beds"] if code else []),
         f"command = {_toml(command)}",
         f"created = {_toml(_now())}",
         f"not_set = {_toml([name for name, value in values.items() if value is None])}",
@@ -211,10 +212,11 @@ def _checked(name: str) -> str:
 class RunFolder:
     """The folder of one run. Make one with `create`, take up an old one with `open`, or let `ensure` choose."""
 
-    def __init__(self, path: Path, command: str, version: str, settings: dict[str, Any]):
+    def __init__(self, path: Path, command: str, version: str, settings: dict[str, Any], code: str = ""):
         self.path = Path(path)
         self.command = command
         self.version = version
+        self.code = code  # digest of the code that computes, where the experiment has one
         self.settings = settings  # as run.toml has them: name -> value, None for what is not set
 
     def __repr__(self) -> str:
@@ -223,14 +225,16 @@ class RunFolder:
     # Making and taking up
 
     @classmethod
-    def create(cls, path: Path, command: str, settings: BaseModel, version: str = __version__) -> "RunFolder":
+    def create(
+        cls, path: Path, command: str, settings: BaseModel, version: str = __version__, code: str = ""
+    ) -> "RunFolder":
         """Make the folder of a new run and write its run.toml.
 
         Raises ValueError, naming the path, if it is in use (a file, or a folder that holds something) or cannot be
         written; and if the settings would not read back from run.toml as they are.
         """
         path = Path(path)
-        text = settings_toml(command, settings, version)
+        text = settings_toml(command, settings, version, code)
         if type(settings)(**settings_in(tomllib.loads(text))) != settings:
             raise ValueError(
                 f"the settings of {command} cannot be kept: they do not read back from run.toml as they are"
@@ -269,10 +273,13 @@ class RunFolder:
             raise ValueError(f"{str(path / 'run.toml')!r} cannot be read: {error}") from None
         if table.get("format") != RUN_FORMAT or not isinstance(table.get("settings"), dict):
             raise ValueError(f"{str(path / 'run.toml')!r} is not of the format {RUN_FORMAT}")
-        return cls(path, str(table.get("command")), str(table.get("version")), settings_in(table))
+        command, version, code = (str(table.get(key, "")) for key in ("command", "version", "code"))
+        return cls(path, command, version, settings_in(table), code)
 
     @classmethod
-    def ensure(cls, path: Path, command: str, settings: BaseModel, version: str = __version__) -> "RunFolder":
+    def ensure(
+        cls, path: Path, command: str, settings: BaseModel, version: str = __version__, code: str = ""
+    ) -> "RunFolder":
         """`open` the folder if it is one of the same command with the same settings, else `create` it.
 
         An experiment calls this first: it then works alike from the command line, which has made the folder already,
@@ -282,7 +289,7 @@ class RunFolder:
             folder = cls.open(path)
             if folder.command == command and type(settings)(**folder.settings) == settings:
                 return folder
-        return cls.create(path, command, settings, version)
+        return cls.create(path, command, settings, version, code)
 
     # Who is writing
 

@@ -167,7 +167,8 @@ class PenetrateSettings(BaseModel):
         if self.tip_height + self.shaft_length < reach * (1 - 1e-9):
             return (
                 f"shaft_length = {self.shaft_length:g} m lets the whole spike sink where a drop may go, {reach:g} m "
-                f"deep (bed_size less tip_diameter): at least {reach - self.tip_height:.3g} m would do, or a shallower bed"
+                f"deep (bed_size less tip_diameter): at least {reach - self.tip_height:.3g} m would do, or a shallower "
+                f"bed"
             )
         return None
 
@@ -220,8 +221,8 @@ class PenetrateSettings(BaseModel):
         passes = f"takes a spike at {key} = {value:g} m/s through {0.5 * ratio:.2g} grains in one step of the spike"
         if self.time_step is not None:
             return (
-                f"time_step = {time_step:g} s {passes} ({self.substeps} of the grains'): at most {time_step / ratio:.2g} "
-                f"s would do"
+                f"time_step = {time_step:g} s {passes} ({self.substeps} of the grains'): at most "
+                f"{time_step / ratio:.2g} s would do"
             )
         if self.young is not None and self.young * ratio**2 <= stiffest:
             return (
@@ -231,7 +232,7 @@ class PenetrateSettings(BaseModel):
         if self.substeps > 10 and self.substeps / ratio >= 1:
             return (
                 f"substeps = {self.substeps} {passes} ({self.substeps} x {time_step:.3g} s): at most "
-                f"{math.floor(self.substeps / ratio)} would do"
+                f"{math.floor(self.substeps / ratio + 1e-9)} would do"
             )
         return (
             f"{key} = {value:g} m/s takes the spike through {0.5 * ratio:.2g} grains in one step ({self.substeps} x "

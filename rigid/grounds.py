@@ -7,7 +7,7 @@ in: depth is positive downwards from `surface`.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -61,6 +61,10 @@ class SpringDamper:
             raise ValueError(f"mu_d is {self.mu_d}: it must be from 0 to mu_s, {self.mu_s}")
         if not (math.isfinite(self.time_step) and self.time_step > 0):
             raise ValueError(f"time_step is {self.time_step}: it must be above 0 (in s)")
+
+    def describe(self) -> dict[str, Any]:
+        """What it is, in plain numbers, for run.toml."""
+        return {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(self).items()}
 
     def force(self, depth: ArrayLike, velocity: ArrayLike) -> np.ndarray:
         """Upward force on the body [N] at `depth` [m] and `velocity` [m/s], both positive downwards, any one shape."""

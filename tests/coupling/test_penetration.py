@@ -143,13 +143,16 @@ def test_a_saved_run_is_a_run_folder(tmp_path):
 
     run = drive(SPIKE, into=FakeBed(), speed=0.2, depth=0.004)
     folder = run.save(tmp_path / "first")
-    assert tomllib.loads((folder / "run.toml").read_text())["speed"] == 0.2
+    text = (folder / "run.toml").read_text()
+    table = tomllib.loads(text)
+    assert (table["speed"], table["spike"]["diameter"], table["bed"]["grain_count"]) == (0.2, 0.012, 200)
+    assert "speed = 0.2  # m/s" in text and "depth = 0.004  # m" in text
     result = json.loads((folder / "result.json").read_text())
     assert result["quantities"]["peak_force"]["value"] == run.peak_force
     back = Penetration.read_csv(folder / result["runs"][0]["series"], kind="driven", macro_step=run.macro_step)
     for name in ("time", "depth", "velocity", "force", "phase"):
         assert np.array_equal(getattr(back, name), getattr(run, name))
-    with pytest.raises(FileExistsError):
+    with pytest.raises(ValueError, match="in use"):
         run.save(folder)
 
 

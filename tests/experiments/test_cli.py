@@ -153,15 +153,22 @@ def test_failed_says_why_without_a_traceback(dig, capsys):
     assert main(["dig", "--ending", "RuntimeError", "--out", "a"]) == 1
     text = capsys.readouterr().err
     assert "a grain was lost at t = 0.1 s" in text
-    assert "Traceback" not in text
+    assert "Traceback" not in text and "resume" not in text
     status = json.loads(Path("a/status.json").read_text())
     assert status["status"] == "failed"
     assert "a grain was lost" in status["reason"]
 
 
-@pytest.mark.parametrize("ending", ["ZeroDivisionError", "ValueError"])
-def test_a_mistake_of_ours_shows_where(dig, capsys, ending):
-    assert main(["dig", "--ending", ending, "--out", "a"]) == 1
+def test_a_value_found_wrong_after_work_began_is_a_sentence(dig, capsys):
+    assert main(["dig", "--ending", "ValueError", "--out", "a"]) == 1
+    text = capsys.readouterr().err
+    assert "failed: " in text and "Traceback" not in text
+    assert "Traceback" in Path("a/traceback.txt").read_text()
+    assert Path("a/series/dig.csv").exists()
+
+
+def test_a_mistake_of_ours_shows_where(dig, capsys):
+    assert main(["dig", "--ending", "ZeroDivisionError", "--out", "a"]) == 1
     assert "Traceback" in capsys.readouterr().err
     assert Path("a/series/dig.csv").exists()
 

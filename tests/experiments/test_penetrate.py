@@ -2,6 +2,10 @@
 
 import itertools
 import json
+import os
+import signal
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 from types import SimpleNamespace
@@ -124,12 +128,72 @@ def test_a_run_that_died_goes_on_to_the_same_bits(fake, tmp_path, monkeypatch):
     assert fake == []
 
 
+KILLED = """
+import os, signal, sys
+from types import SimpleNamespace
+from fake_bed import FakeBed
+from experiments import penetrate
+from experiments.settings import PenetrateSettings
+import test_penetrate as here
+
+penetrate.prepare_bed = lambda settings, seed, young, progress: FakeBed(
+    size=settings.bed_size, seed=seed, hardness=here.hard(seed), rate=0.5, unload=4000.0)
+penetrate.find_material = lambda name: here.SAND
+penetrate.write_report = lambda folder, progress: None
+penetrate.bed_step = lambda settings, young: 2e-5
+folder, settings = sys.argv[1], PenetrateSettings(**(here.QUICK | here.KILLABLE))
+advance = FakeBed.advance
+
+def fragile(self, steps):
+    advance(self, steps)
+    if list(penetrate.Path(folder, "checkpoint").glob("seed1-drop-*.npz")) and self._rate[2] < 0:
+        fragile.left -= 1
+        if fragile.left == 0:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+fragile.left = 20
+FakeBed.advance = fragile
+penetrate.run(settings, folder)
+"""
+KILLABLE = {"seeds": (1,), "checkpoint_interval": 1e-3}
+
+
+def test_a_run_killed_in_a_drop_goes_on_to_the_same_bits(fake, tmp_path):
+    """kill -9 in the middle of a drop; not even Python gets to tidy up."""
+    whole, broken = tmp_path / "whole", tmp_path / "broken"
+    penetrate.run(PenetrateSettings(**(QUICK | KILLABLE)), whole)
+    here = Path(__file__).parent
+    paths = os.pathsep.join(map(str, (here, here.parent, here.parents[1])))
+    done = subprocess.run(
+        [sys.executable, "-c", KILLED, str(broken)], env=os.environ | {"PYTHONPATH": paths}, capture_output=True
+    )
+    assert done.returncode == -signal.SIGKILL, done.stderr.decode()
+    assert list((broken / "checkpoint").glob("seed1-drop-*.npz"))
+    penetrate.resume(broken)
+    names = sorted(str(path.relative_to(whole)) for path in whole.rglob("*") if path.suffix in (".csv", ".vtu", ".pvd"))
+    assert len(names) > 10 and names == sorted(
+        str(path.relative_to(broken)) for path in broken.rglob("*") if path.suffix in (".csv", ".vtu", ".pvd")
+    )
+    for name in [*names, "result.json"]:
+        assert (whole / name).read_bytes() == (broken / name).read_bytes(), name
+
+
+def test_a_run_taken_up_by_other_code_says_so(fake, tmp_path, monkeypatch):
+    monkeypatch.setattr(penetrate, "fingerprint", lambda: "before")
+    settings = PenetrateSettings(**(QUICK | {"seeds": (1,), "frame_count": 0}))
+    penetrate.run(settings, tmp_path / "run")
+    assert tomllib.loads((tmp_path / "run" / "run.toml").read_text())["code"] == "before"
+    monkeypatch.setattr(penetrate, "fingerprint", lambda: "after")
+    result = penetrate.resume(tmp_path / "run")
+    assert result["code"] == "after" and any("different versions of the code" in text for text in result["warnings"])
+
+
 def test_a_failing_bed_leaves_its_state(fake, tmp_path, monkeypatch):
     def fail(self, steps):
         raise RuntimeError("a grain was lost")
 
     monkeypatch.setattr(FakeBed, "advance", fail)
-    with pytest.raises(RuntimeError, match="lost"):
+    with pytest.raises(RuntimeError, match=r"lost; change .*the state is in checkpoint/seed1-driven-0.2.failed.npz"):
         penetrate.run(PenetrateSettings(**QUICK), tmp_path / "run")
     assert list((tmp_path / "run" / "checkpoint").glob("*.failed.npz"))
 
