@@ -4,7 +4,7 @@ The module of an experiment offers
 ``run(settings, folder: Path, *, progress: Progress) -> dict`` (the result, as result.json has it) and
 ``resume(folder: Path, *, progress: Progress) -> dict``;
 if it also has ``check(settings) -> None``, that is called before a folder is made and raises ValueError for what
-the settings class cannot see; if it has ``fingerprint() -> str``, a digest of the code that computes, run.toml keeps it.
+the settings class cannot see; if it has ``fingerprint() -> str``, a digest of what computes, run.toml keeps it.
 Both names are text here so that help does not wait for Taichi.
 """
 
