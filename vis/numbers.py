@@ -62,12 +62,15 @@ def quote(value: float | None, std: float | None = None, unit: str = "1", *, sig
 
     Args:
         value: The number in SI; None reads "unknown".
-        std: Its standard deviation; 0 for what is exact, None where unknown: neither is shown.
+        std: Its standard deviation; 0 for what is exact, None where unknown: neither is shown, nor is one below a
+            ten-thousandth of the value.
         unit: An SI unit; "1" for none, "%" for a share to be shown in per cent.
         significant: Digits where the uncertainty does not set them.
     """
     if value is None:
         return "unknown"
+    if std and std < 1e-4 * abs(value):
+        std = None
     scale, shown = _scale(value, unit)
     if unit == "1" and float(value).is_integer() and not std:
         return _fixed(value, 0)

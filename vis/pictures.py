@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vis.canvas import colour_values, nice_above
 from vis.folder import Run, RunFolder, read_folder
@@ -207,10 +208,38 @@ class _Story:
 
     @property
     def deepest(self) -> int:
-        """The first frame within 2 % of the greatest depth: still on the way in, where one was written there."""
+        """The deepest frame before the pull-out; of several as deep, the first: it is still, or was just, moving."""
         known = np.array([d if d is not None else -np.inf for d in self.depth])
-        top = known.max()
-        return int(np.argmax(known >= top - 0.02 * abs(top))) if np.isfinite(top) else len(known) - 1
+        before = self._before_the_way_out()
+        top = known[before].max()
+        if not np.isfinite(top):
+            return len(known) - 1
+        return int(before[np.argmax(known[before] >= top - 0.002 * abs(top))])
+
+    def _before_the_way_out(self) -> NDArray[np.int64]:
+        """Indices of the frames before the run's first row of the way out; all where it has none, or no series."""
+        every = np.arange(len(self.frames))
+        if self.run is None or self.run.bed is None:
+            return every
+        out = np.flatnonzero(self.run.bed.phase == "out")
+        if self.kind != "driven" or not len(out):
+            return every
+        before = every[np.asarray(self.frames.times) < self.run.bed.time[out[0]]]
+        return before if len(before) else every
+
+    def held(self, index: int) -> bool:
+        """Whether a driven spike was held still at this frame, its force falling off from what it was on the way in."""
+        if self.run is None or self.run.bed is None or self.kind != "driven":
+            return False
+        row = int(np.searchsorted(self.run.bed.time, self.frames.times[index], side="right")) - 1
+        return bool(self.run.bed.phase[max(row, 0)] == "rest")
+
+    @property
+    def rested(self) -> bool:
+        """Whether it was set down and came to rest, so that its last frame shows it at rest."""
+        sinkage = self.run.quantities.get("sinkage") if self.run else None
+        value = sinkage.get("value") if isinstance(sinkage, dict) else sinkage
+        return self.kind == "set_down" and value is not None
 
     @property
     def kind(self) -> str:
@@ -288,16 +317,25 @@ def _plan(
             )
         )
 
-    still(main, main.deepest, "displacement", top, "deepest", "at its deepest")
+    def deep(story: _Story) -> None:
+        if story.rested:
+            still(story, len(story.frames) - 1, "displacement", top, "rest", "at rest")
+        else:
+            held = ", held still" if story.held(story.deepest) else ""
+            still(story, story.deepest, "displacement", top, "deepest", f"at its deepest{held}")
+
+    deep(main)
     half = _half_way(main)
     fast = _high(main.frames[half], "speed")
     if fast > 0.0:
         still(main, half, "speed", nice_above(fast), "speed", "the grains' speed half way in")
     last = len(main.frames) - 1
     if last != main.deepest and main.kind == "driven":
-        still(main, last, "displacement", top, "end", "pulled out")
+        depth = main.depth[last]
+        inside = depth is not None and depth > 0.0
+        still(main, last, "displacement", top, "end", "near the end of the pull-out" if inside else "pulled out")
     for story in chosen[1:]:
-        still(story, story.deepest, "displacement", top, "deepest", "at its deepest")
+        deep(story)
     animation = None
     if animation_size is not None and len(main.frames) > 1:
         frames = np.unique(np.linspace(0, last, min(len(main.frames), _ANIMATED)).round().astype(int)).tolist()

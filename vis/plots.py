@@ -16,10 +16,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from vis.folder import Run, RunFolder, Series
-from vis.numbers import plain
+from vis.numbers import column, plain, quote, short
 from vis.style import BED, GREY, INK, MODEL, styled
 
 __all__ = [
@@ -107,23 +108,28 @@ def drag_plot(run: RunFolder) -> Plot | None:
                     axis.plot(1e3 * grid, mean, color=MODEL, ls=style, lw=1.8)
             axis.axhline(0.0, color=GREY, lw=0.8)
             axis.set_xlim(left=0.0)
-        _label(figure, axes, "depth of the tip [mm]", "force on the spike [N]")
+            axis.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
+        _label(axes, "depth of the tip [mm]", "force on the spike [N]")
         _legend(
             figure,
             [
                 Line2D([], [], color=BED, lw=2.2, label="bed, way in"),
                 Line2D([], [], color=BED, lw=2.2, alpha=0.45, label="bed, way out"),
-                Line2D([], [], color=MODEL, ls=(0, (4, 2)), label="spring-damper, way in"),
-                Line2D([], [], color=MODEL, ls=(0, (1, 1.5)), label="spring-damper, way out"),
+                Line2D([], [], color=BED, lw=0.7, alpha=0.55, label="bed, as recorded"),
+                Line2D([], [], color=MODEL, ls=(0, (4, 2)), label="spring-damper, in"),
+                Line2D([], [], color=MODEL, ls=(0, (1, 1.5)), label="spring-damper, out"),
             ],
         )
     many = any(sum(r.speed == s for r in driven) > 1 for s in speeds)
-    spread = "Thin lines: each bed; band: one standard deviation between beds. " if many else ""
+    width = _bin_width([_way(r.bed, "in") for r in driven])
+    spread = f"Thick: mean over {width} of depth" if width else "Thick: mean over slices of depth"
+    spread += f"{' and over the beds' if many else ''}. Faint: as recorded{', each bed' if many else ''}. "
+    spread += "Band: one standard deviation between beds. " if many else ""
     return Plot(
         "drag",
         "Drag against depth",
         f"The ground's force on the spike, upwards, while it is driven in and pulled out at constant speed. {spread}"
-        "Dashed: the fitted spring-damper in the same motion; its way out is predicted, not fitted.",
+        "Dashed: the fitted spring-damper in the same motion; dotted: its way out, predicted, not fitted.",
         figure,
     )
 
@@ -141,15 +147,19 @@ def gap_plot(run: RunFolder) -> Plot | None:
         at = depths.index((row["depth_from"], row["depth_to"])), speeds.index(row["speed"])
         difference[at] = row["model_force"] - row["bed_force"]
         share[at] = difference[at] / row["bed_force"] if row["bed_force"] > 0 else np.nan
-    bound = float(np.nanmax(np.abs(difference))) or 1.0
+    unit, words = column([float(cell) for cell in difference.ravel()], "N")
+    scale = {"N": 1.0, "mN": 1e3, "kN": 1e-3}.get(unit)
+    if scale is None:
+        unit, scale, words = "N", 1.0, [plain(float(cell)) for cell in difference.ravel()]
+    bound = scale * float(np.nanmax(np.abs(difference))) or 1.0
     with styled():
         figure = Figure(figsize=(_WIDTH, max(2.6, 0.9 + 0.42 * len(depths))))
         FigureCanvasAgg(figure)
         axis = figure.add_subplot()
         norm = TwoSlopeNorm(0.0, -bound, bound)
-        image = axis.imshow(difference, cmap="PuOr_r", norm=norm, aspect="auto")
+        image = axis.imshow(scale * difference, cmap="PuOr_r", norm=norm, aspect="auto")
         axis.set_xticks(range(len(speeds)), [f"{s:.4g}" for s in speeds])
-        axis.set_yticks(range(len(depths)), [f"{1e3 * a:.3g} to {1e3 * b:.3g}" for a, b in depths])
+        axis.set_yticks(range(len(depths)), [f"{short(1e3 * a)} to {short(1e3 * b)}" for a, b in depths])
         axis.set_xlabel("speed [m/s]")
         axis.set_ylabel("depth [mm]")
         axis.grid(False)
@@ -158,17 +168,17 @@ def gap_plot(run: RunFolder) -> Plot | None:
         axis.grid(True, which="minor", color="white", lw=2.0)
         axis.tick_params(which="both", length=0)
         axis.spines[:].set_visible(False)
-        for (i, j), cell in np.ndenumerate(difference):
+        for ((i, j), cell), word in zip(np.ndenumerate(difference), words, strict=True):
             number = float(cell)
             if not np.isfinite(number):
                 continue
-            text = f"{_signed(number)} N"
+            text = f"{'+' if number > 0 else ''}{word} {unit}"
             if np.isfinite(share[i, j]):
                 text += f"   ({_signed(100.0 * float(share[i, j]), 2)} %)"
-            dark = abs(number) > 0.62 * bound
+            dark = abs(scale * number) > 0.62 * bound
             axis.text(j, i, text, ha="center", va="center", fontsize=8.5, color="white" if dark else INK)
         bar = figure.colorbar(image, ax=axis, pad=0.015, fraction=0.05)
-        bar.set_label("spring-damper − bed [N]")
+        bar.set_label(f"spring-damper − bed [{unit}]")
         bar.outline.set_visible(False)
     return Plot(
         "gap",
@@ -186,7 +196,7 @@ def work_plot(run: RunFolder) -> Plot | None:
     if not speeds:
         return None
     with styled():
-        figure, axes = _panels(2, height=2.7)
+        figure, axes = _panels(2, height=2.7, sharey=True)
         for axis, key, title in zip(
             axes, ("work_in", "work_out"), ("put in, way in", "got back, way out"), strict=True
         ):
@@ -197,19 +207,19 @@ def work_plot(run: RunFolder) -> Plot | None:
                 axis.errorbar(where, mean, spread, fmt="none", ecolor=INK, elinewidth=1.0, capsize=3)
                 for x, y, s in zip(where, mean, np.nan_to_num(spread), strict=True):
                     if np.isfinite(y):
-                        _above(axis, x, max(y, 0.0) + s, plain(y))
+                        _above(axis, x, max(y, 0.0) + s, plain(y, 2 if abs(y) < 0.1 else 3))
             axis.set_title(f"Work {title}")
             axis.set_xticks(range(len(speeds)), [f"{s:.4g}" for s in speeds])
             axis.grid(False, axis="x")
             axis.margins(y=0.15)
             axis.axhline(0.0, color=GREY, lw=0.8)
-        _label(figure, axes, "speed [m/s]", "work [mJ]", each=True)
+        _label(axes, "speed [m/s]", "work [mJ]")
         _legend(figure, _pair(bars=True))
     return Plot(
         "work",
         "Work in and out",
-        "Work done on the ground on the way in, and got back from it on the way out. A spring gives back what it took; "
-        "sand hardly anything." + _spread_words(driven),
+        "Work done on the ground on the way in, and got back from it on the way out; below zero, pulling out took "
+        f"work as well.{_returned_words(driven)}{_spread_words(driven)}",
         figure,
     )
 
@@ -227,6 +237,7 @@ def drops_plot(run: RunFolder) -> Plot | None:
         figure = Figure(figsize=(_WIDTH, 4.6))
         FigureCanvasAgg(figure)
         axes = figure.subplots(2, len(speeds), sharex="col", sharey="row", squeeze=False)
+        window = _nice(0.04 * max(_settled(r) for r in drops))
         for column, speed in enumerate(speeds):
             above, below = axes[0, column], axes[1, column]
             here = [r for r in drops if r.speed == speed]
@@ -240,7 +251,11 @@ def drops_plot(run: RunFolder) -> Plot | None:
                     time = 1e3 * (series.time[shown] - start)
                     thin = len(here) > 1 and colour == BED
                     above.plot(time, 1e3 * series.depth[shown], color=colour, ls=style, lw=1.1 if thin else 1.8)
-                    below.plot(time, series.force[shown], color=colour, ls=style, lw=1.1 if thin else 1.8)
+                    force = series.force
+                    if colour == BED:
+                        below.plot(time, force[shown], color=colour, lw=0.6, alpha=0.4)
+                        force = _running_mean(series.time, force, window)
+                    below.plot(time, force[shown], color=colour, ls=style, lw=1.2 if thin else 1.8)
                     peak = int(np.argmax(series.force))
                     below.plot(
                         1e3 * (series.time[peak] - start), series.force[peak], "o" if colour == BED else "D",
@@ -252,12 +267,17 @@ def drops_plot(run: RunFolder) -> Plot | None:
         axes[0, 0].set_ylabel("depth of the tip [mm]")
         axes[1, 0].set_ylabel("force on the spike [N]")
         axes[0, 0].invert_yaxis()
-        _legend(figure, [*_pair(), Line2D([], [], color=GREY, marker="o", ls="", ms=5, label="peak force")])
+        recorded = Line2D([], [], color=BED, lw=0.7, alpha=0.55, label="bed, as recorded")
+        peaks = Line2D([], [], color=GREY, marker="o", ls="", ms=5, label="peak force, as recorded")
+        bed, model = _pair()
+        _legend(figure, [bed, recorded, model, peaks])
+    each = ", a line for each bed" if len({(r.speed, r.seed) for r in drops}) > len(speeds) else ""
     return Plot(
         "drops",
         "Drops",
-        "Depth (downwards) and the ground's force against time since touch-down. The fit uses each drop up to its "
-        "first stop; what follows is predicted.",
+        f"Depth (downwards) and the ground's force against time since touch-down{each}. Of the bed's force the running "
+        f"mean over {quote(window, 0.0, 's')} is drawn full, what was recorded faint; the peaks are those of what was "
+        "recorded. The fit uses each drop up to its first stop; what follows is predicted.",
         figure,
     )
 
@@ -283,16 +303,19 @@ def drop_peaks_plot(run: RunFolder) -> Plot | None:
             for prefix, colour, style in (("", BED, "o-"), ("model_", MODEL, "D--")):
                 mean, spread = _by_speed(drops, speeds, prefix + key, scale)
                 axis.errorbar(speeds, mean, spread, fmt=style, color=colour, ms=5, mec="white", mew=0.8, capsize=3)
-            axis.set_title(title)
             axis.set_ylabel(unit_label(title, unit))
             axis.set_xlabel("speed at touch-down [m/s]")
             axis.set_ylim(0.0, 1.1 * axis.get_ylim()[1])
-            axis.set_xlim(0.0, 1.12 * max(speeds) or 1.0)
+            axis.margins(x=0.12)
+            if len(speeds) <= 5:
+                axis.set_xticks(speeds, [f"{s:.4g}" for s in speeds])
         _legend(figure, _pair(markers=True))
+    names = [title[0].lower() + title[1:] for _, title, *_ in columns]
+    listed = ", ".join(names[:-1]) + (" and " if len(names) > 1 else "") + names[-1]
     return Plot(
         "drop_peaks",
         "Peaks of the drops",
-        f"{'; '.join(title for _, title, *_ in columns)}: by speed at touch-down." + _spread_words(drops),
+        f"{listed[0].upper()}{listed[1:]} of the drops by their speed at touch-down.{_spread_words(drops)}",
         figure,
     )
 
@@ -313,36 +336,49 @@ def set_down_plot(run: RunFolder) -> Plot | None:
                     time = series.time - series.time[0]
                     shown = time <= end
                     axis.plot(1e3 * time[shown], 1e3 * series.depth[shown], color=colour, ls=style, lw=1.4)
+            assert r.bed is not None
+            if _number(r.quantities, "sinkage") is not None and r.bed.time[-1] - r.bed.time[0] <= end:
+                axis.plot(
+                    1e3 * (r.bed.time[-1] - r.bed.time[0]), 1e3 * r.bed.depth[-1], "o", color=BED, ms=5, mec="white",
+                    mew=0.8, zorder=5,
+                )  # fmt: skip
         rests = []
         for key, what, colour in (("sinkage", "bed", BED), ("model_sinkage", "spring-damper", MODEL)):
             depths = [1e3 * n for r in sets if (n := _number(r.quantities, key)) is not None]
             if depths:
-                rests.append(
-                    (float(np.mean(depths)), float(np.std(depths, ddof=1)) if len(depths) > 1 else 0.0, what, colour)
-                )
+                spread = float(np.std(depths, ddof=1)) if len(depths) > 1 else None
+                rests.append((float(np.mean(depths)), spread, what, colour))
         axis.invert_yaxis()
         low, high = sorted(axis.get_ylim())
         gap = 0.075 * (high - low)
         last = -np.inf
-        for depth, spread, what, colour in sorted(rests):
+        for depth, spread, what, colour in sorted(rests, key=lambda rest: rest[0]):
             axis.axhline(depth, color=colour, lw=0.8, alpha=0.6)
             if spread:
                 axis.axhspan(depth - spread, depth + spread, color=colour, alpha=0.12, lw=0)
             last = max(depth, last + gap)
-            number = f"{depth:.2f}" + (f" ± {spread:.2f}" if spread else "")
+            exact = spread is None or (what != "bed" and spread < 0.005)  # one law: its beds differ in their start only
+            number = f"{depth:.2f}" if exact else f"{depth:.2f} ± {spread:.2f}"
             axis.text(
                 1.01, last, f"{what}: {number} mm", color=colour, va="center", transform=axis.get_yaxis_transform()
             )
         axis.set_xlim(0.0, 1e3 * end)
         axis.set_xlabel("time since the spike was set down [ms]")
         axis.set_ylabel("depth of the tip [mm]")
-        _legend(figure, _pair())
+        _legend(figure, [*_pair(), *([_dot("at rest")] if any(what == "bed" for *_, what, _ in rests) else [])])
+    still = sum(_number(r.quantities, "sinkage") is not None for r in sets)
+    many = len(sets) > 1
+    said = f"Sinking under the load, {len(sets)} bed{'s' if many else ''}."
+    if still < len(sets):
+        said += f" {still or 'None'} of them came to rest in the time that was followed." if many else (
+            " It did not come to rest in the time that was followed."
+        )  # fmt: skip
+    if rests:
+        said += f" Right: the depth at rest{', ± the standard deviation between beds' if still > 1 else ''}."
     return Plot(
         "set_down",
         "Set down under its load",
-        f"Sinking to rest, {len(sets)} bed{'s' if len(sets) > 1 else ''}. Right: the depth at rest"
-        f"{' with the standard deviation between beds' if len(sets) > 1 else ''}. Rest is predicted by the "
-        "spring-damper, not fitted.",
+        f"{said} The spring-damper is the one fitted to all beds; where it rests is predicted, not fitted.",
         figure,
     )
 
@@ -361,19 +397,19 @@ def spread_plot(run: RunFolder) -> Plot | None:
         figure, axes = _panels(len(panels), height=2.5)
         for axis, (key, title, unit) in zip(axes, panels, strict=True):
             rows = [
-                (f.get("seed", i + 1), n, _std(f, key))
+                (f.get("seed", i + 1), n, _error(f, key))
                 for i, f in enumerate(fits)
                 if (n := _number(f, key)) is not None
             ]
             values = np.array([value for _, value, _ in rows])
-            mean, spread = float(values.mean()), float(values.std(ddof=1)) if len(values) > 1 else 0.0
+            mean, spread = float(values.mean()), float(values.std(ddof=1)) if len(values) > 1 else None
             axis.axhline(mean, color=INK, lw=1.0)
             if spread:
                 axis.axhspan(mean - spread, mean + spread, color=MODEL, alpha=0.15, lw=0)
             axis.errorbar(
                 range(len(rows)),
                 values,
-                [std or 0.0 for *_, std in rows],
+                [np.nan if error is None else error for *_, error in rows],
                 fmt="o",
                 color=MODEL,
                 ms=7,
@@ -385,15 +421,16 @@ def spread_plot(run: RunFolder) -> Plot | None:
             axis.set_title(title)
             axis.set_xlabel("seed of the bed")
             axis.set_ylabel(f"{title.split()[1]} [{unit}]")
-            reach = max(2.2 * spread, 0.1 * abs(mean), 1e-12)
+            reach = max(2.2 * (spread or 0.0), 0.1 * abs(mean), 1e-12)
             axis.set_ylim(min(mean - reach, *axis.get_ylim()), max(mean + reach, *axis.get_ylim()))
             axis.grid(False, axis="x")
-    bars = "; bars: the fit's own uncertainty" if any(_std(f, "stiffness") for f in fits) else ""
+    known = any(_error(f, key) is not None for f in fits for key in ("stiffness", "damping"))
+    bars = "; bars: standard error of the fit" if known else "; how well each fit is determined is not known"
     return Plot(
         "spread",
         "Spread between beds",
-        f"The spring-damper fitted to each bed by itself{bars}. Line and band: mean and standard deviation between "
-        "beds.",
+        f"The spring-damper fitted to each bed by itself, on the runs that every bed has{bars}. Line and band: mean "
+        "and standard deviation between beds. The axes do not start at zero.",
         figure,
     )
 
@@ -429,11 +466,11 @@ def _panels(count: int, *, height: float, sharex: bool = False, sharey: bool = F
     return figure, axes[:count]
 
 
-def _label(figure: Figure, axes: list[Axes], x: str, y: str, *, each: bool = False) -> None:
+def _label(axes: list[Axes], x: str, y: str) -> None:
     for axis in axes:
         place = axis.get_subplotspec()
         axis.set_xlabel(x)
-        if each or place is None or place.is_first_col():
+        if place is None or place.is_first_col():
             axis.set_ylabel(y)
 
 
@@ -463,10 +500,10 @@ def _band(axis: Axes, parts: Iterable[Series | None], colour: str, *, alpha: flo
     grid, mean, spread = _mean_by_depth(there)
     if len(there) > 1:
         for part in there:
-            axis.plot(1e3 * part.depth, part.force, color=colour, lw=0.5, alpha=0.35 * alpha)
+            axis.plot(1e3 * part.depth, part.force, color=colour, lw=0.6, alpha=0.45 * alpha)
         axis.fill_between(1e3 * grid, mean - spread, mean + spread, color=colour, alpha=0.2 * alpha, lw=0)
     else:
-        axis.plot(1e3 * there[0].depth, there[0].force, color=colour, lw=0.5, alpha=0.4 * alpha)
+        axis.plot(1e3 * there[0].depth, there[0].force, color=colour, lw=0.7, alpha=0.55 * alpha)
     axis.plot(1e3 * grid, mean, color=colour, alpha=alpha, lw=2.2 if solid else 1.8)
 
 
@@ -490,7 +527,7 @@ def _mean_by_depth(
     if not there:
         return np.zeros(0), np.zeros(0), np.zeros(0)
     deepest = max(float(part.depth.max()) for part in there)
-    bins = int(np.clip(min(len(part) for part in there) // 3, 4, bins))
+    bins = _bins(there, bins)
     edges = np.linspace(0.0, max(deepest, 1e-12), bins + 1)
     rows = np.full((len(there), bins), np.nan)
     for row, part in zip(rows, there, strict=True):
@@ -501,6 +538,10 @@ def _mean_by_depth(
     rows = rows[:, filled]
     spread = np.nanstd(rows, axis=0, ddof=0) * np.sqrt(_bessel(np.isfinite(rows).sum(axis=0)))
     return (0.5 * (edges[1:] + edges[:-1]))[filled], np.nanmean(rows, axis=0), spread
+
+
+def _bins(parts: list[Series], most: int = 40) -> int:
+    return int(np.clip(min(len(part) for part in parts) // 3, 4, most))
 
 
 def _bessel(count: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -554,9 +595,10 @@ def _number(quantities: Any, key: str) -> float | None:
     return float(number) if isinstance(number, int | float) and np.isfinite(number) else None
 
 
-def _std(fit: dict[str, Any], key: str) -> float | None:
+def _error(fit: dict[str, Any], key: str) -> float | None:
+    """Standard error of a bed's own fit; None where unknown."""
     entry = fit.get(key)
-    number = entry.get("std") if isinstance(entry, dict) else fit.get(f"{key}_std")
+    number = entry.get("std") if isinstance(entry, dict) else fit.get(f"{key}_error", fit.get(f"{key}_std"))
     return float(number) if isinstance(number, int | float) and np.isfinite(number) else None
 
 
@@ -577,6 +619,34 @@ def _settled(run: Run) -> float:
     return 1.25 * last if last > 0.0 else 1.0
 
 
+def _running_mean(time: NDArray[np.float64], force: NDArray[np.float64], window: float) -> NDArray[np.float64]:
+    """Mean of the force over `window` [s] around each time, over what there is of it at the ends."""
+    if len(time) < 2:
+        return force
+    impulse = np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(time))])
+    reach = np.minimum(0.5 * window, np.minimum(time - time[0], time[-1] - time))  # stays centred at the ends
+    low, high = time - reach, time + reach
+    mean = (np.interp(high, time, impulse) - np.interp(low, time, impulse)) / np.maximum(high - low, 1e-300)
+    return np.where(high > low, mean, force)
+
+
+def _nice(number: float) -> float:
+    """The next 1, 2 or 5 times a power of ten not above `number`."""
+    power = 10.0 ** np.floor(np.log10(number))
+    return float(next(n * power for n in (5.0, 2.0, 1.0) if n * power <= 1.0001 * number))
+
+
+def _bin_width(parts: Iterable[Series | None]) -> str:
+    """The slices of depth that `_mean_by_depth` averages over, in words; "" where they differ between speeds."""
+    there = [part for part in parts if part is not None and len(part) > 1]
+    widths = {quote(float(part.depth.max()) / _bins([part]), None, "m", significant=2) for part in there}
+    return widths.pop() if len(widths) == 1 else ""
+
+
+def _dot(label: str) -> Line2D:
+    return Line2D([], [], color=BED, marker="o", ls="", ms=5, label=label)
+
+
 def _above(axis: Axes, x: float, y: float, text: str) -> None:
     axis.annotate(text, (x, y), xytext=(0, 3), textcoords="offset points", ha="center", fontsize=7.5, color=INK)
 
@@ -587,6 +657,21 @@ def _speed(speed: float) -> str:
 
 def _signed(number: float, significant: int = 3) -> str:
     return ("+" if number > 0 else "") + plain(number, significant)
+
+
+def _returned_words(runs: list[Run]) -> str:
+    """What share of the work put in was got back, of bed and spring-damper: the mean over these runs."""
+    shares = []
+    for prefix, what in (("", "the bed"), ("model_", "the spring-damper")):
+        works = [
+            out / put
+            for r in runs
+            if (put := _number(r.quantities, f"{prefix}work_in") or 0.0) > 0.0
+            and (out := _number(r.quantities, f"{prefix}work_out")) is not None
+        ]
+        if works:
+            shares.append(f"{what} {quote(float(np.mean(works)), None, '%', significant=2)}")
+    return f" Got back over put in, mean of the driven runs: {', '.join(shares)}." if shares else ""
 
 
 def _spread_words(runs: list[Run]) -> str:

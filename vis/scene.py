@@ -62,7 +62,7 @@ class Scene:
         plotter.add_mesh(slab, color=(0.55, 0.55, 0.57), ambient=0.25, diffuse=0.8)
         plotter.enable_ssao(radius=3.0 * radius, bias=0.12 * radius, kernel_size=48, blur=True)
         camera = plotter.camera
-        view = np.array([0.22, -1.0, 0.40])
+        view = np.array([0.0, -1.0, 0.40])  # from straight ahead: a depth on the ruler is the same all across the cut
         camera.focal_point = tuple(centre)
         camera.position = tuple(centre + view / np.linalg.norm(view) * 5.0 * reach)
         camera.up = (0.0, 0.0, 1.0)
@@ -105,7 +105,7 @@ class Scene:
 
     def _fit(self, points: NDArray[np.float64]) -> None:
         """Zoom and shift so that these points fill the page between the depth scale and the colour bar."""
-        left, right, foot, head = 0.125, 0.865, 0.075, 0.90
+        left, right, foot, head = 0.125, 0.865, 0.12, 0.90
         camera = self._plotter.camera
         low, high = (edge(self.place(points), axis=0) for edge in (np.min, np.max))
         zoom = min((right - left) / (high[0] - low[0]), (head - foot) / (high[1] - low[1]))

@@ -54,11 +54,12 @@ _NAMES = {
     "material": "material",
     "pressure": "pressure expected under the tip",
     "speed": "speed expected",
+    "real": "Young's modulus of the real grain",
     "factor": "softer than the real grain by a factor of",
     "overlap": "overlap expected",
 }
 _UNITS = {
-    "size": "m", "grain": "m", "grain_diameter": "m", "surface": "m", "gravity": "m/s2", "young": "Pa",
+    "size": "m", "grain": "m", "grain_diameter": "m", "surface": "m", "gravity": "m/s2", "young": "Pa", "real": "Pa",
     "pressure": "Pa", "time_step": "s",
     "diameter": "m", "shaft_diameter": "m", "length": "m", "mass": "kg", "load": "N", "speed": "m/s",
     "cone_angle": "degrees",
@@ -130,6 +131,15 @@ def _lead(run: RunFolder, experiment: str) -> list[str]:
 
 def _tiles(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, str]]:
     tiles = []
+    if _restless(run, quantities):
+        model = quantity(quantities.get("sinkage_spring_damper"))
+        tiles.append(
+            {
+                "label": "Sinks to rest at",
+                "value": "unknown",
+                "note": f"no set-down came to rest in time; the spring-damper says {model}",
+            }
+        )
     if _value(quantities, "sinkage_dem") is not None:
         under = f"under {quantity(quantities['load'])}" if _value(quantities, "load") is not None else "under its load"
         model = quantity(quantities.get("sinkage_spring_damper"))
@@ -185,6 +195,11 @@ def _answers(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, st
             text += f" The fitted spring-damper says {quantity(quantities['sinkage_spring_damper'])}"
             text += f", {_more(law / sunk - 1.0, 'deeper', 'less deep')}." if sunk > 0 else "."
         answers.append({"question": "How far does it sink?", "answer": text})
+    elif _restless(run, quantities):
+        text = "Not known: set down under its load, the spike did not come to rest in the time that was followed."
+        if law is not None:
+            text += f" The fitted spring-damper says {quantity(quantities['sinkage_spring_damper'])}."
+        answers.append({"question": "How far does it sink?", "answer": text})
     if push := _push(run):
         text = f"{push['value']} {push['note']}."
         drops = _peaks(run, "drop", "peak_force")
@@ -192,10 +207,7 @@ def _answers(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, st
             words = [f"{quote(*peak, 'N')} at {speed:g}{_NBSP}m/s" for speed, peak in drops]
             text += f" Dropped, its force peaks at {_and(words)}."
         if _value(quantities, "work_returned_dem") is not None:
-            text += (
-                f" Pulled out, it gives back {quantity(quantities['work_returned_dem'], unit='%')} of the work put in"
-                f" (spring-damper: {quantity(quantities.get('work_returned_spring_damper'), unit='%')})."
-            )
+            text += " " + _returned(quantities)
         answers.append({"question": "What does the sand push back with?", "answer": text})
     if _value(quantities, "drag_gap") is not None:
         text = (
@@ -213,6 +225,23 @@ def _answers(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, st
     return answers
 
 
+def _restless(run: RunFolder, quantities: Mapping[str, Any]) -> bool:
+    """Whether the spike was set down but never came to rest in the bed."""
+    null = "sinkage_dem" in quantities and _value(quantities, "sinkage_dem") is None
+    return null and bool(run.of_kind("set_down"))
+
+
+def _returned(quantities: Mapping[str, Any]) -> str:
+    """What the bed gives back of the work put in; where that is negative, pulling out takes work as well."""
+    share, entry = _value(quantities, "work_returned_dem"), quantities["work_returned_dem"]
+    model = f"(spring-damper: {quantity(quantities.get('work_returned_spring_damper'), unit='%')} given back)"
+    if share is not None and share < 0.0:
+        std = _plain_value(_mapping(entry).get("std"))
+        more = quote(-share, std, "%", significant=2)
+        return f"Pulled out, it gives nothing back: that takes another {more} of the work put in {model}."
+    return f"Pulled out, it gives back {quantity(entry, unit='%')} of the work put in {model}."
+
+
 def _worst(result: Mapping[str, Any]) -> str:
     rows = [row for row in _departure_rows(result) if row["bed_force"] > 0]
     if not rows:
@@ -220,8 +249,8 @@ def _worst(result: Mapping[str, Any]) -> str:
     worst = max(rows, key=lambda row: abs(row["model_force"] - row["bed_force"]))
     difference = worst["model_force"] - worst["bed_force"]
     return (
-        f"It is farthest off at {worst['speed']:g}{_NBSP}m/s between {short(1e3 * worst['depth_from'], 3)} and "
-        f"{short(1e3 * worst['depth_to'], 3)}{_NBSP}mm: {quote(abs(difference), unit='N')} too "
+        f"It is farthest off at {worst['speed']:g}{_NBSP}m/s between {short(1e3 * worst['depth_from'])} and "
+        f"{short(1e3 * worst['depth_to'])}{_NBSP}mm: {quote(abs(difference), unit='N')} too "
         f"{'much' if difference > 0 else 'little'} ({_percent(abs(difference) / worst['bed_force'])})."
     )
 
@@ -254,6 +283,7 @@ def _peaks(run: RunFolder, kind: str, key: str) -> list[tuple[float, tuple[float
 def _fit(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> dict[str, Any] | None:
     if _value(quantities, "stiffness") is None and not result.get("fits"):
         return None
+    own = [_mapping(fit) for fit in _list(result.get("fits"))]
     rows = [
         [
             "all beds together",
@@ -262,13 +292,12 @@ def _fit(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> dict[str, 
             quantity(quantities.get("drag_gap"), unit="%"),
         ]
     ]
-    for i, entry in enumerate(_list(result.get("fits"))):
-        fit = _mapping(entry)
+    for i, fit in enumerate(own):
         rows.append(
             [
                 f"bed {fit.get('seed', i + 1)} by itself",
-                quote(_value(fit, "stiffness"), _plain_value(fit.get("stiffness_std")), "N/m"),
-                quote(_value(fit, "damping"), _plain_value(fit.get("damping_std")), "N s/m"),
+                quote(_value(fit, "stiffness"), _fit_error(fit, "stiffness"), "N/m"),
+                quote(_value(fit, "damping"), _fit_error(fit, "damping"), "N s/m"),
                 quote(_value(fit, "drag_gap"), None, "%") if "drag_gap" in fit else "\N{EN DASH}",
             ]
         )
@@ -277,8 +306,19 @@ def _fit(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> dict[str, 
         for name, key in (("K", "stiffness_error"), ("C", "damping_error"))
         if _value(quantities, key) is not None
     ]
-    note = f"Standard error of the fit to all beds: {_and(errors)}." if errors else ""
+    said = []
+    if errors:
+        said.append(f"Standard error of the fit to all beds, leaving out one run at a time: {_and(errors)}.")
+    if any(_fit_error(fit, key) is not None for fit in own for key in ("stiffness", "damping")):
+        said.append(
+            "± is the spread between beds in the first row, the standard error of that bed's fit in the others."
+        )
+    note = " ".join(said)
     return {"table": {"head": ["fitted to", "K", "C", "drag gap"], "rows": rows}, "note": note}
+
+
+def _fit_error(fit: Mapping[str, Any], key: str) -> float | None:
+    return _plain_value(fit.get(f"{key}_error", fit.get(f"{key}_std")))
 
 
 def _departures(result: Mapping[str, Any]) -> dict[str, Any]:
@@ -288,7 +328,7 @@ def _departures(result: Mapping[str, Any]) -> dict[str, Any]:
     rows = [
         [
             f"{row['speed']:g}",
-            f"{short(1e3 * row['depth_from'], 3)} to {short(1e3 * row['depth_to'], 3)}",
+            f"{short(1e3 * row['depth_from'])} to {short(1e3 * row['depth_to'])}",
             bed,
             model,
             _signed_percent(row["model_force"] / row["bed_force"] - 1.0) if row["bed_force"] > 0 else "\N{EN DASH}",

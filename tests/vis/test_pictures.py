@@ -117,3 +117,17 @@ def test_gif_keeps_to_its_limit(tmp_path):
     write_gif(tmp_path / "large.gif", images, limit=10_000_000)
     with Image.open(tmp_path / "large.gif") as animation:
         assert animation.n_frames == 30
+
+
+def test_the_deepest_picture_is_from_before_the_pull_out(tmp_path, make_run):
+    folder = make_run(tmp_path, frames=9)
+    run = pictures.read_folder(folder)
+    for name in pictures.frame_names(folder):
+        story = pictures._tell(run, name)
+        if story.kind != "driven":
+            continue
+        out = story.run.bed.time[np.flatnonzero(story.run.bed.phase == "out")[0]]
+        time, depth = story.frames.times[story.deepest], story.depth[story.deepest]
+        assert time < out
+        before = [d for d, t in zip(story.depth, story.frames.times, strict=True) if t < out]
+        assert depth == pytest.approx(max(before), rel=3e-3)

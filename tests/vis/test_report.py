@@ -3,14 +3,18 @@
 import json
 import re
 import shutil
+import subprocess
+import sys
 from html.parser import HTMLParser
 
+import numpy as np
 import pytest
 from PIL import Image
 
+import vis
 from vis import style
 from vis.folder import read_folder, read_series
-from vis.plots import PLOTS, make_plots
+from vis.plots import PLOTS, _running_mean, make_plots
 from vis.report import write_report
 from vis.summary import summarise
 
@@ -189,3 +193,86 @@ def test_a_series_that_is_cut_short_is_refused(tmp_path):
     path.write_text("t_s,depth_m,velocity_m_s,force_N,phase\n")
     with pytest.raises(ValueError, match="no rows"):
         read_series(path)
+
+
+def edit_result(folder, change):
+    result = json.loads((folder / "result.json").read_text())
+    change(result)
+    (folder / "result.json").write_text(json.dumps(result))
+    return read_folder(folder)
+
+
+def test_a_spike_that_never_rests_has_no_sinkage_and_the_report_says_so(tmp_path, make_run):
+    def forget(result):
+        result["quantities"]["sinkage_dem"] |= {"value": None, "std": None}
+        for run in result["runs"]:
+            run["quantities"].pop("sinkage", None)
+
+    run = edit_result(make_run(tmp_path, frames=0), forget)
+    said = summarise(run)
+    assert said["answers"][0]["answer"].startswith("Not known: set down under its load, the spike did not come to rest")
+    assert said["tiles"][0]["value"] == "unknown"
+    assert "None of them came to rest" in PLOTS["Set down under its load"](run).caption
+
+
+@pytest.mark.parametrize("word", ["error", "std"])
+def test_the_error_of_each_fit_is_read_under_both_its_names(tmp_path, word, make_run):
+    def rename(result):
+        for fit in result["fits"]:
+            for key in ("stiffness", "damping"):
+                fit.pop(f"{key}_error", None)
+                fit.pop(f"{key}_std", None)
+                fit[f"{key}_{word}"] = 0.04 * fit[key]
+
+    run = edit_result(make_run(tmp_path, frames=0), rename)
+    assert all("±" in row[1] and "±" in row[2] for row in summarise(run)["fit"]["table"]["rows"])
+    assert "bars: standard error of the fit" in PLOTS["Spread between beds"](run).caption
+
+
+def test_fits_without_an_error_get_no_bars(tmp_path, make_run):
+    def forget(result):
+        result["fits"] = [{key: fit[key] for key in ("seed", "stiffness", "damping")} for fit in result["fits"]]
+
+    run = edit_result(make_run(tmp_path, frames=0), forget)
+    plot = PLOTS["Spread between beds"](run)
+    assert "how well each fit is determined is not known" in plot.caption
+    bars = [line for axis in plot.figure.axes for bar in axis.containers for line in bar[2]]
+    assert not any(len(segment) and np.isfinite(segment).all() for bar in bars for segment in bar.get_segments())
+
+
+def test_what_the_ground_gives_back_is_read_from_the_data(tmp_path, make_run):
+    def elastic(result):
+        for run in result["runs"]:
+            numbers = run["quantities"]
+            if run["kind"] == "driven":
+                numbers["work_out"]["value"] = 0.5 * numbers["work_in"]["value"]
+        result["quantities"]["work_returned_dem"] = {"value": 0.5, "std": 0.0, "unit": "1"}
+
+    run = edit_result(make_run(tmp_path, frames=0), elastic)
+    assert "the bed 50\N{NO-BREAK SPACE}%" in PLOTS["Work in and out"](run).caption
+    answer = next(item["answer"] for item in summarise(run)["answers"] if "push back" in item["question"])
+    assert "gives back 50\N{NO-BREAK SPACE}%" in answer
+
+    def costly(result):
+        result["quantities"]["work_returned_dem"] = {"value": -0.006, "std": None, "unit": "1"}
+
+    run = edit_result(run.path, costly)
+    answer = next(item["answer"] for item in summarise(run)["answers"] if "push back" in item["question"])
+    assert "gives nothing back: that takes another 0.60" in answer
+
+
+def test_a_running_mean_of_a_line_is_the_line():
+    time = np.linspace(0.0, 1.0, 101) ** 1.3
+    assert _running_mean(time, 2.0 + 3.0 * time, 0.1) == pytest.approx(2.0 + 3.0 * time, abs=2e-3)
+    wave = np.sin(2 * np.pi * np.linspace(0.0, 10.0, 2001))
+    assert np.abs(_running_mean(np.linspace(0.0, 10.0, 2001), wave, 1.0)[200:-200]).max() < 1e-3
+
+
+def test_the_rooms_own_names_are_loaded_when_asked_for():
+    code = (
+        "import sys, vis; assert 'matplotlib' not in sys.modules; vis.FrameWriter; vis.read_frames;"
+        "assert 'matplotlib' not in sys.modules; vis.write_report; assert set(vis.__all__) <= set(dir(vis))"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+    with pytest.raises(AttributeError, match="no attribute 'write_raport'"):
+        vis.write_raport
