@@ -1,5 +1,6 @@
 """Shapes: distances and normals against densely sampled surfaces; forces and torques between grains and bodies."""
 
+import itertools
 import math
 
 import numpy as np
@@ -65,7 +66,7 @@ def test_distance_to_a_body_of_revolution_is_that_of_its_sampled_profile(distanc
     """The nearest of 60,000 points of the profile; the sign by whether the point is in the profile."""
     corners = profile_of(shape)
     t = np.linspace(0, 1, 20_001)[:, None]
-    samples = np.concatenate([a + t * (b - a) for a, b in zip(corners[:-1], corners[1:], strict=True)])
+    samples = np.concatenate([a + t * (b - a) for a, b in itertools.pairwise(corners)])
     points = points_around()
     flat = np.column_stack([np.hypot(points[:, 0], points[:, 1]), points[:, 2]])
     apart = np.array([np.sqrt(((samples - p) ** 2).sum(axis=1).min()) for p in flat])

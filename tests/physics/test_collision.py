@@ -128,9 +128,7 @@ def row_of_grains(**options):
     return positions, np.full(16, RADIUS), options
 
 
-@pytest.mark.parametrize(
-    ("numbers", "published"), [(ALUMINA, (8.089, 0.6154, 6.105)), (IRON, (17.19, 0.5068, 12.97))]
-)
+@pytest.mark.parametrize(("numbers", "published"), [(ALUMINA, (8.089, 0.6154, 6.105)), (IRON, (17.19, 0.5068, 12.97))])
 def test_a_small_sphere_on_a_rigid_plane_t3(numbers, published):
     speed = 3.9
     star, _ = effective_moduli(numbers["young"], numbers["poisson"], math.inf, 0.3)

@@ -1,0 +1,160 @@
+"""The contact law's parameters and the time step: against the equation of motion and Hertz's closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from dem import MATERIALS, SAND, Bed, Material, material
+from dem.contact import damping_factor, effective_moduli, pair_parameters
+from dem.timestep import CHAIN, choose_young, contact_time, time_step_for
+
+
+def rebound(factor):
+    """Restitution of x'' = -max(0, x^1.5 + c sqrt(3/2) x^0.25 x'), in units of its mass, stiffness and speed."""
+    c = factor * math.sqrt(1.5)
+
+    def rates(_, y):
+        x = max(y[0], 0.0)
+        return [y[1], -max(0.0, x**1.5 + c * x**0.25 * y[1])]
+
+    def lets_go(_, y):
+        return max(y[0], 0.0) ** 1.25 + c * y[1]
+
+    lets_go.terminal, lets_go.direction = True, -1
+    path = solve_ivp(rates, (0, 500), [1e-12, 1.0], events=lets_go, rtol=1e-10, atol=1e-13, method="DOP853")
+    return -path.y[1, -1]
+
+
+@pytest.mark.parametrize("restitution", [0.02, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 0.901, 0.95, 0.98, 0.999])
+def test_damping_gives_the_restitution_asked_for(restitution):
+    """Thornton et al. 2013's fit below 0.9 (within 3e-4), the expansion above it."""
+    assert rebound(damping_factor(restitution)) == pytest.approx(restitution, abs=3e-4)
+
+
+def test_elastic_contacts_have_no_damping_and_none_is_out_of_bounds():
+    assert damping_factor(1.0) == 0.0 == damping_factor(1.0, tensile=True)
+    for e in (0.0, 1.1, -1.0, math.nan):
+        with pytest.raises(ValueError, match=r"restitution = .* must lie between"):
+            damping_factor(e)
+    with pytest.raises(ValueError, match="must not be negative"):
+        pair_parameters(effective_young=1e7, effective_shear=1e6, restitution=0.5, friction=-0.1)
+
+
+def test_effective_moduli_are_those_of_hertz_and_mindlin():
+    """1/E* = sum (1 - nu^2)/E, 1/G* = sum (2 - nu)/G with G = E / 2 (1 + nu); a rigid body adds nothing."""
+    young, shear = effective_moduli(48e9, 0.2, 20e9, 0.25)
+    assert young == pytest.approx(1 / ((1 - 0.04) / 48e9 + (1 - 0.0625) / 20e9))
+    g1, g2 = 48e9 / 2.4, 20e9 / 2.5
+    assert shear == pytest.approx(1 / (1.8 / g1 + 1.75 / g2))
+    assert effective_moduli(48e9, 0.2, math.inf, 0.3) == pytest.approx((48e9 / 0.96, g1 / 1.8))
+
+
+# ---------------------------------------------------------------------------- the time step
+
+STUFF = Material("grain", 2600, 1e8, 0.25, 0.5, 0.5)
+
+
+def test_the_contact_time_is_half_a_period_of_the_stiffest_contact():
+    """pi sqrt(m* / S_n) with S_n = 2 E* sqrt(R* delta): on a rigid plane, which is the stiffest there is."""
+    d, overlap = 0.002, 0.05
+    mass = 2600 * math.pi * d**3 / 6
+    stiff = 2 * 1e8 / (1 - 0.0625) * math.sqrt(d / 2 * overlap * d)
+    pair = math.pi * math.sqrt(mass / 2 / (1e8 / (1 - 0.0625) * math.sqrt(d / 4 * overlap * d)))
+    plane = math.pi * math.sqrt(mass / stiff)
+    assert contact_time(STUFF, diameter=d, max_overlap=overlap) == pytest.approx(min(plane, pair))
+
+
+def test_a_collision_lasts_longer_than_the_time_that_the_step_is_taken_from():
+    """Hertz's t_c = 2.943275 delta / v at the largest overlap allowed is 1.28 times the contact time."""
+    d, overlap = 0.002, 0.05
+    mass = 2600 * math.pi * d**3 / 6
+    k = 4 / 3 * effective_moduli(1e8, 0.25, 1e8, 0.25)[0] * math.sqrt(d / 4)
+    speed = math.sqrt(4 * k * (overlap * d) ** 2.5 / (5 * mass / 2))
+    ours = math.pi * math.sqrt(mass / 2 / (1.5 * k * math.sqrt(overlap * d)))
+    assert 2.943275 * overlap * d / speed == pytest.approx(1.28 * ours, rel=5e-3)
+
+
+def test_the_step_is_an_eighth_of_the_contact_time_and_a_longer_one_is_refused():
+    shortest = contact_time(STUFF, diameter=0.002, max_overlap=0.05)
+    assert time_step_for(STUFF, diameter=0.002, max_overlap=0.05) == pytest.approx(shortest / 8)
+    assert time_step_for(STUFF, diameter=0.002, max_overlap=0.05, wanted=shortest / 5.01) == shortest / 5.01
+    for wanted in (shortest / 4.99, 1.0, 0.0, -1e-6, math.nan):
+        with pytest.raises(ValueError, match=r"time_step = .* s is outside 0 to .* a fifth of the shortest contact"):
+            time_step_for(STUFF, diameter=0.002, max_overlap=0.05, wanted=wanted)
+
+
+@pytest.mark.parametrize("bound", [0.01, 0.05])
+def test_the_young_chosen_keeps_a_collision_within_the_bound_and_near_it(bound):
+    """Two grains meet at the speed for which the modulus was chosen: the overlap is the bound, but for the step."""
+    d, speed = 0.004, 2.0
+    young = choose_young(SAND, pressure=0.0, speed=speed, max_overlap=bound)
+    assert young < SAND.young
+    stuff = Material("grain", SAND.density, SAND.young, SAND.poisson, 0.0, 1.0)
+    bed = Bed.from_grains(
+        stuff,
+        young=young,
+        positions=np.array([[0.02, 0.02, 0.02], [0.02 + d, 0.02, 0.02]]),
+        radii=np.full(2, d / 2),
+        velocities=np.array([[speed / 2, 0, 0], [-speed / 2, 0, 0]]),
+        size=(0.06, 0.06, 0.04),
+        gravity=0.0,
+        floor=False,
+        max_overlap=1.02 * bound,
+    )
+    bed.advance(20)
+    assert bed.max_overlap == pytest.approx(bound, rel=5e-3)
+
+
+def test_the_young_chosen_bears_the_largest_force_of_a_bed_under_pressure():
+    """F = 2/3 E* d^2 (delta/d)^1.5 at the bound is CHAIN times p d^2."""
+    young = choose_young(SAND, pressure=1e4, speed=0.0, max_overlap=0.05)
+    star = young / (1 - SAND.poisson**2) / 2
+    assert 2 / 3 * star * 0.05**1.5 == pytest.approx(CHAIN * 1e4)
+
+
+def test_the_young_chosen_is_never_above_the_materials_own():
+    assert choose_young(SAND, pressure=0.0, speed=1000.0, max_overlap=0.01) == SAND.young
+
+
+# ---------------------------------------------------------------------------- materials
+
+GOOD = {"name": "x", "density": 1.0, "young": 1.0, "poisson": 0.2, "friction": 0.1, "restitution": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("poisson", 0.5),
+        ("poisson", -0.1),
+        ("poisson", math.nan),
+        ("restitution", 1.1),
+        ("restitution", 0.0),
+        ("density", -1.0),
+        ("density", math.inf),
+        ("density", math.nan),
+        ("young", 0.0),
+        ("young", math.nan),
+        ("young", math.inf),
+        ("friction", -0.1),
+        ("friction", math.inf),
+        ("rolling_friction", -0.1),
+    ],
+)
+def test_a_material_that_cannot_be_is_refused_by_key_and_value(key, value):
+    with pytest.raises(ValueError, match=rf"material 'x': {key} = {value} must be"):
+        Material(**GOOD | {key: value})
+
+
+def test_materials_are_found_by_name_and_the_nearest_is_offered():
+    assert material("Sand") is SAND is material(SAND) and MATERIALS["sand"] is SAND
+    with pytest.raises(ValueError, match=r"material = 'sandd' is not known.*did you mean 'sand'\?"):
+        material("sandd")
+    with pytest.raises(ValueError, match="material = 'gold' is not known; there is sand"):
+        material("gold")
+
+
+def test_every_number_of_a_preset_has_a_source():
+    for stuff in MATERIALS.values():
+        assert set(stuff.sources) == {"density", "young", "poisson", "friction", "restitution", "rolling_friction"}

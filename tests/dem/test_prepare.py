@@ -1,0 +1,256 @@
+"""Preparation and its cache: rain, level, settle; the same seed gives the same bits; what cannot be made is refused."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import dem.prepare
+from dem import SAND, Bed
+from dem.prepare import ENERGY_RATIO, prepare_bed
+
+GRAIN = 0.004
+BED = {"size": (0.024, 0.024, 0.03), "grain": GRAIN, "seed": 3}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A small bed, as it came out of its preparation: the bed, its state, the cache it left."""
+    folder = tmp_path_factory.mktemp("cache")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("HEDGEBED_CACHE", str(folder))
+        bed = Bed.prepare(SAND, **BED)
+    return bed, bed.state(), folder
+
+
+@pytest.fixture
+def bed(made):
+    """The bed, back in the state in which it was prepared."""
+    made[0].restore(made[1])
+    return made[0]
+
+
+def same(a, b):
+    return a.keys() == b.keys() and all(a[k].tobytes() == b[k].tobytes() for k in a)
+
+
+def test_a_prepared_bed_is_at_rest_and_level(bed):
+    """Mean kinetic energy below 1e-5 m g d, floor force within 1 % of the weight, no grain above the level."""
+    assert bed.time == 0 and bed.max_overlap == 0 and np.abs(bed.grains()["displacement"]).max() == 0
+    unit = bed.weight / bed.grain_count * GRAIN
+    assert bed.kinetic_energy / bed.grain_count < ENERGY_RATIO * unit
+    assert bed.floor_force == pytest.approx(bed.weight, rel=0.01)
+    bed.advance(round(0.05 / bed.time_step))
+    assert bed.kinetic_energy / bed.grain_count < 3 * ENERGY_RATIO * unit
+    assert bed.floor_force == pytest.approx(bed.weight, rel=0.01)
+    grains = bed.grains()
+    assert (grains["position"][:, 2] <= 0.03 * 1.01).all() and (grains["position"][:, 2] > 0).all()
+    assert 0.027 < bed.surface < 0.0305
+    assert 0.53 < bed.packing_fraction < 0.64
+    assert 3.5 < bed.coordination_number < 6.5
+    assert 0 < bed.max_overlap < 0.01  # at rest, far below the bound
+    assert (np.abs(grains["radius"] * 2 / GRAIN - 1) <= 0.15).all()
+    assert bed.material.young < SAND.young and bed.seed == 3
+
+
+class Progress:
+    """Keeps what it is told."""
+
+    def __init__(self):
+        self.stages, self.shares = [], []
+
+    def stage(self, name, total):
+        self.stages.append(name)
+
+    def update(self, done):
+        self.shares.append(done)
+
+
+class Stop(Exception):  # noqa: N818
+    """Ends a preparation where a test has seen enough."""
+
+
+def stop(*_):
+    raise Stop
+
+
+def test_the_same_seed_gives_the_same_bits_and_progress_is_told(made):
+    progress = Progress()
+    again = prepare_bed("sand", **BED, cache=False, progress=progress)
+    assert same(again.state(), made[1])
+    assert progress.stages == ["rain", "settle"]
+    assert len(progress.shares) > 4 and all(0 <= share <= 1 for share in progress.shares)
+
+
+def test_another_seed_rains_other_grains(monkeypatch):
+    rained = []
+    monkeypatch.setattr(dem.prepare, "_fall", lambda bed, *_: rained.append(bed.grains()) or stop())
+    for seed in (3, 4):
+        with pytest.raises(Stop):
+            prepare_bed("sand", **BED | {"seed": seed}, cache=False)
+    for name in ("radius", "position"):
+        assert not np.isclose(rained[0][name], rained[1][name], rtol=1e-9).any()
+
+
+def test_a_cached_bed_is_the_bed_to_the_bit_and_needs_no_making(made, monkeypatch):
+    monkeypatch.setenv("HEDGEBED_CACHE", str(made[2]))
+    monkeypatch.setattr(dem.prepare, "_rain", lambda *_: pytest.fail("it was made anew"))
+    bed = prepare_bed(SAND, **BED)
+    assert same(bed.state(), made[1])
+    for name in ("surface", "packing_fraction", "size", "gravity", "time_step", "seed", "material", "overlap_limit"):
+        assert getattr(bed, name) == getattr(made[0], name), name
+    assert bed.material.sources == SAND.sources
+    (kept,) = (made[2] / "beds").glob("*.json")
+    assert json.loads(kept.read_text())["grain"] == GRAIN
+
+
+@pytest.mark.parametrize("damage", [b"", b"no bed", None])
+def test_a_damaged_file_in_the_cache_is_said_and_made_anew(made, monkeypatch, tmp_path, damage):
+    (file,) = (made[2] / "beds").glob("*.npz")
+    whole = file.read_bytes()
+    here = tmp_path / "cache" / "beds" / file.name
+    here.parent.mkdir(parents=True)
+    here.write_bytes(whole[: len(whole) // 3] if damage is None else damage)
+    monkeypatch.setattr(dem.prepare, "_rain", stop)
+    with pytest.warns(UserWarning, match="cannot be read and is made anew"), pytest.raises(Stop):
+        prepare_bed(SAND, **BED)
+
+
+def test_the_key_of_the_cache_holds_every_option(monkeypatch):
+    """Each option that shapes a bed gives another file; threads, and whether there is progress, do not."""
+    asked = []
+
+    class NoBed:
+        packing_fraction = 0.6
+        grain_count = 1
+
+        def measure_surface(self):
+            pass
+
+        def save(self, path):
+            asked.append(path.name)
+            path.parent.mkdir(parents=True, exist_ok=True)
+
+    for name in ("_rain", "_level", "_tap", "_reset"):
+        monkeypatch.setattr(dem.prepare, name, lambda *_: NoBed())
+    for name in ("_fall", "_settle"):
+        monkeypatch.setattr(dem.prepare, name, lambda *_, **__: None)
+    monkeypatch.setattr(dem.prepare.runtime, "start", lambda **_: None)
+
+    def name_of(material=SAND, **options):
+        prepare_bed(material, **BED | {"young": 1e7} | options)
+        return asked[-1]
+
+    plain = name_of()
+    assert name_of() == plain and name_of("SAND") == plain
+    assert name_of(threads=1) == plain
+    numbers = {"density": 2600, "poisson": 0.2, "friction": 0.4, "restitution": 0.6, "rolling_friction": 0.2}
+    others = [name_of(replace(SAND, **{key: value})) for key, value in numbers.items()]
+    others += [
+        name_of(**{key: value})
+        for key, value in {
+            "size": (0.024, 0.024, 0.031),
+            "grain": 0.0039,
+            "spread": 0.1,
+            "packing": 0.6,
+            "gravity": 1.62,
+            "seed": 2,
+            "young": 2e7,
+            "max_overlap": 0.01,
+            "time_step": 1e-6,
+            "precision": "float32",
+            "arch": "cuda",
+        }.items()
+    ]
+    assert len({plain, *others}) == 1 + len(others)
+    before = len(asked)
+    prepare_bed(SAND, **BED, cache=False)
+    assert len(asked) == before
+
+
+@pytest.fixture
+def already_rained(bed, monkeypatch):
+    """Preparation starts from the bed at rest, so that tapping alone is tested."""
+    monkeypatch.setattr(dem.prepare, "_rain", lambda *_: bed)
+    monkeypatch.setattr(dem.prepare, "_fall", lambda *_: None)
+    monkeypatch.setattr(dem.prepare, "_level", lambda bed, _: bed)
+    return bed.packing_fraction
+
+
+def test_a_bed_is_tapped_to_the_packing_asked_for(already_rained):
+    wanted = already_rained + 0.004
+    bed = prepare_bed(SAND, **BED, packing=wanted, cache=False)
+    assert wanted - 0.0005 <= bed.packing_fraction < wanted + 0.01
+    assert bed.floor_force == pytest.approx(bed.weight, rel=0.01)
+    assert bed.time == 0 and bed.gravity == (0.0, 0.0, -9.81)
+
+
+@pytest.mark.parametrize(
+    ("packing", "words"), [(0.52, r"rains in at 0\.\d+ already"), (0.64, "1 taps brought the bed")]
+)
+def test_a_packing_out_of_reach_is_refused(already_rained, monkeypatch, packing, words):
+    """Looser than the rain, and denser than tapping makes it."""
+    monkeypatch.setattr(dem.prepare, "_MOST_TAPS", 1)
+    with pytest.raises(ValueError, match=rf"packing = {packing} cannot be reached: .*{words}"):
+        prepare_bed(SAND, **BED, packing=packing, cache=False)
+
+
+def test_a_bed_that_does_not_come_to_rest_says_so(bed, monkeypatch):
+    monkeypatch.setattr(dem.prepare, "_LONGEST", 0.1)
+    with pytest.raises(dem.BedFailure, match="did not come to rest"):
+        dem.prepare._settle(bed, GRAIN, 1e-30, dem.prepare._Reporter(None))
+
+
+def test_levelling_keeps_the_contacts_of_what_stays(bed):
+    """Right after the cut the forces away from it are what they were, springs of friction and rolling included."""
+    before = bed.grains()
+    cut = 0.024
+    above = before["position"][:, 2] > cut
+    contacts = bed.contact_counts()
+    less = bed.without(above)
+    after = less.grains()
+    assert less.grain_count == (~above).sum() and (after["id"] == np.arange(less.grain_count)).all()
+    assert (after["radius"] == before["radius"][~above]).all()
+    assert (after["position"] == before["position"][~above]).all()
+    far = before["position"][~above][:, 2] < cut - 1.2 * GRAIN
+    assert far.sum() > 60
+    assert (less.contact_counts()[far] == contacts[~above][far]).all()
+    weight = bed.weight / bed.grain_count
+    assert np.abs(after["force"][far] - before["force"][~above][far]).max() < 1e-9 * weight
+    near = ~far
+    assert np.abs(after["force"][near] - before["force"][~above][near]).max() > weight
+    # Histories came over: without them friction would be gone and these grains would feel it.
+    springs = less.state()["slide"]
+    assert (np.linalg.norm(springs, axis=1) > 0).mean() > 0.9
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"size": (0.024, -0.024, 0.02)}, "size = .* must be three positive lengths"),
+        ({"size": (0.024, 0.024)}, "size = .* must be three positive lengths"),
+        ({"size": (0.024, 0.024, math.nan)}, "size = .* must be three positive lengths"),
+        ({"grain": -0.004}, "grain = -0.004 must be a positive diameter"),
+        ({"grain": 0.005}, "size: x = 0.024 m is less than 6 grains of 0.005 m; .*0.03 m"),
+        ({"size": (0.024, 0.024, 0.015)}, "size: z = 0.015 m is less than 4 grains"),
+        ({"spread": 0.6}, "spread = 0.6"),
+        ({"packing": 0.9}, "packing = 0.9 is no packing fraction"),
+        ({"gravity": 0.0}, "gravity = 0.0 must be positive"),
+        ({"max_overlap": 0.3}, "max_overlap = 0.3"),
+        ({"young": -1.0}, "young = -1.0 must be positive"),
+        ({"time_step": 1e-3}, "time_step = 0.001 s is outside 0 to"),
+        ({"precision": "float16"}, "precision = 'float16' is unknown"),
+        ({"arch": "tpu"}, "arch = 'tpu' is unknown"),
+        ({"threads": 0}, "threads = 0 must be at least 1"),
+    ],
+)
+def test_what_cannot_be_made_is_refused_by_name(options, words):
+    with pytest.raises(ValueError, match=words):
+        prepare_bed(SAND, **BED | options)
+
+
+def test_a_misspelt_option_raises():
+    with pytest.raises(TypeError):
+        Bed.prepare(SAND, **BED, graine=0.004)

@@ -1,0 +1,213 @@
+"""Bad input is refused in a sentence; what fails on the way is found, said, and can still be saved."""
+
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dem import Ball, Bed, BedFailure, Cylinder, Material, Plane
+
+STUFF = Material("grain", 2600, 1e7, 0.25, 0.5, 0.6)
+RADIUS = 0.002
+POSITIONS = np.array([[0.01, 0.01, RADIUS], [0.03, 0.03, RADIUS], [0.02, 0.01, 0.03]])
+GIVEN = {"positions": POSITIONS, "radii": np.full(3, RADIUS), "size": (0.04, 0.04, 0.04), "height": 0.06}
+
+
+UPWARDS = np.array([[0, 0, 0], [0.3, 0, 30.0], [0, 0, 0]])
+
+
+def make(material=STUFF, **options):
+    return Bed.from_grains(material, **GIVEN | options)
+
+
+def with_nan(row):
+    return np.where(np.arange(3)[:, None] == row, math.nan, POSITIONS)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"positions": with_nan(1)}, "positions holds a number that is not finite, in row 1"),
+        ({"positions": POSITIONS[:2]}, r"positions has shape \(2, 3\), \(3, 3\) was expected"),
+        ({"velocities": with_nan(2)}, "velocities holds a number that is not finite, in row 2"),
+        ({"spins": np.zeros(3)}, r"spins has shape \(3,\)"),
+        ({"radii": np.array([1e-3, -1e-3, 1e-3])}, "radii must be positive"),
+        ({"radii": np.array([1e-3, math.inf, 1e-3])}, "radii holds a number that is not finite, in row 1"),
+        ({"radii": np.zeros(0), "positions": np.zeros((0, 3))}, "at least one grain"),
+        ({"size": (0.04, -0.04, 0.04)}, r"size = \(0.04, -0.04, 0.04\) must be three positive lengths"),
+        ({"size": (0.04, 0.04)}, r"size = .* must be three positive lengths"),
+        ({"size": (0.04, 0.013, 0.04)}, "the bed is 0.013 m across, less than three grains"),
+        ({"height": 0.031}, "height = 0.031 m is no length, or below the highest grain's top at 0.032 m"),
+        ({"height": math.nan}, "height = nan"),
+        ({"max_overlap": 0.0}, "max_overlap = 0.0"),
+        ({"gravity": -9.81}, "gravity = -9.81 must be 0 or more"),
+        ({"gravity": (0.0, 0.0)}, r"gravity = \(0.0, 0.0\)"),
+        ({"gravity": math.nan}, "gravity = nan"),
+        ({"young": -1e7}, "young = -10000000.0 must be positive"),
+        ({"time_step": 1e-2}, "time_step = 0.01 s is outside"),
+        ({"precision": "double"}, "precision = 'double' is unknown; use one of float64, float32"),
+        ({"material": "sandy"}, r"material = 'sandy' is not known.*did you mean 'sand'"),
+    ],
+)
+def test_a_bed_that_cannot_be_is_refused(options, words):
+    with pytest.raises(ValueError, match=words):
+        make(**options)
+
+
+@pytest.mark.parametrize(
+    ("shape", "options", "words"),
+    [
+        ([], {}, "shape is empty"),
+        ([Ball(radius=0.005)], {"position": (0.01, math.nan, 0.05)}, "position = .* must be 3 finite numbers"),
+        ([Ball(radius=0.005)], {"position": (0.01, 0.05)}, "position = .* must be 3 finite numbers"),
+        ([Ball(radius=0.005)], {"friction": -1.0}, "friction = -1.0"),
+        ([Ball(radius=0.005)], {"restitution": 1.5}, "restitution = 1.5 must lie between"),
+        ([Ball(radius=0.005)] * 65, {}, "at most 8 bodies of 64 primitives"),
+    ],
+)
+def test_a_body_that_cannot_be_is_refused(shape, options, words):
+    bed = make()
+    with pytest.raises(ValueError, match=words):
+        bed.add_body(shape, **{"position": (0.01, 0.03, 0.05)} | options)
+    assert bed.add_body([Ball(radius=0.002)], position=(0.01, 0.03, 0.05)) == 1
+
+
+def test_a_body_in_overlap_is_refused_and_leaves_no_trace():
+    """The bed goes on as if it had not been asked."""
+    plain, asked = make(), make()
+    for bed in (plain, asked):
+        bed.advance(2000)
+    assert plain.contact_counts().sum() > 0
+    with pytest.raises(ValueError, match=r"starts in overlap with a grain by .* % of its diameter .*start it higher"):
+        asked.add_body([Cylinder(-0.001, 0.02, 0.005)], position=(0.01, 0.01, 0.004))
+    assert asked.max_overlap == plain.max_overlap
+    with pytest.raises(ValueError, match="body = 1: there is no such body"):
+        asked.reaction(1)
+    plain.advance(1000)
+    asked.advance(1000)
+    a, b = plain.grains(), asked.grains()
+    for name in ("position", "velocity", "spin"):
+        assert np.abs(a[name] - b[name]).max() <= 1e-12 * max(1e-3, np.abs(a[name]).max())
+
+
+def test_moving_a_body_that_is_not_there_or_to_nowhere_is_refused():
+    bed = make()
+    with pytest.raises(ValueError, match="body = 3: there is no such body"):
+        bed.move_body(3, velocity=(0, 0, 0))
+    with pytest.raises(ValueError, match=r"velocity = .* must be 3 finite numbers"):
+        bed.move_body(0, velocity=(0, 0, math.nan))
+    with pytest.raises(ValueError, match=r"turn = .* must be 4 finite numbers"):
+        bed.move_body(0, turn=(1, 0, 0))
+    with pytest.raises(ValueError, match="drag_time"):
+        bed.advance(10, drag_time=0.0)
+
+
+def test_many_bodies_are_told_apart():
+    """Eight bodies, the floor among them; the ninth is refused."""
+    bed = make(gravity=0.0)
+    bodies = [bed.add_body([Ball(radius=0.002)], position=(0.005 * k, 0.02, 0.05)) for k in range(7)]
+    assert bodies == [1, 2, 3, 4, 5, 6, 7]
+    for k in bodies:
+        assert bed.body_position(k) == pytest.approx((0.005 * (k - 1), 0.02, 0.05))
+    with pytest.raises(ValueError, match="at most 8 bodies"):
+        bed.add_body([Plane()], position=(0, 0, -1))
+
+
+# ---------------------------------------------------------------------------- on the way
+
+
+def test_a_lost_grain_is_named_and_the_state_can_be_saved(tmp_path):
+    bed = make(velocities=UPWARDS, gravity=0.0)
+    sound = bed.state()
+    with pytest.raises(BedFailure, match=r"grain 1 left the box \(1 in all\) at t = .* s: it is at \(.*\) m") as caught:
+        bed.advance(1000)
+    assert "grain 1 left" in caught.value.reason
+    where = bed.grains()["position"][1]
+    assert where[2] > 0.06
+    kept = bed.save(tmp_path / "lost.npz")
+    again = Bed.load(kept)
+    assert again.grains()["position"] == pytest.approx(bed.grains()["position"])
+    assert again.steps == bed.steps > 0
+    # And the bed itself can go back to a sound state and on from there, to the same bits.
+    digests = []
+    for _ in range(2):
+        bed.restore(sound)
+        bed.advance(50)
+        digests.append(bed.grains()["position"].tobytes())
+    fresh = make(velocities=UPWARDS, gravity=0.0)
+    fresh.advance(50)
+    assert digests == [fresh.grains()["position"].tobytes()] * 2
+
+
+def test_a_grain_that_falls_through_is_lost_below():
+    bed = make(floor=False, velocities=np.tile([0.0, 0.0, -5.0], (3, 1)))
+    with pytest.raises(BedFailure, match=r"left the box \(\d in all\).*, -0\.\d+\) m, the box reaches from -0\.008 "):
+        bed.advance(10_000)
+
+
+@pytest.mark.parametrize("what", ["velocity", "spin", "position"])
+def test_a_number_that_is_none_is_found(what, tmp_path):
+    """In a velocity, a position, or a spin that a contact hands on; the file of the state is whole."""
+    bed = make()
+    bed.advance(100)  # the lower two lie on the floor
+    assert (bed.contact_counts() > 0).sum() >= 2
+    state = bed.state()
+    row = int(np.flatnonzero(state["id"] == 1)[0])
+    state[what][row, 0] = math.nan
+    bed.restore(state)
+    with pytest.raises(BedFailure, match="the position of grain 1 is not a number at t ="):
+        bed.advance(2000)
+    with np.load(bed.save(tmp_path / "bed.npz")) as file:
+        assert np.isnan(file["state.position"]).any()
+
+
+def test_an_overlap_past_its_bound_stops_the_bed(tmp_path):
+    bed = make(max_overlap=0.01, velocities=np.tile([0.0, 0.0, -3.0], (3, 1)), time_step=1e-6)
+    with pytest.raises(BedFailure, match=r"an overlap of .* % of a diameter went past its bound of 1 % at t = "):
+        bed.advance(5000)
+    assert bed.max_overlap > 0.01
+    again = Bed.load(bed.save(tmp_path / "bed.npz"))
+    assert again.max_overlap == bed.max_overlap and again.overlap_limit == 0.01
+
+
+def test_a_bed_whose_taichi_was_restarted_says_so_and_float32_agrees_with_float64():
+    """In a process of its own: another precision starts Taichi anew, and the earlier bed refuses to go on.
+
+    A collision of two grains in float32 against the same in float64: to 1e-4 of its speed.
+    """
+    script = """
+import numpy as np
+from dem import Bed, Material
+def collide(precision):
+    bed = Bed.from_grains(
+        Material("grain", 2600, 1e7, 0.25, 0.3, 0.7, 0.1), precision=precision, gravity=0.0, floor=False,
+        positions=np.array([[0.010, 0.010, 0.01], [0.0141, 0.0105, 0.01]]), radii=np.full(2, 0.002),
+        velocities=np.array([[0.5, 0, 0], [-0.5, 0, 0]]), spins=np.array([[0, 0, 50.0], [20.0, 0, 0]]),
+        size=(0.03, 0.03, 0.02), time_step=5e-6)
+    bed.advance(400)
+    return bed, bed.grains()
+double, a = collide("float64")
+single, b = collide("float32")
+assert np.abs(a["velocity"][0, 0] - 0.5) > 0.3
+assert np.abs(a["velocity"] - b["velocity"]).max() < 1e-4, np.abs(a["velocity"] - b["velocity"]).max()
+assert np.abs(a["spin"] - b["spin"]).max() < 0.05
+assert single.state()["position"].dtype == np.float32
+assert single.max_overlap > 0.005
+momentum = b["mass"] @ b["velocity"]
+assert np.abs(momentum).max() < 1e-6 * b["mass"].sum()
+for call in (lambda: double.advance(1), double.grains, double.state, lambda: double.save("bed.npz")):
+    try:
+        call()
+    except RuntimeError as problem:
+        assert "no longer valid" in str(problem)
+    else:
+        raise AssertionError("an earlier bed went on")
+print("fine")
+"""
+    root = Path(__file__).resolve().parents[2]
+    done = subprocess.run([sys.executable, "-c", script], cwd=root, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "fine\n"  # and Taichi greets nobody
