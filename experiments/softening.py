@@ -24,10 +24,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-__all__ = ["CHAIN", "Softening", "bearing_gradient", "drop_depth", "soften"]
+from dem.timestep import CHAIN
 
-CHAIN = 4.0
-"""Largest over mean contact force [1]."""
+__all__ = ["Softening", "bearing_gradient", "drop_depth", "soften"]
+
 INERTIA = 1.1
 """lambda: dynamic pressure over rho v^2 [1] (Agarwal et al. 2023)."""
 
