@@ -92,7 +92,7 @@ def test_kill_9_and_resume_gives_the_bits_of_a_run_without(two_threads, tmp_path
     _, digests, _, middle = two_threads
     path = tmp_path / "bed.npz"
     path.write_bytes(middle.read_bytes())
-    first = elsewhere("resume", path, 1_000_000, 2, EVERY)
+    first = elsewhere("resume", path, 1_000_000, 1, EVERY)
     lines = [first.stdout.readline().split() for _ in range(2)]
     first.send_signal(signal.SIGKILL)
     first.communicate()
