@@ -34,7 +34,7 @@ class PenetrateSettings(BaseModel):
     # The bed
     material: str = Field("sand", description="Grain material, by name.")
     bed_size: tuple[Positive, Positive, Positive] = Field(
-        (0.072, 0.072, 0.052), description="Bed: both widths (periodic) and depth of grains [m]."
+        (0.072, 0.072, 0.0508), description="Bed: both widths (periodic) and depth of grains [m]."
     )
     grain: Positive = Field(0.0024, description="Mean grain diameter [m].")
     spread: float = Field(0.15, ge=0, le=0.5, description="Grain diameters are uniform within 1 +- this [1].")
@@ -62,22 +62,22 @@ class PenetrateSettings(BaseModel):
         None, description="Weight on the spike [N]; (m + m_b) g_sim / 4 of platform and counterweight if not given."
     )
     mass: Positive = Field(
-        0.2,
+        0.1,
         description="Mass that a drop moves, under `load` [kg]. The shipped 0.2 kg stops within a shallow bed; the "
         "platform's own share in the rig, (m + m_b) / 4, is 2.63 kg, and a free drop in a laboratory has load = m g.",
     )
 
     # What is done with it
     speeds: tuple[Positive, ...] = Field((0.1, 0.2, 0.4), min_length=1, description="Speeds of driven runs [m/s].")
-    depth: Positive = Field(0.015, description="Depth of driven runs [m].")
-    hold: NotNegative = Field(0.02, description="How long a driven spike is held at depth [s].")
+    depth: Positive = Field(0.012, description="Depth of driven runs [m].")
+    hold: NotNegative = Field(0.01, description="How long a driven spike is held at depth [s].")
     retreat_speed: Positive = Field(0.4, description="Speed of the pull-out [m/s].")
     drop_speeds: tuple[Positive, ...] = Field(
         (0.1, 0.15, 0.2), description="Speeds at the surface of dropped runs [m/s]."
     )
-    after_stop: Positive = Field(0.05, description="How long a drop is followed after its first stop [s].")
+    after_stop: Positive = Field(0.03, description="How long a drop is followed after its first stop [s].")
     drop_time: Positive = Field(0.8, description="A drop that has not come to rest ends after this [s].")
-    lowering_speed: Positive = Field(0.05, description="Speed at which a spike is lowered to be set down [m/s].")
+    lowering_speed: Positive = Field(0.1, description="Speed at which a spike is lowered to be set down [m/s].")
     rest_time: Positive = Field(0.04, description="For how long the signs of rest must hold [s].")
     other_speeds: tuple[Positive, ...] = Field((0.2,), description="Speeds driven on the seeds after the first [m/s].")
     other_drop_speeds: tuple[Positive, ...] = Field((0.15,), description="Drops on the seeds after the first [m/s].")
@@ -96,7 +96,7 @@ class PenetrateSettings(BaseModel):
     cache: bool = Field(True, description="Keep prepared beds and use those kept.")
 
     # What is kept
-    frame_count: int = Field(40, ge=0, le=2000, description="Frames of each shown run [1]; 0 for none.")
+    frame_count: int = Field(30, ge=0, le=2000, description="Frames of each shown run [1]; 0 for none.")
     checkpoint_interval: Positive = Field(20.0, description="Time between checkpoints [s of waiting].")
     reference: str | None = Field(
         None,
