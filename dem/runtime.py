@@ -71,7 +71,7 @@ def start(*, arch: str = "cpu", threads: int | None = None, precision: str = "fl
 
     real = ti.f64 if precision == "float64" else ti.f32
     # Taichi's own control-flow pass triples the time to compile and LLVM does its work: steps run as fast without it.
-    options = dict(default_fp=real, default_ip=ti.i32, fast_math=False, cfg_optimization=False, log_level=ti.ERROR)
+    options = dict(default_fp=real, default_ip=ti.i32, fast_math=False, cfg_optimization=False)
     with contextlib.redirect_stdout(io.StringIO()):  # its greeting would spoil what a script prints
         if arch == "cpu":
             ti.init(arch=ti.cpu, cpu_max_num_threads=threads, **options)

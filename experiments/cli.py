@@ -39,7 +39,7 @@ def main(tokens: Sequence[str] | None = None) -> int:
     """Run the command line on `tokens` (``sys.argv[1:]`` by default) and return the exit status."""
     # Taichi greets on stdout and has a new version looked for: neither belongs here.
     os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
-    os.environ.setdefault("TI_LOG_LEVEL", "warn")
+    os.environ.setdefault("TI_LOG_LEVEL", "error")
     os.environ.setdefault("TI_SKIP_VERSION_CHECK", "1")
     try:
         with _terminate_like_ctrl_c():
