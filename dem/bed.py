@@ -141,7 +141,7 @@ class Bed:
             bed._add([Plane()], (0.0, 0.0, 0.0), stuff.friction, stuff.restitution, stuff.rolling_friction, None)
         bed._make_lists()
         bed._push()
-        bed._start_clock()
+        bed._shift_velocities(-0.5)  # half a step behind the positions, where the leapfrog wants them
         bed.measure_surface()
         return bed
 
@@ -167,7 +167,6 @@ class Bed:
         self._skin = _SKIN * self._diameter
         self._since_lists = 0
         self._reaction_steps = 0
-        self._stale = False
         self._has_floor = False
         self.surface = math.nan
         self.packing_fraction = math.nan
@@ -435,10 +434,6 @@ class Bed:
     def _push(self, elapsed: float = 0.0) -> None:
         """Forces where the grains are; ``elapsed`` is the time by which contacts have slid since they were computed."""
         self._engine.push_all(elapsed)
-
-    def _start_clock(self) -> None:
-        """Put the velocities half a step behind the positions, where the leapfrog wants them."""
-        self._shift_velocities(-0.5)
 
     def _shift_velocities(self, part: float) -> None:
         self._engine.shift_velocities(part * self.time_step)

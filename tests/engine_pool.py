@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import gc
+
+import pytest
 
 import dem.bed
 
@@ -18,7 +21,7 @@ class EnginePool:
         return self._take(owner, **(settings | self.overrides))
 
     @contextlib.contextmanager
-    def installed(self, *, keep: bool = False):
+    def installed(self):
         """Beds made inside have the overrides."""
         real, dem.bed.take_engine = dem.bed.take_engine, self
         try:
@@ -29,3 +32,18 @@ class EnginePool:
 
 
 POOL = EnginePool()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def quick_collection():
+    gc.collect()
+    gc.freeze()  # what was imported need not be looked through again and again
+
+
+@pytest.fixture(autouse=True)
+def engines(tmp_path, monkeypatch):
+    """The layouts a test may ask for; and a cache of its own for every test."""
+    monkeypatch.setenv("HEDGEBED_CACHE", str(tmp_path / "cache"))
+    with POOL.installed() as pool:
+        yield pool
+    gc.collect()  # beds that a traceback held give their engines back, to be used again instead of compiled anew
