@@ -41,12 +41,16 @@ class Odd(BaseModel):
     tables: dict[str, list[int]] = Field(default_factory=dict)
 
 
+# No subnormal numbers: a test before this one may have loaded Taichi, whose runtime flushes them to zero.
+_numbers = st.floats(allow_nan=False, allow_subnormal=False)
+
+
 @given(
     st.builds(
         Odd,
-        number=st.floats(allow_nan=False),
+        number=_numbers,
         text=st.text(st.characters(codec="utf-8")),
-        several=st.lists(st.floats(allow_nan=False)).map(tuple),
+        several=st.lists(_numbers).map(tuple),
         tables=st.dictionaries(
             st.text(st.characters(codec="utf-8"), max_size=3), st.lists(st.integers(-9, 9)), max_size=2
         ),
