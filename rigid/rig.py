@@ -1,0 +1,144 @@
+"""The gravity-offloading rig: an Atwood machine that carries most of the platform's weight.
+
+A counterweight m_b hangs on wires over pulleys and moves up as the platform moves down (dy_b/dt = -dy/dt). The weight
+left on the surface is W = (m + m_b) g_sim; the inertia in y is m + m_b, in x it is m. Source: the Lagrangian of the
+pair in Reid, Roveda, Nesnas and Pavone (i-SAIRAS 2014), eqs 17 to 19, whose "0.0085 g" can be read in two ways:
+
+- ``pair``: the free-fall acceleration of the pair, g_sim = g (m - m_b) / (m + m_b);
+- ``weight``: the weight that is left, per mass of the platform, g (m - m_b) / m.
+
+The two are almost a factor of two apart.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+__all__ = ["STANDARD_GRAVITY", "Reading", "Rig", "counterweight_for"]
+
+STANDARD_GRAVITY = 9.80665
+"""Standard gravity [m/s2], the unit of ``--rig``."""
+
+Reading = Literal["pair", "weight"]
+"""What a stated gravity of the rig means."""
+
+
+def counterweight_for(
+    mass: float, gravity_stated: float, *, gravity: float = STANDARD_GRAVITY, reading: Reading = "pair"
+) -> float:
+    """The counterweight [kg] that offloads a platform of `mass` [kg] to `gravity_stated` [m/s2].
+
+    Read as ``pair``, m_b = m (g - g_sim) / (g + g_sim); as ``weight``, m_b = m (1 - g_stated / g). Raises ValueError,
+    naming the argument, for a mass, gravity or reading that cannot be, and for a stated gravity that is not below the
+    local one, `gravity` [m/s2]: a counterweight can only take weight away.
+    """
+    if reading not in get_args(Reading):
+        raise ValueError(f"reading = {reading!r} is neither 'pair' nor 'weight'")
+    _positive("mass", mass, "kg")
+    _positive("gravity", gravity, "m/s2")
+    _positive("gravity_stated", gravity_stated, "m/s2")
+    if gravity_stated >= gravity:
+        raise ValueError(
+            f"gravity_stated = {gravity_stated:g} m/s2 is not below the local gravity, {gravity:g} m/s2: a rig can "
+            f"only take weight away, so less would do, or no rig"
+        )
+    if reading == "pair":
+        return mass * (gravity - gravity_stated) / (gravity + gravity_stated)
+    return mass * (1 - gravity_stated / gravity)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rig:
+    """A platform in the rig. `gravity_sim` rules the weight, whatever (m - m_b) g would give.
+
+    Raises ValueError, naming the key, its value and what would do, for a counterweight that is not lighter than the
+    platform (it would pull it off the ground), and for a simulated gravity that is not below the local one.
+    """
+
+    mass: float
+    """Of the platform [kg]."""
+    counterweight: float
+    """m_b [kg]."""
+    gravity_sim: float
+    """Free-fall acceleration of the pair [m/s2]."""
+    gravity: float = STANDARD_GRAVITY
+    """Local gravity [m/s2]."""
+    wire_length: float | None = None
+    """From the pulley down to the shaft [m]; only the pendulum of the wires asks for it."""
+
+    def __post_init__(self) -> None:
+        _positive("mass", self.mass, "kg")
+        _positive("gravity", self.gravity, "m/s2")
+        _positive("gravity_sim", self.gravity_sim, "m/s2")
+        _positive("counterweight", self.counterweight, "kg")
+        if self.wire_length is not None:
+            _positive("wire_length", self.wire_length, "m")
+        if self.counterweight >= self.mass:
+            raise ValueError(
+                f"counterweight = {self.counterweight:g} kg is not below the platform's mass = {self.mass:g} kg: "
+                f"the rig would lift the platform off the ground; less would do"
+            )
+        if self.gravity_sim >= self.gravity:
+            raise ValueError(
+                f"gravity_sim = {self.gravity_sim:g} m/s2 is not below the local gravity, {self.gravity:g} m/s2: less "
+                f"would do, or no rig"
+            )
+
+    @classmethod
+    def offloading(
+        cls,
+        mass: float,
+        gravity_stated: float,
+        *,
+        reading: Reading = "pair",
+        counterweight: float | None = None,
+        gravity: float = STANDARD_GRAVITY,
+        wire_length: float | None = None,
+    ) -> Rig:
+        """The rig that a stated gravity [m/s2] means for a platform of `mass` [kg].
+
+        Without `counterweight` [kg] it is the one that gives that gravity. With one, the stated gravity still rules the
+        weight: W = (m + m_b) g_stated read as ``pair``, W = m g_stated read as ``weight``.
+        """
+        if counterweight is None:
+            counterweight = counterweight_for(mass, gravity_stated, gravity=gravity, reading=reading)
+        elif reading not in get_args(Reading):
+            raise ValueError(f"reading = {reading!r} is neither 'pair' nor 'weight'")
+        share = 1.0 if reading == "pair" else mass / (mass + counterweight)
+        return cls(
+            mass=mass,
+            counterweight=counterweight,
+            gravity_sim=gravity_stated * share,
+            gravity=gravity,
+            wire_length=wire_length,
+        )
+
+    @property
+    def weight(self) -> float:
+        """What rests on the surface, (m + m_b) g_sim [N]."""
+        return (self.mass + self.counterweight) * self.gravity_sim
+
+    @property
+    def inertia_ratio(self) -> float:
+        """(m + m_b) / m [1]: how much heavier the platform is to move up and down than sideways."""
+        return (self.mass + self.counterweight) / self.mass
+
+    @property
+    def balance(self) -> float:
+        """The counterweight [kg] at which (m - m_b) g is the weight that gravity_sim says."""
+        return self.mass * (self.gravity - self.gravity_sim) / (self.gravity + self.gravity_sim)
+
+    def wire_tension(self, vertical_acceleration: float = 0.0) -> float:
+        """Tension of the wires [N] while the platform accelerates upwards [m/s2]: m_b (g - y'').
+
+        The counterweight's own equation, m_b y_b'' = T - m_b g with y_b'' = -y''. At rest m_b g; in a free hop
+        (y'' = -g_sim) m_b (g + g_sim). Never below zero: a wire does not push.
+        """
+        return max(0.0, self.counterweight * (self.gravity - vertical_acceleration))
+
+
+def _positive(key: str, value: float, unit: str) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not (math.isfinite(value) and value > 0):
+        raise ValueError(f"{key} = {value!r} is no number above 0 [{unit}]")
