@@ -11,7 +11,7 @@ import numpy as np
 
 from . import runtime, state
 from .contact import effective_moduli, pair_parameters
-from .engine import MOST_PRIMITIVES, STEPS_PER_LAUNCH, take_engine
+from .engine import MOST_PRIMITIVES, take_engine
 from .lists import MOST_BODIES
 from .materials import Material
 from .materials import material as find_material
@@ -21,7 +21,6 @@ from .timestep import time_step_for
 
 __all__ = ["Bed", "BedFailure"]
 
-LAUNCHES_PER_LOOK = 5
 # Skin over mean diameter: first guess and bounds. It adapts to how often lists are made.
 _SKIN, _LEAST_SKIN, _LARGEST_SKIN = 0.06, 0.02, 0.15
 # A rebuild costs about as much as this many steps, and a skin of one diameter would add about this share to a step.
@@ -363,16 +362,7 @@ class Bed:
         limit = 0.5 * self._skin
         done = 0
         while done < steps:
-            e.done[None] = 0
-            ahead = 0
-            for _ in range(LAUNCHES_PER_LOOK):
-                count = STEPS_PER_LAUNCH if steps - done - ahead >= STEPS_PER_LAUNCH else 1
-                if ahead + count > steps - done:
-                    break
-                e.run(self.time_step, limit, *self.gravity, keep, count)
-                ahead += count
-            advanced = int(e.done[None])
-            halted = int(e.halted[None])
+            advanced, halted = e.launch(steps - done, self.time_step, limit, self.gravity, keep)
             done += advanced
             self.steps += advanced
             self._since_lists += advanced

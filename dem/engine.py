@@ -27,7 +27,9 @@ from . import runtime
 from .contact import PAIR_WIDTH, contact_force, turning_torque
 from .lists import (
     BOTTOM,
+    CACHE_LINE,
     CHUNKS,
+    FINISHED,
     GRAINS,
     INDEX_BITS,
     INDEX_MASK,
@@ -36,7 +38,9 @@ from .lists import (
     NEAR_ROOM,
     PERIOD_X,
     PERIOD_Y,
+    QUEUE,
     SAME_IMAGE,
+    TURN,
     Lists,
     curve_ranks,
 )
@@ -44,9 +48,12 @@ from .shapes import ROW_WIDTH
 
 __all__ = ["Engine", "MOST_BODIES", "MOST_PRIMITIVES", "STEPS_PER_LAUNCH", "take_engine"]
 
-STEPS_PER_LAUNCH = 2
+# A launch is short enough for a thread that left to come back soon, and for Ctrl-C.
+STEPS_PER_LAUNCH = 20
 GRAINS_PER_CHUNK = 1250
 MOST_CHUNKS = 64
+# Looks at a counter, per grain of a chunk, before a thread gives up waiting: some milliseconds.
+PATIENCE = 100
 MOST_PRIMITIVES = 64
 
 _free: dict[tuple, list] = {}
@@ -226,9 +233,9 @@ class Engine(Lists):
         self.old_near_body = ti.field(ti.i32, near)
         self.old_near_slide = F(3, real, near)
         self.old_near_roll = F(3, real, near)
-        # Who computes which chunk: one counter for each of the two loops of a step.
+        # Who computes which chunk, each counter in a cache line of its own.
         self.cpu_items = threads * ITEMS_PER_THREAD
-        self.ticket = ti.field(ti.i32, 2)
+        self.ticket = ti.field(ti.i32, 3 * CACHE_LINE)
         # Per chunk.
         self.overlap = ti.field(real, chunk_capacity)
         self.pushes = F(6, real, (chunk_capacity, MOST_BODIES))
@@ -294,44 +301,55 @@ class Engine(Lists):
 
     # ------------------------------------------------------------------ the step
 
+    def launch(
+        self, most: int, dt: float, limit: float, gravity: tuple[float, float, float], keep: float
+    ) -> tuple[int, bool]:
+        """Up to ``most`` steps, or a few where that is many: (steps done, whether new lists are needed)."""
+        if self.gpu:
+            self.done[None] = 0
+            for _ in range(min(most, STEPS_PER_LAUNCH)):
+                self.run_on_gpu(dt, limit, *gravity, keep)
+        else:
+            self.run(dt, limit, *gravity, keep, min(most, STEPS_PER_LAUNCH))
+        return int(self.done[None]), bool(self.halted[None])
+
     @ti.func
     def move(self, c, dt, limit, gravity, keep):
         """Kick and drift the grains of a chunk; chunk 0 moves the bodies as well.
 
         ``keep`` is the share of its speed that drag leaves a grain in a step; 1 without drag.
         """
-        if self.halted[None] == 0:
-            start, end = self.chunk_range(c)
-            far = 0
-            for i in range(start, end):
-                x = self.position[i]
-                v = self.velocity[i]
-                f = self.force[i]
-                w = self.spin[i]
-                t = self.torque[i]
-                inverse = dt / v.w
-                v.xyz = keep * v.xyz + f * inverse
-                w.xyz = keep * w.xyz + t * (2.5 * inverse / (x.w * x.w))
-                x.xyz += v.xyz * dt
-                self.position[i] = x
-                self.velocity[i] = v
-                self.spin[i] = w
-                self.force[i] = v.w * gravity
-                self.torque[i] = ti.Vector.zero(self.real, 3)
-                # Written so that a NaN counts as far.
-                if not ((x.xyz - self.listed[i]).norm_sqr() <= limit * limit):
+        start, end = self.chunk_range(c)
+        far = 0
+        for i in range(start, end):
+            x = self.position[i]
+            v = self.velocity[i]
+            f = self.force[i]
+            w = self.spin[i]
+            t = self.torque[i]
+            inverse = dt / v.w
+            v.xyz = keep * v.xyz + f * inverse
+            w.xyz = keep * w.xyz + t * (2.5 * inverse / (x.w * x.w))
+            x.xyz += v.xyz * dt
+            self.position[i] = x
+            self.velocity[i] = v
+            self.spin[i] = w
+            self.force[i] = v.w * gravity
+            self.torque[i] = ti.Vector.zero(self.real, 3)
+            # Written so that a NaN counts as far.
+            if not ((x.xyz - self.listed[i]).norm_sqr() <= limit * limit):
+                far = 1
+        if c == 0:
+            for b in range(self.body_count[None]):
+                self.body_position[b] = self.body_position[b] + (self.body_velocity[b] * dt)
+                self.turn_body(b, dt)
+                # The surface's farthest point moves with the origin and turns by at most this much.
+                path = (self.body_position[b] - self.body_listed[b]).norm()
+                path += 2.0 * (self.body_turn[b] - self.body_listed_turn[b]).norm() * self.body_extent[b]
+                if not (path <= limit):
                     far = 1
-            if c == 0:
-                for b in range(self.body_count[None]):
-                    self.body_position[b] = self.body_position[b] + (self.body_velocity[b] * dt)
-                    self.turn_body(b, dt)
-                    # The surface's farthest point moves with the origin and turns by at most this much.
-                    path = (self.body_position[b] - self.body_listed[b]).norm()
-                    path += 2.0 * (self.body_turn[b] - self.body_listed_turn[b]).norm() * self.body_extent[b]
-                    if not (path <= limit):
-                        far = 1
-            if far == 1:
-                self.moved[None] = 1
+        if far == 1:
+            self.moved[None] = 1
 
     @ti.func
     def turn_body(self, b, dt):
@@ -461,45 +479,84 @@ class Engine(Lists):
             self.near_roll[s] = ti.Vector.zero(self.real, 3)
         return result
 
-    @ti.func
-    def push_if_listed(self, c, dt):
-        """Forces, unless the lists are too old; then stop this launch and say so."""
-        if self.moved[None] == 0:
-            self.push(c, dt)
-            if c == 0:
-                self.done[None] = self.done[None] + 1
-        elif c == 0:
-            self.halted[None] = 1
+    @ti.kernel
+    def run(self, dt: float, limit: float, gx: float, gy: float, gz: float, keep: float, steps: int):
+        """Up to ``steps`` steps on a CPU; stops by itself where new lists are needed.
+
+        Then halted is 1, done says how many steps are whole, and the forces of the next one are still to come.
+
+        One parallel loop for all the steps, because waking threads costs more than a small bed's step. Threads take
+        tickets; ticket t is chunk t mod chunk_count of phase t div chunk_count, even phases move and odd ones push. A
+        phase opens when the one before is finished, so a thread that finds itself alone does everything and never
+        waits for one that has not started.
+        """
+        for _ in range(1):
+            self.ticket[TURN] = 0
+            self.ticket[FINISHED] = 0
+            self.done[None] = steps
+        for w in range(self.cpu_items):
+            if w % ITEMS_PER_THREAD == 0:
+                chunks = self.count[CHUNKS]
+                patience = PATIENCE * (1 + self.count[GRAINS] // chunks)
+                here = True
+                while here:
+                    # Leave when it takes long (another program has the core of whom we wait for): the rest is done
+                    # by those who stay. Once a ticket is taken there is no leaving.
+                    opens = ti.atomic_add(self.ticket[TURN], 0) // chunks * chunks
+                    looks = 0
+                    while ti.atomic_add(self.ticket[FINISHED], 0) < opens and looks < patience:
+                        looks += 1
+                    if looks == patience:
+                        here = False
+                    else:
+                        turn = ti.atomic_add(self.ticket[TURN], 1)
+                        phase = turn // chunks
+                        if phase >= 2 * steps:
+                            here = False
+                        else:
+                            while ti.atomic_add(self.ticket[FINISHED], 0) < phase * chunks:
+                                pass
+                            c = turn - phase * chunks
+                            if ti.atomic_add(self.halted[None], 0) == 1:
+                                here = False
+                            elif phase % 2 == 0:
+                                gravity = ti.Vector([gx, gy, gz])
+                                self.move(
+                                    c, ti.cast(dt, self.real), ti.cast(limit, self.real), gravity, ti.cast(keep, self.real)
+                                )
+                            elif ti.atomic_add(self.moved[None], 0) == 1:
+                                self.halted[None] = 1
+                                self.done[None] = phase // 2
+                                here = False
+                            else:
+                                self.push(c, ti.cast(dt, self.real))
+                            ti.atomic_add(self.ticket[FINISHED], 1)
 
     @ti.kernel
-    def run(self, dt: float, limit: float, gx: float, gy: float, gz: float, keep: float, steps: ti.template()):
-        """Up to ``steps`` steps; stops by itself where new lists are needed (halted = 1, the forces still to come)."""
-        for _ in ti.static(range(steps)):
-            for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
-                self.ticket[1] = 0
-                c = self.next_chunk(w, 0, True)
-                while c < self.count[CHUNKS]:
-                    gravity = ti.Vector([gx, gy, gz])
-                    self.move(c, ti.cast(dt, self.real), ti.cast(limit, self.real), gravity, ti.cast(keep, self.real))
-                    c = self.next_chunk(w, 0, False)
-            for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
-                self.ticket[0] = 0
-                c = self.next_chunk(w, 1, True)
-                while c < self.count[CHUNKS]:
-                    self.push_if_listed(c, ti.cast(dt, self.real))
-                    c = self.next_chunk(w, 1, False)
+    def run_on_gpu(self, dt: float, limit: float, gx: float, gy: float, gz: float, keep: float):
+        """One step on a GPU, where every grain is a chunk; nothing where new lists are needed, as in ``run``."""
+        for c in range(self.count[CHUNKS]):
+            if self.halted[None] == 0:
+                gravity = ti.Vector([gx, gy, gz])
+                self.move(c, ti.cast(dt, self.real), ti.cast(limit, self.real), gravity, ti.cast(keep, self.real))
+        for c in range(self.count[CHUNKS]):
+            if self.moved[None] == 0:
+                self.push(c, ti.cast(dt, self.real))
+                if c == 0:
+                    self.done[None] = self.done[None] + 1
+            elif c == 0:
+                self.halted[None] = 1
 
     @ti.kernel
     def push_all(self, dt: float):
         """The forces of the step that was interrupted by new lists."""
         for _ in range(1):
-            self.ticket[1] = 0
+            self.ticket[QUEUE] = 0
         for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
-            self.ticket[0] = 0
-            c = self.next_chunk(w, 1, True)
+            c = self.next_chunk(w, True)
             while c < self.count[CHUNKS]:
                 self.push(c, ti.cast(dt, self.real))
-                c = self.next_chunk(w, 1, False)
+                c = self.next_chunk(w, False)
 
     # ------------------------------------------------------------------ what the host reads
 

@@ -14,6 +14,9 @@ from .shapes import distance_to
 __all__ = ["INDEX_BITS", "INDEX_MASK", "ITEMS_PER_THREAD", "Lists", "MOST_BODIES", "SAME_IMAGE", "curve_ranks"]
 
 ITEMS_PER_THREAD = 512
+# Places of the counters in Engine.ticket: of a plain loop over chunks; of ``Engine.run``.
+CACHE_LINE = 16
+QUEUE, TURN, FINISHED = 0, CACHE_LINE, 2 * CACHE_LINE
 MOST_BODIES = 8
 
 # A neighbour's code: its index, and in the upper bits which periodic image is meant. The sign says "touching".
@@ -35,7 +38,7 @@ class Lists:
         def __getattr__(self, name: str) -> Any: ...
 
     @ti.func
-    def next_chunk(self, w, queue, first: ti.template()):
+    def next_chunk(self, w, first: ti.template()):
         """The next chunk for work item w, or chunk_count where nothing is left.
 
         Taichi gives a CPU thread at least 512 items of a loop, so each thread has that many and one of them works.
@@ -46,7 +49,7 @@ class Lists:
             if ti.static(first):
                 c = w
         elif w % ITEMS_PER_THREAD == 0:
-            c = ti.atomic_add(self.ticket[queue], 1)
+            c = ti.atomic_add(self.ticket[QUEUE], 1)
         return c
 
     @ti.func
@@ -169,12 +172,12 @@ class Lists:
     def keep_lists(self):
         """Put the lists aside, so that the new ones can take the history over."""
         for _ in range(1):
-            self.ticket[0] = 0
+            self.ticket[QUEUE] = 0
         for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
-            c = self.next_chunk(w, 0, True)
+            c = self.next_chunk(w, True)
             while c < self.count[CHUNKS]:
                 self.keep_chunk(c)
-                c = self.next_chunk(w, 0, False)
+                c = self.next_chunk(w, False)
 
     @ti.func
     def keep_chunk(self, c):
@@ -218,12 +221,12 @@ class Lists:
             self.body_listed[b] = self.body_position[b]
             self.body_listed_turn[b] = self.body_turn[b]
         for _ in range(1):
-            self.ticket[0] = 0
+            self.ticket[QUEUE] = 0
         for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
-            c = self.next_chunk(w, 0, True)
+            c = self.next_chunk(w, True)
             while c < self.count[CHUNKS]:
                 self.list_chunk(c, ti.cast(skin, self.real))
-                c = self.next_chunk(w, 0, False)
+                c = self.next_chunk(w, False)
         for _ in range(1):
             self.moved[None] = 0
             self.halted[None] = 0

@@ -109,7 +109,6 @@ def put_back(bed: Bed, state: dict[str, np.ndarray]) -> None:
     e.body_count[None] = bodies
     e.moved[None] = 0
     e.halted[None] = 0
-    e.ticket[0] = e.ticket[1] = 0
     reals = [float(v) for v in state["reals"]]
     bed.time_step, bed._skin = reals[:2]
     bed.gravity = tuple(reals[2:5])
