@@ -21,7 +21,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from datetime import datetime
+from datetime import date, datetime, time
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -38,6 +38,7 @@ __all__ = [
     "read_series",
     "settings_in",
     "settings_toml",
+    "toml_value",
     "write_json",
     "write_series",
     "write_text",
@@ -140,7 +141,7 @@ def read_series(path: Path) -> dict[str, np.ndarray]:
 # run.toml ------------------------------------------------------------------------------------------------------------
 
 
-def _toml(value: Any) -> str:
+def toml_value(value: Any) -> str:
     """`value` as TOML writes it."""
     if isinstance(value, bool):
         return "true" if value else "false"
@@ -150,10 +151,12 @@ def _toml(value: Any) -> str:
         return repr(value)  # inf and nan are TOML's words too
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, date | time):  # a datetime is a date
+        return value.isoformat()
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(_toml(item) for item in value) + "]"
+        return "[" + ", ".join(toml_value(item) for item in value) + "]"
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{_toml(str(key))} = {_toml(item)}" for key, item in value.items()) + "}"
+        return "{" + ", ".join(f"{toml_value(str(key))} = {toml_value(item)}" for key, item in value.items()) + "}"
     raise TypeError(f"a setting of type {type(value).__name__} cannot be written to run.toml: {value!r}")
 
 
@@ -163,12 +166,12 @@ def settings_toml(command: str, settings: BaseModel, version: str, code: str = "
     lines = [
         f"# hedgebed {command}: every setting of this run, as given or by default.",
         f"# `hedgebed {command} run.toml` does the same again.",
-        f"format = {_toml(RUN_FORMAT)}",
-        f"version = {_toml(version)}",
-        *([f"code = {_toml(code)}  # digest of the code that computes beds"] if code else []),
-        f"command = {_toml(command)}",
-        f"created = {_toml(_now())}",
-        f"not_set = {_toml([name for name, value in values.items() if value is None])}",
+        f"format = {toml_value(RUN_FORMAT)}",
+        f"version = {toml_value(version)}",
+        *([f"code = {toml_value(code)}  # digest of the code that computes beds"] if code else []),
+        f"command = {toml_value(command)}",
+        f"created = {toml_value(_now())}",
+        f"not_set = {toml_value([name for name, value in values.items() if value is None])}",
         "",
         "[settings]",
     ]
@@ -177,7 +180,7 @@ def settings_toml(command: str, settings: BaseModel, version: str, code: str = "
         value = values[name]
         if isinstance(value, Path):
             value = str(value)
-        lines += [f"# {name} is not set" if value is None else f"{name} = {_toml(value)}"]
+        lines += [f"# {name} is not set" if value is None else f"{name} = {toml_value(value)}"]
     return "\n".join(lines) + "\n"
 
 

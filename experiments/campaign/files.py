@@ -1,0 +1,241 @@
+"""Campaigns and models as files: read, checked, written. The format is in docs/campaigns.md.
+
+```
+campaign = read_campaign("brick")                 # a folder with campaign.toml and one CSV file per sensor and trial
+campaign.tables.platform.mass                     # the tables, by their names in the file
+campaign.recording("001", "pose")["theta_rad"]    # arrays, in the format's units
+write_campaign("copy", campaign)                  # reads back to the same bits
+model = read_model("model.toml")                  # the same tables with [[effect]]
+```
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from experiments.reading import nearest
+from experiments.runfolder import toml_value, write_text
+
+from .recording import Recording, read_recording, write_recording
+from .tables import PenetrationCampaign, PenetrationModel, TumbleCampaign, TumbleModel
+
+__all__ = ["Campaign", "read_campaign", "read_model", "write_campaign", "write_model"]
+
+_CAMPAIGNS: dict[str, type[BaseModel]] = {"tumble": TumbleCampaign, "penetration": PenetrationCampaign}
+_MODELS: dict[str, type[BaseModel]] = {"tumble": TumbleModel, "penetration": PenetrationModel}
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """Measured trials: the tables of campaign.toml, and the recordings by (id of the trial, sensor).
+
+    The sensors of a tumble are ``pose``, ``imu`` and ``wheel``; that of a penetration is ``data``.
+    """
+
+    tables: TumbleCampaign | PenetrationCampaign
+    recordings: Mapping[tuple[str, str], Recording] = field(repr=False)
+    folder: Path | None = None
+    """Where it was read from."""
+
+    def recording(self, trial: str, sensor: str) -> Recording | None:
+        """What a sensor recorded in the trial of this id; None where it has none. Raises KeyError for an unknown id."""
+        if trial not in {known.id for known in self.tables.trial}:
+            raise KeyError(f"there is no trial {trial!r} in the campaign {self.tables.name!r}")
+        return self.recordings.get((trial, sensor))
+
+
+def read_campaign(folder: str | Path) -> Campaign:
+    """Read the campaign in `folder`.
+
+    Raises ValueError, one sentence a line, naming the file, the line or key, what was found and what was expected, for
+    whatever is wrong (see `experiments.campaign.tables` and `experiments.campaign.recording`).
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise ValueError(f"{str(folder)!r} is no folder: one with campaign.toml was expected")
+    tables = _read_tables(folder / "campaign.toml", _CAMPAIGNS)
+    assert isinstance(tables, TumbleCampaign | PenetrationCampaign)
+    recordings = {
+        (trial.id, sensor): read_recording(folder / name, trial.columns(sensor))
+        for trial in tables.trial
+        for sensor, name in trial.files.items()
+    }
+    return Campaign(tables, recordings, folder)
+
+
+def write_campaign(folder: str | Path, campaign: Campaign) -> Path:
+    """Write a campaign into `folder`, which must be new or empty, and return it.
+
+    Raises ValueError where the folder is in use or a file that a trial names has no recording.
+    """
+    folder = Path(folder)
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise ValueError(f"{str(folder)!r} is in use: a folder that is empty or does not exist yet was expected")
+    for trial in campaign.tables.trial:
+        for sensor, name in trial.files.items():
+            recording = campaign.recordings.get((trial.id, sensor))
+            if recording is None:
+                raise ValueError(f"trial {trial.id!r} names {sensor} = {name!r}, but there is no recording of it")
+            write_recording(folder / name, recording)
+    write_text(folder / "campaign.toml", _tables_toml(campaign.tables))
+    return folder
+
+
+def read_model(path: str | Path) -> TumbleModel | PenetrationModel:
+    """Read a model.toml. Raises ValueError as `read_campaign` does."""
+    model = _read_tables(Path(path), _MODELS)
+    assert isinstance(model, TumbleModel | PenetrationModel)
+    return model
+
+
+def write_model(path: str | Path, model: TumbleModel | PenetrationModel) -> None:
+    """Write a model.toml, which reads back as the same."""
+    write_text(Path(path), _tables_toml(model))
+
+
+# Reading --------------------------------------------------------------------------------------------------------------
+
+
+def _read_tables(path: Path, kinds: Mapping[str, type[BaseModel]]) -> BaseModel:
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except FileNotFoundError:
+        raise ValueError(f"{path}: there is no such file") from None
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read ({error.strerror})") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: is not TOML: {error}") from None
+    kind = table.get("kind")
+    if not isinstance(kind, str) or kind not in kinds:
+        found = "is missing" if kind is None else f"= {kind!r}"
+        raise ValueError(f"{path}: kind {found}; {' or '.join(map(repr, kinds))} was expected")
+    frozen = {key: value if key == "notes" else _tuples(value) for key, value in table.items()}
+    try:
+        return kinds[kind](**frozen)
+    except ValidationError as error:
+        said = [f"{path}: {_sentence(kinds[kind], detail, table)}" for detail in error.errors()]
+        raise ValueError("\n".join(dict.fromkeys(said))) from None
+
+
+def _tuples(value: Any) -> Any:
+    """`value` with tuples for lists, at every depth."""
+    if isinstance(value, list):
+        return tuple(_tuples(item) for item in value)
+    return {key: _tuples(item) for key, item in value.items()} if isinstance(value, dict) else value
+
+
+def _sentence(tables: type[BaseModel], detail: ErrorDetails, table: Mapping[str, Any]) -> str:
+    """One fault that pydantic found, as a sentence: where, what was found, what was expected."""
+    location, kind = list(detail["loc"]), detail["type"]
+    message = detail["msg"].removeprefix("Value error, ")
+    model, where, key = _walk(tables, location, table)
+    if kind == "value_error" and key is None:
+        return f"{where}: {message}" if where else message
+    place = f"{where} {key}" if where else str(key)
+    if kind == "extra_forbidden":
+        names = list(model.model_fields) if model is not None else []
+        return f"{place} = {_short(detail['input'])} is an unknown key; {nearest(str(key), names)}"
+    field = model.model_fields.get(str(key).split("[")[0]) if model is not None else None
+    expected = (field.description if field is not None else None) or message
+    if kind == "missing":
+        return f"{place} is missing; {expected} was expected"
+    if key == "trial" and kind == "too_short":
+        return "there is no [[trial]] at all; at least one was expected"
+    reason = "" if kind == "literal_error" else f" ({message[:1].lower() + message[1:]})"
+    return f"{place} = {_short(detail['input'])}; {expected} was expected{reason}"
+
+
+def _walk(
+    tables: type[BaseModel], location: list[int | str], table: Mapping[str, Any]
+) -> tuple[type[BaseModel] | None, str, str | None]:
+    """The model that a fault is in, its place as the file has it, and the key (None: the table itself)."""
+    model: type[BaseModel] | None = tables
+    names: list[str] = []
+    where = ""
+    value: Any = table
+    while location:
+        field = model.model_fields.get(str(location[0])) if model is not None else None
+        inner = _table_in(field.annotation) if field is not None else None
+        if inner is None or (len(location) == 1 and not isinstance(_get(value, location[0]), dict)):
+            index = "".join(f"[{part}]" for part in location[1:])
+            return model, where, f"{location[0]}{index}"
+        name = str(location.pop(0))
+        value = _get(value, name)
+        names.append(name)
+        if location and isinstance(location[0], int):
+            number = int(location.pop(0))
+            value = value[number] if isinstance(value, list) and number < len(value) else None
+            called = f" (id {value['id']!r})" if isinstance(value, dict) and isinstance(value.get("id"), str) else ""
+            where = f"[[{'.'.join(names)}]] {number + 1}{called}"
+        else:
+            where = f"[{'.'.join(names)}]"
+        model = inner
+    return model, where, None
+
+
+def _get(value: Any, key: int | str) -> Any:
+    return value.get(key) if isinstance(value, dict) else None
+
+
+def _table_in(hint: Any) -> type[BaseModel] | None:
+    """The model inside an annotation, None where there is none."""
+    if isinstance(hint, type) and issubclass(hint, BaseModel):
+        return hint
+    return next((found for item in get_args(hint) if (found := _table_in(item)) is not None), None)
+
+
+def _short(value: Any) -> str:
+    text = repr(list(value)) if isinstance(value, tuple) else repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+# Writing --------------------------------------------------------------------------------------------------------------
+
+
+def _tables_toml(tables: BaseModel) -> str:
+    """The tables as TOML, each number with its meaning in a comment; what is not set is left out."""
+    plain, nested, listed = [], [], []
+    for name, info in type(tables).model_fields.items():
+        value = getattr(tables, name)
+        if name == "notes":
+            if value:
+                listed.append("\n".join(["[notes]", *_pairs(value)]))
+        elif isinstance(value, BaseModel):
+            nested += _table_toml(name, value)
+        elif isinstance(value, tuple) and _table_in(info.annotation) is not None:
+            listed += ["\n".join([f"[[{name}]]", *_lines(item)]) for item in value]
+        else:
+            plain.append(f"{name} = {toml_value(value)}")
+    return "\n\n".join(["\n".join(plain), *nested, *listed]) + "\n"
+
+
+def _table_toml(name: str, table: BaseModel) -> list[str]:
+    """A table and those within it, each as a block."""
+    lines = _lines(table)
+    blocks = ["\n".join([f"[{name}]", *lines])] if lines else []
+    for key in type(table).model_fields:
+        inner = getattr(table, key)
+        if isinstance(inner, BaseModel):
+            blocks += _table_toml(f"{name}.{key}", inner)
+    return blocks
+
+
+def _lines(table: BaseModel) -> list[str]:
+    lines = []
+    for key, info in type(table).model_fields.items():
+        value = getattr(table, key)
+        if value is None or isinstance(value, BaseModel) or (isinstance(value, dict) and not value):
+            continue
+        lines.append(f"{key} = {toml_value(value)}  # {info.description}")
+    return lines
+
+
+def _pairs(notes: Mapping[str, Any]) -> list[str]:
+    return [f"{toml_value(str(key))} = {toml_value(value)}" for key, value in notes.items()]

@@ -1,0 +1,161 @@
+"""One sensor's CSV file of one trial: columns whose names carry their unit.
+
+A required quantity may come in any unit there is for it (``theta_deg`` is read as ``theta_rad``, converted). Columns
+that are not asked for are kept as text and written back. An empty cell and ``nan`` are gaps; a row of nothing but gaps
+is left out. Times rise, or stay the same where a clock is coarse.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.runfolder import write_text
+
+__all__ = ["Recording", "read_recording", "write_recording"]
+
+
+def _thousandth(value: float) -> float:
+    return value / 1000  # correctly rounded, as a product with 0.001 is not
+
+
+#: Unit of the format -> unit in a file -> conversion.
+_UNITS: dict[str, dict[str, Callable[[float], float]]] = {
+    "s": {"s": float, "ms": _thousandth},
+    "m": {"m": float, "mm": _thousandth},
+    "rad": {"rad": float, "deg": math.radians},
+    "m_s2": {"m_s2": float, "g": lambda value: value * 9.80665},
+    "N": {"N": float, "mN": _thousandth},
+    "rad_s": {"rad_s": float, "deg_s": math.radians, "rpm": lambda value: value * (2 * math.pi / 60)},
+}
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What one file holds: ``x_m`` -> array of shape [row_count] in the format's units, NaN in a gap; ``t_s`` first.
+
+    `extra` holds the columns that nobody asked for, as text.
+    """
+
+    columns: Mapping[str, NDArray[np.float64]]
+    extra: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        """The column `name`, such as ``x_m``. Raises KeyError for one that was not asked for."""
+        return self.columns[name]
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """``t_s`` [s]"""
+        return self.columns["t_s"]
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+
+def read_recording(path: Path, wanted: Sequence[tuple[str, str]]) -> Recording:
+    """Read the CSV file `path`, which must hold the quantities `wanted`: (name, unit), the time first.
+
+    Raises ValueError, naming file, line and column, what was found and what was expected: for a missing file or column,
+    a quantity given twice, text in a number, an infinite number, a row of another length, a time that runs backwards or
+    is missing in a row with numbers, and a file without rows.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise ValueError(f"{path}: there is no such file, though campaign.toml names it") from None
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read ({error.strerror})") from None
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: is not UTF-8 text ({error.reason} at byte {error.start})") from None
+    reader = csv.reader(io.StringIO(text))
+    try:
+        header = [name.strip() for name in next(reader, [])]
+        rows = [(reader.line_num, row) for row in reader if row]
+    except csv.Error as error:
+        raise ValueError(f"{path}, line {reader.line_num}: is no CSV ({error})") from None
+    _check_header(path, header)
+    chosen = [_find_column(path, header, name, unit) for name, unit in wanted]
+    for line, row in rows:
+        if len(row) != len(header):
+            raise ValueError(f"{path}, line {line}: found {len(row)} cells, expected {len(header)} as in the header")
+    parsed = [
+        [_number(path, line, header[index], row[index], convert) for line, row in rows] for index, convert in chosen
+    ]
+    numbers = np.array(parsed, dtype=float).reshape(len(wanted), len(rows))
+    kept = np.flatnonzero(~np.isnan(numbers).all(axis=0))
+    if not len(kept):
+        raise ValueError(f"{path}: holds no row of numbers, at least one was expected")
+    rows, numbers = [rows[index] for index in kept], numbers[:, kept]
+    _check_times(path, header[chosen[0][0]], [line for line, _ in rows], numbers[0])
+    columns = {f"{name}_{unit}": values for (name, unit), values in zip(wanted, numbers, strict=True)}
+    asked = {index for index, _ in chosen}
+    extra = {
+        name: tuple(row[index] for _, row in rows) for index, name in enumerate(header) if index not in asked and name
+    }
+    return Recording(columns, extra)
+
+
+def write_recording(path: Path, recording: Recording) -> None:
+    """Write `recording` to `path`; the numbers read back to the same bits."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow([*recording.columns, *recording.extra])
+    cells = [
+        [repr(value) for value in np.asarray(values, dtype=float).tolist()] for values in recording.columns.values()
+    ]
+    writer.writerows(zip(*cells, *recording.extra.values(), strict=True))
+    write_text(path, out.getvalue())
+
+
+def _check_header(path: Path, header: list[str]) -> None:
+    if not any(header):
+        raise ValueError(f"{path}, line 1: has no header, names of columns were expected")
+    for name in header:
+        if name and header.count(name) > 1:
+            raise ValueError(f"{path}, line 1: column {name!r} is there {header.count(name)} times, once was expected")
+
+
+def _find_column(path: Path, header: list[str], name: str, unit: str) -> tuple[int, Callable[[float], float]]:
+    """Where a quantity stands, and what converts it."""
+    known = {f"{name}_{there}": convert for there, convert in _UNITS[unit].items()}
+    found = [column for column in header if column in known]
+    if not found:
+        held = ", ".join(column for column in header if column)
+        raise ValueError(f"{path}, line 1: column {' or '.join(known)} is missing; found {held}")
+    if len(found) > 1:
+        raise ValueError(f"{path}, line 1: columns {' and '.join(found)} are the same quantity, one was expected")
+    return header.index(found[0]), known[found[0]]
+
+
+def _number(path: Path, line: int, name: str, cell: str, convert: Callable[[float], float]) -> float:
+    text = cell.strip()
+    if not text:
+        return math.nan
+    try:
+        value = float(text)
+    except ValueError:
+        raise ValueError(f"{path}, line {line}: {name} = {cell!r}, a number or nan was expected") from None
+    if math.isinf(value):
+        raise ValueError(f"{path}, line {line}: {name} = {cell!r}, a finite number or nan was expected")
+    return convert(value)
+
+
+def _check_times(path: Path, name: str, lines: list[int], times: NDArray[np.float64]) -> None:
+    missing = np.flatnonzero(np.isnan(times))
+    if len(missing):
+        raise ValueError(f"{path}, line {lines[missing[0]]}: {name} is missing, a number was expected")
+    back = np.flatnonzero(np.diff(times) < 0)
+    if len(back):
+        at = int(back[0]) + 1
+        raise ValueError(
+            f"{path}, line {lines[at]}: {name} runs backwards, from {times[at - 1]:.10g} s to {times[at]:.10g} s; "
+            f"a time no earlier was expected"
+        )
