@@ -7,9 +7,11 @@ the machine or the grains' material is refused by the experiment's `check`.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal, get_args, get_origin
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, model_validator
+
+from .strict import StrictSettings
 
 __all__ = ["STANDARD_GRAVITY", "PenetrateSettings", "expected_grain_count"]
 
@@ -26,10 +28,8 @@ def expected_grain_count(bed_size: tuple[float, float, float], grain: float, spr
     return 0.57 * math.prod(bed_size) / (math.pi / 6 * grain**3 * (1 + spread**2))
 
 
-class PenetrateSettings(BaseModel):
+class PenetrateSettings(StrictSettings):
     """A spike driven into, dropped on and set down on a bed of grains, beside the spring-damper fitted to it."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     # The bed
     material: str = Field("sand", description="Grain material, by name.")
@@ -103,26 +103,6 @@ class PenetrateSettings(BaseModel):
         description="A result.json to compare stiffness, damping and sinkage with, or 'shipped' for that of the case "
         "that ships; none if not given.",
     )
-
-    @field_validator("*", mode="before")
-    @classmethod
-    def _of_its_kind(cls, value: Any, info: ValidationInfo) -> Any:
-        """Text is no number, true is not 1, and one number is no list of them."""
-        hint = cls.model_fields[str(info.field_name)].annotation
-        kinds = _kinds(hint)
-        if bool in kinds:
-            if not isinstance(value, bool):
-                raise ValueError("it must be true or false")
-        elif kinds & {int, float} and value is not None:
-            several = get_origin(hint) is tuple
-            if several and not isinstance(value, list | tuple):
-                raise ValueError(f"it must be a list such as [{value if _is_number(value) else 0.1}]")
-            if not several and isinstance(value, list | tuple):
-                raise ValueError("it must be one number, not a list")
-            for item in value if several else (value,):
-                if isinstance(item, bool | str):
-                    raise ValueError(f"{item!r} is not a valid number")
-        return value
 
     @model_validator(mode="after")
     def _fits_together(self) -> PenetrateSettings:
@@ -263,20 +243,6 @@ class PenetrateSettings(BaseModel):
         """The mass that a spike's quarter of the platform moves [kg]: (m + m_b) / 4, without a rig m / 4."""
         counterweight = self.platform_mass * (1 - self.rig) / (1 + self.rig) if self.rig else 0.0
         return (self.platform_mass + counterweight) / 4
-
-
-def _kinds(hint: Any) -> set[type]:
-    """The plain types inside an annotation."""
-    inside = get_args(hint)
-    if get_origin(hint) is Literal or not inside:
-        return {hint} if isinstance(hint, type) else set()
-    if get_origin(hint) is Annotated:
-        return _kinds(inside[0])
-    return set().union(*(_kinds(item) for item in inside))
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _plain(values: tuple[float, ...]) -> str:

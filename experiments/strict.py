@@ -1,0 +1,49 @@
+"""What every settings class shares: closed, frozen, and true to kind."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, get_args, get_origin
+
+from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator
+
+__all__ = ["StrictSettings"]
+
+
+class StrictSettings(BaseModel):
+    """Settings of an experiment: frozen, no unknown keys, text is no number, true is not 1."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _of_its_kind(cls, value: Any, info: ValidationInfo) -> Any:
+        """Text is no number, true is not 1, and one number is no list of them."""
+        hint = cls.model_fields[str(info.field_name)].annotation
+        kinds = _kinds(hint)
+        if bool in kinds:
+            if not isinstance(value, bool):
+                raise ValueError("it must be true or false")
+        elif kinds & {int, float} and value is not None:
+            several = get_origin(hint) is tuple
+            if several and not isinstance(value, list | tuple):
+                raise ValueError(f"it must be a list such as [{value if _is_number(value) else 0.1}]")
+            if not several and isinstance(value, list | tuple):
+                raise ValueError("it must be one number, not a list")
+            for item in value if several else (value,):
+                if isinstance(item, bool | str):
+                    raise ValueError(f"{item!r} is not a valid number")
+        return value
+
+
+def _kinds(hint: Any) -> set[type]:
+    """The plain types inside an annotation."""
+    inside = get_args(hint)
+    if get_origin(hint) is Literal or not inside:
+        return {hint} if isinstance(hint, type) else set()
+    if get_origin(hint) is Annotated:
+        return _kinds(inside[0])
+    return set().union(*(_kinds(item) for item in inside))
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)

@@ -1,0 +1,52 @@
+"""The materials behind ``--surface``: stiffness, damping and friction of each, with where the numbers come from."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from .reading import nearest
+
+__all__ = ["Surface", "find_surface", "surface_names"]
+
+FILE = Path(__file__).parent / "surfaces.toml"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Surface:
+    """Numbers of one material, per row of two spikes."""
+
+    name: str
+    stiffness: float
+    """K [N/m]."""
+    damping: float
+    """C [N s/m], while going in."""
+    mu_s: float
+    """Coefficient of static friction [1]."""
+    mu_d: float
+    """Coefficient of sliding friction [1]."""
+    source: str
+    granular: bool = False
+    guess: bool = False
+    """Whether nothing but judgement stands behind the numbers."""
+
+
+@cache
+def _surfaces() -> dict[str, Surface]:
+    tables = tomllib.loads(FILE.read_text(encoding="utf-8"))
+    return {name: Surface(name=name, **table) for name, table in tables.items()}
+
+
+def surface_names() -> list[str]:
+    """The names there are."""
+    return list(_surfaces())
+
+
+def find_surface(name: str) -> Surface:
+    """The surface called `name`. Raises ValueError naming those there are."""
+    surfaces = _surfaces()
+    if name not in surfaces:
+        raise ValueError(f"surface = {name!r} is not known; {nearest(name, surfaces)}")
+    return surfaces[name]
