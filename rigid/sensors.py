@@ -5,7 +5,7 @@ are those of a measured trial:
 
 - camera: x, y, theta of the geometric centre; x from the start, y from the undisturbed surface; its zero may be off.
 - IMU at the geometric centre: gyro d theta/dt, clockwise positive, instantaneous; specific force, the acceleration of
-  the centre + g_loc (0, 1), in body axes, its mean over a window centred on the row's time (the value itself where the
+  the centre + g_loc upwards, in body axes, its mean over a window centred on the row's time (the value itself where the
   window is 0). Body x in the world is (cos theta, -sin theta), body y (sin theta, cos theta).
 - wheel: |omega_w|.
 
@@ -162,6 +162,7 @@ def measure(
     sensors: SensorSet,
     *,
     gravity_local: float,
+    up: tuple[float, float] = (0.0, 1.0),
     seed: int | tuple[int, ...] | None = None,
     camera_zero: tuple[float, float, float] | None = None,
 ) -> Measured:
@@ -171,6 +172,7 @@ def measure(
         motion: From t = 0; samples at `sensor_times` make the result exact, others are interpolated linearly.
         sensors: Rates, noise and faults.
         gravity_local: g_loc [m/s2]: the local gravity in the rig, where the wires carry part of it; g_sim without one.
+        up: The vertical in the surface's axes, a unit vector; not (0, 1) on a slope.
         seed: Fixes noise and camera zero; None: no noise, and a camera zero of 0.
         camera_zero: Added to x, y [m] and theta [rad]; None: drawn (with a seed) within `camera_zero_spread`.
 
@@ -198,7 +200,7 @@ def measure(
 
     written = _imu_times(sensors, duration)
     true = written - sensors.clock_offset
-    ax, ay = _specific_force(moving, true, sensors.imu_window, gravity_local)
+    ax, ay = _specific_force(moving, true, sensors.imu_window, (gravity_local * up[0], gravity_local * up[1]))
     gyro = np.interp(true, moving.time, moving.omega)
     imu = {"t_s": written, "gyro_rad_s": gyro, "ax_m_s2": ax, "ay_m_s2": ay}
     _add_noise(imu, sensors.imu_std, streams[2])
@@ -260,7 +262,7 @@ class _Extended(Motion):
         """Its parts have been checked."""
 
 
-def _specific_force(moving: Motion, at: ArrayLike, window: float, gravity: float) -> tuple[Array, Array]:
+def _specific_force(moving: Motion, at: ArrayLike, window: float, gravity: tuple[float, float]) -> tuple[Array, Array]:
     """Specific force in body axes [m/s2], (ax, ay) of shape [row_count] each, averaged over `window` [s] about `at`."""
     at = np.asarray(at, dtype=float)
     time = moving.time
@@ -268,16 +270,17 @@ def _specific_force(moving: Motion, at: ArrayLike, window: float, gravity: float
         if moving.ax is None or moving.ay is None:
             raise ValueError("imu_window = 0 asks for the motion's accelerations, ax and ay: it holds none")
         # Before t = 0 the platform is at rest: nothing is to be interpolated towards the first acceleration.
-        ax = np.where(at < 0, 0.0, np.interp(at, time, moving.ax))
-        ay = np.where(at < 0, 0.0, np.interp(at, time, moving.ay)) + gravity
+        ax = np.where(at < 0, 0.0, np.interp(at, time, moving.ax)) + gravity[0]
+        ay = np.where(at < 0, 0.0, np.interp(at, time, moving.ay)) + gravity[1]
         theta = np.interp(at, time, moving.theta)
         return ax * np.cos(theta) - ay * np.sin(theta), ax * np.sin(theta) + ay * np.cos(theta)
     sine, cosine = np.sin(moving.theta), np.cos(moving.theta)
     # Velocity in body axes, whose change is the mean of R^T a plus what the axes' own turning adds.
     along, up = moving.vx * cosine - moving.vy * sine, moving.vx * sine + moving.vy * cosine
     start, end = at - 0.5 * window, at + 0.5 * window
-    mean_x = _change(time, along, start, end) + _integral(time, moving.omega * up - gravity * sine, start, end)
-    mean_y = _change(time, up, start, end) + _integral(time, gravity * cosine - moving.omega * along, start, end)
+    pull_x, pull_y = gravity[0] * cosine - gravity[1] * sine, gravity[0] * sine + gravity[1] * cosine
+    mean_x = _change(time, along, start, end) + _integral(time, moving.omega * up + pull_x, start, end)
+    mean_y = _change(time, up, start, end) + _integral(time, pull_y - moving.omega * along, start, end)
     return mean_x / window, mean_y / window
 
 

@@ -66,6 +66,16 @@ def test_at_rest_the_imu_reads_the_local_gravity_upwards(gravity):
     assert recorded.imu["ay_m_s2"] == pytest.approx(gravity, rel=1e-12)
 
 
+@pytest.mark.parametrize("window", [0.0, 0.004])
+def test_at_rest_on_a_slope_the_imu_reads_the_vertical(window):
+    sensors, angle = replace(SENSORS, imu_window=window), 0.1
+    time = sensor_times(sensors, 0.5)
+    still = motion(time, ax=0.0 * time, ay=0.0 * time)
+    recorded = measure(still, sensors, gravity_local=G, up=(math.sin(angle), math.cos(angle)))
+    assert recorded.imu["ax_m_s2"] == pytest.approx(G * math.sin(angle), rel=1e-12)
+    assert recorded.imu["ay_m_s2"] == pytest.approx(G * math.cos(angle), rel=1e-12)
+
+
 def test_in_a_free_hop_the_imu_reads_nothing_without_a_rig():
     time = sensor_times(SENSORS, 0.5)
     recorded = measure(hopping(time, rate=2.0, gravity=G_SIM), SENSORS, gravity_local=G_SIM)
