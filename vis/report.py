@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,9 @@ from vis.plots import Plot, make_plots
 from vis.summary import summarise
 
 __all__ = ["write_report"]
+
+#: Experiment -> module and function of its own report.
+_OTHERS = {"tumble": ("vis.tumble", "write_tumble_report")}
 
 
 def write_report(folder: str | Path, *, pictures: bool = True, progress: Callable[[float], None] | None = None) -> Path:
@@ -38,6 +42,9 @@ def write_report(folder: str | Path, *, pictures: bool = True, progress: Callabl
     """
     tell = progress if progress is not None else lambda done: None
     run = read_folder(folder)
+    home, name = _OTHERS.get(str(run.result.get("experiment")), ("", ""))
+    if home:
+        return getattr(import_module(home), name)(folder, progress=progress)
     plots, undrawn = make_plots(run)
     tell(0.1)
     drawn = Pictures(notes=["Pictures were not asked for."])

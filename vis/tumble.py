@@ -1,0 +1,351 @@
+"""Plots, animation and report of a tumble: reads trajectory.csv, series/motion.csv, result.json and run.toml."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Callable, Mapping
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+
+from vis.numbers import quantity, short
+from vis.page import Block, Page, Section, Tile, code, figure, table, text, write_page
+from vis.style import BED, GREY, INK, MODEL, styled
+
+__all__ = ["STATES", "read_columns", "state_runs", "write_tumble_report"]
+
+Array = NDArray[np.float64]
+
+STATES = {"stand": GREY, "pivot": BED, "slip": MODEL, "hop": "#009E73"}
+"""The states in the order of losing hold, with their colours."""
+_WIDTH = 8.6
+_DPI = 130
+_JOULES = (("mJ", 1.0), ("µJ", 1e3), ("nJ", 1e6), ("pJ", 1e9), ("fJ", 1e12))
+"""Units of energy, and how many of them a mJ has."""
+
+
+def write_tumble_report(folder: str | Path, *, progress: Callable[[float], None] | None = None) -> Path:
+    """Make figures/, animation.gif and report.html of the folder of a tumble, and return the report.
+
+    Raises FileNotFoundError where the folder has no trajectory.csv or result.json.
+    """
+    tell = progress if progress is not None else lambda done: None
+    folder = Path(folder)
+    result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    numbers, states = read_columns(folder / "trajectory.csv")
+    motion, _ = read_columns(folder / "series" / "motion.csv")
+    figures = folder / "figures"
+    figures.mkdir(exist_ok=True)
+    drawn = []
+    for index, draw in enumerate((_draw_trajectory, _draw_states, _draw_energy)):
+        name, title, caption, drawing = draw(result, numbers, states, motion)
+        with styled():
+            drawing.savefig(figures / f"{name}.png", dpi=_DPI)
+        drawn.append(figure(figures / f"{name}.png", title=title, caption=caption))
+        tell(0.2 * (index + 1))
+    moving = _animate(folder / "animation.gif", result, numbers, states)
+    tell(0.9)
+    page = _page(folder, result, drawn, moving, len(numbers["t_s"]))
+    report = write_page(folder / "report.html", page)
+    tell(1.0)
+    return report
+
+
+def read_columns(path: Path) -> tuple[dict[str, Array], NDArray[np.str_]]:
+    """The columns of a CSV file that are numbers, by name, and its column ``state`` (empty where it has none)."""
+    with path.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.reader(file))
+    header, body = rows[0], rows[1:]
+    kept = [index for index, name in enumerate(header) if name != "state"]
+    values = np.array([[row[index] for index in kept] for row in body], dtype=float).reshape(len(body), len(kept))
+    states = [row[header.index("state")] for row in body] if "state" in header else []
+    return {header[index]: values[:, place] for place, index in enumerate(kept)}, np.array(states, dtype=str)
+
+
+def state_runs(states: NDArray[np.str_]) -> list[tuple[int, int, str]]:
+    """Stretches of one state: (first row, row after the last, state)."""
+    if not len(states):
+        return []
+    edges = [0, *(np.flatnonzero(states[1:] != states[:-1]) + 1).tolist(), len(states)]
+    return [(low, high, str(states[low])) for low, high in pairwise(edges)]
+
+
+# Figures --------------------------------------------------------------------------------------------------------------
+
+Drawn = tuple[str, str, str, Figure]
+
+
+def _panels(
+    count: int, height: float, *, widths: tuple[float, ...] | None = None, right: float = 0.985, legend: bool = True
+) -> tuple[Figure, list[Axes]]:
+    """Panels side by side, placed by hand: a layout engine would take as long as all the rest."""
+    with mpl.rc_context({"figure.constrained_layout.use": False}):
+        drawing = Figure(figsize=(_WIDTH, height))
+    FigureCanvasAgg(drawing)
+    axes = drawing.subplots(1, count, width_ratios=widths)
+    top = 1 - (0.38 if legend else 0.12) / height
+    drawing.subplots_adjust(left=0.075, right=right, bottom=0.5 / height, top=top, wspace=0.2)
+    return drawing, list(np.atleast_1d(axes))
+
+
+def _legend_of_states(drawing: Figure, states: NDArray[np.str_], more: tuple[Line2D, ...] = ()) -> None:
+    there = [name for name in STATES if name in states]
+    handles = [Line2D([], [], color=STATES[name], lw=3, label=name) for name in there]
+    drawing.legend(handles=[*handles, *more], loc="upper left", bbox_to_anchor=(0.06, 1.0), ncols=8)
+
+
+def _by_state(axis: Axes, x: Array, y: Array, states: NDArray[np.str_], **style: Any) -> None:
+    """A line in the colours of the states, without gaps between them."""
+    for low, high, name in state_runs(states):
+        axis.plot(x[low : high + 1], y[low : high + 1], color=STATES.get(name, INK), **style)
+
+
+def _draw_trajectory(
+    result: Mapping[str, Any], numbers: Mapping[str, Array], states: NDArray[np.str_], motion: Mapping[str, Array]
+) -> Drawn:
+    x, y, time = 1e3 * numbers["x_m"], 1e3 * numbers["y_m"], numbers["t_s"]
+    angle = _value(result, "trajectory_angle")
+    with styled():
+        drawing, (path, rates) = _panels(2, 3.5, widths=(1.25, 1.0), right=0.925)
+        _by_state(path, x, y, states, lw=2.4, solid_capstyle="round")
+        path.plot(x[:1], y[:1], "o", color=INK, ms=4)
+        more: tuple[Line2D, ...] = ()
+        if angle is not None:
+            reach = 0.35 * max(float(np.ptp(x)), float(np.ptp(y)), 10.0)
+            path.plot(
+                x[0] + np.array([0, reach]) * math.cos(angle),
+                y[0] + np.array([0, reach]) * math.sin(angle),
+                color=INK,
+                lw=1.0,
+                ls=(0, (4, 3)),
+            )
+            label = f"trajectory angle {short(math.degrees(angle), 3)}°"
+            more = (Line2D([], [], color=INK, lw=1.0, ls=(0, (4, 3)), label=label),)
+        path.set_aspect("equal", adjustable="datalim")
+        path.margins(0.08)
+        path.set_xlabel("x of the centre [mm]")
+        path.set_ylabel("y of the centre above the surface [mm]")
+        speed = np.hypot(numbers["vx_m_s"], numbers["vy_m_s"])
+        _by_state(rates, time, speed, states, lw=1.8)
+        rates.set_xlabel("time [s]")
+        rates.set_ylabel("speed of the centre [m/s]")
+        rates.set_ylim(bottom=0.0)
+        other = rates.twinx()
+        other.plot(time, numbers["omega_rad_s"], color=INK, lw=1.1, ls=(0, (1, 1.2)))
+        other.set_ylabel("dθ/dt [rad/s], dotted")
+        other.grid(False)
+        other.spines["right"].set_visible(True)
+        _legend_of_states(drawing, states, more)
+    caption = (
+        "Left: path of the geometric centre in proportion, coloured by state, from the dot on. Right: speed of the "
+        "centre, and angular velocity (dotted)."
+    )
+    return "trajectory", "The path", caption, drawing
+
+
+def _draw_states(
+    result: Mapping[str, Any], numbers: Mapping[str, Array], states: NDArray[np.str_], motion: Mapping[str, Array]
+) -> Drawn:
+    time, theta = numbers["t_s"], np.degrees(numbers["theta_rad"])
+    order = list(STATES)
+    with styled():
+        drawing, (over_time, over_angle) = _panels(2, 3.0)
+        _by_state(over_time, time, theta, states, lw=2.4)
+        over_time.set_xlabel("time [s]")
+        over_time.set_ylabel("θ [degrees]")
+        for low, high, name in state_runs(states):
+            last = min(high, len(theta) - 1)
+            row = order.index(name) if name in order else 0
+            here, colour = theta[low : last + 1], STATES.get(name, INK)
+            over_angle.plot(here, np.full(len(here), row), color=colour, lw=6, solid_capstyle="butt")
+            if np.ptp(here) < 0.01 * np.ptp(theta):  # too short to be seen
+                over_angle.plot(here[:1], [row], "s", color=colour, ms=5)
+            if last < len(theta) - 1 and str(states[last]) in order:
+                there = [row, order.index(str(states[last]))]
+                over_angle.plot([theta[last]] * 2, there, color=GREY, lw=0.7)
+        over_angle.set_yticks(range(len(order)), order)
+        over_angle.set_ylim(-0.5, len(order) - 0.5)
+        over_angle.set_xlabel("θ [degrees]")
+        _legend_of_states(drawing, states)
+    caption = (
+        "Left: the angle over time. Right: state against angle, as in Figure 6 of the paper: stand (two or more spikes "
+        "stick), pivot (one sticks), slip (all that touch slide), hop (none touches)."
+    )
+    return "states", "Pivot, slip, hop", caption, drawing
+
+
+def _draw_energy(
+    result: Mapping[str, Any], numbers: Mapping[str, Array], states: NDArray[np.str_], motion: Mapping[str, Array]
+) -> Drawn:
+    time = motion["t_s"]
+    gained = 1e3 * (motion["energy_J"] - motion["energy_J"][0])
+    work, lost = 1e3 * motion["torque_work_J"], 1e3 * motion["dissipated_J"]
+    with styled():
+        drawing, (book, rest) = _panels(2, 2.8, legend=False)
+        book.plot(time, work, color=BED, label="work of the torque")
+        book.plot(time, gained, color=MODEL, ls=(0, (4, 2)), label="energy gained")
+        book.plot(time, lost, color=GREY, ls=(0, (1, 1.2)), label="dissipated")
+        book.set_xlabel("time [s]")
+        book.set_ylabel("energy [mJ]")
+        book.legend(loc="upper left")
+        residual = gained - work + lost
+        most = float(np.abs(residual).max())
+        unit, scale = next(((u, k) for u, k in _JOULES if most * k >= 0.999), _JOULES[-1])
+        rest.plot(time, scale * residual, color=INK, lw=1.0)
+        rest.set_xlabel("time [s]")
+        rest.set_ylabel(f"gained − work + dissipated [{unit}]")
+    residual_words = quantity(result["quantities"].get("energy_residual"))
+    caption = (
+        f"Left: what the torque put in, what the platform, counterweight and surface hold, and what friction and "
+        f"damping took. Right: what is left over. Its largest, over the work of the torque or W l, is {residual_words}."
+    )
+    return "energy", "The energy book", caption, drawing
+
+
+# Animation ------------------------------------------------------------------------------------------------------------
+
+
+def _animate(path: Path, result: Mapping[str, Any], numbers: Mapping[str, Array], states: NDArray[np.str_]) -> Path:
+    """The section of the platform on its way, as a GIF in real time, at most some 60 frames."""
+    time, x, y, theta = (numbers[name] for name in ("t_s", "x_m", "y_m", "theta_rad"))
+    length = float(result["trial"]["spike_length"]["value"])
+    count = int(result.get("spike_count", 8))
+    frame_count = int(min(60, max(2, 25 * time[-1])))
+    rows = np.unique(np.searchsorted(time, np.linspace(0.0, time[-1], frame_count)).clip(0, len(time) - 1))
+    low_x, high_x = float(x.min()) - 1.35 * length, float(x.max()) + 1.35 * length
+    high_y = float(y.max()) + 1.25 * length
+    low_y = min(-0.12 * length, float(y.min()) - 1.25 * length)
+    scale = min(720 / (high_x - low_x), 480 / (high_y - low_y))
+    size = (int(scale * (high_x - low_x)) & ~1, int(scale * (high_y - low_y)) & ~1)
+    palette = ["#ffffff", "#ece6dc", "#786e64", "#fafafa", "#5a5a5a", "#c8c8c8", INK, *STATES.values()]
+    white, soil, edge, shell, metal, mark, ink = range(7)
+    pens = {name: 7 + place for place, name in enumerate(STATES)}
+
+    def page(px: Any, py: Any) -> list[tuple[float, float]]:
+        return list(
+            zip((np.atleast_1d(px) - low_x) * scale, size[1] - (np.atleast_1d(py) - low_y) * scale, strict=True)
+        )
+
+    frames = []
+    for row in rows:
+        image = Image.new("P", size, white)
+        image.putpalette([int(colour[k : k + 2], 16) for colour in palette for k in (1, 3, 5)])
+        draw = ImageDraw.Draw(image)
+        ((_, ground),) = page(0.0, 0.0)
+        draw.rectangle((0, ground, size[0], size[1]), fill=soil)
+        draw.line((0, ground, size[0], ground), fill=edge, width=2)
+        pen = pens.get(str(states[row]), ink)
+        angles = theta[row] + math.pi / count + 2 * math.pi / count * np.arange(count)
+        tips = page(x[row] - length * np.sin(angles), y[row] - length * np.cos(angles))
+        hull = page(x[row] - 0.82 * length * np.sin(angles), y[row] - 0.82 * length * np.cos(angles))
+        draw.polygon(hull, fill=shell, outline=metal)
+        (centre,) = page(x[row], y[row])
+        for inner, tip in zip(hull, tips, strict=True):
+            draw.line((*inner, *tip), fill=metal, width=5)
+        draw.line((*centre, *hull[0]), fill=mark, width=2)
+        trail = page(x[: row + 1 : 4], y[: row + 1 : 4])
+        if len(trail) > 1:
+            draw.line(trail, fill=pen, width=2)
+        draw.ellipse((centre[0] - 4, centre[1] - 4, centre[0] + 4, centre[1] + 4), fill=pen)
+        draw.text((10, 8), f"t = {time[row]:.2f} s   {states[row]}", fill=pen, font_size=18)
+        frames.append(image)
+    pause = int(round(1000 * time[-1] / max(1, len(rows) - 1) / 10) * 10)
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=max(20, pause), loop=0, optimize=False)
+    return path
+
+
+# The page -------------------------------------------------------------------------------------------------------------
+
+
+def _value(result: Mapping[str, Any], name: str) -> float | None:
+    return (result.get("quantities") or {}).get(name, {}).get("value")
+
+
+def _degrees(value: float | None) -> str:
+    return "none" if value is None else f"{short(math.degrees(value), 3)}°"
+
+
+def _page(folder: Path, result: Mapping[str, Any], drawn: list[Block], moving: Path, row_count: int) -> Page:
+    quantities = result["quantities"]
+    tiles = [
+        Tile("Trajectory angle", _degrees(_value(result, "trajectory_angle")), "of the first 10 mm"),
+        Tile("Largest speed", quantity(quantities["max_speed"]), "of the centre"),
+        Tile("Largest angular velocity", quantity(quantities["max_angular_velocity"]), ""),
+        Tile("Slips from", _degrees(_value(result, "transition_angle_slip")), "θ at the first slip", second=True),
+        Tile("Hops from", _degrees(_value(result, "transition_angle_hop")), "θ at the first hop", second=True),
+    ]
+    rows = [
+        (name, f"{entry['value']:.6g}" if entry["value"] is not None else "–", _unit(entry["unit"]), entry["origin"])
+        for name, entry in result["trial"].items()
+    ]
+    passages = [
+        (f"{entry['time']:.6g}", entry["state"], f"{math.degrees(entry['theta']):.4g}")
+        for entry in result["transitions"][:60]
+    ]
+    beyond = len(result["transitions"]) - len(passages)
+    effects = [
+        f"{effect['id']} ({', '.join(f'{key} = {value:g}' for key, value in effect['parameters'].items())})"
+        for effect in result["effects"]
+    ]
+    animation = figure(
+        moving,
+        title="The section of the platform on its way",
+        caption="In real time as far as sixty frames go; a spike stands for the row of spikes at its corner.",
+        half=True,
+        show_file=True,
+    )
+    settled = [
+        table(("number", "value", "unit", "where from"), rows, words=True),
+        text(
+            f"Ground: {result['ground']}. Actuator: {result['actuator']}. Integrator: {result['method']}. "
+            f"Terms beyond the base model: {', '.join(effects) if effects else 'none'}.",
+        ),
+    ]
+    every = table(
+        ("quantity", "value", "unit", "note"),
+        [
+            (name, "null" if q["value"] is None else f"{q['value']:.6g}", _unit(q["unit"]), q.get("note", ""))
+            for name, q in quantities.items()
+        ],
+        words=True,
+    )
+    passage_blocks = [
+        table(("time [s]", "state", "θ [degrees]"), passages),
+        *([text(f"And {beyond} more, in result.json.", small=True)] if beyond > 0 else []),
+    ]
+    return Page(
+        title=str(result["title"]),
+        lead=[f"hedgebed {result['version']}", "tumble", f"{result['duration']:g} s", f"{row_count} rows"],
+        tiles=tiles,
+        warnings=[str(warning)[:1].upper() + str(warning)[1:] for warning in result["warnings"]],
+        sections=[
+            Section("", [drawn[0], drawn[1], animation]),
+            Section("Transitions", passage_blocks),
+            Section("Energy", [drawn[2]]),
+            Section("The trial", settled),
+            Section("Every number of the result", [every]),
+            Section(
+                "To do this again",
+                [
+                    text(f"With hedgebed {result['version']}, in this folder:"),
+                    code("hedgebed tumble run.toml"),
+                    text("The same settings give the same trajectory.csv.", small=True),
+                ],
+            ),
+        ],
+    )
+
+
+def _unit(unit: str) -> str:
+    return "" if unit == "1" else unit
