@@ -7,9 +7,9 @@ Layout (measured reasons in docs/performance.md):
   computed once, by the chunk's own serial loop, and added to both; a pair across chunks is computed by both sides. So
   no two threads write to one grain, and every sum has one order: the same bits on any number of threads. On a GPU a
   chunk is one grain, and the same code is a full list.
-* A step is two parallel loops. ``move`` kicks and drifts (leapfrog: velocities live half a step behind positions);
-  ``push`` computes forces. The loop that moves also finds out whether a grain has come further than half the skin;
-  if so the later loops of the launch do nothing, and the host makes new lists and goes on from there.
+* A step has two phases. ``move`` kicks and drifts (leapfrog: velocities live half a step behind positions); ``push``
+  computes forces. Moving also finds out whether a grain has come further than half the skin; if so the launch ends
+  there, and the host makes new lists and goes on. On a CPU all steps of a launch are one parallel loop (``run``).
 * Sums into a field are written as x = x + y, because Taichi's x += y is an atomic operation.
 
 An engine is compiled for a capacity, not for a number of grains, and is used again by the next bed that fits:
@@ -28,6 +28,7 @@ from .contact import PAIR_WIDTH, contact_force, turning_torque
 from .lists import (
     BOTTOM,
     CACHE_LINE,
+    CHUNK_ROOM,
     CHUNKS,
     FINISHED,
     GRAINS,
@@ -207,11 +208,14 @@ class Engine(Lists):
         self.rank = ti.field(ti.i32, cell_capacity)
         self.cell_start = ti.field(ti.i32, cell_capacity + 1)
         self.cell_fill = ti.field(ti.i32, cell_capacity)
-        # Pair lists: chunk c owns the rows from c times its room; offsets per grain.
+        # Pair lists: chunk c owns the rows from c times its room, those of a grain lie together. ``first`` is the
+        # grain a row belongs to, ``pair`` its neighbour's code, ``touching`` the rows in contact in this step.
         room = n * neighbours_per_grain + 8 * chunk_capacity
         self.pair_start = ti.field(ti.i32, n)
         self.pair_end = ti.field(ti.i32, n)
         self.pair = ti.field(ti.i32, room)
+        self.first = ti.field(ti.i32, room)
+        self.touching = ti.field(ti.i32, room)
         self.slide = F(3, real, room)
         self.old_start = ti.field(ti.i32, n)
         self.old_end = ti.field(ti.i32, n)
@@ -371,73 +375,83 @@ class Engine(Lists):
     def push(self, c, dt):
         """Forces between the grains of a chunk and all that they touch."""
         start, end = self.chunk_range(c)
-        p = self.grain_pair[None]
-        largest = ti.cast(0.0, self.real)
-        for i in range(start, end):
+        # First find out which pairs touch, without a branch that a processor would have to guess; then their forces.
+        base = c * self.count[CHUNK_ROOM]
+        last = base
+        for s in range(base, self.pair_end[end - 1]):
+            code = self.pair[s]
+            i = self.first[s]
+            bits = ti.select(code < 0, ~code, code)
             x_i = self.position[i]
-            v_i = self.velocity[i]
-            w_i = self.spin[i]
-            sum_f = ti.Vector.zero(self.real, 3)
-            sum_t = ti.Vector.zero(self.real, 3)
-            for s in range(self.pair_start[i], self.pair_end[i]):
-                code = self.pair[s]
-                touching = code < 0
-                bits = ti.select(touching, ~code, code)
-                j = bits & INDEX_MASK
-                image = bits >> INDEX_BITS
-                x_j = self.position[j]
-                d = x_i.xyz - x_j.xyz
-                if image != SAME_IMAGE:
-                    d.x += ti.cast(image % 3 - 1, self.real) * self.box[PERIOD_X]
-                    d.y += ti.cast(image // 3 - 1, self.real) * self.box[PERIOD_Y]
-                square = d.norm_sqr()
-                sum_r = x_i.w + x_j.w
-                if square < sum_r * sum_r:
-                    v_j = self.velocity[j]
-                    w_j = self.spin[j]
-                    length = ti.sqrt(square)
-                    overlap = sum_r - length
-                    mass = v_i.w + v_j.w
-                    # One division for three reciprocals.
-                    inverse = 1.0 / (length * sum_r * mass)
-                    n = d * (sum_r * mass * inverse)
-                    by_sum = length * mass * inverse
-                    radius = x_i.w * x_j.w * by_sum
-                    mass = v_i.w * v_j.w * (length * sum_r * inverse)
-                    arm_i = x_i.w - 0.5 * overlap
-                    arm_j = x_j.w - 0.5 * overlap
-                    v = v_i.xyz - v_j.xyz - (arm_i * w_i.xyz + arm_j * w_j.xyz).cross(n)
-                    u = self.slide[s]
-                    f_n, f_t, k_t, a, root = contact_force(p, n, v, overlap, radius, mass, dt, u, self.tensile)
-                    self.slide[s] = u
-                    f = f_n * n + f_t
-                    t = f_t.cross(n)
-                    sum_f += f
-                    sum_t += arm_i * t
-                    turn = ti.Vector.zero(self.real, 3)
-                    if ti.static(self.rolling):
-                        q = self.roll[s]
-                        turn = turning_torque(p, n, w_i.xyz - w_j.xyz, f_n, k_t, a, radius, root, dt, q)
-                        self.roll[s] = q
-                        sum_t += turn
-                    if ti.static(not self.gpu):
-                        if j >= start and j < end:
-                            self.force[j] = self.force[j] - (f)
-                            self.torque[j] = self.torque[j] + (arm_j * t - turn)
-                    largest = ti.max(largest, overlap * by_sum)
-                    if not touching:
-                        self.pair[s] = ~code
-                elif touching:
-                    self.pair[s] = bits
+            x_j = self.position[bits & INDEX_MASK]
+            sum_r = x_i.w + x_j.w
+            d = self.apart(x_i, x_j, bits)
+            touching = d.norm_sqr() < sum_r * sum_r
+            self.touching[last] = s
+            last += ti.select(touching, 1, 0)
+            if touching != (code < 0):
+                self.pair[s] = ~code
+                if code < 0:
                     self.slide[s] = ti.Vector.zero(self.real, 3)
                     if ti.static(self.rolling):
                         self.roll[s] = ti.Vector.zero(self.real, 3)
-            self.force[i] = self.force[i] + (sum_f)
-            self.torque[i] = self.torque[i] + (sum_t)
-        base = c * self.count[NEAR_ROOM]
-        for s in range(base, self.near_end[c]):
+        p = self.grain_pair[None]
+        largest = ti.cast(0.0, self.real)
+        for k in range(base, last):
+            s = self.touching[k]
+            i = self.first[s]
+            bits = ~self.pair[s]
+            j = bits & INDEX_MASK
+            x_i = self.position[i]
+            x_j = self.position[j]
+            v_i = self.velocity[i]
+            v_j = self.velocity[j]
+            w_i = self.spin[i]
+            w_j = self.spin[j]
+            d = self.apart(x_i, x_j, bits)
+            length = d.norm()
+            sum_r = x_i.w + x_j.w
+            overlap = sum_r - length
+            mass = v_i.w + v_j.w
+            # One division for three reciprocals.
+            inverse = 1.0 / (length * sum_r * mass)
+            n = d * (sum_r * mass * inverse)
+            by_sum = length * mass * inverse
+            radius = x_i.w * x_j.w * by_sum
+            mass = v_i.w * v_j.w * (length * sum_r * inverse)
+            arm_i = x_i.w - 0.5 * overlap
+            arm_j = x_j.w - 0.5 * overlap
+            v = v_i.xyz - v_j.xyz - (arm_i * w_i.xyz + arm_j * w_j.xyz).cross(n)
+            u = self.slide[s]
+            f_n, f_t, k_t, a, root = contact_force(p, n, v, overlap, radius, mass, dt, u, self.tensile)
+            self.slide[s] = u
+            f = f_n * n + f_t
+            t = f_t.cross(n)
+            turn = ti.Vector.zero(self.real, 3)
+            if ti.static(self.rolling):
+                q = self.roll[s]
+                turn = turning_torque(p, n, w_i.xyz - w_j.xyz, f_n, k_t, a, radius, root, dt, q)
+                self.roll[s] = q
+            self.force[i] = self.force[i] + f
+            self.torque[i] = self.torque[i] + (arm_i * t + turn)
+            if ti.static(not self.gpu):
+                if j >= start and j < end:
+                    self.force[j] = self.force[j] - f
+                    self.torque[j] = self.torque[j] + (arm_j * t - turn)
+            largest = ti.max(largest, overlap * by_sum)
+        for s in range(c * self.count[NEAR_ROOM], self.near_end[c]):
             largest = ti.max(largest, self.push_near(c, s, dt))
         self.overlap[c] = ti.max(self.overlap[c], largest)
+
+    @ti.func
+    def apart(self, x_i, x_j, bits):
+        """From the neighbour, or its image that the upper bits mean, to the grain."""
+        d = x_i.xyz - x_j.xyz
+        image = bits >> INDEX_BITS
+        if image != SAME_IMAGE:
+            d.x += ti.cast(image % 3 - 1, self.real) * self.box[PERIOD_X]
+            d.y += ti.cast(image // 3 - 1, self.real) * self.box[PERIOD_Y]
+        return d
 
     @ti.func
     def push_near(self, c, s, dt):
@@ -520,16 +534,13 @@ class Engine(Lists):
                             if ti.atomic_add(self.halted[None], 0) == 1:
                                 here = False
                             elif phase % 2 == 0:
-                                gravity = ti.Vector([gx, gy, gz])
-                                self.move(
-                                    c, ti.cast(dt, self.real), ti.cast(limit, self.real), gravity, ti.cast(keep, self.real)
-                                )
+                                self.move(c, dt, limit, ti.Vector([gx, gy, gz]), keep)
                             elif ti.atomic_add(self.moved[None], 0) == 1:
                                 self.halted[None] = 1
                                 self.done[None] = phase // 2
                                 here = False
                             else:
-                                self.push(c, ti.cast(dt, self.real))
+                                self.push(c, dt)
                             ti.atomic_add(self.ticket[FINISHED], 1)
 
     @ti.kernel
@@ -537,11 +548,10 @@ class Engine(Lists):
         """One step on a GPU, where every grain is a chunk; nothing where new lists are needed, as in ``run``."""
         for c in range(self.count[CHUNKS]):
             if self.halted[None] == 0:
-                gravity = ti.Vector([gx, gy, gz])
-                self.move(c, ti.cast(dt, self.real), ti.cast(limit, self.real), gravity, ti.cast(keep, self.real))
+                self.move(c, dt, limit, ti.Vector([gx, gy, gz]), keep)
         for c in range(self.count[CHUNKS]):
             if self.moved[None] == 0:
-                self.push(c, ti.cast(dt, self.real))
+                self.push(c, dt)
                 if c == 0:
                     self.done[None] = self.done[None] + 1
             elif c == 0:
@@ -555,7 +565,7 @@ class Engine(Lists):
         for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
             c = self.next_chunk(w, True)
             while c < self.count[CHUNKS]:
-                self.push(c, ti.cast(dt, self.real))
+                self.push(c, dt)
                 c = self.next_chunk(w, False)
 
     # ------------------------------------------------------------------ what the host reads

@@ -75,12 +75,18 @@ class Lists:
         return result
 
     @ti.func
-    def nearest(self, b, x):
-        """Distance, normal and curvature of body b at a point, and the arm from its origin to the nearest point."""
+    def from_body(self, b, x):
+        """From a body's origin, or its nearest image's, to a point."""
         d = x - self.body_position[b]
         if self.body_extent[b] < 1e30:
             d.x -= self.box[PERIOD_X] * ti.round(d.x / self.box[PERIOD_X])
             d.y -= self.box[PERIOD_Y] * ti.round(d.y / self.box[PERIOD_Y])
+        return d
+
+    @ti.func
+    def nearest(self, b, x):
+        """Distance, normal and curvature of body b at a point, and the arm from its origin to the nearest point."""
+        d = self.from_body(b, x)
         q = self.body_turn[b]
         local = rotate(ti.Vector([q[0], -q[1], -q[2], -q[3]]), d)
         best = ti.cast(1e30, self.real)
@@ -280,6 +286,7 @@ class Lists:
     @ti.func
     def list_pair(self, s, i, j, code):
         oi, oj = self.came_from[i], self.came_from[j]
+        self.first[s] = i
         sign = ti.cast(1.0, self.real)
         old = self.find_old(oi, oj)
         if old < 0:
@@ -303,8 +310,11 @@ class Lists:
         for i in range(start, end):
             x = self.position[i]
             for b in range(self.body_count[None]):
-                distance, n, curvature, arm = self.nearest(b, x.xyz)
-                if distance < x.w + skin:
+                reach = x.w + skin
+                distance = 2.0 * reach
+                if self.from_body(b, x.xyz).norm_sqr() < (self.body_extent[b] + reach) ** 2:
+                    distance, n, curvature, arm = self.nearest(b, x.xyz)
+                if distance < reach:
                     if s < base + self.count[NEAR_ROOM]:
                         self.near_grain[s] = i
                         self.near_body[s] = b

@@ -97,6 +97,7 @@ def put_back(bed: Bed, state: dict[str, np.ndarray]) -> None:
     touching = rows[state["pair"] < 0]
     e.write("pair_start", start)
     e.write("pair_end", (start + counts).astype(np.int32))
+    e.write("first", np.repeat(np.arange(bed.grain_count), counts).astype(np.int32), rows)
     for name, at in (("pair", rows), ("slide", touching), *((("roll", touching),) if e.rolling else ())):
         e.write(name, state[name], at)
     near = _near_rows(state["near_count"], e.near_room)
