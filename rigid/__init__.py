@@ -2,7 +2,27 @@
 
 from .grounds import SpringDamper, SurfaceGround
 from .laws import GROUNDS
+from .planar import simulate
 from .reaction import Contact, Reaction
 from .spike import Section, Spike
+from .terms import EFFECTS, Term
+from .trajectory import STATES, Trajectory
+from .trial import Effect, Ground, Trial
 
-__all__ = ["GROUNDS", "Contact", "Reaction", "Section", "SpringDamper", "Spike", "SurfaceGround"]
+__all__ = [
+    "EFFECTS",
+    "GROUNDS",
+    "STATES",
+    "Contact",
+    "Effect",
+    "Ground",
+    "Reaction",
+    "Section",
+    "SpringDamper",
+    "Spike",
+    "SurfaceGround",
+    "Term",
+    "Trajectory",
+    "Trial",
+    "simulate",
+]

@@ -1,0 +1,97 @@
+"""The paper's integrator: a fixed step of 1 ms, modes that change at the next step.
+
+The paper gives the step and not the method. This is the plainest that holds: semi-implicit Euler (speeds first, then
+the pose with the new speeds), of order 1, with touch-down, lift-off, stick and slip read from the state at the start of
+a step. It is here to show what that step does; the located integrator is the one to trust.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from .dynamics import LOST, OMEGA, THETA, VX, VY, WHEEL, WORK, Modes, System, X, Y
+from .modes import resolve, settle
+from .statics import standing
+
+__all__ = ["integrate_fixed"]
+
+
+def integrate_fixed(
+    system: System,
+    *,
+    duration: float,
+    time_step: float,
+    on_step: Callable[[float, list[float], list[float], Modes], None],
+) -> list[tuple[float, str, float]]:
+    """Step from static equilibrium to `duration` [s]; `on_step(time, z, dz/dt, modes)` sees the start and every step.
+
+    Returns the transitions (time, state, theta). Raises RuntimeError where numbers stop being finite.
+    """
+    trial = system.trial
+    z, modes = standing(system)
+    modes.torque_over = trial.torque == 0 or trial.torque_until <= 0
+    still = [n for n in modes.touching if modes.slip[n] == 0]
+    rate = resolve(system, 0.0, z, modes, spikes=still, vertical=True, rotation=True)
+    transitions = [(0.0, modes.state, z[THETA])]
+    on_step(0.0, z, rate, modes)
+    count = round(duration / time_step)
+    for k in range(1, count + 1):
+        time = k * time_step
+        if settle(system, time, z, modes, rate):
+            on_step(time, z, rate, modes)
+            if not modes.torque_over and time >= trial.torque_until:
+                modes.torque_over = True
+                rate = resolve(system, time, z, modes, vertical=True, rotation=True)
+            continue
+        before = {n: z[VX] - z[OMEGA] * system.arms(n, z)[0] for n in modes.touching}
+        old = (z[VX], z[VY], z[OMEGA], modes.vertical, modes.rotation)
+        for i in (VX, VY, OMEGA, WHEEL):
+            z[i] += time_step * rate[i]
+        for i in (X, Y, THETA):
+            z[i] += time_step * z[i + 3]
+        # The books with the speeds' mean over the step.
+        mean = 0.5 * (old[2] + z[OMEGA])
+        z[WORK] += time_step * (rate[WORK] / old[2] * mean if old[2] else system.s.torque * mean)
+        z[LOST] += time_step * rate[LOST]
+        if not all(map(math.isfinite, z)):
+            raise RuntimeError(f"the motion is no longer finite at t = {time:.6g} s: {trial.describe()}")
+        rate = _read_modes(system, time, z, modes, before, old)
+        if modes.state != transitions[-1][1]:
+            transitions.append((time, modes.state, z[THETA]))
+        on_step(time, z, rate, modes)
+    return transitions
+
+
+def _read_modes(
+    system: System, time: float, z: list[float], modes: Modes, before: dict[int, float], old: tuple[float, ...]
+) -> list[float]:
+    """The modes that the state shows; dz/dt."""
+    trial = system.trial
+    if not modes.torque_over and time >= trial.torque_until:
+        modes.torque_over = True
+    if trial.actuator == "brake" and not modes.torque_over and z[WHEEL] <= 0 and trial.torque > 0:
+        z[WHEEL], modes.torque_over = 0.0, True
+    stopped = []
+    for n in range(trial.spike_count):
+        h, _ = system.arms(n, z)
+        depth, slip = h - z[Y], z[VX] - z[OMEGA] * h
+        inside = depth > system.crater * max(modes.top[n], depth)
+        if system.has_memory:
+            modes.top[n] = max(modes.top[n], depth) if depth > 0 else 0.0
+        if inside and n not in modes.touching:
+            modes.touching = sorted([*modes.touching, n])
+            modes.slip[n] = 1 if slip > 0 else -1
+        elif not inside and n in modes.touching:
+            z[LOST] += system.stored(n, z, modes)
+            modes.touching = [m for m in modes.touching if m != n]
+            modes.slip[n] = 0
+        elif inside and modes.slip[n]:
+            if before.get(n, slip) * slip <= 0:
+                stopped.append(n)
+            else:
+                modes.slip[n] = 1 if slip > 0 else -1
+    up_x, up_y = system.s.up_x, system.s.up_y
+    vertical = bool(modes.vertical) and (up_x * old[0] + up_y * old[1]) * (up_x * z[VX] + up_y * z[VY]) <= 0
+    rotation = bool(modes.rotation) and old[2] * z[OMEGA] <= 0
+    return resolve(system, time, z, modes, spikes=stopped, vertical=vertical, rotation=rotation)

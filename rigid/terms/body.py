@@ -1,0 +1,160 @@
+"""Effects on the body: the rig's wires and pulleys, the mass off the shaft, the slope, cable, bearing and motor."""
+
+import math
+from math import cos, sin
+
+from .term import Parameter, Term
+
+__all__ = ["BODY_EFFECTS"]
+
+
+def pendulum_potential(s, length, offset):
+    """V = m_b g d^2 / 2 L, d the horizontal distance from under the pulleys."""
+    d = s.up_y * s.x - s.up_x * (s.y - s.stance) - offset
+    return 0.5 * s.counterweight * s.gravity * d * d / length
+
+
+def pendulum_force(s, length, offset):
+    """-dV/dq."""
+    d = s.up_y * s.x - s.up_x * (s.y - s.stance) - offset
+    pull = -s.counterweight * s.gravity * d / length
+    return pull * s.up_y, -pull * s.up_x, 0.0
+
+
+def com_offset_mass(s, x, y):
+    """T = m v . e', e the offset in the world's axes, e' = omega (e_y, -e_x)."""
+    ex = x * s.cosine + y * s.sine
+    ey = y * s.cosine - x * s.sine
+    return 0.0, 0.0, 0.0, s.mass * ey, -s.mass * ex, 0.0
+
+
+def com_offset_potential(s, x, y):
+    """V = m g (height of the centre of mass over the shaft), g the true gravity."""
+    ex = x * s.cosine + y * s.sine
+    ey = y * s.cosine - x * s.sine
+    return s.mass * s.gravity * (ex * s.up_x + ey * s.up_y)
+
+
+def com_offset_force(s, x, y):
+    """Centripetal m omega^2 e, and -dV/d theta."""
+    ex = x * s.cosine + y * s.sine
+    ey = y * s.cosine - x * s.sine
+    spin = s.mass * s.omega * s.omega
+    return spin * ex, spin * ey, s.mass * s.gravity * (ex * s.up_y - ey * s.up_x)
+
+
+def slope_up(angle):
+    """The surface rises towards +x, so the vertical leans towards +x in the surface's axes."""
+    return sin(angle), cos(angle)
+
+
+def pulley_mass(s, mass):
+    """T = m_p (vertical speed)^2 / 2, m_p = sum of I / r^2 over the pulleys."""
+    return mass * s.up_x * s.up_x, mass * s.up_x * s.up_y, mass * s.up_y * s.up_y, 0.0, 0.0, 0.0
+
+
+def rig_friction(s, force):
+    """Dry friction of the pulleys' bearings, felt along the wires."""
+    return force + 0.0 * s.vy
+
+
+def bearing_drag(s, torque):
+    """Dry friction of the shaft's bearings."""
+    return torque + 0.0 * s.omega
+
+
+def umbilical_potential(s, stiffness):
+    """V = k theta^2 / 2."""
+    return 0.5 * stiffness * s.theta * s.theta
+
+
+def umbilical_force(s, stiffness, drag):
+    """-k theta - c omega."""
+    return 0.0, 0.0, -stiffness * s.theta - drag * s.omega
+
+
+def umbilical_loss(s, drag):
+    """c omega^2."""
+    return drag * s.omega * s.omega
+
+
+def torque_fade_factor(s, speed_loss, time_loss):
+    """Falls in a straight line with the wheel's speed and with time, never below zero."""
+    return max(0.0, 1.0 - speed_loss * abs(s.wheel_speed) - time_loss * s.time)
+
+
+BODY_EFFECTS: tuple[Term, ...] = (
+    Term(
+        id="pendulum", summary="the rig's wires pull back", acts="V", needs_rig=True,
+        parameters=(
+            Parameter(name="length", unit="m", default=math.inf, lowest=0.0, above_lowest=True,
+                      summary="from the pulleys down to the shaft"),
+            Parameter(name="offset", unit="m", default=0.0, lowest=-1.0, highest=1.0,
+                      summary="how far the pulleys stand towards +x of the start"),
+        ),
+        source="planar-model.md: wire tension times x / length; the paper names it as a suspect beyond 40 mm",
+        limits="tension at its rest value m_b g (the motion changes it by a_y / g, below 1 %); x far below the length",
+        hooks={"potential": pendulum_potential, "force": pendulum_force},
+    ),
+    Term(
+        id="com-offset", summary="the centre of mass is off the shaft", acts="T and V",
+        parameters=(
+            Parameter(name="x", unit="m", default=0.0, lowest=-0.05, highest=0.05,
+                      summary="along body x (forward at theta = 0)"),
+            Parameter(name="y", unit="m", default=0.0, lowest=-0.05, highest=0.05,
+                      summary="along body y (up at theta = 0)"),
+        ),
+        source="planar-model.md: true gravity pulls at the centre of mass, the wires hold the shaft",
+        limits="J stays the inertia about the shaft",
+        hooks={"mass": com_offset_mass, "potential": com_offset_potential, "force": com_offset_force},
+    ),
+    Term(
+        id="slope", summary="the surface is not level", acts="gravity, counterweight, wires: their direction",
+        parameters=(
+            Parameter(name="angle", unit="rad", default=0.0, lowest=-1.2, highest=1.2,
+                      summary="the surface rises towards +x; x and y stay along and normal to it"),
+        ),
+        source="planar-model.md and trials.md: gravity and wires vertical, the camera's axes along the surface",
+        limits="plane; the wires stay vertical", hooks={"up": slope_up},
+    ),
+    Term(
+        id="pulley-inertia", summary="the pulleys turn with the wires", acts="T", needs_rig=True,
+        parameters=(Parameter(name="mass", unit="kg", default=0.0, lowest=0.0,
+                              summary="I / r^2 summed over the pulleys, added in y"),),
+        source="Atwood's machine with a heavy pulley (any mechanics textbook)", limits="the wires do not slip",
+        hooks={"mass": pulley_mass},
+    ),
+    Term(
+        id="rig-friction", summary="pulleys resist vertical motion", acts="virtual work, dry friction", needs_rig=True,
+        parameters=(Parameter(name="force", unit="N", default=0.0, lowest=0.0, summary="the same in both directions"),),
+        source="Coulomb friction of the pulleys' bearings", limits="static and sliding bounds are one; no Stribeck",
+        hooks={"vertical_friction": rig_friction},
+    ),
+    Term(
+        id="bearing-drag", summary="constant torque against the rotation", acts="virtual work, dry friction",
+        parameters=(Parameter(name="torque", unit="N m", default=0.0, lowest=0.0,
+                              summary="the same in both directions"),),
+        source="Coulomb friction of the bearings on which the rig's wires hold the shaft",
+        limits="static and sliding bounds are one", hooks={"rotation_friction": bearing_drag},
+    ),
+    Term(
+        id="umbilical", summary="the cable pulls or drags on the rotation", acts="V and D",
+        parameters=(
+            Parameter(name="stiffness", unit="N m/rad", default=0.0, lowest=0.0, summary="bending of the cable"),
+            Parameter(name="drag", unit="N m s/rad", default=0.0, lowest=0.0, summary="its inner friction"),
+        ),
+        source="a cable as a torsion spring and a linear damper, free of torque at theta = 0",
+        limits="small strains; the cable's pull on x and y is left out",
+        hooks={"potential": umbilical_potential, "force": umbilical_force, "loss": umbilical_loss},
+    ),
+    Term(
+        id="torque-fade", summary="the torque falls with speed or time", acts="virtual work: the flywheel's torque",
+        parameters=(
+            Parameter(name="speed_loss", unit="s/rad", default=0.0, lowest=0.0,
+                      summary="share lost per rad/s of the wheel: 1 / no-load speed of a DC motor"),
+            Parameter(name="time_loss", unit="1/s", default=0.0, lowest=0.0, summary="share lost a second: heating"),
+        ),
+        source="torque-speed line of a DC motor at a fixed voltage; fade of a brake that warms",
+        limits="a straight line, cut at zero", hooks={"torque_factor": torque_fade_factor},
+    ),
+)  # fmt: skip

@@ -1,0 +1,134 @@
+"""Effects at the contact: friction that changes, tips that are balls, ground that drags, hardens, stays or holds."""
+
+from math import exp
+
+from .term import Parameter, Term
+
+__all__ = ["CONTACT_EFFECTS"]
+
+
+def vibration_factor(s, slip, reduction, speed):
+    """1 - r w^2 / (w^2 + w_0^2) on both coefficients, w the wheel's speed."""
+    w = s.wheel_speed * s.wheel_speed
+    factor = 1.0 - reduction * w / (w + speed * speed)
+    return factor, factor
+
+
+def ball_radius(radius):
+    """The spike ends in a ball of this radius, whose lowest point touches."""
+    return radius
+
+
+def inertial_rate_force(s, depth, rate, normal):
+    """b rate^2 while going in: the ground's own inertia."""
+    sinking = max(rate, 0.0)
+    return normal * sinking * sinking
+
+
+def inertial_side_force(s, depth, slip, sideways):
+    """-b_x |u| u: the same for a tip that ploughs."""
+    return -sideways * abs(slip) * slip
+
+
+def hardened(depth, force, work, exponent, reference):
+    """The law's force times (z / z_0)^(n - 1); the work is exact for every law that is a power of depth."""
+    z = max(depth, 1e-12)
+    grown = force * (z / reference) ** (exponent - 1.0)
+    ratio = (z / reference) ** (exponent - 1.0)
+    stored = work * ratio
+    if exponent != 1.0 and work > 0.0:
+        stored = grown * z / (force * z / work + exponent - 1.0)
+    return grown, stored
+
+
+def crater_share(share):
+    """Unloading follows the loading curve compressed into the last 1 - f of the depth."""
+    return share
+
+
+def held(s, depth, top, force, reach):
+    """A (1 - exp(-(top - z) / d)) of pull, mobilised over the retreat from the deepest depth."""
+    back = max(top - depth, 0.0)
+    left = exp(-back / reach)
+    return force * (1.0 - left), force * (back - reach * (1.0 - left))
+
+
+def rate_friction_factor(s, slip, change, speed):
+    """mu_d (1 + c |u| / (|u| + u_0)): grows (c > 0) or falls (c < 0) and saturates."""
+    return 1.0, 1.0 + change * abs(slip) / (abs(slip) + speed)
+
+
+CONTACT_EFFECTS: tuple[Term, ...] = (
+    Term(
+        id="wheel-vibration", summary="a spinning wheel lowers the friction at the spikes", acts="mu_s and mu_d",
+        parameters=(
+            Parameter(name="reduction", unit="1", default=0.0, lowest=0.0, highest=0.99,
+                      summary="share of the friction that a fast wheel takes away"),
+            Parameter(name="speed", unit="rad/s", default=100.0, lowest=0.0, above_lowest=True,
+                      summary="wheel speed at half of it"),
+        ),
+        source="the paper suspects it; vibration lowers mean friction by the share of time in light contact "
+               "(Dupont et al. 1994, IEEE TAC 39:2, for the phenomenon)",
+        limits="a mean effect: no resonances, no normal vibration of the platform",
+        hooks={"friction_factor": vibration_factor},
+    ),
+    Term(
+        id="tip-radius", summary="the tips are balls", acts="contact geometry: the point that touches rolls",
+        parameters=(Parameter(name="radius", unit="m", default=0.0, lowest=0.0, highest=0.1,
+                              summary="of the ball, whose centre is l - r from the platform's"),),
+        source="the paper names ball tips; rolling of a circle on a line",
+        limits="the ball's sinkage does not move the point of contact round it", hooks={"tip_radius": ball_radius},
+    ),
+    Term(
+        id="inertial-drag", summary="force of the square of the tip's speed", acts="normal and tangential force",
+        parameters=(
+            Parameter(name="normal", unit="kg/m", default=0.0, lowest=0.0, summary="b, while the tip goes in"),
+            Parameter(name="sideways", unit="kg/m", default=0.0, lowest=0.0, summary="b_x, while the tip slides"),
+        ),
+        source="Katsuragi and Durian, Nature Physics 3 (2007), 420: the inertia of displaced grains",
+        limits="b does not grow with depth",
+        hooks={"rate_force": inertial_rate_force, "side_force": inertial_side_force},
+    ),
+    Term(
+        id="depth-hardening", summary="force grows other than linearly with depth", acts="the ground's law",
+        parameters=(
+            Parameter(name="exponent", unit="1", default=1.0, lowest=0.3, highest=4.0,
+                      summary="n of (z / z_0)^(n - 1) on the law's force; 1 changes nothing"),
+            Parameter(name="reference", unit="m", default=1e-3, lowest=0.0, above_lowest=True,
+                      summary="z_0: the depth at which the force is the base law's"),
+        ),
+        source="pressure and sinkage of soils (Bekker 1969); slow penetration grows as z^1.3 (Hill et al. 2005)",
+        limits="work exact for laws that are powers of depth (spring-damper, Hunt-Crossley, power, Katsuragi-Durian)",
+        hooks={"stiffen": hardened},
+    ),
+    Term(
+        id="plastic-sinkage", summary="the surface does not spring back", acts="the ground's law, with memory",
+        parameters=(Parameter(name="share", unit="1", default=0.0, lowest=0.0, highest=0.95,
+                              summary="of the deepest depth that stays when the load is gone"),),
+        source="elastic-plastic unloading as in Walton and Braun 1986, with the unloading curve similar to the loading",
+        limits="a spike forgets its crater when its tip leaves the undisturbed surface",
+        hooks={"crater": crater_share},
+    ),
+    Term(
+        id="adhesion", summary="the tip is held on retreat", acts="normal force, with memory",
+        parameters=(
+            Parameter(name="force", unit="N", default=0.0, lowest=0.0, summary="A, a row's, fully mobilised"),
+            Parameter(name="reach", unit="m", default=1e-4, lowest=0.0, above_lowest=True,
+                      summary="retreat over which it is mobilised"),
+        ),
+        source="pull-off force of cohesive ground; mobilised over a distance so that rest is well defined",
+        limits="breaks where the tip leaves the surface; friction does not see the pull",
+        hooks={"hold": held},
+    ),
+    Term(
+        id="rate-friction", summary="friction depends on the sliding speed", acts="mu_d",
+        parameters=(
+            Parameter(name="change", unit="1", default=0.0, lowest=-0.95, highest=10.0,
+                      summary="relative change of mu_d at high sliding speed"),
+            Parameter(name="speed", unit="m/s", default=0.05, lowest=0.0, above_lowest=True,
+                      summary="sliding speed at half of it"),
+        ),
+        source="velocity strengthening or weakening (Stribeck; Armstrong-Helouvry et al. 1994, Automatica 30:1083)",
+        limits="no memory of past sliding", hooks={"friction_factor": rate_friction_factor},
+    ),
+)  # fmt: skip

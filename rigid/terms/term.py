@@ -1,0 +1,136 @@
+"""What a term of the model is: named, with parameters in units, and a few plain functions ("hooks").
+
+A hook is plain arithmetic on numbers, without loops, early returns or calls of other functions of ours, so that the
+very same source runs as Python in the accurate integrator and, compiled by Taichi, in the batch. Mathematical functions
+are those of `math`, imported by name (`from math import exp`). What its arguments are called says what it gets: first
+the fixed ones listed below, then the term's own parameters, by name, in any number.
+
+| hook                 | fixed arguments           | gives                                                        |
+|----------------------|---------------------------|--------------------------------------------------------------|
+| `up`                 |                           | (x, y) of the vertical in the surface's axes, a unit vector  |
+| `tip_radius`         |                           | radius of the balls at the tips [m]                          |
+| `mass`               | s                         | xx, xy, yy, x theta, y theta, theta theta of the mass matrix |
+| `potential`          | s                         | V [J]                                                        |
+| `force`              | s                         | generalised force (x [N], y [N], theta [N m]): everything    |
+|                      |                           | but M q'': -dV/dq, terms in the square of speeds, drags      |
+| `loss`               | s                         | power [W] that this force dissipates                         |
+| `torque_factor`      | s                         | factor on the flywheel's torque [1]                          |
+| `vertical_friction`  | s                         | bound [N] of a dry friction on the vertical motion           |
+| `rotation_friction`  | s                         | bound [N m] of a dry friction on the rotation                |
+| `crater`             |                           | share of the deepest depth that stays [1], 0 to below 1      |
+| `stiffen`            | depth, force, work        | the law's force [N] and work [J] at a new depth, altered     |
+| `hold`               | s, depth, top             | pull [N] on a tip below its deepest depth, energy stored [J] |
+| `rate_force`         | s, depth, rate            | normal force [N] that dissipates, by the rate of sinking     |
+| `side_force`         | s, depth, slip            | tangential force [N] on the tip against its slip speed       |
+| `friction_factor`    | s, slip                   | factors on mu_s and mu_d [1]                                 |
+
+Without hooks a term is a sensor's (`sensor=True`): it is declared here and applied where the sensors are.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+__all__ = ["FIXED_ARGUMENTS", "STATE_FIELDS", "Parameter", "Term"]
+
+FIXED_ARGUMENTS: dict[str, tuple[str, ...]] = {
+    "up": (),
+    "tip_radius": (),
+    "mass": ("s",),
+    "potential": ("s",),
+    "force": ("s",),
+    "loss": ("s",),
+    "torque_factor": ("s",),
+    "vertical_friction": ("s",),
+    "rotation_friction": ("s",),
+    "crater": (),
+    "stiffen": ("depth", "force", "work"),
+    "hold": ("s", "depth", "top"),
+    "rate_force": ("s", "depth", "rate"),
+    "side_force": ("s", "depth", "slip"),
+    "friction_factor": ("s", "slip"),
+}
+"""The hooks and what each gets before its parameters."""
+
+STATE_FIELDS = (
+    "time", "x", "y", "theta", "vx", "vy", "omega", "wheel_speed", "cosine", "sine", "up_x", "up_y",
+    "mass", "inertia", "length", "stance", "counterweight", "gravity", "weight", "torque",
+)  # fmt: skip
+"""What `s` holds, SI units: the state of the platform; cosine and sine of theta; the vertical's direction; then the
+trial's own numbers: mass, inertia, spike length, height of the centre over tips that only just touch at theta = 0,
+counterweight, gravity that pulls at the centre of mass, weight on the surface, and the torque that acts now."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """One parameter of a term; with all defaults a term changes nothing, to the bit."""
+
+    name: str
+    unit: str
+    default: float
+    summary: str
+    lowest: float = -math.inf
+    highest: float = math.inf
+    above_lowest: bool = False
+    """Whether it must exceed `lowest`, not only reach it."""
+
+    def check(self, value: Any, term: str) -> float:
+        """`value` as a float. Raises ValueError, naming it and what would do."""
+        if isinstance(value, bool) or not isinstance(value, int | float) or math.isnan(value):
+            raise ValueError(f"{term}.{self.name} = {value!r} must be a number ({self.unit})")
+        low = value > self.lowest if self.above_lowest else value >= self.lowest
+        if not (low and value <= self.highest) or (math.isinf(value) and value != self.default):
+            least = "" if self.lowest == -math.inf else f"{'above' if self.above_lowest else 'from'} {self.lowest:g}"
+            most = "" if self.highest == math.inf else f"at most {self.highest:g}"
+            raise ValueError(
+                f"{term}.{self.name} = {value!r} must be {' and '.join(filter(None, (least, most))) or 'finite'} "
+                f"({self.unit}; {self.summary})"
+            )
+        return float(value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Term:
+    """One named term of the model. Raises ValueError for a hook there is not, or one whose arguments do not fit."""
+
+    id: str
+    summary: str
+    acts: str
+    """Where it acts, in words."""
+    parameters: tuple[Parameter, ...] = ()
+    source: str
+    limits: str
+    hooks: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
+    sensor: bool = False
+    """Whether it alters a sensor, not the motion."""
+    needs_rig: bool = False
+    """Whether it has a meaning in the gravity-offloading rig only."""
+
+    def __post_init__(self) -> None:
+        own = {parameter.name for parameter in self.parameters}
+        for name, hook in self.hooks.items():
+            if name not in FIXED_ARGUMENTS:
+                raise ValueError(f"{self.id}: there is no hook {name!r}; there is {', '.join(FIXED_ARGUMENTS)}")
+            fixed = FIXED_ARGUMENTS[name]
+            arguments = tuple(inspect.signature(hook).parameters)
+            if arguments[: len(fixed)] != fixed:
+                raise ValueError(f"{self.id}: {name}{arguments} must begin with {fixed}")
+            unknown = set(arguments[len(fixed) :]) - own
+            if unknown:
+                raise ValueError(f"{self.id}: {name} asks for {sorted(unknown)}; its parameters are {sorted(own)}")
+
+    def arguments(self, hook: str) -> tuple[str, ...]:
+        """Names of the parameters that `hook` takes, in its order."""
+        return tuple(inspect.signature(self.hooks[hook]).parameters)[len(FIXED_ARGUMENTS[hook]) :]
+
+    def values(self, given: Mapping[str, Any]) -> dict[str, float]:
+        """All parameters, as given or by default. Raises ValueError for one there is not, or that cannot be."""
+        known = {parameter.name: parameter for parameter in self.parameters}
+        for key in given:
+            if key not in known:
+                raise ValueError(f"{self.id}.{key} is no parameter; there is {', '.join(known) or 'none'}")
+        return {key: known[key].check(given.get(key, known[key].default), self.id) for key in known}
