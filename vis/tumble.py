@@ -87,15 +87,14 @@ Drawn = tuple[str, str, str, Figure]
 
 
 def _panels(
-    count: int, height: float, *, widths: tuple[float, ...] | None = None, right: float = 0.985, legend: bool = True
+    count: int, height: float, *, widths: tuple[float, ...] | None = None, right: float = 0.985
 ) -> tuple[Figure, list[Axes]]:
     """Panels side by side, placed by hand: a layout engine would take as long as all the rest."""
     with mpl.rc_context({"figure.constrained_layout.use": False}):
         drawing = Figure(figsize=(_WIDTH, height))
     FigureCanvasAgg(drawing)
     axes = drawing.subplots(1, count, width_ratios=widths)
-    top = 1 - (0.38 if legend else 0.12) / height
-    drawing.subplots_adjust(left=0.075, right=right, bottom=0.5 / height, top=top, wspace=0.2)
+    drawing.subplots_adjust(left=0.075, right=right, bottom=0.5 / height, top=1 - 0.38 / height, wspace=0.2)
     return drawing, list(np.atleast_1d(axes))
 
 
@@ -192,13 +191,13 @@ def _draw_energy(
     gained = 1e3 * (motion["energy_J"] - motion["energy_J"][0])
     work, lost = 1e3 * motion["torque_work_J"], 1e3 * motion["dissipated_J"]
     with styled():
-        drawing, (book, rest) = _panels(2, 2.8, legend=False)
+        drawing, (book, rest) = _panels(2, 3.0)
         book.plot(time, work, color=BED, label="work of the torque")
         book.plot(time, gained, color=MODEL, ls=(0, (4, 2)), label="energy gained")
         book.plot(time, lost, color=GREY, ls=(0, (1, 1.2)), label="dissipated")
         book.set_xlabel("time [s]")
         book.set_ylabel("energy [mJ]")
-        book.legend(loc="upper left")
+        drawing.legend(handles=book.lines, loc="upper left", bbox_to_anchor=(0.06, 1.0), ncols=3)
         residual = gained - work + lost
         most = float(np.abs(residual).max())
         unit, scale = next(((u, k) for u, k in _JOULES if most * k >= 0.999), _JOULES[-1])

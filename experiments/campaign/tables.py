@@ -163,7 +163,7 @@ class TumbleTrial(Table):
     torque: NotNegative = Field(description="N m")
     actuator: Literal["motor", "brake"] = Field(description="'motor' or 'brake'")
     torque_until: Annotated[float, Field(ge=0)] = Field(math.inf, description="s")
-    wheel_speed_0: Number = Field(0.0, description="rad/s")
+    wheel_speed_0: NotNegative = Field(0.0, description="rad/s, 0 or more")
     counterweight: Positive | None = Field(None, description="kg, where it differs from [rig]")
     pose: str | None = Field(None, description="file with t_s,x_m,y_m,theta_rad")
     imu: str | None = Field(None, description="file with t_s,gyro_rad_s,ax_m_s2,ay_m_s2")
