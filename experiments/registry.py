@@ -81,6 +81,24 @@ EXPERIMENTS: dict[str, Experiment] = {
                 ),
             ),
         ),
+        Experiment(
+            "hop",
+            "The wheel speed that a hop over a distance takes: launch, flight, and how near escape is.",
+            settings="experiments.hop_settings:HopSettings",
+            module="experiments.hop",
+        ),
+        Experiment(
+            "tumble",
+            "One trial of a platform on spikes that a flywheel turns over: pivot, slip, hop.",
+            settings="experiments.tumble_settings:TumbleSettings",
+            module="experiments.tumble",
+        ),
+        Experiment(
+            "campaign",
+            "Makes up a campaign of tumbles: every gravity and torque, recorded by noisy sensors, and what is true.",
+            settings="experiments.campaign_settings:CampaignSettings",
+            module="experiments.synthesis",
+        ),
     ]
 }
 

@@ -20,7 +20,10 @@ from vis.summary import summarise
 __all__ = ["write_report"]
 
 #: Experiment -> module and function of its own report.
-_OTHERS = {"tumble": ("vis.tumble", "write_tumble_report")}
+_OTHERS = {
+    "tumble": ("vis.tumble", "write_tumble_report"),
+    "campaign": ("vis.campaign", "write_campaign_report"),
+}
 
 
 def write_report(folder: str | Path, *, pictures: bool = True, progress: Callable[[float], None] | None = None) -> Path:

@@ -1,0 +1,305 @@
+"""`hedgebed campaign`: trials that never were, with what is true of them beside what is said of them.
+
+DIR/campaign is a campaign as a laboratory would hand it over: stated numbers, uncertainties, noisy recordings.
+DIR/truth.toml is the model that made it: the true numbers, the terms beyond the base model, each trial's true gravity.
+"""
+
+from __future__ import annotations
+
+import math
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hedgebed import __version__
+from rigid.planar import simulate
+from rigid.sensors import Measured, Motion, SensorSet, measure, sensor_times
+from rigid.trial import Trial
+
+from .campaign import Campaign, EffectTable, Recording, TumbleCampaign, TumbleModel, write_campaign, write_model
+from .campaign.tables import (
+    FORMAT,
+    ImuSensor,
+    PlatformTable,
+    PoseSensor,
+    RigTable,
+    TumbleSensors,
+    TumbleSurface,
+    TumbleTrial,
+    TumbleUncertainty,
+    WheelSensor,
+    WheelTable,
+)
+from .campaign_settings import CampaignSettings
+from .progress import Progress
+from .runfolder import RunFolder
+from .surfaces import find_surface
+from .tumble_settings import TrialSettings, TumbleSettings
+from .tumble_trial import TumblePlan, plan_tumble
+
+__all__ = ["check", "record", "resume", "run"]
+
+_DRAWN = ("mass", "inertia", "stiffness", "damping", "mu_s", "mu_d")
+
+
+def run(settings: CampaignSettings, folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
+    """Make the campaign in `folder` and return the result, as result.json has it. Raises ValueError before any work."""
+    check(settings)
+    kept = RunFolder.ensure(Path(folder), "campaign", settings)
+    return _carry_out(settings, kept, progress or Progress())
+
+
+def resume(folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
+    """Make the campaign of a folder again from its start."""
+    kept = RunFolder.open(Path(folder))
+    return _carry_out(CampaignSettings(**kept.settings), kept, progress or Progress())
+
+
+def check(settings: CampaignSettings) -> None:
+    """Raise ValueError, naming key, value and what would do, for what the settings class cannot see."""
+    _conditions(settings)
+    _sensors(settings)
+
+
+def record(
+    trial: Trial, *, duration: float, sensors: SensorSet, seed: int | tuple[int, ...] | None
+) -> tuple[Measured, Any]:
+    """Integrate `trial` and record it; the trajectory stands beside it.
+
+    The effects `clock-offset`, `camera-scale` and `slope` of the trial alter the sensors; g_loc is the rig's gravity in
+    the rig, gravity_sim without one.
+    """
+    clock, camera, slope = (trial.effect_values(name) for name in ("clock-offset", "camera-scale", "slope"))
+    sensors = replace(
+        sensors,
+        clock_offset=clock["offset"] if clock else sensors.clock_offset,
+        camera_scale=camera["scale"] if camera else sensors.camera_scale,
+    )
+    lean = slope["angle"] if slope else 0.0
+    trajectory = simulate(trial, duration=duration, times=sensor_times(sensors, duration))
+    motion = Motion(
+        time=trajectory.time,
+        x=trajectory.x,
+        y=trajectory.y,
+        theta=trajectory.theta,
+        vx=trajectory.vx,
+        vy=trajectory.vy,
+        omega=trajectory.omega,
+        wheel_speed=trajectory.wheel_speed,
+        ax=trajectory.ax,
+        ay=trajectory.ay,
+    )
+    local = trial.gravity if trial.counterweight > 0 else trial.gravity_sim
+    measured = measure(motion, sensors, gravity_local=local, up=(math.sin(lean), math.cos(lean)), seed=seed)
+    return measured, trajectory
+
+
+@dataclass(frozen=True)
+class _Condition:
+    """One trial to be made: its id and its plan as stated."""
+
+    id: str
+    plan: TumblePlan
+
+
+def _conditions(settings: CampaignSettings) -> list[_Condition]:
+    """Every trial as stated, in the order of its id."""
+    shared = {name: getattr(settings, name) for name in TrialSettings.model_fields}
+    where: Sequence[dict[str, float]]
+    if settings.gravities:
+        where = [{"gravity": value} for value in settings.gravities]
+    else:
+        where = [{"rig": value} for value in settings.rigs]
+    turns: list[dict[str, Any]] = [{"torque": torque, "actuator": "motor"} for torque in settings.motor_torques]
+    turns += [
+        {"torque": torque, "actuator": "brake", "wheel_speed_0": settings.brake_wheel_speed}
+        for torque in settings.brake_torques
+    ]
+    plans = [plan_tumble(TumbleSettings(**shared, **place, **turn)) for place in where for turn in turns]
+    repeated = [plan for plan in plans for _ in range(settings.repeats)]
+    width = max(3, len(str(len(repeated))))
+    return [_Condition(f"{number:0{width}d}", plan) for number, plan in enumerate(repeated, 1)]
+
+
+def _sensors(settings: CampaignSettings) -> SensorSet:
+    return SensorSet(
+        camera_rate=settings.camera_rate,
+        imu_rate=settings.imu_rate,
+        wheel_rate=settings.wheel_rate,
+        pose_std=settings.pose_std,
+        imu_std=settings.imu_std,
+        wheel_std=settings.wheel_std,
+        imu_window=settings.imu_window,
+        lead=settings.lead,
+    )
+
+
+def _truth(settings: CampaignSettings, stated: Trial) -> dict[str, Any]:
+    """The true values of what all trials share, drawn within the stated uncertainties."""
+    values: dict[str, Any] = {name: getattr(stated, name) for name in _DRAWN} | {"mu_d": stated.sliding_friction}
+    if settings.exact:
+        return values
+    stream = np.random.default_rng([settings.seed, 0])
+    for name in _DRAWN:
+        # Within three sigma, so that nothing that cannot be is drawn.
+        values[name] *= 1 + getattr(settings, f"sigma_{name}") * float(np.clip(stream.standard_normal(), -3, 3))
+    values["mu_d"] = min(values["mu_d"], values["mu_s"])
+    return values
+
+
+def _true_gravity(settings: CampaignSettings, stated: float, number: int) -> float:
+    if settings.exact:
+        return stated
+    stream = np.random.default_rng([settings.seed, 1, number])
+    return stated * (1 + settings.sigma_gravity_sim * float(np.clip(stream.standard_normal(), -3, 3)))
+
+
+def _carry_out(settings: CampaignSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
+    conditions = _conditions(settings)
+    first = conditions[0].plan
+    truth = _truth(settings, first.trial)
+    sensors = _sensors(settings)
+    recordings: dict[tuple[str, str], Recording] = {}
+    true_trials, rows = [], []
+    with folder.lock():
+        for sentence in first.sentences():
+            progress.message(sentence)
+        progress.stage("trials", total=float(len(conditions)))
+        for number, condition in enumerate(conditions, 1):
+            gravity = _true_gravity(settings, condition.plan.trial.gravity_sim, number)
+            trial = replace(condition.plan.trial, gravity_sim=gravity, **truth)
+            measured, trajectory = record(
+                trial, duration=settings.duration, sensors=sensors, seed=(settings.seed, 2, number)
+            )
+            for sensor in ("pose", "imu", "wheel"):
+                recordings[condition.id, sensor] = Recording(getattr(measured, sensor))
+            true_trials.append(_trial_table(condition.id, trial))
+            rows.append(_row(condition, trial, measured, trajectory))
+            progress.update(number)
+        campaign = Campaign(_stated(settings, conditions), recordings)
+        target = folder.path / "campaign"
+        if target.exists():  # of a run that was stopped
+            shutil.rmtree(target)
+        write_campaign(target, campaign)
+        write_model(folder.path / "truth.toml", _true_model(settings, first, truth, true_trials))
+        result = _result(settings, first, rows, recordings)
+        folder.write_result(result)
+        progress.stage("report", total=1.0)
+        write_report(folder.path, progress)
+    return result
+
+
+def write_report(folder: Path, progress: Progress) -> None:
+    """Plots and report.html of a run folder."""
+    from vis.campaign import write_campaign_report as write
+
+    write(folder, progress=progress.update)
+
+
+def _trial_table(name: str, trial: Trial) -> TumbleTrial:
+    return TumbleTrial(
+        id=name,
+        gravity_sim=trial.gravity_sim,
+        torque=trial.torque,
+        actuator=trial.actuator,
+        torque_until=trial.torque_until,
+        wheel_speed_0=trial.wheel_speed_0,
+        counterweight=trial.counterweight if trial.counterweight > 0 else None,
+        pose=f"{name}-pose.csv",
+        imu=f"{name}-imu.csv",
+        wheel=f"{name}-wheel.csv",
+    )
+
+
+def _tables(settings: CampaignSettings, plan: TumblePlan, values: dict[str, Any]) -> dict[str, Any]:
+    """What the campaign and the truth both say, with their own numbers."""
+    trial = plan.trial
+    known = find_surface(settings.surface) if settings.surface is not None else None
+    rig = RigTable(wire_length=settings.wire_length, gravity=trial.gravity) if trial.counterweight > 0 else None
+    return {
+        "format": FORMAT,
+        "kind": "tumble",
+        "name": settings.name,
+        "platform": PlatformTable(mass=values["mass"], inertia=values["inertia"], spike_length=trial.spike_length),
+        "wheel": WheelTable(inertia=trial.wheel_inertia),
+        "rig": rig,
+        "surface": TumbleSurface(
+            kind=plan.surface,
+            granular=known.granular if known is not None else False,
+            **{name: values[name] for name in ("stiffness", "damping", "mu_s", "mu_d")},
+        ),
+        "sensors": TumbleSensors(
+            pose=PoseSensor(std=settings.pose_std),
+            imu=ImuSensor(std=settings.imu_std, window=settings.imu_window),
+            wheel=WheelSensor(std=(settings.wheel_std,)),
+        ),
+    }
+
+
+def _stated(settings: CampaignSettings, conditions: Sequence[_Condition]) -> TumbleCampaign:
+    plan = conditions[0].plan
+    values = {name: getattr(plan.trial, name) for name in _DRAWN} | {"mu_d": plan.trial.sliding_friction}
+    sigmas = {name: getattr(settings, f"sigma_{name}") for name in (*_DRAWN, "gravity_sim")}
+    return TumbleCampaign(
+        **_tables(settings, plan, values),
+        uncertainty=TumbleUncertainty(**sigmas),
+        notes={"made_by": f"hedgebed {__version__} campaign", "seed": settings.seed},
+        trial=tuple(_trial_table(condition.id, condition.plan.trial) for condition in conditions),
+    )
+
+
+def _true_model(
+    settings: CampaignSettings, plan: TumblePlan, truth: dict[str, Any], trials: Sequence[TumbleTrial]
+) -> TumbleModel:
+    effects = tuple(
+        EffectTable(
+            id=effect.id,
+            parameters=dict(effect.values),
+            file=str(Path(effect.file).resolve()) if effect.file is not None else None,
+        )
+        for effect in plan.trial.effects
+    )
+    return TumbleModel(**_tables(settings, plan, truth), trial=tuple(trials), effect=effects)
+
+
+def _row(condition: _Condition, trial: Trial, measured: Measured, trajectory: Any) -> dict[str, Any]:
+    """One trial in result.json."""
+    return {
+        "id": condition.id,
+        "gravity_sim": condition.plan.trial.gravity_sim,
+        "true_gravity_sim": trial.gravity_sim,
+        "torque": trial.torque,
+        "actuator": trial.actuator,
+        "camera_zero": list(measured.camera_zero),
+        "trajectory_angle": trajectory.trajectory_angle,
+        "max_speed": trajectory.max_speed,
+        "max_angular_velocity": trajectory.max_angular_velocity,
+        "states": [state for _, state, _ in trajectory.transitions],
+    }
+
+
+def _result(
+    settings: CampaignSettings, plan: TumblePlan, rows: list[dict[str, Any]], recordings: dict[Any, Recording]
+) -> dict[str, Any]:
+    count = sum(len(recording) for recording in recordings.values())
+    return {
+        "format": "hedgebed-result/1",
+        "experiment": "campaign",
+        "version": __version__,
+        "title": f"A made-up campaign on {plan.surface}: {len(rows)} trials",
+        "status": "done",
+        "quantities": {
+            "trial_count": {"value": len(rows), "std": 0.0, "unit": "1"},
+            "row_count": {"value": count, "std": 0.0, "unit": "1", "note": "of all recordings together"},
+            "duration": {"value": settings.duration, "std": 0.0, "unit": "s", "note": "of each trial"},
+        },
+        "campaign": "campaign",
+        "truth": "truth.toml",
+        "effects": [{"id": effect.id, "parameters": dict(effect.values)} for effect in plan.trial.effects],
+        "trials": rows,
+        "warnings": list(plan.warnings),
+    }

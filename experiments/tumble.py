@@ -1,0 +1,194 @@
+"""`hedgebed tumble`: one trial of the planar model, integrated and written down.
+
+The folder holds trajectory.csv, series/motion.csv (accelerations, wheel, energies), result.json, figures and a report.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hedgebed import __version__
+from rigid.planar import Trajectory, simulate
+
+from .campaign import read_model
+from .progress import Progress
+from .runfolder import RunFolder, write_series
+from .tumble_settings import TumbleSettings
+from .tumble_trial import TumblePlan, plan_tumble
+
+__all__ = ["check", "quantities_of", "resume", "run", "trajectory_columns"]
+
+MODEL_COPY = "model.toml"
+"""The model that was run, in the run's folder; effects of one's own lie beside it."""
+
+
+def run(settings: TumbleSettings, folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
+    """Carry the trial out into `folder` and return the result, as result.json has it.
+
+    Raises ValueError for settings that will not do, before any work; RuntimeError where the integration cannot go on.
+    """
+    check(settings)
+    kept = RunFolder.ensure(Path(folder), "tumble", settings)
+    return _carry_out(settings, kept, progress or Progress())
+
+
+def resume(folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
+    """Do the trial of a folder again from its start: it takes no longer than to read half of it."""
+    kept = RunFolder.open(Path(folder))
+    return _carry_out(TumbleSettings(**kept.settings), kept, progress or Progress())
+
+
+def check(settings: TumbleSettings) -> None:
+    """Raise ValueError, naming key, value and what would do, for what the settings class cannot see."""
+    plan = plan_tumble(settings)
+    _integrate(settings, plan, duration=1e-3)
+
+
+def quantities_of(trajectory: Trajectory) -> dict[str, dict[str, Any]]:
+    """The numbers that every tumble has, as result.json holds them; a value is null where there is none."""
+    angle = "first point 10 mm from the start, atan2(dy, dx); null if never reached"
+    entry = "theta at the first entry; null if there is none"
+    return {
+        "trajectory_angle": _quantity(trajectory.trajectory_angle, "rad", angle),
+        "max_speed": _quantity(trajectory.max_speed, "m/s", "of the centre"),
+        "max_angular_velocity": _quantity(trajectory.max_angular_velocity, "rad/s", ""),
+        "transition_angle_slip": _quantity(trajectory.transition_angle("slip"), "rad", entry),
+        "transition_angle_hop": _quantity(trajectory.transition_angle("hop"), "rad", entry),
+        "energy_residual": _quantity(
+            trajectory.energy_residual,
+            "1",
+            "largest |E(t) - E(0) - work of the torque + dissipated| over max(|work of the torque|, W l)",
+        ),
+    }
+
+
+def trajectory_columns(trajectory: Trajectory) -> dict[str, Any]:
+    """The columns of trajectory.csv."""
+    return {
+        "t_s": trajectory.time,
+        "x_m": trajectory.x,
+        "y_m": trajectory.y,
+        "theta_rad": trajectory.theta,
+        "vx_m_s": trajectory.vx,
+        "vy_m_s": trajectory.vy,
+        "omega_rad_s": trajectory.omega,
+        "state": np.array(trajectory.state_names),
+    }
+
+
+def _quantity(value: float | None, unit: str, note: str) -> dict[str, Any]:
+    return {"value": None if value is None else float(value), "std": 0.0, "unit": unit} | (
+        {"note": note} if note else {}
+    )
+
+
+def _integrate(settings: TumbleSettings, plan: TumblePlan, *, duration: float) -> Trajectory:
+    return simulate(
+        plan.trial, duration=duration, method=settings.method, sample_interval=min(settings.sample_interval, duration)
+    )
+
+
+def write_report(folder: Path, progress: Progress) -> None:
+    """Plots and report.html of a run folder."""
+    from vis.tumble import write_tumble_report as write
+
+    write(folder, progress=progress.update)
+
+
+def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
+    with folder.lock():
+        copied = _keep_model(settings, folder)
+        plan = plan_tumble(settings, model_file=copied)
+        for sentence in plan.sentences():
+            progress.message(sentence)
+        for warning in plan.warnings:
+            progress.message(f"warning: {warning}")
+        progress.stage("tumble", total=1.0)
+        trajectory = _integrate(settings, plan, duration=settings.duration)
+        progress.update(1.0)
+        write_series(folder.path / "trajectory.csv", trajectory_columns(trajectory))
+        folder.write_series("motion", _motion_columns(trajectory))
+        result = _result(settings, plan, trajectory)
+        folder.write_result(result)
+        progress.stage("report", total=1.0)
+        write_report(folder.path, progress)
+    return result
+
+
+def _keep_model(settings: TumbleSettings, folder: RunFolder) -> Path | None:
+    """Copy the model and the files of its effects into the folder, once; return the copy."""
+    if settings.model is None:
+        return None
+    copy, source = folder.path / MODEL_COPY, Path(settings.model)
+    if not copy.exists():
+        for effect in getattr(read_model(source), "effect", ()):
+            if effect.file is not None:
+                target = folder.path / effect.file
+                target.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(source.parent / effect.file, target)
+        shutil.copyfile(source, copy)
+    return copy
+
+
+def _motion_columns(trajectory: Trajectory) -> dict[str, Any]:
+    """What else the plots show, by time."""
+    columns: dict[str, Any] = {
+        "t_s": trajectory.time,
+        "ax_m_s2": trajectory.ax,
+        "ay_m_s2": trajectory.ay,
+        "wheel_speed_rad_s": trajectory.wheel_speed,
+    }
+    for name, values in _energies(trajectory).items():
+        columns[f"{name}_J"] = values
+    return columns
+
+
+def _energies(trajectory: Trajectory) -> Mapping[str, Any]:
+    return {
+        "kinetic": trajectory.kinetic_energy,
+        "potential": trajectory.potential_energy,
+        "stored": trajectory.stored_energy,
+        "energy": trajectory.energy,
+        "torque_work": trajectory.torque_work,
+        "dissipated": trajectory.dissipated,
+    }
+
+
+def _result(settings: TumbleSettings, plan: TumblePlan, trajectory: Trajectory) -> dict[str, Any]:
+    trial = plan.trial
+    stated = (
+        f"rig at {trial.gravity_sim:.4g} m/s2" if trial.counterweight > 0 else f"free at {trial.gravity_sim:.4g} m/s2"
+    )
+    warnings = list(plan.warnings)
+    if trajectory.trajectory_angle is None:
+        warnings.append("the centre never got 10 mm away from its start: there is no trajectory angle")
+    return {
+        "format": "hedgebed-result/1",
+        "experiment": "tumble",
+        "version": __version__,
+        "title": f"A tumble on {plan.surface}: {trial.torque:g} N m, {stated}",
+        "status": "done",
+        "quantities": quantities_of(trajectory),
+        "trial": {
+            name: {"value": number.value, "unit": number.unit, "origin": number.origin}
+            for name, number in plan.numbers.items()
+        }
+        | {"weight": {"value": trial.weight, "unit": "N", "origin": "(m + m_b) g_sim"}},
+        "surface": plan.surface,
+        "ground": settings.ground,
+        "actuator": settings.actuator,
+        "method": settings.method,
+        "duration": settings.duration,
+        "spike_count": trial.spike_count,
+        "effects": [{"id": effect.id, "parameters": dict(effect.values)} for effect in trial.effects],
+        "transitions": [
+            {"time": float(time), "state": state, "theta": float(theta)}
+            for time, state, theta in trajectory.transitions
+        ],
+        "warnings": warnings,
+    }

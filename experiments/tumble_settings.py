@@ -1,0 +1,161 @@
+"""Settings of `hedgebed tumble`: one trial of the platform, options by the names of the campaign format.
+
+A number that is not given comes from `model` where there is one, else from the surface or from the defaults, which
+`experiments.tumble_trial` holds and every run prints.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from .strict import StrictSettings
+
+__all__ = ["TrialSettings", "TumbleSettings"]
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+
+class TrialSettings(StrictSettings):
+    """What every trial of a platform on spikes shares: surface, platform, rig, terms."""
+
+    # The surface
+    surface: str | None = Field(
+        None, description="Material: steel, brick, sand or jsc1a; of the model, else steel, if not given."
+    )
+    ground: str = Field("spring-damper", description="Law that computes the surface's force, by name.")
+    ground_parameters: tuple[str, ...] = Field(
+        (), description="Parameters of another law than the spring-damper, of one spike, as name=value in SI."
+    )
+    stiffness: Positive | None = Field(None, description="K of a row of spikes [N/m]; the surface's if not given.")
+    damping: NotNegative | None = Field(
+        None, description="C of a row of spikes, while going in [N s/m]; the surface's if not given."
+    )
+    mu_s: NotNegative | None = Field(None, description="Static friction [1]; the surface's if not given.")
+    mu_d: NotNegative | None = Field(
+        None, description="Sliding friction [1]; the surface's if not given, half of mu_s where that is."
+    )
+
+    # The platform
+    platform: str = Field(
+        "hedgehog", description="Platform that gives what is not given here: one that ships, or its TOML file."
+    )
+    mass: Positive | None = Field(None, description="Mass of the platform [kg]; the platform's if not given.")
+    inertia: Positive | None = Field(
+        None,
+        description="Inertia about the axis of rotation, without the wheel's own [kg m2]; the platform's if not given.",
+    )
+    spike_length: Positive | None = Field(
+        None, description="Centre to tip of a spike [m]; the platform's if not given."
+    )
+    wheel_inertia: Positive | None = Field(
+        None, description="Inertia of the flywheel [kg m2]; the platform's if not given."
+    )
+
+    # The rig
+    rig_reading: Literal["pair", "weight"] = Field(
+        "pair",
+        description="What rig means: free-fall acceleration of platform and counterweight (pair), or the weight left "
+        "per mass of the platform (weight).",
+    )
+    counterweight: Positive | None = Field(
+        None, description="m_b of the rig [kg]; m (g - g_sim) / (g + g_sim) if not given; g_sim rules the weight."
+    )
+
+    # Beyond the base model
+    model: str | None = Field(
+        None, description="A model.toml: its tables stand under what is given here, its effects are added."
+    )
+    effects: tuple[str, ...] = Field(
+        (), description="Terms beyond the base model, as id or id.parameter=value in SI (pendulum.length=2.2)."
+    )
+
+    # How long
+    torque_until: NotNegative | None = Field(None, description="End of the torque [s]; it does not end if not given.")
+    duration: Positive = Field(3.0, le=3600, description="How long the trial lasts [s].")
+
+    @model_validator(mode="after")
+    def _surface_fits_together(self) -> Self:
+        finding = self._ground()
+        if finding:
+            raise ValueError(finding)
+        return self
+
+    def _ground(self) -> str | None:
+        if self.mu_s is not None and self.mu_d is not None and self.mu_d > self.mu_s:
+            return f"mu_d = {self.mu_d:g} is above mu_s = {self.mu_s:g}: at most that would do"
+        if self.ground == "spring-damper":
+            if self.ground_parameters:
+                return (
+                    f"ground_parameters = {' '.join(self.ground_parameters)} is for other laws: the spring-damper has "
+                    f"stiffness and damping"
+                )
+            return None
+        for key in ("stiffness", "damping"):
+            value = getattr(self, key)
+            if value is not None:
+                return (
+                    f"{key} = {value:g} is the spring-damper's, of a row: with ground = {self.ground!r} say "
+                    f"ground_parameters {key}=... of one spike"
+                )
+        return None
+
+
+class TumbleSettings(TrialSettings):
+    """One trial of a platform on spikes that a flywheel turns over: pivot, slip, hop."""
+
+    # The gravity
+    rig: Positive | None = Field(
+        None, description="g_sim of the offloading rig [9.80665 m/s2]; 0.0085 if neither it nor gravity is given."
+    )
+    gravity: Positive | None = Field(None, description="Gravity of a free platform, without a rig [m/s2].")
+
+    # What turns it
+    torque: NotNegative | None = Field(
+        None, description="Torque on the platform while a spike touches [N m]; 0.22 if not given."
+    )
+    actuator: Literal["motor", "brake"] = Field(
+        "motor",
+        description="What makes the torque: a motor that speeds the wheel up, or a brake that slows it to rest.",
+    )
+    wheel_speed_0: NotNegative | None = Field(
+        None, description="Speed of the wheel at the start [rad/s]; 0 for a motor; a brake must be given one."
+    )
+
+    # How it is computed
+    method: Literal["located", "paper"] = Field(
+        "located", description="Integrator: transitions located in time, or the paper's fixed step of 1 ms."
+    )
+    sample_interval: float = Field(1e-3, gt=0, le=1e-3, description="Time between rows of trajectory.csv [s].")
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        for finding in (self._gravity(), self._actuation()):
+            if finding:
+                raise ValueError(finding)
+        return self
+
+    def _gravity(self) -> str | None:
+        if self.rig is not None and self.gravity is not None:
+            return (
+                f"gravity = {self.gravity:g} m/s2 and rig = {self.rig:g} are both given: gravity is that of a free "
+                f"platform, one of them would do"
+            )
+        if self.gravity is not None:
+            for key, value, default in (
+                ("counterweight", self.counterweight, None),
+                ("rig_reading", self.rig_reading, "pair"),
+            ):
+                if value != default:
+                    return f"{key} = {value} belongs to a rig, and gravity = {self.gravity:g} m/s2 is a free platform's"
+        return None
+
+    def _actuation(self) -> str | None:
+        if self.actuator == "brake" and not (self.wheel_speed_0 or 0.0) > 0:
+            return (
+                f"wheel_speed_0 = {self.wheel_speed_0} leaves a brake nothing to slow down: the wheel's speed at the "
+                f"start in rad/s must be given, such as 500"
+            )
+        return None

@@ -1,0 +1,375 @@
+"""From the settings of a tumble to the numbers of its trial, each with where it comes from.
+
+What is given wins over the model, the model over the surface's numbers and over the defaults below.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import rigid
+from rigid.rig import STANDARD_GRAVITY, Rig
+from rigid.trial import Effect, Ground, Trial
+
+from .campaign import TumbleModel, read_model
+from .surfaces import find_surface
+from .tumble_settings import TumbleSettings
+
+__all__ = ["DEFAULT_RIG", "Number", "PlatformNumbers", "TumblePlan", "model_trial", "plan_tumble", "platform_numbers"]
+
+PLATFORMS = Path(rigid.__file__).parent / "platforms"
+"""Where the platforms are that ship."""
+SPIKE_LENGTH = 0.2
+"""Of the Hedgehog [m]: the paper's octagon is 0.4 m across."""
+TORQUE = 0.22
+"""The paper's middle one [N m]."""
+DEFAULT_RIG = 0.0085
+"""The paper's lower gravity [9.80665 m/s2]."""
+DEFAULT_SURFACE = "steel"
+SPIKES_PER_ROW = 2.0
+"""The platform stands on two rows of two."""
+
+UNITS = {
+    "mass": "kg",
+    "inertia": "kg m2",
+    "spike_length": "m",
+    "wheel_inertia": "kg m2",
+    "stiffness": "N/m",
+    "damping": "N s/m",
+    "mu_s": "1",
+    "mu_d": "1",
+    "gravity_sim": "m/s2",
+    "gravity": "m/s2",
+    "counterweight": "kg",
+    "torque": "N m",
+    "torque_until": "s",
+    "wheel_speed_0": "rad/s",
+}
+
+
+@dataclass(frozen=True)
+class Number:
+    """One number of a trial: value, unit, and where it comes from ("given", "default", "surface steel", ...)."""
+
+    value: float
+    unit: str
+    origin: str
+
+
+@dataclass(frozen=True)
+class PlatformNumbers:
+    """What the planar model takes from a platform, and what its wheel can do."""
+
+    name: str
+    mass: float
+    inertia: float
+    spike_length: float
+    spike_count: int
+    wheel_inertia: float
+    motor_torque: float
+    brake_torque: float
+    max_wheel_speed: float
+
+
+def platform_numbers(name: str) -> PlatformNumbers:
+    """The numbers of a platform that ships, by name, or of the TOML file `name`.
+
+    Raises ValueError for one there is not, and for one that is no regular polygon seen from the side.
+    """
+    if name == "hedgehog":  # straight from its file: the mesh's geometry takes longer to load than a trial lasts
+        table = tomllib.loads((PLATFORMS / "hedgehog.toml").read_text(encoding="utf-8"))
+        wheels = table["wheels"]
+        return PlatformNumbers(
+            name,
+            table["body"]["mass"],
+            table["body"]["inertia"][1],
+            SPIKE_LENGTH,
+            8,
+            wheels["inertia"],
+            wheels["motor_torque"],
+            wheels["brake_torque"],
+            wheels["max_speed"],
+        )
+    from rigid.platform_files import find_platform
+
+    platform = find_platform(name)
+    stance, wheel = platform.stance(), platform.wheel()
+    count = round(math.pi / stance.lean)
+    if abs(count * stance.lean - math.pi) > 1e-6:
+        raise ValueError(
+            f"platform = {name!r} leans {math.degrees(stance.lean):.4g} degrees over its front tips, which is no "
+            f"regular polygon: the planar model takes one whose spikes are at equal angles"
+        )
+    return PlatformNumbers(
+        name,
+        platform.mass,
+        platform.moment(),
+        stance.spike_length,
+        count,
+        wheel.inertia,
+        wheel.motor_torque,
+        wheel.brake_torque,
+        wheel.max_speed,
+    )
+
+
+@dataclass(frozen=True)
+class TumblePlan:
+    """A trial, and what is said of it."""
+
+    trial: Trial
+    numbers: Mapping[str, Number]
+    surface: str
+    """Name of the material."""
+    choices: Mapping[str, str]
+    """What else was left at its default: name -> value, as a person would type it."""
+    warnings: tuple[str, ...] = ()
+
+    def sentences(self) -> list[str]:
+        """One line for each number and choice that was not given: every default is said."""
+        lines = [f"{name} = {value} (default)" for name, value in self.choices.items()]
+        for name, number in self.numbers.items():
+            if number.origin != "given":
+                unit = "" if number.unit == "1" else f" {number.unit}"
+                lines.append(f"{name} = {number.value:.6g}{unit} ({number.origin})")
+        return lines
+
+
+def plan_tumble(settings: TumbleSettings, *, model_file: Path | None = None) -> TumblePlan:
+    """The trial that `settings` describe. `model_file` stands in for ``settings.model``, where that was copied.
+
+    Raises ValueError, naming the setting, for a surface, law, effect or parameter there is not, a model that cannot be
+    read, and numbers that no platform or rig can have.
+    """
+    source = model_file if model_file is not None else Path(settings.model) if settings.model is not None else None
+    model = _read(source) if source is not None else None
+    numbers: dict[str, Number] = {}
+
+    def settle(name: str, default: float, origin: str, *, in_model: float | None = None) -> float:
+        given = getattr(settings, name, None)
+        if given is not None:
+            numbers[name] = Number(given, UNITS[name], "given")
+        elif in_model is not None:
+            numbers[name] = Number(in_model, UNITS[name], "model")
+        else:
+            numbers[name] = Number(default, UNITS[name], origin)
+        return numbers[name].value
+
+    platform = platform_numbers(settings.platform)
+    for name in ("mass", "inertia", "spike_length"):
+        in_model = getattr(model.platform, name) if model is not None else None
+        settle(name, getattr(platform, name), f"platform {platform.name}", in_model=in_model)
+    in_model = model.wheel.inertia if model is not None else None
+    settle("wheel_inertia", platform.wheel_inertia, f"platform {platform.name}", in_model=in_model)
+    surface, warnings = _settle_surface(settings, model, settle)
+    _settle_gravity(settings, model, numbers)
+    settle("torque", TORQUE, "default")
+    settle("torque_until", float("inf"), "default: as long as the trial")
+    settle("wheel_speed_0", 0.0, "default")
+    if model is None:
+        _check_wheel(settings, platform, numbers)
+    values: dict[str, Any] = {name: number.value for name, number in numbers.items()}
+    ground = _ground(settings)
+    trial = Trial(
+        **values,
+        spike_count=platform.spike_count if model is None else 8,
+        actuator=settings.actuator,
+        ground=ground,
+        effects=(*_model_effects(model, source), *_given_effects(settings.effects)),
+    )
+    if ground is not None:
+        for name in ("stiffness", "damping"):
+            del numbers[name]
+        for name, value in ground.law.values(ground.parameters).items():
+            unit = next(parameter.unit for parameter in ground.law.parameters if parameter.name == name)
+            origin = "given" if name in ground.parameters else f"default of {ground.name}, of one spike"
+            numbers[name] = Number(value, unit, origin)
+    warnings += _rig_warnings(trial)
+    return TumblePlan(trial, numbers, surface, _choices(settings, surface, model), tuple(warnings))
+
+
+def _choices(settings: TumbleSettings, surface: str, model: TumbleModel | None) -> dict[str, str]:
+    """The settings that are no numbers of the trial and stand at their defaults."""
+    units = {"duration": " s", "sample_interval": " s"}
+    names = ("platform", "ground", "actuator", "duration", "method", "sample_interval")
+    fields = type(settings).model_fields
+    found = {
+        name: f"{getattr(settings, name)}{units.get(name, '')}"
+        for name in names
+        if getattr(settings, name) == fields[name].default
+    }
+    return ({"surface": surface} if settings.surface is None and model is None else {}) | found
+
+
+def _check_wheel(settings: TumbleSettings, platform: PlatformNumbers, numbers: Mapping[str, Number]) -> None:
+    """Refuse what the platform's wheel cannot do."""
+    most = platform.motor_torque if settings.actuator == "motor" else platform.brake_torque
+    other = ", or actuator = brake with a wheel_speed_0" if settings.actuator == "motor" else ""
+    torque, speed = numbers["torque"].value, numbers["wheel_speed_0"].value
+    if torque > most * (1 + 1e-9):
+        raise ValueError(
+            f"torque = {torque:g} N m is beyond the {settings.actuator} of platform = {platform.name!r}: at most "
+            f"{most:g} N m would do{other}, or a platform with a stronger one"
+        )
+    if speed > platform.max_wheel_speed:
+        raise ValueError(
+            f"wheel_speed_0 = {speed:g} rad/s is beyond the wheel of platform = {platform.name!r}: at most "
+            f"{platform.max_wheel_speed:g} rad/s would do"
+        )
+
+
+def _read(path: Path) -> TumbleModel:
+    model = read_model(path)
+    if not isinstance(model, TumbleModel):
+        raise ValueError(f"model = {str(path)!r} is of kind {model.kind!r}: one of kind 'tumble' would do")
+    return model
+
+
+def _settle_surface(settings: TumbleSettings, model: TumbleModel | None, settle: Any) -> tuple[str, list[str]]:
+    """Settle K, C and friction; return the material's name and what has to be said of it."""
+    numbers: Any
+    warnings: list[str] = []
+    if settings.surface is None and model is not None:
+        numbers, name, origin = model.surface, model.surface.kind, "model"
+    else:
+        numbers = found = find_surface(settings.surface or DEFAULT_SURFACE)
+        name, origin = found.name, f"surface {found.name}"
+        warnings = [f"stiffness, damping and friction of {name} are {found.source}"] if found.guess else []
+    for key in ("stiffness", "damping", "mu_s"):
+        settle(key, getattr(numbers, key), origin)
+    if settings.mu_s is not None:
+        settle("mu_d", 0.5 * settings.mu_s, "default: half of mu_s")
+    else:
+        sliding = numbers.mu_d if numbers.mu_d is not None else 0.5 * numbers.mu_s
+        settle("mu_d", sliding, origin)
+    return name, warnings
+
+
+def _settle_gravity(settings: TumbleSettings, model: TumbleModel | None, numbers: dict[str, Number]) -> None:
+    """Settle gravity_sim, local gravity and counterweight, in the rig or free of it."""
+    if settings.gravity is not None:
+        numbers["gravity_sim"] = Number(settings.gravity, "m/s2", "given")
+        numbers["gravity"] = Number(settings.gravity, "m/s2", "free platform: the same")
+        numbers["counterweight"] = Number(0.0, "kg", "free platform")
+        return
+    if model is not None and model.rig is None and settings.rig is None:
+        raise ValueError(f"gravity must be given: the model {settings.model!r} has no [rig] (m/s2, or rig)")
+    in_model = model.rig if model is not None else None
+    local = in_model.gravity if in_model is not None else STANDARD_GRAVITY
+    stated = settings.rig if settings.rig is not None else DEFAULT_RIG
+    if stated * STANDARD_GRAVITY >= local:
+        raise ValueError(
+            f"rig = {stated:g} (of 9.80665 m/s2) is not below the local gravity, {local:g} m/s2: a rig can only take "
+            f"weight away, so less would do, or gravity in place of rig"
+        )
+    counterweight = settings.counterweight
+    origin = "given"
+    if counterweight is None and in_model is not None and in_model.counterweight is not None:
+        counterweight, origin = in_model.counterweight, "model"
+    rig = Rig.offloading(
+        numbers["mass"].value,
+        stated * STANDARD_GRAVITY,
+        reading=settings.rig_reading,
+        counterweight=counterweight,
+        gravity=local,
+    )
+    if counterweight is None:
+        origin = "m (g - g_sim) / (g + g_sim)" if settings.rig_reading == "pair" else "m (1 - rig g0 / g)"
+    read = f"rig = {stated:g}{'' if settings.rig is not None else ' by default'}, read as {settings.rig_reading}"
+    numbers["gravity_sim"] = Number(rig.gravity_sim, "m/s2", read)
+    numbers["gravity"] = Number(local, "m/s2", "model" if in_model is not None else "default")
+    numbers["counterweight"] = Number(rig.counterweight, "kg", origin)
+
+
+def _rig_warnings(trial: Trial) -> list[str]:
+    """What has to be said of a counterweight that does not belong to the gravity."""
+    if trial.counterweight == 0:
+        return []
+    hung = (trial.mass - trial.counterweight) * trial.gravity
+    if abs(hung - trial.weight) <= 0.02 * trial.weight:
+        return []
+    return [
+        f"counterweight = {trial.counterweight:.5g} kg would leave {hung:.3g} N on the surface; the simulated gravity "
+        f"rules, which says {trial.weight:.3g} N"
+    ]
+
+
+def _ground(settings: TumbleSettings) -> Ground | None:
+    """The law that is named; None for the spring-damper of K and C."""
+    if settings.ground == "spring-damper":
+        return None
+    parameters = dict(_assignment("ground_parameters", text) for text in settings.ground_parameters)
+    try:
+        return Ground(name=settings.ground, parameters=parameters, spikes_per_row=SPIKES_PER_ROW)
+    except ValueError as error:
+        raise ValueError(f"ground = {settings.ground!r}: {error}") from None
+
+
+def _assignment(key: str, text: str) -> tuple[str, float]:
+    name, equals, value = text.partition("=")
+    try:
+        return name.strip(), float(value)
+    except ValueError:
+        found = "has no number" if equals else "has no ="
+        raise ValueError(f"{key} = {text!r} {found}: name=value would do, such as exponent=1.5") from None
+
+
+def _model_effects(model: TumbleModel | None, path: Path | None) -> tuple[Effect, ...]:
+    """The effects of a model; the files of one's own are sought beside it."""
+    if model is None or path is None:
+        return ()
+    try:
+        return tuple(
+            Effect(
+                id=effect.id,
+                parameters=effect.parameters,
+                file=path.parent / effect.file if effect.file is not None else None,
+            )
+            for effect in model.effect
+        )
+    except ValueError as error:
+        raise ValueError(f"{path}: [[effect]]: {error}") from None
+
+
+def _given_effects(texts: tuple[str, ...]) -> tuple[Effect, ...]:
+    """Effects from ``id`` and ``id.parameter=value``; several parameters of one effect may stand apart."""
+    found: dict[str, dict[str, float]] = {}
+    for text in texts:
+        head, equals, _ = text.partition("=")
+        name, dot, parameter = head.partition(".")
+        values = found.setdefault(name.strip(), {})
+        if bool(dot) != bool(equals):
+            raise ValueError(f"effects = {text!r} will not do: id, or id.parameter=value such as pendulum.length=2.2")
+        if dot:
+            values[parameter.strip()] = _assignment("effects", text)[1]
+    try:
+        return tuple(Effect(id=name, parameters=values) for name, values in found.items())
+    except ValueError as error:
+        raise ValueError(f"effects: {error}") from None
+
+
+def model_trial(tables: Any, trial: Any, *, effects: tuple[Effect, ...] = ()) -> Trial:
+    """The `Trial` of one ``[[trial]]`` of a campaign, or of a model of tumbles, with these effects."""
+    return Trial(
+        mass=tables.platform.mass,
+        inertia=tables.platform.inertia,
+        spike_length=tables.platform.spike_length,
+        stiffness=tables.surface.stiffness,
+        damping=tables.surface.damping,
+        mu_s=tables.surface.mu_s,
+        mu_d=tables.surface.sliding_friction,
+        gravity_sim=trial.gravity_sim,
+        gravity=tables.local_gravity_of(trial),
+        counterweight=tables.counterweight_of(trial),
+        torque=trial.torque,
+        torque_until=trial.torque_until,
+        actuator=trial.actuator,
+        wheel_inertia=tables.wheel.inertia,
+        wheel_speed_0=trial.wheel_speed_0,
+        effects=effects,
+    )
