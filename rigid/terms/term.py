@@ -93,7 +93,7 @@ class Parameter:
         return float(value)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Term:
     """One named term of the model. Raises ValueError for a hook there is not, or one whose arguments do not fit."""
 
