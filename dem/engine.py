@@ -81,12 +81,11 @@ def take_engine(owner: Any, **settings: Any) -> "Engine":
 
 
 def _roomy(count: int, *, least: int) -> int:
-    """The next of 1, 1.25, 1.5, 1.75 times a power of two: few shapes to compile, little room wasted."""
+    """The next of 1 and 1.5 times a power of two: few shapes to compile, and little room wasted."""
     power = least
     while power < count:
-        for quarters in (5, 6, 7, 8):
-            if power * quarters // 4 >= count:
-                return power * quarters // 4
+        if power * 3 // 2 >= count:
+            return power * 3 // 2
         power *= 2
     return power
 
