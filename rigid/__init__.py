@@ -1,5 +1,6 @@
 """The platform and the surface laws of the paper's model; knows nothing of grains."""
 
+from .batch import BatchTrajectory, simulate_batch
 from .grounds import SpringDamper, SurfaceGround
 from .laws import GROUNDS
 from .planar import simulate
@@ -13,6 +14,7 @@ __all__ = [
     "EFFECTS",
     "GROUNDS",
     "STATES",
+    "BatchTrajectory",
     "Contact",
     "Effect",
     "Ground",
@@ -25,4 +27,5 @@ __all__ = [
     "Trajectory",
     "Trial",
     "simulate",
+    "simulate_batch",
 ]

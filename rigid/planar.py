@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike
 from .dynamics import LOST, OMEGA, VX, VY, WORK, Modes, System, X, Y
 from .planar_located import integrate
 from .planar_paper import integrate_fixed
+from .statics import standing, stiffness_at_rest
 from .trajectory import LAUNCH_DISTANCE, STATES, Tally, Trajectory
 from .trial import Trial
 
-__all__ = ["Method", "longest_step", "simulate"]
+__all__ = ["Method", "check_step", "longest_step", "simulate", "step_bound"]
 
 Method = Literal["located", "paper"]
 PAPER_STEP = 1e-3
@@ -70,15 +71,16 @@ def longest_step(trial: Trial) -> float:
     A fifth of sqrt(M / K), a thirtieth of the period, keeps the error of order 2 below half a percent; a damper adds
     the bound M / C (explicit steps are stable to 2 M / C).
     """
-    system = System(trial)
-    from .statics import stiffness_at_rest
+    stiffness, damping = stiffness_at_rest(System(trial))
+    # 1 / M of a tip at its largest lever.
+    inverse = 1 / (trial.mass + trial.counterweight) + trial.spike_length**2 / trial.inertia
+    return step_bound(stiffness, damping, inverse)
 
-    stiffness, damping = stiffness_at_rest(system)
-    # 1 / M of a tip straight under the rim: 1 / M_y + d^2 / J, at its largest lever.
-    lever = trial.spike_length
-    inverse = 1 / (trial.mass + trial.counterweight) + lever**2 / trial.inertia
-    bound = 0.2 / math.sqrt(stiffness * inverse) if stiffness > 0 else math.inf
-    return min(bound, 1 / (damping * inverse)) if damping > 0 else bound
+
+def step_bound(stiffness: float, damping: float, inverse_mass: float) -> float:
+    """The longest step [s] for a row's stiffness [N/m] and damping [N s/m] under a tip of this 1 / M [1/kg]."""
+    bound = 0.2 / math.sqrt(stiffness * inverse_mass) if stiffness > 0 else math.inf
+    return min(bound, 1 / (damping * inverse_mass)) if damping > 0 else bound
 
 
 def check_step(trial: Trial, time_step: float) -> None:
@@ -141,8 +143,6 @@ class _Recorder:
 def _simulate_located(trial: Trial, duration: float, samples: list[float], tolerance: float) -> Trajectory:
     system = System(trial)
     recorder = _Recorder(system, samples)
-    from .statics import standing
-
     z0, modes0 = standing(system)
     tally = Tally(trial, z0[X], z0[Y], sum(system.energy(0.0, z0, modes0)))
 
