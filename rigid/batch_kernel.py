@@ -259,6 +259,7 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
             slide_r = 0
             over = nominal == 0.0 or until <= 0.0
             margin = 0.0
+            pull = 0.0  # the torque at the step's start
             margin_v = 0.0
             margin_r = 0.0
             best_angle = NAN
@@ -312,7 +313,7 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                 s.cosine = ti.cos(theta1)
                 s.sine = ti.sin(theta1)
                 driving = touch != 0 and not over
-                s.wheel_speed = wheel + dt * spin_up * s.torque
+                s.wheel_speed = wheel + dt * spin_up * pull
                 s.torque = 0.0
                 if driving:
                     s.torque = nominal * torque_factor(p, s)
@@ -509,7 +510,7 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                         kind = 4
                 wheel1 = wheel
                 if driving:
-                    wheel1 = wheel + dt * spin_up * s.torque
+                    wheel1 = wheel + 0.5 * dt * spin_up * (pull + s.torque)
                     if braking and wheel1 < 0.0 and dt > 0.0:
                         share = wheel / (wheel - wheel1)
                         if share < ahead or kind == 0:
@@ -619,6 +620,7 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                 vy = py
                 omega = pt
                 wheel = wheel1
+                pull = s.torque
                 ax = ax1
                 ay = ay1
                 alpha = alpha1

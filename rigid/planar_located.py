@@ -176,10 +176,13 @@ def _attempt(
     tolerance: float,
 ) -> _Step:
     rates = [k1]
-    for c, weights in zip(_C, (_A2, _A3, _A4, _A5, _A6), strict=True):
-        rates.append(system.derivative(time + c * h, _combine(z, h, weights, rates), modes))
-    end = _combine(z, h, _B, rates)
-    rates.append(system.derivative(time + h, end, modes))
+    try:
+        for c, weights in zip(_C, (_A2, _A3, _A4, _A5, _A6), strict=True):
+            rates.append(system.derivative(time + c * h, _combine(z, h, weights, rates), modes))
+        end = _combine(z, h, _B, rates)
+        rates.append(system.derivative(time + h, end, modes))
+    except (ValueError, OverflowError, ZeroDivisionError):  # far beyond what is finite: too long a step
+        return _Step(list(z), rates, math.inf)
     error = 0.0
     for i in range(9):
         off = h * sum(e * k[i] for e, k in zip(_E, rates, strict=True))
@@ -363,7 +366,8 @@ def _locate(
             low, low_values = guess, {key: values[key][0] for key in found}
             weight_low = 1.0
             if tiny == 0.0:
-                high, high_step, high_values = guess, trial_step, values
+                high_step, high_values, high = trial_step, values, guess
+                found = [key for key in found if values[key][0] == 0.0]
                 break
         else:
             weight_low = 0.5 if guess < high else 1.0

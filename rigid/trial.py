@@ -161,6 +161,7 @@ class Trial:
             raise ValueError(f"actuator = {self.actuator!r} must be 'motor' or 'brake'")
         if math.isnan(self.torque_until) or self.torque_until < 0:
             raise ValueError(f"torque_until = {self.torque_until} must be 0 or more (in s)")
+        object.__setattr__(self, "torque_until", float(self.torque_until))
         if self.actuator == "brake" and self.torque > 0 and self.wheel_speed_0 == 0:
             raise ValueError("wheel_speed_0 = 0 must be above 0 (rad/s) for a brake: it slows a wheel that spins")
         seen: set[str] = set()
@@ -180,6 +181,7 @@ class Trial:
             raise ValueError(f"{key} = {value!r} must be a finite number")
         if value < 0 or (above and value == 0):
             raise ValueError(f"{key} = {value!r} must be {'above 0' if above else '0 or more'}")
+        object.__setattr__(self, key, float(value))
 
     def effect_values(self, id: str) -> dict[str, float] | None:
         """All parameters of the effect `id`, None where it is off."""
