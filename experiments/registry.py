@@ -94,6 +94,12 @@ EXPERIMENTS: dict[str, Experiment] = {
             module="experiments.tumble",
         ),
         Experiment(
+            "paper",
+            "Redoes Figures 5 to 8 of the paper beside what its text states in numbers.",
+            settings="experiments.paper_settings:PaperSettings",
+            module="experiments.paper",
+        ),
+        Experiment(
             "campaign",
             "Makes up a campaign of tumbles: every gravity and torque, recorded by noisy sensors, and what is true.",
             settings="experiments.campaign_settings:CampaignSettings",

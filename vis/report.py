@@ -22,6 +22,7 @@ __all__ = ["write_report"]
 #: Experiment -> module and function of its own report.
 _OTHERS = {
     "tumble": ("vis.tumble", "write_tumble_report"),
+    "paper": ("vis.paper", "write_paper_report"),
     "campaign": ("vis.campaign", "write_campaign_report"),
 }
 

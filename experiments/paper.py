@@ -1,0 +1,288 @@
+"""`hedgebed paper`: the trials of Reid, Roveda, Nesnas and Pavone (i-SAIRAS 2014) with our model.
+
+Every gravity, torque and surface, with friction as it is and at both ends of its band, by the located integrator and by
+the paper's fixed step; then the numbers that the paper does not give, halved and doubled. What the paper's text states
+is compared in `experiments.paper_claims`.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass, replace
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hedgebed import __version__
+from rigid.planar import simulate
+from rigid.trial import Ground, Trial
+
+from .paper_claims import claims
+from .paper_settings import PaperSettings
+from .progress import Progress
+from .runfolder import RunFolder
+from .surfaces import find_surface
+from .tumble_settings import TumbleSettings
+from .tumble_trial import SPIKES_PER_ROW, plan_tumble
+
+__all__ = ["Job", "check", "plan_jobs", "resume", "run"]
+
+SAMPLE_INTERVAL = 5e-3
+"""Between the rows that are kept [s]; numbers come from the integration itself."""
+SWEPT = ("inertia", "wheel_inertia", "stiffness", "damping", "wheel_speed_0")
+"""What the paper does not give."""
+FACTORS = (0.5, 2.0)
+GRAINS_LAW, GRAINS_SURFACE = "katsuragi-durian", "sand"
+"""A law that gives back next to nothing, and the surface that its own parameters are for."""
+HARD = ("steel", "brick")
+"""The surfaces of Figures 5 to 7."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One integration."""
+
+    id: str
+    rig: float
+    """g_sim [9.80665 m/s2]."""
+    torque: float
+    surface: str
+    variant: str
+    """"nominal", "low" or "high" friction, "paper" (the fixed step), another law, or what was swept ("inertia x2")."""
+    trial: Trial
+    duration: float
+    trusted: float
+
+    @property
+    def method(self) -> Any:
+        """Of the integrator."""
+        return "paper" if self.variant == "paper" else "located"
+
+
+def run(settings: PaperSettings, folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
+    """Do it all into `folder` and return the result, as result.json has it. Raises ValueError before any work."""
+    check(settings)
+    kept = RunFolder.ensure(Path(folder), "paper", settings)
+    return _carry_out(settings, kept, progress or Progress())
+
+
+def resume(folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
+    """Do it again from the start: it takes less than a minute."""
+    kept = RunFolder.open(Path(folder))
+    return _carry_out(PaperSettings(**kept.settings), kept, progress or Progress())
+
+
+def check(settings: PaperSettings) -> None:
+    """Raise ValueError, naming key, value and what would do, for what the settings class cannot see."""
+    jobs = plan_jobs(settings)
+    for job in jobs:
+        if job.variant == "paper":  # a step too long for the ground
+            simulate(job.trial, duration=1e-3, method="paper")
+
+
+def plan_jobs(settings: PaperSettings) -> list[Job]:
+    """Every integration, in order."""
+    jobs: list[Job] = []
+    turns: list[dict[str, Any]] = [{"torque": torque, "actuator": "motor"} for torque in settings.motor_torques]
+    turns += [
+        {"torque": torque, "actuator": "brake", "wheel_speed_0": settings.brake_wheel_speed}
+        for torque in settings.brake_torques
+    ]
+    for rig in settings.rigs:
+        for turn in turns:
+            for surface in settings.surfaces:
+                jobs += _case_jobs(settings, rig, turn, surface)
+    return jobs
+
+
+def _case_jobs(settings: PaperSettings, rig: float, turn: dict[str, Any], surface: str) -> Iterator[Job]:
+    """The integrations of one gravity, torque and surface."""
+    plan = plan_tumble(
+        TumbleSettings(rig=rig, surface=surface, platform=settings.platform, rig_reading=settings.rig_reading, **turn)
+    )
+    trial, torque = plan.trial, turn["torque"]
+    name = f"{surface}-{rig:g}g-{torque:g}Nm"
+    duration = settings.duration if turn["actuator"] == "motor" else settings.brake_duration
+
+    def job(variant: str, varied: Trial) -> Job:
+        return Job(
+            f"{name}-{variant.replace(' ', '-')}", rig, torque, surface, variant, varied, duration, settings.trusted
+        )
+
+    yield job("nominal", trial)
+    for variant, factor in (("low", 1 - settings.friction_band), ("high", 1 + settings.friction_band)):
+        yield job(variant, replace(trial, mu_s=factor * trial.mu_s, mu_d=factor * trial.sliding_friction))
+    yield job("paper", trial)
+    if surface == GRAINS_SURFACE and turn["actuator"] == "brake":
+        grains = Ground(name=GRAINS_LAW, spikes_per_row=SPIKES_PER_ROW)
+        yield job(GRAINS_LAW, replace(trial, ground=grains))
+    if settings.sweep and surface in HARD and rig == settings.rigs[0]:
+        for key in SWEPT:
+            value = getattr(trial, key)
+            for factor in FACTORS if value else ():
+                yield job(f"{key} x{factor:g}", replace(trial, **{key: factor * value}))
+
+
+def _integrate(job: Job) -> dict[str, Any]:
+    """The numbers of one job, and its rows where they are drawn."""
+    trajectory = simulate(job.trial, duration=job.duration, method=job.method, sample_interval=SAMPLE_INTERVAL)
+    away = np.hypot(trajectory.x - trajectory.x[0], trajectory.y - trajectory.y[0])
+    beyond = np.flatnonzero(away >= job.trusted)
+    end = int(beyond[0]) + 1 if len(beyond) else len(away)
+    speed = np.hypot(trajectory.vx, trajectory.vy)[:end]
+    states = [(float(time), state, float(theta)) for time, state, theta in trajectory.transitions]
+    return {
+        "id": job.id,
+        "rig": job.rig,
+        "torque": job.torque,
+        "actuator": job.trial.actuator,
+        "surface": job.surface,
+        "variant": job.variant,
+        "trajectory_angle": trajectory.trajectory_angle,
+        "max_speed": float(speed.max()),
+        "max_angular_velocity": float(np.abs(trajectory.omega[:end]).max()),
+        "until": float(trajectory.time[end - 1]),
+        "transition_angle_slip": trajectory.transition_angle("slip"),
+        "transition_angle_hop": trajectory.transition_angle("hop"),
+        "energy_residual": trajectory.energy_residual,
+        "transitions": states,
+        "launch": _launch(trajectory, states),
+        "rows": _rows(trajectory) if job.variant in ("nominal", "low", "high", "paper") else None,
+    }
+
+
+def _rows(trajectory: Any) -> dict[str, Any]:
+    return {
+        "t_s": trajectory.time,
+        "x_m": trajectory.x,
+        "y_m": trajectory.y,
+        "theta_rad": trajectory.theta,
+        "vx_m_s": trajectory.vx,
+        "vy_m_s": trajectory.vy,
+        "omega_rad_s": trajectory.omega,
+        "state": np.array(trajectory.state_names),
+    }
+
+
+def _launch(trajectory: Any, states: Sequence[tuple[float, str, float]]) -> dict[str, float] | None:
+    """Position and velocity at the first hop, from a row in that flight, which is a parabola; None without one."""
+    start = next((time for time, state, _ in states if state == "hop"), None)
+    if start is None:
+        return None
+    end = next((time for time, state, _ in states if time > start and state != "hop"), math.inf)
+    inside = np.flatnonzero((trajectory.time >= start) & (trajectory.time <= end))
+    if not len(inside):
+        return None
+    row = int(inside[0])
+    back, g = float(trajectory.time[row]) - start, trajectory.trial.gravity_sim
+    vx, vy = float(trajectory.vx[row]), float(trajectory.vy[row]) + g * back
+    return {
+        "time": start,
+        "x": float(trajectory.x[row]) - vx * back,
+        "y": float(trajectory.y[row]) - vy * back + 0.5 * g * back**2,
+        "vx": vx,
+        "vy": vy,
+        "gravity": g,
+        "lasts": float(min(end, trajectory.time[-1]) - start),
+    }
+
+
+def _all(jobs: Sequence[Job], workers: int, progress: Progress) -> list[dict[str, Any]]:
+    """The results of the jobs, in their order."""
+    found = []
+    if workers == 1:
+        for number, job in enumerate(jobs, 1):
+            found.append(_integrate(job))
+            progress.update(number)
+        return found
+    with ProcessPoolExecutor(workers, mp_context=get_context("fork")) as pool:
+        for number, result in enumerate(pool.map(_integrate, jobs, chunksize=4), 1):
+            found.append(result)
+            progress.update(number)
+    return found
+
+
+def write_report(folder: Path, progress: Progress) -> None:
+    """Figures and report.html of a run folder."""
+    from vis.paper import write_paper_report as write
+
+    write(folder, progress=progress.update)
+
+
+def _carry_out(settings: PaperSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
+    jobs = plan_jobs(settings)
+    workers = settings.workers or len(os.sched_getaffinity(0))
+    with folder.lock():
+        progress.plan({"trials": float(len(jobs)), "report": 0.1 * len(jobs)})
+        progress.stage("trials", total=float(len(jobs)))
+        progress.message(f"{len(jobs)} integrations on {workers} processes")
+        found = _all(jobs, workers, progress)
+        for entry in found:
+            rows = entry.pop("rows")
+            if rows is not None and entry["surface"] in HARD:
+                entry["series"] = folder.write_series(entry["id"], rows)
+        result = _result(settings, jobs, found)
+        folder.write_result(result)
+        progress.stage("report", total=1.0)
+        write_report(folder.path, progress)
+    return result
+
+
+def _result(settings: PaperSettings, jobs: Sequence[Job], found: list[dict[str, Any]]) -> dict[str, Any]:
+    cases = [entry for entry in found if entry["variant"] in ("nominal", "low", "high", "paper")]
+    swept = [entry for entry in found if " x" in entry["variant"]]
+    stated = claims(settings, found, jobs)
+    met = [claim for claim in stated if claim["met"] is not None]
+    guesses = sorted({job.surface for job in jobs if find_surface(job.surface).guess})
+    warnings = [f"the numbers of {name} are a guess until they are calibrated" for name in guesses]
+    platform = jobs[0].trial
+    return {
+        "format": "hedgebed-result/1",
+        "experiment": "paper",
+        "version": __version__,
+        "title": "The paper's Figures 5 to 8 with our model",
+        "status": "done",
+        "quantities": _quantities(cases, stated, met),
+        "platform": {key: getattr(platform, key) for key in ("mass", "inertia", "spike_length", "wheel_inertia")},
+        "surfaces": {name: asdict(find_surface(name)) for name in settings.surfaces},
+        "claims": stated,
+        "cases": cases,
+        "sweep": [{key: value for key, value in entry.items() if key != "transitions"} for entry in swept],
+        "warnings": warnings,
+    }
+
+
+def _quantities(cases: list[dict[str, Any]], stated: list[dict[str, Any]], met: list[dict[str, Any]]) -> dict[str, Any]:
+    """The numbers that a person would quote."""
+
+    def number(value: float | None, unit: str, note: str) -> dict[str, Any]:
+        return {"value": value, "std": 0.0, "unit": unit, "note": note}
+
+    nominal = {entry["id"].removesuffix("-nominal"): entry for entry in cases if entry["variant"] == "nominal"}
+    fixed = {entry["id"].removesuffix("-paper"): entry for entry in cases if entry["variant"] == "paper"}
+
+    def apart(key: str) -> float:
+        pairs = [(nominal[name][key], fixed[name][key]) for name in nominal if name in fixed]
+        return max((abs(a - b) for a, b in pairs if a is not None and b is not None), default=0.0)
+
+    return {
+        "claims_met": number(
+            sum(1 for claim in met if claim["met"]), "1", f"of {len(met)} statements of the text that can be compared"
+        ),
+        "claims_compared": number(len(met), "1", f"{len(stated) - len(met)} more cannot be"),
+        "case_count": number(len(nominal), "1", "gravities x torques x surfaces"),
+        "step_angle_gap": number(
+            apart("trajectory_angle"), "rad", "largest change of a trajectory angle by the paper's fixed step"
+        ),
+        "step_speed_gap": number(
+            apart("max_speed"), "m/s", "largest change of a largest speed by the paper's fixed step"
+        ),
+        "energy_residual": number(
+            max(entry["energy_residual"] for entry in nominal.values()), "1", "largest of the located integrations"
+        ),
+    }
