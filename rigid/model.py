@@ -92,6 +92,10 @@ class Model:
         """Whether any effect has one of these hooks."""
         return any(hook in term.hooks for term in self.terms for hook in hooks)
 
+    def reads(self, *fields: str) -> bool:
+        """Whether any effect looks at one of these fields of the state."""
+        return any(set(fields) & set(hook.__code__.co_names) for term in self.terms for hook in term.hooks.values())
+
     @property
     def has_memory(self) -> bool:
         """Whether the deepest depth of a spike matters."""

@@ -1,0 +1,72 @@
+"""A motor whose torque takes a while: with it the platform pivots first on steel, as the paper saw at 0.125 N m.
+
+From static equilibrium under a torque that is there at once, the springs have not yet moved the load to the leading
+row: both rows hold the tips, and sticking asks for F = m l c tau / (J + m l^2 c^2), c = cos(pi / 8): 0.51 N where
+mu_s W = 0.22 N. So it slips, and half the friction does not catch it again. Once the load has moved, pivoting asks for
+less than a fifth of the weight.
+"""
+
+import math
+
+import pytest
+
+from rigid import Effect, Trial, simulate
+
+G = 9.80665
+MASS = 5.3
+TERM = """
+from math import exp
+from rigid.terms import Parameter, Term
+
+def factor(s, rise):
+    return 1.0 - exp(-s.time / rise)
+
+TERM = Term(
+    id="torque-rise", summary="the torque comes up with a time constant", acts="force", source="a first-order motor",
+    limits="none", hooks={"torque_factor": factor},
+    parameters=(Parameter(name="rise", unit="s", default=1e-9, summary="its time", lowest=0.0, above_lowest=True),),
+)
+"""
+
+
+def steel(tmp_path, *, rise: float | None, reading: str = "pair") -> Trial:
+    weight_of = 0.0085 * G
+    counterweight = MASS * (G - weight_of) / (G + weight_of) if reading == "pair" else MASS * (G - weight_of) / G
+    effects = ()
+    if rise is not None:
+        path = tmp_path / "rise.py"
+        path.write_text(TERM)
+        effects = (Effect(id="torque-rise", parameters={"rise": rise}, file=path),)
+    return Trial(
+        mass=MASS, inertia=0.06, spike_length=0.2, stiffness=1.5e4, damping=60.0, mu_s=0.25, mu_d=0.125,
+        gravity_sim=G * (MASS - counterweight) / (MASS + counterweight), counterweight=counterweight, torque=0.125,
+        torque_until=100.0, actuator="motor", wheel_inertia=1.2e-3, wheel_speed_0=0.0, effects=effects,
+    )  # fmt: skip
+
+
+def states(trial: Trial) -> list[str]:
+    return [state for _, state, _ in simulate(trial, duration=1.5).transitions]
+
+
+def test_a_torque_that_is_there_at_once_makes_it_slip_at_once(tmp_path):
+    trial = steel(tmp_path, rise=None)
+    arm = trial.spike_length * math.cos(math.pi / 8)
+    held = MASS * arm * trial.torque / (trial.inertia + MASS * arm**2)
+    assert held > trial.mu_s * trial.weight
+    assert states(trial)[0] == "slip"
+
+
+def test_with_a_torque_that_takes_a_tenth_of_a_second_it_stands_then_pivots(tmp_path):
+    trajectory = simulate(steel(tmp_path, rise=0.1), duration=1.5)
+    assert [state for _, state, _ in trajectory.transitions][:2] == ["stand", "pivot"]
+    assert math.degrees(trajectory.trajectory_angle) == pytest.approx(22.5, abs=2.5)
+
+
+def test_by_the_other_reading_of_the_gravity_it_slips_all_the_same(tmp_path):
+    assert states(steel(tmp_path, rise=0.1, reading="weight"))[:2] == ["stand", "slip"]
+
+
+def test_a_stand_is_not_taken_for_rest_while_the_torque_rises(tmp_path):
+    trajectory = simulate(steel(tmp_path, rise=0.1), duration=1.5)
+    assert trajectory.transitions[1][0] > 0.05
+    assert trajectory.theta[-1] > 0.02
