@@ -211,7 +211,7 @@ def _tables_toml(tables: BaseModel) -> str:
             nested += _table_toml(name, value)
         elif isinstance(value, tuple) and _table_in(info.annotation) is not None:
             listed += ["\n".join([f"[[{name}]]", *_lines(item)]) for item in value]
-        else:
+        elif value is not None:
             plain.append(f"{name} = {toml_value(value)}")
     return "\n\n".join(["\n".join(plain), *nested, *listed]) + "\n"
 

@@ -159,6 +159,9 @@ def test_a_model_written_and_read_back_is_the_same(tmp_path):
     model = TumbleModel(**shared, effect=effects)
     write_model(tmp_path / "model.toml", model)
     assert read_model(tmp_path / "model.toml") == model
+    free = model.model_copy(update={"rig": None})
+    write_model(tmp_path / "free.toml", free)
+    assert read_model(tmp_path / "free.toml") == free
 
 
 def test_a_model_needs_no_trials_but_a_campaign_does(tmp_path):

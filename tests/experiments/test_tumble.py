@@ -1,0 +1,348 @@
+"""`hedgebed tumble` from the command line: what it writes, what it says, what it refuses, and that it is quick."""
+
+import json
+import math
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.campaign import EffectTable, TumbleModel, write_model
+from experiments.campaign.tables import FORMAT, PlatformTable, RigTable, TumbleSurface, WheelTable
+from experiments.cli import main
+from experiments.runfolder import read_series
+from experiments.surfaces import find_surface, surface_names
+from experiments.tumble_settings import TumbleSettings
+from experiments.tumble_trial import plan_tumble
+from rigid.planar import simulate
+from rigid.rig import STANDARD_GRAVITY
+
+SHORT = ("--duration", "0.3", "--quiet")
+
+
+@pytest.fixture(autouse=True)
+def _somewhere_else(tmp_path, monkeypatch, request):
+    """Runs go to `tmp_path`; only what asks for it with ``reported`` draws a report."""
+    monkeypatch.chdir(tmp_path)
+    if "reported" not in request.fixturenames:
+        monkeypatch.setattr("experiments.tumble.write_report", lambda folder, progress: None)
+
+
+@pytest.fixture
+def reported():
+    """The report is drawn."""
+
+
+def result_of(folder):
+    return json.loads((Path(folder) / "result.json").read_text())
+
+
+def value_of(folder, name):
+    return result_of(folder)["quantities"][name]["value"]
+
+
+def a_model(**changes):
+    tables = {
+        "format": FORMAT,
+        "kind": "tumble",
+        "name": "fitted",
+        "platform": PlatformTable(mass=5.2, inertia=0.07, spike_length=0.19),
+        "wheel": WheelTable(inertia=1.1e-3),
+        "rig": RigTable(counterweight=5.1, wire_length=2.2),
+        "surface": TumbleSurface(kind="slate", stiffness=2e4, damping=70.0, mu_s=0.4),
+        "effect": (EffectTable(id="pendulum", parameters={"length": 2.2}),),
+    }
+    return TumbleModel(**(tables | changes))
+
+
+# What it writes
+
+
+def test_the_trajectory_has_the_columns_and_rows_that_were_agreed():
+    assert main(["tumble", "--duration", "0.7503", "--quiet", "--out", "a"]) == 0
+    text = Path("a/trajectory.csv").read_text().splitlines()
+    assert text[0] == "t_s,x_m,y_m,theta_rad,vx_m_s,vy_m_s,omega_rad_s,state"
+    columns = read_series(Path("a/trajectory.csv"))
+    assert columns["t_s"][0] == 0.0 and columns["t_s"][-1] == 0.7503
+    assert np.diff(columns["t_s"]).max() <= 1e-3 + 1e-12
+    assert set(columns["state"]) <= {"stand", "pivot", "slip", "hop"}
+    assert columns["x_m"][0] == 0.0 and columns["theta_rad"][0] == 0.0
+
+
+def test_the_quantities_are_those_of_the_trajectory():
+    assert main(["tumble", "--surface", "brick", "--torque", "0.22", "--duration", "1.0", "--quiet", "--out", "a"]) == 0
+    result = result_of("a")
+    units = {name: quantity["unit"] for name, quantity in result["quantities"].items()}
+    assert units == {
+        "trajectory_angle": "rad",
+        "max_speed": "m/s",
+        "max_angular_velocity": "rad/s",
+        "transition_angle_slip": "rad",
+        "transition_angle_hop": "rad",
+        "energy_residual": "1",
+    }
+    rows = read_series(Path("a/trajectory.csv"))
+    away = np.hypot(rows["x_m"] - rows["x_m"][0], rows["y_m"] - rows["y_m"][0])
+    first = int(np.argmax(away >= 0.01))
+    angle = math.atan2(rows["y_m"][first] - rows["y_m"][0], rows["x_m"][first] - rows["x_m"][0])
+    assert value_of("a", "trajectory_angle") == pytest.approx(angle, abs=1e-3)
+    speed = np.hypot(rows["vx_m_s"], rows["vy_m_s"]).max()
+    assert speed * (1 - 1e-12) <= value_of("a", "max_speed") <= 1.001 * speed
+    assert value_of("a", "transition_angle_hop") == pytest.approx(
+        rows["theta_rad"][rows["state"] == "hop"][0], abs=2e-3
+    )
+    assert value_of("a", "energy_residual") < 1e-6
+
+
+def test_what_never_happens_is_null():
+    assert main(["tumble", "--torque", "0.02", *SHORT, "--out", "a"]) == 0  # W l sin(pi/8) = 0.067 N m would tip it
+    for name in ("trajectory_angle", "transition_angle_slip", "transition_angle_hop"):
+        assert value_of("a", name) is None
+
+
+def test_json_prints_the_result_and_nothing_else(capsys):
+    assert main(["tumble", *SHORT, "--json", "--out", "a"]) == 0
+    assert json.loads(capsys.readouterr().out) == result_of("a")
+
+
+def test_every_default_is_printed(capsys):
+    assert main(["tumble", "--duration", "0.05", "--torque", "0.2", "--out", "a"]) == 0
+    said = capsys.readouterr().err
+    for line in (
+        "surface = steel (default)",
+        "ground = spring-damper (default)",
+        "actuator = motor (default)",
+        "platform = hedgehog (default)",
+        "mass = 5.3 kg (platform hedgehog)",
+        "inertia = 0.06 kg m2 (platform hedgehog)",
+        "spike_length = 0.2 m (platform hedgehog)",
+        "wheel_inertia = 0.0012 kg m2 (platform hedgehog)",
+        "stiffness = 15000 N/m (surface steel)",
+        "damping = 60 N s/m (surface steel)",
+        "mu_s = 0.25 (surface steel)",
+        "mu_d = 0.125 (surface steel)",
+        "gravity_sim = 0.0833565 m/s2 (rig = 0.0085 by default, read as pair)",
+        "counterweight = 5.21066 kg",
+        "torque_until = inf s",
+        "wheel_speed_0 = 0 rad/s (default)",
+    ):
+        assert line in said, line
+    assert "torque = 0.2 " not in said  # that was given
+
+
+def test_the_report_stands_on_its_own(reported):
+    assert main(["tumble", *SHORT, "--out", "a"]) == 0
+    page = Path("a/report.html").read_text()
+    assert page.count("data:image/png") == 3 and "data:image/gif" in page
+    assert "http://" not in page and "https://" not in page and "<script" not in page
+    assert {item.name for item in Path("a/figures").iterdir()} == {"trajectory.png", "states.png", "energy.png"}
+
+
+def test_a_run_is_a_case_that_gives_the_same_trajectory():
+    assert main(["tumble", "--surface", "sand", "--torque", "0.2", *SHORT, "--out", "a"]) == 0
+    assert main(["tumble", "a/run.toml", "--quiet", "--out", "b"]) == 0
+    assert Path("a/trajectory.csv").read_bytes() == Path("b/trajectory.csv").read_bytes()
+
+
+def test_a_run_whose_result_was_lost_is_finished_by_resume():
+    assert main(["tumble", *SHORT, "--out", "a"]) == 0
+    before = Path("a/trajectory.csv").read_bytes()
+    Path("a/result.json").unlink()
+    assert main(["resume", "a", "--quiet"]) == 0
+    assert Path("a/trajectory.csv").read_bytes() == before and Path("a/result.json").exists()
+
+
+def test_no_compiler_and_no_3d_is_loaded_for_it():
+    script = (
+        "import sys; from experiments.cli import main; status = main(['tumble', '--duration', '0.05', '--quiet']); "
+        "sys.exit(status or sum(name in sys.modules for name in ('taichi', 'pyvista', 'vtk')))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+# What it computes
+
+
+def test_the_rig_can_be_read_in_two_ways():
+    plans = [plan_tumble(TumbleSettings(rig=0.0085, rig_reading=reading)) for reading in ("pair", "weight")]
+    pair, weight = (plan.trial for plan in plans)
+    g = 0.0085 * STANDARD_GRAVITY
+    assert pair.gravity_sim == pytest.approx(g) and pair.weight == pytest.approx((5.3 + pair.counterweight) * g)
+    assert weight.weight == pytest.approx(5.3 * g)
+    assert pair.weight / weight.weight == pytest.approx(2 / 1.0085)
+
+
+def test_with_a_counterweight_the_stated_gravity_still_rules_the_weight():
+    plan = plan_tumble(TumbleSettings(rig=0.0085, counterweight=5.0))
+    assert plan.trial.gravity_sim == pytest.approx(0.0085 * STANDARD_GRAVITY)
+    assert plan.trial.weight == pytest.approx((5.3 + 5.0) * 0.0085 * STANDARD_GRAVITY)
+    assert any("would leave" in warning for warning in plan.warnings)
+
+
+def test_a_free_platform_has_no_counterweight():
+    trial = plan_tumble(TumbleSettings(gravity=1e-3)).trial
+    assert (trial.counterweight, trial.gravity_sim, trial.weight) == (0.0, 1e-3, pytest.approx(5.3e-3))
+
+
+@pytest.mark.parametrize(("options", "ratio"), [((), 1.0), (("--rig", "0.0085"), 2.0)], ids=["default", "rig"])
+def test_a_strong_brake_slides_off_at_the_angle_of_the_closed_form(options, ratio):
+    # tan(angle) = m / (M_y mu_d): 76.1 degrees in the rig on steel, 82.9 free of it. The weight, small against the
+    # force of the brake, bends the first 10 mm down by less than half a degree.
+    free = options == ()
+    options = ("--gravity", "0.01") if free else options
+    brake = ("--torque", "6", "--actuator", "brake", "--wheel-speed-0", "500")
+    assert main(["tumble", "--surface", "steel", *brake, *options, *SHORT, "--out", "a"]) == 0
+    expected = 82.87 if free else 76.06
+    assert math.degrees(value_of("a", "trajectory_angle")) == pytest.approx(expected, abs=0.5)
+    assert value_of("a", "transition_angle_slip") == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_platform_of_another_shape_tumbles():
+    plan = plan_tumble(TumbleSettings(platform="cubli", torque=0.05, gravity=0.05))
+    assert plan.trial.spike_count == 4
+    assert plan.trial.spike_length == pytest.approx(0.075 * math.sqrt(2))
+    assert simulate(plan.trial, duration=0.5).theta[-1] > 0.1
+
+
+@pytest.mark.parametrize("name", surface_names())
+def test_every_surface_has_its_numbers_and_their_source(name):
+    surface = find_surface(name)
+    trial = plan_tumble(TumbleSettings(surface=name)).trial
+    assert (trial.stiffness, trial.damping, trial.mu_s, trial.mu_d) == (
+        surface.stiffness, surface.damping, surface.mu_s, surface.mu_d,
+    )  # fmt: skip
+    assert len(surface.source) > 20
+    assert surface.guess == (name == "jsc1a")
+
+
+def test_the_sand_is_twice_the_spike_that_was_computed_grain_by_grain():
+    shipped = json.loads((Path(__file__).parents[2] / "docs/results/penetrate/result.json").read_text())["quantities"]
+    sand = find_surface("sand")
+    assert sand.stiffness == pytest.approx(2 * shipped["stiffness"]["value"], rel=2e-3)
+    assert sand.damping == pytest.approx(2 * shipped["damping"]["value"], rel=2e-3)
+
+
+def test_another_law_takes_its_parameters_of_one_spike():
+    given = ("dissipation=0.1", "exponent=1.4")
+    plan = plan_tumble(TumbleSettings(ground="hunt-crossley", ground_parameters=given))
+    assert plan.trial.ground.parameters == {"dissipation": 0.1, "exponent": 1.4}
+    assert plan.trial.ground.spikes_per_row == 2.0
+    assert (plan.numbers["exponent"].origin, plan.numbers["stiffness"].unit) == ("given", "N/m^n")
+    assert main(["tumble", "--ground", "hunt-crossley", *SHORT, "--out", "a"]) == 0
+
+
+# Models
+
+
+def test_a_model_gives_what_is_not_given_and_adds_its_effects():
+    write_model("model.toml", a_model())
+    assert main(["tumble", "--model", "model.toml", "--mass", "5.4", *SHORT, "--out", "a"]) == 0
+    result = result_of("a")
+    told = {name: (entry["value"], entry["origin"]) for name, entry in result["trial"].items()}
+    assert told["mass"] == (5.4, "given")
+    assert told["inertia"] == (0.07, "model")
+    assert told["stiffness"] == (2e4, "model")
+    assert told["mu_d"] == (0.2, "model")  # half of mu_s, which the model has
+    assert told["counterweight"] == (5.1, "model")
+    assert result["effects"][0]["id"] == "pendulum" and result["effects"][0]["parameters"]["length"] == 2.2
+    assert result["surface"] == "slate"
+    assert tomllib.loads(Path("a/model.toml").read_text())["name"] == "fitted"
+
+
+def test_an_effect_of_a_model_moves_the_platform():
+    write_model("with.toml", a_model())
+    write_model("without.toml", a_model(effect=()))
+    ends = {}
+    for name in ("with", "without"):
+        assert main(["tumble", "--model", f"{name}.toml", "--duration", "1", "--quiet", "--out", name]) == 0
+        ends[name] = read_series(Path(name) / "trajectory.csv")["x_m"][-1]
+    assert ends["with"] < ends["without"] - 1e-4  # the wires pull back
+
+
+def test_a_model_is_kept_with_the_run_so_that_resume_needs_nothing_else():
+    write_model("model.toml", a_model())
+    assert main(["tumble", "--model", "model.toml", *SHORT, "--out", "a"]) == 0
+    before = Path("a/trajectory.csv").read_bytes()
+    Path("model.toml").unlink()
+    Path("a/result.json").unlink()
+    assert main(["resume", "a", "--quiet"]) == 0
+    assert Path("a/trajectory.csv").read_bytes() == before
+
+
+def test_a_term_of_ones_own_runs_from_a_file_beside_the_model():
+    Path("wind.py").write_text(
+        "from rigid.terms import Parameter, Term\n"
+        "def blow(s, push):\n"
+        "    return push, 0.0, 0.0\n"
+        "TERM = Term(id='wind', summary='a steady push', acts='virtual work', source='test', limits='steady',\n"
+        "            hooks={'force': blow}, parameters=(Parameter(name='push', unit='N', default=0.0, summary='x'),))\n"
+    )
+    effect = EffectTable(id="wind", parameters={"push": 0.05}, file="wind.py")
+    write_model("model.toml", a_model(effect=(effect,)))
+    assert main(["tumble", "--model", "model.toml", *SHORT, "--out", "a"]) == 0
+    write_model("calm.toml", a_model(effect=()))
+    assert main(["tumble", "--model", "calm.toml", *SHORT, "--out", "b"]) == 0
+    blown, calm = (read_series(Path(name) / "trajectory.csv")["x_m"][-1] for name in "ab")
+    assert blown > calm
+    assert Path("a/wind.py").exists()
+
+
+# What is refused
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--actuator", "brake"], ["wheel_speed_0 = None", "must be given"]),
+        (["--actuator", "brake", "--wheel-speed-0", "0"], ["wheel_speed_0 = 0"]),
+        (["--torque", "0.5"], ["torque = 0.5 N m", "motor", "at most 0.22"]),
+        (["--torque", "7", "--actuator", "brake", "--wheel-speed-0", "9"], ["torque = 7 N m", "brake", "at most 6"]),
+        (["--actuator", "brake", "--wheel-speed-0", "2000"], ["wheel_speed_0 = 2000", "at most 1050"]),
+        (["--counterweight", "6"], ["counterweight = 6 kg", "mass = 5.3 kg", "lift"]),
+        (["--rig", "1"], ["rig = 1", "below the local gravity"]),
+        (["--rig", "0.01", "--gravity", "0.1"], ["gravity = 0.1", "rig = 0.01"]),
+        (["--gravity", "0.1", "--counterweight", "5"], ["counterweight = 5.0 belongs to a rig"]),
+        (["--gravity", "0.1", "--rig-reading", "weight"], ["rig_reading = weight belongs to a rig"]),
+        (["--inertia", "0.5"], ["inertia = 0.5 kg m2", "no body"]),
+        (["--mass", "-1"], ["--mass = -1.0", "greater than 0", "[kg]"]),
+        (["--mass", "nan"], ["--mass", "finite"]),
+        (["--torque", "-0.1"], ["--torque = -0.1", "greater than or equal to 0"]),
+        (["--mu-s", "0.2", "--mu-d", "0.3"], ["mu_d = 0.3", "mu_s = 0.2"]),
+        (["--surface", "snow"], ["surface = 'snow'", "steel, brick, sand, jsc1a"]),
+        (["--ground", "moon"], ["ground = 'moon'", "spring-damper"]),
+        (["--ground", "power", "--stiffness", "100"], ["stiffness = 100", "ground_parameters"]),
+        (["--ground", "power", "--ground-parameters", "n=2"], ["n is no parameter of power", "exponent"]),
+        (["--ground", "power", "--ground-parameters", "exponent"], ["'exponent' has no =", "exponent=1.5"]),
+        (["--ground-parameters", "exponent=2"], ["ground_parameters", "stiffness and damping"]),
+        (["--effects", "magic"], ["effect 'magic' is unknown", "pendulum"]),
+        (["--effects", "pendulum.size=2"], ["size", "length"]),
+        (["--effects", "pendulum=2"], ["effects = 'pendulum=2'", "pendulum.length=2.2"]),
+        (["--effects", "pendulum.length=-2"], ["pendulum", "length"]),
+        (["--platform", "nothing"], ["nothing", "hedgehog"]),
+        (["--platform", "mascot"], ["platform = 'mascot'", "regular polygon"]),
+        (["--model", "absent.toml"], ["absent.toml", "no such file"]),
+        (["--model", "bad.toml"], ["bad.toml: [platform] mass = 'heavy'", "kg"]),
+        (["--model", "spike.toml"], ["spike.toml", "kind 'penetration'", "'tumble'"]),
+        (["--model", "free.toml"], ["gravity must be given", "no [rig]"]),
+        (["--stiffness", "1e9", "--method", "paper"], ["time_step = 0.001 s", "stiffness"]),
+        (["--sample-interval", "0.01"], ["--sample-interval = 0.01", "[s]"]),
+        (["--duration", "0"], ["--duration = 0"]),
+        (["--spike-lenght", "0.2"], ["--spike-lenght", "--spike-length"]),
+    ],
+)  # fmt: skip
+def test_bad_input_is_refused_by_name_and_leaves_no_folder(capsys, options, said):
+    write_model("free.toml", a_model(rig=None, effect=()))
+    Path("bad.toml").write_text(Path("free.toml").read_text().replace("mass = 5.2 ", "mass = 'heavy' "))
+    Path("spike.toml").write_text(
+        'format = "hedgehog-campaign/1"\nkind = "penetration"\nname = "x"\n[spike]\ndiameter = 0.01\n'
+        '[surface]\nkind = "sand"\nstiffness = 1.0\ndamping = 1.0\n'
+    )
+    assert main(["tumble", *options, "--out", "a"]) == 2
+    text = capsys.readouterr().err
+    assert all(words in text for words in said), text
+    assert "Traceback" not in text
+    assert not Path("a").exists()
