@@ -1,0 +1,131 @@
+"""The recordings of a tumble campaign as the fit wants them: one flat list of samples a trial, and when to simulate.
+
+Contract: a trial's samples are ordered camera x, y, theta, then gyro, ax, ay, then wheel; gaps (NaN) are left out.
+Nothing is averaged or resampled. Whitening divides by the std that campaign.toml states.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.campaign import Campaign, TumbleCampaign
+
+__all__ = ["CHANNELS", "TrialData", "TumbleData", "tumble_data"]
+
+Array = NDArray[np.float64]
+
+CHANNELS = ("x", "y", "theta", "gyro", "ax", "ay", "wheel")
+"""Channels of a diagnosis, in the order of a trial's samples."""
+
+_COLUMNS = {
+    "x": ("pose", "x_m", 0), "y": ("pose", "y_m", 1), "theta": ("pose", "theta_rad", 2),
+    "gyro": ("imu", "gyro_rad_s", 0), "ax": ("imu", "ax_m_s2", 1), "ay": ("imu", "ay_m_s2", 2),
+    "wheel": ("wheel", "omega_rad_s", 0),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrialData:
+    """One trial: its conditions and its samples, shape [sample_count] each."""
+
+    id: str
+    gravity_sim: float
+    """As stated [m/s2]."""
+    counterweight: float
+    """[kg], 0 without a rig."""
+    local_gravity: float | None
+    """[m/s2]; None for a free platform, whose local gravity is gravity_sim."""
+    torque: float
+    torque_until: float
+    actuator: str
+    wheel_speed_0: float
+    time: Array = field(repr=False)
+    """On the sensor's own clock [s]."""
+    value: Array = field(repr=False)
+    """As measured, in the format's units."""
+    std: Array = field(repr=False)
+    """As stated."""
+    channel: NDArray[np.int8] = field(repr=False)
+    """Number into CHANNELS."""
+
+    @property
+    def end(self) -> float:
+        """The last sample's time [s]."""
+        return float(self.time.max())
+
+    def of(self, name: str) -> NDArray[np.bool_]:
+        """Which samples belong to the channel `name`."""
+        return self.channel == CHANNELS.index(name)
+
+    @property
+    def condition(self) -> tuple[float, float, str]:
+        """What replicates share: stated gravity [m/s2], torque [N m] and actuator."""
+        return (self.gravity_sim, self.torque, self.actuator)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TumbleData:
+    """A campaign of tumbles: its tables and its trials."""
+
+    tables: TumbleCampaign
+    trials: tuple[TrialData, ...]
+
+    @property
+    def window(self) -> float:
+        """Over which each specific force is a mean [s]."""
+        imu = self.tables.sensors.imu
+        return 0.0 if imu is None else imu.window
+
+    def only(self, ids: set[str]) -> TumbleData:
+        """The same campaign with these trials. Raises KeyError for an id there is not."""
+        missing = ids - {trial.id for trial in self.trials}
+        if missing:
+            raise KeyError(f"there is no trial {sorted(missing)}")
+        return TumbleData(tables=self.tables, trials=tuple(trial for trial in self.trials if trial.id in ids))
+
+
+def tumble_data(campaign: Campaign) -> TumbleData:
+    """The samples of `campaign`. Raises ValueError for one of another kind, a sensor with a std of 0, no sample."""
+    tables = campaign.tables
+    if not isinstance(tables, TumbleCampaign):
+        raise ValueError(f"kind = {tables.kind!r}: 'tumble' was expected")
+    trials = []
+    for trial in tables.trial:
+        parts: list[tuple[Array, Array, Array, NDArray[np.int8]]] = []
+        for number, name in enumerate(CHANNELS):
+            sensor, column, index = _COLUMNS[name]
+            recording = campaign.recording(trial.id, sensor)
+            if recording is None:
+                continue
+            std = getattr(tables.sensors, sensor).std[index]
+            if std == 0:
+                raise ValueError(
+                    f"[sensors.{sensor}] std = {list(getattr(tables.sensors, sensor).std)}: numbers above 0 were "
+                    f"expected, without noise no residual can be weighed"
+                )
+            good = np.isfinite(recording[column])
+            time, value = recording.time[good], recording[column][good]
+            parts.append((time, value, np.full(len(time), std), np.full(len(time), number, dtype=np.int8)))
+        if not parts or not sum(len(part[0]) for part in parts):
+            raise ValueError(f"trial {trial.id!r} holds no sample: numbers of at least one sensor were expected")
+        time, value, std, channel = (np.concatenate(column) for column in zip(*parts, strict=True))
+        trials.append(
+            TrialData(
+                id=trial.id,
+                gravity_sim=trial.gravity_sim,
+                counterweight=tables.counterweight_of(trial),
+                local_gravity=None if tables.rig is None else tables.rig.gravity,
+                torque=trial.torque,
+                torque_until=trial.torque_until,
+                actuator=trial.actuator,
+                wheel_speed_0=trial.wheel_speed_0,
+                time=time,
+                value=value,
+                std=std,
+                channel=channel,
+            )
+        )
+    return TumbleData(tables=tables, trials=tuple(trials))

@@ -1,0 +1,338 @@
+"""What the sensors of a tumble campaign should have read, for many sets of parameters at once.
+
+Method: one lane of the batched integrator (`rigid.batch_kernel`) for every (trial, set of parameters), all effects of
+the library compiled in with values that change nothing where they are off, so one kernel serves every candidate. The
+motion is sampled at the measured times themselves, and at both ends and the middle of every window of the IMU, whose
+mean specific force is taken by parts as in `rigid.sensors`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigid.model import parameter_names
+from rigid.terms import EFFECTS, Term
+
+from .tumble_data import CHANNELS, TrialData, TumbleData
+
+__all__ = ["Forward", "Prediction", "SHARED", "neutral"]
+
+Array = NDArray[np.float64]
+
+SHARED = ("mass", "inertia", "stiffness", "damping", "mu_s", "mu_d")
+"""Numbers that all trials share and that may be uncertain."""
+_SPIKES = 8
+_MOST_BYTES = 1.5e8
+"""Of the sampled motion held at a time."""
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """One trial under several sets of parameters."""
+
+    value: Array
+    """Shape [set_count, sample_count], in the order of `TrialData.value`; NaN where a set cannot stand or run."""
+    state: NDArray[np.int8]
+    """Number into rigid.STATES at each sample, shape [set_count, sample_count]."""
+    motion: Array
+    """x, y, theta, vx, vy, omega, wheel_speed at each sample, shape [set_count, sample_count, 7]; or [.., 0, 7]."""
+
+
+@lru_cache(maxsize=8)
+def _moving_terms(rig: bool) -> tuple[Term, ...]:
+    return tuple(term for term in EFFECTS.values() if not term.sensor and (rig or not term.needs_rig))
+
+
+def neutral(name: str) -> float:
+    """The value of "<effect>.<parameter>" that changes nothing."""
+    effect, _, parameter = name.partition(".")
+    return next(p.default for p in EFFECTS[effect].parameters if p.name == parameter)
+
+
+class Forward:
+    """The forward model of one campaign.
+
+    `predict` takes arrays by name: the shared numbers ("mass" ...), "gravity" (relative to each trial's stated one) and
+    effects' parameters ("pendulum.length", "clock-offset.offset"), each of shape [set_count] or, for "gravity",
+    [set_count, trial_count].
+    """
+
+    def __init__(self, data: TumbleData, *, time_step: float = 5e-4, threads: int | None = None) -> None:
+        self.data, self.time_step, self.threads = data, time_step, threads
+        tables = data.tables
+        self.rig = tables.rig is not None
+        self.nominal = {
+            "mass": tables.platform.mass, "inertia": tables.platform.inertia,
+            "stiffness": tables.surface.stiffness, "damping": tables.surface.damping,
+            "mu_s": tables.surface.mu_s, "mu_d": tables.surface.sliding_friction,
+        }  # fmt: skip
+        self._grids = [_Grid(trial, data.window) for trial in data.trials]
+        self.simulated = 0
+        """How many trials have been simulated so far."""
+
+    def predict(
+        self,
+        sets: Mapping[str, Array],
+        *,
+        trials: Sequence[int] | None = None,
+        motion: bool = False,
+        extra: Sequence[Term] = (),
+    ) -> list[Prediction]:
+        """Predictions, one a trial (of `trials`, all by default), for all sets at once.
+
+        Raises ValueError for a name there is not.
+        """
+        chosen = range(len(self.data.trials)) if trials is None else trials
+        count = max((np.shape(value)[0] for value in sets.values()), default=1)
+        on = {name.partition(".")[0] for name in sets if "." in name}
+        moving = any(id in EFFECTS and not EFFECTS[id].sensor for id in on)
+        terms = (*(_moving_terms(self.rig) if moving else ()), *extra)
+        columns = self._columns(sets, count, terms)
+        offset = np.asarray(sets.get("clock-offset.offset", np.zeros(count)), dtype=float)
+        scale = np.asarray(sets.get("camera-scale.scale", np.ones(count)), dtype=float)
+        slope = np.asarray(sets.get("slope.angle", np.zeros(count)), dtype=float)
+        found = []
+        for lanes in self._chunks(chosen, count):
+            found += self._run(lanes, columns, terms, offset, scale, slope, motion)
+        return _joined(found, chosen, count)
+
+    def _columns(self, sets: Mapping[str, Array], count: int, terms: tuple[Term, ...]) -> dict[str, Array]:
+        known = {f"{term.id}.{p.name}" for term in (*terms, *EFFECTS.values()) for p in term.parameters}
+        for name in sets:
+            if name not in self.nominal and name != "gravity" and name not in known:
+                raise ValueError(f"{name!r} is no number of a tumble; there is {', '.join((*SHARED, *sorted(known)))}")
+        columns = {
+            name: np.broadcast_to(np.asarray(sets.get(name, value), dtype=float), (count,))
+            for name, value in self.nominal.items()
+        }
+        columns["gravity"] = np.broadcast_to(
+            np.asarray(sets.get("gravity", np.ones((1, len(self.data.trials)))), dtype=float),
+            (count, len(self.data.trials)),
+        )
+        for term in terms:
+            for p in term.parameters:
+                name = f"{term.id}.{p.name}"
+                columns[name] = np.broadcast_to(np.asarray(sets.get(name, p.default), dtype=float), (count,))
+        return columns
+
+    def _chunks(self, chosen: Sequence[int], count: int) -> list[list[tuple[int, int, int]]]:
+        """Lanes (trial, first set, set after the last) in chunks of one length that fit in memory."""
+        chunks: dict[float, list[list[tuple[int, int, int]]]] = {}
+        room: dict[float, float] = {}
+        for trial in chosen:
+            grid = self._grids[trial]
+            each = 88.0 * grid.size
+            most = max(1, int(_MOST_BYTES / each))
+            for first in range(0, count, most):
+                last = min(first + most, count)
+                if room.get(grid.end, 0.0) < each * (last - first):
+                    chunks.setdefault(grid.end, []).append([])
+                    room[grid.end] = _MOST_BYTES
+                chunks[grid.end][-1].append((trial, first, last))
+                room[grid.end] -= each * (last - first)
+        return [chunk for same_end in chunks.values() for chunk in same_end]
+
+    def _run(
+        self, lanes: list[tuple[int, int, int]], columns: Mapping[str, Array], terms: tuple[Term, ...],
+        offset: Array, scale: Array, slope: Array, motion: bool,
+    ) -> list[tuple[int, int, Prediction]]:  # fmt: skip
+        from rigid.batch_kernel import CHANNELS as RECORDED
+        from rigid.batch_kernel import SUMMARY, batch_kernel
+        from rigid.runtime import ensure
+        from rigid.trajectory import LAUNCH_DISTANCE
+
+        ensure(threads=self.threads)
+        stand, advance = batch_kernel(terms, "spring-damper", _SPIKES)
+        total = sum(last - first for _, first, last in lanes)
+        width = max(self._grids[trial].size for trial, _, _ in lanes)
+        numbers = np.empty((total, 16 + len(parameter_names(terms))))
+        times = np.empty((total, width))
+        at, end = 0, 0.0
+        for trial, first, last in lanes:
+            rows, grid = slice(at, at + last - first), self._grids[trial]
+            self._fill(numbers[rows], self.data.trials[trial], trial, columns, terms, slice(first, last))
+            own = grid.times(offset[first:last])
+            times[rows, : grid.size] = own
+            times[rows, grid.size :] = own[:, -1:]
+            end = max(end, float(own.max()))
+            at += last - first
+        poses = np.zeros((total, 2))
+        stand(numbers, poses)
+        summary = np.full((total, len(SUMMARY)), np.nan)
+        series = np.full((total, width, len(RECORDED)), np.nan)
+        end += 1e-9
+        steps = math.ceil(end / self.time_step)
+        advance(numbers, poses, times, self.time_step, steps, end, LAUNCH_DISTANCE, summary, series)
+        self.simulated += total
+        series[~np.isin(summary[:, SUMMARY.index("status")], (0.0, 1.0))] = np.nan
+        found, at = [], 0
+        for trial, first, last in lanes:
+            rows = slice(at, at + last - first)
+            local = self.data.trials[trial].local_gravity
+            pull = columns["gravity"][first:last, trial] * self.data.trials[trial].gravity_sim
+            pull = pull if local is None else np.full(last - first, local)
+            grid, sets = self._grids[trial], slice(first, last)
+            value, state, moved = grid.read(
+                series[rows, : grid.size], offset[sets], pull, slope[sets], scale[sets], motion
+            )
+            found.append((trial, first, Prediction(value, state, moved)))
+            at += last - first
+        return found
+
+    def _fill(
+        self, numbers: Array, trial: TrialData, index: int, columns: Mapping[str, Array], terms: tuple[Term, ...],
+        sets: slice,
+    ) -> None:  # fmt: skip
+        """Rows of numbers as `rigid.batch_kernel` wants them (FIXED_NUMBERS, the ground's law, the effects')."""
+        length = self.data.tables.platform.spike_length
+        gravity = columns["gravity"][sets, index] * trial.gravity_sim
+        mass = columns["mass"][sets]
+        fixed = (
+            mass, columns["inertia"][sets], length, length * math.cos(math.pi / _SPIKES), trial.counterweight,
+            gravity if trial.local_gravity is None else trial.local_gravity, (mass + trial.counterweight) * gravity,
+            trial.torque, trial.torque_until, self.data.tables.wheel.inertia,
+            1.0 if trial.actuator == "motor" else -1.0, trial.wheel_speed_0, columns["mu_s"][sets],
+            np.minimum(columns["mu_d"][sets], columns["mu_s"][sets]),
+            columns["stiffness"][sets], columns["damping"][sets],
+        )  # fmt: skip
+        for k, value in enumerate(fixed):
+            numbers[:, k] = value
+        names = [f"{term.id}.{p.name}" for term in terms for p in term.parameters]
+        for k, name in enumerate(names):
+            numbers[:, len(fixed) + k] = columns[name][sets]
+        numbers[:, -1] = 1.0  # the spring-damper gives all back
+
+
+class _Grid:
+    """When one trial is to be sampled, and how its samples become readings."""
+
+    def __init__(self, trial: TrialData, window: float) -> None:
+        self.window = window
+        self.channel = trial.channel
+        imu = np.isin(trial.channel, [CHANNELS.index(name) for name in ("gyro", "ax", "ay")])
+        force = np.isin(trial.channel, [CHANNELS.index(name) for name in ("ax", "ay")])
+        self.camera_time, self.camera_row = np.unique(trial.time[~imu], return_inverse=True)
+        self.imu_time, self.imu_row = np.unique(trial.time[imu], return_inverse=True)
+        self.camera_at, self.imu_at = np.cumsum(~imu) - 1, np.cumsum(imu) - 1  # of a sample, among its clock's
+        self.imu, self.force = imu, force
+        self.parts = 3 if window > 0 and force.any() else 1
+        self.size = len(self.camera_time) + self.parts * len(self.imu_time)
+        half = 0.5 * window if self.parts == 3 else 0.0
+        latest = max(self.camera_time[-1:].tolist() + (self.imu_time[-1:] + half).tolist())
+        self.end = round(max(latest, 1e-3), 1)
+        self._sorted: dict[float, tuple[Array, NDArray[np.intp]]] = {}
+
+    def _plain(self, offset: float) -> tuple[Array, NDArray[np.intp]]:
+        """Rising sample times for a clock that is off by `offset` [s], and where each reading's sample has gone."""
+        if offset not in self._sorted:
+            if len(self._sorted) > 64:
+                self._sorted.clear()
+            true = self.imu_time - offset
+            half = 0.5 * self.window
+            parts = (true - half, true, true + half) if self.parts == 3 else (true,)
+            wanted = np.maximum(np.concatenate([self.camera_time, *parts]), 0.0)
+            order = np.argsort(wanted, kind="stable")
+            place = np.empty_like(order)
+            place[order] = np.arange(len(order))
+            self._sorted[offset] = (wanted[order], place)
+        return self._sorted[offset]
+
+    def times(self, offset: Array) -> Array:
+        """Sample times [s], never below 0, shape [set_count, size]."""
+        return np.stack([self._plain(float(value))[0] for value in offset])
+
+    def read(
+        self, series: Array, offset: Array, pull: Array, slope: Array, scale: Array, motion: bool
+    ) -> tuple[Array, NDArray[np.int8], Array]:
+        """Readings and states, shape [set_count, sample_count], from the sampled motion of one trial.
+
+        Args:
+            series: as the batch recorded it at `times`, shape [set_count, size, channel].
+            offset: of the IMU's clock [s], shape [set_count] like the rest.
+            pull: local gravity [m/s2].
+            slope: of the surface [rad].
+            scale: of the camera [1].
+            motion: whether to give the motion at every sample too.
+        """
+        count = len(series)
+        value = np.empty((count, len(self.channel)))
+        state = np.empty((count, len(self.channel)), dtype=np.int8)
+        moved = np.empty((count, len(self.channel), 7)) if motion else np.empty((count, 0, 7))
+        for one in np.unique(offset):
+            sets = np.flatnonzero(offset == one)
+            self._read(series, sets, float(one), pull, slope, scale, value, state, moved)
+        return value, state, moved
+
+    def _read(
+        self, series: Array, sets: NDArray[np.intp], offset: float, pull: Array, slope: Array, scale: Array,
+        value: Array, state: NDArray[np.int8], moved: Array,
+    ) -> None:  # fmt: skip
+        place = self._plain(offset)[1]
+        here = series if len(sets) == len(series) else series[sets]
+        cameras, imus = len(self.camera_time), len(self.imu_time)
+        camera = here[:, place[:cameras]]
+        parts = [here[:, place[cameras + k * imus : cameras + (k + 1) * imus]] for k in range(self.parts)]
+        middle = parts[self.parts // 2] if imus else camera[:, :0]
+        readings = {
+            "x": scale[sets, None] * camera[:, :, 0], "y": scale[sets, None] * camera[:, :, 1],
+            "theta": camera[:, :, 2], "wheel": np.abs(camera[:, :, 8]), "gyro": middle[:, :, 5],
+        }  # fmt: skip
+        if self.force.any():
+            readings["ax"], readings["ay"] = self._specific_force(parts, offset, pull[sets], slope[sets])
+        for number, name in enumerate(CHANNELS):
+            mine = np.flatnonzero(self.channel == number)
+            if not len(mine):
+                continue
+            rows = self.imu_row[self.imu_at[mine]] if self.imu[mine[0]] else self.camera_row[self.camera_at[mine]]
+            source = middle if self.imu[mine[0]] else camera
+            value[np.ix_(sets, mine)] = readings[name][:, rows]
+            numbers = source[:, rows, 9]
+            state[np.ix_(sets, mine)] = np.where(np.isfinite(numbers), numbers, 0).astype(np.int8)
+            if moved.shape[1]:
+                moved[np.ix_(sets, mine)] = source[:, rows][:, :, (0, 1, 2, 3, 4, 5, 8)]
+
+    def _specific_force(self, parts: list[Array], offset: float, pull: Array, slope: Array) -> tuple[Array, Array]:
+        """In body axes [m/s2]: mean over the window by parts (`rigid.sensors`), the integral by Simpson's rule."""
+        gx, gy = (pull * np.sin(slope))[:, None], (pull * np.cos(slope))[:, None]
+        if self.parts == 1:
+            at = parts[0]
+            sine, cosine = np.sin(at[:, :, 2]), np.cos(at[:, :, 2])
+            moves = self.imu_time - offset >= 0
+            ax, ay = np.where(moves, at[:, :, 6], 0.0) + gx, np.where(moves, at[:, :, 7], 0.0) + gy
+            return ax * cosine - ay * sine, ax * sine + ay * cosine
+        along, up, over_x, over_y = [], [], [], []
+        for at in parts:
+            sine, cosine = np.sin(at[:, :, 2]), np.cos(at[:, :, 2])
+            along.append(at[:, :, 3] * cosine - at[:, :, 4] * sine)
+            up.append(at[:, :, 3] * sine + at[:, :, 4] * cosine)
+            over_x.append(at[:, :, 5] * up[-1] + gx * cosine - gy * sine)
+            over_y.append(gx * sine + gy * cosine - at[:, :, 5] * along[-1])
+        weights = (1 / 6, 4 / 6, 1 / 6)
+        mean_x = sum(w * over for w, over in zip(weights, over_x, strict=True))
+        mean_y = sum(w * over for w, over in zip(weights, over_y, strict=True))
+        return (along[2] - along[0]) / self.window + mean_x, (up[2] - up[0]) / self.window + mean_y
+
+
+def _joined(
+    found: list[tuple[int, int, Prediction]], chosen: Sequence[int], count: int
+) -> list[Prediction]:
+    """The pieces of every trial put together, in the order of `chosen`."""
+    joined = []
+    for trial in chosen:
+        own = [piece for at, _, piece in sorted((f for f in found if f[0] == trial), key=lambda f: f[1])]
+        joined.append(
+            own[0]
+            if len(own) == 1
+            else Prediction(
+                np.concatenate([piece.value for piece in own]),
+                np.concatenate([piece.state for piece in own]),
+                np.concatenate([piece.motion for piece in own]),
+            )
+        )
+    return joined
