@@ -107,7 +107,7 @@ class System:
                 f"tip-radius.radius = {self.radius:g} m must be below spike_length = {trial.spike_length:g} m"
             )
         self.crater = model.crater(self.p)
-        self.has_memory = model.has_memory
+        self.has_memory = self._remembers()
         self.sheds = self.has_memory and (ground.law.has_memory or model.has("crater"))
         self.has_vertical, self.has_rotation = model.has("vertical_friction"), model.has("rotation_friction")
         self.mu_s, self.mu_d = trial.mu_s, trial.sliding_friction
@@ -117,6 +117,15 @@ class System:
         self.stick_force = self.stick_load = self.stick_bound = 0.0
         self.vertical_force = self.vertical_bound = self.rotation_force = self.rotation_bound = 0.0
         self.acceleration = (0.0, 0.0, 0.0)
+
+    def _remembers(self) -> bool:
+        """Whether the deepest depth matters: not where the effects that look at it have no amplitude."""
+        if not self.model.has_memory:
+            return False
+        depth = 1e-3
+        fresh = self.model.contact(self.p, self.s, self.q, depth, 0.0, 0.0, depth)
+        again = self.model.contact(self.p, self.s, self.q, depth, 0.0, 0.0, 2 * depth)
+        return bool(self.crater != 0.0 or fresh != again)
 
     # -- geometry ----------------------------------------------------------------------------------------------------
 
@@ -249,6 +258,8 @@ class System:
 
     def _shed(self, depth: float, slip: float, elastic: float) -> float:
         """Work that the elastic force does not store, per depth, on new ground [N]: F - d(stored)/d(depth)."""
+        if not self.model.law.has_memory:
+            return self.crater * elastic
         e = 1e-3 * depth
 
         def stored(z: float) -> float:

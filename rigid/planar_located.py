@@ -83,9 +83,10 @@ def integrate(
     time, told = 0.0, Progress()
     if trial.torque_until <= 0 or trial.torque == 0:
         modes.torque_over = True
-    rate = resolve(
-        system, time, z, modes, spikes=[n for n in modes.touching if modes.slip[n] == 0], vertical=True, rotation=True
-    )
+    still = [n for n in modes.touching if modes.slip[n] == 0]
+    climbing = system.s.up_x * z[VX] + system.s.up_y * z[VY]
+    modes.vertical, modes.rotation = _sign(climbing), _sign(z[OMEGA])
+    rate = resolve(system, time, z, modes, spikes=still, vertical=climbing == 0, rotation=z[OMEGA] == 0)
     told.transitions.append((time, modes.state, z[THETA]))
     h, crowd, crowd_since = 1e-4, 0, -math.inf
     before: dict[Monitor, tuple[float, float]] = {}
@@ -153,6 +154,10 @@ def integrate(
             rate = system.derivative(time, z, modes)
         h = h_next
     return told
+
+
+def _sign(value: float) -> int:
+    return (value > 0) - (value < 0)
 
 
 def _scale(system: System) -> list[float]:
@@ -289,31 +294,56 @@ def _triggered(before: dict[Monitor, tuple[float, float]], after: dict[Monitor, 
     return found
 
 
-def _grazed(
-    before: dict[Monitor, tuple[float, float]], after: dict[Monitor, tuple[float, float]], h: float
-) -> float | None:
-    """The earliest time within the step [s from its start] at which a monitor dips below zero and comes back."""
-    earliest = None
+def _lowest(
+    system: System,
+    time: float,
+    z: list[float],
+    modes: Modes,
+    rate: list[float],
+    h: float,
+    before: dict[Monitor, tuple[float, float]],
+    after: dict[Monitor, tuple[float, float]],
+    scale: Sequence[float],
+    tolerance: float,
+) -> tuple[float, _Step, dict[Monitor, tuple[float, float]]] | None:
+    """A shorter step that ends where a monitor, positive at both ends, is lowest between them and below zero.
+
+    Only monitors that come near zero by the cubic through both ends are followed, by the root of their rate.
+    """
     for key, (end, end_rate) in after.items():
         if key[0] not in ("touch", "slip", "lift") or key not in before:
             continue
         start, start_rate = before[key]
         if not (start > 0 and end >= 0 and start_rate < 0 < end_rate):
             continue
-        # The cubic through both ends: its lowest point by ternary search.
-        a, b = 0.0, 1.0
+        least = min(_cubic(0.05 * k, start, end, h * start_rate, h * end_rate) for k in range(1, 20))
+        if least > 0.1 * max(start, end):
+            continue
+        low, low_rate, high, high_rate = 0.0, start_rate, h, end_rate
+        for _ in range(30):
+            guess = low - low_rate * (high - low) / (high_rate - low_rate)
+            edge = 1e-3 * (high - low)
+            guess = min(max(guess, low + edge), high - edge)
+            step = _attempt(system, time, z, modes, rate, guess, scale, tolerance)
+            values = _monitors(system, step.z, modes)
+            if key not in values:
+                break
+            value, slope = values[key]
+            if value < 0:
+                return guess, step, values
+            if slope == 0.0 or high - low < 1e-12:
+                break
+            if slope < 0:
+                low, low_rate = guess, slope
+            else:
+                high, high_rate = guess, slope
+    return None
 
-        def cubic(u: float, start=start, end=end, r0=h * start_rate, r1=h * end_rate) -> float:
-            v = 1 - u
-            return start * v * v * (1 + 2 * u) + r0 * u * v * v + end * u * u * (3 - 2 * u) - r1 * u * u * v
 
-        for _ in range(40):
-            m1, m2 = a + (b - a) / 3, b - (b - a) / 3
-            a, b = (a, m2) if cubic(m1) < cubic(m2) else (m1, b)
-        u = 0.5 * (a + b)
-        if cubic(u) < 0 and (earliest is None or u * h < earliest):
-            earliest = u * h
-    return earliest
+def _cubic(u: float, start: float, end: float, rise_0: float, rise_1: float) -> float:
+    """The cubic on 0 to 1 with these ends and slopes."""
+    v = 1 - u
+    return start * v * v * (1 + 2 * u) + rise_0 * u * v * v + end * u * u * (3 - 2 * u) - rise_1 * u * u * v
 
 
 def _locate(
@@ -332,11 +362,10 @@ def _locate(
     after = _monitors(system, step.z, modes)
     found = _triggered(before, after)
     if not found:
-        dip = _grazed(before, after, h)
+        dip = _lowest(system, time, z, modes, rate, h, before, after, scale, tolerance)
         if dip is None:
             return h, step, []
-        h, step = dip, _attempt(system, time, z, modes, rate, dip, scale, tolerance)
-        after = _monitors(system, step.z, modes)
+        h, step, after = dip
         found = _triggered(before, after)
         if not found:
             return h, step, []

@@ -1,0 +1,74 @@
+"""Trials that the tests of the planar model share."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigid import EFFECTS, Effect, Trial
+
+G = 9.80665
+MASS, INERTIA, LENGTH = 5.3, 0.06, 0.2
+
+RANGES = {
+    "pendulum": {"length": (1.5, 3.0)},
+    "com-offset": {"x": (-4e-4, 4e-4), "y": (-1e-3, 1e-3)},
+    "slope": {"angle": (-0.03, 0.03)},
+    "pulley-inertia": {"mass": (0.05, 0.6)},
+    "rig-friction": {"force": (0.01, 0.1)},
+    "bearing-drag": {"torque": (0.002, 0.02)},
+    "umbilical": {"stiffness": (0.005, 0.05), "drag": (0.002, 0.02)},
+    "torque-fade": {"speed_loss": (1e-4, 2e-3), "time_loss": (0.01, 0.2)},
+    "wheel-vibration": {"reduction": (0.05, 0.6)},
+    "tip-radius": {"radius": (0.002, 0.01)},
+    "inertial-drag": {"normal": (5.0, 80.0), "sideways": (0.1, 5.0)},
+    "depth-hardening": {"exponent": (0.8, 1.6)},
+    "plastic-sinkage": {"share": (0.05, 0.6)},
+    "adhesion": {"force": (0.02, 0.4)},
+    "rate-friction": {"change": (-0.4, 1.0)},
+}
+"""Plausible sizes of every effect that acts on the motion."""
+
+
+def counterweight(gravity_sim: float, mass: float = MASS) -> float:
+    """The counterweight for which (m - m_b) g = (m + m_b) g_sim."""
+    return mass * (G - gravity_sim) / (G + gravity_sim)
+
+
+def in_rig(torque: float = 0.0, *, mu_s: float = 0.5, level: float = 0.0085, **other) -> Trial:
+    """The paper's platform in its rig at `level` g."""
+    given = {"gravity_sim": level * G, "counterweight": counterweight(level * G), "torque": torque, "mu_s": mu_s}
+    return Trial(**(given | other))
+
+
+def free(torque: float = 0.0, *, mu_s: float = 0.5, level: float = 0.0085, **other) -> Trial:
+    """The paper's platform without a rig."""
+    return Trial(**({"gravity_sim": level * G, "torque": torque, "mu_s": mu_s} | other))
+
+
+def effect(id: str, **parameters: float) -> Effect:
+    return Effect(id=id, parameters=parameters)
+
+
+def drawn_effect(id: str, rng: np.random.Generator) -> Effect:
+    return effect(id, **{name: rng.uniform(*bounds) for name, bounds in RANGES[id].items()})
+
+
+def drawn(rng: np.random.Generator, effects: tuple[str, ...] = ()) -> Trial:
+    """A random trial: motor or brake, rig or free, both of the paper's gravities, soft to hard ground."""
+    mass, level = rng.uniform(4, 7), rng.choice([0.0085, 0.015]) * G
+    rigged = any(EFFECTS[id].needs_rig for id in effects) or rng.random() < 0.6
+    brake = rng.random() < 0.3
+    return Trial(
+        mass=mass,
+        inertia=rng.uniform(0.04, 0.09),
+        gravity_sim=level,
+        counterweight=counterweight(level, mass) if rigged else 0.0,
+        mu_s=rng.uniform(0.15, 0.8),
+        stiffness=10 ** rng.uniform(3, 4.3),
+        damping=10 ** rng.uniform(0.5, 2.2),
+        torque=6.0 if brake else rng.uniform(0.05, 0.4),
+        actuator="brake" if brake else "motor",
+        wheel_speed_0=rng.uniform(50, 400) if brake else 0.0,
+        torque_until=10.0 if rng.random() < 0.7 else rng.uniform(0.05, 0.8),
+        effects=tuple(drawn_effect(id, rng) for id in effects),
+    )
