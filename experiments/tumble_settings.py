@@ -29,29 +29,31 @@ class TrialSettings(StrictSettings):
     ground_parameters: tuple[str, ...] = Field(
         (), description="Parameters of another law than the spring-damper, of one spike, as name=value in SI."
     )
-    stiffness: Positive | None = Field(None, description="K of a row of spikes [N/m]; the surface's if not given.")
-    damping: NotNegative | None = Field(
-        None, description="C of a row of spikes, while going in [N s/m]; the surface's if not given."
+    stiffness: Positive | None = Field(
+        None, description="K of a row of spikes [N/m]; the surface's if not given (steel: 1.5e4)."
     )
-    mu_s: NotNegative | None = Field(None, description="Static friction [1]; the surface's if not given.")
+    damping: NotNegative | None = Field(
+        None, description="C of a row of spikes, while going in [N s/m]; the surface's if not given (steel: 60)."
+    )
+    mu_s: NotNegative | None = Field(None, description="Static friction [1]; the surface's if not given (steel: 0.25).")
     mu_d: NotNegative | None = Field(
-        None, description="Sliding friction [1]; the surface's if not given, half of mu_s where that is."
+        None, description="Sliding friction [1]; the surface's if not given (steel: 0.125), half of mu_s where that is."
     )
 
     # The platform
     platform: str = Field(
         "hedgehog", description="Platform that gives what is not given here: one that ships, or its TOML file."
     )
-    mass: Positive | None = Field(None, description="Mass of the platform [kg]; the platform's if not given.")
+    mass: Positive | None = Field(None, description="Mass [kg]; the platform's if not given (hedgehog: 5.3).")
     inertia: Positive | None = Field(
         None,
-        description="Inertia about the axis of rotation, without the wheel's own [kg m2]; the platform's if not given.",
+        description="Inertia about the axis of rotation, without the wheel's own [kg m2]; the platform's if not given (hedgehog: 0.06).",
     )
     spike_length: Positive | None = Field(
-        None, description="Centre to tip of a spike [m]; the platform's if not given."
+        None, description="Centre to tip of a spike [m]; the platform's if not given (hedgehog: 0.2)."
     )
     wheel_inertia: Positive | None = Field(
-        None, description="Inertia of the flywheel [kg m2]; the platform's if not given."
+        None, description="Inertia of the flywheel [kg m2]; the platform's if not given (hedgehog: 1.2e-3)."
     )
 
     # The rig

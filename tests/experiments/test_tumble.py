@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import subprocess
 import sys
 import tomllib
@@ -233,6 +234,14 @@ def test_another_law_takes_its_parameters_of_one_spike():
     assert plan.trial.ground.spikes_per_row == 2.0
     assert (plan.numbers["exponent"].origin, plan.numbers["stiffness"].unit) == ("given", "N/m^n")
     assert main(["tumble", "--ground", "hunt-crossley", *SHORT, "--out", "a"]) == 0
+
+
+def test_the_defaults_that_help_states_are_those_that_are_taken():
+    said = {name: field.description for name, field in TumbleSettings.model_fields.items()}
+    for name, number in plan_tumble(TumbleSettings()).numbers.items():
+        stated = re.search(r"\((?:hedgehog|steel): ([0-9.e-]+)\)", said.get(name, ""))
+        if stated:
+            assert number.value == float(stated[1]), name
 
 
 # Models
