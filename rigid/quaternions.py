@@ -1,0 +1,52 @@
+"""Unit quaternions, scalar first, that turn body axes into world axes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["from_turn", "multiply", "rate", "to_matrix"]
+
+Array = NDArray[np.float64]
+
+
+def to_matrix(q: ArrayLike) -> Array:
+    """Rotation matrix of `q`, normalised, shape [3, 3]: world = matrix @ body."""
+    w, x, y, z = (float(part) for part in np.asarray(q, dtype=float))
+    s = 2.0 / (w * w + x * x + y * y + z * z)
+    return np.array(
+        [
+            [1 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)],
+            [s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x)],
+            [s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y)],
+        ]
+    )
+
+
+def multiply(a: ArrayLike, b: ArrayLike) -> Array:
+    """The product a b: first b, then a."""
+    a0, a1, a2, a3 = (float(part) for part in np.asarray(a, dtype=float))
+    b0, b1, b2, b3 = (float(part) for part in np.asarray(b, dtype=float))
+    return np.array(
+        [
+            a0 * b0 - a1 * b1 - a2 * b2 - a3 * b3,
+            a0 * b1 + a1 * b0 + a2 * b3 - a3 * b2,
+            a0 * b2 - a1 * b3 + a2 * b0 + a3 * b1,
+            a0 * b3 + a1 * b2 - a2 * b1 + a3 * b0,
+        ]
+    )
+
+
+def rate(q: ArrayLike, spin: ArrayLike) -> Array:
+    """dq/dt under the angular velocity `spin` in world axes [rad/s], shape (3,): (0, spin) q / 2."""
+    return 0.5 * multiply(np.concatenate([[0.0], np.asarray(spin, dtype=float)]), q)
+
+
+def from_turn(turn: ArrayLike) -> Array:
+    """The quaternion of a turn about `turn`, by its length [rad], shape (3,)."""
+    v = np.asarray(turn, dtype=float)
+    angle = float(np.linalg.norm(v))
+    share = 0.5 * float(np.sinc(0.5 * angle / math.pi))
+    return np.concatenate([[math.cos(0.5 * angle)], share * v])
