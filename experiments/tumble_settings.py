@@ -47,7 +47,8 @@ class TrialSettings(StrictSettings):
     mass: Positive | None = Field(None, description="Mass [kg]; the platform's if not given (hedgehog: 5.3).")
     inertia: Positive | None = Field(
         None,
-        description="Inertia about the axis of rotation, without the wheel's own [kg m2]; the platform's if not given (hedgehog: 0.06).",
+        description="Inertia about the axis of rotation, without the wheel's own [kg m2]; the platform's if not given "
+        "(hedgehog: 0.06).",
     )
     spike_length: Positive | None = Field(
         None, description="Centre to tip of a spike [m]; the platform's if not given (hedgehog: 0.2)."
