@@ -20,7 +20,7 @@ import numpy as np
 
 from hedgebed import __version__
 from rigid.planar import simulate
-from rigid.trial import Ground, Trial
+from rigid.trial import Effect, Ground, Trial
 
 from .paper_claims import claims
 from .paper_settings import PaperSettings
@@ -37,6 +37,8 @@ SAMPLE_INTERVAL = 5e-3
 SWEPT = ("inertia", "wheel_inertia", "stiffness", "damping", "wheel_speed_0")
 """What the paper does not give."""
 FACTORS = (0.5, 2.0)
+TORQUE_RISE, RISE = Path(__file__).parent / "terms" / "torque_rise.py", 0.1
+"""A term, and its time constant [s]: what a step of the torque hides."""
 GRAINS_LAW, GRAINS_SURFACE = "katsuragi-durian", "sand"
 """A law that gives back next to nothing, and the surface that its own parameters are for."""
 HARD = ("steel", "brick")
@@ -121,6 +123,9 @@ def _case_jobs(settings: PaperSettings, rig: float, turn: dict[str, Any], surfac
     if surface == GRAINS_SURFACE and turn["actuator"] == "brake":
         grains = Ground(name=GRAINS_LAW, spikes_per_row=SPIKES_PER_ROW)
         yield job(GRAINS_LAW, replace(trial, ground=grains))
+    if surface == "steel" and rig == settings.rigs[0] and torque == min(settings.motor_torques):
+        rising = Effect(id="torque-rise", parameters={"rise": RISE}, file=TORQUE_RISE)
+        yield job(f"torque rise {RISE:g} s", replace(trial, effects=(rising,)))
     if settings.sweep and surface in HARD and rig == settings.rigs[0]:
         for key in SWEPT:
             value = getattr(trial, key)

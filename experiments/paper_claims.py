@@ -163,13 +163,9 @@ def _hops(settings: PaperSettings, table: dict[Any, Any]) -> dict[str, Any] | No
 
 
 def _pivots_first(table: dict[Any, Any], trials: dict[Any, Any], rig: float, torque: float) -> dict[str, Any]:
-    transitions = table["steel", rig, torque, "nominal"]["transitions"]
-    ends = [time for time, _, _ in transitions[1:]] + [math.inf]
-    lasting = next(
-        state
-        for (time, state, _), end in zip(transitions, ends, strict=True)
-        if state != "stand" and not (state == "slip" and end <= BRIEF)
-    )
+    lasting = _first_lasting(table["steel", rig, torque, "nominal"])
+    rises = [case for (*_, variant), case in table.items() if variant.startswith("torque rise")]
+    risen = "".join(f"; with a {case['variant']} it would {_first_lasting(case)} first" for case in rises)
     trial = trials["steel", rig, torque]
     asked = friction_of_a_rigid_pivot(trial)
     return _claim(
@@ -180,8 +176,18 @@ def _pivots_first(table: dict[Any, Any], trials: dict[Any, Any], rig: float, tor
         judged=f"the first state but for a slip of less than {BRIEF:g} s as the torque sets in",
         note=f"on rigid ground a pivot would ask for a friction coefficient of {asked:.3f}, of the {trial.mu_s:g} "
         f"there is; on springs the front spike takes the weight over only in time, and a slip that has begun has "
-        f"mu_d = {trial.sliding_friction:g} to hold it",
+        f"mu_d = {trial.sliding_friction:g} to hold it{risen}",
     )
+
+
+def _first_lasting(case: dict[str, Any]) -> str:
+    """The first state in which the platform moves, but for a brief slip as the torque sets in; stand if none."""
+    transitions = case["transitions"]
+    ends = [time for time, _, _ in transitions[1:]] + [math.inf]
+    for (_, state, _), end in zip(transitions, ends, strict=True):
+        if state != "stand" and not (state == "slip" and end <= BRIEF):
+            return str(state)
+    return "stand"
 
 
 def _negative(table: dict[Any, Any], surface: str, rig: float, torque: float) -> dict[str, Any]:

@@ -2,9 +2,9 @@
 
 import json
 import math
-import time
 from dataclasses import replace
 from pathlib import Path
+from resource import RUSAGE_CHILDREN, RUSAGE_SELF, getrusage
 
 import numpy as np
 import pytest
@@ -15,6 +15,7 @@ from experiments.paper_claims import friction_of_a_rigid_pivot
 from experiments.paper_settings import PaperSettings
 from experiments.tumble_settings import TumbleSettings
 from experiments.tumble_trial import plan_tumble
+from rigid.planar import simulate
 
 
 @pytest.fixture(scope="module")
@@ -90,6 +91,16 @@ def test_the_numbers_hold_both_integrators_and_the_friction_band(small):
     assert brake[0] > brake[1] > brake[2]  # tan(angle) = m / (M_y mu_d): less friction, steeper
 
 
+def test_steel_slips_at_once_under_a_step_of_the_torque_and_pivots_under_one_that_rises():
+    jobs = [job for job in plan_jobs(PaperSettings(sweep=False)) if (job.surface, job.rig) == ("steel", 0.0085)]
+    first = {}
+    for job in jobs:
+        if job.torque == 0.125 and job.variant in ("nominal", "torque rise 0.1 s"):
+            transitions = simulate(job.trial, duration=0.5).transitions
+            first[job.variant] = next(state for _, state, _ in transitions if state != "stand")
+    assert first == {"nominal": "slip", "torque rise 0.1 s": "pivot"}
+
+
 def test_a_hop_is_extrapolated_from_where_and_how_it_begins(small):
     case = next(
         c for c in result_of(small)["cases"] if (c["surface"], c["torque"], c["variant"]) == ("brick", 6.0, "nominal")
@@ -141,10 +152,13 @@ def test_bad_input_is_refused_by_name_and_leaves_no_folder(capsys, tmp_path, mon
 
 
 @pytest.mark.slow
-def test_the_whole_paper_takes_less_than_a_minute_on_two_cores(tmp_path):
-    start = time.monotonic()
+def test_the_whole_paper_takes_less_than_a_minute_of_processor_time(tmp_path):
+    def processor_time():  # of this process and of those it has started; the wall's depends on who else is there
+        return sum(r.ru_utime + r.ru_stime for r in map(getrusage, (RUSAGE_SELF, RUSAGE_CHILDREN)))
+
+    start = processor_time()
     result = run(PaperSettings(workers=2), tmp_path / "a")
-    assert time.monotonic() - start < 60
+    assert processor_time() - start < 60
     assert result["quantities"]["case_count"]["value"] == 24
     assert result["quantities"]["energy_residual"]["value"] < 1e-6
     for name in ("figure5", "figure6", "figure7", "figure8", "sweep"):
