@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .model import parameter_names
-from .planar import check_step
+from .planar import check_step, step_bound
 from .trajectory import LAUNCH_DISTANCE, STATES
 from .trial import Trial
 
@@ -248,16 +248,16 @@ def _with(trial: Trial, changes: Mapping[str, float], *, quiet: set[str]) -> Tri
 def _check_stiffest(first: Trial, numbers: Array, time_step: float) -> None:
     """Refuse a step too long for the stiffest, lightest trial of the batch."""
     if first.surface.name == "spring-damper":
-        from .planar import step_bound
-
         inverse = 1 / (numbers[:, 0] + numbers[:, 4]) + numbers[:, 2] ** 2 / numbers[:, 1]
-        bounds = [step_bound(k, c, inv) for k, c, inv in zip(numbers[:, 14], numbers[:, 15], inverse, strict=True)]
-        worst = int(np.argmin(bounds))
-        if time_step > bounds[worst]:
-            raise ValueError(
-                f"time_step = {time_step:g} s is too long for the ground of trial {worst} (stiffness = "
-                f"{numbers[worst, 14]:g} N/m, damping = {numbers[worst, 15]:g} N s/m): at most {bounds[worst]:.3g} s"
-            )
+        stiffness, damping = numbers[:, 14], numbers[:, 15]
+        # The worst of each kind: the bound falls with stiffness / M and with damping / M.
+        for worst in {int(np.argmax(stiffness * inverse)), int(np.argmax(damping * inverse))}:
+            bound = step_bound(float(stiffness[worst]), float(damping[worst]), float(inverse[worst]))
+            if time_step > bound:
+                raise ValueError(
+                    f"time_step = {time_step:g} s is too long for the ground of trial {worst} (stiffness = "
+                    f"{stiffness[worst]:g} N/m, damping = {damping[worst]:g} N s/m): at most {bound:.3g} s"
+                )
     else:
         check_step(first, time_step)
 

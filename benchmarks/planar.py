@@ -1,0 +1,228 @@
+"""``hedgebed bench planar``: how many tumbles of 1 s the batch does a second, and how near it is to the accurate one.
+
+Trials are drawn at random over platform, ground, gravity and torque; the step is 1 ms. Two sets of terms: the base
+model, and every effect on at once. Several rounds, the median counts; compiling is timed on its own. Beside the figure
+of the clock stands what the processor time would give on as many idle cores. For quick trials, in the environment:
+HEDGEBED_BENCH_TRIALS (timed ones), HEDGEBED_BENCH_ROUNDS, HEDGEBED_BENCH_COMPARED (with the accurate integrator).
+"""
+
+from __future__ import annotations
+
+import os
+import statistics
+import sys
+import time
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.machine import count_cores, describe_machine
+from hedgebed import __version__
+from rigid import Effect, Trial, simulate, simulate_batch
+
+__all__ = ["Settings", "drawn_trials", "run"]
+
+FORMAT = "hedgebed-bench/1"
+DURATION, TIME_STEP = 1.0, 1e-3
+GRAVITY = 9.80665
+AMPLITUDES = {
+    "pendulum": {"length": (1.5, 3.0)},
+    "com-offset": {"x": (-3e-4, 3e-4), "y": (-1e-3, 1e-3)},
+    "slope": {"angle": (-0.02, 0.02)},
+    "pulley-inertia": {"mass": (0.05, 0.6)},
+    "rig-friction": {"force": (0.01, 0.1)},
+    "bearing-drag": {"torque": (0.002, 0.02)},
+    "umbilical": {"stiffness": (0.005, 0.05), "drag": (0.002, 0.02)},
+    "torque-fade": {"speed_loss": (1e-4, 2e-3), "time_loss": (0.01, 0.2)},
+    "wheel-vibration": {"reduction": (0.05, 0.6)},
+    "tip-radius": {"radius": (0.002, 0.01)},
+    "inertial-drag": {"normal": (5.0, 80.0), "sideways": (0.1, 5.0)},
+    "depth-hardening": {"exponent": (0.8, 1.6)},
+    "plastic-sinkage": {"share": (0.05, 0.6)},
+    "adhesion": {"force": (0.02, 0.4)},
+    "rate-friction": {"change": (-0.4, 1.0)},
+}
+"""Ranges of the effects' parameters, where all terms are on."""
+
+
+class Settings:
+    """Numbers of trials and rounds. Raises ValueError where the environment holds no positive whole number."""
+
+    def __init__(self) -> None:
+        self.trials = _number("TRIALS", 20_000)
+        self.rounds = _number("ROUNDS", 5)
+        self.compared = _number("COMPARED", 300)
+
+
+def _number(name: str, default: int) -> int:
+    key = f"HEDGEBED_BENCH_{name}"
+    value = os.environ.get(key, str(default))
+    if not (value.isdigit() and int(value) > 0):
+        raise ValueError(f"{key} = {value!r} must be a positive whole number")
+    return int(value)
+
+
+def drawn_trials(count: int, *, seed: int, all_terms: bool) -> tuple[Trial, dict[str, np.ndarray]]:
+    """One trial in the rig and the numbers that vary over it, each of shape [count]."""
+    rng = np.random.default_rng(seed)
+    effects = tuple(Effect(id=id) for id in AMPLITUDES) if all_terms else ()
+    level = rng.choice([0.0085, 0.015], count) * GRAVITY
+    mass = rng.uniform(4.5, 6.5, count)
+    base = Trial(gravity_sim=0.0085 * GRAVITY, counterweight=5.0, torque=0.2, effects=effects)
+    vary = {
+        "gravity_sim": level,
+        "mass": mass,
+        "counterweight": mass * (GRAVITY - level) / (GRAVITY + level),
+        "inertia": rng.uniform(0.04, 0.09, count),
+        "mu_s": rng.uniform(0.15, 0.8, count),
+        "stiffness": 10 ** rng.uniform(3, 4.3, count),
+        "damping": 10 ** rng.uniform(0.5, 2.2, count),
+        "torque": rng.uniform(0.05, 0.4, count),
+    }
+    if all_terms:
+        for id, ranges in AMPLITUDES.items():
+            for name, bounds in ranges.items():
+                vary[f"{id}.{name}"] = rng.uniform(*bounds, count)
+    return base, vary
+
+
+def _one(base: Trial, vary: dict[str, np.ndarray], k: int) -> Trial:
+    plain = {name: float(value[k]) for name, value in vary.items() if "." not in name}
+    effects = tuple(
+        Effect(id=id, parameters={name: float(vary[f"{id}.{name}"][k]) for name in AMPLITUDES[id]})
+        for id in (effect.id for effect in base.effects)
+    )
+    return replace(base, effects=effects, **plain)  # type: ignore[arg-type]
+
+
+def _timed(base: Trial, vary: dict[str, np.ndarray], rounds: int) -> tuple[list[float], float, float]:
+    """Trials a second of each round; the time of the first call, with compiling [s]; processor time a trial [s]."""
+    few = {name: value[:64] for name, value in vary.items()}
+    begin = time.perf_counter()
+    simulate_batch(base, duration=DURATION, vary=few, time_step=TIME_STEP)
+    compiling = time.perf_counter() - begin
+    speeds, busy = [], []
+    for _ in range(rounds):
+        begin, worked = time.perf_counter(), time.process_time()
+        batch = simulate_batch(base, duration=DURATION, vary=vary, time_step=TIME_STEP)
+        speeds.append(batch.trial_count / (time.perf_counter() - begin))
+        busy.append((time.process_time() - worked) / batch.trial_count)
+    return speeds, compiling, statistics.median(busy)
+
+
+def _agreement(base: Trial, vary: dict[str, np.ndarray], count: int) -> dict[str, Any]:
+    """Largest difference to the accurate integrator within a trial: median, 99 % quantile and maximum over trials."""
+    few = {name: value[:count] for name, value in vary.items()}
+    times = np.linspace(0.0, DURATION, 101)
+    batch = simulate_batch(base, duration=DURATION, vary=few, time_step=TIME_STEP, times=times)
+    found: dict[str, list[float]] = {name: [] for name in ("x", "y", "theta", "vx", "vy", "omega")}
+    seconds, residual, done = 0.0, 0.0, 0
+    for k in range(batch.trial_count):
+        if not batch.stands[k]:
+            continue
+        trial = _one(base, few, k)
+        begin = time.perf_counter()
+        accurate = simulate(trial, duration=DURATION, times=times)
+        seconds += time.perf_counter() - begin
+        done += 1
+        residual = max(residual, accurate.energy_residual)
+        for name, values in found.items():
+            values.append(float(np.abs(batch.channel(name)[k] - getattr(accurate, name)).max()))
+    return {
+        "trials": done,
+        "seconds_per_accurate_trial": seconds / max(done, 1),
+        "largest_energy_residual_accurate": residual,
+        "differences": {
+            name: {
+                "median": float(np.median(values)),
+                "quantile_99": float(np.quantile(values, 0.99)),
+                "largest": max(values),
+            }
+            for name, values in found.items()
+        },
+    }
+
+
+def run(out: Path, *, progress: Any) -> dict[str, Any]:
+    """Time the batch and compare it; show the table; return what goes into bench.json.
+
+    Args:
+        out: folder of bench.json; nothing else is written there.
+        progress: an ``experiments.progress.Progress``.
+
+    Raises:
+        ValueError: a variable of the environment is wrong.
+        RuntimeError: the batch failed.
+    """
+    settings = Settings()
+    cores, load = count_cores(), os.getloadavg()[0]
+    if load > 0.5 * cores:
+        progress.message(f"the machine was busy at the start (load {load:.1f} on {cores} cores): timings mean little")
+    bench: dict[str, Any] = {
+        "format": FORMAT,
+        "what": "planar",
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "version": __version__,
+        "machine": describe_machine(cores, load),
+        "unit": "trials of 1 s at 1 ms a second",
+        "trials": settings.trials,
+        "rounds": settings.rounds,
+        "time_step": TIME_STEP,
+        "duration": DURATION,
+        "precision": "float64",
+        "sets": {},
+    }
+    progress.plan({"base": 1.0, "all terms": 3.0})
+    for name, all_terms in (("base", False), ("all terms", True)):
+        progress.stage(name, total=1.0)
+        base, vary = drawn_trials(settings.trials, seed=1, all_terms=all_terms)
+        speeds, compiling, processor = _timed(base, vary, settings.rounds)
+        compared = settings.compared if not all_terms else max(1, settings.compared // 3)
+        bench["sets"][name] = {
+            "trials_per_s": statistics.median(speeds),
+            "rounds": speeds,
+            "processor_s_per_trial": processor,
+            "trials_per_s_idle_cores": cores / processor,
+            "first_call_s": compiling,
+            "effects": [effect.id for effect in base.effects],
+            "agreement": _agreement(base, vary, compared),
+        }
+    bench["trials_per_s"] = bench["sets"]["base"]["trials_per_s"]
+    bench["trials_per_s_all_terms"] = bench["sets"]["all terms"]["trials_per_s"]
+    progress.close()
+    _show(bench)
+    return bench
+
+
+def _show(bench: dict[str, Any]) -> None:
+    cores = bench["machine"]["cores"]
+    table = Table(title=f"planar: trials of {DURATION:g} s at {1e3 * TIME_STEP:g} ms, {cores} cores")
+    for column in ("terms", "trials/s", "slowest - fastest", "by processor time", "first call [s]", "accurate [ms]"):
+        table.add_column(column, justify="right")
+    for name, part in bench["sets"].items():
+        table.add_row(
+            name,
+            f"{part['trials_per_s']:,.0f}",
+            f"{min(part['rounds']):,.0f} - {max(part['rounds']):,.0f}",
+            f"{part['trials_per_s_idle_cores']:,.0f}",
+            f"{part['first_call_s']:.1f}",
+            f"{1e3 * part['agreement']['seconds_per_accurate_trial']:.0f}",
+        )
+    near = Table(title="largest difference to the accurate integrator in a trial: median, 99 %, maximum over trials")
+    near.add_column("terms")
+    for channel in ("x", "y", "theta", "vx", "vy", "omega"):
+        near.add_column(channel, justify="right")
+    for name, part in bench["sets"].items():
+        rows = part["agreement"]["differences"].values()
+        near.add_row(
+            f"{name} ({part['agreement']['trials']})",
+            *(f"{row['median']:.0e} {row['quantile_99']:.0e} {row['largest']:.0e}" for row in rows),
+        )
+    console = Console(width=None if sys.stdout.isatty() else 150, highlight=False)
+    console.print(table)
+    console.print(near)

@@ -1,0 +1,33 @@
+"""``hedgebed bench planar`` on a few trials."""
+
+import json
+
+import pytest
+
+from benchmarks import planar
+from experiments.cli import main
+from rigid import EFFECTS
+
+
+def test_all_terms_means_all():
+    assert set(planar.AMPLITUDES) == {id for id, term in EFFECTS.items() if not term.sensor}
+
+
+def test_bench_planar_writes_speed_and_agreement(tmp_path, monkeypatch):
+    monkeypatch.setenv("HEDGEBED_BENCH_TRIALS", "200")
+    monkeypatch.setenv("HEDGEBED_BENCH_ROUNDS", "2")
+    monkeypatch.setenv("HEDGEBED_BENCH_COMPARED", "6")
+    assert main(["bench", "planar", "--out", str(tmp_path / "bench"), "--quiet"]) == 0
+    bench = json.loads((tmp_path / "bench" / "bench.json").read_text(encoding="utf-8"))
+    assert (bench["format"], bench["what"]) == ("hedgebed-bench/1", "planar")
+    assert bench["trials_per_s"] > 1000 and bench["trials_per_s_all_terms"] > 300
+    for part in bench["sets"].values():
+        assert part["agreement"]["trials"] >= 1
+        assert part["agreement"]["differences"]["x"]["largest"] < 1e-3
+        assert part["agreement"]["largest_energy_residual_accurate"] < 1e-6
+
+
+def test_a_wrong_variable_of_the_environment_is_refused(monkeypatch, tmp_path):
+    monkeypatch.setenv("HEDGEBED_BENCH_TRIALS", "many")
+    with pytest.raises(ValueError, match="HEDGEBED_BENCH_TRIALS"):
+        planar.Settings()

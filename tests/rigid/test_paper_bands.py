@@ -1,0 +1,96 @@
+"""What the paper's text states in numbers, with our J = 0.06, J_w = 1.2e-3, K = 1.5e4, C = 60 (planar-model.md)."""
+
+import math
+
+import pytest
+from rigid_trials import LENGTH, MASS, G, in_rig
+
+from rigid import simulate
+from rigid.dynamics import Modes, System
+
+STEEL, BRICK = 0.25, 0.5
+LEVELS = pytest.mark.parametrize("level", [0.0085, 0.015])
+
+
+def tumble(torque, mu_s, level=0.0085, duration=2.0):
+    spinning = {"actuator": "brake", "wheel_speed_0": 300.0} if torque == 6.0 else {}
+    return simulate(in_rig(torque, mu_s=mu_s, level=level, **spinning), duration=duration, sample_interval=5e-3)
+
+
+def degrees(run):
+    return math.degrees(run.trajectory_angle)
+
+
+@LEVELS
+def test_tumbles_at_low_torque_on_brick_start_at_about_22_5_degrees(level):
+    # 22.5 degrees is the tangent of the pivot's circle at the start; the chord to the first point 10 mm away is
+    # 10 mm / 2 l = 1.43 degrees lower.
+    run = tumble(0.125, BRICK, level)
+    assert degrees(run) == pytest.approx(22.5 - math.degrees(0.01 / (2 * LENGTH)), abs=0.5)
+    assert run.transition_angle("pivot") < math.radians(0.2)
+
+
+@LEVELS
+@pytest.mark.parametrize("mu_s", [STEEL, BRICK])
+def test_the_angle_grows_with_torque(mu_s, level):
+    angles = [degrees(tumble(torque, mu_s, level)) for torque in (0.125, 0.22, 6.0)]
+    assert angles[0] < angles[1] < angles[2]
+
+
+def test_the_angle_grows_to_about_60_degrees():
+    assert 55 < degrees(tumble(0.22, STEEL)) < 65
+    assert 55 < degrees(tumble(6.0, BRICK)) < 65
+
+
+@LEVELS
+@pytest.mark.parametrize("mu_s", [STEEL, BRICK])
+def test_at_6_nm_the_platform_slips_at_once_and_until_it_hops(mu_s, level):
+    names = [name for _, name, _ in tumble(6.0, mu_s, level, duration=0.2).transitions]
+    assert names == ["slip", "hop"]
+
+
+def test_even_a_short_tumble_at_0_0085_g_ends_in_a_brief_hop():
+    # Seen in 5 of 6 cases: steel and brick, three torques. Within one tumble, an eighth of a turn.
+    hops = 0
+    for mu_s in (STEEL, BRICK):
+        for torque in (0.125, 0.22, 6.0):
+            angle = tumble(torque, mu_s).transition_angle("hop")
+            hops += angle is not None and angle < math.pi / 4
+    assert hops >= 5
+
+
+def test_ten_percent_of_friction_moves_a_sliding_start_and_not_a_pivot():
+    def spread(torque, mu_s):
+        return degrees(tumble(torque, 0.9 * mu_s)) - degrees(tumble(torque, 1.1 * mu_s))
+
+    assert abs(spread(0.125, BRICK)) < 0.2
+    assert 2 < spread(6.0, BRICK) < 8
+    assert 2 < spread(0.22, STEEL) < 10
+
+
+def held_share(trial):
+    """Force that holds over load, of the leading spike alone, at the start of a pivot whose spring has settled.
+
+    Settled: the tip's own vertical acceleration is zero, found by its depth.
+    """
+    system = System(trial)
+    low, high = 0.0, 1e-2
+    for _ in range(100):
+        depth = 0.5 * (low + high)
+        z = [0.0, LENGTH * math.cos(math.pi / 8) - depth, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+        system.derivative(0.0, z, Modes(touching=[7], slip=[0] * 8, top=[0.0] * 8))
+        _, ay, alpha = system.acceleration
+        tip = ay - alpha * LENGTH * math.sin(math.pi / 8)
+        low, high = (low, depth) if tip > 0 else (depth, high)
+    return abs(system.stick_force) / system.contacts[0].load
+
+
+def test_the_pair_s_reading_of_0_0085_g_pivots_on_steel_at_0_125_nm_where_the_weight_s_slips():
+    # planar-model.md: W = (m + m_b) g_sim with g_sim = 0.0085 g lets a pivot hold; half of it does not. That is the
+    # pivot itself, its spring settled. (A torque that begins at once jerks two soft feet loose before, whatever K:
+    # tests/rigid/test_planar_events.py.)
+    assert held_share(in_rig(0.125, mu_s=STEEL)) == pytest.approx(0.18, abs=0.01)
+    counterweight = MASS * (1 - 0.0085)  # g_sim = g (m - m_b) / m
+    weight = MASS * 0.0085 * G
+    half = in_rig(0.125, mu_s=STEEL, counterweight=counterweight, gravity_sim=weight / (MASS + counterweight))
+    assert held_share(half) > STEEL
