@@ -76,6 +76,11 @@ class Forward:
         self.simulated = 0
         """How many trials have been simulated so far."""
 
+    @staticmethod
+    def neutral(name: str) -> float:
+        """The value of "<effect>.<parameter>" that changes nothing."""
+        return neutral(name)
+
     def predict(
         self,
         sets: Mapping[str, Array],
@@ -319,9 +324,7 @@ class _Grid:
         return (along[2] - along[0]) / self.window + mean_x, (up[2] - up[0]) / self.window + mean_y
 
 
-def _joined(
-    found: list[tuple[int, int, Prediction]], chosen: Sequence[int], count: int
-) -> list[Prediction]:
+def _joined(found: list[tuple[int, int, Prediction]], chosen: Sequence[int], count: int) -> list[Prediction]:
     """The pieces of every trial put together, in the order of `chosen`."""
     joined = []
     for trial in chosen:
