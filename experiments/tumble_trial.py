@@ -172,7 +172,7 @@ def plan_tumble(settings: TumbleSettings, *, model_file: Path | None = None) -> 
     settle("torque_until", float("inf"), "default: as long as the trial")
     settle("wheel_speed_0", 0.0, "default")
     if model is None:
-        _check_wheel(settings, platform, numbers)
+        warnings += _check_wheel(settings, platform, numbers)
     values: dict[str, Any] = {name: number.value for name, number in numbers.items()}
     ground = _ground(settings)
     trial = Trial(
@@ -206,21 +206,25 @@ def _choices(settings: TumbleSettings, surface: str, model: TumbleModel | None) 
     return ({"surface": surface} if settings.surface is None and model is None else {}) | found
 
 
-def _check_wheel(settings: TumbleSettings, platform: PlatformNumbers, numbers: Mapping[str, Number]) -> None:
-    """Refuse what the platform's wheel cannot do."""
-    most = platform.motor_torque if settings.actuator == "motor" else platform.brake_torque
-    other = ", or actuator = brake with a wheel_speed_0" if settings.actuator == "motor" else ""
+def _check_wheel(settings: TumbleSettings, platform: PlatformNumbers, numbers: Mapping[str, Number]) -> list[str]:
+    """Refuse a torque beyond the platform's motor; say where brake or wheel are taken beyond what they can do.
+
+    A brake is an impulse in the limit, and a stronger one a fair question; what a motor cannot give never happens.
+    """
     torque, speed = numbers["torque"].value, numbers["wheel_speed_0"].value
-    if torque > most * (1 + 1e-9):
+    if settings.actuator == "motor" and torque > platform.motor_torque * (1 + 1e-9):
         raise ValueError(
-            f"torque = {torque:g} N m is beyond the {settings.actuator} of platform = {platform.name!r}: at most "
-            f"{most:g} N m would do{other}, or a platform with a stronger one"
+            f"torque = {torque:g} N m is beyond the motor of platform = {platform.name!r}: at most "
+            f"{platform.motor_torque:g} N m would do, or actuator = brake with a wheel_speed_0, or a platform with a "
+            f"stronger one"
         )
+    said = []
+    if settings.actuator == "brake" and torque > platform.brake_torque * (1 + 1e-9):
+        said.append(f"torque = {torque:g} N m is beyond the brake of {platform.name}, {platform.brake_torque:g} N m")
     if speed > platform.max_wheel_speed:
-        raise ValueError(
-            f"wheel_speed_0 = {speed:g} rad/s is beyond the wheel of platform = {platform.name!r}: at most "
-            f"{platform.max_wheel_speed:g} rad/s would do"
-        )
+        most = platform.max_wheel_speed
+        said.append(f"wheel_speed_0 = {speed:g} rad/s is beyond the wheel of {platform.name}, {most:g} rad/s")
+    return said
 
 
 def _read(path: Path) -> TumbleModel:
