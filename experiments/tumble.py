@@ -165,6 +165,12 @@ def _result(settings: TumbleSettings, plan: TumblePlan, trajectory: Trajectory) 
         f"rig at {trial.gravity_sim:.4g} m/s2" if trial.counterweight > 0 else f"free at {trial.gravity_sim:.4g} m/s2"
     )
     warnings = list(plan.warnings)
+    fastest = float(np.abs(trajectory.wheel_speed).max())
+    if settings.actuator == "motor" and fastest > plan.max_wheel_speed:
+        warnings.append(
+            f"the motor takes the wheel to {fastest:.4g} rad/s, beyond the {plan.max_wheel_speed:g} rad/s of "
+            f"{settings.platform}: torque_until would end it in time"
+        )
     if trajectory.trajectory_angle is None:
         warnings.append("the centre never got 10 mm away from its start: there is no trajectory angle")
     return {

@@ -129,6 +129,8 @@ class TumblePlan:
     choices: Mapping[str, str]
     """What else was left at its default: name -> value, as a person would type it."""
     warnings: tuple[str, ...] = ()
+    max_wheel_speed: float = math.inf
+    """What the platform's wheel can do [rad/s]."""
 
     def sentences(self) -> list[str]:
         """One line for each number and choice that was not given: every default is said."""
@@ -190,7 +192,8 @@ def plan_tumble(settings: TumbleSettings, *, model_file: Path | None = None) -> 
             origin = "given" if name in ground.parameters else f"default of {ground.name}, of one spike"
             numbers[name] = Number(value, unit, origin)
     warnings += _rig_warnings(trial)
-    return TumblePlan(trial, numbers, surface, _choices(settings, surface, model), tuple(warnings))
+    fastest = platform.max_wheel_speed if model is None else math.inf
+    return TumblePlan(trial, numbers, surface, _choices(settings, surface, model), tuple(warnings), fastest)
 
 
 def _choices(settings: TumbleSettings, surface: str, model: TumbleModel | None) -> dict[str, str]:

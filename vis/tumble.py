@@ -31,6 +31,10 @@ STATES = {"stand": GREY, "pivot": BED, "slip": MODEL, "hop": "#009E73"}
 """The states in the order of losing hold, with their colours."""
 _WIDTH = 8.6
 _DPI = 130
+_MOST_STEPS = 60
+"""Changes of state that are joined by a line; more would paint the panel grey."""
+_FOLLOWED = 1.2
+"""How far from its start the animation follows the centre [m]."""
 _JOULES = (("mJ", 1.0), ("µJ", 1e3), ("nJ", 1e6), ("pJ", 1e9), ("fJ", 1e12))
 """Units of energy, and how many of them a mJ has."""
 
@@ -94,14 +98,14 @@ def _panels(
         drawing = Figure(figsize=(_WIDTH, height))
     FigureCanvasAgg(drawing)
     axes = drawing.subplots(1, count, width_ratios=widths)
-    drawing.subplots_adjust(left=0.075, right=right, bottom=0.5 / height, top=1 - 0.38 / height, wspace=0.2)
+    drawing.subplots_adjust(left=0.09, right=right, bottom=0.5 / height, top=1 - 0.38 / height, wspace=0.23)
     return drawing, list(np.atleast_1d(axes))
 
 
 def _legend_of_states(drawing: Figure, states: NDArray[np.str_], more: tuple[Line2D, ...] = ()) -> None:
     there = [name for name in STATES if name in states]
     handles = [Line2D([], [], color=STATES[name], lw=3, label=name) for name in there]
-    drawing.legend(handles=[*handles, *more], loc="upper left", bbox_to_anchor=(0.06, 1.0), ncols=8)
+    drawing.legend(handles=[*handles, *more], loc="upper left", bbox_to_anchor=(0.075, 1.0), ncols=8)
 
 
 def _by_state(axis: Axes, x: Array, y: Array, states: NDArray[np.str_], **style: Any) -> None:
@@ -113,7 +117,10 @@ def _by_state(axis: Axes, x: Array, y: Array, states: NDArray[np.str_], **style:
 def _draw_trajectory(
     result: Mapping[str, Any], numbers: Mapping[str, Array], states: NDArray[np.str_], motion: Mapping[str, Array]
 ) -> Drawn:
-    x, y, time = 1e3 * numbers["x_m"], 1e3 * numbers["y_m"], numbers["t_s"]
+    time = numbers["t_s"]
+    far = max(float(np.ptp(numbers["x_m"])), float(np.ptp(numbers["y_m"])))
+    unit, scale = ("m", 1.0) if far > 2.0 else ("mm", 1e3)
+    x, y = scale * numbers["x_m"], scale * numbers["y_m"]
     angle = _value(result, "trajectory_angle")
     with styled():
         drawing, (path, rates) = _panels(2, 3.5, widths=(1.25, 1.0), right=0.925)
@@ -121,7 +128,7 @@ def _draw_trajectory(
         path.plot(x[:1], y[:1], "o", color=INK, ms=4)
         more: tuple[Line2D, ...] = ()
         if angle is not None:
-            reach = 0.35 * max(float(np.ptp(x)), float(np.ptp(y)), 10.0)
+            reach = 0.35 * scale * max(far, 0.01)
             path.plot(
                 x[0] + np.array([0, reach]) * math.cos(angle),
                 y[0] + np.array([0, reach]) * math.sin(angle),
@@ -131,10 +138,15 @@ def _draw_trajectory(
             )
             label = f"trajectory angle {short(math.degrees(angle), 3)}°"
             more = (Line2D([], [], color=INK, lw=1.0, ls=(0, (4, 3)), label=label),)
-        path.set_aspect("equal", adjustable="datalim")
-        path.margins(0.08)
-        path.set_xlabel("x of the centre [mm]")
-        path.set_ylabel("y of the centre above the surface [mm]")
+        path.ticklabel_format(useOffset=False)
+        if far < 1e-4:  # it has not moved to speak of
+            path.set_xlim(x[0] - 1, x[0] + 1)
+            path.set_ylim(y[0] - 1, y[0] + 1)
+        else:
+            path.set_aspect("equal", adjustable="datalim")
+            path.margins(0.08)
+        path.set_xlabel(f"x of the centre [{unit}]")
+        path.set_ylabel(f"y of the centre above the surface [{unit}]")
         speed = np.hypot(numbers["vx_m_s"], numbers["vy_m_s"])
         _by_state(rates, time, speed, states, lw=1.8)
         rates.set_xlabel("time [s]")
@@ -163,14 +175,15 @@ def _draw_states(
         _by_state(over_time, time, theta, states, lw=2.4)
         over_time.set_xlabel("time [s]")
         over_time.set_ylabel("θ [degrees]")
-        for low, high, name in state_runs(states):
+        stretches = state_runs(states)
+        for low, high, name in stretches:
             last = min(high, len(theta) - 1)
             row = order.index(name) if name in order else 0
             here, colour = theta[low : last + 1], STATES.get(name, INK)
             over_angle.plot(here, np.full(len(here), row), color=colour, lw=6, solid_capstyle="butt")
-            if np.ptp(here) < 0.01 * np.ptp(theta):  # too short to be seen
+            if np.ptp(here) <= 0.01 * np.ptp(theta):  # too short to be seen
                 over_angle.plot(here[:1], [row], "s", color=colour, ms=5)
-            if last < len(theta) - 1 and str(states[last]) in order:
+            if len(stretches) <= _MOST_STEPS and last < len(theta) - 1 and str(states[last]) in order:
                 there = [row, order.index(str(states[last]))]
                 over_angle.plot([theta[last]] * 2, there, color=GREY, lw=0.7)
         over_angle.set_yticks(range(len(order)), order)
@@ -197,7 +210,7 @@ def _draw_energy(
         book.plot(time, lost, color=GREY, ls=(0, (1, 1.2)), label="dissipated")
         book.set_xlabel("time [s]")
         book.set_ylabel("energy [mJ]")
-        drawing.legend(handles=book.lines, loc="upper left", bbox_to_anchor=(0.06, 1.0), ncols=3)
+        drawing.legend(handles=book.lines, loc="upper left", bbox_to_anchor=(0.075, 1.0), ncols=3)
         residual = gained - work + lost
         most = float(np.abs(residual).max())
         unit, scale = next(((u, k) for u, k in _JOULES if most * k >= 0.999), _JOULES[-1])
@@ -218,6 +231,9 @@ def _draw_energy(
 def _animate(path: Path, result: Mapping[str, Any], numbers: Mapping[str, Array], states: NDArray[np.str_]) -> Path:
     """The section of the platform on its way, as a GIF in real time, at most some 60 frames."""
     time, x, y, theta = (numbers[name] for name in ("t_s", "x_m", "y_m", "theta_rad"))
+    beyond = np.flatnonzero(np.hypot(x - x[0], y - y[0]) > _FOLLOWED)
+    if len(beyond):
+        time, x, y, theta = (values[: beyond[0] + 1] for values in (time, x, y, theta))
     length = float(result["trial"]["spike_length"]["value"])
     count = int(result.get("spike_count", 8))
     frame_count = int(min(60, max(2, 25 * time[-1])))
@@ -300,7 +316,7 @@ def _page(folder: Path, result: Mapping[str, Any], drawn: list[Block], moving: P
     animation = figure(
         moving,
         title="The section of the platform on its way",
-        caption="In real time as far as sixty frames go; a spike stands for the row of spikes at its corner.",
+        caption=f"In real time, until the centre is {_FOLLOWED:g} m away; a spike stands for the row at its corner.",
         half=True,
         show_file=True,
     )

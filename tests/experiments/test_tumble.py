@@ -208,6 +208,12 @@ def test_a_brake_or_a_wheel_beyond_the_platforms_own_is_said():
     assert any("beyond the wheel" in warning for warning in plan.warnings)
 
 
+def test_a_motor_that_takes_its_wheel_too_far_is_said():
+    # 0.22 N m over 1.2e-3 kg m2 takes the wheel past 1050 rad/s within 0.3 s of contact from 1040 rad/s
+    assert main(["tumble", "--wheel-speed-0", "1040", *SHORT, "--out", "a"]) == 0
+    assert any("torque_until" in warning for warning in result_of("a")["warnings"])
+
+
 def test_an_impulsive_brake_on_ground_that_does_not_give_way_leaves_at_half_a_spikes_angle():
     # Closed form, sticking, damped far beyond critical: omega = H / (J + m l^2), v = l omega, launch at 22.5 degrees.
     options = {"mu_s": 20.0, "mu_d": 20.0, "stiffness": 1e6, "damping": 1e5, "gravity": 1e-2}
