@@ -174,17 +174,20 @@ class Fitter:
             rows = slice(at, at + len(points))
             for name in SHARED:
                 columns[name][rows] = [values.get(name, self.forward.nominal[name]) for values, _ in points]
-            gravity[rows] = [own for _, own in points]
+            gravity[rows] = [relative for _, relative in points]
             for form in forms:
-                own = {p.name: np.array([values.get(p.name, p.value) for values, _ in points]) for p in form.parameters}
-                for name, array in form.physical(own).items():
+                given = {
+                    p.name: np.array([values.get(p.name, p.value) for values, _ in points]) for p in form.parameters
+                }
+                for name, array in form.physical(given).items():
                     columns.setdefault(name, np.full(total, self.forward.neutral(name)))[rows] = array
             at += len(points)
         predictions = self.forward.predict(columns | {"gravity": gravity}, trials=self.trials)
-        answers, at = [], 0
+        answers: list[Answers] = []
+        at = 0
         for _, points, horizon in asked:
             rows = slice(at, at + len(points))
-            own = []
+            own: Answers = []
             for trial, prediction in zip(self.trials, predictions, strict=True):
                 data = self.forward.data.trials[trial]
                 until = np.inf if horizon >= 1 else horizon * data.end
@@ -210,8 +213,17 @@ class Fitter:
             name = f"gravity_sim[{self.forward.data.trials[trial].id}]"
             low = max(-6.0, -0.95 / self.sigma_gravity)
             rows.append((name, 1.0, self.sigma_gravity, 1.0, low, 6.0, 0.02))
-        names, *numbers = zip(*rows, strict=True) if rows else ((), *([()] * 6))
-        return _Space(tuple(names), *(np.array(column, dtype=float) for column in numbers), gravities)
+        table = np.array([row[1:] for row in rows], dtype=float).reshape(-1, 6)
+        return _Space(
+            names=tuple(row[0] for row in rows),
+            value=table[:, 0],
+            scale=table[:, 1],
+            std=table[:, 2],
+            low=table[:, 3],
+            high=table[:, 4],
+            step=table[:, 5],
+            gravities=gravities,
+        )
 
     def _descend(self, start: Start, steps: int) -> Generator[tuple[list[Point], float], Answers, Fit]:
         space = self._space(start)

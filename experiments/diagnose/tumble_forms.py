@@ -30,8 +30,8 @@ class TumbleForm(Form):
     """Arrays of the form's parameters -> arrays of the term's, under their names "<effect>.<parameter>"."""
 
 
-def _free(name: str, unit: str, scale: float, **bounds: float) -> Parameter:
-    return Parameter(name=name, unit=unit, value=0.0, scale=scale, step=0.02 * scale, **bounds)
+def _free(name: str, unit: str, scale: float, *, lowest: float = -math.inf, highest: float = math.inf) -> Parameter:
+    return Parameter(name=name, unit=unit, value=0.0, scale=scale, step=0.02 * scale, lowest=lowest, highest=highest)
 
 
 def _log(name: str) -> Parameter:
@@ -88,82 +88,209 @@ def tumble_forms(
     force, moment = 0.02 * weight, 0.005 * weight
     forms = [
         TumbleForm(
-            effect="wheel-vibration", name="saturating", amplitude="wheel-vibration.reduction",
-            parameters=(_free("wheel-vibration.reduction", "1", 0.1, lowest=0.0, highest=0.95), _log("wheel-vibration.log_speed")),
-            physical=_scaled("wheel-vibration.reduction", "wheel-vibration.speed", wheel_speed, log="wheel-vibration.log_speed"),
+            effect="wheel-vibration",
+            name="saturating",
+            amplitude="wheel-vibration.reduction",
+            parameters=(
+                _free("wheel-vibration.reduction", "1", 0.1, lowest=0.0, highest=0.95),
+                _log("wheel-vibration.log_speed"),
+            ),
+            physical=_scaled(
+                "wheel-vibration.reduction", "wheel-vibration.speed", wheel_speed, log="wheel-vibration.log_speed"
+            ),
             starts=tuple({"wheel-vibration.reduction": 0.15, "wheel-vibration.log_speed": s} for s in (-1.5, 0.0, 1.2)),
         ),
-        _plain("com-offset", "both", _free("com-offset.x", "m", 2e-4, lowest=-0.03, highest=0.03),
-               _free("com-offset.y", "m", 2e-4, lowest=-0.03, highest=0.03),
-               starts=tuple({"com-offset.x": x, "com-offset.y": y} for x, y in ((3e-4, 0.), (-3e-4, 0.), (0., 3e-4), (0., -3e-4)))),
-        _plain("slope", "plane", _free("slope.angle", "rad", 1e-3, lowest=-0.3, highest=0.3),
-               starts=({"slope.angle": 2e-3}, {"slope.angle": -2e-3})),
-        _plain("tip-radius", "ball", _free("tip-radius.radius", "m", 1e-3, lowest=0.0, highest=0.05),
-               starts=({"tip-radius.radius": 2e-3}, {"tip-radius.radius": 8e-3})),
-        _plain("torque-fade", "speed", _free("torque-fade.speed_loss", "s/rad", 1e-4, lowest=0.0, highest=0.02),
-               starts=({"torque-fade.speed_loss": 1e-4}, {"torque-fade.speed_loss": 6e-4})),
-        _plain("torque-fade", "time", _free("torque-fade.time_loss", "1/s", 0.02, lowest=0.0, highest=5.0),
-               starts=({"torque-fade.time_loss": 0.03}, {"torque-fade.time_loss": 0.2})),
-        _plain("inertial-drag", "normal", _free("inertial-drag.normal", "kg/m", 0.5, lowest=0.0, highest=1e4),
-               starts=({"inertial-drag.normal": 1.0}, {"inertial-drag.normal": 20.0})),
-        _plain("inertial-drag", "both", _free("inertial-drag.normal", "kg/m", 0.5, lowest=0.0, highest=1e4),
-               _free("inertial-drag.sideways", "kg/m", 0.2, lowest=0.0, highest=1e4),
-               starts=({"inertial-drag.normal": 1.0, "inertial-drag.sideways": 0.3},
-                       {"inertial-drag.normal": 10.0, "inertial-drag.sideways": 2.0})),
-        TumbleForm(
-            effect="depth-hardening", name="power", amplitude="depth-hardening.exponent_change",
-            parameters=(_free("depth-hardening.exponent_change", "1", 0.1, lowest=-0.65, highest=2.5),
-                        _log("depth-hardening.log_reference")),
-            physical=_scaled("depth-hardening.exponent", "depth-hardening.reference", max(sinkage, 1e-6), shift=1.0,
-                             log="depth-hardening.log_reference"),
-            starts=tuple({"depth-hardening.exponent_change": n, "depth-hardening.log_reference": s}
-                         for n, s in ((0.3, 0.7), (-0.2, 0.7), (0.3, 2.0))),
+        _plain(
+            "com-offset",
+            "both",
+            _free("com-offset.x", "m", 2e-4, lowest=-0.03, highest=0.03),
+            _free("com-offset.y", "m", 2e-4, lowest=-0.03, highest=0.03),
+            starts=tuple(
+                {"com-offset.x": x, "com-offset.y": y}
+                for x, y in ((3e-4, 0.0), (-3e-4, 0.0), (0.0, 3e-4), (0.0, -3e-4))
+            ),
         ),
-        _plain("plastic-sinkage", "share", _free("plastic-sinkage.share", "1", 0.1, lowest=0.0, highest=0.93),
-               starts=({"plastic-sinkage.share": 0.15}, {"plastic-sinkage.share": 0.5})),
+        _plain(
+            "slope",
+            "plane",
+            _free("slope.angle", "rad", 1e-3, lowest=-0.3, highest=0.3),
+            starts=({"slope.angle": 2e-3}, {"slope.angle": -2e-3}),
+        ),
+        _plain(
+            "tip-radius",
+            "ball",
+            _free("tip-radius.radius", "m", 1e-3, lowest=0.0, highest=0.05),
+            starts=({"tip-radius.radius": 2e-3}, {"tip-radius.radius": 8e-3}),
+        ),
+        _plain(
+            "torque-fade",
+            "speed",
+            _free("torque-fade.speed_loss", "s/rad", 1e-4, lowest=0.0, highest=0.02),
+            starts=({"torque-fade.speed_loss": 1e-4}, {"torque-fade.speed_loss": 6e-4}),
+        ),
+        _plain(
+            "torque-fade",
+            "time",
+            _free("torque-fade.time_loss", "1/s", 0.02, lowest=0.0, highest=5.0),
+            starts=({"torque-fade.time_loss": 0.03}, {"torque-fade.time_loss": 0.2}),
+        ),
+        _plain(
+            "inertial-drag",
+            "normal",
+            _free("inertial-drag.normal", "kg/m", 0.5, lowest=0.0, highest=1e4),
+            starts=({"inertial-drag.normal": 1.0}, {"inertial-drag.normal": 20.0}),
+        ),
+        _plain(
+            "inertial-drag",
+            "both",
+            _free("inertial-drag.normal", "kg/m", 0.5, lowest=0.0, highest=1e4),
+            _free("inertial-drag.sideways", "kg/m", 0.2, lowest=0.0, highest=1e4),
+            starts=(
+                {"inertial-drag.normal": 1.0, "inertial-drag.sideways": 0.3},
+                {"inertial-drag.normal": 10.0, "inertial-drag.sideways": 2.0},
+            ),
+        ),
         TumbleForm(
-            effect="adhesion", name="mobilised", amplitude="adhesion.force",
-            parameters=(_free("adhesion.force", "N", force, lowest=0.0, highest=20 * weight), _log("adhesion.log_reach")),
+            effect="depth-hardening",
+            name="power",
+            amplitude="depth-hardening.exponent_change",
+            parameters=(
+                _free("depth-hardening.exponent_change", "1", 0.1, lowest=-0.65, highest=2.5),
+                _log("depth-hardening.log_reference"),
+            ),
+            physical=_scaled(
+                "depth-hardening.exponent",
+                "depth-hardening.reference",
+                max(sinkage, 1e-6),
+                shift=1.0,
+                log="depth-hardening.log_reference",
+            ),
+            starts=tuple(
+                {"depth-hardening.exponent_change": n, "depth-hardening.log_reference": s}
+                for n, s in ((0.3, 0.7), (-0.2, 0.7), (0.3, 2.0))
+            ),
+        ),
+        _plain(
+            "plastic-sinkage",
+            "share",
+            _free("plastic-sinkage.share", "1", 0.1, lowest=0.0, highest=0.93),
+            starts=({"plastic-sinkage.share": 0.15}, {"plastic-sinkage.share": 0.5}),
+        ),
+        TumbleForm(
+            effect="adhesion",
+            name="mobilised",
+            amplitude="adhesion.force",
+            parameters=(
+                _free("adhesion.force", "N", force, lowest=0.0, highest=20 * weight),
+                _log("adhesion.log_reach"),
+            ),
             physical=_scaled("adhesion.force", "adhesion.reach", max(sinkage, 1e-6), log="adhesion.log_reach"),
-            starts=tuple({"adhesion.force": a * force, "adhesion.log_reach": s} for a, s in ((3, 0.0), (10, 1.5), (10, -1.0))),
+            starts=tuple(
+                {"adhesion.force": a * force, "adhesion.log_reach": s} for a, s in ((3, 0.0), (10, 1.5), (10, -1.0))
+            ),
         ),
         TumbleForm(
-            effect="rate-friction", name="saturating", amplitude="rate-friction.change",
-            parameters=(_free("rate-friction.change", "1", 0.1, lowest=-0.9, highest=5.0), _log("rate-friction.log_speed")),
-            physical=_scaled("rate-friction.change", "rate-friction.speed", friction_speed, log="rate-friction.log_speed"),
-            starts=tuple({"rate-friction.change": c, "rate-friction.log_speed": s}
-                         for c, s in ((0.3, 0.0), (-0.25, 0.0), (0.4, 1.5), (-0.35, 1.5))),
+            effect="rate-friction",
+            name="saturating",
+            amplitude="rate-friction.change",
+            parameters=(
+                _free("rate-friction.change", "1", 0.1, lowest=-0.9, highest=5.0),
+                _log("rate-friction.log_speed"),
+            ),
+            physical=_scaled(
+                "rate-friction.change", "rate-friction.speed", friction_speed, log="rate-friction.log_speed"
+            ),
+            starts=tuple(
+                {"rate-friction.change": c, "rate-friction.log_speed": s}
+                for c, s in ((0.3, 0.0), (-0.25, 0.0), (0.4, 1.5), (-0.35, 1.5))
+            ),
         ),
-        _plain("umbilical", "spring", _free("umbilical.stiffness", "N m/rad", moment, lowest=0.0, highest=50 * weight),
-               starts=({"umbilical.stiffness": 3 * moment},)),
-        _plain("umbilical", "both", _free("umbilical.stiffness", "N m/rad", moment, lowest=0.0, highest=50 * weight),
-               _free("umbilical.drag", "N m s/rad", moment, lowest=0.0, highest=50 * weight),
-               starts=({"umbilical.stiffness": 0.0, "umbilical.drag": 2 * moment},
-                       {"umbilical.stiffness": 2 * moment, "umbilical.drag": moment})),
-        _plain("bearing-drag", "dry", _free("bearing-drag.torque", "N m", moment, lowest=0.0, highest=5 * weight),
-               starts=({"bearing-drag.torque": moment}, {"bearing-drag.torque": 4 * moment})),
-        _plain("clock-offset", "constant", _free("clock-offset.offset", "s", 1e-3, lowest=-0.5, highest=0.5),
-               starts=({"clock-offset.offset": 3e-3}, {"clock-offset.offset": -3e-3},
-                       {"clock-offset.offset": 0.02}, {"clock-offset.offset": -0.02})),
+        _plain(
+            "umbilical",
+            "spring",
+            _free("umbilical.stiffness", "N m/rad", moment, lowest=0.0, highest=50 * weight),
+            starts=({"umbilical.stiffness": 3 * moment},),
+        ),
+        _plain(
+            "umbilical",
+            "both",
+            _free("umbilical.stiffness", "N m/rad", moment, lowest=0.0, highest=50 * weight),
+            _free("umbilical.drag", "N m s/rad", moment, lowest=0.0, highest=50 * weight),
+            starts=(
+                {"umbilical.stiffness": 0.0, "umbilical.drag": 2 * moment},
+                {"umbilical.stiffness": 2 * moment, "umbilical.drag": moment},
+            ),
+        ),
+        _plain(
+            "bearing-drag",
+            "dry",
+            _free("bearing-drag.torque", "N m", moment, lowest=0.0, highest=5 * weight),
+            starts=({"bearing-drag.torque": moment}, {"bearing-drag.torque": 4 * moment}),
+        ),
+        _plain(
+            "clock-offset",
+            "constant",
+            _free("clock-offset.offset", "s", 1e-3, lowest=-0.5, highest=0.5),
+            starts=(
+                {"clock-offset.offset": 3e-3},
+                {"clock-offset.offset": -3e-3},
+                {"clock-offset.offset": 0.02},
+                {"clock-offset.offset": -0.02},
+            ),
+        ),
         TumbleForm(
-            effect="camera-scale", name="same in x and y", amplitude="camera-scale.scale_change",
+            effect="camera-scale",
+            name="same in x and y",
+            amplitude="camera-scale.scale_change",
             parameters=(_free("camera-scale.scale_change", "1", 2e-3, lowest=-0.3, highest=0.3),),
-            physical=lambda values: {"camera-scale.scale": 1.0 + np.asarray(values["camera-scale.scale_change"], dtype=float)},
+            physical=lambda values: {
+                "camera-scale.scale": 1.0 + np.asarray(values["camera-scale.scale_change"], dtype=float)
+            },
             starts=({"camera-scale.scale_change": 5e-3}, {"camera-scale.scale_change": -5e-3}),
         ),
-    ]  # fmt: skip
+    ]
     if rig:
         curvature = _free("pendulum.curvature", "1/m", 0.05, lowest=0.0, highest=20.0)
         forms += [
-            TumbleForm(effect="pendulum", name="centred", parameters=(curvature,), amplitude="pendulum.curvature",
-                       physical=_pendulum, starts=({"pendulum.curvature": 0.1}, {"pendulum.curvature": 0.5})),
-            TumbleForm(effect="pendulum", name="off centre", amplitude="pendulum.curvature", physical=_pendulum,
-                       parameters=(curvature, Parameter(name="pendulum.offset", unit="m", value=0.0, std=0.02, scale=0.01,
-                                                        lowest=-0.2, highest=0.2, step=2e-4)),
-                       starts=({"pendulum.curvature": 0.3, "pendulum.offset": 0.0},)),
-            _plain("rig-friction", "dry", _free("rig-friction.force", "N", force, lowest=0.0, highest=5 * weight),
-                   starts=({"rig-friction.force": force}, {"rig-friction.force": 5 * force})),
-            _plain("pulley-inertia", "added mass", _free("pulley-inertia.mass", "kg", 0.05, lowest=0.0, highest=20.0),
-                   starts=({"pulley-inertia.mass": 0.1}, {"pulley-inertia.mass": 1.0})),
-        ]  # fmt: skip
+            TumbleForm(
+                effect="pendulum",
+                name="centred",
+                parameters=(curvature,),
+                amplitude="pendulum.curvature",
+                physical=_pendulum,
+                starts=({"pendulum.curvature": 0.1}, {"pendulum.curvature": 0.5}),
+            ),
+            TumbleForm(
+                effect="pendulum",
+                name="off centre",
+                amplitude="pendulum.curvature",
+                physical=_pendulum,
+                parameters=(
+                    curvature,
+                    Parameter(
+                        name="pendulum.offset",
+                        unit="m",
+                        value=0.0,
+                        std=0.02,
+                        scale=0.01,
+                        lowest=-0.2,
+                        highest=0.2,
+                        step=2e-4,
+                    ),
+                ),
+                starts=({"pendulum.curvature": 0.3, "pendulum.offset": 0.0},),
+            ),
+            _plain(
+                "rig-friction",
+                "dry",
+                _free("rig-friction.force", "N", force, lowest=0.0, highest=5 * weight),
+                starts=({"rig-friction.force": force}, {"rig-friction.force": 5 * force}),
+            ),
+            _plain(
+                "pulley-inertia",
+                "added mass",
+                _free("pulley-inertia.mass", "kg", 0.05, lowest=0.0, highest=20.0),
+                starts=({"pulley-inertia.mass": 0.1}, {"pulley-inertia.mass": 1.0}),
+            ),
+        ]
     return tuple(forms)

@@ -1,0 +1,292 @@
+"""Tumbles as the statistics of `hedgebed diagnose` see them (`experiments.diagnose.problem`).
+
+A trial's own nuisance is its simulated gravity. The camera's zero is no parameter: it is marginalised in the whitening
+(`tumble_fit.whiten`) and, for the gap that a person reads, put at its most probable value.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.campaign import Campaign, EffectTable, TumbleModel, write_model
+from rigid.trajectory import STATES
+
+from .problem import Finding, Form, Parameter, Samples, TrialInfo, Values
+from .tumble_data import CHANNELS, TumbleData, tumble_data
+from .tumble_fit import LOST, ZERO_STD, whiten
+from .tumble_forms import TumbleForm, tumble_forms
+from .tumble_forward import SHARED, Forward, Prediction
+from .tumble_latent import latent_columns
+
+__all__ = ["TumbleProblem", "make_problem"]
+
+Array = NDArray[np.float64]
+
+_UNITS = {"mass": "kg", "inertia": "kg m2", "stiffness": "N/m", "damping": "N s/m", "mu_s": "1", "mu_d": "1"}
+_STEP = 0.02  # of finite differences, in sigmas: contacts make smaller ones rough
+
+
+class TumbleProblem:
+    """One campaign of tumbles: a `Problem`."""
+
+    kind = "tumble"
+
+    def __init__(self, data: TumbleData, *, findings: Sequence[Finding] = (), threads: int | None = None) -> None:
+        self.data = data
+        self.forward = Forward(data, threads=threads)
+        self.findings = tuple(findings)
+        self._index = {trial.id: k for k, trial in enumerate(data.trials)}
+
+    @cached_property
+    def trials(self) -> tuple[TrialInfo, ...]:
+        """In the campaign's order."""
+        return tuple(
+            TrialInfo(
+                id=trial.id,
+                condition=trial.condition,
+                settings={"torque_N_m": trial.torque, "gravity_m_s2": trial.gravity_sim},
+            )
+            for trial in self.data.trials
+        )
+
+    @cached_property
+    def base(self) -> tuple[Parameter, ...]:
+        """Shared numbers that are uncertain, and each trial's gravity."""
+        told = self.data.tables.uncertainty
+        found = []
+        for name in SHARED:
+            value, sigma = self.forward.nominal[name], getattr(told, name)
+            if sigma > 0 and value > 0:
+                size = sigma * value
+                lowest, highest = value * max(1 - 6 * sigma, 0.05), value * (1 + 6 * sigma)
+                found.append(
+                    Parameter(
+                        name=name,
+                        unit=_UNITS[name],
+                        value=value,
+                        std=size,
+                        scale=size,
+                        lowest=lowest,
+                        highest=highest,
+                        step=_STEP * size,
+                    )
+                )
+        if told.gravity_sim > 0:
+            for trial in self.data.trials:
+                size = told.gravity_sim * trial.gravity_sim
+                found.append(
+                    Parameter(
+                        name=f"gravity_sim[{trial.id}]",
+                        unit="m/s2",
+                        value=trial.gravity_sim,
+                        std=size,
+                        scale=size,
+                        lowest=trial.gravity_sim * max(1 - 6 * told.gravity_sim, 0.05),
+                        trial=trial.id,
+                        highest=trial.gravity_sim * (1 + 6 * told.gravity_sim),
+                        kind="gravity_sim",
+                        step=_STEP * size,
+                    )
+                )
+        return tuple(found)
+
+    @cached_property
+    def forms(self) -> tuple[TumbleForm, ...]:
+        """The library, scaled to this campaign."""
+        weights = [
+            (self.forward.nominal["mass"] + trial.counterweight) * trial.gravity_sim for trial in self.data.trials
+        ]
+        weight = float(np.mean(weights))
+        wheel_inertia = self.data.tables.wheel.inertia
+        wheel = [
+            trial.wheel_speed_0
+            if trial.actuator == "brake"
+            else trial.wheel_speed_0 + trial.torque * min(trial.torque_until, trial.end) / wheel_inertia
+            for trial in self.data.trials
+        ]
+        return tumble_forms(
+            rig=self.forward.rig,
+            sinkage=0.5 * weight / self.forward.nominal["stiffness"],
+            weight=weight,
+            wheel_speed=max(10.0, 0.5 * float(np.mean(wheel))),
+        )
+
+    @cached_property
+    def design(self) -> str:
+        """Digest of sampling, conditions, noise and priors."""
+        tables = self.data.tables
+        told = {
+            "tables": tables.model_dump(mode="json", exclude={"name", "notes", "trial"}),
+            "trials": [
+                [*trial.condition, trial.counterweight, str(trial.torque_until), trial.wheel_speed_0, trial.end]
+                + np.bincount(trial.channel, minlength=len(CHANNELS)).tolist()
+                for trial in self.data.trials
+            ],
+        }
+        return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]
+
+    def samples(self, trial: str) -> Samples:
+        """Times, channels and std of a trial's samples."""
+        data = self.data.trials[self._index[trial]]
+        return Samples(time=data.time, channel=np.array(CHANNELS)[data.channel], std=data.std)
+
+    def evaluate(
+        self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[str]
+    ) -> list[dict[str, Array]]:
+        """Whitened residuals of each trial at each point."""
+        found = self._predict(points, forms, trials)
+        residuals = {}
+        for trial, prediction in zip(trials, found, strict=True):
+            residuals[trial] = whiten(self.data.trials[self._index[trial]], prediction.value)
+        return [{trial: residuals[trial][k] for trial in trials} for k in range(len(points))]
+
+    def rewhiten(self, values: Values, forms: Sequence[Form]) -> None:
+        """The whitening does not depend on the values."""
+
+    def chi_square(self, values: Values, forms: Sequence[Form], trial: str) -> tuple[float, int]:
+        """With the camera's zero at its most probable value."""
+        data = self.data.trials[self._index[trial]]
+        residual = self._residual(values, forms, trial)
+        residual = residual - self._zero(data.channel, residual)
+        return float(residual @ residual), len(residual)
+
+    def noise(self, random: np.random.Generator, trial: str) -> Array:
+        """White."""
+        return random.standard_normal(len(self.data.trials[self._index[trial]].time))
+
+    def phases(self, values: Values, forms: Sequence[Form], trial: str) -> NDArray[np.str_]:
+        """stand, pivot, slip or hop at each sample."""
+        return np.array(STATES)[self._predict([values], forms, [trial])[0].state[0]]
+
+    def reported(self, values: Values, form: Form) -> dict[str, tuple[float, str]]:
+        """The term's parameters under the fixed names of trials.md."""
+        from rigid.terms import EFFECTS
+
+        units = {f"{form.effect}.{p.name}": p.unit for p in EFFECTS[form.effect].parameters}
+        physical = self._physical(values, form)
+        return {name.partition(".")[2]: (value, units[name]) for name, value in physical.items()}
+
+    def latent(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
+        """Force and torque that the model lacks, and what they might depend on (`tumble_latent`)."""
+        data = self.data.trials[self._index[trial]]
+        prediction = self._predict([values], forms, [trial], motion=True)[0]
+        mass = values.get("mass", self.forward.nominal["mass"])
+        inertia = values.get("inertia", self.forward.nominal["inertia"])
+        return latent_columns(data, prediction, mass=mass, inertia=inertia)
+
+    def compare(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, dict[str, Array]]:
+        """Measured and modelled, by channel, the camera's zero put right in the model."""
+        data = self.data.trials[self._index[trial]]
+        value = self._predict([values], forms, [trial])[0].value[0]
+        value = value + self._zero(data.channel, (data.value - value) / data.std) * data.std
+        told = {}
+        for number, name in enumerate(CHANNELS):
+            mine = data.channel == number
+            if mine.any():
+                told[name] = {"t_s": data.time[mine], "measured": data.value[mine], "model": value[mine]}
+        return told
+
+    def write_model(self, path: str, values: Values, forms: Sequence[Form]) -> None:
+        """model.toml, which `hedgebed tumble --model` runs."""
+        tables = self.data.tables
+        numbers = {name: float(values.get(name, self.forward.nominal[name])) for name in SHARED}
+        numbers["mu_d"] = min(numbers["mu_d"], numbers["mu_s"])
+        kept = tables.model_dump(include={"format", "kind", "name", "notes"})
+        used = {trial.id for trial in self.data.trials}
+        model = TumbleModel(
+            **kept,
+            platform=tables.platform.model_copy(update={name: numbers[name] for name in ("mass", "inertia")}),
+            wheel=tables.wheel,
+            rig=tables.rig,
+            surface=tables.surface.model_copy(
+                update={name: numbers[name] for name in ("stiffness", "damping", "mu_s", "mu_d")}
+            ),
+            uncertainty=tables.uncertainty,
+            sensors=tables.sensors,
+            trial=tuple(
+                trial.model_copy(update={"gravity_sim": float(values.get(f"gravity_sim[{trial.id}]", stated))})
+                for trial in tables.trial
+                if trial.id in used
+                for stated in (trial.gravity_sim,)
+            ),
+            effect=tuple(
+                EffectTable(
+                    id=form.effect,
+                    parameters={
+                        name.partition(".")[2]: value
+                        for name, value in self._physical(values, form).items()
+                        if math.isfinite(value)
+                    },
+                )
+                for form in forms
+            ),
+        )
+        write_model(path, model)
+
+    def next_experiment(self, first: Form, second: Form, values: Values) -> str:
+        """What would tell two effects apart."""
+        from .tumble_advice import advice
+
+        return advice(first.effect, second.effect)
+
+    # Helpers ----------------------------------------------------------------------------------------------------------
+
+    def gravity(self, points: Sequence[Values]) -> Array:
+        """Of each trial over its stated one, shape [point_count, trial_count]."""
+        return np.array(
+            [
+                [values.get(f"gravity_sim[{t.id}]", t.gravity_sim) / t.gravity_sim for t in self.data.trials]
+                for values in points
+            ]
+        )
+
+    def _predict(
+        self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[str], *, motion: bool = False
+    ) -> list[Prediction]:
+        columns = {
+            name: np.array([values.get(name, value) for values in points])
+            for name, value in self.forward.nominal.items()
+        }
+        columns["gravity"] = self.gravity(points)
+        for form in forms:
+            assert isinstance(form, TumbleForm)
+            own = {p.name: np.array([values.get(p.name, p.value) for values in points]) for p in form.parameters}
+            columns |= form.physical(own)
+        return self.forward.predict(columns, trials=[self._index[trial] for trial in trials], motion=motion)
+
+    def _residual(self, values: Values, forms: Sequence[Form], trial: str) -> Array:
+        data = self.data.trials[self._index[trial]]
+        residual = (data.value - self._predict([values], forms, [trial])[0].value[0]) / data.std
+        return np.where(np.isfinite(residual), residual, LOST)
+
+    @staticmethod
+    def _zero(channel: NDArray[np.int8], residual: Array) -> Array:
+        """The most probable zero of the camera in units of its noise, at each sample."""
+        zero = np.zeros(len(residual))
+        for number, name in enumerate(CHANNELS):
+            mine = np.flatnonzero(channel == number)
+            if name in ("x", "y", "theta") and len(mine):
+                most = len(mine) / (len(mine) + ZERO_STD**-2)
+                zero[mine] = np.clip(most * residual[mine].mean(), -3.0, 3.0)
+        return zero
+
+    @staticmethod
+    def _physical(values: Mapping[str, float], form: Form) -> dict[str, float]:
+        assert isinstance(form, TumbleForm)
+        own = {p.name: np.array([values.get(p.name, p.value)]) for p in form.parameters}
+        return {name: float(array[0]) for name, array in form.physical(own).items()}
+
+
+def make_problem(campaign: Campaign) -> TumbleProblem:
+    """The problem of one campaign. Raises ValueError as `tumble_data` does."""
+    from .tumble_checks import checked
+
+    data, findings = checked(tumble_data(campaign))
+    return TumbleProblem(data, findings=findings)
