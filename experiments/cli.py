@@ -7,6 +7,7 @@ Results go to stdout, everything else to stderr.
 
 import inspect
 import os
+import re
 import shutil
 import signal
 import sys
@@ -17,7 +18,7 @@ from pathlib import Path
 from types import FrameType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from cyclopts import App, CycloptsError, Parameter
+from cyclopts import App, CoercionError, CycloptsError, MissingArgumentError, Parameter
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 from rich.console import Console
@@ -28,6 +29,7 @@ from experiments.progress import Progress, make_progress
 from experiments.reading import Layer, find_case, read_case, settings_from
 from experiments.registry import Experiment, find_experiment
 from experiments.runfolder import RunFolder, fresh_path, write_json, write_text
+from experiments.strict import may_be_empty, plain_kinds
 from hedgebed import __version__
 
 __all__ = ["DONE", "FAILED", "BAD_INPUT", "STOPPED", "build_app", "main"]
@@ -49,7 +51,7 @@ def main(tokens: Sequence[str] | None = None) -> int:
         if not isinstance(error, CycloptsError | _RefusedError):
             traceback.print_exc()
             return FAILED
-        _say(str(error))
+        _say(_said(error))
         return BAD_INPUT
     except KeyboardInterrupt:
         _say("stopped")
@@ -66,6 +68,38 @@ class _RefusedError(ValueError):
 def _say(text: str) -> None:
     for line in text.splitlines():
         print(f"hedgebed: {line}", file=sys.stderr, flush=True)
+
+
+def _said(error: Exception) -> str:
+    """What was wrong with the words typed, and what would do."""
+    text = str(error)
+    if isinstance(error, MissingArgumentError) and error.argument is not None:
+        count, got = error.argument.token_count()[0], len(error.tokens_so_far)
+        if count > 1:
+            typed = " ".join(error.tokens_so_far) or "nothing"
+            about = f" ({error.argument.parameter.help.rstrip('.')})" if error.argument.parameter.help else ""
+            return f"{error.argument.name} = {typed} will not do: it takes {count} values, not {got}{about}"
+    if isinstance(error, CoercionError) and error.target_type is float and error.token and error.argument:
+        unit = re.findall(r"\[([^\[\]]+)\]", error.argument.parameter.help or "")[-1:]
+        if unit and unit[0] != "1":
+            named = _UNIT_NAMES.get(unit[0], unit[0])
+            text = f"{text.rstrip('.')}: give a plain number in {named}{_in_metres(error.token.value, unit[0])}"
+    return text
+
+
+_UNIT_NAMES = {"m": "metres", "N": "newtons", "kg": "kilograms", "s": "seconds"}
+_LENGTHS = {"mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6, "m": 1.0}
+
+
+def _in_metres(typed: str, unit: str) -> str:
+    """``, e.g. 0.016`` for ``16mm``; nothing where it is no length with a unit."""
+    found = re.fullmatch(r"\s*([0-9.]+(?:e-?[0-9]+)?)\s*([a-zµ]+)\s*", typed)
+    if unit != "m" or not found or found[2] not in _LENGTHS:
+        return ""
+    try:
+        return f", e.g. {float(found[1]) * _LENGTHS[found[2]]:.6g}"
+    except ValueError:
+        return ""
 
 
 @contextmanager
@@ -137,11 +171,32 @@ def _bare(hint: Any) -> Any:
     origin, inside = get_origin(hint), get_args(hint)
     if origin is Annotated:
         return _bare(inside[0])
+    if hint is int:
+        return float  # cyclopts would round 1.5 to 2; `_as_typed` makes whole numbers of it again
     if not inside or origin is Literal:
         return hint
     if origin in (Union, UnionType):
         return Union[tuple(_bare(item) for item in inside)]
     return origin[tuple(_bare(item) for item in inside)]
+
+
+def _as_typed(given: dict[str, Any], fields: dict[str, FieldInfo]) -> dict[str, Any]:
+    """The values as the settings class takes them: a float that is whole is an int, a list of ``none`` is empty."""
+
+    def whole(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return tuple(whole(item) for item in value)
+        return int(value) if isinstance(value, float) and value.is_integer() else value
+
+    found = {}
+    for name, value in given.items():
+        field = fields.get(name)
+        if field is not None:
+            value = () if may_be_empty(field) and value == (None,) else value
+            kinds = plain_kinds(field.annotation)
+            value = whole(value) if int in kinds and float not in kinds else value
+        found[name] = value
+    return found
 
 
 def _option(name: str, field: FieldInfo) -> inspect.Parameter:
@@ -152,6 +207,8 @@ def _option(name: str, field: FieldInfo) -> inspect.Parameter:
     shown: bool | Callable[[Any], str] = False if default is None or default is PydanticUndefined else _shown
     is_flag = field.annotation is bool
     hint = _bare(field.annotation)
+    if may_be_empty(field):
+        hint = tuple[get_args(hint)[0] | None, ...]
     annotation = Annotated[
         hint,  # type: ignore[valid-type]
         Parameter(help=field.description, show_default=shown, consume_multiple=True, negative=None if is_flag else ""),
@@ -180,7 +237,8 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
         with _refusing():
             layers = [read_case(registry.CASES / preset.case) for preset in presets if given.pop(preset.option, False)]
             layers += [read_case(find_case(case, registry.CASES))] if case is not None else []
-            settings = settings_from(settings_class, [*layers, Layer(None, given)])
+            typed = Layer(None, _as_typed(given, settings_class.model_fields))
+            settings = settings_from(settings_class, [*layers, typed])
             with _stdout_to_stderr():
                 experiment.check(settings)
                 code = experiment.code()

@@ -15,6 +15,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from experiments.runfolder import RUN_FORMAT, settings_in
+from experiments.strict import may_be_empty
 
 __all__ = ["Layer", "find_case", "nearest", "option", "read_case", "settings_from"]
 
@@ -89,20 +90,28 @@ def settings_from(settings_class: type[BaseModel], layers: Iterable[Layer]) -> B
             if name not in names:
                 faults.append(f"{layer.called(name)} = {value!r} is no setting; {nearest(name, names)}")
             else:
-                merged[name] = None if value == "none" and _may_be_unset(settings_class, name) else value
+                merged[name] = _unset(settings_class, name) if value == "none" else value
                 origin[name] = layer
     if faults:
         raise ValueError("\n".join(faults))
     try:
         return settings_class(**merged)
     except ValidationError as error:
-        sentences = [_sentence(settings_class, detail, origin) for detail in error.errors()]
+        sentences = [_sentence(settings_class, detail, origin) for detail in error.errors() if not _follows(detail)]
         raise ValueError("\n".join(dict.fromkeys(sentences))) from None
 
 
-def _may_be_unset(settings_class: type[BaseModel], name: str) -> bool:
-    """Whether None is among the values of the setting `name`."""
-    return type(None) in get_args(settings_class.model_fields[name].annotation)
+def _unset(settings_class: type[BaseModel], name: str) -> Any:
+    """What "none" means for the setting `name`: None, a list of nothing, or where it must be set, the word itself."""
+    described = settings_class.model_fields[name]
+    if type(None) in get_args(described.annotation):
+        return None
+    return () if may_be_empty(described) else "none"
+
+
+def _follows(detail: ErrorDetails) -> bool:
+    """Whether a fault is but the echo of another: a list too short because one of its values would not do."""
+    return detail["type"] == "too_short" and len(detail["input"]) >= detail["ctx"]["min_length"]
 
 
 def _sentence(settings_class: type[BaseModel], detail: ErrorDetails, origin: Mapping[str, Layer]) -> str:
@@ -117,6 +126,8 @@ def _sentence(settings_class: type[BaseModel], detail: ErrorDetails, origin: Map
     described = settings_class.model_fields[name].description if name in settings_class.model_fields else None
     if detail["type"] == "missing":
         said = f"{option(name)} must be given"
+    elif detail["type"] == "too_short" and not detail["input"]:
+        said = f"{called} is empty: give at least one"
     else:
         said = f"{called}{inside} = {detail['input']!r} will not do: {message[:1].lower() + message[1:]}"
     return f"{said} ({described.strip().rstrip('.')})" if described else said

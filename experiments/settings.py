@@ -7,7 +7,7 @@ the machine or the grains' material is refused by the experiment's `check`.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -47,7 +47,11 @@ class PenetrateSettings(StrictSettings):
     # The spike
     tip: Literal["sphere", "cone", "flat"] = Field("sphere", description="Shape of the tip.")
     tip_diameter: Positive = Field(0.012, description="Diameter of the tip [m].")
-    shaft_diameter: Positive | None = Field(None, description="Diameter of the shaft [m]; the tip's if not given.")
+    shaft_diameter: Positive | None = Field(
+        None,
+        description="Diameter of the shaft [m]: at most the tip's and at least a grain, with a flat tip the tip's own; "
+        "the tip's if not given.",
+    )
     shaft_length: Positive = Field(0.06, description="Length of the shaft above the tip's widest point [m].")
     cone_angle: float = Field(60.0, ge=1, lt=180, description="Full angle of a conical tip [degrees].")
     spike_friction: NotNegative = Field(0.5, description="Friction coefficient of spike and grains [1].")
@@ -59,11 +63,14 @@ class PenetrateSettings(StrictSettings):
         0.0085, lt=1, description="Simulated gravity of the offloading rig [9.80665 m/s2]; 0: no rig, `gravity` rules."
     )
     load: Positive | None = Field(
-        None, description="Weight on the spike [N]; (m + m_b) g_sim / 4 of platform and counterweight if not given."
+        None,
+        description="Weight on the spike, set down and dropped [N]. If not given, a quarter of the platform's: in the "
+        "rig (m + m_b) g_sim / 4, which is (5.3 kg platform + 5.2 kg counterweight) x 0.0085 g / 4 = 0.219 N by "
+        "default; without a rig m g / 4.",
     )
     mass: Positive = Field(
         0.1,
-        description="Mass that a drop moves, under `load` [kg]. The shipped 0.2 kg stops within a shallow bed; the "
+        description="Mass that a drop moves, under `load` [kg]. The shipped 0.1 kg stops within a shallow bed; the "
         "platform's own share in the rig, (m + m_b) / 4, is 2.63 kg, and a free drop in a laboratory has load = m g.",
     )
 
@@ -73,7 +80,9 @@ class PenetrateSettings(StrictSettings):
     hold: NotNegative = Field(0.01, description="How long a driven spike is held at depth [s].")
     retreat_speed: Positive = Field(0.4, description="Speed of the pull-out [m/s].")
     drop_speeds: tuple[Positive, ...] = Field(
-        (0.1, 0.15, 0.2), description="Speeds at the surface of dropped runs [m/s]."
+        (0.1, 0.15, 0.2),
+        description="Speeds at the surface of dropped runs [m/s]; none: no drops, on no seed unless other_drop_speeds "
+        "is given.",
     )
     after_stop: Positive = Field(0.03, description="How long a drop is followed after its first stop [s].")
     drop_time: Positive = Field(0.8, description="A drop that has not come to rest ends after this [s].")
@@ -104,12 +113,32 @@ class PenetrateSettings(StrictSettings):
         "that ships; none if not given.",
     )
 
+    @model_validator(mode="before")
+    @classmethod
+    def _no_drops_are_none(cls, given: Any) -> Any:
+        """Who leaves the drops out leaves them out on every seed."""
+        if isinstance(given, dict) and given.get("drop_speeds", True) in ((), []):
+            return {"other_drop_speeds": ()} | given
+        return given
+
     @model_validator(mode="after")
     def _fits_together(self) -> PenetrateSettings:
         for finding in (self._spike(), self._bed(), self._runs()):
             if finding:
-                raise ValueError(finding)
+                raise ValueError(finding + self._perhaps_millimetres())
         return self
+
+    def _perhaps_millimetres(self) -> str:
+        """What to ask of a length above a metre; empty where there is none."""
+        for key in ("tip_diameter", "shaft_diameter", "shaft_length", "grain", "depth", "bed_size"):
+            value = getattr(self, key)
+            for length in value if isinstance(value, tuple) else (value,):
+                if length is not None and length > 1:
+                    return (
+                        f". Is {key} = {_plain(value) if isinstance(value, tuple) else f'{value:g}'} in millimetres? "
+                        f"Lengths are in metres: {length:g} mm is {1e-3 * length:g}"
+                    )
+        return ""
 
     def _spike(self) -> str | None:
         across = self.tip_diameter / self.grain

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, get_args, get_origin
 
+from annotated_types import MinLen
 from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator
+from pydantic.fields import FieldInfo
 
-__all__ = ["StrictSettings"]
+__all__ = ["StrictSettings", "may_be_empty", "plain_kinds"]
 
 
 class StrictSettings(BaseModel):
@@ -19,7 +21,7 @@ class StrictSettings(BaseModel):
     def _of_its_kind(cls, value: Any, info: ValidationInfo) -> Any:
         """Text is no number, true is not 1, and one number is no list of them."""
         hint = cls.model_fields[str(info.field_name)].annotation
-        kinds = _kinds(hint)
+        kinds = plain_kinds(hint)
         if bool in kinds:
             if not isinstance(value, bool):
                 raise ValueError("it must be true or false")
@@ -35,14 +37,20 @@ class StrictSettings(BaseModel):
         return value
 
 
-def _kinds(hint: Any) -> set[type]:
+def may_be_empty(field: FieldInfo) -> bool:
+    """Whether the setting is a list that may hold nothing, which one types as ``none``."""
+    endless = get_origin(field.annotation) is tuple and get_args(field.annotation)[-1:] == (Ellipsis,)
+    return endless and not any(isinstance(bound, MinLen) for bound in field.metadata)
+
+
+def plain_kinds(hint: Any) -> set[type]:
     """The plain types inside an annotation."""
     inside = get_args(hint)
     if get_origin(hint) is Literal or not inside:
         return {hint} if isinstance(hint, type) else set()
     if get_origin(hint) is Annotated:
-        return _kinds(inside[0])
-    return set().union(*(_kinds(item) for item in inside))
+        return plain_kinds(inside[0])
+    return set().union(*(plain_kinds(item) for item in inside))
 
 
 def _is_number(value: Any) -> bool:

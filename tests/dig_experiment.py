@@ -15,7 +15,7 @@ class DigSettings(BaseModel):
     grain: Literal["sand", "glass"] = Field("sand", description="Material of the grains.")
     spike_diameter: float = Field(0.02, gt=0, description="Diameter of the spike [m].")
     drive_speeds: tuple[float, ...] = Field((0.1, 0.2), description="Speeds of the driven runs [m/s].")
-    seeds: tuple[Annotated[int, Field(ge=0)], ...] = Field((1,), description="Seeds [1].")
+    seeds: tuple[Annotated[int, Field(ge=0)], ...] = Field((1,), min_length=1, description="Seeds [1].")
     size: tuple[float, float, float] = Field((0.1, 0.1, 0.05), description="Size of the bed [m].")
     steps: int = Field(3, ge=0, description="Steps to take [1].")
     load: Annotated[float, Field(gt=0)] | None = Field(1.5, description="Load on the spike [N]; none if not set.")

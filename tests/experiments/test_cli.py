@@ -91,7 +91,12 @@ def test_none_unsets_what_need_not_be_set(dig):
         (["--spike-diameter", "thin"], ["--spike-diameter", "thin", "float"]),
         (["--spike-diameter", "0.2"], ["spike_diameter = 0.2", "at most 0.1"]),
         (["--grain", "snow"], ["--grain", "snow", "sand"]),
-        (["--size", "1"], ["--size", "3"]),
+        (["--size", "1"], ["--size = 1 will not do: it takes 3 values, not 1 (Size of the bed [m])"]),
+        (["--seeds", "1.5"], ["--seeds[0] = 1.5", "fractional part"]),
+        (["--steps", "10.7"], ["--steps = 10.7", "fractional part"]),
+        (["--seeds"], ["--seeds is empty: give at least one (Seeds [1])"]),
+        (["--spike-diameter", "16mm"], ["16mm", "give a plain number in metres, e.g. 0.016"]),
+        (["--load", "3N"], ["3N", "give a plain number in newtons"]),
         (["misspelt.toml"], ["misspelt.toml", "deep"]),
         (["key.toml"], ["key.toml: spike_diametre = 0.1", "did you mean 'spike_diameter'"]),
         (["hyphen.toml"], ["hyphen.toml: spike-diameter", "did you mean 'spike_diameter'"]),
@@ -127,6 +132,27 @@ def test_a_check_of_the_experiment_refuses_before_a_folder_is_made(dig, capsys):
     assert main(["dig", "--out", "a"]) == 2
     assert "at most 2 GiB" in capsys.readouterr().err
     assert not Path("a").exists()
+
+
+@pytest.mark.parametrize(("line", "said"), [("seeds = [1.5]", "fractional part"), ("seeds = []", "give at least one")])
+def test_one_fault_is_one_sentence(dig, capsys, line, said):
+    Path("case.toml").write_text(f"{line}\n")
+    assert main(["dig", "case.toml"]) == 2
+    (sentence,) = capsys.readouterr().err.splitlines()
+    assert said in sentence
+
+
+def test_none_empties_a_list_that_may_be_empty(dig):
+    Path("case.toml").write_text('drive_speeds = "none"\n')
+    assert main(["dig", "--drive-speeds", "none", "--out", "a"]) == 0
+    assert main(["dig", "case.toml", "--out", "b"]) == 0
+    assert settings_of(Path("a"))["drive_speeds"] == settings_of(Path("b"))["drive_speeds"] == []
+
+
+def test_a_whole_number_stays_one(dig):
+    assert main(["dig", "--steps", "4", "--seeds", "2", "3", "--out", "a"]) == 0
+    settings = settings_of(Path("a"))
+    assert (settings["steps"], settings["seeds"]) == (4, [2, 3]) and isinstance(settings["steps"], int)
 
 
 # How it ends

@@ -178,6 +178,36 @@ def test_a_run_killed_in_a_drop_goes_on_to_the_same_bits(fake, tmp_path):
         assert (whole / name).read_bytes() == (broken / name).read_bytes(), name
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_run_that_is_stopped_keeps_what_it_has_done_to_the_step(fake, tmp_path, monkeypatch, number):
+    """However long the time between checkpoints; and it goes on to the same bits."""
+    settings = PenetrateSettings(**(QUICK | {"seeds": (1,), "checkpoint_interval": 1e6}))
+    whole, broken = tmp_path / "whole", tmp_path / "broken"
+    penetrate.run(settings, whole)
+    advance = FakeBed.advance
+    left = 300
+
+    def interrupted(self, steps):
+        nonlocal left
+        left -= 1
+        if left == 0:
+            os.kill(os.getpid(), number)
+        advance(self, steps)
+
+    monkeypatch.setattr(FakeBed, "advance", interrupted)
+    before = signal.getsignal(number)
+    with pytest.raises(KeyboardInterrupt):
+        penetrate.run(settings, broken)
+    assert left == 0, "the step was finished and no other begun"
+    assert signal.getsignal(number) == before
+    (kept,) = (broken / "checkpoint").glob("*.npz")
+    with np.load(kept) as state:
+        assert state["run.counts"][0] > 100
+    penetrate.resume(broken)
+    for path in whole.rglob("*.csv"):
+        assert path.read_bytes() == (broken / path.relative_to(whole)).read_bytes(), path.name
+
+
 def test_a_run_taken_up_by_other_code_says_so(fake, tmp_path, monkeypatch):
     monkeypatch.setattr(penetrate, "fingerprint", lambda: "before")
     settings = PenetrateSettings(**(QUICK | {"seeds": (1,), "frame_count": 0}))
@@ -283,6 +313,17 @@ def test_the_load_is_the_platforms_share():
     assert PenetrateSettings(load=1.0).weight == 1.0
 
 
+def test_drops_can_be_left_out(fake, tmp_path):
+    """None on the first seed is none on any; the fit is then to the driven runs alone."""
+    settings = PenetrateSettings(**({k: v for k, v in QUICK.items() if "drop" not in k} | {"drop_speeds": ()}))
+    assert settings.other_drop_speeds == ()
+    assert PenetrateSettings(drop_speeds=(), other_drop_speeds=(0.1,)).other_drop_speeds == (0.1,)
+    penetrate.check(settings)
+    result = penetrate.run(settings, tmp_path / "run")
+    assert {run["kind"] for run in result["runs"]} == {"driven", "set_down"}
+    assert result["quantities"]["stiffness"]["value"] > 0
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [
@@ -308,6 +349,8 @@ def test_the_load_is_the_platforms_share():
         ({"max_overlap": 0.5}, "max_overlap"),
         ({"seeds": ()}, "seeds"),
         ({"depht": 0.01}, "depht"),
+        ({"tip_diameter": 16.0}, r"Is tip_diameter = 16 in millimetres\? Lengths are in metres: 16 mm is 0.016"),
+        ({"bed_size": (100.0, 100.0, 0.02)}, "Is bed_size = .* in millimetres"),
     ],
 )
 def test_bad_settings_are_refused_by_name(given, words):

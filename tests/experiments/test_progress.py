@@ -82,6 +82,50 @@ def test_a_stage_outside_the_plan_belongs_to_the_one_it_comes_within(clock):
     assert progress.fraction == 0.75
 
 
+def test_a_bed_that_was_in_the_cache_counts_nothing(clock):
+    """A stage that is over without an update found its work done: the rest is still all to do."""
+    progress = Progress(clock=clock)
+    progress.plan({"bed": 1.5, "drive": 0.5, "drop": 0.5})
+    progress.stage("bed", total=2.0)
+    clock.now += 0.5
+    progress.stage("drive", total=1.0)
+    clock.now += 9.5
+    assert progress.fraction < 0.6
+    progress.update(0.5)
+    assert progress.remaining() == pytest.approx(9.5 + 19.0)
+    assert progress.fraction == pytest.approx(10.0 / 38.5)
+
+
+def test_the_whole_goes_on_at_least_as_long_as_the_stage(clock):
+    progress = Progress(clock=clock)
+    progress.plan({"drive": 1.0}, seconds={"report": 40.0})
+    progress.stage("drive", total=1.0)
+    clock.now += 100
+    progress.update(1.0)
+    assert progress.remaining() == pytest.approx(40.0)
+    progress.stage("report", total=1.0)
+    clock.now += 30
+    progress.update(0.1)
+    assert progress.stage_remaining() == pytest.approx(270)
+    assert progress.remaining() == pytest.approx(270)
+
+
+def test_a_share_once_told_is_never_taken_back(clock):
+    """A stage slower than its cost said, a last stage longer than thought, an update that goes back."""
+    progress = Progress(clock=clock)
+    progress.plan({"bed": 1.5, "drive": 0.5, "report": 0.5})
+    told = []
+    for stage, pace, steps in (("bed", 0.2, 10), ("drive", 3.0, 10), ("report", 9.0, 10)):
+        progress.stage(stage, total=steps)
+        for done in (*range(1, steps // 2 + 1), 2, *range(steps // 2, steps + 1)):
+            clock.now += pace
+            progress.update(done)
+            told.append((progress.fraction, progress.stage_fraction if done != 2 else 0.0))
+    shares = [share for share, _ in told]
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1.0)
+
+
 def test_a_cost_below_nothing_is_refused():
     with pytest.raises(ValueError, match="less than nothing"):
         Progress().plan({"dig": -1.0})
