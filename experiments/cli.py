@@ -208,7 +208,7 @@ def _option(name: str, field: FieldInfo) -> inspect.Parameter:
     is_flag = field.annotation is bool
     hint = _bare(field.annotation)
     if may_be_empty(field):
-        hint = tuple[get_args(hint)[0] | None, ...]
+        hint = tuple[get_args(hint)[0] | None, ...]  # type: ignore[misc]
     annotation = Annotated[
         hint,  # type: ignore[valid-type]
         Parameter(help=field.description, show_default=shown, consume_multiple=True, negative=None if is_flag else ""),

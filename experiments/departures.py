@@ -12,11 +12,14 @@ from typing import Any
 import numpy as np
 
 from coupling import Penetration
+from vis.numbers import quote
 
 from .fit import Fit, fit_rows
 
 __all__ = ["departure_table", "departures", "depth_exponent", "sentences"]
 
+Known = tuple[float, float | None]
+"""A number and its standard deviation, None where unknown."""
 _WHOSE = "the spring-damper's"
 BANDS = 4
 """Bands of depth between the surface and the deepest point."""
@@ -28,12 +31,12 @@ def departures(
     beds: Mapping[str, Penetration],
     fit: Fit,
     *,
-    sinkage: tuple[float, float] | None = None,
+    sinkage: tuple[Known, Known] | None = None,
 ) -> dict[str, Any]:
     """The entry "departures" of result.json: table, exponents, returned work and sentences.
 
     `driven` are the bed's driven runs; `beds` and `models` all runs by id, in the bed and on the spring-damper;
-    `sinkage` the resting depth (bed, model) [m].
+    `sinkage` the resting depth (bed, model) [m], each with its spread between seeds (None: unknown).
     """
     table = departure_table(driven, fit)
     exponents = depth_exponent(driven)
@@ -100,7 +103,7 @@ def sentences(
     exponents: Mapping[float, float],
     returned: tuple[float, ...] | None,
     drops: Sequence[tuple[Penetration, Penetration]],
-    sinkage: tuple[float, float] | None,
+    sinkage: tuple[Known, Known] | None,
 ) -> list[str]:
     """What the numbers say, one finding a sentence."""
     said = [text for part in (_by_depth(table), _by_rate(table)) for text in part]
@@ -110,9 +113,10 @@ def sentences(
         said.append(f"Going in, the bed's force grows with depth to the power {shown}; the spring's to the power 1.")
     if sinkage is not None:
         bed, law = sinkage
+        against = f", {_compared(law[0] / bed[0] - 1, 'deeper', 'less deep', 'as deep')}" if bed[0] > 0 else ""
         said.append(
-            f"Set down under its load the spike sinks {1e3 * bed:.2f} mm into the bed; the spring-damper says "
-            f"{1e3 * law:.2f} mm, {_compared(law / bed - 1, 'deeper', 'less deep', 'as deep')}."
+            f"Set down under its load the spike sinks {_plain(quote(*bed, 'm', significant=2))} into the bed; the "
+            f"spring-damper says {_plain(quote(*law, 'm', significant=2))}{against}."
         )
     if returned is not None:
         said.append(
@@ -202,6 +206,11 @@ def _percent(value: float) -> str:
 
 def _share(value: float) -> str:
     return f"{100 * value:.0f} %" if abs(value) >= 0.095 else f"{100 * value:.1f} %"
+
+
+def _plain(text: str) -> str:
+    """Without spaces that do not break: the sentences are shown on terminals too."""
+    return text.replace("\N{NO-BREAK SPACE}", " ")
 
 
 def _signed(share: float) -> str:

@@ -2,6 +2,9 @@
 
 Spread between seeds is that of the runs which every seed has (same kind, same speed), each seed fitted by itself; the
 value is fitted to all runs of all seeds. A quantity that no second seed has gets the std null, one that is exact 0.
+
+Grains stick out of the surface, depth 0, so that a spike is carried by some of them before it: neither the fit nor the
+law know of that, and `Findings.at_surface` says how much it is.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ import numpy as np
 
 from coupling import Penetration, overdamped_below
 from rigid import SpringDamper
+from vis.numbers import quote
 
 from .departures import departures
 from .fit import Fit, drag_gap, fit_rows, fit_spring_damper, spread
@@ -27,6 +31,12 @@ from .units import Unit, make_run
 __all__ = ["Findings", "bed_entry", "bed_quantities", "compare_with", "model_run", "read_reference"]
 
 Runs = Mapping[str, Penetration]
+LEAST_CONDITIONS = 3
+"""Kinds and speeds that a fit of two numbers wants."""
+MOST_CORRELATED = 0.85
+"""Of K and C: runs at one constant speed alone give 0.87, sqrt(3) / 2."""
+ENOUGH_TIPS = 6.0
+"""Width of the bed that ships, in tips."""
 COMPARED = ("stiffness", "damping", "sinkage_dem", "sinkage_spring_damper", "drag_gap")
 
 
@@ -95,8 +105,92 @@ class Findings:
             "work_returned_dem": self._work_returned(self.beds, "work of the way out over work in, driven runs"),
             "work_returned_spring_damper": self._work_returned(self.models, "the same on the fitted law"),
             "load": _quantity(load, 0.0, "N", "on the spike, set down and dropped; (m + m_b) g_sim / 4 unless set"),
-            "drop_mass": _quantity(self.settings.mass, 0.0, "kg", self.drop_note()),
+            **({"drop_mass": _quantity(self.settings.mass, 0.0, "kg", self.drop_note())} if self.of("drop") else {}),
+            **self._standing(),
+            **self._surface_quantities(),
         }  # fmt: skip
+
+    def _standing(self) -> dict[str, dict[str, Any]]:
+        """The stiffness that gives the sinkage at rest, load / sinkage: for a foot that stands."""
+        own = [self.settings.weight / sunk if sunk is not None and sunk > 0 else None for sunk in self._sunk()]
+        sunk = _mean(self._sunk())
+        if sunk is None or sunk <= 0:
+            return {}
+        note = "load over sinkage at rest: the K for a foot that stands under this load"
+        return {"stiffness_standing": _quantity(self.settings.weight / sunk, spread(own), "N/m", note)}
+
+    def _surface_quantities(self) -> dict[str, dict[str, Any]]:
+        """How far grains stick out under the tip, and what the bed pushes back with at depth 0."""
+        forces, heights = [], []
+        for seed in self.seeds:
+            runs = self.of("driven", seed)
+            forces.append(_mean([force_at_surface(run, 0.1 * self.settings.grain) for run in runs]))
+            starts = [run.settings.get("start_depth") for run in runs]
+            heights.append(_mean([-start for start in starts if start is not None]))
+        found = {}
+        for name, values, unit, note in (
+            (
+                "surface_force",
+                forces,
+                "N",
+                "the bed's as the tip reaches depth 0, driven; mean of a tenth of a grain",
+            ),
+            ("surface_roughness", heights, "m", "how far above depth 0 the tip first meets a grain"),
+        ):
+            if (mean := _mean(values)) is not None:
+                found[name] = _quantity(mean, spread(values), unit, note)
+        return found
+
+    def _sunk(self) -> list[float | None]:
+        return self.sinkages(self.beds)
+
+    def at_surface(self) -> str | None:
+        """What the bed pushes back with before depth 0, where that matters; None below a tenth of the load."""
+        numbers = self._surface_quantities()
+        force, load = numbers.get("surface_force"), self.settings.weight
+        if force is None or force["value"] <= 0.1 * load:
+            return None
+        out = numbers.get("surface_roughness")
+        grains = f", because grains stick out of the surface by up to {_words(out)}" if out else ""
+        return (
+            f"at depth 0 the bed already pushes with {_words(force)}, {100 * force['value'] / load:.2g} % of the load"
+            f"{grains}: the spring-damper knows nothing of that, and the fit leaves out what is above depth 0"
+        )
+
+    def set_down_note(self) -> str | None:
+        """What a set-down is, and why a drop at the same speed goes deeper."""
+        sets = [run for run in self.of("set_down") if run.settings.get("mass")]
+        if not sets:
+            return None
+        speed, feels = self.settings.lowering_speed, float(sets[0].settings["mass"])
+        return (
+            f"a set-down is lowered at {speed:g} m/s to where it first touches and then let go, held back by a hand "
+            f"that bears what the ground does not yet carry and lets it feel {1e3 * feels:.3g} g: it sinks ever more "
+            f"slowly to where the bed first carries the load. A drop brings its momentum, {self.settings.mass:.3g} kg "
+            f"times its speed, and goes deeper even at the same speed"
+        )
+
+    def which_stiffness(self) -> str | None:
+        """When to use the fitted K, and when that of a foot that stands."""
+        standing, fitted = self._standing().get("stiffness_standing"), self.fit.stiffness
+        if standing is None or fitted <= 0:
+            return None
+        ratio = standing["value"] / fitted
+        if ratio >= 1.005:
+            wrong = f"overstates the sinkage at rest {ratio:.2g} times"
+        elif ratio <= 0.995:
+            wrong = f"understates the sinkage at rest {1 / ratio:.2g} times"
+        else:
+            wrong = "gives the sinkage at rest as well"
+        return (
+            f"K and C are for motion down to {1e3 * self._deepest():.3g} mm; the damper acts only while the spike goes "
+            f"in. For a foot that stands under {_words(_quantity(self.settings.weight, 0.0, 'N'))} this K {wrong}: "
+            f"there K = {_words(standing)} (load over sinkage) would do"
+        )
+
+    def _deepest(self) -> float:
+        """How deep the runs went that were fitted [m]."""
+        return max(self.beds[name].max_depth for name in self.fit.runs)
 
     def drop_note(self) -> str:
         """What a drop is, and what it is not."""
@@ -167,14 +261,21 @@ class Findings:
 
     def departures(self) -> dict[str, Any]:
         """The entry "departures"."""
-        sunk, law = _mean(self.sinkages(self.beds)), _mean(self.sinkages(self.models))
-        pair = (sunk, law) if sunk and law is not None else None
+        numbers = self.quantities()
+        sunk, law = (
+            (numbers[name]["value"], numbers[name]["std"]) for name in ("sinkage_dem", "sinkage_spring_damper")
+        )
+        pair = (sunk, law) if sunk[0] is not None and law[0] is not None else None
         found = departures(self.of("driven"), self.models, self.beds, self.fit, sinkage=pair)
-        shallow = self._shallow()
-        found["sentences"] += [f"{shallow[:1].upper()}{shallow[1:]}."] if shallow else []
-        if self.of("drop"):
-            note = self.drop_note()
-            found["sentences"].append(f"{note[:1].upper()}{note[1:]}.")
+        notes = {
+            "which_stiffness": self.which_stiffness(),
+            "surface": self.at_surface(),
+            "set_down": self.set_down_note(),
+            "drop": self.drop_note() if self.of("drop") else None,
+        }
+        found |= {name: _sentence(text) for name, text in notes.items() if text}
+        for text in (notes["which_stiffness"], notes["surface"], self._shallow(), notes["set_down"], notes["drop"]):
+            found["sentences"] += [_sentence(text)] if text else []
         return found
 
     def _shallow(self) -> str | None:
@@ -182,9 +283,12 @@ class Findings:
         sunk = _mean(self.sinkages(self.beds))
         if sunk is None or sunk >= 2 * self.settings.grain:
             return None
+        several = len([value for value in self._sunk() if value is not None]) > 1
+        spread_words = "its spread between seeds is part of the answer" if several else "another seed will give another"
+        shown = _words(self.quantities()["sinkage_dem"])
         return (
-            f"the sinkage, {1e3 * sunk:.2f} mm, is only {sunk / self.settings.grain:.2g} grains: it depends on which "
-            f"grain the tip met, so its spread between seeds is part of the answer"
+            f"the sinkage, {shown}, is only {sunk / self.settings.grain:.2g} grains: it depends on which grain the tip "
+            f"met, so {spread_words}"
         )
 
     def warnings(self) -> list[str]:
@@ -222,11 +326,41 @@ class Findings:
                 f"the stiffness fitted, {self.fit.stiffness:.3g} N/m, is above {bound:.3g} N/m, up to which a spike "
                 f"set down is damped beyond critical: it may have overshot; a lower lowering_speed would do"
             )
+        said += [text for text in (self._inseparable(), self._narrow()) if text]
         if self.fit.damping == 0:
             said.append("the damping fitted is 0, its bound: the bed shows no drag that grows with speed in these runs")
         if self.fit.stiffness == 0:
             said.append("the stiffness fitted is 0, its bound: the law has no resting sinkage")
         return said
+
+    def _inseparable(self) -> str | None:
+        """Where the runs fitted do not tell K from C."""
+        conditions = {unit.condition for unit in self.units if unit.id in self.fit.runs}
+        if len(conditions) >= LEAST_CONDITIONS and abs(self.fit.correlation or 0.0) <= MOST_CORRELATED:
+            return None
+        shown = "unknown" if self.fit.correlation is None else f"{self.fit.correlation:.2f}"
+        listed = ", ".join(f"{kind} at {speed:g} m/s" for kind, speed in sorted(conditions))
+        return (
+            f"the fit hardly tells K from C (correlation of the two: {shown}; fitted to {listed}): give at least two "
+            f"speeds and two drop_speeds"
+        )
+
+    def _narrow(self) -> str | None:
+        """A bed so narrow that the spike meets its own images, or so shallow that it feels the floor."""
+        width, tip = min(self.settings.bed_size[:2]), self.settings.tip_diameter
+        if width >= ENOUGH_TIPS * tip * (1 - 1e-9):
+            return None
+        return (
+            f"the bed is {width / tip:.2g} tips wide and goes on beside itself, so the spike meets its own images at "
+            f"that distance: force, K and sinkage may move with a wider one (bed_size of {ENOUGH_TIPS * tip:.3g} m "
+            f"both ways would be {ENOUGH_TIPS:g} tips, as in the case that ships)"
+        )
+
+
+def force_at_surface(run: Penetration, reach: float) -> float | None:
+    """Mean force of the last `reach` [m] above depth 0 on the way in [N]; None where no row is there."""
+    rows = (run.depth <= 0) & (run.depth >= -reach) & (run.velocity > 0)
+    return float(run.force[rows].mean()) if rows.any() else None
 
 
 def model_run(settings: PenetrateSettings, unit: Unit, bed: Penetration, fit: Fit, time_step: float) -> Penetration:
@@ -252,7 +386,7 @@ def bed_entry(facts: Sequence[Mapping[str, Any]], settings: PenetrateSettings, s
 
 
 def bed_quantities(facts: Sequence[Mapping[str, Any]], overlap: float | None) -> dict[str, dict[str, Any]]:
-    """Numbers of the beds, means over seeds; counts and settings that are exact get the std 0."""
+    """Numbers of the beds, means over seeds; what is exact gets the std 0, what one bed does not tell null."""
     found: dict[str, dict[str, Any]] = {}
     for name, unit, note in (
         ("grain_count", "1", ""),
@@ -264,15 +398,16 @@ def bed_quantities(facts: Sequence[Mapping[str, Any]], overlap: float | None) ->
     ):
         values = [float(entry[name]) for entry in facts if entry.get(name) is not None]
         if values:
-            exact = all(value == values[0] for value in values)
-            mean = values[0] if exact else float(np.mean(values))
-            found[name] = _quantity(mean, 0.0 if exact and name not in _MEASURED else spread(values), unit, note)
+            alike = all(value == values[0] for value in values)
+            mean = values[0] if alike else float(np.mean(values))
+            found[name] = _quantity(mean, 0.0 if alike and name in _CHOSEN else spread(values), unit, note)
     if overlap is not None:
         found["max_overlap"] = _quantity(overlap, None, "1", "largest overlap of grains in any run, of a diameter")
     return found
 
 
-_MEASURED = ("packing_fraction", "coordination_number", "surface")
+_CHOSEN = ("young",)
+"""What is set, and so exact; of the rest one bed does not tell how much it differs from bed to bed."""
 
 
 def read_reference(reference: str | Path) -> dict[str, Any]:
@@ -360,6 +495,16 @@ def _differences(other: Mapping[str, Any], result: Mapping[str, Any]) -> list[st
 def _quantity(value: float | None, std: float | None, unit: str, note: str = "") -> dict[str, Any]:
     entry: dict[str, Any] = {"value": value, "std": std, "unit": unit}
     return entry | {"note": note} if note else entry
+
+
+def _words(entry: Mapping[str, Any]) -> str:
+    """A quantity as a person quotes it: by its spread, else with two figures."""
+    text = quote(entry["value"], entry["std"], entry["unit"], significant=2)
+    return text.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}."
 
 
 def _mean(values: Sequence[float | None]) -> float | None:

@@ -37,6 +37,8 @@ class Fit:
     """Standard error of C by jackknife over runs [N s/m]; None below three runs."""
     runs: tuple[str, ...]
     """Ids of the runs that counted."""
+    correlation: float | None = None
+    """Of the two estimates, -1 to 0: at -1 only a sum of both is known, not each (None where it was not fitted)."""
 
     def force(self, depth: Array, velocity: Array) -> Array:
         """The law [N] at `depth` [m] and `velocity` [m/s], one shape."""
@@ -71,7 +73,8 @@ def fit_spring_damper(runs: Mapping[str, Penetration], weights: Mapping[str, flo
         count = len(parts)
         variance = (count - 1) / count * ((left_out - left_out.mean(axis=0)) ** 2).sum(axis=0)
         errors = (float(np.sqrt(variance[0])), float(np.sqrt(variance[1])))
-    return Fit(stiffness, damping, *errors, tuple(parts))
+    size = float(np.sqrt(matrix[0, 0] * matrix[1, 1]))
+    return Fit(stiffness, damping, *errors, tuple(parts), -float(matrix[0, 1]) / size if size > 0 else None)
 
 
 def drag_gap(runs: Sequence[Penetration], fit: Fit, weights: Sequence[float] | None = None) -> float | None:

@@ -3,6 +3,8 @@
 quote(92.31, 4.2, "N/m") == "92 ± 4 N/m"
 quote(0.00215, 0.00012, "m") == "2.15 ± 0.12 mm"
 quote(0.231, 0.02, "%") == "23 ± 2 %"
+
+Forces stay in newtons, as they are given: what is compared in one sentence has one unit.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ from typing import Any
 __all__ = ["column", "digits_for", "plain", "quantity", "quote", "short"]
 
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
-_SCALED = {"N", "J", "s", "Pa", "W", "kg"}
+_SCALED = {"J", "s", "Pa", "W", "kg"}
 _MINUS, _SPACE = "\N{MINUS SIGN}", "\N{NO-BREAK SPACE}"
 
 
@@ -84,21 +86,23 @@ def quote(value: float | None, std: float | None = None, unit: str = "1", *, sig
     return f"{text}{_SPACE}{shown}" if shown else text
 
 
-def quantity(entry: Any, *, unit: str | None = None, significant: int = 3) -> str:
+def quantity(entry: Any, *, unit: str | None = None, significant: int | None = None) -> str:
     """A quantity of result.json, `{"value", "std", "unit"}` or a bare number; "unknown" where it is missing.
 
     Args:
         entry: The quantity.
         unit: In place of its own unit, such as "%" for a share.
-        significant: Digits where the uncertainty does not set them.
+        significant: Digits where the uncertainty does not set them; by default two where that is unknown (a std of
+            null), more would claim what no one knows.
     """
     if isinstance(entry, Mapping):
         value, std, own = entry.get("value"), entry.get("std"), str(entry.get("unit") or "1")
+        significant = significant or (2 if std is None and "std" in entry else 3)
     else:
         value, std, own = entry, None, "1"
     if isinstance(value, bool) or not isinstance(value, int | float):
         return "unknown" if value is None else str(value)
-    return quote(value, std if isinstance(std, int | float) else None, unit or own, significant=significant)
+    return quote(value, std if isinstance(std, int | float) else None, unit or own, significant=significant or 3)
 
 
 def _scale(value: float, unit: str) -> tuple[float, str]:

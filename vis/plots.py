@@ -148,16 +148,13 @@ def gap_plot(run: RunFolder) -> Plot | None:
         difference[at] = row["model_force"] - row["bed_force"]
         share[at] = difference[at] / row["bed_force"] if row["bed_force"] > 0 else np.nan
     unit, words = column([float(cell) for cell in difference.ravel()], "N")
-    scale = {"N": 1.0, "mN": 1e3, "kN": 1e-3}.get(unit)
-    if scale is None:
-        unit, scale, words = "N", 1.0, [plain(float(cell)) for cell in difference.ravel()]
-    bound = scale * float(np.nanmax(np.abs(difference))) or 1.0
+    bound = float(np.nanmax(np.abs(difference))) or 1.0
     with styled():
         figure = Figure(figsize=(_WIDTH, max(2.6, 0.9 + 0.42 * len(depths))))
         FigureCanvasAgg(figure)
         axis = figure.add_subplot()
         norm = TwoSlopeNorm(0.0, -bound, bound)
-        image = axis.imshow(scale * difference, cmap="PuOr_r", norm=norm, aspect="auto")
+        image = axis.imshow(difference, cmap="PuOr_r", norm=norm, aspect="auto")
         axis.set_xticks(range(len(speeds)), [f"{s:.4g}" for s in speeds])
         axis.set_yticks(range(len(depths)), [f"{short(1e3 * a)} to {short(1e3 * b)}" for a, b in depths])
         axis.set_xlabel("speed [m/s]")
@@ -175,7 +172,7 @@ def gap_plot(run: RunFolder) -> Plot | None:
             text = f"{'+' if number > 0 else ''}{word} {unit}"
             if np.isfinite(share[i, j]):
                 text += f"   ({_signed(100.0 * float(share[i, j]), 2)} %)"
-            dark = abs(scale * number) > 0.62 * bound
+            dark = abs(number) > 0.62 * bound
             axis.text(j, i, text, ha="center", va="center", fontsize=8.5, color="white" if dark else INK)
         bar = figure.colorbar(image, ax=axis, pad=0.015, fraction=0.05)
         bar.set_label(f"spring-damper − bed [{unit}]")

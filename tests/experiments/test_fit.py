@@ -31,6 +31,14 @@ def test_a_bed_with_a_memory_gives_its_way_in():
     assert fit.stiffness == pytest.approx(90.0, rel=1e-9) and fit.damping == pytest.approx(0.8, rel=1e-9)
 
 
+def test_one_constant_speed_hardly_tells_the_two_apart():
+    """Columns z and v = const over 0 < z < Z: their cosine is mean(z) / rms(z) = sqrt(3) / 2."""
+    run = drive(SPIKE, into=SpringDamper(stiffness=123.0, damping=1.5, time_step=2e-5), speed=0.1, depth=0.01)
+    assert fit_spring_damper({"a": run}).correlation == pytest.approx(-np.sqrt(0.75), abs=1e-3)
+    more = fit_spring_damper(runs_on(lambda: SpringDamper(stiffness=123.0, damping=1.5, time_step=2e-5)))
+    assert -0.8 < more.correlation < 0
+
+
 def test_coefficients_stay_at_or_above_zero():
     """A drag that falls with speed would want C < 0."""
     fit = fit_spring_damper(runs_on(lambda: FakeBed(hardness=90.0, rate=-0.5)))
@@ -76,9 +84,9 @@ def test_departures_are_said_by_depth_and_speed():
         assert value == pytest.approx(2.0, abs=0.02)
     law = SpringDamper(stiffness=fit.stiffness, damping=fit.damping, time_step=2e-5)
     models = {"a": drive(SPIKE, into=law, speed=0.1, depth=0.02)}
-    found = departures(driven, models, {"a": driven[0]}, fit, sinkage=(0.002, 0.003))
+    found = departures(driven, models, {"a": driven[0]}, fit, sinkage=((0.002, 0.0003), (0.003, None)))
     text = " ".join(found["sentences"])
     assert "In the top 5 mm the spring-damper pushes" in text and "too hard at" in text and "too softly at" in text
-    assert "sinks 2.00 mm into the bed; the spring-damper says 3.00 mm, 50 % deeper" in text
+    assert "sinks 2.0 ± 0.3 mm into the bed; the spring-damper says 3.0 mm, 50 % deeper" in text
     assert found["work_returned"]["bed"] < 0.2 < found["work_returned"]["model"]
     assert departure_table([], Fit(1.0, 0.0, None, None, ())) == []

@@ -313,17 +313,6 @@ def test_the_load_is_the_platforms_share():
     assert PenetrateSettings(load=1.0).weight == 1.0
 
 
-def test_drops_can_be_left_out(fake, tmp_path):
-    """None on the first seed is none on any; the fit is then to the driven runs alone."""
-    settings = PenetrateSettings(**({k: v for k, v in QUICK.items() if "drop" not in k} | {"drop_speeds": ()}))
-    assert settings.other_drop_speeds == ()
-    assert PenetrateSettings(drop_speeds=(), other_drop_speeds=(0.1,)).other_drop_speeds == (0.1,)
-    penetrate.check(settings)
-    result = penetrate.run(settings, tmp_path / "run")
-    assert {run["kind"] for run in result["runs"]} == {"driven", "set_down"}
-    assert result["quantities"]["stiffness"]["value"] > 0
-
-
 @pytest.mark.parametrize(
     ("given", "words"),
     [

@@ -23,6 +23,7 @@ SPACE = "\N{NO-BREAK SPACE}"
         ((3.2e-4, None, "J"), "320 µJ"),
         ((-1234567.0, None, "Pa"), "−1.23 MPa"),
         ((0.9997, None, "N"), "1.00 N"),
+        ((0.219, None, "N"), "0.219 N"),
         ((0.0, 0.0, "m"), "0 mm"),
         ((None, None, "m"), "unknown"),
         ((math.nan, None, "N"), "not a number N"),
@@ -34,7 +35,9 @@ def test_quote(given, words):
 
 def test_quantity_takes_what_result_json_holds():
     assert quantity({"value": 4.21, "std": 0.35, "unit": "N s/m"}).replace(SPACE, " ") == "4.2 ± 0.3 N s/m"
-    assert quantity({"value": 0.284, "std": None, "unit": "1"}, unit="%").replace(SPACE, " ") == "28.4 %"
+    assert quantity({"value": 0.284, "std": None, "unit": "1"}, unit="%").replace(SPACE, " ") == "28 %"
+    assert quantity({"value": 0.000546, "std": None, "unit": "m"}).replace(SPACE, " ") == "0.55 mm"
+    assert quantity({"value": 0.3, "std": 0.0, "unit": "N"}).replace(SPACE, " ") == "0.3 N"
     assert quantity({"value": None, "std": None, "unit": "m"}) == "unknown"
     assert quantity(None) == "unknown"
     assert quantity("sand") == "sand"
