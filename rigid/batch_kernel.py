@@ -60,6 +60,7 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
     crater_of, contact, arms, divide = model.crater, model.contact, model.contact_arms, model.divide_mass
     MEMORY = model.has_memory
     SHEDS = model.law.has_memory or model.has("crater")
+    HOLDS = model.has("hold")
     DRY = model.has("vertical_friction", "rotation_friction")
     BETA = 2 * math.pi / count
     HALF = math.pi / count
@@ -127,7 +128,9 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
             low, high = 0.0, s.length
             for _ in range(200):  # the depth at which a row carries half the weight
                 middle = 0.5 * (low + high)
-                elastic, lost, stored, side, factor_s, factor_d = contact(p, s, q, middle, 0.0, 0.0, middle)
+                elastic, lost, stored, side, factor_s, factor_d = contact(
+                    p, s, q, middle, 0.0, 0.0, middle, middle
+                )
                 if elastic < share:
                     low = middle
                 else:
@@ -164,7 +167,9 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                         h, d = arms(ti.cos(angle), ti.sin(angle), s.length, radius)
                         z = h - at_y
                         in_z = ti.max(z, 1e-300)
-                        elastic, lost, stored, side, factor_s, factor_d = contact(p, s, q, in_z, 0.0, 0.0, in_z)
+                        elastic, lost, stored, side, factor_s, factor_d = contact(
+                            p, s, q, in_z, 0.0, 0.0, in_z, in_z
+                        )
                         press = ti.max(elastic, 0.0)
                         fy += elastic
                         ft += elastic * d
@@ -234,6 +239,7 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
             radius = tip_radius(p)
             crater = crater_of(p)
             top = ti.Vector([0.0 for _ in ti.static(range(count if MEMORY else 1))])
+            held = ti.Vector([0.0 for _ in ti.static(range(count if HOLDS else 1))])
 
             x = 0.0
             y = poses[i, 0]
@@ -251,6 +257,8 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                 for n in ti.static((0, count - 1)):
                     angle = theta + HALF + n * BETA
                     top[n] = ti.max((s.length - radius) * ti.cos(angle) + radius - y, 0.0)
+                    if ti.static(HOLDS):
+                        held[n] = top[n]
             touch = 1 | (1 << (count - 1))
             stick = touch
             backwards = 0  # bits of the spikes that slide towards -x
@@ -343,12 +351,15 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                     deepest = depth
                     if ti.static(MEMORY):
                         deepest = ti.max(top[n], depth)
+                    since = deepest
+                    if ti.static(HOLDS):
+                        since = ti.max(held[n], depth)
                     if (touch & bit) != 0:
                         rate = -(py + pt * d)
                         slip = px - pt * h
                         at = ti.max(depth, crater * deepest * (1.0 + 1e-15) + 1e-300)
                         elastic, lost, stored, side, factor_s, factor_d = contact(
-                            p, s, q, at, rate, slip, ti.max(deepest, at)
+                            p, s, q, at, rate, slip, ti.max(deepest, at), ti.max(since, at)
                         )
                         normal = elastic + lost
                         press = ti.max(normal, 0.0)
@@ -610,6 +621,8 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                             depth = (s.length - radius) * ti.cos(angle) + radius - y1
                             if (touch & (1 << n)) != 0:
                                 top[n] = ti.max(top[n], depth)
+                                if ti.static(HOLDS):
+                                    held[n] = ti.max(held[n], depth)
                             elif depth < 0.0:
                                 top[n] = 0.0
                 # -- accept --
@@ -637,6 +650,8 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                     fresh = 0
                     if kind == 1:
                         touch |= bit
+                        if ti.static(HOLDS):
+                            held[which] = 0.0
                         slip = vx - omega * ((s.length - radius) * ti.cos(theta + HALF + which * BETA) + radius)
                         stick &= ~bit
                         if slip > 0.0:

@@ -38,6 +38,8 @@ class Modes:
     """Of each spike: 0 sticks, +1 and -1 slides towards +x and -x."""
     top: list[float] = field(default_factory=list)
     """Deepest depth of each spike [m] since it entered the ground."""
+    held: list[float] = field(default_factory=list)
+    """Deepest depth of each spike [m] since it touched; empty: as `top`."""
     vertical: int = 0
     """Dry friction of the rig: 0 holds, +1 and -1 slides up and down."""
     rotation: int = 0
@@ -50,9 +52,27 @@ class Modes:
     def copy(self) -> Modes:
         """A copy that can be changed."""
         return Modes(
-            list(self.touching), list(self.slip), list(self.top), self.vertical, self.rotation, self.torque_over,
-            self.resting,
+            list(self.touching), list(self.slip), list(self.top), list(self.held), self.vertical, self.rotation,
+            self.torque_over, self.resting,
         )  # fmt: skip
+
+    def deepest(self, spike: int, depth: float) -> tuple[float, float]:
+        """Deepest depths [m] since the spike entered the ground, and since it touched, with `depth` reached now."""
+        top = max(self.top[spike], depth)
+        return top, (max(self.held[spike], depth) if self.held else top)
+
+    def remember(self, spike: int, depth: float) -> None:
+        """The spike is at `depth` now."""
+        self.top[spike] = max(self.top[spike], depth)
+        if self.held:
+            self.held[spike] = max(self.held[spike], depth)
+
+    def touch(self, spike: int, depth: float) -> None:
+        """The spike touches, at `depth`: in a crater of its own above 0."""
+        self.top[spike] = max(self.top[spike], 0.0)
+        if not self.held:
+            self.held = [0.0] * len(self.top)
+        self.held[spike] = depth
 
     @property
     def state(self) -> str:
@@ -123,8 +143,8 @@ class System:
         if not self.model.has_memory:
             return False
         depth = 1e-3
-        fresh = self.model.contact(self.p, self.s, self.q, depth, 0.0, 0.0, depth)
-        again = self.model.contact(self.p, self.s, self.q, depth, 0.0, 0.0, 2 * depth)
+        fresh = self.model.contact(self.p, self.s, self.q, depth, 0.0, 0.0, depth, depth)
+        again = self.model.contact(self.p, self.s, self.q, depth, 0.0, 0.0, 2 * depth, 2 * depth)
         return bool(self.crater != 0.0 or fresh != again)
 
     # -- geometry ----------------------------------------------------------------------------------------------------
@@ -167,16 +187,16 @@ class System:
         mass = model.inertia(p, s)
         c, sn, crater = s.cosine, s.sine, self.crater
         contacts: list[Contact] = []
-        sticking: list[tuple[Contact, float, float]] = []
+        sticking: list[tuple[Contact, float, float, float]] = []
         for n in modes.touching:
             cosine = c * self.cosines[n] - sn * self.sines[n]
             sine = sn * self.cosines[n] + c * self.sines[n]
             h, d = model.contact_arms(cosine, sine, s.length, self.radius)
             depth, rate, slip = h - y, -(vy + omega * d), vx - omega * h
-            top = max(modes.top[n], depth)
+            top, held = modes.deepest(n, depth)
             at = max(depth, crater * top * (1 + 1e-15) + _SLIGHT)  # touching: on the ground's side of the surface
-            top = max(top, at)
-            elastic, lost, _, side, factor_s, factor_d = model.contact(p, s, self.q, at, rate, slip, top)
+            top, held = max(top, at), max(held, at)
+            elastic, lost, _, side, factor_s, factor_d = model.contact(p, s, self.q, at, rate, slip, top, held)
             normal = elastic + lost
             load = max(normal, 0.0)
             power += lost * rate - side * slip
@@ -190,7 +210,7 @@ class System:
                 fx, ft = fx + friction, ft - friction * h
                 power -= friction * slip
             else:
-                sticking.append((contact, at, top))
+                sticking.append((contact, at, top, held))
         rows: list[tuple[tuple[float, float, float], float, tuple[float, float, float]]] = []
         if sticking:
             rows.append(self._stick_row(sticking, omega))
@@ -218,21 +238,21 @@ class System:
         return [vx, vy, omega, a[0], a[1], a[2], spin, s.torque * omega, power]
 
     def _stick_row(
-        self, sticking: list[tuple[Contact, float, float]], omega: float
+        self, sticking: list[tuple[Contact, float, float, float]], omega: float
     ) -> tuple[tuple[float, float, float], float, tuple[float, float, float]]:
         """The constraint A a + b = 0 of the spikes that stick, and the direction B of its force: (A, b, B)."""
-        self.stick_load = sum(contact.load for contact, _, _ in sticking)
-        self.stick_bound = sum(contact.friction_bound for contact, _, _ in sticking)
+        self.stick_load = sum(contact.load for contact, *_ in sticking)
+        self.stick_bound = sum(contact.friction_bound for contact, *_ in sticking)
         if len(sticking) == 1:
             only = sticking[0][0]
             return (1.0, 0.0, -only.h), omega * omega * only.d, (1.0, 0.0, -only.h)
         total, mean, ay, at, b = self.stick_load, 0.0, 0.0, 0.0, 0.0
-        for contact, depth, top in sticking:
+        for contact, depth, top, held in sticking:
             share = contact.load / total if total > 0 else 1.0 / len(sticking)
             mean += share * contact.h
             b += share * omega * omega * contact.d
             if contact.slip != 0.0 and total > 0:
-                by_depth, by_rate = self._load_slopes(depth, contact, top)
+                by_depth, by_rate = self._load_slopes(depth, contact, top, held)
                 by_depth, by_rate = by_depth * contact.slip / total, by_rate * contact.slip / total
                 if abs(by_rate) > _SHIFTING:
                     continue
@@ -241,20 +261,24 @@ class System:
                 b += by_depth * contact.rate - by_rate * omega * omega * (contact.h - self.radius)
         return (1.0, ay, at - mean), b, (1.0, 0.0, -mean)
 
-    def _load_slopes(self, depth: float, contact: Contact, top: float) -> tuple[float, float]:
-        """d load / d depth [N/m] and d load / d rate [N s/m], by central differences."""
+    def _load_slopes(self, depth: float, contact: Contact, top: float, held: float) -> tuple[float, float]:
+        """d load / d depth [N/m] and d load / d rate [N s/m], by differences; in depth on the side it moves to."""
         if contact.load == 0.0:
             return 0.0, 0.0
 
         def load(z: float, rate: float) -> float:
-            elastic, lost, *_ = self.model.contact(self.p, self.s, self.q, z, rate, contact.slip, max(top, z))
+            elastic, lost, *_ = self.model.contact(
+                self.p, self.s, self.q, z, rate, contact.slip, max(top, z), max(held, z)
+            )
             return elastic + lost
 
-        dz, dr = 1e-6 * depth, 1e-6 * abs(contact.rate) + 1e-12
-        return (
-            (load(depth + dz, contact.rate) - load(depth - dz, contact.rate)) / (2 * dz) if dz > 0 else 0.0,
-            (load(depth, contact.rate + dr) - load(depth, contact.rate - dr)) / (2 * dr),
-        )
+        rate, dr = contact.rate, 1e-6 * abs(contact.rate) + 1e-12
+        by_rate = (load(depth, rate + dr) - load(depth, rate - dr)) / (2 * dr)
+        if depth < 1e-12:
+            return 0.0, by_rate
+        dz = math.copysign(1e-6 * depth, rate)  # where a spike is at its deepest, loading and unloading differ
+        by_depth = (4 * load(depth + dz, rate) - load(depth + 2 * dz, rate) - 3 * load(depth, rate)) / (2 * dz)
+        return by_depth, by_rate
 
     def _shed(self, depth: float, slip: float, elastic: float) -> float:
         """Work that the elastic force does not store, per depth, on new ground [N]: F - d(stored)/d(depth)."""
@@ -263,7 +287,7 @@ class System:
         e = 1e-3 * depth
 
         def stored(z: float) -> float:
-            return float(self.model.contact(self.p, self.s, self.q, z, 0.0, slip, z)[2])
+            return float(self.model.contact(self.p, self.s, self.q, z, 0.0, slip, z, z)[2])
 
         near, far = stored(depth + e) - stored(depth - e), stored(depth + 2 * e) - stored(depth - 2 * e)
         return elastic - (8 * near - far) / (12 * e) if e > 0 else 0.0
@@ -302,14 +326,13 @@ class System:
         stored = 0.0
         for n in modes.touching:
             depth = max(self.depth(n, z), 0.0)
-            stored += model.contact(p, s, self.q, depth, 0.0, 0.0, max(modes.top[n], depth))[2]
+            stored += model.contact(p, s, self.q, depth, 0.0, 0.0, *modes.deepest(n, depth))[2]
         return kinetic, model.potential(p, s), stored
 
     def stored(self, spike: int, z: Sequence[float], modes: Modes) -> float:
         """Energy [J] that the ground stores under one spike."""
         depth = max(self.depth(spike, z), 0.0)
-        top = max(modes.top[spike], depth)
-        return float(self.model.contact(self.p, self.s, self.q, depth, 0.0, 0.0, top)[2])
+        return float(self.model.contact(self.p, self.s, self.q, depth, 0.0, 0.0, *modes.deepest(spike, depth))[2])
 
     def hold_still(self, z: list[float], modes: Modes) -> None:
         """Take from the speeds in `z` what the constraints of the spikes that stick do not allow.

@@ -13,7 +13,7 @@ the numbers of the ground's law:
 - ``potential(p, s)`` [J], ``losses(p, s)`` [W]: of the same;
 - ``dry_friction(p, s)``: bounds on the vertical motion [N] and on the rotation [N m];
 - ``crater(p)``: share of the deepest depth at which a spike on the way up leaves the ground;
-- ``contact(p, s, q, depth, rate, slip, top)``: elastic normal force, dissipative normal force, stored energy,
+- ``contact(p, s, q, depth, rate, slip, top, held)``: elastic normal force, dissipative normal force, stored energy,
   tangential drag, factors on mu_s and mu_d.
 """
 
@@ -157,7 +157,7 @@ def model_source(terms: Sequence[Term], law: SurfaceLaw) -> str:
         out += ["    f = plastic_share(p)", "    return f + (1.0 - f) * (1.0 - p.rebound)\n"]
     else:
         out += ["    return plastic_share(p)\n"]
-    out += ["def contact(p, s, q, depth, rate, slip, top):"]
+    out += ["def contact(p, s, q, depth, rate, slip, top, held):"]
     if _calls(every, "crater", ""):
         out += ["    f = plastic_share(p)", "    z = (depth - f * top) / (1.0 - f)", "    left = 1.0 - f"]
     else:
@@ -170,7 +170,7 @@ def model_source(terms: Sequence[Term], law: SurfaceLaw) -> str:
         out += ["    elastic = elastic * law_springback(z, top, p.rebound)"]
     if _calls(every, "crater", ""):
         out += ["    stored = left * stored"]
-    for call in _calls(every, "hold", "s, depth, top"):
+    for call in _calls(every, "hold", "s, depth, held"):
         out += [f"    pull, work = {call}", "    elastic = elastic - pull", "    stored = stored + work"]
     out += ["    lost = law_rate_force(z, rate, q)"]
     out += [f"    lost = lost + {call}" for call in _calls(every, "rate_force", "s, depth, rate")]

@@ -77,10 +77,11 @@ def _read_modes(
         h, _ = system.arms(n, z)
         depth, slip = h - z[Y], z[VX] - z[OMEGA] * h
         inside = depth > system.crater * max(modes.top[n], depth)
-        if system.has_memory:
-            modes.top[n] = max(modes.top[n], depth) if depth > 0 else 0.0
+        if system.has_memory and depth > 0:
+            modes.remember(n, depth)
         if inside and n not in modes.touching:
             modes.touching = sorted([*modes.touching, n])
+            modes.touch(n, depth)
             modes.slip[n] = 1 if slip > 0 else -1
         elif not inside and n in modes.touching:
             z[LOST] += system.stored(n, z, modes)
@@ -91,6 +92,8 @@ def _read_modes(
                 stopped.append(n)
             else:
                 modes.slip[n] = 1 if slip > 0 else -1
+        if system.has_memory and depth <= 0:
+            modes.top[n] = 0.0
     up_x, up_y = system.s.up_x, system.s.up_y
     vertical = bool(modes.vertical) and (up_x * old[0] + up_y * old[1]) * (up_x * z[VX] + up_y * z[VY]) <= 0
     rotation = bool(modes.rotation) and old[2] * z[OMEGA] <= 0

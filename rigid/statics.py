@@ -66,6 +66,7 @@ def standing(system: System) -> tuple[list[float], Modes]:
         if n not in modes.touching and system.depth(n, z) > 0:
             raise ValueError(_why_not(system, "the platform sinks in until a third row of spikes touches"))
     modes.top = [max(system.depth(n, z), 0.0) if n in modes.touching else 0.0 for n in range(trial.spike_count)]
+    modes.held = list(modes.top)
     modes.torque_over = False
     return z, modes
 
@@ -82,7 +83,7 @@ def _sinkage(system: System, load: float) -> float:
     system._set(0.0, [0.0] * 9)
 
     def force(depth: float) -> float:
-        return float(system.model.contact(system.p, system.s, system.q, depth, 0.0, 0.0, depth)[0])
+        return float(system.model.contact(system.p, system.s, system.q, depth, 0.0, 0.0, depth, depth)[0])
 
     low, high = 0.0, 1e-6
     while force(high) < load:
@@ -119,7 +120,7 @@ def stiffness_at_rest(system: System) -> tuple[float, float]:
     p, s, q = system.p, system.s, system.q
 
     def force(z: float, rate: float, top: float) -> float:
-        elastic, lost, *_ = system.model.contact(p, s, q, z, rate, 0.0, max(z, top))
+        elastic, lost, *_ = system.model.contact(p, s, q, z, rate, 0.0, max(z, top), max(z, top))
         return float(elastic + lost)
 
     loading = (force(1.01 * depth, 0.0, 0.0) - force(0.99 * depth, 0.0, 0.0)) / (0.02 * depth)

@@ -46,9 +46,9 @@ def crater_share(share):
     return share
 
 
-def held(s, depth, top, force, reach):
-    """A (1 - exp(-(top - z) / d)) of pull, mobilised over the retreat from the deepest depth."""
-    back = max(top - depth, 0.0)
+def held_back(s, depth, held, force, reach):
+    """A (1 - exp(-(top - z) / d)) of pull, mobilised over the retreat from the deepest depth since it touched."""
+    back = max(held - depth, 0.0)
     left = exp(-back / reach)
     return force * (1.0 - left), force * (back - reach * (1.0 - left))
 
@@ -118,7 +118,7 @@ CONTACT_EFFECTS: tuple[Term, ...] = (
         ),
         source="pull-off force of cohesive ground; mobilised over a distance so that rest is well defined",
         limits="breaks where the tip leaves the surface; friction does not see the pull",
-        hooks={"hold": held},
+        hooks={"hold": held_back},
     ),
     Term(
         id="rate-friction", summary="friction depends on the sliding speed", acts="mu_d",

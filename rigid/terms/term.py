@@ -19,7 +19,7 @@ the fixed ones listed below, then the term's own parameters, by name, in any num
 | `rotation_friction`  | s                         | bound [N m] of a dry friction on the rotation                |
 | `crater`             |                           | share of the deepest depth that stays [1], 0 to below 1      |
 | `stiffen`            | depth, force, work        | the law's force [N] and work [J] at a new depth, altered     |
-| `hold`               | s, depth, top             | pull [N] on a tip below its deepest depth, energy stored [J] |
+| `hold`               | s, depth, held            | pull [N], energy stored [J]; held: deepest since it touched   |
 | `rate_force`         | s, depth, rate            | normal force [N] that dissipates, by the rate of sinking     |
 | `side_force`         | s, depth, slip            | tangential force [N] on the tip against its slip speed       |
 | `friction_factor`    | s, slip                   | factors on mu_s and mu_d [1]                                 |
@@ -49,7 +49,7 @@ FIXED_ARGUMENTS: dict[str, tuple[str, ...]] = {
     "rotation_friction": ("s",),
     "crater": (),
     "stiffen": ("depth", "force", "work"),
-    "hold": ("s", "depth", "top"),
+    "hold": ("s", "depth", "held"),
     "rate_force": ("s", "depth", "rate"),
     "side_force": ("s", "depth", "slip"),
     "friction_factor": ("s", "slip"),

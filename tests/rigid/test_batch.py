@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from rigid_trials import RANGES, drawn, effect, in_rig
 
+from dem import runtime
 from rigid import EFFECTS, Effect, Ground, simulate, simulate_batch
 
 TIMES = np.linspace(0.0, 1.0, 101)
@@ -157,6 +158,31 @@ def test_bad_input_is_refused_by_name():
         simulate_batch([], duration=0.5)
     with pytest.raises(ValueError, match="other effects"):
         simulate_batch([base, in_rig(0.2, effects=(effect("slope"),))], duration=0.5)
+
+
+def test_the_batch_and_a_bed_s_runtime_live_in_one_process():
+    # A bed that starts Taichi anew takes nothing from the batch, which is compiled again and gives the same bits.
+    import taichi as ti
+
+    trials = [in_rig(0.2), in_rig(0.3)]
+    before = simulate_batch(trials, duration=0.2, sample_every=20).series
+    runtime.start(threads=1)
+    here = np.zeros(3)
+
+    @ti.kernel
+    def count(out: ti.types.ndarray(dtype=ti.f64, ndim=1)):
+        for i in out:
+            out[i] = 1.0 + i
+
+    count(here)
+    assert np.array_equal(simulate_batch(trials, duration=0.2, sample_every=20).series, before)
+    assert here.tolist() == [1.0, 2.0, 3.0]
+    runtime.start(precision="float32")
+    try:
+        with pytest.raises(RuntimeError, match="single precision"):
+            simulate_batch(trials, duration=0.2)
+    finally:
+        runtime.start()
 
 
 def test_every_hook_of_every_term_compiles_for_taichi():
