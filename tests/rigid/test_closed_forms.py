@@ -184,6 +184,25 @@ def test_the_wheel_takes_the_angular_momentum_that_it_gives():
     assert run.torque_work[-1] == pytest.approx(0.22 * np.interp(begin, run.time, run.theta), rel=1e-5)
 
 
+@BOTH
+def test_the_forces_that_move_the_centre_also_turn_the_platform(place):
+    # Newton and Euler over one touching spike: F = m ax, N = M_y (ay + g_sim), J alpha = tau + N d - F h; and the
+    # angular momentum that the torque and these moments give is J omega, summed over the motion.
+    trial = place(0.3, mu_s=0.7)
+    run = simulate(trial, duration=1.0, sample_interval=5e-4, tolerance=1e-10)
+    angle = run.theta + G0 - math.pi / 4  # spike 7
+    h, d = LENGTH * np.cos(angle), LENGTH * np.sin(angle)
+    force, load = MASS * run.ax, (MASS + trial.counterweight) * (run.ay + trial.gravity_sim)
+    alone = (run.state != 3) & (run.time > 0.05)  # the other row has left by then
+    moment = 0.3 + load * d - force * h
+    assert alone.sum() > 500
+    assert np.allclose(INERTIA * run.alpha[alone], moment[alone], atol=1e-9)
+    total = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(run.time) * (moment[1:] + moment[:-1]))])
+    first, last = np.flatnonzero(alone)[[0, -1]]
+    gained = INERTIA * (run.omega[last] - run.omega[first])
+    assert gained == pytest.approx(total[last] - total[first], rel=2e-4)
+
+
 def test_the_energies_are_those_of_the_pose():
     # E by hand at every sample: platform, counterweight, weight, springs of whatever spikes are in.
     trial = in_rig(0.3, mu_s=0.3)
