@@ -4,7 +4,7 @@ A *mode* says which spikes touch, which of them stick, which way the others slid
 bearing hold, whether the torque acts. Within a mode the right-hand side is smooth; modes change at events only.
 
 Sticking is a constraint, its force comes from the equations of motion. One spike that sticks: its slip speed is zero.
-Several share the horizontal force F in proportion to their loads N_n (planar-model.md), so the virtual work of F is
+Several share the horizontal force F in proportion to their loads N_n (docs/planar.md), so the virtual work of F is
 that of sum N_n slip_n / sum N_n, and this mean is what stays zero: sticking takes no energy, and when all load but one
 spike's is gone the constraint has become that spike's own.
 """
@@ -76,7 +76,7 @@ class Modes:
 
     @property
     def state(self) -> str:
-        """`stand`, `pivot`, `slip` or `hop` (planar-model.md)."""
+        """`stand`, `pivot`, `slip` or `hop` (docs/planar.md)."""
         if not self.touching:
             return "hop"
         sticking = sum(self.slip[n] == 0 for n in self.touching)

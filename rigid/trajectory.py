@@ -14,7 +14,7 @@ from .trial import Trial
 __all__ = ["STATES", "LAUNCH_DISTANCE", "Trajectory", "Transition"]
 
 STATES = ("stand", "pivot", "slip", "hop")
-"""The states (planar-model.md), in the order of `Trajectory.state`'s numbers."""
+"""The states (docs/planar.md), in the order of `Trajectory.state`'s numbers."""
 LAUNCH_DISTANCE = 0.01
 """How far from its start the centre is when its trajectory angle is taken [m]."""
 

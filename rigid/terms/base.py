@@ -44,7 +44,7 @@ BASE: tuple[Term, ...] = (
         limits="wires that neither stretch nor swing", hooks={"mass": counterweight_mass},
     ),
     Term(
-        id="gravity", summary="weight on the surface", acts="V", source="paper, eqs 9 and 19, with planar-model.md's W",
+        id="gravity", summary="weight on the surface", acts="V", source="paper, eqs 9 and 19, W = (m + m_b) g_sim",
         limits="uniform", hooks={"potential": gravity_potential, "force": gravity_force},
     ),
     Term(

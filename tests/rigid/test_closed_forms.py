@@ -1,4 +1,4 @@
-"""The closed forms of planar-model.md, one test each. All of them on the located integrator."""
+"""The closed forms of docs/planar.md, one test each. All of them on the located integrator."""
 
 import math
 
@@ -135,7 +135,7 @@ def test_an_impulsive_brake_that_slides(mu_d):
 def test_a_springy_contact_gives_its_energy_back_and_launches_steeper(ratio, steep):
     # Sticking, the impulse at the spring (1 + e) times the plastic one, e = exp(-ratio pi / 2) with a damper that acts
     # on the way in only; with h, d the tip's arms: tan = (1 + e) d w_p / (h [w_0 - (1 + e)(w_0 - w_p)]),
-    # w_0 = H / (J + m h^2), w_p = H / (J + m l^2). planar-model.md: 41 degrees at a damping ratio of 0.1.
+    # w_0 = H / (J + m h^2), w_p = H / (J + m l^2). docs/planar.md: 41 degrees at a damping ratio of 0.1.
     momentum, stiffness = 0.36, 1e7
     at_tip = 1 / (1 / MASS + D_ARM**2 / (INERTIA + MASS * H_ARM**2))
     damping = 2 * ratio * math.sqrt(stiffness * at_tip)

@@ -189,7 +189,7 @@ def test_three_rows_may_touch():
 
 
 def test_two_that_stick_share_the_force_by_their_loads_and_sticking_takes_no_power():
-    # F acts with the generalised direction sum N_n dslip_n / sum N_n, and sum N_n slip_n stays 0 (planar-model.md).
+    # F acts with the generalised direction sum N_n dslip_n / sum N_n, and sum N_n slip_n stays 0 (docs/planar.md).
     trial, rng = make(()), np.random.default_rng(6)
     touching = [0, 7]
     derived = Derived(trial, touching, {}, True)
@@ -216,7 +216,7 @@ def test_two_that_stick_share_the_force_by_their_loads_and_sticking_takes_no_pow
 
 
 def test_pivoting_in_the_rig_obeys_the_corrected_equations_15_and_16():
-    # planar-model.md, Errata: (m + m_b)[y_c'' - l sin(g) th'' - l cos(g) th'^2] + C y_c'[in] + K y_c + W = 0 and
+    # docs/planar.md, Errata: (m + m_b)[y_c'' - l sin(g) th'' - l cos(g) th'^2] + C y_c'[in] + K y_c + W = 0 and
     # (m l^2 + J + m_b l^2 sin^2 g) th'' + m_b l^2 sin g cos g th'^2 - (m + m_b) l sin g y_c'' - W l sin g = tau,
     # for one spike that sticks: x = l sin(g) + const, y = y_c + l cos(g).
     trial = make(())

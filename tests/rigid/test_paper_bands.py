@@ -1,4 +1,4 @@
-"""What the paper's text states in numbers, with our J = 0.06, J_w = 1.2e-3, K = 1.5e4, C = 60 (planar-model.md)."""
+"""What the paper's text states in numbers, with our J = 0.06, J_w = 1.2e-3, K = 1.5e4, C = 60 (docs/planar.md)."""
 
 import math
 
@@ -86,7 +86,7 @@ def held_share(trial):
 
 
 def test_the_pair_s_reading_of_0_0085_g_pivots_on_steel_at_0_125_nm_where_the_weight_s_slips():
-    # planar-model.md: W = (m + m_b) g_sim with g_sim = 0.0085 g lets a pivot hold; half of it does not. That is the
+    # docs/planar.md: W = (m + m_b) g_sim with g_sim = 0.0085 g lets a pivot hold; half of it does not. That is the
     # pivot itself, its spring settled. (A torque that begins at once jerks two soft feet loose before, whatever K:
     # tests/rigid/test_planar_events.py.)
     assert held_share(in_rig(0.125, mu_s=STEEL)) == pytest.approx(0.18, abs=0.01)

@@ -362,7 +362,7 @@ def test_an_effect_of_one_s_own_comes_from_a_file(tmp_path):
 
 
 def test_gravity_is_the_local_one_at_the_centre_of_mass_in_the_rig():
-    # planar-model.md: at 0.0085 g, 1.3 mm cancels the whole restoring moment W l sin(pi/8), since the moment is m g e.
+    # docs/planar.md: at 0.0085 g, 1.3 mm cancels the whole restoring moment W l sin(pi/8), since the moment is m g e.
     trial = in_rig()
     cancels = trial.weight * LENGTH * math.sin(math.pi / 8) / (MASS * G)
     assert cancels == pytest.approx(1.3e-3, abs=5e-5)
