@@ -1,0 +1,327 @@
+"""Made-up campaigns of penetration with something hidden in them, for `hedgebed bench diagnose`.
+
+Nothing here is shared with the code that diagnoses: the motions come from a leapfrog of very small steps, and every
+effect has another functional form than the library's. What is hidden comes back beside the campaign, not in it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from experiments.campaign import Campaign, PenetrationCampaign, Recording
+
+__all__ = ["EFFECTS", "OUTSIDE", "Hidden", "make_hidden"]
+
+EFFECTS = ("inertial-drag", "depth-hardening", "plastic-sinkage", "adhesion", "shaft-friction", "layering")
+OUTSIDE = ("floor-vibration", "loose-mass", "shock", "load-cell-drift", "sloshing")
+_STEP = 2e-5
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """What is true of a campaign: nothing for a null."""
+
+    effects: tuple[str, ...]
+    outside: str | None
+    parameters: dict[str, float]
+    signature: float
+    """Root mean square of what the effect changes, after K and C are fitted to it, over the noise."""
+    coloured: bool
+    trials: int = 0
+    extra: dict[str, Any] = field(default_factory=dict)
+
+
+class _Law:
+    """The bed's force, with its memory; one object a trial."""
+
+    def __init__(self, k: float, c: float, size: float, settings: dict[str, float]) -> None:
+        self.k, self.c, self.size, self.s = k, c, size, settings
+        self.top = 0.0
+
+    def __call__(self, z: float, v: float, t: float, way: float) -> float:
+        s, force = self.s, 0.0
+        ground = s.get("vibration", 0.0) * math.sin(s.get("vibration_rate", 1.0) * t + s.get("vibration_phase", 0.0))
+        z = z - ground
+        if z > 0.0:
+            self.top = max(self.top, z)
+            force = self.spring(z)
+            if s.get("plastic", 0.0) > 0.0 and z < self.top:
+                left = s["plastic"] * self.top
+                share = (z - left) / (self.top - left)
+                force = self.spring(self.top) * max(share, 0.0) ** s["plastic_bend"]
+            force += self.c * max(v, 0.0)
+            force += s.get("drag", 0.0) * self.size**2 * max(v, 0.0) ** 2 * (1.0 - math.exp(-z / s.get("drag_onset", 1.0)))
+            if "shaft" in s:
+                stribeck = 1.0 + 0.3 * math.exp(-abs(v) / s["shaft_speed"])
+                force += self.size * s["shaft"] * (0.4 + 0.6 * z / s["depth"]) * stribeck * way
+            if "pull" in s and z < self.top:
+                back = (self.top - z) / s["pull_reach"]
+                force -= s["pull"] * self.size**2 * math.sqrt(self.top / s["depth"]) * math.tanh(back)
+        return force + s.get("slosh", 0.0) * math.sin(s.get("slosh_rate", 1.0) * t) * math.exp(-t / s.get("slosh_time", 1.0))
+
+    def spring(self, z: float) -> float:
+        """Loading curve."""
+        s, force = self.s, self.k * z
+        if "hardening" in s:
+            x = z / s["depth"]
+            force *= (1.0 + s["hardening"] * x * x / (0.3 + x)) if s["hardening_kind"] < 0.5 else (
+                math.sinh(s["hardening"] * x + 1e-9) / (s["hardening"] * x + 1e-9)
+            )  # fmt: skip
+        if "layer" in s:
+            z1, w = s["layer_depth"], s["layer_width"]
+            if s["layer_kind"] < 0.5:  # another stiffness below
+                inside = w * math.log1p(math.exp(min((z - z1) / w, 500.0))) if (z - z1) / w < 500 else z - z1
+                force += s["layer"] * self.k * inside
+            else:  # a crust that is punched
+                force += s["layer"] * self.k * s["depth"] * 0.5 * (1.0 + math.tanh((z - z1) / w))
+        return force
+
+
+def make_hidden(seed: int, *, kind: str | None = None, strength: float | None = None) -> tuple[Campaign, Hidden]:
+    """A campaign and what is hidden in it.
+
+    `kind`: None draws one: a null (one in four), an effect, a pair, or what no library has (one in six); else
+    ``null``, an effect's id, ``pair`` or one of `OUTSIDE`. `strength`: the signature aimed at, over the noise.
+    """
+    random = np.random.default_rng(seed)
+    kind = kind or _draw_kind(random)
+    strength = strength if strength is not None else float(np.exp(random.uniform(math.log(0.4), math.log(40.0))))
+    effects = (kind,) if kind in EFFECTS else ()
+    if kind == "pair":
+        effects = tuple(str(e) for e in random.choice(EFFECTS, 2, replace=False))
+    outside = kind if kind in OUTSIDE else None
+    plan = _plan(random, retreat=bool({"plastic-sinkage", "adhesion", "shaft-friction"} & set(effects)),
+                 drops=outside in ("loose-mass",), faster=bool({"inertial-drag"} & set(effects)))  # fmt: skip
+    coloured = random.random() < 0.3
+    clean = [_trial(plan, k, {}) for k in range(len(plan["trials"]))]
+    amplitude, made = 1.0, clean
+    measure = 0.0
+    settings: dict[str, float] = {}
+    if kind != "null":
+        shape = _shape(random, plan, effects, outside)
+        low, high = math.log(1e-4), math.log(30.0)
+        for _ in range(9):  # amplitude by halving: the signature grows with it
+            amplitude = math.exp(0.5 * (low + high))
+            settings = shape(amplitude)
+            few = list(range(0, len(clean), max(1, len(clean) // 4)))
+            measure = _signature(plan, [clean[k] for k in few], [_trial(plan, k, settings) for k in few], few)
+            low, high = (math.log(amplitude), high) if measure < strength else (low, math.log(amplitude))
+        made = [_trial(plan, k, settings) for k in range(len(clean))]
+        measure = _signature(plan, clean, made, list(range(len(clean))))
+    campaign = _record(random, plan, made, coloured)
+    return campaign, Hidden(effects, outside, settings, measure, coloured, len(clean))
+
+
+def _draw_kind(random: np.random.Generator) -> str:
+    draw = random.random()
+    if draw < 0.25:
+        return "null"
+    if draw < 0.42:
+        return str(random.choice(OUTSIDE))
+    return "pair" if draw < 0.5 else str(random.choice(EFFECTS))
+
+
+def _plan(random: np.random.Generator, *, retreat: bool, drops: bool, faster: bool) -> dict[str, Any]:
+    """What is done: trials, the true K, C, what is believed of them, noise."""
+    k, mass = float(np.exp(random.uniform(math.log(300), math.log(4000)))), float(random.uniform(0.2, 1.0))
+    c = float(random.uniform(0.05, 0.3)) * 2 * math.sqrt(k * mass)
+    several = random.random() < 0.25  # diameters: one K and C each, of which little is known
+    free = several or random.random() < 0.2
+    doubt_k, doubt_c = (2.0, 2.0) if free else (0.1, 0.2)
+    believed_k = k / (1 + (0.1 * random.standard_normal())) if not free else k * float(np.exp(random.normal(0, 0.5)))
+    believed_c = c / max(1 + 0.2 * random.standard_normal(), 0.3)
+    style = random.choice(["driven", "drop", "both"])
+    style = "both" if drops or (faster and style == "driven") else style
+    returns = retreat or random.random() < 0.6
+    depth = float(random.uniform(0.012, 0.03))
+    count = int(random.choice([6, 8, 8, 10, 12, 16, 24]))
+    speeds = np.exp(np.sort(random.uniform(math.log(0.003), math.log(0.2), random.integers(2, 5))))
+    drops_at = np.sort(random.uniform(0.1, 1.2, random.integers(2, 5)))
+    gravities = [9.80665] if random.random() < 0.6 else [9.80665, 1.62]
+    diameters = [0.008, 0.016] if several else [0.012]
+    trials = []
+    for index in range(count):
+        driven = style == "driven" or (style == "both" and index % 2 == 0)
+        options = speeds if driven else drops_at
+        trials.append({
+            "driven": bool(driven), "speed": float(options[(index // 2 if style == "both" else index) % len(options)]),
+            "gravity": float(gravities[index % len(gravities)]), "diameter": diameters[index // 2 % len(diameters)],
+        })  # fmt: skip
+    return {
+        "k": k, "c": c, "mass": mass, "believed_k": believed_k, "believed_c": max(believed_c, 0.01), "doubt_k": doubt_k,
+        "doubt_c": doubt_c, "trials": trials, "returns": returns, "depth": depth, "noise_depth": float(10 ** random.uniform(-4.3, -3.6)),
+        "noise_force": k * depth * float(10 ** random.uniform(-2.6, -1.8)), "noise_accel": float(10 ** random.uniform(-1.3, -0.5)),
+        "rate": float(random.choice([200.0, 500.0])), "drop_time": 0.35,
+    }  # fmt: skip
+
+
+def _shape(
+    random: np.random.Generator, plan: dict[str, Any], effects: tuple[str, ...], outside: str | None
+) -> Callable[[float], dict[str, float]]:
+    """What an amplitude means, relative to the force at full depth."""
+    k, depth = plan["k"], plan["depth"]
+    full, fastest = k * depth, max(t["speed"] for t in plan["trials"])
+    bend, reach = float(random.uniform(1.2, 2.2)), float(random.uniform(0.02, 0.2)) * depth
+    layer_at, layer_kind, sign = float(random.uniform(0.3, 0.7)) * depth, float(random.random()), float(random.choice([-0.5, 1.0]))
+    hard_kind, onset = float(random.random()), float(random.uniform(0.1, 0.5)) * depth
+    rate, phase = float(random.uniform(30, 200)), float(random.uniform(0, 6))
+
+    def settings(amplitude: float) -> dict[str, float]:
+        s: dict[str, float] = {"depth": depth}
+        for effect in effects:
+            if effect == "inertial-drag":
+                s |= {"drag": amplitude * full / fastest**2, "drag_onset": onset}
+            elif effect == "depth-hardening":
+                s |= {"hardening": amplitude, "hardening_kind": hard_kind}
+            elif effect == "plastic-sinkage":
+                s |= {"plastic": amplitude / (1 + amplitude), "plastic_bend": bend}
+            elif effect == "adhesion":
+                s |= {"pull": amplitude * full, "pull_reach": reach}
+            elif effect == "shaft-friction":
+                s |= {"shaft": amplitude * full, "shaft_speed": 0.02}
+            else:
+                s |= {"layer": max(sign * amplitude, -0.9), "layer_depth": layer_at, "layer_width": 0.03 * depth,
+                      "layer_kind": layer_kind}  # fmt: skip
+        if outside == "floor-vibration":
+            s |= {"vibration": amplitude * depth * 0.1, "vibration_rate": rate, "vibration_phase": phase}
+        elif outside == "loose-mass":
+            s |= {"loose": amplitude, "loose_rate": rate}
+        elif outside == "shock":
+            s |= {"shock": amplitude * full, "shock_time": 0.3 + 0.3 * phase / 6, "shock_width": 0.02}
+        elif outside == "load-cell-drift":
+            s |= {"drift": amplitude * full}
+        elif outside == "sloshing":
+            s |= {"slosh": amplitude * full, "slosh_rate": rate, "slosh_time": 1.0}
+        return s
+
+    return settings
+
+
+def _trial(plan: dict[str, Any], index: int, s: dict[str, float]) -> dict[str, np.ndarray]:
+    """A trial without noise: time, depth, and force or acceleration."""
+    this = plan["trials"][index]
+    size = this["diameter"] / 0.012
+    law = _Law(plan["k"] * size, plan["c"] * size, size, s)
+    return _driven(plan, this, law, s) if this["driven"] else _drop(plan, this, law, s, index)
+
+
+def _driven(plan: dict[str, Any], this: dict[str, Any], law: _Law, s: dict[str, float]) -> dict[str, np.ndarray]:
+    depth, speed = plan["depth"], this["speed"]
+    going = depth / speed
+    total = going * (1.9 if plan["returns"] else 1.0)
+    rate = max(plan["rate"], 300 / total)
+    rate = min(rate, 900 / total)
+    time = np.arange(0, total, 1 / rate)
+    ease = 0.05 * going  # it turns smoothly
+    velocity = np.where(time < going - ease, speed, np.clip(-(time - going) / ease, -1, 1) * speed)
+    if not plan["returns"]:
+        velocity = np.full(len(time), speed)
+    fine = np.linspace(0, total, 4000)
+    moving = np.where(fine < going - ease, speed, np.clip(-(fine - going) / ease, -1, 1) * speed)
+    moving = moving if plan["returns"] else np.full(len(fine), speed)
+    path = np.concatenate([[0], np.cumsum(0.5 * (moving[1:] + moving[:-1]) * np.diff(fine))])
+    z = np.interp(time, fine, path)
+    force = []
+    slow = 0.02 * speed
+    for t, depth_now, v in zip(time, z, velocity, strict=True):
+        force.append(law(float(depth_now), float(v), float(t), math.tanh(v / slow)))
+    values = np.array(force)
+    if "shock" in s:
+        values = values + s["shock"] * np.exp(-0.5 * ((time / total - s["shock_time"]) / s["shock_width"]) ** 2)
+    values = values + s.get("drift", 0.0) * (time / total) ** 1.5
+    return {"time": time, "depth": z, "other": values}
+
+
+def _drop(plan: dict[str, Any], this: dict[str, Any], law: _Law, s: dict[str, float], index: int) -> dict[str, np.ndarray]:
+    m, g, dt = plan["mass"], this["gravity"], _STEP
+    rate = plan["rate"] * 2
+    time = np.arange(0, plan["drop_time"], 1 / rate)
+    every = round(1 / rate / dt)
+    z, v, a, t = 0.0, this["speed"], g, 0.0
+    loose = s.get("loose", 0.0) * 0.3
+    inner, inner_v = 0.0, 0.0
+    depth, acceleration = np.empty(len(time)), np.empty(len(time))
+    stuck = False
+    for row in range(len(time)):
+        depth[row], acceleration[row] = z, a
+        for _ in range(every):
+            half = v + 0.5 * dt * a
+            way = math.copysign(1.0, half)
+            new = z + dt * half if not stuck else z
+            force = law(new, half if not stuck else 0.0, t + dt, way)
+            total = m * g - force
+            if "shock" in s:
+                total += s["shock"] * math.exp(-0.5 * ((t / plan["drop_time"] - s["shock_time"]) / s["shock_width"]) ** 2)
+            if loose > 0:
+                inner_a = -(s["loose_rate"] ** 2) * inner - a
+                inner_v += dt * inner_a
+                inner += dt * inner_v
+                total += loose * m * s["loose_rate"] ** 2 * inner
+            drift = s.get("drift", 0.0) / m * (t / plan["drop_time"]) ** 1.5
+            if "shaft" in s and new > 0.0 and abs(half) < 2e-3:
+                down, up = m * g - law(new, 0.0, t, 1.0), m * g - law(new, 0.0, t, -1.0)
+                stuck = down <= 0.0 <= up
+            z, a = new, 0.0 if stuck else total / m
+            v = 0.0 if stuck else half + 0.5 * dt * a
+            t += dt
+        if drift:
+            acceleration[row] += drift
+    return {"time": time, "depth": depth, "other": acceleration}
+
+
+def _signature(plan: dict[str, Any], clean: list[dict[str, np.ndarray]], made: list[dict[str, np.ndarray]], which: list[int]) -> float:
+    """Root mean square of the change over the noise, what a change of K would explain taken out."""
+    change, slope = [], []
+    for one, other, index in zip(clean, made, which, strict=True):
+        nudged = _trial({**plan, "k": plan["k"] * 1.01}, index, {})
+        driven = plan["trials"][index]["driven"]
+        if driven:
+            noise = math.hypot(plan["noise_force"], plan["k"] * plan["noise_depth"] * 0.1)
+            change.append((other["other"] - one["other"]) / noise)
+            slope.append((nudged["other"] - one["other"]) / noise)
+        else:
+            for name, noise in (("depth", plan["noise_depth"]), ("other", plan["noise_accel"])):
+                change.append((other[name] - one[name]) / noise)
+                slope.append((nudged[name] - one[name]) / noise)
+    d, k = np.concatenate(change), np.concatenate(slope)
+    d = d - k * (k @ d) / max(float(k @ k), 1e-12)
+    return float(np.sqrt(np.mean(d**2)))
+
+
+def _record(random: np.random.Generator, plan: dict[str, Any], made: list[dict[str, np.ndarray]], coloured: bool) -> Campaign:
+    persistence = float(random.uniform(0.3, 0.8)) if coloured else 0.0
+
+    def noise(count: int, std: float) -> np.ndarray:
+        white = random.standard_normal(count)
+        if persistence:
+            for k in range(1, count):
+                white[k] = persistence * white[k - 1] + math.sqrt(1 - persistence**2) * white[k]
+        return std * white
+
+    trials, recordings = [], {}
+    for index, (this, data) in enumerate(zip(plan["trials"], made, strict=True)):
+        name = f"{index + 1:03d}"
+        table: dict[str, Any] = {"id": name, "mode": "driven" if this["driven"] else "drop", "gravity": this["gravity"],
+                                 "speed": this["speed"], "diameter": this["diameter"], "data": f"{name}.csv"}  # fmt: skip
+        trials.append(table)
+        n = len(data["time"])
+        column, std = ("force_N", plan["noise_force"]) if this["driven"] else ("accel_m_s2", plan["noise_accel"])
+        recordings[(name, "data")] = Recording({
+            "t_s": data["time"], "depth_m": data["depth"] + plan["noise_depth"] * random.standard_normal(n),
+            column: data["other"] + noise(n, std),
+        })  # fmt: skip
+    tables = PenetrationCampaign(**{
+        "format": "hedgehog-campaign/1", "kind": "penetration", "name": "made up",
+        "spike": {"mass": plan["mass"], "diameter": 0.012, "tip": "sphere"},
+        "surface": {"kind": "sand", "stiffness": plan["believed_k"], "damping": plan["believed_c"]},
+        "uncertainty": {"stiffness": plan["doubt_k"], "damping": plan["doubt_c"]},
+        "sensors": {"depth": {"std": (plan["noise_depth"],)}, "force": {"std": (plan["noise_force"],)},
+                    "accel": {"std": (plan["noise_accel"],)}},
+        "trial": tuple(trials),
+    })  # fmt: skip
+    return Campaign(tables, recordings)

@@ -1,0 +1,97 @@
+"""Noise that is not white, or louder than stated: seen in the fast half of a channel's modes, where no motion reaches.
+
+An autoregressive law of order one is fitted to the power of the modes of all trials (Whittle, Arkiv foer Matematik 2
+(1953), 423): S(f) = s^2 (1 - a^2) / (1 - 2 a cos(pi f) + a^2), f from 0 to 1 at half the sampling rate. Where the data
+do not call for it, the noise stays as stated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+
+from .fitting import Fit, Whitener
+from .problem import Array
+
+__all__ = ["Colour", "find_colours", "whitener_for"]
+
+_FAST = 0.4
+"""Share of the band that counts as slow and is left out."""
+_SURE = 16.0
+"""Twice the log likelihood that two more numbers must gain: chance 3e-4 under white noise."""
+
+
+@dataclass(frozen=True)
+class Colour:
+    """The noise of one channel."""
+
+    channel: str
+    std: float
+    """Over the stated one."""
+    persistence: float
+    """Correlation of neighbouring samples, a."""
+
+    def power(self, frequency: Array) -> Array:
+        """S at frequencies 0..1 of half the sampling rate."""
+        return _power(frequency, self.std, self.persistence)
+
+    @property
+    def sentence(self) -> str:
+        """In plain words."""
+        return (
+            f"the noise of {self.channel} is {self.std:.2f} of what is stated and a sample correlates with the next by "
+            f"{self.persistence:.2f}: taken into account"
+        )
+
+
+def find_colours(found: Fit) -> dict[str, Colour]:
+    """Channels whose noise is not as stated. `found` must have been fitted with `Whitener.white`."""
+    powers: dict[str, list[Array]] = {}
+    places: dict[str, list[Array]] = {}
+    model = found.model
+    for trial, rows in model.rows().items():
+        channels = list(dict.fromkeys(model.problem.samples(trial).channel.tolist()))
+        for name, block in zip(channels, model.whitener.block_slices(trial), strict=True):
+            count = block.stop - block.start
+            frequency = np.arange(count) / count
+            fast = frequency > _FAST
+            powers.setdefault(name, []).append(found.modes[rows][block][fast] ** 2)
+            places.setdefault(name, []).append(frequency[fast])
+    colours = {}
+    for name, parts in powers.items():
+        power, frequency = np.concatenate(parts), np.concatenate(places[name])
+        if len(power) < 100:
+            continue
+
+        def twice(numbers: Array, power: Array = power, frequency: Array = frequency) -> float:
+            law = _power(frequency, float(np.exp(numbers[0])), float(np.tanh(numbers[1])))
+            return float((np.log(law) + power / law).sum())
+
+        starts = [minimize(twice, [0.0, a], method="Nelder-Mead") for a in (0.0, 0.7)]
+        best = min(starts, key=lambda result: result.fun)
+        if float(power.sum()) - best.fun > _SURE:
+            colours[name] = Colour(name, float(np.exp(best.x[0])), float(np.clip(np.tanh(best.x[1]), -0.5, 0.97)))
+    return colours
+
+
+def whitener_for(found: Fit, colours: dict[str, Colour]) -> Whitener:
+    """The whitener that these colours call for; never below the stated noise in the slow modes."""
+    white, model = found.model.whitener, found.model
+    weights = {}
+    for trial in white.weights:
+        channels = list(dict.fromkeys(model.problem.samples(trial).channel.tolist()))
+        whole = np.ones(len(white.weights[trial]))
+        for name, block in zip(channels, white.block_slices(trial), strict=True):
+            if name in colours:
+                count = block.stop - block.start
+                power = colours[name].power((np.arange(count) + 0.5) / count)
+                whole[block] = 1 / np.sqrt(power)
+        weights[trial] = whole
+    return Whitener(white.blocks, weights)
+
+
+def _power(frequency: Array, std: float, persistence: float) -> Array:
+    a = persistence
+    return std**2 * (1 - a**2) / (1 - 2 * a * np.cos(np.pi * frequency) + a**2)

@@ -1,0 +1,122 @@
+"""How well a set of effects explains a campaign, and how one is weighed against another.
+
+A real effect never has exactly the library's form, so a model may be right in name and still leave what the sensors can
+see. Evidence that counts every sample as independent would then choose by details of form. Here what is left beyond the
+noise, E = chi-square - samples, is taken for slow modes of unknown size: with M such modes the log likelihood is
+-(M / 2) ln(1 + E / M), which is -E / 2 while E is small, and grows only with the logarithm of the misfit when it is
+large (a variance of unknown scale integrated out). Laplace's factor for the parameters' volume is added to it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .fitting import Fit, Model, fit
+from .gate import low_modes
+from .problem import Array, Form, Values
+
+__all__ = ["Hypothesis", "best_start", "excess", "held_out_fit", "score", "signature_matrix"]
+
+_MODES_EACH = 6
+"""Slow modes that a misfit of form has in one channel of one trial."""
+_MOST_OCCAM = 7.0
+"""What one form's parameters can cost at most [nats]: a misfit of form makes Laplace's volumes too small."""
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A set of effects, each in one form or two, fitted to the trials that choose."""
+
+    fit: Fit
+    score: float
+    """Log evidence, tempered [nats]."""
+
+    @property
+    def forms(self) -> tuple[Form, ...]:
+        """All forms."""
+        return self.fit.model.forms
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names in order, each once."""
+        return tuple(dict.fromkeys(form.effect for form in self.forms))
+
+
+def excess(found: Fit) -> float:
+    """Chi-square (priors included) beyond the number of samples that are left over by the parameters."""
+    return found.objective - (found.count - int(found.free.sum()))
+
+
+def score(found: Fit) -> float:
+    """Tempered log evidence, up to what is common to models of one campaign [nats]."""
+    modes = max(10.0, _MODES_EACH * float(len(low_modes(found.model))))
+    left = excess(found)
+    likelihood = -0.5 * modes * math.log1p(left / modes) if left > 0 else -0.5 * left
+    parameters = found.model.parameters
+    shared = np.array([p.trial is None and "." in p.name for p in parameters])
+    precision, hessian = found.prior_precision(), np.diag(found.hessian())
+    # Per form parameter: half the log of how much the data narrow its prior.
+    cost = 0.0
+    for form in found.model.forms:
+        own = 0.0
+        for k, p in enumerate(parameters):
+            if shared[k] and found.free[k] and precision[k] > 0 and any(p.name == q.name for q in form.parameters):
+                own += 0.5 * math.log(max(hessian[k] / precision[k], 1.0))
+        cost += min(own, _MOST_OCCAM)
+    return likelihood - cost
+
+
+def best_start(model: Model, form: Form, values: Values) -> Fit:
+    """The best fit of `model` (which holds `form`) over the form's starts, other values from `values`."""
+    starts = form.starts or ({form.amplitude: 1.0},)
+    points = [{**values, **start} for start in starts]
+    if len(points) > 2:
+        # One linear step tells which starts are worth following.
+        objectives = [fit(model, point, rounds=2).objective for point in points]
+        points = [points[k] for k in np.argsort(objectives)[:2]]
+    fits = [fit(model, point, rounds=6) for point in points]
+    best = min(fits, key=lambda found: found.objective)
+    return fit(model, best.values)
+
+
+def signature_matrix(found: Fit, forms: Sequence[Form]) -> tuple[Array, list[Form]]:
+    """Unit signatures of forms at small amplitude, the fit's own parameters projected out: [n, k], and whose they are.
+
+    A form that changes nothing here, or only what the parameters change as well, has none.
+    """
+    free = found.free
+    weights = np.diag(np.sqrt(found.prior_precision()))
+    joint = np.vstack([found.jacobian, weights])[:, free]
+    joint = joint / np.maximum(np.linalg.norm(joint, axis=0), 1e-300)
+    left, sizes, _ = np.linalg.svd(joint, full_matrices=False)
+    basis = left[:, sizes > 1e-9]
+    columns, whose = [], []
+    for form in forms:
+        if form.effect in {f.effect for f in found.model.forms}:
+            continue
+        amplitude = next(p for p in form.parameters if p.name == form.amplitude)
+        step = amplitude.step if amplitude.step is not None else 1e-4 * amplitude.scale
+        for start in (form.starts or ({form.amplitude: 1.0},))[:6]:
+            sign = math.copysign(1.0, start[form.amplitude])
+            point = {**found.values, **start, form.amplitude: sign * step}
+            (modes,) = found.model.with_forms((*found.model.forms, form)).evaluate([point])
+            change = np.concatenate([(modes - found.modes) / step, np.zeros(len(found.values))])
+            raw = float(np.linalg.norm(change))
+            change = change - basis @ (basis.T @ change)
+            size = float(np.linalg.norm(change))
+            if size > 1e-3 * raw and raw > 0:
+                columns.append(change[: found.count] / size)
+                whose.append(form)
+    return (np.stack(columns, axis=1) if columns else np.zeros((found.count, 0))), whose
+
+
+def held_out_fit(model: Model, trials: Sequence[str], values: Mapping[str, float]) -> dict[str, float]:
+    """Values with the nuisances of `trials` refitted within their priors, everything shared held."""
+    own = [p for p in (*model.problem.base, *model.scatter) if p.trial is not None and p.trial in trials]
+    if not own or not trials:
+        return dict(values)
+    return {**values, **fit(model.on(trials).holding(values), values).values}

@@ -1,0 +1,249 @@
+"""Fits: the maximum of likelihood times priors, by a damped Gauss-Newton method over all trials at once.
+
+The residuals of a problem are white or are made so (`Whitener`): each channel of each trial is turned by a discrete
+cosine transform and every mode divided by the noise it has. In that domain the sum of squares is that of white noise,
+and slow misfit stands in the first modes.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import dct
+
+from .problem import Array, Form, Parameter, Problem, Values
+
+__all__ = ["Fit", "Model", "Whitener", "fit"]
+
+_ROUNDS = 30
+_DAMPINGS = (0.0, 1e-3, 1e-1, 10.0)
+_ENOUGH = 0.02
+"""Change of chi-square below which a fit has ended: a hundredth of what one sigma is worth."""
+
+
+@dataclass(frozen=True)
+class Whitener:
+    """Turns residuals into modes of unit variance, trial by trial."""
+
+    blocks: Mapping[str, tuple[NDArray[np.intp], ...]]
+    """Rows of each channel in each trial, in the order of time."""
+    weights: Mapping[str, Array]
+    """One over the noise of each mode, in the order of the blocks, shape [sample_count]."""
+
+    @staticmethod
+    def white(problem: Problem) -> Whitener:
+        """For noise that is white as it is."""
+        blocks, weights = {}, {}
+        for trial in problem.trials:
+            samples = problem.samples(trial.id)
+            names = list(dict.fromkeys(samples.channel.tolist()))
+            blocks[trial.id] = tuple(np.flatnonzero(samples.channel == name) for name in names)
+            weights[trial.id] = np.ones(len(samples.time))
+        return Whitener(blocks, weights)
+
+    def modes(self, trial: str, residuals: Array) -> Array:
+        """Modes of the residuals of a trial, shape [sample_count]."""
+        parts = [dct(residuals[rows], norm="ortho") for rows in self.blocks[trial]]
+        return np.concatenate(parts) * self.weights[trial]
+
+    def block_slices(self, trial: str) -> list[slice]:
+        """Where each channel's modes stand."""
+        edges = np.cumsum([0, *(len(rows) for rows in self.blocks[trial])]).tolist()
+        return [slice(low, high) for low, high in itertools.pairwise(edges)]
+
+
+@dataclass(frozen=True)
+class Model:
+    """What is fitted: the problem, the effects added, the trials, and which scatter is let free."""
+
+    problem: Problem
+    whitener: Whitener
+    trials: tuple[str, ...]
+    forms: tuple[Form, ...] = ()
+    scatter: tuple[Parameter, ...] = ()
+    """Nuisances of trials that describe what differs between replicates."""
+    held: Mapping[str, float] | None = None
+    """Values at which all shared parameters are held; None: they are fitted."""
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All that a fit changes."""
+        extra = tuple(p for form in self.forms for p in form.parameters)
+        every = (*self.problem.base, *self.scatter, *extra)
+        shared = self.held is None
+        return tuple(p for p in every if (shared if p.trial is None else p.trial in self.trials))
+
+    def with_forms(self, forms: Sequence[Form]) -> Model:
+        """The same with other effects."""
+        return replace(self, forms=tuple(forms))
+
+    def on(self, trials: Sequence[str]) -> Model:
+        """The same on other trials."""
+        return replace(self, trials=tuple(trials))
+
+    def holding(self, values: Values) -> Model:
+        """The same with all shared parameters held at these values."""
+        return replace(self, held=dict(values))
+
+    def evaluate(self, points: Sequence[Values]) -> list[Array]:
+        """Modes of all trials, one after another, at each point."""
+        held = self.held
+        whole = points if held is None else [{**held, **point} for point in points]
+        found = self.problem.evaluate(whole, self.forms, self.trials)
+        return [np.concatenate([self.whitener.modes(id, one[id]) for id in self.trials]) for one in found]
+
+    def rows(self) -> dict[str, slice]:
+        """Where each trial's modes stand."""
+        edges = np.cumsum([0, *(len(self.whitener.weights[id]) for id in self.trials)]).tolist()
+        return {id: slice(edges[k], edges[k + 1]) for k, id in enumerate(self.trials)}
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model at its best values."""
+
+    model: Model
+    values: dict[str, float]
+    modes: Array
+    """Residual modes, shape [n]."""
+    jacobian: Array
+    """d modes / d parameter / scale, shape [n, p]."""
+    chi_square: float
+    """Of the data alone."""
+    penalty: float
+    """Of the priors."""
+    free: NDArray[np.bool_] = field(repr=False)
+    """Parameters not held by a bound, shape [p]."""
+
+    @property
+    def objective(self) -> float:
+        """Chi-square with the priors'."""
+        return self.chi_square + self.penalty
+
+    @property
+    def count(self) -> int:
+        """Samples."""
+        return len(self.modes)
+
+    def prior_precision(self) -> Array:
+        """(scale / std)^2 of each parameter, 0 where it is free, shape [p]."""
+        return np.array([0.0 if math.isinf(p.std) else (p.scale / p.std) ** 2 for p in self.model.parameters])
+
+    def hessian(self) -> Array:
+        """Of half the objective, in units of the parameters' scales, shape [p, p]."""
+        return self.jacobian.T @ self.jacobian + np.diag(self.prior_precision())
+
+    def covariance(self) -> Array:
+        """Of the values, in their units, shape [p, p]; bounds are not seen, singular directions get wide."""
+        scales = np.array([p.scale for p in self.model.parameters])
+        hessian = self.hessian()
+        size = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
+        inverse = np.linalg.pinv(hessian / np.outer(size, size), rcond=1e-12, hermitian=True)
+        return inverse / np.outer(size, size) * np.outer(scales, scales)
+
+    def evidence(self) -> float:
+        """Laplace's log evidence, up to what is common to models of one campaign [nats].
+
+        A parameter at a bound has half a Gaussian at most: it is counted as held there.
+        """
+        total = -0.5 * self.objective
+        precision = self.prior_precision()
+        hessian = self.hessian()
+        free = self.free
+        if free.any():
+            total -= 0.5 * float(np.linalg.slogdet(hessian[np.ix_(free, free)])[1])
+        known = precision > 0
+        return total + 0.5 * float(np.log(precision[known]).sum() - np.log(precision[known & ~free]).sum())
+
+
+def fit(model: Model, start: Values | None = None, *, rounds: int = _ROUNDS) -> Fit:
+    """The best values near `start` (the parameters' own values where it names none)."""
+    parameters = model.parameters
+    scales = np.array([p.scale for p in parameters])
+    low, high = np.array([p.lowest for p in parameters]), np.array([p.highest for p in parameters])
+    middle = np.array([p.value for p in parameters])
+    precision = np.array([0.0 if math.isinf(p.std) else p.std**-2 for p in parameters])
+    x = np.array([(start or {}).get(p.name, p.value) for p in parameters], dtype=float)
+    x = np.clip(x, low, high)
+    names = [p.name for p in parameters]
+
+    def named(values: Array) -> dict[str, float]:
+        return {name: float(value) for name, value in zip(names, values, strict=True)}
+
+    def penalty(values: Array) -> float:
+        return float((precision * (values - middle) ** 2).sum())
+
+    best: Array | None = None
+    jacobian = np.zeros((0, len(x)))
+    objective = math.inf
+    damping = 1.0
+    free = np.ones(len(x), dtype=bool)
+    for _ in range(rounds):
+        best, jacobian = _linearise(model, parameters, x)
+        objective = float(best @ best) + penalty(x)
+        gradient = jacobian.T @ best + precision * scales * (x - middle)
+        at_low, at_high = (x <= low) & (gradient > 0), (x >= high) & (gradient < 0)
+        free = ~(at_low | at_high)
+        if not free.any():
+            break
+        hessian = (jacobian.T @ jacobian + np.diag(precision * scales**2))[np.ix_(free, free)]
+        diagonal = np.diag(np.maximum(np.diag(hessian), 1e-12))
+        trials = []
+        for factor in _DAMPINGS:
+            step = np.zeros(len(x))
+            step[free] = -_solve(hessian + factor * damping * diagonal, gradient[free])
+            trials.append(np.clip(x + scales * step, low, high))
+        modes = model.evaluate([named(trial) for trial in trials])
+        objectives = [float(m @ m) + penalty(t) for m, t in zip(modes, trials, strict=True)]
+        place = int(np.argmin(objectives))
+        gain = objective - objectives[place]
+        damping = max(damping * (0.3 if place <= 1 else 1.0 if place == 2 else 5.0), 1e-4)
+        if gain > 0:
+            x = trials[place]
+        if gain < _ENOUGH + 1e-7 * objective:
+            if gain > 0:
+                best = modes[place]
+            break
+    if best is None:
+        best = model.evaluate([named(x)])[0]
+    return Fit(model, named(x), best, jacobian, float(best @ best), penalty(x), free)
+
+
+def _solve(matrix: Array, right: Array) -> Array:
+    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    scaled = matrix / np.outer(size, size) + 1e-12 * np.eye(len(size))
+    return np.linalg.lstsq(scaled, right / size, rcond=1e-13)[0] / size
+
+
+def _linearise(model: Model, parameters: Sequence[Parameter], x: Array) -> tuple[Array, Array]:
+    """Modes at `x`, and their changes per scale of each parameter; nuisances of one kind are changed together."""
+    names = [p.name for p in parameters]
+    base = {name: float(value) for name, value in zip(names, x, strict=True)}
+    groups: dict[str, list[int]] = {}
+    for k, p in enumerate(parameters):
+        groups.setdefault(f"kind {p.kind}" if p.trial is not None and p.kind else f"one {p.name}", []).append(k)
+    points = [base]
+    steps = np.zeros(len(parameters))
+    for members in groups.values():
+        point = dict(base)
+        for k in members:
+            p = parameters[k]
+            step = p.step if p.step is not None else 1e-4 * p.scale
+            steps[k] = -step if x[k] + step > p.highest else step
+            point[p.name] = x[k] + steps[k]
+        points.append(point)
+    modes = model.evaluate(points)
+    jacobian = np.zeros((len(modes[0]), len(parameters)))
+    rows = model.rows()
+    for place, members in enumerate(groups.values(), 1):
+        change = modes[place] - modes[0]
+        for k in members:
+            p = parameters[k]
+            where = slice(None) if p.trial is None else rows[p.trial]
+            jacobian[where, k] = change[where] * (p.scale / steps[k])
+    return modes[0], jacobian

@@ -1,0 +1,173 @@
+"""Is anything left? Statistics of a fit's residuals, and what they are where the model is right.
+
+The null is made by bootstrap: white noise in the modes (and in the priors: the true parameters differ from the stated
+ones) with what a refit would take out of it taken out. Near the best fit a refit is a projection on the fit's Jacobian,
+so that a thousand refits cost one; `thorough` makes new data and refits in full instead, for models whose contacts make
+a likelihood rough. No table of a distribution is used, but for the tails, where a gamma law of the bootstrap's own mean
+and variance stands in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from .fitting import Fit, Model, fit
+from .problem import Array, Values
+
+__all__ = ["Gate", "Verdict", "low_modes", "open_gate"]
+
+LOW_MODES = 16
+"""Modes of a channel that count as slow: half a period up to eight periods over its record."""
+_DRAWS = 600
+_LEVEL = 0.005
+"""Chance that a right model is refused, of each of the two rounds of tests."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the gate says of one fit."""
+
+    passed: bool
+    score: float
+    """The most surprising statistic, as standard deviations of a normal law."""
+    threshold: float
+    """What a right model exceeds in `_LEVEL` of all cases."""
+    details: Mapping[str, float]
+    """Statistic -> standard deviations."""
+
+
+@dataclass(frozen=True)
+class Gate:
+    """The null of one model on one set of trials: draws of each statistic, shape [draws, statistic_count]."""
+
+    names: tuple[str, ...]
+    mean: Array
+    variance: Array
+    threshold: float
+
+    def judge(self, statistics: Mapping[str, float]) -> Verdict:
+        """Compare the statistics of real residuals with the null."""
+        values = np.array([statistics[name] for name in self.names])
+        scores = _scores(values[None, :], self.mean, self.variance)[0]
+        worst = float(scores.max())
+        return Verdict(worst <= self.threshold, worst, self.threshold,
+                       {name: float(score) for name, score in zip(self.names, scores, strict=True)})  # fmt: skip
+
+
+def low_modes(model: Model) -> dict[tuple[str, str], np.ndarray]:
+    """Rows of the slow modes of each trial's channels, among the rows of the model."""
+    found = {}
+    for trial, rows in model.rows().items():
+        channels = list(dict.fromkeys(model.problem.samples(trial).channel.tolist()))
+        for name, block in zip(channels, model.whitener.block_slices(trial), strict=True):
+            count = min(LOW_MODES, block.stop - block.start)
+            found[(trial, name)] = rows.start + block.start + np.arange(count)
+    return found
+
+
+def _statistics(modes: Array, slow: Mapping[tuple[str, str], np.ndarray], signatures: Array) -> dict[str, Array]:
+    """Statistics of draws of modes, shape [draws, n]; each of shape [draws]."""
+    squares = modes**2
+    energy = {key: squares[:, rows].sum(axis=1) for key, rows in slow.items()}
+    found = {"all": squares.sum(axis=1), "slow": np.sum(list(energy.values()), axis=0)}
+    excess = np.stack([(e - len(slow[key])) / np.sqrt(2 * len(slow[key])) for key, e in energy.items()])
+    found["one trial"] = excess.max(axis=0)
+    channels = dict.fromkeys(name for _, name in slow)
+    for name in channels:
+        rows = [rows for (_, channel), rows in slow.items() if channel == name]
+        count = min(len(r) for r in rows)
+        together = np.sum([modes[:, r[:count]] for r in rows], axis=0) / np.sqrt(len(rows))
+        found[f"together {name}"] = (together**2).sum(axis=1)
+        found[f"slow {name}"] = np.sum([squares[:, r].sum(axis=1) for r in rows], axis=0)
+    if signatures.shape[1]:
+        found["effects"] = ((modes @ signatures) ** 2).max(axis=1)
+    return found
+
+
+def _scores(values: Array, mean: Array, variance: Array) -> Array:
+    """Standard deviations of a normal law with the same chance, by a gamma law of this mean and variance."""
+    shape = mean**2 / variance
+    log_chance = stats.gamma.logsf(values, shape, scale=variance / mean)
+    normal = -stats.norm.ppf(np.clip(np.exp(log_chance), 1e-300, 1 - 1e-12))
+    far = np.sqrt(np.maximum(-2 * log_chance, 0.0))  # beyond what the normal law's table holds
+    return np.where(log_chance < -600, far, normal)
+
+
+def open_gate(
+    found: Fit,
+    *,
+    signatures: Array | None = None,
+    seed: int = 0,
+    draws: int = _DRAWS,
+    refit: bool = False,
+    tell: Callable[[float], None] | None = None,
+) -> tuple[Gate, Verdict]:
+    """The null for this fit, and what it says of it.
+
+    `signatures`: unit vectors of what candidate effects would change, the fit's own parameters projected out, shape
+    [n, k]. `refit`: make data and fit them in full, `draws` times, instead of projecting.
+    """
+    random = np.random.default_rng(seed)
+    slow = low_modes(found.model)
+    columns = signatures if signatures is not None else np.zeros((found.count, 0))
+    if refit:
+        made = np.stack([_refitted(found, random, tell, k / draws) for k in range(draws)])
+        parts = [_statistics(made, slow, columns)]
+    else:
+        parts = []
+        basis, prior = _basis(found)
+        for _ in range(0, draws, 100):
+            noise = random.standard_normal((100, found.count))
+            more = random.standard_normal((100, prior.shape[0]))
+            weights = noise @ basis + more @ prior
+            parts.append(_statistics(noise - weights @ basis.T, slow, columns))
+    sample = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    offset = 20.0  # "one trial" may be below zero, the gamma law not
+    sample["one trial"] = sample["one trial"] + offset
+    names = tuple(sample)
+    table = np.stack([sample[name] for name in names], axis=1)
+    mean, variance = table.mean(axis=0), np.maximum(table.var(axis=0), 1e-12)
+    worst = _scores(table, mean, variance).max(axis=1)
+    # The far quantile from the body: of the largest of several normal scores the law is close to Gumbel's.
+    location, scale = stats.gumbel_r.fit(worst)
+    threshold = float(max(stats.gumbel_r.ppf(1 - _LEVEL, location, scale), np.quantile(worst, 0.99)))
+    gate = Gate(names, mean, variance, threshold)
+    here = {name: float(value[0]) for name, value in _statistics(found.modes[None, :], slow, columns).items()}
+    here["one trial"] += offset
+    return gate, gate.judge(here)
+
+
+def _basis(found: Fit) -> tuple[Array, Array]:
+    """An orthonormal basis of what a refit takes out of data and priors: rows of the data [n, p], of the priors."""
+    free = found.free
+    priors = np.sqrt(found.prior_precision())
+    joint = np.vstack([found.jacobian, np.diag(priors)])[:, free]
+    joint = joint / np.maximum(np.linalg.norm(joint, axis=0), 1e-300)
+    left, sizes, _ = np.linalg.svd(joint, full_matrices=False)
+    left = left[:, sizes > 1e-9 * max(float(sizes.max(initial=0.0)), 1e-300)]
+    return left[: found.count], left[found.count :]
+
+
+def _refitted(found: Fit, random: np.random.Generator, tell: Callable[[float], None] | None, done: float) -> Array:
+    """Residual modes of a full refit to data made at the fitted values."""
+    if tell is not None:
+        tell(done)
+    at = found.modes
+    noise = random.standard_normal(found.count)
+    return fit(_Shifted(found.model, at - noise), found.values, rounds=8).modes
+
+
+class _Shifted(Model):
+    """A model whose data are other ones: residuals less a constant."""
+
+    def __init__(self, model: Model, shift: Array) -> None:
+        super().__init__(model.problem, model.whitener, model.trials, model.forms, model.scatter)
+        object.__setattr__(self, "shift", shift)
+
+    def evaluate(self, points: list[Values]) -> list[Array]:  # type: ignore[override]
+        shift = self.__dict__["shift"]
+        return [modes - shift for modes in super().evaluate(points)]

@@ -1,0 +1,131 @@
+"""Where a model fails: sensor, trial, phase and seconds; and what a force that no effect explains goes with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .fitting import Model
+from .problem import Array, Form, Problem, Values
+
+__all__ = ["Place", "depends_on", "latent_table", "places"]
+
+_SURE = 4.0
+"""Standard deviations by which the energy of a stretch must exceed that of noise."""
+_MOST = 24
+_WINDOW = 9
+
+
+@dataclass(frozen=True)
+class Place:
+    """One stretch of one channel in which the model fails."""
+
+    trial: str
+    channel: str
+    phase: str
+    from_s: float
+    to_s: float
+    excess: float
+    """Chi-square beyond the number of its samples."""
+
+
+def places(model: Model, values: Values, trials: Sequence[str]) -> list[Place]:
+    """Stretches of one phase in which residuals are beyond noise, the worst first."""
+    problem = model.problem
+    (found,) = problem.evaluate([values], model.forms, trials)
+    out = []
+    for trial in trials:
+        samples = problem.samples(trial)
+        phases = problem.phases(values, model.forms, trial)
+        for channel in dict.fromkeys(samples.channel.tolist()):
+            rows = np.flatnonzero(samples.channel == channel)
+            time, rest, phase = samples.time[rows], found[trial][rows], phases[rows]
+            for low, high in _runs(phase):
+                count = high - low
+                if count < 3:
+                    continue
+                over = float((rest[low:high] ** 2).sum() - count)
+                if over < _SURE * np.sqrt(2 * count):
+                    continue
+                first, last = _core(rest[low:high])
+                out.append(Place(trial, str(channel), str(phase[low]), float(time[low + first]),
+                                 float(time[low + last]), over))  # fmt: skip
+    out.sort(key=lambda place: -place.excess)
+    whole = sum(place.excess for place in out)
+    return [place for place in out[:_MOST] if place.excess > 0.005 * whole]
+
+
+def _runs(phase: NDArray[np.str_]) -> list[tuple[int, int]]:
+    if not len(phase):
+        return []
+    edges = [0, *(np.flatnonzero(phase[1:] != phase[:-1]) + 1).tolist(), len(phase)]
+    return list(pairwise(edges))
+
+
+def _core(rest: Array) -> tuple[int, int]:
+    """The shortest stretch that holds nine tenths of the energy beyond noise."""
+    energy = np.maximum(np.convolve(rest**2 - 1, np.ones(_WINDOW) / _WINDOW, mode="same")[: len(rest)], 0.0)
+    if len(rest) < _WINDOW or energy.sum() <= 0:
+        return 0, len(rest) - 1
+    share = np.cumsum(energy) / energy.sum()
+    return int(np.searchsorted(share, 0.05)), int(min(np.searchsorted(share, 0.95), len(rest) - 1))
+
+
+def latent_table(problem: Problem, values: Values, forms: Sequence[Form]) -> dict[str, NDArray[np.generic]]:
+    """Columns of latent.csv: trial, then what the problem says, trial after trial."""
+    parts: dict[str, list[NDArray[np.generic]]] = {"trial": []}
+    for trial in problem.trials:
+        columns = problem.latent(values, forms, trial.id)
+        count = len(next(iter(columns.values())))
+        parts["trial"].append(np.full(count, trial.id))
+        for name, column in columns.items():
+            parts.setdefault(name, []).append(column)
+        for name, value in trial.settings.items():
+            parts.setdefault(name, []).append(np.full(count, value))
+    return {name: np.concatenate(columns) for name, columns in parts.items()}
+
+
+def depends_on(table: Mapping[str, NDArray[np.generic]]) -> tuple[str, dict[str, float]]:
+    """A sentence on what the latent columns go with, and the share of their variance that each column explains.
+
+    The share is that of a mean in twenty bins of equal count, judged on every second sample after being made on the
+    others, so that noise explains nothing.
+    """
+    shares: dict[str, float] = {}
+    latents = [name for name in table if name.startswith("latent_")]
+    others = [name for name in table if name != "trial" and name not in latents]
+    for latent in latents:
+        y = np.asarray(table[latent], dtype=float)
+        for name in others:
+            x = np.asarray(table[name], dtype=float)
+            good = np.isfinite(x) & np.isfinite(y)
+            share = _explained(x[good], y[good])
+            shares[name] = max(shares.get(name, 0.0), share)
+    ranked = sorted(shares.items(), key=lambda pair: -pair[1])
+    words = {"t_s": "time"}
+    told = [(words.get(name, name), share) for name, share in ranked if share > 0.1]
+    if not told:
+        return "nothing that was recorded: no column explains a tenth of it", shares
+    best = told[0]
+    sentence = f"{best[0]} (explains {100 * best[1]:.0f} % of it)"
+    more = [f"{name} ({100 * share:.0f} %)" for name, share in told[1:3]]
+    return sentence + (f", then {', '.join(more)}" if more else ""), shares
+
+
+def _explained(x: Array, y: Array) -> float:
+    if len(y) < 80 or np.ptp(x) == 0:
+        return 0.0
+    edges = np.unique(np.quantile(x, np.linspace(0, 1, 21)[1:-1]))
+    bins = np.searchsorted(edges, x)
+    learn = np.arange(len(y)) % 2 == 0
+    means = np.zeros(len(edges) + 1)
+    for k in range(len(means)):
+        inside = learn & (bins == k)
+        means[k] = y[inside].mean() if inside.any() else y[learn].mean()
+    rest = y[~learn] - means[bins[~learn]]
+    total = float(np.sum((y[~learn] - y[learn].mean()) ** 2))
+    return max(0.0, 1.0 - float(np.sum(rest**2)) / total) if total > 0 else 0.0

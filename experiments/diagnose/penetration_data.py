@@ -1,0 +1,243 @@
+"""Trials of penetration made ready for fits: gaps left out, faults found and set aside, depth smoothed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from experiments.campaign import Campaign, PenetrationCampaign, Recording
+from experiments.campaign.tables import PenetrationTrial
+
+from .penetration_depth import SmoothDepth, smooth_depth
+from .problem import Array, Finding, TrialInfo
+
+__all__ = ["Prepared", "prepare"]
+
+_FEWEST = 12
+"""Rows that a trial must have to say anything."""
+_OUTLIER = 8.0
+"""Noise standard deviations beyond which a lone reading is a fault (once in 1e15 by chance)."""
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """One trial. Driven: rows with both depth and force. Drop: the times of all rows, and which have what."""
+
+    table: PenetrationTrial
+    info: TrialInfo
+    diameter: float
+    """[m]"""
+    time: Array
+    """[s], shape [n]"""
+    depth: Array
+    """As measured [m], shape [n]."""
+    other: Array
+    """Force [N] or acceleration [m/s2], shape [n]."""
+    has_depth: NDArray[np.bool_]
+    has_other: NDArray[np.bool_]
+    smooth: SmoothDepth | None = None
+    """Of a driven trial."""
+    findings: tuple[Finding, ...] = field(default=())
+
+    @property
+    def driven(self) -> bool:
+        """Whether its depth was prescribed."""
+        return self.table.mode == "driven"
+
+
+def prepare(campaign: Campaign) -> tuple[list[Prepared], list[Finding]]:
+    """The trials that can be used, and what was wrong with the data.
+
+    Raises ValueError where no trial is left, or a sensor that is scored has no noise.
+    """
+    tables = campaign.tables
+    assert isinstance(tables, PenetrationCampaign)
+    trials, findings = [], []
+    for table in tables.trial:
+        recording = campaign.recording(table.id, "data")
+        assert recording is not None
+        trial, found = _one(tables, table, recording)
+        findings += found
+        if trial is not None:
+            trials.append(trial)
+    if not trials:
+        said = "; ".join(finding.what for finding in findings)
+        raise ValueError(f"no trial of {tables.name!r} can be used: {said}")
+    return trials, findings
+
+
+def stds(tables: PenetrationCampaign, driven: bool) -> tuple[float, float]:
+    """Noise of depth [m] and of the other sensor. Raises ValueError for 0 where it is divided by."""
+    name = "force" if driven else "accel"
+    sensor = getattr(tables.sensors, name)
+    depth = tables.sensors.depth
+    if sensor is None or depth is None:
+        raise ValueError(f"[sensors.{name}] or [sensors.depth] is missing: its std was expected")
+    if sensor.std[0] <= 0 or (depth.std[0] <= 0 and not driven):
+        which = name if sensor.std[0] <= 0 else "depth"
+        raise ValueError(f"[sensors.{which}] std = [0.0]: more than 0 was expected, residuals are divided by it")
+    return depth.std[0], sensor.std[0]
+
+
+def _one(
+    tables: PenetrationCampaign, table: PenetrationTrial, recording: Recording
+) -> tuple[Prepared | None, list[Finding]]:
+    driven = table.mode == "driven"
+    channel, key = ("force", "force_N") if driven else ("accel", "accel_m_s2")
+    std_depth, std_other = stds(tables, driven)
+    findings: list[Finding] = []
+    time, depth, other = recording.time.copy(), recording["depth_m"].copy(), recording[key].copy()
+
+    def say(what: str, *, where: str | None = None, rows: NDArray[np.int64] | None = None) -> None:
+        span = (float(time[rows[0]]), float(time[rows[-1]])) if rows is not None and len(rows) else (None, None)
+        findings.append(Finding(trial=table.id, what=f"trial {table.id}: {what}", channel=where, from_s=span[0],
+                                to_s=span[1], set_aside=rows is not None))  # fmt: skip
+
+    keep = np.concatenate([[True], np.diff(time) > 0])  # a coarse clock repeats itself: the first reading rules
+    if not keep.all():
+        say(f"{int((~keep).sum())} rows repeat the time before them and are left out")
+        time, depth, other = time[keep], depth[keep], other[keep]
+    for name, values in (("depth", depth), (channel, other)):
+        missing = int(np.isnan(values).sum())
+        if missing > 0.02 * len(values):
+            say(f"{missing} of {len(values)} readings of {name} are gaps; the rest is used")
+    jump = _clock_jump(time, depth, std_depth)
+    if jump is not None:
+        rows = np.arange(jump, len(time))
+        say(f"the clock jumps by {time[jump] - time[jump - 1]:.3g} s where the depth goes on as if it had not; all "
+            f"that follows is set aside", rows=rows)  # fmt: skip
+        time, depth, other = time[:jump], depth[:jump], other[:jump]
+    for name, values, std in (("depth", depth, std_depth), (channel, other, std_other)):
+        # A depth cannot jump; a force can, where a tip touches for a moment, but not beyond all that it is elsewhere.
+        known = values[np.isfinite(values)]
+        range_ = float(np.ptp(np.percentile(known, [0.5, 99.5]))) if name != "depth" and len(known) else 0.0
+        lone = _lone_readings(values, max(std, 0.15 * range_))
+        if len(lone):
+            what = f"{len(lone)} readings of {name} lie far from their neighbours and are set aside"
+            say(what, where=name, rows=lone)
+            values[lone] = np.nan
+    step = _lasting_step(time, depth, std_depth)
+    if step is not None:
+        rows = np.arange(step, len(depth))
+        say(f"the depth jumps by {1e3 * (depth[step] - depth[step - 1]):.3g} mm between two readings and stays there, "
+            f"as where a marker is lost; it is set aside from there on", where="depth", rows=rows)  # fmt: skip
+        depth[step:] = np.nan
+    if driven:
+        held = _held(other)
+        if held is not None:
+            say(f"the force is held: {int((~held).sum())} of {len(other)} readings repeat the one before; only fresh "
+                f"ones are used", where="force")  # fmt: skip
+            other[~held] = np.nan
+        return _driven(tables, table, time, depth, other, std_depth, findings)
+    has_depth, has_other = np.isfinite(depth), np.isfinite(other)
+    has_other &= np.abs(time) > 1e-9  # the force jumps at the touch: neither side is wrong
+    if has_depth.sum() + has_other.sum() < _FEWEST:
+        say("too few readings are left: it is set aside", rows=np.arange(0))
+        return None, findings
+    info = _info(tables, table, abs(float(table.speed or 0.0)))
+    return Prepared(table, info, tables.diameter_of(table), time, depth, other, has_depth, has_other), findings
+
+
+def _driven(
+    tables: PenetrationCampaign, table: PenetrationTrial, time: Array, depth: Array, other: Array, std: float,
+    findings: list[Finding],
+) -> tuple[Prepared | None, list[Finding]]:  # fmt: skip
+    known = np.isfinite(depth)
+    if known.sum() < _FEWEST or (known & np.isfinite(other)).sum() < _FEWEST:
+        what = f"trial {table.id}: fewer than {_FEWEST} rows hold both depth and force: it is set aside"
+        findings.append(Finding(trial=table.id, what=what, set_aside=True))
+        return None, findings
+    smooth = smooth_depth(time[known], depth[known], std)
+    both = known & np.isfinite(other)
+    rows = both[known]
+    smooth = SmoothDepth(smooth.depth[rows], smooth.speed[rows], smooth.depth_error[rows], smooth.speed_error[rows])
+    speed = float(table.speed) if table.speed else float(np.percentile(np.abs(smooth.speed), 80))
+    everything = np.ones(int(both.sum()), dtype=bool)
+    info = _info(tables, table, speed)
+    return Prepared(
+        table, info, tables.diameter_of(table), time[both], depth[both], other[both], everything, everything, smooth
+    ), findings
+
+
+def _info(tables: PenetrationCampaign, table: PenetrationTrial, speed: float) -> TrialInfo:
+    gravity = table.gravity
+    grains = gravity if table.grain_gravity is None else table.grain_gravity
+    diameter = tables.diameter_of(table)
+    alike = f"{table.speed:.6g}" if table.speed is not None else "by hand"
+    return TrialInfo(
+        id=table.id,
+        condition=(table.mode, diameter, gravity, grains, alike),
+        settings={"speed_m_s": speed, "diameter_m": diameter, "gravity_m_s2": gravity},
+    )
+
+
+# Faults ---------------------------------------------------------------------------------------------------------------
+
+
+def _lone_readings(values: Array, std: float) -> NDArray[np.int64]:
+    """Rows that lie far from the median of the seven around them, while those seven agree among themselves."""
+    known = np.flatnonzero(np.isfinite(values))
+    if len(known) < 9:
+        return known[:0]
+    v = values[known]
+    middle = median_filter(v, 7, mode="nearest")
+    away = np.abs(v - middle)
+    spread = median_filter(away, 15, mode="nearest")
+    suspect = away > np.maximum(_OUTLIER * std, 12 * spread)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], suspect.astype(int), [0]])))
+    for low, high in zip(edges[::2], edges[1::2], strict=True):
+        # A touch or a turn is sharp as well, but what is before it and after it differs.
+        alike = low > 0 and high < len(v) and abs(v[low - 1] - v[high]) < 0.3 * away[low:high].min()
+        if high - low > 3 or not alike:
+            suspect[low:high] = False
+    return known[suspect] if suspect.sum() <= 0.05 * len(v) else known[:0]
+
+
+def _lasting_step(time: Array, depth: Array, std: float) -> int | None:
+    """The row from which the depth is another, the speeds before and after it agreeing; None where there is none."""
+    known = np.flatnonzero(np.isfinite(depth))
+    t, d = time[known], depth[known]
+    if len(t) < 20 or np.any(np.diff(t) <= 0):
+        return None
+    for k in range(6, len(t) - 6):
+        if abs(d[k] - d[k - 1]) < 12 * std:
+            continue
+        before, after = slice(k - 6, k), slice(k, k + 6)
+        if t[k] - t[k - 1] > 4 * np.median(np.diff(t[k - 6 : k + 6])):
+            continue
+        left, right = np.polyfit(t[before] - t[k], d[before], 1), np.polyfit(t[after] - t[k], d[after], 1)
+        bend = abs(left[0] - right[0]) * (t[k] - t[k - 1])
+        if abs(right[1] - left[1]) > 12 * std + 3 * bend + 0.8 * abs(left[0]) * (t[k] - t[k - 1]):
+            return int(known[k])
+    return None
+
+
+def _clock_jump(time: Array, depth: Array, std: float) -> int | None:
+    """The row at which the clock jumps forward while the motion does not; None where it never does."""
+    known = np.flatnonzero(np.isfinite(depth))
+    t, d = time[known], depth[known]
+    if len(t) < 20:
+        return None
+    gaps = np.diff(t)
+    usual = float(np.median(gaps))
+    for k in np.flatnonzero(gaps > 4 * usual) + 1:
+        if k < 8 or k > len(t) - 8:
+            continue
+        left = np.polyfit(t[k - 8 : k] - t[k - 1], d[k - 8 : k], 1)
+        right = np.polyfit(t[k : k + 8] - t[k], d[k : k + 8], 1)
+        if abs(left[0] - right[0]) > 0.2 * max(abs(left[0]), abs(right[0])):
+            continue
+        moved = d[k : k + 8].mean() - right[0] * (t[k : k + 8] - t[k]).mean() - left[1]
+        if abs(moved - left[0] * gaps[k - 1]) > 10 * std and abs(moved - left[0] * usual) < 5 * std:
+            return int(known[k])
+    return None
+
+
+def _held(values: Array) -> NDArray[np.bool_] | None:
+    """Which readings are fresh where most repeat the one before to the last digit; None where that is not so."""
+    fresh = np.concatenate([[True], np.diff(values) != 0])
+    known = np.isfinite(values)
+    return fresh if known.sum() > 20 and fresh[known].mean() < 0.6 else None

@@ -1,0 +1,430 @@
+"""Trials of a spike that goes straight down, as the statistics of diagnose see them (`problem.Problem`).
+
+Driven trials are scored on their force along the smoothed depth. The error of that depth is one smooth curve, not white
+noise, so the likelihood takes its covariance in full: force noise plus (dF/dz, dF/dv) times the error of depth and
+speed; `chi_square` has trials.md's own sum, std_force^2 + (dF/dz s)^2. Drops are integrated from their exact start and
+scored on depth and acceleration.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.campaign import Campaign, EffectTable, PenetrationCampaign, PenetrationModel, write_model
+
+from .penetration_data import Prepared, prepare, stds
+from .penetration_forms import Library, Scales, make_library, physical, unit_of
+from .penetration_law import PHASES, SLOTS, fall, push, slot_table
+from .problem import Array, Finding, Form, Parameter, Samples, TrialInfo, Values
+
+__all__ = ["PenetrationProblem", "make_problem"]
+
+_SLOT = {name: place for place, name in enumerate(SLOTS)}
+_FAILED = 1e3
+_BED_STD = 0.5
+"""How far the bed may differ between replicates while it is asked whether it does [1]."""
+
+
+def make_problem(campaign: Campaign) -> PenetrationProblem:
+    """The problem of a campaign of kind "penetration". Raises ValueError where none of its trials can be used."""
+    return PenetrationProblem(campaign)
+
+
+class PenetrationProblem:
+    """One campaign; see `problem.Problem` for what the members mean."""
+
+    kind = "penetration"
+
+    def __init__(self, campaign: Campaign) -> None:
+        tables = campaign.tables
+        if not isinstance(tables, PenetrationCampaign):
+            raise ValueError(f"kind = {tables.kind!r}: 'penetration' was expected here")
+        self.tables: PenetrationCampaign = tables
+        prepared, findings = prepare(campaign)
+        self._trials: dict[str, Prepared] = {trial.info.id: trial for trial in prepared}
+        self.findings: tuple[Finding, ...] = tuple(findings)
+        self.trials: tuple[TrialInfo, ...] = tuple(trial.info for trial in prepared)
+        self._diameters = sorted({trial.diameter for trial in prepared})
+        self._middle = self._diameters[len(self._diameters) // 2]
+        self.base: tuple[Parameter, ...] = self._base_parameters()
+        self._scales = self._find_scales()
+        speeds = np.array([s for trial in prepared for s in _speeds(trial)])
+        differ = speeds.max() > 1.05 * max(speeds.min(), 1e-12)
+        self._library: Library = make_library(self._scales, retreats=self._retreats(), speeds_differ=bool(differ))
+        self.forms: tuple[Form, ...] = self._library.forms
+        self._whitening: dict[str, tuple[Array, Array]] = {}
+        self.rewhiten({}, ())
+
+    # What is fitted ---------------------------------------------------------------------------------------------------
+
+    def _base_parameters(self) -> tuple[Parameter, ...]:
+        surface, doubt = self.tables.surface, self.tables.uncertainty
+        guess_k, guess_c = max(surface.stiffness, 1e-9), max(surface.damping, 1e-9)
+        found = []
+        for diameter in self._diameters:
+            for name, unit, value, relative, size in (
+                ("stiffness", "N/m", surface.stiffness, doubt.stiffness, guess_k),
+                ("damping", "N s/m", surface.damping, doubt.damping, guess_c),
+            ):
+                if relative == 0:
+                    continue
+                free = relative >= 1
+                start = self._straight_stiffness(diameter) if free and name == "stiffness" else value
+                if free and name == "damping":
+                    size = max(size, 1e-3 * self._straight_stiffness(diameter))
+                found.append(Parameter(
+                    name=self._named(name, diameter), unit=unit, value=start,
+                    std=math.inf if free else relative * value,
+                    scale=max(0.02 * (start if name == "stiffness" else size), 1e-12), lowest=0.0,
+                    step=1e-4 * max(start, size),
+                ))  # fmt: skip
+        return tuple(found)
+
+    def _named(self, name: str, diameter: float) -> str:
+        return name if len(self._diameters) == 1 else f"{name}@{diameter:g}"
+
+    @property
+    def scatter(self) -> dict[str, tuple[Parameter, ...]]:
+        """What may differ between replicates beyond the sensors: kind -> one nuisance a trial, mostly not fitted."""
+        return {"bed": tuple(
+            Parameter(name=f"bed[{id}]", unit="1", value=0.0, std=_BED_STD, scale=0.02, lowest=-0.95, highest=5.0,
+                      trial=id, kind="bed", step=1e-4)
+            for id in self._trials
+        )}  # fmt: skip
+
+    def _straight_stiffness(self, diameter: float) -> float:
+        """F / z by least squares over the driven trials of this diameter; from the depth of drops where there is none.
+
+        A drop from speed v to depth z without loss: K z^2 / 2 = m v^2 / 2 + m g z.
+        """
+        driven = [trial for trial in self._trials.values() if trial.driven and trial.diameter == diameter]
+        top = sum(float((t.smooth.depth * t.other)[t.smooth.depth > 0].sum()) for t in driven if t.smooth is not None)
+        down = sum(float((t.smooth.depth**2)[t.smooth.depth > 0].sum()) for t in driven if t.smooth is not None)
+        if down > 0 and top > 0:
+            return top / down
+        found = []
+        for trial in self._trials.values():
+            if not trial.driven and trial.diameter == diameter and trial.has_depth.any():
+                z = max(float(trial.depth[trial.has_depth].max()), 1e-6)
+                mass, speed = self.tables.spike.mass or 1.0, trial.table.speed or 0.0
+                found.append(mass * (speed**2 + 2 * trial.table.gravity * z) / z**2)
+        return float(np.median(found)) if found else max(self.tables.surface.stiffness, 1e-9)
+
+    def _find_scales(self) -> Scales:
+        depths = [float(_depths(trial).max()) for trial in self._trials.values()]
+        depth = max(0.75 * max(depths), 1e-9)
+        speed = max(max(_speeds(trial).max() for trial in self._trials.values()), 1e-9)
+        stiffness = next((p.value for p in self.base if p.name == self._named("stiffness", self._middle)), None)
+        stiffness = self.tables.surface.stiffness if stiffness is None else stiffness
+        return Scales(depth=depth, speed=speed, force=max(stiffness, 1e-9) * depth)
+
+    def _retreats(self) -> bool:
+        for trial in self._trials.values():
+            if not trial.driven:
+                return True
+            assert trial.smooth is not None
+            back = np.maximum.accumulate(trial.smooth.depth) - trial.smooth.depth
+            if back.max() > 0.02 * max(trial.smooth.depth.max(), 1e-12) + 5 * trial.smooth.depth_std.max():
+                return True
+        return False
+
+    @property
+    def design(self) -> str:
+        """Digest of what decides the gate."""
+        parts: list[Any] = [repr(self.tables.uncertainty), repr(self.tables.sensors), repr(self.tables.surface)]
+        parts += [(t.info.condition, len(t.time), round(float(t.time[-1]), 3)) for t in self._trials.values()]
+        return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
+
+    # The model --------------------------------------------------------------------------------------------------------
+
+    def _numbers(self, values: Values, forms: Sequence[Form], trial: Prepared, into: Array) -> None:
+        """Fill one lane's slots."""
+        name_k, name_c = self._named("stiffness", trial.diameter), self._named("damping", trial.diameter)
+        surface = self.tables.surface
+        bed = 1.0 + values.get(f"bed[{trial.info.id}]", 0.0)
+        stiffness = values.get(name_k, self._default(name_k, surface.stiffness)) * bed
+        into[_SLOT["mass"]] = self.tables.spike.mass or 1.0
+        into[_SLOT["gravity"]] = trial.table.gravity
+        into[_SLOT["stiffness"]] = stiffness
+        into[_SLOT["damping"]] = values.get(name_c, self._default(name_c, surface.damping)) * bed
+        into[_SLOT["reference"]] = self._scales.depth
+        into[_SLOT["radius_depth"]] = _tip_depth(self.tables.spike, trial.diameter)
+        if trial.smooth is not None:
+            fast = float(np.abs(trial.smooth.speed).max())
+            into[_SLOT["speed_scale"]] = max(0.02 * fast, 2 * float(np.median(trial.smooth.speed_std)), 1e-12)
+        size = trial.diameter / self._middle
+        for form in forms:
+            for parameter in form.parameters:
+                slot = self._library.slots[form.id][parameter.name]
+                value = values.get(parameter.name, parameter.value)
+                into[_SLOT[slot.name]] = physical(slot, value, self._scales, stiffness=stiffness, size=size)
+
+    def _default(self, name: str, stated: float) -> float:
+        return next((parameter.value for parameter in self.base if parameter.name == name), stated)
+
+    def _run(self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[Prepared],
+             shifts: tuple[float, float] = (0.0, 0.0)) -> list[Array]:  # fmt: skip
+        """Forces [points, n] of driven trials, or motions [points, n, 4] of drops; all trials of one mode."""
+        count = len(points)
+        numbers = slot_table(count * len(trials))
+        lanes = np.repeat(np.arange(len(trials)), count)
+        for place, trial in enumerate(trials):
+            for k, values in enumerate(points):
+                self._numbers(values, forms, trial, numbers[place * count + k])
+        numbers[:, _SLOT["shift_depth"]], numbers[:, _SLOT["shift_speed"]] = shifts
+        starts = np.concatenate([[0], np.cumsum([len(trial.time) for trial in trials])])
+        if trials[0].driven:
+            depth = np.concatenate([trial.smooth.depth for trial in trials if trial.smooth is not None])
+            speed = np.concatenate([trial.smooth.speed for trial in trials if trial.smooth is not None])
+            out = push(numbers, lanes, starts, depth, speed)
+        else:
+            speeds = np.array([trial.table.speed or 0.0 for trial in trials])
+            out = fall(numbers, lanes, starts, np.concatenate([trial.time for trial in trials]), speeds)
+        return [out[p * count : (p + 1) * count, : len(trial.time)] for p, trial in enumerate(trials)]
+
+    def _models(self, points: Sequence[Values], forms: Sequence[Form], ids: Sequence[str]) -> dict[str, Array]:
+        found: dict[str, Array] = {}
+        for driven in (True, False):
+            chosen = [self._trials[id] for id in ids if self._trials[id].driven == driven]
+            if chosen:
+                for trial, out in zip(chosen, self._run(points, forms, chosen), strict=True):
+                    found[trial.info.id] = out
+        return found
+
+    def evaluate(
+        self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[str]
+    ) -> list[dict[str, Array]]:
+        """Whitened residuals; see `Problem`."""
+        models = self._models(points, forms, trials)
+        return [{id: self._residuals(self._trials[id], models[id][k]) for id in trials} for k in range(len(points))]
+
+    def _residuals(self, trial: Prepared, model: Array) -> Array:
+        std_depth, std_other = stds(self.tables, trial.driven)
+        if trial.driven:
+            rest = (trial.other - model) / std_other
+            directions, shrink = self._whitening[trial.info.id]
+            rest = rest - directions @ (shrink * (directions.T @ rest)) if len(shrink) else rest
+        else:
+            rest = np.concatenate([
+                (trial.depth - model[:, 0])[trial.has_depth] / std_depth,
+                (trial.other - model[:, 2])[trial.has_other] / std_other,
+            ])  # fmt: skip
+        return np.where(np.isfinite(rest), np.clip(rest, -1e5, 1e5), _FAILED)
+
+    def rewhiten(self, values: Values, forms: Sequence[Form]) -> None:
+        """Take the error of the smoothed depth into the whitening, at these values."""
+        driven = [trial for trial in self._trials.values() if trial.driven]
+        if not driven:
+            return
+        std_force = stds(self.tables, True)[1]
+        for trial, by_depth, by_speed in self._slopes(values, forms, driven):
+            assert trial.smooth is not None
+            factor = by_depth[:, None] * trial.smooth.depth_error + by_speed[:, None] * trial.smooth.speed_error
+            left, sizes, _ = np.linalg.svd(factor / std_force, full_matrices=False)
+            kept = sizes > 1e-3
+            self._whitening[trial.info.id] = (left[:, kept], 1 - 1 / np.sqrt(1 + sizes[kept] ** 2))
+
+    def _slopes(
+        self, values: Values, forms: Sequence[Form], driven: list[Prepared]
+    ) -> list[tuple[Prepared, Array, Array]]:
+        """dF/dz [N/m] and dF/dv [N s/m] along each path, by central differences."""
+        dz, dv = 1e-4 * self._scales.depth, 1e-4 * self._scales.speed
+        sides = [self._run([values], forms, driven, shift) for shift in ((dz, 0), (-dz, 0), (0, dv), (0, -dv))]
+        found = []
+        for place, trial in enumerate(driven):
+            up, down, fast, slow = (side[place][0] for side in sides)
+            # a shift of the path may cross the surface: the force there is no slope
+            most = 20 * np.median(np.abs(up - down)) + 1e-12
+            found.append((trial, np.clip(up - down, -most, most) / (2 * dz), (fast - slow) / (2 * dv)))
+        return found
+
+    def chi_square(self, values: Values, forms: Sequence[Form], trial: str) -> tuple[float, int]:
+        """trials.md's sum; see `Problem`."""
+        this = self._trials[trial]
+        if not this.driven:
+            (rest,) = self.evaluate([values], forms, [trial])
+            return float(rest[trial] @ rest[trial]), len(rest[trial])
+        assert this.smooth is not None
+        force = self._run([values], forms, [this])[0][0]
+        ((_, by_depth, _),) = self._slopes(values, forms, [this])
+        std = stds(self.tables, True)[1]
+        rest = (this.other - force) / np.sqrt(std**2 + (by_depth * this.smooth.depth_std) ** 2)
+        return float(rest @ rest), len(rest)
+
+    # What is seen -----------------------------------------------------------------------------------------------------
+
+    def samples(self, trial: str) -> Samples:
+        """See `Problem`."""
+        this = self._trials[trial]
+        std_depth, std_other = stds(self.tables, this.driven)
+        if this.driven:
+            n = len(this.time)
+            return Samples(time=this.time, channel=np.full(n, "force"), std=np.full(n, std_other))
+        first, second = this.time[this.has_depth], this.time[this.has_other]
+        return Samples(
+            time=np.concatenate([first, second]),
+            channel=np.concatenate([np.full(len(first), "depth"), np.full(len(second), "accel")]),
+            std=np.concatenate([np.full(len(first), std_depth), np.full(len(second), std_other)]),
+        )
+
+    def noise(self, random: np.random.Generator, trial: str) -> Array:
+        """Standard normal: the whitening has taken the depth's error in."""
+        this = self._trials[trial]
+        return random.standard_normal(
+            len(this.time) if this.driven else int(this.has_depth.sum() + this.has_other.sum())
+        )
+
+    def _state(self, values: Values, forms: Sequence[Form], trial: str) -> tuple[Array, Array, NDArray[np.str_], Array]:
+        """Depth, speed, phase, and model's force or motion at every row."""
+        this = self._trials[trial]
+        model = self._run([values], forms, [this])[0][0]
+        if this.smooth is None:
+            names = np.array(PHASES)[np.clip(model[:, 3].astype(int), 0, 3)]
+            return model[:, 0], model[:, 1], names, model
+        depth, speed = this.smooth.depth, this.smooth.speed
+        slow = max(0.02 * float(np.abs(speed).max()), 3 * float(np.median(this.smooth.speed_std)))
+        names = np.where(speed > slow, "in", np.where(speed < -slow, "out", "rest"))
+        return depth, speed, np.where(depth <= 0, "free", names), model
+
+    def phases(self, values: Values, forms: Sequence[Form], trial: str) -> NDArray[np.str_]:
+        """See `Problem`."""
+        this = self._trials[trial]
+        names = self._state(values, forms, trial)[2]
+        return names if this.driven else np.concatenate([names[this.has_depth], names[this.has_other]])
+
+    def reported(self, values: Values, form: Form) -> dict[str, tuple[float, str]]:
+        """Forces and lengths of the campaign's middle diameter in SI units; exponents and shares as they are."""
+        name = self._named("stiffness", self._middle)
+        stiffness = values.get(name, self._default(name, self.tables.surface.stiffness))
+        found = {}
+        for parameter in form.parameters:
+            slot = self._library.slots[form.id][parameter.name]
+            value = physical(
+                slot, values.get(parameter.name, parameter.value), self._scales, stiffness=stiffness, size=1.0
+            )
+            found[slot.name] = (float(value), unit_of(slot))
+        return found
+
+    def latent(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
+        """The force [N] that the model lacks; of a drop m (g - a) over the model's, at the accelerometer's rows."""
+        this = self._trials[trial]
+        depth, speed, _, model = self._state(values, forms, trial)
+        rows = this.has_other
+        if this.driven:
+            missing = this.other - model
+        else:
+            missing = (self.tables.spike.mass or 1.0) * (model[:, 2] - this.other)
+        deepest = np.maximum.accumulate(np.maximum(depth, 0.0))
+        columns = {"t_s": this.time, "latent_force_N": missing, "depth_m": depth, "velocity_m_s": speed,
+                   "retreat_m": deepest - depth}  # fmt: skip
+        return {name: np.asarray(column)[rows] for name, column in columns.items()}
+
+    def compare(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, dict[str, Array]]:
+        """See `Problem`."""
+        this = self._trials[trial]
+        _, _, _, model = self._state(values, forms, trial)
+        if this.smooth is not None:
+            return {"force": {"t_s": this.time, "measured": this.other, "model": model, "depth_m": this.smooth.depth}}
+        return {
+            name: {"t_s": this.time[rows], "measured": measured[rows], "model": model[rows, column]}
+            for name, measured, rows, column in (
+                ("depth", this.depth, this.has_depth, 0), ("accel", this.other, this.has_other, 2),
+            )
+        }  # fmt: skip
+
+    # What is written --------------------------------------------------------------------------------------------------
+
+    def write_model(self, path: str, values: Values, forms: Sequence[Form]) -> None:
+        """model.toml. The slots of `penetration_law` are the parameters of an effect; where trials have several
+        diameters the middle one's K and C stand in [surface], all of them in [notes]."""
+        pairs = {
+            f"{diameter:g}": {
+                name: float(values.get(self._named(name, diameter), self._default(self._named(name, diameter), stated)))
+                for name, stated in (
+                    ("stiffness", self.tables.surface.stiffness), ("damping", self.tables.surface.damping),
+                )
+            }
+            for diameter in self._diameters
+        }  # fmt: skip
+        own = pairs[f"{self._middle:g}"]
+        notes: dict[str, Any] = dict(self.tables.notes)
+        if len(pairs) > 1:
+            notes["fitted_by_diameter"] = pairs
+        effects = tuple(
+            EffectTable(id=form.effect, parameters={
+                "reference": self._scales.depth,
+                **{name: value for name, (value, _) in self.reported(values, form).items()},
+            })
+            for form in forms
+        )  # fmt: skip
+        tables = {
+            name: getattr(self.tables, name) for name in ("format", "kind", "name", "spike", "uncertainty", "sensors")
+        }
+        surface = self.tables.surface.model_copy(update=own)
+        model = PenetrationModel(**tables, surface=surface, notes=notes, trial=self.tables.trial, effect=effects)
+        write_model(Path(path), model)
+
+    def next_experiment(self, first: Form, second: Form, values: Values) -> str:
+        """See `Problem`."""
+        pair = frozenset((first.effect, second.effect))
+        for names, sentence in _TELLING.items():
+            if pair == names:
+                return sentence
+        return (
+            f"Drive the spike in and out at two speeds a factor of ten apart, to twice the depth reached here: "
+            f"{first.effect} and {second.effect} part where speed, direction and depth change one at a time."
+        )
+
+
+_TELLING: Mapping[frozenset[str], str] = {
+    frozenset(("depth-hardening", "layering")): "Push once, slowly, to twice the depth in this bed and once in a bed "
+    "prepared anew: hardening goes on smoothly, a layer stays at its depth.",
+    frozenset(
+        ("inertial-drag", "shaft-friction")
+    ): "Push to one depth at a tenth of the speed and at the full one: drag falls to a hundredth, friction stays.",
+    frozenset(
+        ("adhesion", "plastic-sinkage")
+    ): "Retreat slowly and look at the force after it has passed zero: adhesion "
+    "pulls (a negative force), a crater leaves exactly none.",
+    frozenset(
+        ("adhesion", "shaft-friction")
+    ): "Stop half-way in for a second and go on: friction falls and comes back on "
+    "the way in too, adhesion shows on the way out only.",
+    frozenset(
+        ("plastic-sinkage", "shaft-friction")
+    ): "Retreat by a tenth of the depth and push in again: along a crater's "
+    "curve the force returns the same way, friction changes sign at once.",
+    frozenset(("depth-hardening", "shaft-friction")): "Push in and retreat slowly: friction changes sign, hardening "
+    "does not.",
+    frozenset(("depth-hardening", "inertial-drag")): "Push to one depth at a tenth of the speed: hardening stays.",
+    frozenset(("inertial-drag", "layering")): "Push to one depth at a tenth of the speed: a layer stays.",
+    frozenset(("inertial-drag", "plastic-sinkage")): "Push in slowly and retreat: a crater shows at any speed.",
+}
+
+
+def _tip_depth(spike: Any, diameter: float) -> float:
+    """Depth at which the tip is wholly in [m]."""
+    if spike.tip == "sphere":
+        return 0.5 * diameter
+    if spike.tip == "cone":
+        return 0.5 * diameter / math.tan(math.radians(spike.cone_angle) / 2)
+    return 1e-4 * diameter
+
+
+def _depths(trial: Prepared) -> Array:
+    return trial.smooth.depth if trial.smooth is not None else trial.depth[trial.has_depth]
+
+
+def _speeds(trial: Prepared) -> Array:
+    if trial.smooth is None:
+        return np.array([0.0, trial.table.speed or 0.0])
+    inside = trial.smooth.depth > 0
+    fast = trial.smooth.speed[inside] if inside.any() else trial.smooth.speed
+    return np.percentile(np.maximum(fast, 0.0), [20, 90])
