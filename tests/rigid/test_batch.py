@@ -185,6 +185,45 @@ def test_the_batch_and_a_bed_s_runtime_live_in_one_process():
         runtime.start()
 
 
+OWN = """
+from math import exp, sin
+
+from rigid.terms import Parameter, Term
+
+
+def force(s, strength, reach):
+    turn = 0.0
+    if s.theta > 0.0:
+        turn = -strength * sin(3.0 * s.theta) * exp(-abs(s.x) / reach)
+    return 0.0, 0.0, turn
+
+
+def factor(s, slip, strength):
+    return 1.0, 1.0 - strength * min(1.0, abs(slip))
+
+
+TERM = Term(
+    id="my-magnet", summary="pulls back near the start", acts="virtual work and mu_d",
+    parameters=(
+        Parameter(name="strength", unit="N m", default=0.0, summary="of the pull"),
+        Parameter(name="reach", unit="m", default=0.01, summary="where it fades"),
+    ),
+    source="a test", limits="none", hooks={"force": force, "friction_factor": factor},
+)
+"""
+
+
+def test_an_effect_of_one_s_own_file_runs_in_the_batch_as_well(tmp_path):
+    file = tmp_path / "my_magnet.py"
+    file.write_text(OWN, encoding="utf-8")
+    trial = in_rig(0.22, effects=(Effect(id="my-magnet", parameters={"strength": 0.05}, file=file),))
+    run = simulate(trial, duration=0.7, sample_interval=0.01)
+    batch = simulate_batch([trial], duration=0.7, sample_every=10)
+    assert np.abs(batch.channel("theta")[0] - run.theta).max() < 2e-4
+    bare = simulate(in_rig(0.22), duration=0.7, sample_interval=0.01)
+    assert np.abs(bare.theta - run.theta).max() > 5e-3
+
+
 def test_every_hook_of_every_term_compiles_for_taichi():
     # One kernel with all effects on: if a term's source were no Taichi, this would not compile.
     every = tuple(Effect(id=id) for id, term in EFFECTS.items() if not term.sensor)
