@@ -13,9 +13,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["PHASES", "Run", "RunFolder", "Series", "Setting", "read_folder", "read_series"]
+__all__ = [
+    "PHASES",
+    "PYTHON_RUNS",
+    "Run",
+    "RunFolder",
+    "Series",
+    "Setting",
+    "from_python",
+    "read_folder",
+    "read_series",
+]
 
 PHASES = ("free", "in", "rest", "out")
+#: Experiment of a run that a script has saved -> the function of `coupling` that made it.
+PYTHON_RUNS = {"driven": "drive", "drop": "drop", "set_down": "set_down"}
 _COLUMNS = ("t_s", "depth_m", "velocity_m_s", "force_N", "phase")
 
 
@@ -116,7 +128,9 @@ def read_folder(folder: str | Path) -> RunFolder:
     for entry in _dicts(result.get("runs")):
         name = str(entry.get("id", "unnamed"))
         bed = _try_series(path, entry.get("series"), f"run {name}: the bed's series", missing)
-        model = _try_series(path, entry.get("model_series"), f"run {name}: the spring-damper's series", missing)
+        alone = "model_series" not in entry and result.get("experiment") in PYTHON_RUNS
+        law = f"run {name}: the spring-damper's series"
+        model = None if alone else _try_series(path, entry.get("model_series"), law, missing)
         speed, seed = entry.get("speed"), entry.get("seed")
         runs.append(
             Run(
@@ -135,6 +149,11 @@ def read_folder(folder: str | Path) -> RunFolder:
     if result.get("status"):
         status = str(result["status"])
     return RunFolder(path, result, runs, _read_settings(path / "run.toml", missing), missing, status, reason)
+
+
+def from_python(run: RunFolder) -> bool:
+    """Whether it is one run that a script has saved, beside which there is no spring-damper."""
+    return run.result.get("experiment") in PYTHON_RUNS
 
 
 def read_series(path: str | Path) -> Series:

@@ -33,7 +33,7 @@ __all__ = ["Picture", "Pictures", "make_pictures", "opengl_available"]
 
 _STILLS = 6
 _ANIMATED = 48
-_CUT = "grains in front of the spike's mid-plane are left out"
+_CUT = "cut open along the spike's mid-plane: what is in front is left out, of the spike too"
 _SLAB = "shown are those up to four diameters behind the spike's mid-plane, the farther the darker"
 
 
@@ -301,7 +301,8 @@ def _plan(
     if not chosen:
         return job, [], None
     main = chosen[0]
-    top = nice_above(max(_high(story.frames[story.deepest], "displacement") for story in chosen))
+    moved = [_high(story.frames[story.deepest], "displacement") for story in chosen if not story.rested]
+    top = nice_above(max(moved, default=0.0))
     figures = run.path / "figures"
     stills: list[Picture] = []
 
@@ -318,8 +319,9 @@ def _plan(
         )
 
     def deep(story: _Story) -> None:
-        if story.rested:
-            still(story, len(story.frames) - 1, "displacement", top, "rest", "at rest")
+        if story.rested:  # it moves grains far less than a drive does: its scale is its own
+            own = nice_above(_high(story.frames[len(story.frames) - 1], "displacement"))
+            still(story, len(story.frames) - 1, "displacement", own, "rest", "at rest")
         else:
             held = ", held still" if story.held(story.deepest) else ""
             still(story, story.deepest, "displacement", top, "deepest", f"at its deepest{held}")

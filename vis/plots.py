@@ -94,6 +94,7 @@ def drag_plot(run: RunFolder) -> Plot | None:
         return None
     with styled():
         figure, axes = _panels(len(speeds), height=3.0, sharex=True, sharey=True)
+        above = [part for r in driven if (part := _above_surface(r.bed)) is not None]
         for axis, speed in zip(axes, speeds, strict=True):
             here = [r for r in driven if r.speed == speed]
             seeds = len(here)
@@ -106,30 +107,43 @@ def drag_plot(run: RunFolder) -> Plot | None:
                     grid, mean, _ = _mean_by_depth(models)
                     style = (0, (4, 2)) if way == "in" else (0, (1, 1.5))
                     axis.plot(1e3 * grid, mean, color=MODEL, ls=style, lw=1.8)
+            for part in (_above_surface(r.bed) for r in here):
+                if part is not None:
+                    axis.plot(1e3 * part.depth, part.force, color=BED, lw=0.6, alpha=0.25)
+                    grid, mean, _ = _mean_by_depth([part], bins=8)
+                    axis.plot(1e3 * grid, mean, color=BED, lw=1.6, alpha=0.4)
             axis.axhline(0.0, color=GREY, lw=0.8)
-            axis.set_xlim(left=0.0)
+            if above:
+                axis.axvline(0.0, color=GREY, lw=0.8, ls=(0, (2, 2)))
+            axis.set_xlim(left=1e3 * min((float(part.depth.min()) for part in above), default=0.0))
             axis.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
         _label(axes, "depth of the tip [mm]", "force on the spike [N]")
-        _legend(
-            figure,
-            [
-                Line2D([], [], color=BED, lw=2.2, label="bed, way in"),
-                Line2D([], [], color=BED, lw=2.2, alpha=0.45, label="bed, way out"),
-                Line2D([], [], color=BED, lw=0.7, alpha=0.55, label="bed, as recorded"),
-                Line2D([], [], color=MODEL, ls=(0, (4, 2)), label="spring-damper, in"),
-                Line2D([], [], color=MODEL, ls=(0, (1, 1.5)), label="spring-damper, out"),
-            ],
-        )
+        handles = [Line2D([], [], color=BED, lw=2.2, label="bed, way in")]
+        out = any(len(_way(r.bed, "out") or ()) for r in driven)
+        handles += [Line2D([], [], color=BED, lw=2.2, alpha=0.45, label="bed, way out")] if out else []
+        handles += [Line2D([], [], color=BED, lw=0.7, alpha=0.55, label="bed, as recorded")]
+        law = _has_model(driven)
+        handles += [Line2D([], [], color=MODEL, ls=(0, (4, 2)), label="spring-damper, in")] if law else []
+        handles += [Line2D([], [], color=MODEL, ls=(0, (1, 1.5)), label="spring-damper, out")] if law and out else []
+        _legend(figure, handles)
     many = any(sum(r.speed == s for r in driven) > 1 for s in speeds)
     width = _bin_width([_way(r.bed, "in") for r in driven])
     spread = f"Thick: mean over {width} of depth" if width else "Thick: mean over slices of depth"
     spread += f"{' and over the beds' if many else ''}. Faint: as recorded{', each bed' if many else ''}. "
     spread += "Band: one standard deviation between beds. " if many else ""
+    if above:
+        spread += (
+            "Left of 0, pale: before the tip has reached the surface it is carried by grains that stick out of it; the "
+            "fit leaves that out. "
+        )
+    if law:
+        spread += "Dashed: the fitted spring-damper in the same motion"
+        spread += "; dotted: its way out, predicted, not fitted." if out else "."
     return Plot(
         "drag",
         "Drag against depth",
-        f"The ground's force on the spike, upwards, while it is driven in and pulled out at constant speed. {spread}"
-        "Dashed: the fitted spring-damper in the same motion; dotted: its way out, predicted, not fitted.",
+        "The ground's force on the spike, upwards, while it is driven in"
+        f"{' and pulled out' if out else ''} at constant speed. {spread}".strip(),
         figure,
     )
 
@@ -194,10 +208,12 @@ def work_plot(run: RunFolder) -> Plot | None:
         return None
     with styled():
         figure, axes = _panels(2, height=2.7, sharey=True)
+        law = any(_number(r.quantities, "model_work_in") is not None for r in driven)
+        sides = ((-0.2, "", BED), (0.2, "model_", MODEL)) if law else ((0.0, "", BED),)
         for axis, key, title in zip(
             axes, ("work_in", "work_out"), ("put in, way in", "got back, way out"), strict=True
         ):
-            for shift, prefix, colour in ((-0.2, "", BED), (0.2, "model_", MODEL)):
+            for shift, prefix, colour in sides:
                 mean, spread = _by_speed(driven, speeds, prefix + key, 1e3)
                 where = np.arange(len(speeds)) + shift
                 axis.bar(where, mean, 0.36, color=colour, hatch="///" if prefix else "", edgecolor="white", lw=0.6)
@@ -208,10 +224,11 @@ def work_plot(run: RunFolder) -> Plot | None:
             axis.set_title(f"Work {title}")
             axis.set_xticks(range(len(speeds)), [f"{s:.4g}" for s in speeds])
             axis.grid(False, axis="x")
+            axis.set_xlim(-0.7, max(len(speeds), 2) - 0.3 if len(speeds) > 1 else 0.7)
             axis.margins(y=0.15)
             axis.axhline(0.0, color=GREY, lw=0.8)
         _label(axes, "speed [m/s]", "work [mJ]")
-        _legend(figure, _pair(bars=True))
+        _legend(figure, _pair(bars=True)[: 2 if law else 1])
     return Plot(
         "work",
         "Work in and out",
@@ -235,16 +252,19 @@ def drops_plot(run: RunFolder) -> Plot | None:
         FigureCanvasAgg(figure)
         axes = figure.subplots(2, len(speeds), sharex="col", sharey="row", squeeze=False)
         window = _nice(0.04 * max(_settled(r) for r in drops))
+        free = False
         for column, speed in enumerate(speeds):
             above, below = axes[0, column], axes[1, column]
             here = [r for r in drops if r.speed == speed]
             end = max(_settled(r) for r in here)
+            early = [r.bed.time[0] - _touch(r.bed) for r in here if r.bed is not None and _above_surface(r.bed)]
+            begin = min(-0.03 * end, *(max(_first_touch(r.bed), -0.5 * end) for r in here)) if early else -0.03 * end
             for r in here:
                 for series, colour, style in ((r.bed, BED, "-"), (r.model, MODEL, (0, (4, 2)))):
                     if series is None:
                         continue
                     start = _touch(series)
-                    shown = (series.time - start <= end) & (series.time - start >= -0.03 * end)
+                    shown = (series.time - start <= end) & (series.time - start >= begin)
                     time = 1e3 * (series.time[shown] - start)
                     thin = len(here) > 1 and colour == BED
                     above.plot(time, 1e3 * series.depth[shown], color=colour, ls=style, lw=1.1 if thin else 1.8)
@@ -252,7 +272,9 @@ def drops_plot(run: RunFolder) -> Plot | None:
                     if colour == BED:
                         below.plot(time, force[shown], color=colour, lw=0.6, alpha=0.4)
                         force = _running_mean(series.time, force, window)
-                    below.plot(time, force[shown], color=colour, ls=style, lw=1.2 if thin else 1.8)
+                    inside, width = time >= 0.0, 1.2 if thin else 1.8
+                    below.plot(time[inside], force[shown][inside], color=colour, ls=style, lw=width)
+                    below.plot(time[~inside], force[shown][~inside], color=colour, ls=style, lw=width, alpha=0.4)
                     peak = int(np.argmax(series.force))
                     below.plot(
                         1e3 * (series.time[peak] - start), series.force[peak], "o" if colour == BED else "D",
@@ -260,21 +282,27 @@ def drops_plot(run: RunFolder) -> Plot | None:
                     )  # fmt: skip
             above.set_title(f"dropped at {_speed(speed)}")
             above.axhline(0.0, color=GREY, lw=0.8)
+            if early:
+                for axis in (above, below):
+                    axis.axvline(0.0, color=GREY, lw=0.8, ls=(0, (2, 2)))
+            free = free or bool(early)
             below.set_xlabel("time since touch-down [ms]")
         axes[0, 0].set_ylabel("depth of the tip [mm]")
         axes[1, 0].set_ylabel("force on the spike [N]")
         axes[0, 0].invert_yaxis()
         recorded = Line2D([], [], color=BED, lw=0.7, alpha=0.55, label="bed, as recorded")
         peaks = Line2D([], [], color=GREY, marker="o", ls="", ms=5, label="peak force, as recorded")
-        bed, model = _pair()
-        _legend(figure, [bed, recorded, model, peaks])
+        bed, *model = _pair()[: 2 if _has_model(drops) else 1]
+        _legend(figure, [bed, recorded, *model, peaks])
     each = ", a line for each bed" if len({(r.speed, r.seed) for r in drops}) > len(speeds) else ""
     return Plot(
         "drops",
         "Drops",
         f"Depth (downwards) and the ground's force against time since touch-down{each}. Of the bed's force the running "
         f"mean over {quote(window, 0.0, 's')} is drawn full, what was recorded faint; the peaks are those of what was "
-        "recorded. The fit uses each drop up to its first stop; what follows is predicted.",
+        "recorded."
+        + (" Left of 0, pale: grains that stick out of the surface, which the fit leaves out." if free else "")
+        + (" The fit uses each drop up to its first stop; what follows is predicted." if _has_model(drops) else ""),
         figure,
     )
 
@@ -306,7 +334,8 @@ def drop_peaks_plot(run: RunFolder) -> Plot | None:
             axis.margins(x=0.12)
             if len(speeds) <= 5:
                 axis.set_xticks(speeds, [f"{s:.4g}" for s in speeds])
-        _legend(figure, _pair(markers=True))
+        law = any(_number(r.quantities, "model_peak_force") is not None for r in drops)
+        _legend(figure, _pair(markers=True)[: 2 if law else 1])
     names = [title[0].lower() + title[1:] for _, title, *_ in columns]
     listed = ", ".join(names[:-1]) + (" and " if len(names) > 1 else "") + names[-1]
     return Plot(
@@ -326,19 +355,20 @@ def set_down_plot(run: RunFolder) -> Plot | None:
         figure = Figure(figsize=(_WIDTH, 3.1))
         FigureCanvasAgg(figure)
         axis = figure.add_subplot()
-        end = 1.15 * max(_settled(r) for r in sets)
+        end, begin = 1.15 * max(_settled(r) + _touch(r.bed) for r in sets if r.bed is not None), 0.0
+        dots = 0
         for r in sets:
             for series, colour, style in ((r.bed, BED, "-"), (r.model, MODEL, (0, (4, 2)))):
                 if series is not None:
-                    time = series.time - series.time[0]
-                    shown = time <= end
-                    axis.plot(1e3 * time[shown], 1e3 * series.depth[shown], color=colour, ls=style, lw=1.4)
+                    shown = (series.time <= end) & (series.time >= -0.1 * end)
+                    axis.plot(1e3 * series.time[shown], 1e3 * series.depth[shown], color=colour, ls=style, lw=1.4)
+                    begin = min(begin, float(series.time[shown].min(initial=0.0)))
             assert r.bed is not None
-            if _number(r.quantities, "sinkage") is not None and r.bed.time[-1] - r.bed.time[0] <= end:
+            if _number(r.quantities, "sinkage") is not None and r.bed.time[-1] <= end:
+                dots += 1
                 axis.plot(
-                    1e3 * (r.bed.time[-1] - r.bed.time[0]), 1e3 * r.bed.depth[-1], "o", color=BED, ms=5, mec="white",
-                    mew=0.8, zorder=5,
-                )  # fmt: skip
+                    1e3 * r.bed.time[-1], 1e3 * r.bed.depth[-1], "o", color=BED, ms=5, mec="white", mew=0.8, zorder=5
+                )
         rests = []
         for key, what, colour in (("sinkage", "bed", BED), ("model_sinkage", "spring-damper", MODEL)):
             depths = [1e3 * n for r in sets if (n := _number(r.quantities, key)) is not None]
@@ -354,15 +384,21 @@ def set_down_plot(run: RunFolder) -> Plot | None:
             if spread:
                 axis.axhspan(depth - spread, depth + spread, color=colour, alpha=0.12, lw=0)
             last = max(depth, last + gap)
-            exact = spread is None or (what != "bed" and spread < 0.005)  # one law: its beds differ in their start only
-            number = f"{depth:.2f}" if exact else f"{depth:.2f} ± {spread:.2f}"
-            axis.text(
-                1.01, last, f"{what}: {number} mm", color=colour, va="center", transform=axis.get_yaxis_transform()
-            )
-        axis.set_xlim(0.0, 1e3 * end)
-        axis.set_xlabel("time since the spike was set down [ms]")
+            # one law: its beds differ in their start only
+            known = None if what != "bed" and spread is not None and spread < 0.005 else spread
+            number = quote(1e-3 * depth, None if known is None else 1e-3 * known, "m", significant=2)
+            axis.text(1.01, last, f"{what}: {number}", color=colour, va="center", transform=axis.get_yaxis_transform())
+        axis.set_xlim(1e3 * begin, 1e3 * end)
+        axis.axhline(0.0, color=GREY, lw=0.8)
+        axis.set_xlabel("time since the spike was let go [ms]")
         axis.set_ylabel("depth of the tip [mm]")
-        _legend(figure, [*_pair(), *([_dot("at rest")] if any(what == "bed" for *_, what, _ in rests) else [])])
+        _legend(
+            figure,
+            [
+                *_pair()[: 2 if _has_model(sets) else 1],
+                *([_dot("at rest")] if dots else []),
+            ],
+        )
     still = sum(_number(r.quantities, "sinkage") is not None for r in sets)
     many = len(sets) > 1
     said = f"Sinking under the load, {len(sets)} bed{'s' if many else ''}."
@@ -372,10 +408,16 @@ def set_down_plot(run: RunFolder) -> Plot | None:
         )  # fmt: skip
     if rests:
         said += f" Right: the depth at rest{', ± the standard deviation between beds' if still > 1 else ''}."
+    if _has_model(sets):
+        fitted = "all beds" if many else "this bed's drives and drops"
+        said += f" The spring-damper is the one fitted to {fitted}; where it rests is predicted, not fitted."
+    departures = run.result.get("departures")
+    if isinstance(departures, dict) and isinstance(departures.get("set_down"), str):
+        said += f" {departures['set_down']}"
     return Plot(
         "set_down",
         "Set down under its load",
-        f"{said} The spring-damper is the one fitted to all beds; where it rests is predicted, not fitted.",
+        said,
         figure,
     )
 
@@ -513,6 +555,28 @@ def _way(series: Series | None, way: str) -> Series | None:
     return Series(part.time[keep], part.depth[keep], part.velocity[keep], part.force[keep], part.phase[keep])
 
 
+def _above_surface(series: Series | None) -> Series | None:
+    """The way in before depth 0 from where grains are first felt; None where none are."""
+    if series is None:
+        return None
+    touched = np.flatnonzero((series.depth < 0.0) & (series.force > 0.0) & (series.velocity > 0.0))
+    if not len(touched):
+        return None
+    keep = (series.depth < 0.0) & (series.velocity > 0.0)
+    keep[: touched[0]] = False
+    return Series(series.time[keep], series.depth[keep], series.velocity[keep], series.force[keep], series.phase[keep])
+
+
+def _first_touch(series: Series | None) -> float:
+    """Time from the first grain felt to depth 0 [s], below 0; 0 where no grain sticks out."""
+    part = _above_surface(series)
+    return 0.0 if part is None or series is None else float(part.time[0]) - _touch(series)
+
+
+def _has_model(runs: Iterable[Run]) -> bool:
+    return any(r.model is not None for r in runs)
+
+
 def _mean_by_depth(
     parts: Iterable[Series | None], bins: int = 40
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
@@ -525,7 +589,8 @@ def _mean_by_depth(
         return np.zeros(0), np.zeros(0), np.zeros(0)
     deepest = max(float(part.depth.max()) for part in there)
     bins = _bins(there, bins)
-    edges = np.linspace(0.0, max(deepest, 1e-12), bins + 1)
+    lowest = min(0.0, *(float(part.depth.min()) for part in there))
+    edges = np.linspace(lowest, max(deepest, lowest + 1e-12), bins + 1)
     rows = np.full((len(there), bins), np.nan)
     for row, part in zip(rows, there, strict=True):
         which = np.clip(np.digitize(part.depth, edges) - 1, 0, bins - 1)

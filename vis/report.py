@@ -12,13 +12,16 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from PIL import Image
 
-from vis.folder import read_folder
+from vis.folder import RunFolder, from_python, read_folder
 from vis.pictures import Picture, Pictures, make_pictures
 from vis.plots import Plot, make_plots
 from vis.summary import summarise
 
 __all__ = ["write_report"]
 
+#: Plot -> the kind of run it is of.
+_NEEDS = {"Drag against depth": "driven", "Work in and out": "driven", "Set down under its load": "set_down"}
+_NEEDS |= {"Drops": "drop", "Peaks of the drops": "drop"}
 #: Experiment -> module and function of its own report.
 _OTHERS = {
     "tumble": ("vis.tumble", "write_tumble_report"),
@@ -58,7 +61,7 @@ def write_report(folder: str | Path, *, pictures: bool = True, progress: Callabl
         except (ValueError, KeyError, IndexError, OSError) as error:
             drawn = Pictures(notes=[f"Pictures could not be drawn ({type(error).__name__}: {error})."])
     context = summarise(run)
-    context["missing"] = [*context["missing"], *undrawn]
+    context["missing"] = [*context["missing"], *(text for text in undrawn if _asked_for(run, text))]
     context["plots"] = {plot.name: _figure(plot, path) for plot, path in plots}
     context["pictures"] = [_picture(picture) for picture in drawn.stills if picture.file.exists()]
     context["animation"] = _picture(drawn.animation) if drawn.animation and drawn.animation.file.exists() else None
@@ -70,6 +73,14 @@ def write_report(folder: str | Path, *, pictures: bool = True, progress: Callabl
     temporary.replace(report)
     tell(1.0)
     return report
+
+
+def _asked_for(run: RunFolder, undrawn: str) -> bool:
+    """Whether what could not be drawn for want of data was part of this run at all."""
+    what, _, why = undrawn.partition(": ")
+    if why != "no data." or not run.runs:
+        return True
+    return not from_python(run) and (what not in _NEEDS or bool(run.of_kind(_NEEDS[what])))
 
 
 def _template() -> Any:

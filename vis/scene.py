@@ -19,6 +19,7 @@ __all__ = ["Scene"]
 
 _OVERSAMPLE = 1.5  # rendered larger and shrunk: smooth edges at a third of the cost of multi-sampling
 _METAL = (0.74, 0.76, 0.79)
+_RIM = (0.30, 0.32, 0.35)
 
 
 class Scene:
@@ -27,7 +28,7 @@ class Scene:
     Args:
         size: Width and height of the image [pixels].
         low, high: Corners of the undisturbed bed [m].
-        cut: Grains with y below this [m] are left out.
+        cut: Grains with y below this [m], and the part of a body in front of it, are left out.
         radius: Typical radius of a grain [m], for the shading of the gaps between them.
     """
 
@@ -85,7 +86,7 @@ class Scene:
         shown = position[:, 1] >= self.cut
         self._actors = [self._spheres(position[shown], frame.grains["radius"][shown], colours[shown])]
         for points, triangles in frame.bodies.values():
-            self._actors.append(self._body(points, triangles))
+            self._actors += self._body(points, triangles)
         self._plotter.render()  # a screenshot alone would show the frame before
         image = np.asarray(self._plotter.screenshot(None, return_img=True))[..., :3]
         return np.asarray(Image.fromarray(image).resize(self.size, Image.Resampling.LANCZOS))
@@ -134,11 +135,20 @@ class Scene:
         self._plotter.add_actor(actor, render=False, reset_camera=False)
         return actor
 
-    def _body(self, points: NDArray[np.float64], triangles: NDArray[np.int64]) -> Any:
+    def _body(self, points: NDArray[np.float64], triangles: NDArray[np.int64]) -> list[Any]:
+        """What of a body lies behind the cut, closed by its section: in front its rim would be nearer the camera, and
+        the tip would not meet the scale of depth."""
         faces = np.column_stack([np.full(len(triangles), 3), triangles]).ravel()
-        mesh = self._pyvista.PolyData(points.astype(np.float32), faces)
+        mesh = self._pyvista.PolyData(points, faces)
+        if points[:, 1].min() < self.cut < points[:, 1].max():
+            mesh = mesh.clip_closed_surface(normal=(0.0, 1.0, 0.0), origin=(0.0, self.cut, 0.0))
+        rim = mesh.extract_feature_edges(feature_angle=60.0, boundary_edges=False, non_manifold_edges=False)
         mesh = mesh.compute_normals(feature_angle=40.0, split_vertices=True)
-        return self._plotter.add_mesh(
-            mesh, color=_METAL, smooth_shading=True, ambient=0.25, diffuse=0.75, specular=0.5, specular_power=30,
+        body = self._plotter.add_mesh(
+            mesh, color=_METAL, smooth_shading=True, ambient=0.35, diffuse=0.75, specular=0.5, specular_power=30,
             render=False, reset_camera=False,
         )  # fmt: skip
+        if not rim.n_cells:
+            return [body]
+        line = self._plotter.add_mesh(rim, color=_RIM, line_width=2.5, lighting=False, render=False, reset_camera=False)
+        return [body, line]

@@ -6,13 +6,16 @@ reads "unknown"; nothing here raises for a part that is missing.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from vis.folder import Run, RunFolder, Setting
+from vis.folder import PYTHON_RUNS, Run, RunFolder, Setting
+from vis.frames import frame_names
 from vis.numbers import column, plain, quantity, quote, short
 
 __all__ = ["Table", "summarise"]
@@ -21,6 +24,9 @@ __all__ = ["Table", "summarise"]
 Table = dict[str, Any]
 
 _NBSP = "\N{NO-BREAK SPACE}"
+_REAL_GRAINS = {"sand": 2e-4}
+"""Diameter of real grains [m]: 0.2 mm is where fine sand ends and medium sand begins (ISO 14688-1)."""
+_BARE_UNITS = {"1", "m", "m/s", "m/s2", "s", "kg", "N", "N/m", "N s/m", "Pa", "degrees"}
 _STATUS = {
     "stopped": "This run was stopped before it was finished; what follows is what it had by then. `hedgebed resume` on "
     "its folder finishes it.",
@@ -38,6 +44,10 @@ _NAMES = {
     "work_returned_dem": "work given back, bed",
     "work_returned_spring_damper": "work given back, spring-damper",
     "load": "load set down",
+    "drop_mass": "mass dropped",
+    "stiffness_standing": "stiffness for a foot that stands (load over sinkage)",
+    "surface_force": "force at depth 0, driven",
+    "surface_roughness": "how far grains stick out under the tip",
     "grain_count": "grains",
     "packing_fraction": "packing fraction",
     "coordination_number": "contacts per grain",
@@ -75,7 +85,8 @@ def summarise(run: RunFolder) -> dict[str, Any]:
 
     Returns:
         A dict with "title", "status", "banner", "lead" (facts under the title), "tiles", "answers", "fit",
-        "departures", "reference", "bed", "spike", "runs", "numbers", "settings", "warnings", "missing" and "reproduce".
+        "departures", "reference", "bed", "spike", "runs", "numbers", "settings", "warnings", "missing", "frames" and
+        "reproduce"; "caveat" is what to know before any number.
     """
     result = run.result
     quantities = _mapping(result.get("quantities"))
@@ -88,17 +99,19 @@ def summarise(run: RunFolder) -> dict[str, Any]:
         "lead": _lead(run, experiment),
         "seeds": len({r.seed for r in run.runs if r.seed is not None}),
         "tiles": _tiles(run, quantities),
+        "caveat": _caveat(result, quantities),
         "answers": _answers(run, quantities),
         "fit": _fit(result, quantities),
         "departures": _departures(result),
         "reference": _reference(result),
         "bed": _bed(result, quantities),
-        "spike": _facts(_mapping(result.get("spike"))),
+        "spike": _facts(_spike(_mapping(result.get("spike")))),
         "runs": _runs(run),
         "numbers": _numbers(quantities),
         "settings": _settings(run.settings),
         "warnings": [_sentence(str(text)) for text in _list(result.get("warnings"))],
         "missing": list(run.missing),
+        "frames": _frames(run),
         "reproduce": _reproduce(run, experiment),
     }
 
@@ -164,11 +177,61 @@ def _tiles(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, str]
         tiles.append(
             {
                 "label": "Fitted stiffness K",
-                "value": quantity(quantities["stiffness"]),
-                "note": f"and damping C = {quantity(quantities.get('damping'))}",
+                "value": _fitted(quantities, "stiffness"),
+                "note": _fitted_note(run, quantities),
             }
         )
     return tiles
+
+
+def _fitted(quantities: Mapping[str, Any], key: str) -> str:
+    """K or C with its spread between beds, or for one bed with the standard error of the fit."""
+    entry = _mapping(quantities.get(key))
+    error = _value(quantities, f"{key}_error")
+    if entry.get("std") is None and error is not None:
+        entry = {**entry, "std": error}
+    return quantity(entry) if entry else "unknown"
+
+
+def _fitted_note(run: RunFolder, quantities: Mapping[str, Any]) -> str:
+    words = [f"and damping C = {_fitted(quantities, 'damping')}, for motion"]
+    depths = [float(r.bed.depth.max()) for r in run.of_kind("driven") if r.bed is not None]
+    words[0] += f" down to {quote(max(depths), 0.0, 'm')}" if depths else ""
+    if _value(quantities, "stiffness_standing") is not None:
+        words.append(f"for a foot that stands K = {quantity(quantities['stiffness_standing'])}")
+    if _mapping(quantities["stiffness"]).get("std") is None and _value(quantities, "stiffness_error") is not None:
+        words.append("± is the standard error of the fit")
+    return "; ".join(words)
+
+
+def _caveat(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> str:
+    """How far the grains of this run are from real ones; empty where that is not known."""
+    bed = _mapping(result.get("bed"))
+    overlap, grain = _value(quantities, "max_overlap"), _plain_value(bed.get("grain"))
+    factor = _plain_value(_mapping(bed.get("softening")).get("factor"))
+    real = _REAL_GRAINS.get(str(bed.get("material")))
+    parts = []
+    if factor is not None and factor > 1.05:
+        parts.append(f"softened {plain(factor, 2)} times")
+    if parts and overlap is not None:
+        parts[0] += f" (overlaps of up to {quote(overlap, None, '%', significant=2)} of a diameter)"
+    if grain is not None and real is not None and grain > 1.5 * real:
+        sizes = f"{quote(grain, 0.0, 'm')} for {quote(real, 0.0, 'm')}"
+        parts.append(f"{plain(grain / real, 2)} times larger than real ones ({sizes})")
+    if not parts:
+        return ""
+    return f"The grains are {_and(parts)}: these are numbers of that bed, not of a material."
+
+
+def _spike(facts: Mapping[str, Any]) -> dict[str, Any]:
+    """What there is to say of this spike: only a cone has an angle."""
+    return {key: value for key, value in facts.items() if key != "cone_angle" or facts.get("tip") == "cone"}
+
+
+def _frames(run: RunFolder) -> list[str]:
+    """The .pvd files and which run each shows."""
+    known = {r.id: r for r in run.runs}
+    return [f"{name}.pvd ({_run_words(known[name]) if name in known else 'frames'})" for name in frame_names(run.path)]
 
 
 def _push(run: RunFolder) -> dict[str, str] | None:
@@ -187,6 +250,11 @@ def _push(run: RunFolder) -> dict[str, str] | None:
 
 def _answers(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, str]]:
     answers = []
+    said = _mapping(run.result.get("departures"))
+
+    def also(*names: str) -> str:
+        return "".join(f" {_sentence(str(said[name]))}" for name in names if said.get(name))
+
     sunk, law = _value(quantities, "sinkage_dem"), _value(quantities, "sinkage_spring_damper")
     if sunk is not None:
         load = f" of {quantity(quantities['load'])}" if _value(quantities, "load") is not None else ""
@@ -194,11 +262,13 @@ def _answers(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, st
         if law is not None:
             text += f" The fitted spring-damper says {quantity(quantities['sinkage_spring_damper'])}"
             text += f", {_more(law / sunk - 1.0, 'deeper', 'less deep')}." if sunk > 0 else "."
+        text += also("set_down", "surface")
         answers.append({"question": "How far does it sink?", "answer": text})
     elif _restless(run, quantities):
         text = "Not known: set down under its load, the spike did not come to rest in the time that was followed."
         if law is not None:
             text += f" The fitted spring-damper says {quantity(quantities['sinkage_spring_damper'])}."
+        text += also("set_down", "surface")
         answers.append({"question": "How far does it sink?", "answer": text})
     if push := _push(run):
         text = f"{push['value']} {push['note']}."
@@ -211,7 +281,7 @@ def _answers(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, st
         answers.append({"question": "What does the sand push back with?", "answer": text})
     if _value(quantities, "drag_gap") is not None:
         text = (
-            f"With K = {quantity(quantities.get('stiffness'))} and C = {quantity(quantities.get('damping'))} it misses "
+            f"With K = {_fitted(quantities, 'stiffness')} and C = {_fitted(quantities, 'damping')} it misses "
             f"the bed's drag on the way in by {quantity(quantities['drag_gap'], unit='%')} (rms difference over rms "
             "drag)."
         )
@@ -222,6 +292,8 @@ def _answers(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, st
         if peaks is not None:
             text += f" In drops its peak force is {_more(peaks, 'above', 'below')} the bed's on average."
         answers.append({"question": "How wrong is the spring-damper?", "answer": text})
+        if said.get("which_stiffness"):
+            answers.append({"question": "Which K, and when?", "answer": also("which_stiffness").strip()})
     return answers
 
 
@@ -247,11 +319,21 @@ def _worst(result: Mapping[str, Any]) -> str:
     if not rows:
         return ""
     worst = max(rows, key=lambda row: abs(row["model_force"] - row["bed_force"]))
-    difference = worst["model_force"] - worst["bed_force"]
+    text = f"In newtons it is farthest off {_off(worst)}."
+    top = min(row["depth_to"] for row in rows)
+    shallow = [row for row in rows if row["depth_to"] == top and row is not worst]
+    if shallow:
+        near = max(shallow, key=lambda row: abs(row["model_force"] / row["bed_force"] - 1.0))
+        text += f" At the top, where a foot stands, it is farthest off {_off(near)}."
+    return text
+
+
+def _off(row: Mapping[str, float]) -> str:
+    difference = row["model_force"] - row["bed_force"]
     return (
-        f"It is farthest off at {worst['speed']:g}{_NBSP}m/s between {short(1e3 * worst['depth_from'])} and "
-        f"{short(1e3 * worst['depth_to'])}{_NBSP}mm: {quote(abs(difference), unit='N')} too "
-        f"{'much' if difference > 0 else 'little'} ({_percent(abs(difference) / worst['bed_force'])})."
+        f"at {row['speed']:g}{_NBSP}m/s between {short(1e3 * row['depth_from'])} and {short(1e3 * row['depth_to'])}"
+        f"{_NBSP}mm: {quote(abs(difference), unit='N', significant=2)} too {'much' if difference > 0 else 'little'} "
+        f"({_percent(abs(difference) / row['bed_force'])})"
     )
 
 
@@ -284,14 +366,20 @@ def _fit(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> dict[str, 
     if _value(quantities, "stiffness") is None and not result.get("fits"):
         return None
     own = [_mapping(fit) for fit in _list(result.get("fits"))]
+    one = len(own) < 2
     rows = [
         [
-            "all beds together",
-            quantity(quantities.get("stiffness")),
-            quantity(quantities.get("damping")),
+            "this bed" if one else "all beds together",
+            _fitted(quantities, "stiffness"),
+            _fitted(quantities, "damping"),
             quantity(quantities.get("drag_gap"), unit="%"),
         ]
     ]
+    if one:
+        said = "± is the standard error of the fit, leaving out one run at a time; how much K and C differ from bed to "
+        said += "bed is not known."
+        known = _value(quantities, "stiffness_error") is not None
+        return {"table": {"head": ["fitted to", "K", "C", "drag gap"], "rows": rows}, "note": said if known else ""}
     for i, fit in enumerate(own):
         rows.append(
             [
@@ -306,14 +394,14 @@ def _fit(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> dict[str, 
         for name, key in (("K", "stiffness_error"), ("C", "damping_error"))
         if _value(quantities, key) is not None
     ]
-    said = []
+    said_of: list[str] = []
     if errors:
-        said.append(f"Standard error of the fit to all beds, leaving out one run at a time: {_and(errors)}.")
+        said_of.append(f"Standard error of the fit to all beds, leaving out one run at a time: {_and(errors)}.")
     if any(_fit_error(fit, key) is not None for fit in own for key in ("stiffness", "damping")):
-        said.append(
+        said_of.append(
             "± is the spread between beds in the first row, the standard error of that bed's fit in the others."
         )
-    note = " ".join(said)
+    note = " ".join(said_of)
     return {"table": {"head": ["fitted to", "K", "C", "drag gap"], "rows": rows}, "note": note}
 
 
@@ -335,9 +423,11 @@ def _departures(result: Mapping[str, Any]) -> dict[str, Any]:
         ]
         for row, bed, model in zip(entries, forces[::2], forces[1::2], strict=True)
     ]
+    answered = {_sentence(str(departures.get(name, ""))) for name in ("which_stiffness", "surface", "set_down")}
+    said = [_sentence(str(text)) for text in _list(departures.get("sentences"))]
     head = ["speed [m/s]", "depth [mm]", f"bed [{unit}]", f"spring-damper [{unit}]", "gap"]
     return {
-        "sentences": [_sentence(str(text)) for text in _list(departures.get("sentences"))],
+        "sentences": [text for text in said if text not in answered],
         "table": {"head": head, "rows": rows} if rows else None,
     }
 
@@ -389,7 +479,7 @@ def _bed(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> dict[str, 
         if key in quantities:
             own[key] = quantities[key]
     seeds = None
-    if listed:
+    if len(listed) > 1:
         keys = [key for key in listed[0] if key != "seed"]
         rows = [[str(e.get("seed", "?")), *(_cell(key, e.get(key)) for key in keys)] for e in listed]
         seeds = {"head": ["seed", *(_label(key) for key in keys)], "rows": rows}
@@ -408,7 +498,8 @@ def _runs(run: RunFolder) -> Table | None:
     ]
     runs = [r for kind in ("driven", "drop", "set_down") for r in run.of_kind(kind)]
     runs += [r for r in run.runs if r not in runs]
-    head, cells = ["run"], [[_run_words(r) for r in runs]]
+    many = len({r.seed for r in runs}) > 1
+    head, cells = ["run"], [[_run_words(r, which_bed=many) for r in runs]]
     for title, key, unit in columns:
         bed = [_value(r.quantities, key) for r in runs]
         model = [_value(r.quantities, f"model_{key}") for r in runs]
@@ -420,10 +511,10 @@ def _runs(run: RunFolder) -> Table | None:
     return {"head": head, "rows": [list(row) for row in zip(*cells, strict=True)]} if runs else None
 
 
-def _run_words(run: Run) -> str:
+def _run_words(run: Run, *, which_bed: bool = True) -> str:
     words = {"driven": "driven", "drop": "dropped", "set_down": "set down"}.get(run.kind, run.id)
     speed = f" at {run.speed:g}{_NBSP}m/s" if run.speed and run.kind != "set_down" else ""
-    return f"{words}{speed}" + (f", bed {run.seed}" if run.seed is not None else "")
+    return f"{words}{speed}" + (f", bed {run.seed}" if run.seed is not None and which_bed else "")
 
 
 def _numbers(quantities: Mapping[str, Any]) -> Table | None:
@@ -444,16 +535,22 @@ def _settings(settings: Iterable[Setting]) -> Table | None:
         if not setting.table and setting.key in ("format", "version", "command", "created", "not_set"):
             continue
         units = re.findall(r"\[([^\[\]]+)\]", setting.comment)
+        meaning = re.sub(r"\s*\[[^\[\]]+\]", "", setting.comment).strip().rstrip(".")
+        if meaning in _BARE_UNITS:  # a run saved from Python: the comment is the unit
+            units, meaning = [meaning], ""
         unit = units[-1] if units and units[-1] != "1" else ""
-        meaning = re.sub(r"\s*\[[^\[\]]+\]\.?\s*$", "", setting.comment).rstrip(".")
         name = setting.key if setting.table in ("", "settings") else f"{setting.table}.{setting.key}"
         rows.append([name, setting.value, unit, meaning])
     return {"head": ["setting", "value", "unit", "meaning"], "rows": rows, "text": True} if rows else None
 
 
 def _reproduce(run: RunFolder, experiment: str) -> dict[str, str]:
+    called = PYTHON_RUNS.get(experiment, "")
+    folder = Path(os.path.relpath(run.path)) if run.path.resolve().is_relative_to(Path.cwd()) else run.path.resolve()
+    command = f".venv/bin/hedgebed {experiment or 'penetrate'} {folder / 'run.toml'} --out runs/again"
     return {
-        "command": f"hedgebed {experiment or 'penetrate'} run.toml --out runs/again",
+        "command": "" if called else command,
+        "script": f"coupling.{called}" if called else "",
         "version": str(run.result.get("version") or _setting(run, "version") or "unknown"),
     }
 

@@ -74,6 +74,36 @@ def test_rendered_with_opengl(tmp_path, needs_opengl, make_run):
     assert redness(speed) != pytest.approx(redness(deepest), abs=0.5)
 
 
+def test_a_flat_tip_meets_the_scale_of_depth(needs_opengl):
+    """The spike is cut at the plane that the scale lies in: its lower edge is where `place` puts the tip's depth."""
+    from vis.frames import Frame
+    from vis.meshes import spike_mesh
+    from vis.scene import Scene
+
+    points, triangles = spike_mesh("flat", diameter=0.016, length=0.06)
+    tip = np.array([0.036, 0.036, 0.030])
+    scene = Scene((400, 300), np.zeros(3), np.array([0.072, 0.072, 0.05]), cut=0.036, radius=0.0012)
+    far = {"position": np.array([[0.002, 0.07, 0.002]]), "radius": np.array([0.0012])}
+    image = scene.render(Frame(0.0, far, {"spike": (points + tip, triangles)}, {}), np.ones((1, 4))).astype(int)
+    scene.close()
+    across, up = scene.place(tip[None])[0]
+    column = image[:, round(400 * across)]
+    lowest = np.flatnonzero((column.max(axis=1) < 245) & (np.arange(300) < 300 * (1 - up) + 20)).max()
+    assert lowest == pytest.approx(300 * (1 - up), abs=2.5)
+
+
+def test_the_set_down_has_a_scale_of_its_own(tmp_path, make_run):
+    """What a drive moves by millimetres a set-down moves by less: on the drive's scale nothing would be seen."""
+    folder = make_run(tmp_path, frames=2)
+    run = pictures.read_folder(folder)
+    (folder / "frames/set_down-seed1.pvd").write_text((folder / "frames/driven-0.1-seed1.pvd").read_text())
+    job, stills, _ = pictures._plan(run, (40, 30), None, [])
+    rest = next(view for view, still in zip(job["stills"], stills, strict=True) if "at rest" in still.title)
+    assert rest["top"] <= min(view["top"] for view in job["stills"] if view["by"] == "displacement")
+    tops = {view["top"] for view in job["stills"] if view["by"] == "displacement" and view is not rest}
+    assert len(tops) == 1
+
+
 def test_a_renderer_that_dies_costs_no_pictures(tmp_path, monkeypatch, make_run):
     monkeypatch.setattr(pictures, "opengl_available", lambda: True)
     monkeypatch.setattr(pictures.sys, "executable", "/bin/false")

@@ -90,7 +90,7 @@ def test_it_answers_first(report):
     assert text.index("How far does it sink?") < text.index("The spring-damper, fitted") < text.index("Settings")
     for words in (
         "231 ± 12 N/m", "4.2 ± 0.3 N s/m", "28 ± 2 %", "Grains are softened", "On the way out the sand lets go at once",
-        "0.5934 ± 0.0011", "Mean diameter of the grains", "hedgebed penetrate run.toml", "no OpenGL",
+        "0.5934 ± 0.0011", "Mean diameter of the grains", "run.toml --out runs/again", "no OpenGL",
     ):  # fmt: skip
         assert words in text, words
 
@@ -259,6 +259,121 @@ def test_what_the_ground_gives_back_is_read_from_the_data(tmp_path, make_run):
     run = edit_result(run.path, costly)
     answer = next(item["answer"] for item in summarise(run)["answers"] if "push back" in item["question"])
     assert "gives nothing back: that takes another 0.60" in answer
+
+
+def push_before_the_surface(folder, force):
+    """Grains that stick out: a force on every row of the way in above depth 0."""
+    for path in folder.glob("series/*-seed?.csv"):
+        head, *rows = path.read_text().splitlines()
+        cells = [row.split(",") for row in rows]
+        for row in cells:
+            if float(row[1]) < 0 and row[4] == "free":
+                row[3] = repr(force)
+        path.write_text("\n".join([head, *(",".join(row) for row in cells)]) + "\n")
+
+
+def test_what_pushes_before_the_surface_is_drawn_left_of_it(tmp_path, make_run):
+    folder = make_run(tmp_path, frames=0)
+    before = PLOTS["Drag against depth"](read_folder(folder))
+    assert before.figure.axes[0].get_xlim()[0] == 0.0
+    assert "stick out" not in before.caption
+    push_before_the_surface(folder, 0.4)
+    run = read_folder(folder)
+    drag, drops = PLOTS["Drag against depth"](run), PLOTS["Drops"](run)
+    axis = drag.figure.axes[0]
+    assert axis.get_xlim()[0] == pytest.approx(-2.0, abs=0.1)  # mm: the fixture's way in begins there
+    pale = [line for line in axis.lines if len(line.get_xdata()) and np.max(line.get_xdata()) < 0]
+    assert any(np.allclose(line.get_ydata(), 0.4) for line in pale)
+    assert "carried by grains that stick out" in drag.caption
+    assert "Left of 0, pale: grains that stick out" in drops.caption
+    assert drops.figure.axes[0].get_xlim()[0] < 0
+
+
+def test_the_headline_says_what_the_grains_are_which_k_holds_and_what_a_set_down_is(tmp_path, make_run):
+    def add(result):
+        result["bed"] |= {"material": "sand", "grain": 0.0024, "softening": {"factor": 6400.0}}
+        result["quantities"] |= {"max_overlap": {"value": 0.047, "std": None, "unit": "1"}}
+        result["quantities"] |= {"stiffness_standing": {"value": 54.0, "std": 5.0, "unit": "N/m"}}
+        words = {"which_stiffness": "K and C are for motion.", "set_down": "A set-down is lowered.", "surface": "At 0."}
+        result["departures"] |= words | {"sentences": [*result["departures"]["sentences"], *words.values()]}
+
+    run = edit_result(make_run(tmp_path, frames=0), add)
+    said = summarise(run)
+    assert said["caveat"].replace("\N{NO-BREAK SPACE}", " ") == (
+        "The grains are softened 6400 times (overlaps of up to 4.7 % of a diameter) and 12 times larger than real ones "
+        "(2.4 mm for 0.2 mm): these are numbers of that bed, not of a material."
+    )
+    note = next(tile["note"] for tile in said["tiles"] if tile["label"].startswith("Fitted"))
+    assert "for a foot that stands K = 54" in note
+    answers = {item["question"]: item["answer"] for item in said["answers"]}
+    assert answers["Which K, and when?"] == "K and C are for motion."
+    assert answers["How far does it sink?"].endswith("A set-down is lowered. At 0.")
+    assert not any(text.startswith("A set-down") for text in said["departures"]["sentences"])  # it has been said
+    text = Page(write_report(run.path, pictures=False).read_text()).text
+    assert text.index("The grains are softened 6400") < text.index("How far does it sink?")
+
+
+def test_the_worst_place_is_named_in_newtons_and_at_the_top(made_once):
+    answer = next(
+        item["answer"] for item in summarise(read_folder(made_once))["answers"] if "wrong" in item["question"]
+    )
+    answer = answer.replace("\N{NO-BREAK SPACE}", " ")
+    assert "In newtons it is farthest off at 0.4 m/s" in answer
+    assert "At the top, where a foot stands, it is farthest off at" in answer
+
+
+def test_one_bed_is_called_one_bed(tmp_path, make_run):
+    def keep_one(result):
+        result["runs"] = [run for run in result["runs"] if run["seed"] == 1]
+        result["fits"] = result["fits"][:1]
+        for entry in result["quantities"].values():
+            entry["std"] = None
+        result["quantities"]["stiffness_error"] = {"value": 1.4, "std": None, "unit": "N/m"}
+
+    said = summarise(edit_result(make_run(tmp_path, frames=0), keep_one))
+    assert [row[0] for row in said["fit"]["table"]["rows"]] == ["this bed"]
+    tile = next(tile for tile in said["tiles"] if tile["label"].startswith("Fitted"))
+    assert tile["value"].replace("\N{NO-BREAK SPACE}", " ") == "231.4 ± 1.4 N/m"
+    assert "standard error of the fit" in tile["note"]
+    assert not any("bed 1" in row[0] for row in said["runs"]["rows"])
+    assert "all beds" not in json.dumps(said)
+
+
+def test_a_run_saved_from_python_speaks_only_of_what_is_there(tmp_path):
+    from coupling import drive
+    from rigid import Spike, SpringDamper
+
+    ground = SpringDamper(stiffness=100.0, damping=1.0, time_step=1e-4)
+    drive(Spike(diameter=0.012), into=ground, speed=0.1, depth=0.01).save(tmp_path / "run")
+    path = write_report(tmp_path / "run")
+    text = Page(path.read_text()).text
+    assert "Set down" not in text and "dropped" not in text and "Pictures" not in text
+    assert "coupling.drive" in text and "hedgebed driven" not in text
+    run = read_folder(tmp_path / "run")
+    rows = {row[0]: row for row in summarise(run)["settings"]["rows"]}
+    assert rows["speed"][2:] == ["m/s", ""] and rows["spike.diameter"][2:] == ["m", ""]
+    for name in ("Drag against depth", "Work in and out"):
+        plot = PLOTS[name](run)
+        assert not any("spring-damper" in text.get_text() for text in plot.figure.legends[0].get_texts()), name
+        assert "spring-damper" not in plot.caption
+    axis = PLOTS["Work in and out"](run).figure.axes[0]
+    (bar,) = axis.patches
+    assert bar.get_x() + 0.5 * bar.get_width() == pytest.approx(axis.get_xticks()[0])  # the bar stands on its tick
+
+
+def test_to_do_it_again_works_from_the_top_of_the_checkout(tmp_path, make_run, monkeypatch):
+    make_run(tmp_path / "runs/a", frames=0)
+    monkeypatch.chdir(tmp_path)
+    said = summarise(read_folder("runs/a"))["reproduce"]["command"]
+    assert said == ".venv/bin/hedgebed penetrate runs/a/run.toml --out runs/again"
+
+
+def test_only_a_cone_has_a_cone_angle(tmp_path, make_run):
+    for tip, shown in (("flat", False), ("cone", True)):
+        run = edit_result(
+            make_run(tmp_path / tip, frames=0), lambda r, t=tip: r["spike"].update(tip=t, cone_angle=60.0)
+        )
+        assert ("cone angle" in str(summarise(run)["spike"])) == shown
 
 
 def test_a_running_mean_of_a_line_is_the_line():
