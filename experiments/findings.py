@@ -4,7 +4,7 @@ Spread between seeds is that of the runs which every seed has (same kind, same s
 value is fitted to all runs of all seeds. A quantity that no second seed has gets the std null, one that is exact 0.
 
 Grains stick out of the surface, depth 0, so that a spike is carried by some of them before it: neither the fit nor the
-law know of that, and `Findings.at_surface` says how much it is.
+law know of that, and `experiments.remarks` says how much it is.
 """
 
 from __future__ import annotations
@@ -18,25 +18,19 @@ from typing import Any
 
 import numpy as np
 
-from coupling import Penetration, overdamped_below
+from coupling import Penetration
 from rigid import SpringDamper
-from vis.numbers import quote
 
 from .departures import departures
 from .fit import Fit, drag_gap, fit_rows, fit_spring_damper, spread
-from .settings import STANDARD_GRAVITY, PenetrateSettings
+from .remarks import drop_note, remarks, warnings
+from .settings import PenetrateSettings
 from .softening import Softening
 from .units import Unit, make_run
 
 __all__ = ["Findings", "bed_entry", "bed_quantities", "compare_with", "model_run", "read_reference"]
 
 Runs = Mapping[str, Penetration]
-LEAST_CONDITIONS = 3
-"""Kinds and speeds that a fit of two numbers wants."""
-MOST_CORRELATED = 0.85
-"""Of K and C: runs at one constant speed alone give 0.87, sqrt(3) / 2."""
-ENOUGH_TIPS = 6.0
-"""Width of the bed that ships, in tips."""
 COMPARED = ("stiffness", "damping", "sinkage_dem", "sinkage_spring_damper", "drag_gap")
 
 
@@ -90,6 +84,7 @@ class Findings:
         ]
         law_sinkages = [load / fit.stiffness if fit.stiffness > 0 else None for fit in fits]
         shared = "spread: each seed fitted to the runs that all seeds have"
+        dropped = _quantity(self.settings.mass, 0.0, "kg", drop_note(self.settings))
         error = "standard error of the pooled fit, jackknife over runs"
         return {
             "stiffness": _quantity(self.fit.stiffness, spread([fit.stiffness for fit in fits]), "N/m", shared),
@@ -105,12 +100,12 @@ class Findings:
             "work_returned_dem": self._work_returned(self.beds, "work of the way out over work in, driven runs"),
             "work_returned_spring_damper": self._work_returned(self.models, "the same on the fitted law"),
             "load": _quantity(load, 0.0, "N", "on the spike, set down and dropped; (m + m_b) g_sim / 4 unless set"),
-            **({"drop_mass": _quantity(self.settings.mass, 0.0, "kg", self.drop_note())} if self.of("drop") else {}),
-            **self._standing(),
-            **self._surface_quantities(),
+            **({"drop_mass": dropped} if self.of("drop") else {}),
+            **self.standing_stiffness(),
+            **self.at_surface(),
         }  # fmt: skip
 
-    def _standing(self) -> dict[str, dict[str, Any]]:
+    def standing_stiffness(self) -> dict[str, dict[str, Any]]:
         """The stiffness that gives the sinkage at rest, load / sinkage: for a foot that stands."""
         own = [self.settings.weight / sunk if sunk is not None and sunk > 0 else None for sunk in self._sunk()]
         sunk = _mean(self._sunk())
@@ -119,7 +114,7 @@ class Findings:
         note = "load over sinkage at rest: the K for a foot that stands under this load"
         return {"stiffness_standing": _quantity(self.settings.weight / sunk, spread(own), "N/m", note)}
 
-    def _surface_quantities(self) -> dict[str, dict[str, Any]]:
+    def at_surface(self) -> dict[str, dict[str, Any]]:
         """How far grains stick out under the tip, and what the bed pushes back with at depth 0."""
         forces, heights = [], []
         for seed in self.seeds:
@@ -144,61 +139,13 @@ class Findings:
     def _sunk(self) -> list[float | None]:
         return self.sinkages(self.beds)
 
-    def at_surface(self) -> str | None:
-        """What the bed pushes back with before depth 0, where that matters; None below a tenth of the load."""
-        numbers = self._surface_quantities()
-        force, load = numbers.get("surface_force"), self.settings.weight
-        if force is None or force["value"] <= 0.1 * load:
-            return None
-        out = numbers.get("surface_roughness")
-        grains = f", because grains stick out of the surface by up to {_words(out)}" if out else ""
-        return (
-            f"at depth 0 the bed already pushes with {_words(force)}, {100 * force['value'] / load:.2g} % of the load"
-            f"{grains}: the spring-damper knows nothing of that, and the fit leaves out what is above depth 0"
-        )
+    def warnings(self) -> list[str]:
+        """What a reader has to know (see `experiments.remarks.warnings`)."""
+        return warnings(self)
 
-    def set_down_note(self) -> str | None:
-        """What a set-down is, and why a drop at the same speed goes deeper."""
-        sets = [run for run in self.of("set_down") if run.settings.get("mass")]
-        if not sets:
-            return None
-        speed, feels = self.settings.lowering_speed, float(sets[0].settings["mass"])
-        return (
-            f"a set-down is lowered at {speed:g} m/s to where it first touches and then let go, held back by a hand "
-            f"that bears what the ground does not yet carry and lets it feel {1e3 * feels:.3g} g: it sinks ever more "
-            f"slowly to where the bed first carries the load. A drop brings its momentum, {self.settings.mass:.3g} kg "
-            f"times its speed, and goes deeper even at the same speed"
-        )
-
-    def which_stiffness(self) -> str | None:
-        """When to use the fitted K, and when that of a foot that stands."""
-        standing, fitted = self._standing().get("stiffness_standing"), self.fit.stiffness
-        if standing is None or fitted <= 0:
-            return None
-        ratio = standing["value"] / fitted
-        if ratio >= 1.005:
-            wrong = f"overstates the sinkage at rest {ratio:.2g} times"
-        elif ratio <= 0.995:
-            wrong = f"understates the sinkage at rest {1 / ratio:.2g} times"
-        else:
-            wrong = "gives the sinkage at rest as well"
-        return (
-            f"K and C are for motion down to {1e3 * self._deepest():.3g} mm; the damper acts only while the spike goes "
-            f"in. For a foot that stands under {_words(_quantity(self.settings.weight, 0.0, 'N'))} this K {wrong}: "
-            f"there K = {_words(standing)} (load over sinkage) would do"
-        )
-
-    def _deepest(self) -> float:
+    def deepest(self) -> float:
         """How deep the runs went that were fitted [m]."""
         return max(self.beds[name].max_depth for name in self.fit.runs)
-
-    def drop_note(self) -> str:
-        """What a drop is, and what it is not."""
-        return (
-            f"a drop moves mass = {self.settings.mass:.4g} kg under load = {self.settings.weight:.4g} N; the "
-            f"platform's own share is {self.settings.share:.4g} kg, and a body that falls freely in the laboratory "
-            f"would have {self.settings.mass * STANDARD_GRAVITY:.4g} N on it"
-        )
 
     def sinkages(self, runs: Runs) -> list[float | None]:
         """Depth at rest of every set-down [m]; None where it did not come to rest."""
@@ -267,94 +214,10 @@ class Findings:
         )
         pair = (sunk, law) if sunk[0] is not None and law[0] is not None else None
         found = departures(self.of("driven"), self.models, self.beds, self.fit, sinkage=pair)
-        notes = {
-            "which_stiffness": self.which_stiffness(),
-            "surface": self.at_surface(),
-            "set_down": self.set_down_note(),
-            "drop": self.drop_note() if self.of("drop") else None,
-        }
-        found |= {name: _sentence(text) for name, text in notes.items() if text}
-        for text in (notes["which_stiffness"], notes["surface"], self._shallow(), notes["set_down"], notes["drop"]):
-            found["sentences"] += [_sentence(text)] if text else []
+        notes = remarks(self)
+        found |= notes
+        found["sentences"] += notes.values()
         return found
-
-    def _shallow(self) -> str | None:
-        """What to know of a sinkage that is hardly more than a grain."""
-        sunk = _mean(self.sinkages(self.beds))
-        if sunk is None or sunk >= 2 * self.settings.grain:
-            return None
-        several = len([value for value in self._sunk() if value is not None]) > 1
-        spread_words = "its spread between seeds is part of the answer" if several else "another seed will give another"
-        shown = _words(self.quantities()["sinkage_dem"])
-        return (
-            f"the sinkage, {shown}, is only {sunk / self.settings.grain:.2g} grains: it depends on which grain the tip "
-            f"met, so {spread_words}"
-        )
-
-    def warnings(self) -> list[str]:
-        """What a reader has to know: runs that did not end as they should, a law that came out at its bound."""
-        said = []
-        bobbing = []
-        for unit in self.units:
-            ended = self.beds[unit.id].ended
-            if ended == "max_time":
-                said.append(f"{unit.title} had not come to rest when its time was over: it has no depth at rest")
-            elif ended == "max_depth":
-                said.append(
-                    f"{unit.title} went within one tip's diameter of the floor and was ended there: it has no depth at "
-                    f"rest, and the spring-damper is not fitted to it"
-                )
-            elif ended == "stopped":
-                bobbing.append(unit)
-            elif ended == "unfinished":
-                said.append(f"{unit.title} is unfinished: it has no depth at rest")
-        if bobbing:
-            said.append(
-                f"{len(bobbing)} of {len(self.of('drop'))} drops were still bobbing after_stop = "
-                f"{self.settings.after_stop:g} s after their first stop and ended there: they have no depth at rest"
-            )
-        if _mean(self.sinkages(self.beds)) is None:
-            said.append("no set-down came to rest: there is no sinkage_dem")
-        if _mean(self.sinkages(self.models)) is None:
-            said.append("the spring-damper did not come to rest: there is no sinkage_spring_damper")
-        shallow = self._shallow()
-        if shallow:
-            said.append(shallow)
-        bound = overdamped_below(self.settings.weight, self.settings.lowering_speed)
-        if self.of("set_down") and self.fit.stiffness > bound:
-            said.append(
-                f"the stiffness fitted, {self.fit.stiffness:.3g} N/m, is above {bound:.3g} N/m, up to which a spike "
-                f"set down is damped beyond critical: it may have overshot; a lower lowering_speed would do"
-            )
-        said += [text for text in (self._inseparable(), self._narrow()) if text]
-        if self.fit.damping == 0:
-            said.append("the damping fitted is 0, its bound: the bed shows no drag that grows with speed in these runs")
-        if self.fit.stiffness == 0:
-            said.append("the stiffness fitted is 0, its bound: the law has no resting sinkage")
-        return said
-
-    def _inseparable(self) -> str | None:
-        """Where the runs fitted do not tell K from C."""
-        conditions = {unit.condition for unit in self.units if unit.id in self.fit.runs}
-        if len(conditions) >= LEAST_CONDITIONS and abs(self.fit.correlation or 0.0) <= MOST_CORRELATED:
-            return None
-        shown = "unknown" if self.fit.correlation is None else f"{self.fit.correlation:.2f}"
-        listed = ", ".join(f"{kind} at {speed:g} m/s" for kind, speed in sorted(conditions))
-        return (
-            f"the fit hardly tells K from C (correlation of the two: {shown}; fitted to {listed}): give at least two "
-            f"speeds and two drop_speeds"
-        )
-
-    def _narrow(self) -> str | None:
-        """A bed so narrow that the spike meets its own images, or so shallow that it feels the floor."""
-        width, tip = min(self.settings.bed_size[:2]), self.settings.tip_diameter
-        if width >= ENOUGH_TIPS * tip * (1 - 1e-9):
-            return None
-        return (
-            f"the bed is {width / tip:.2g} tips wide and goes on beside itself, so the spike meets its own images at "
-            f"that distance: force, K and sinkage may move with a wider one (bed_size of {ENOUGH_TIPS * tip:.3g} m "
-            f"both ways would be {ENOUGH_TIPS:g} tips, as in the case that ships)"
-        )
 
 
 def force_at_surface(run: Penetration, reach: float) -> float | None:
@@ -495,16 +358,6 @@ def _differences(other: Mapping[str, Any], result: Mapping[str, Any]) -> list[st
 def _quantity(value: float | None, std: float | None, unit: str, note: str = "") -> dict[str, Any]:
     entry: dict[str, Any] = {"value": value, "std": std, "unit": unit}
     return entry | {"note": note} if note else entry
-
-
-def _words(entry: Mapping[str, Any]) -> str:
-    """A quantity as a person quotes it: by its spread, else with two figures."""
-    text = quote(entry["value"], entry["std"], entry["unit"], significant=2)
-    return text.replace("\N{NO-BREAK SPACE}", " ")
-
-
-def _sentence(text: str) -> str:
-    return f"{text[:1].upper()}{text[1:]}."
 
 
 def _mean(values: Sequence[float | None]) -> float | None:

@@ -6,7 +6,9 @@ import pytest
 from fake_bed import FakeBed
 
 from experiments import penetrate
+from experiments.remarks import overlap_warning, softening_note
 from experiments.settings import PenetrateSettings
+from experiments.softening import Softening
 
 SAND = SimpleNamespace(name="sand", density=2650.0, young=7e10, poisson=0.25, friction=0.5)
 QUICK = {
@@ -101,3 +103,18 @@ def test_drops_can_be_left_out(tmp_path):
     result = penetrate.run(settings, tmp_path / "run")
     assert {run["kind"] for run in result["runs"]} == {"driven", "set_down"}
     assert result["quantities"]["stiffness"]["value"] > 0
+
+
+def test_the_first_line_says_where_speed_and_pressure_come_from():
+    settings = PenetrateSettings(**QUICK, retreat_speed=0.7)
+    said = softening_note(settings, Softening(1e7, 3000.0, 0.7, 7e10))
+    assert "0.7 m/s, the speed of the pull-out" in said and "under the tip at its deepest" in said
+    assert "of a driven run" in softening_note(settings, Softening(1e7, 3000.0, 0.4, 7e10))
+
+
+def test_an_overlap_near_its_bound_names_the_modulus_that_leaves_room():
+    """Hertz: delta/d goes with E^(-2/3), so 0.048 comes down to 0.8 x 0.05 with E times (0.048 / 0.04)^1.5."""
+    settings = PenetrateSettings(**QUICK)
+    softening = Softening(1e7, 3000.0, 0.4, 7e10)
+    assert overlap_warning(0.044, settings, softening) is None
+    assert "young = 1.3e+07 Pa (here 1e+07 Pa) would leave room" in overlap_warning(0.048, settings, softening)
