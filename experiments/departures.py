@@ -119,10 +119,10 @@ def sentences(
             f"spring-damper says {_plain(quote(*law, 'm', significant=2))}{against}."
         )
     if returned is not None:
-        said.append(
-            f"Pulled out, the bed gives back {_share(returned[0])} of the work put in, the spring-damper "
-            f"{_share(returned[1])}."
-        )
+        back = f"gives back {_share(returned[0])} of the work put in"
+        if returned[0] < 0:
+            back = f"gives nothing back, that takes another {_share(-returned[0])} of the work put in"
+        said.append(f"Pulled out, the bed {back}; the spring-damper gives back {_share(returned[1])}.")
     if drops:
         peaks = [model.peak_force / bed.peak_force for bed, model in drops if bed.peak_force > 0]
         # A drop that was ended near the floor, or by its time while still sinking, has no deepest point of its own.

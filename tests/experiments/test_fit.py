@@ -5,7 +5,7 @@ import pytest
 from fake_bed import FakeBed
 
 from coupling import drive, drop
-from experiments.departures import departure_table, departures, depth_exponent
+from experiments.departures import departure_table, departures, depth_exponent, sentences
 from experiments.fit import Fit, drag_gap, fit_rows, fit_spring_damper, spread
 from rigid import Spike, SpringDamper
 
@@ -88,5 +88,8 @@ def test_departures_are_said_by_depth_and_speed():
     text = " ".join(found["sentences"])
     assert "In the top 5 mm the spring-damper pushes" in text and "too hard at" in text and "too softly at" in text
     assert "sinks 2.0 ± 0.3 mm into the bed; the spring-damper says 3.0 mm, 50 % deeper" in text
+    assert "Pulled out, the bed gives back" in text and "; the spring-damper gives back 100 %." in text
+    (costly,) = sentences([], {}, (-0.003, 0.68), [], None)
+    assert "gives nothing back, that takes another 0.3 % of the work put in" in costly
     assert found["work_returned"]["bed"] < 0.2 < found["work_returned"]["model"]
     assert departure_table([], Fit(1.0, 0.0, None, None, ())) == []
