@@ -160,6 +160,8 @@ class SpatialTrajectory:
     events: int
     forced_steps: int
     """Steps taken without looking for events, where too many came at once."""
+    stalls: int
+    """How often tips that crept along were made to stick or to keep their direction (`rigid.spatial_steps`)."""
 
     @property
     def energy(self) -> Array:
@@ -289,7 +291,7 @@ def simulate(
         sticking=np.array([c[1] for c in counts]), kinetic_energy=kinetic, potential_energy=potential,
         stored_energy=stored_all, torque_work=rows[:, TORQUE_WORK], dissipated=lost,
         transitions=tuple(run.transitions), energy_residual=worst / max(most, scale, abs(energy_0), 1e-300),
-        events=run.events, forced_steps=run.forced_steps,
+        events=run.events, forced_steps=run.forced_steps, stalls=run.stalls,
     )  # fmt: skip
 
 

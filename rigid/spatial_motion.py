@@ -44,6 +44,8 @@ class Modes:
     sticking: list[int] = field(default_factory=list)
     direction: dict[int, Array] = field(default_factory=dict)
     """Of each touching tip that slides: the unit vector of its slip, shape (2,)."""
+    frozen: set[int] = field(default_factory=set)
+    """Those that slide so slowly that their direction is kept instead of followed (see `rigid.spatial_steps`)."""
     weight: dict[int, float] = field(default_factory=dict)
     """Share of each sticking tip in the load of all."""
     top: dict[int, float] = field(default_factory=dict)
@@ -143,7 +145,8 @@ class Motion:
                 depth, rate, slip = -float(z[2] + arms[n, 2]), -float(speeds[n, 2]), speeds[n, :2]
                 load = self.normal(depth, rate, modes.top.get(k, 0.0))
                 if k in modes.direction:
-                    pushes[n, :2] = -self.mu_d * load * self._along(slip, modes.direction[k])
+                    ahead = modes.direction[k]
+                    pushes[n, :2] = -self.mu_d * load * (ahead if k in modes.frozen else self._along(slip, ahead))
                 pushes[n, 2] = load
                 ground_work -= load * rate
                 found.append(Tip(k, arms[n], depth, rate, slip, load, pushes[n, :2]))

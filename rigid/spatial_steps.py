@@ -1,8 +1,12 @@
 """Steps and events of `rigid.spatial`: what changes the modes, when, and into which.
 
 Events are looked for at the end of each step and located by repeating it, so the state at an event has the step's own
-accuracy. Events at one moment are taken together. Where more than `CROWD` come within a microsecond, a step of
-`FORCED` is made in the present modes and they are set anew from the state: it is counted and never a hang.
+accuracy. Events at one moment are taken together. Two things could make it crawl, and both are counted, not hidden:
+- More than `CROWD` events within a microsecond: a step of `FORCED` is made in the present modes, which are then set
+  anew from the state (`forced_steps`).
+- A slip that is driven along hardly faster than nothing turns its direction ever faster, and never passes through 0 as
+  it does in the plane. Where steps fall below `STALL`, tips slower than `SLOW` are made to stick (`stalls`). Those that
+  the static bound lets go start against the force that held them, and keep that direction until they are faster.
 """
 
 from __future__ import annotations
@@ -24,6 +28,7 @@ LONGEST = 2e-2  # step in flight [s]
 LONGEST_TOUCHING = 1e-2
 SHORTEST = 1e-9  # below it the step no longer adapts [s]
 CROWD, MOMENT, FORCED = 40, 1e-6, 1e-5
+STALL, SLOW = 5e-5, 1e-3  # [s], and share of sqrt(g reach)
 STILL = 1e-9  # a slip below this share of sqrt(g reach) is none
 _A, _B, _C, _E = (np.asarray(getattr(RK45, name)) for name in ("A", "B", "C", "E"))
 
@@ -50,7 +55,7 @@ class Integration:
         pull = float(np.linalg.norm(motion.weight)) / float(motion.masses[2])
         self.speed = max(math.sqrt(pull * platform.reach), float(np.linalg.norm(z[P])) / platform.mass, 1e-6)
         self.step = time_step or 1e-4
-        self.events = self.forced_steps = 0
+        self.events = self.forced_steps = self.stalls = 0
         self.crowd, self.since = 0, -math.inf
         self.transitions: list[tuple[float, int, int]] = []
         depths = motion.depths(z)
@@ -109,7 +114,7 @@ class Integration:
         elif found:
             self._switch(found)
         else:
-            self._keep_still()
+            self._keep_still(stalled=h < STALL and h < room and not self.fixed)
         if self.time == ends:
             self._at_time(ends)
         self.step = grown if not found else min(max(grown, 1e-4), 1e-3)
@@ -213,7 +218,7 @@ class Integration:
         low, high, high_z = 0.0, h, z
         values_low, values_high = {key: before.get(key, 0.0) for key in found}, after
         for iteration in range(70):
-            if high - low <= 1e-15 * max(1.0, abs(self.time)):
+            if high - low <= 1e-13 + 1e-15 * abs(self.time):
                 break
             guess = high
             for key in found:  # the earliest crossing of the straight lines, halved now and then
@@ -298,6 +303,7 @@ class Integration:
     def _lift(self, k: int) -> None:
         self.modes.direction.pop(k, None)
         self.modes.weight.pop(k, None)
+        self.modes.frozen.discard(k)
         if self.modes.top.get(k, 0.0) <= 0 or not self.motion.law.has_memory:
             self.modes.top.pop(k, None)
         self.modes.touching = [n for n in self.modes.touching if n != k]
@@ -323,6 +329,7 @@ class Integration:
         self.modes.weight.pop(k, None)
         size = float(np.linalg.norm(friction))
         self.modes.direction[k] = -friction / size if size > 0 else np.array([1.0, 0.0])
+        self.modes.frozen.add(k)
 
     def _slip(self, k: int) -> Array:
         turn, spin = self.motion.turning(self.z)
@@ -340,6 +347,7 @@ class Integration:
         for k in may_stick:
             if k in modes.direction and k in modes.touching:
                 del modes.direction[k]
+                modes.frozen.discard(k)
                 modes.sticking = sorted([*modes.sticking, k])
         for _ in range(2 * len(modes.touching) + 2):
             self._weigh()
@@ -385,18 +393,29 @@ class Integration:
                 torque[k] = history.torque(self.time, float(self.z[H.start + k]) / history.wheel.inertia)
         self.modes.torque = (torque[0], torque[1], torque[2])
 
-    def _keep_still(self) -> None:
+    def _keep_still(self, *, stalled: bool) -> None:
         """After a step without events: new weights and directions; the speeds that sticking forbids taken out."""
         modes, motion = self.modes, self.motion
-        if modes.sticking:
-            self._weigh()
-        if modes.touching:
-            motion.rates(self.z, modes)
-            for tip in motion.found:
-                size = float(np.linalg.norm(tip.slip))
-                if tip.index in modes.direction and size > 1e-12 * self.speed:
-                    modes.direction[tip.index] = tip.slip / size
-            motion.hold_still(self.z, modes)
+        if not modes.touching:
+            return
+        self._weigh()
+        motion.rates(self.z, modes)
+        slow = []
+        for tip in motion.found:
+            k, size = tip.index, float(np.linalg.norm(tip.slip))
+            if k not in modes.direction:
+                continue
+            if size > 2 * SLOW * self.speed:
+                modes.frozen.discard(k)
+            if k not in modes.frozen:
+                if size > 1e-12 * self.speed:
+                    modes.direction[k] = tip.slip / size
+                if size < SLOW * self.speed:
+                    slow.append(k)
+        motion.hold_still(self.z, modes)
+        if stalled and slow:
+            self.stalls += 1
+            self._resolve(slow)  # what cannot stick is let go, its direction frozen
 
     def _set_anew(self) -> None:
         """After a forced step: who touches and which way they slide, read from the state."""
