@@ -6,6 +6,7 @@ Results go to stdout, everything else to stderr.
 """
 
 import inspect
+import math
 import os
 import re
 import shutil
@@ -31,6 +32,7 @@ from experiments.registry import Experiment, find_experiment
 from experiments.runfolder import RunFolder, fresh_path, write_json, write_text
 from experiments.strict import may_be_empty, plain_kinds
 from hedgebed import __version__
+from vis.numbers import digits_for
 
 __all__ = ["DONE", "FAILED", "BAD_INPUT", "STOPPED", "build_app", "main"]
 
@@ -235,6 +237,8 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
         case: Path | None = None, *, out: Path | None = None, json: bool = False, quiet: bool = False, **given: Any
     ) -> int:
         with _refusing():
+            if experiment.subject and case is not None and not case.is_file():
+                case, given[experiment.subject] = None, str(case)
             layers = [read_case(registry.CASES / preset.case) for preset in presets if given.pop(preset.option, False)]
             layers += [read_case(find_case(case, registry.CASES))] if case is not None else []
             typed = Layer(None, _as_typed(given, settings_class.model_fields))
@@ -258,8 +262,13 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
         )
         for preset in presets
     ]
-    parameters = [_reserved("case")]
-    parameters += [_option(name, field) for name, field in settings_class.model_fields.items()]
+    fields = settings_class.model_fields
+    first = _reserved("case")
+    if experiment.subject:
+        about = Parameter(help=fields[experiment.subject].description, negative="", show_default=False)
+        first = first.replace(annotation=Annotated[Path | None, about])
+    parameters = [first]
+    parameters += [_option(name, field) for name, field in fields.items() if name != experiment.subject]
     parameters += [*flags, _reserved("out"), _reserved("json"), _reserved("quiet")]
     command.__signature__ = inspect.Signature(parameters, return_annotation=int)  # type: ignore[attr-defined]
     command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
@@ -327,8 +336,17 @@ def _discard(folder: RunFolder) -> None:
         shutil.rmtree(folder.path)
 
 
-def _number(value: Any) -> str:
-    return "-" if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)
+def _number(value: Any, std: Any = 0.0) -> str:
+    """A value to the digits its spread allows, to two where that is unknown (None), to four where it is exact."""
+    if not isinstance(value, float) or not math.isfinite(value):
+        return "-" if value is None else str(value)
+    if std is None:
+        whole = value.is_integer() and abs(value) < 1e15
+        return f"{value:.0f}" if whole else f"{value:.2g}" if abs(value) < 100 or abs(value) >= 1e6 else f"{value:.0f}"
+    if not std or not math.isfinite(std):
+        return f"{value:.4g}"
+    decimals = digits_for(std)
+    return f"{value:.{max(decimals, 0)}f}" if decimals <= 9 else f"{value:.4g}"
 
 
 def _show_result(folder: RunFolder) -> None:
@@ -342,7 +360,12 @@ def _show_result(folder: RunFolder) -> None:
     table.add_column("unit")
     for name, quantity in result.get("quantities", {}).items():
         unit = quantity.get("unit", "")
-        table.add_row(name, _number(quantity.get("value")), _number(quantity.get("std")), "" if unit == "1" else unit)
+        table.add_row(
+            name,
+            _number(quantity.get("value"), quantity.get("std")),
+            _number(quantity.get("std"), None),
+            "" if unit == "1" else unit,
+        )
     console.print(table, markup=False)
     for sentence in result.get("departures", {}).get("sentences", []):
         console.print(f"- {sentence}", markup=False)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import hedgebed
-from experiments.cli import main
+from experiments.cli import _number, main
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -164,6 +164,17 @@ def test_done_shows_the_numbers_and_the_folder(dig, capsys):
     for expected in ("A hole", "depth", "0.02", "0.001", "The hole is [deep].", "warning: it is dark", "folder: a"):
         assert expected in out
     assert json.loads(Path("a/status.json").read_text())["status"] == "done"
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "shown"),
+    [
+        (37.616584, 2.5318, "38"), (0.0040577, 0.00036257, "0.0041"), (0.000546, None, "0.00055"),
+        (20214.0, None, "20214"), (0.219033, 0.0, "0.219"), (0.57207, 0.00058, "0.5721"), (None, None, "-"), (51.2, 0.6, "51.2"),
+    ],
+)  # fmt: skip
+def test_numbers_are_shown_to_the_digits_that_are_known(value, std, shown):
+    assert _number(value, std) == shown
 
 
 def test_stopped_says_how_to_resume_and_resume_finishes(dig, capsys):
