@@ -170,7 +170,8 @@ def test_done_shows_the_numbers_and_the_folder(dig, capsys):
     ("value", "std", "shown"),
     [
         (37.616584, 2.5318, "38"), (0.0040577, 0.00036257, "0.0041"), (0.000546, None, "0.00055"),
-        (20214.0, None, "20214"), (0.219033, 0.0, "0.219"), (0.57207, 0.00058, "0.5721"), (None, None, "-"), (51.2, 0.6, "51.2"),
+        (20214.0, None, "20214"), (0.219033, 0.0, "0.219"), (0.57207, 0.00058, "0.5721"), (None, None, "-"),
+        (51.2, 0.6, "51.2"),
     ],
 )  # fmt: skip
 def test_numbers_are_shown_to_the_digits_that_are_known(value, std, shown):
