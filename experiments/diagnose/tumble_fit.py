@@ -15,66 +15,32 @@ from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .tumble_data import TrialData
 from .tumble_forms import TumbleForm
 from .tumble_forward import SHARED, Forward
+from .tumble_steps import (
+    LENGTHS,
+    SETTLED,
+    Answers,
+    Linearised,
+    Point,
+    Space,
+    Start,
+    Way,
+    is_flat,
+    normal_equations,
+    steps_to_try,
+    whiten,
+)
 
-__all__ = ["Fit", "Fitter", "Start", "ZERO_STD", "whiten"]
+__all__ = ["Fit", "Fitter"]
 
 Array = NDArray[np.float64]
 
-ZERO_STD = 3.0 / np.sqrt(3.0)
-"""Std of the camera's zero over the sensor's: it may be off by up to 3 of them, evenly (trials.md)."""
-LOST = 1e3
-"""Residual where the model cannot stand or run [1]."""
 _SCAN = np.linspace(-3.0, 3.0, 25)  # of a trial's gravity, in its sigmas
-_DAMPING = (0.0, 1e-2, 1.0, 30.0)  # on the diagonal of the normal matrix
-_LENGTHS = (1.0, 0.4)
-_SETTLED = 0.05  # a step that gains less than this in chi-square ends a fit
-
-
-def whiten(trial: TrialData, value: Array, *, until: float = np.inf) -> Array:
-    """(measured - value) / std with the camera's zero marginalised, shape [set_count, sample_count].
-
-    With the zero's covariance s^2 1 1' beside unit noise, C^(-1/2) takes the share 1 - 1 / sqrt(1 + n s^2) of the mean.
-    Samples after `until` [s] count for nothing: 0.
-    """
-    residual = (trial.value - value) / trial.std
-    lost = ~np.isfinite(residual).all(axis=1)
-    seen = trial.time <= until
-    for name in ("x", "y", "theta"):
-        mine = np.flatnonzero(trial.of(name))
-        count = int(seen[mine].sum())
-        if count:
-            share = 1 - 1 / np.sqrt(1 + count * ZERO_STD**2)
-            own = slice(mine[0], mine[0] + count)  # a channel's samples lie in the order of their times
-            residual[:, own] -= share * residual[:, own].mean(axis=1, keepdims=True)
-    residual[lost] = LOST
-    residual[:, ~seen] = 0.0
-    return residual
-
-
-@dataclass(frozen=True, kw_only=True)
-class Start:
-    """Where a fit begins, and what it may change."""
-
-    forms: tuple[TumbleForm, ...] = ()
-    values: Mapping[str, float] = field(default_factory=dict)
-    """Shared numbers and effects' parameters; what is left out has its nominal value."""
-    gravity: Array | None = None
-    """Each trial's over its stated one, shape [trial_count]; None: 1."""
-    frozen: frozenset[str] = frozenset()
-    """Shared names that stay."""
-    scan: bool = False
-    """Whether to scan each trial's gravity before the first step."""
-    horizons: tuple[float, ...] = (1.0,)
-    """Shares of a trial's time that are fitted, one after another; the last is 1. What happens early is smooth in the
-    parameters and tells most of them, so that later contacts are met on the right branch."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,31 +75,6 @@ class Fit:
         return dict(zip(self.names, spread.tolist(), strict=True))
 
 
-@dataclass(frozen=True)
-class _Space:
-    """What one fit moves, in scaled coordinates: shared first, then gravities."""
-
-    names: tuple[str, ...]
-    value: Array
-    scale: Array
-    std: Array
-    low: Array
-    high: Array
-    step: Array
-    gravities: int
-
-    @property
-    def shared(self) -> int:
-        """How many are shared."""
-        return len(self.names) - self.gravities
-
-
-Point = tuple[Mapping[str, float], Array]
-Answers = list[Array]
-Walk = Generator[tuple[list[Point], float], Answers, Any]
-"""Asks for residuals at points, over a share of each trial's time."""
-
-
 class Fitter:
     """Fits to one campaign's trials. `trials`: indices of those that take part, all by default."""
 
@@ -147,6 +88,26 @@ class Fitter:
     def residuals(self, points: list[Point], forms: Sequence[TumbleForm]) -> Answers:
         """Whitened residuals at points of (values, gravity): one array [point_count, sample_count] a trial."""
         return self._answer([(tuple(forms), points, 1.0)])[0]
+
+    def signatures(self, asked: Sequence[tuple[Sequence[TumbleForm], Mapping[str, float], Array]]) -> list[Answers]:
+        """Whitened residuals, one array a trial, at points with forms of their own: (forms, values, gravity)."""
+        answers = self._answer([(tuple(forms), [(values, gravity)], 1.0) for forms, values, gravity in asked])
+        return [[rows[0] for rows in answer] for answer in answers]
+
+    def linearised(self, start: Start) -> Linearised:
+        """The model about a start."""
+        space = self._space(start)
+        way = self._way(space, start)
+        u = way.begin()
+        residuals = [r[0] for r in self._answer([(start.forms, [way.point(u)], 1.0)])[0]]
+        walk = self._jacobian(u, residuals, way, 1.0)
+        points, horizon = next(walk)
+        try:
+            walk.send(self._answer([(start.forms, points, horizon)])[0])
+        except StopIteration as end:
+            jacobian = end.value
+        normal, slope = normal_equations(jacobian, residuals, u, space)
+        return Linearised(residuals, jacobian, normal, slope, space.shared, space.gravities)
 
     def fit(self, starts: Sequence[Start], *, steps: int = 25) -> list[Fit]:
         """Carry out all fits together."""
@@ -165,12 +126,21 @@ class Fitter:
         return [done[k] for k in range(len(starts))]
 
     def _answer(self, asked: list[tuple[tuple[TumbleForm, ...], list[Point], float]]) -> list[Answers]:
-        """Residuals for several lists of points, by one call of the model."""
-        total = sum(len(points) for _, points, _ in asked)
+        """Residuals for several lists of points, by one call of the model for each horizon."""
+        answers: dict[int, Answers] = {}
+        for horizon in dict.fromkeys(horizon for _, _, horizon in asked):
+            mine = [k for k, (_, _, own) in enumerate(asked) if own == horizon]
+            for k, answer in zip(mine, self._together([asked[k][:2] for k in mine], horizon), strict=True):
+                answers[k] = answer
+        return [answers[k] for k in range(len(asked))]
+
+    def _together(self, asked: list[tuple[tuple[TumbleForm, ...], list[Point]]], horizon: float) -> list[Answers]:
+        """The same for one horizon."""
+        total = sum(len(points) for _, points in asked)
         columns = {name: np.full(total, value) for name, value in self.forward.nominal.items()}
         gravity = np.ones((total, len(self.forward.data.trials)))
         at = 0
-        for forms, points, _ in asked:
+        for forms, points in asked:
             rows = slice(at, at + len(points))
             for name in SHARED:
                 columns[name][rows] = [values.get(name, self.forward.nominal[name]) for values, _ in points]
@@ -182,10 +152,10 @@ class Fitter:
                 for name, array in form.physical(given).items():
                     columns.setdefault(name, np.full(total, self.forward.neutral(name)))[rows] = array
             at += len(points)
-        predictions = self.forward.predict(columns | {"gravity": gravity}, trials=self.trials)
+        predictions = self.forward.predict(columns | {"gravity": gravity}, trials=self.trials, horizon=horizon)
         answers: list[Answers] = []
         at = 0
-        for _, points, horizon in asked:
+        for _, points in asked:
             rows = slice(at, at + len(points))
             own: Answers = []
             for trial, prediction in zip(self.trials, predictions, strict=True):
@@ -196,7 +166,10 @@ class Fitter:
             at += len(points)
         return answers
 
-    def _space(self, start: Start) -> _Space:
+    def _way(self, space: Space, start: Start) -> Way:
+        return Way(space, start, self.trials, len(self.forward.data.trials), self.sigma_gravity)
+
+    def _space(self, start: Start) -> Space:
         rows: list[tuple[str, float, float, float, float, float, float]] = []
         for name in SHARED:
             sigma, nominal = self.sigma[name], self.forward.nominal[name]
@@ -214,7 +187,7 @@ class Fitter:
             low = max(-6.0, -0.95 / self.sigma_gravity)
             rows.append((name, 1.0, self.sigma_gravity, 1.0, low, 6.0, 0.02))
         table = np.array([row[1:] for row in rows], dtype=float).reshape(-1, 6)
-        return _Space(
+        return Space(
             names=tuple(row[0] for row in rows),
             value=table[:, 0],
             scale=table[:, 1],
@@ -227,7 +200,7 @@ class Fitter:
 
     def _descend(self, start: Start, steps: int) -> Generator[tuple[list[Point], float], Answers, Fit]:
         space = self._space(start)
-        way = _Way(space, start, self)
+        way = self._way(space, start)
         u = way.begin()
         taken, normal = 0, np.eye(len(u))
         residuals: list[Array] = []
@@ -240,18 +213,18 @@ class Fitter:
             for _ in range(steps if horizon >= 1 else max(3, steps // 3)):
                 taken += 1
                 jacobian = yield from self._jacobian(u, residuals, way, horizon)
-                normal, slope = _normal(jacobian, residuals, u, space)
-                tried = _trials(normal, slope, u, space, damping)
+                normal, slope = normal_equations(jacobian, residuals, u, space)
+                tried = steps_to_try(normal, slope, u, space, damping)
                 answer = yield [way.point(v) for v in tried], horizon
                 prices = [way.price(answer, row, v) for row, v in enumerate(tried)]
                 best = int(np.argmin(prices))
                 gain = cost - prices[best]
                 if gain > 0:
                     u, cost, residuals = tried[best], prices[best], [r[best] for r in answer]
-                    damping = 0.0 if best < len(_LENGTHS) * 2 else 1.0
-                if gain > (_SETTLED if horizon >= 1 else 1e-3 * cost):
+                    damping = 0.0 if best < len(LENGTHS) * 2 else 1.0
+                if gain > (SETTLED if horizon >= 1 else 1e-3 * cost):
                     continue
-                if gain <= 0 and damping < 1e3 and not _flat(normal, slope):
+                if gain <= 0 and damping < 1e3 and not is_flat(normal, slope):
                     damping = max(1e3, 10 * damping)
                     continue
                 seen = sum(int(np.count_nonzero(r)) for r in residuals)
@@ -269,7 +242,7 @@ class Fitter:
         )  # fmt: skip
 
     def _scan(
-        self, u: Array, residuals: list[Array], cost: float, way: _Way, horizon: float
+        self, u: Array, residuals: list[Array], cost: float, way: Way, horizon: float
     ) -> Generator[tuple[list[Point], float], Answers, tuple[Array, list[Array], float]]:
         """The best gravity of each trial on a grid over its prior."""
         shared = way.space.shared
@@ -290,7 +263,7 @@ class Fitter:
         return u, residuals, cost
 
     def _jacobian(
-        self, u: Array, residuals: list[Array], way: _Way, horizon: float
+        self, u: Array, residuals: list[Array], way: Way, horizon: float
     ) -> Generator[tuple[list[Point], float], Answers, list[Array]]:
         """d residual / d u, one array [shared (+ 1), sample_count] a trial: the shared ones, then its own gravity."""
         space, shared = way.space, way.space.shared
@@ -309,74 +282,3 @@ class Fitter:
         answer = yield points, horizon
         inverse = 1 / np.array(steps)
         return [(rows - now) * inverse[:, None] for rows, now in zip(answer, residuals, strict=True)]
-
-
-class _Way:
-    """Between scaled coordinates and what the model takes."""
-
-    def __init__(self, space: _Space, start: Start, fitter: Fitter) -> None:
-        self.space, self.fixed, self.fitter = space, dict(start.values), fitter
-        count = len(fitter.forward.data.trials)
-        self.gravity = np.ones(count) if start.gravity is None else np.array(start.gravity, dtype=float)
-
-    def begin(self) -> Array:
-        """Where it starts, within the bounds."""
-        space = self.space
-        named = zip(space.names, space.value, space.scale, strict=True)
-        u = np.array([(self.fixed.get(name, value) - value) / scale for name, value, scale in named])
-        if space.gravities:
-            u[space.shared :] = (self.gravity[self.fitter.trials] - 1) / self.fitter.sigma_gravity
-        return np.clip(u, space.low, space.high)
-
-    def point(self, u: Array) -> Point:
-        """(values, gravity)"""
-        space, shared = self.space, self.space.shared
-        actual = space.value + space.scale * u
-        gravity = self.gravity.copy()
-        if space.gravities:
-            gravity[self.fitter.trials] = actual[shared:]
-        return self.fixed | dict(zip(space.names[:shared], actual[:shared].tolist(), strict=True)), gravity
-
-    def price(self, answer: Answers, row: int, u: Array) -> float:
-        """Chi-square and the priors'."""
-        return float(sum(r[row] @ r[row] for r in answer) + np.sum((u / self.space.std) ** 2))
-
-
-def _normal(jacobian: list[Array], residuals: list[Array], u: Array, space: _Space) -> tuple[Array, Array]:
-    """Normal matrix and half the gradient, priors included."""
-    shared = space.shared
-    normal = np.diag(space.std**-2.0)
-    slope = u / space.std**2
-    for k, (rows, residual) in enumerate(zip(jacobian, residuals, strict=True)):
-        own = [*range(shared), shared + k] if space.gravities else list(range(shared))
-        normal[np.ix_(own, own)] += rows @ rows.T
-        slope[own] += rows @ residual
-    return normal, slope
-
-
-def _trials(normal: Array, slope: Array, u: Array, space: _Space, damping: float) -> list[Array]:
-    """Steps to try: several dampings and lengths, held within bounds."""
-    tried = []
-    diagonal = np.diag(normal).copy()
-    diagonal[diagonal <= 0] = 1.0
-    for add in _DAMPING:
-        free = ~(((u <= space.low) & (slope > 0)) | ((u >= space.high) & (slope < 0)))
-        step = np.zeros_like(u)
-        for _ in range(2):  # once more without those that run into a bound at once
-            where = np.flatnonzero(free)
-            if not len(where):
-                break
-            matrix = normal[np.ix_(where, where)] + np.diag((add + damping) * diagonal[where])
-            step = np.zeros_like(u)
-            step[where] = -np.linalg.lstsq(matrix, slope[where], rcond=1e-12)[0]
-            blocked = ((u <= space.low) & (step < 0)) | ((u >= space.high) & (step > 0))
-            if not (blocked & free).any():
-                break
-            free &= ~blocked
-        tried += [np.clip(u + length * step, space.low, space.high) for length in _LENGTHS]
-    return tried
-
-
-def _flat(normal: Array, slope: Array) -> bool:
-    """Whether the quadratic model promises next to nothing."""
-    return float(slope @ np.linalg.lstsq(normal, slope, rcond=1e-12)[0]) < _SETTLED

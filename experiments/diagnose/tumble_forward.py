@@ -87,9 +87,12 @@ class Forward:
         *,
         trials: Sequence[int] | None = None,
         motion: bool = False,
+        horizon: float = 1.0,
         extra: Sequence[Term] = (),
     ) -> list[Prediction]:
         """Predictions, one a trial (of `trials`, all by default), for all sets at once.
+
+        After the share `horizon` of a trial's time nothing is simulated, and what is given is of no meaning.
 
         Raises ValueError for a name there is not.
         """
@@ -104,7 +107,7 @@ class Forward:
         slope = np.asarray(sets.get("slope.angle", np.zeros(count)), dtype=float)
         found = []
         for lanes in self._chunks(chosen, count):
-            found += self._run(lanes, columns, terms, offset, scale, slope, motion)
+            found += self._run(lanes, columns, terms, offset, scale, slope, motion, horizon)
         return _joined(found, chosen, count)
 
     def _columns(self, sets: Mapping[str, Array], count: int, terms: tuple[Term, ...]) -> dict[str, Array]:
@@ -145,7 +148,7 @@ class Forward:
 
     def _run(
         self, lanes: list[tuple[int, int, int]], columns: Mapping[str, Array], terms: tuple[Term, ...],
-        offset: Array, scale: Array, slope: Array, motion: bool,
+        offset: Array, scale: Array, slope: Array, motion: bool, horizon: float,
     ) -> list[tuple[int, int, Prediction]]:  # fmt: skip
         from rigid.batch_kernel import CHANNELS as RECORDED
         from rigid.batch_kernel import SUMMARY, batch_kernel
@@ -162,7 +165,8 @@ class Forward:
         for trial, first, last in lanes:
             rows, grid = slice(at, at + last - first), self._grids[trial]
             self._fill(numbers[rows], self.data.trials[trial], trial, columns, terms, slice(first, last))
-            own = grid.times(offset[first:last])
+            until = np.inf if horizon >= 1 else horizon * self.data.trials[trial].end + self.data.window
+            own = np.minimum(grid.times(offset[first:last]), until)
             times[rows, : grid.size] = own
             times[rows, grid.size :] = own[:, -1:]
             end = max(end, float(own.max()))

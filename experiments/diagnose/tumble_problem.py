@@ -20,10 +20,11 @@ from rigid.trajectory import STATES
 
 from .problem import Finding, Form, Parameter, Samples, TrialInfo, Values
 from .tumble_data import CHANNELS, TumbleData, tumble_data
-from .tumble_fit import LOST, ZERO_STD, whiten
 from .tumble_forms import TumbleForm, tumble_forms
 from .tumble_forward import SHARED, Forward, Prediction
+from .tumble_guess import Guesser
 from .tumble_latent import latent_columns
+from .tumble_steps import LOST, ZERO_STD, whiten
 
 __all__ = ["TumbleProblem", "make_problem"]
 
@@ -236,6 +237,16 @@ class TumbleProblem:
 
         return advice(first.effect, second.effect)
 
+    def guess(
+        self, forms: Sequence[Form], trials: Sequence[str], values: Values, *, held: bool = False
+    ) -> dict[str, float]:
+        """Values near the best, from which a local fit may begin (`tumble_guess`)."""
+        return self._guesser.guess(_ours(forms), trials, values, held=held)
+
+    @cached_property
+    def _guesser(self) -> Guesser:
+        return Guesser(self.forward, self.forms)
+
     # Helpers ----------------------------------------------------------------------------------------------------------
 
     def gravity(self, points: Sequence[Values]) -> Array:
@@ -282,6 +293,10 @@ class TumbleProblem:
         assert isinstance(form, TumbleForm)
         own = {p.name: np.array([values.get(p.name, p.value)]) for p in form.parameters}
         return {name: float(array[0]) for name, array in form.physical(own).items()}
+
+
+def _ours(forms: Sequence[Form]) -> list[TumbleForm]:
+    return [form for form in forms if isinstance(form, TumbleForm)]
 
 
 def make_problem(campaign: Campaign) -> TumbleProblem:

@@ -1,0 +1,178 @@
+"""Where fits of tumbles should begin: near the best values, on the branch that was measured.
+
+The statistics' own fits are local. Contact makes the likelihood of a tumble jump, so before them stands a search of its
+own (`tumble_fit`): growing horizons, several starts, a scan of each trial's gravity. All candidates of one round are
+looked for together, so that the batched model has its hands full.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .problem import Values
+from .tumble_fit import Fit, Fitter
+from .tumble_forms import TumbleForm
+from .tumble_forward import SHARED, Forward
+from .tumble_steps import Start
+
+__all__ = ["Guesser"]
+
+Array = NDArray[np.float64]
+
+_STEP = 1e-3
+"""Of the integration while looking [s]; what follows is finer."""
+_GROWING = (0.3, 0.6, 1.0)
+_POOR = 1.1
+"""Chi-square per sample beyond which the base model is looked for from more places."""
+_FOLLOWED = 6
+"""Effects that are looked for again from nominal values, over growing horizons."""
+
+
+class Guesser:
+    """Guesses for one campaign. They are kept: the same question is answered once."""
+
+    def __init__(self, forward: Forward, forms: Sequence[TumbleForm]) -> None:
+        self.forward = Forward(forward.data, time_step=_STEP, threads=forward.threads)
+        self.forms = tuple(forms)
+        self._ids = [trial.id for trial in forward.data.trials]
+        self._stated = [trial.gravity_sim for trial in forward.data.trials]
+        self._kept: dict[tuple[object, ...], dict[str, Fit]] = {}
+        self._warm: dict[tuple[str, ...], tuple[dict[str, float], float]] = {}
+
+    def guess(
+        self, forms: Sequence[TumbleForm], trials: Sequence[str], values: Values, *, held: bool = False
+    ) -> dict[str, float]:
+        """Values near the best for the base model with `forms` on `trials`, beginning from `values`.
+
+        Args:
+            forms: effects that are on.
+            trials: their ids.
+            values: what is known; parameters of a form that are missing are looked for from the form's starts.
+            held: whether everything shared stays as it is.
+        """
+        fitter = Fitter(self.forward, trials=[self._ids.index(trial) for trial in trials])
+        start = self._start(forms, values)
+        if held:
+            names = {*SHARED, *(p.name for form in forms for p in form.parameters)}
+            fixed = Start(
+                forms=start.forms, values=start.values, gravity=start.gravity, frozen=frozenset(names), scan=True
+            )
+            return self._told(fitter.fit([fixed])[0], trials, values)
+        new = [form for form in forms if any(p.name not in values for p in form.parameters)]
+        if not new:
+            return self._told(self._base(fitter, start), trials, values)
+        old = [form for form in forms if form not in new]
+        key = (tuple(form.id for form in old), tuple(trials), len(new) > 1 and tuple(form.id for form in new))
+        if key not in self._kept:
+            self._kept[key] = {}
+        kept = self._kept[key]
+        if new[-1].id not in kept:
+            others = [form for form in self.forms if form.effect not in {f.effect for f in forms}]
+            candidates = [*others, *(f for f in self.forms if f.effect == new[-1].effect)] if not old else [new[-1]]
+            if len(new) > 1:
+                candidates = [new[-1]]
+            kept |= self._candidates(fitter, old + new[:-1], candidates, start)
+        return self._told(kept[new[-1].id], trials, values)
+
+    def _start(self, forms: Sequence[TumbleForm], values: Values) -> Start:
+        gravity = np.array(
+            [values.get(f"gravity_sim[{i}]", g) / g for i, g in zip(self._ids, self._stated, strict=True)]
+        )
+        known = {*SHARED, *(p.name for form in forms for p in form.parameters)}
+        return Start(
+            forms=tuple(forms), values={name: v for name, v in values.items() if name in known}, gravity=gravity
+        )
+
+    def _told(self, found: Fit, trials: Sequence[str], values: Values) -> dict[str, float]:
+        told = {**values, **found.values}
+        for trial in trials:
+            k = self._ids.index(trial)
+            told[f"gravity_sim[{trial}]"] = float(found.gravity[k]) * self._stated[k]
+        return told
+
+    def _base(self, fitter: Fitter, start: Start) -> Fit:
+        random = np.random.default_rng(0)
+
+        def drawn() -> Mapping[str, float]:
+            values = dict(start.values)
+            for name in SHARED:
+                if fitter.sigma[name] > 0:
+                    z = float(np.clip(random.standard_normal(), -2.5, 2.5))
+                    values[name] = self.forward.nominal[name] * (1 + fitter.sigma[name] * z)
+            return values
+
+        def begin(values: Mapping[str, float], horizons: tuple[float, ...]) -> Start:
+            return Start(forms=start.forms, values=values, gravity=start.gravity, scan=True, horizons=horizons)
+
+        def poor(found: Fit, limit: float) -> bool:
+            return found.cost > limit * sum(len(r) for r in found.residuals)
+
+        key = tuple(form.id for form in start.forms)
+        if key in self._warm:  # found before, on other trials
+            before, limit = self._warm[key]
+            values = {name: start.values.get(name, value) for name, value in before.items()}
+            (again,) = fitter.fit([begin(values, (1.0,))])
+            if not poor(again, limit):
+                return again
+        (best,) = fitter.fit([begin(start.values, _GROWING)], steps=15)
+        if poor(best, _POOR):
+            others = [begin(start.values, (1.0,)), begin(drawn(), _GROWING), begin(drawn(), _GROWING)]
+            best = min([best, *fitter.fit(others, steps=15)], key=lambda found: found.cost)
+        size = best.cost / sum(len(r) for r in best.residuals)
+        self._warm[key] = ({name: best.values[name] for name in SHARED}, max(_POOR, 1.3 * size))
+        return best
+
+    def _candidates(
+        self, fitter: Fitter, old: Sequence[TumbleForm], forms: Sequence[TumbleForm], start: Start
+    ) -> dict[str, Fit]:
+        """The best fit found for each form added to `old`."""
+        begun = [(form, point) for form in forms for point in form.starts]
+        chosen = self._screened(fitter, old, begun, start)
+        fits = fitter.fit([self._add(start, old, form, values) for form, values in chosen], steps=12)
+        best: dict[str, Fit] = {}
+        for (form, _), found in zip(chosen, fits, strict=True):
+            if form.id not in best or found.cost < best[form.id].cost:
+                best[form.id] = found
+        effects: dict[str, float] = {}
+        for form in forms:
+            effects[form.effect] = min(effects.get(form.effect, np.inf), best[form.id].cost)
+        followed = sorted(effects, key=lambda effect: effects[effect])[:_FOLLOWED]
+        again = [(form, point) for form, point in begun if form.effect in followed]
+        fresh = Start(values={name: start.values[name] for form in old for p in form.parameters for name in (p.name,)
+                              if name in start.values})  # fmt: skip
+        starts = [self._add(fresh, old, form, point, horizons=_GROWING) for form, point in again]
+        for (form, _), found in zip(again, fitter.fit(starts, steps=15), strict=True):
+            if found.cost < best[form.id].cost:
+                best[form.id] = found
+        return best
+
+    def _add(
+        self, start: Start, old: Sequence[TumbleForm], form: TumbleForm, values: Values,
+        *, horizons: tuple[float, ...] = (1.0,),
+    ) -> Start:  # fmt: skip
+        return Start(
+            forms=(*old, form), values={**start.values, **values}, gravity=start.gravity,
+            scan=len(horizons) > 1, horizons=horizons,
+        )  # fmt: skip
+
+    def _screened(
+        self, fitter: Fitter, old: Sequence[TumbleForm], begun: Sequence[tuple[TumbleForm, Values]], start: Start
+    ) -> list[tuple[TumbleForm, dict[str, float]]]:
+        """For each form the start from which a linear step, the base model's included, promises most."""
+        space = fitter.linearised(Start(forms=tuple(old), values=start.values, gravity=start.gravity))
+        gravity = np.ones(len(self._ids)) if start.gravity is None else start.gravity
+        answers = fitter.signatures([((*old, form), {**start.values, **point}, gravity) for form, point in begun])
+        best: dict[str, tuple[float, TumbleForm, dict[str, float]]] = {}
+        for (form, point), residuals in zip(begun, answers, strict=True):
+            gain, share = space.promise(residuals)
+            share = float(np.clip(share, 0.1, 4.0))
+            scaled = dict(point)
+            for p in form.parameters:
+                if p.name in point and not np.isfinite(p.std):
+                    scaled[p.name] = float(np.clip(share * point[p.name], p.lowest, p.highest))
+            if form.id not in best or gain > best[form.id][0]:
+                best[form.id] = (gain, form, scaled)
+        return [(form, values) for _, form, values in best.values()]
