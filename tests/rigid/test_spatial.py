@@ -276,6 +276,22 @@ def test_any_fall_keeps_its_books_and_ends(seed):
     assert fallen.forced_steps == 0
 
 
+def test_a_tip_that_creeps_along_in_turning_directions_does_not_stall_the_steps():
+    """A Cubli on a corner: one tip sticks, its neighbour slips at 1e-6 m/s, and steps had fallen to 1e-7 s for good."""
+    cubli = find_platform("cubli")
+    thrown = simulate(
+        SpatialTrial(
+            platform=cubli, gravity=9.8, ground="power", mu_s=1.0,
+            torques=(TorqueHistory.constant(cubli.wheel((0, 0, 1)), -0.07743513079767816, 0.4921865359721752),),
+        ),
+        duration=0.5, sample_interval=0.01, position=(0, 0, 0.1423439882811688),
+        quaternion=(0.65724271, -0.04039608, 0.70501239, -0.2633585), velocity=(0.15099243, 0.76149057, 1.13421447),
+        angular_velocity=(-2.1897656, -6.23460567, 8.11271502),
+    )  # fmt: skip
+    assert thrown.stalls > 0
+    assert thrown.energy_residual < 1e-6
+
+
 def test_a_brake_ends_with_its_wheel_at_rest():
     brake = TorqueHistory.constant(HEDGEHOG.wheel(), 2.0, actuator="brake", wheel_speed_0=100.0)
     run = simulate(trial(torques=(brake,), mu_s=3.0), duration=0.2, sample_interval=0.01)
