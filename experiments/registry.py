@@ -39,6 +39,8 @@ class Experiment:
     settings: str  # "module:Class", a frozen pydantic model; every field with a description that gives the unit
     module: str
     presets: tuple[Preset, ...] = ()
+    subject: str = ""
+    """The setting that the command's first argument is, instead of a case file."""
 
     def settings_class(self) -> type[BaseModel]:
         """The settings class. Quick: it imports no Taichi."""
