@@ -79,6 +79,8 @@ class BedGround:
             value = getattr(self.bed, name, None)
             if value is not None:
                 found[name] = value if isinstance(value, str) else np.asarray(value).tolist()
+        recipe = getattr(self.bed, "recipe", {})
+        found |= {name: recipe.get(name) for name in ("grain", "spread", "packing", "young", "max_overlap", "code")}
         return {name: value for name, value in found.items() if value is not None}
 
     def step(self, position: ArrayLike, velocity: ArrayLike, dt: float) -> Reaction:

@@ -46,6 +46,8 @@ class Run:
     """Common to all three runs: the clock, the rows, the saved state. `advance` makes one macro step."""
 
     kind = ""
+    lets_go_at_touch = False
+    """Whether the prescribed approach ends where the ground is first felt, if that is above its surface."""
 
     def __init__(
         self,
@@ -66,10 +68,11 @@ class Run:
         self.macro_step = int(substeps) * self.ground.time_step
         lift = -start_depth if start_depth is not None else self.ground.clearance
         self._approach = max(0, math.ceil(lift / (self.speed * self.macro_step) - 1e-9))
-        """Macro steps before the surface; they end at depth 0 exactly."""
+        """Macro steps before it is let go; they end at depth 0 exactly."""
+        self._start = -self._approach * self.speed * self.macro_step
         self.count = 0
         """Macro steps done."""
-        self.depth = -self._approach * self.speed * self.macro_step
+        self.depth = self._start
         """Depth of the tip now [m]."""
         self.velocity = self.speed
         """Velocity now, positive downwards [m/s]."""
@@ -88,7 +91,7 @@ class Run:
 
     @property
     def time(self) -> float:
-        """Now [s]; 0 at the surface."""
+        """Now [s]; 0 at the surface, or where a spike set down is let go above it."""
         return (self.count - self._approach) * self.macro_step
 
     @property
@@ -133,6 +136,11 @@ class Run:
         self._rows.append((self.time - 0.5 * self.macro_step, middle, held, force))
         self._phases.append(FREE if middle <= 0 else IN if held > 0 else OUT if held < 0 else REST)
         if not approaching:
+            self._after(held, force)
+        elif self.lets_go_at_touch and force > 0 and steps_left > 0:
+            sooner = steps_left * self.macro_step
+            self._rows = [(when + sooner, *row) for when, *row in self._rows]
+            self._approach = self.count
             self._after(held, force)
         if not self.done and self.time >= self.max_time - 0.5 * self.macro_step:
             self.ended = "max_time"
@@ -184,7 +192,7 @@ class Run:
         return {
             "ground": self.ground.name,
             "speed": self.speed,
-            "start_depth": -self._approach_height(),
+            "start_depth": self._start,
             "substeps": round(self.macro_step / self.ground.time_step),
             "spike": asdict(self.spike),
             "ground_settings": getattr(self.ground, "describe", dict)(),
@@ -214,9 +222,6 @@ class Run:
         self._phases = [int(code) for code in state["run.phases"]]
         prefix = "ground."
         self.ground.restore({key[len(prefix) :]: value for key, value in state.items() if key.startswith(prefix)})
-
-    def _approach_height(self) -> float:
-        return self._approach * self.speed * self.macro_step
 
     def _held_velocity(self) -> float:
         """Velocity of the step to come [m/s]."""
@@ -388,15 +393,17 @@ class Drop(Run):
 class SetDown(Drop):
     """Lowered as by a hand that lets go slowly: m dv/dt = W - F - c v with c = W / lowering_speed.
 
-    Free of the ground it sinks at `lowering_speed`; the hand bears whatever the ground does not, so the ground's force
-    rises to the load from below and the spike comes to rest where the bed first carries it. `mass` is what the hand
-    leaves the spike to feel; by default c times 2 ms, so light that the motion is damped beyond critical on any ground
-    softer than W / (8 ms lowering_speed) (`overdamped_below`) and cannot overshoot. It ends when over the last
+    It is let go where it first touches, which grains that stick out of a bed make sooner than depth 0: time counts from
+    there. Free of the ground it sinks at `lowering_speed`; the hand bears whatever the ground does not, so the ground's
+    force rises to the load from below and the spike comes to rest where the bed first carries it. `mass` is what the
+    hand leaves the spike to feel; by default c times 2 ms, so light that the motion is damped beyond critical on any
+    ground softer than W / (8 ms lowering_speed) (`overdamped_below`) and cannot overshoot. It ends when over the last
     `rest_time` the mean speed is below 0.3 % of the lowering speed and the mean force within 0.3 % of the load. What is
     left of the way is not waited for: on a spring the sinkage comes out shallow by what the force lacks, 0.3 % at most.
     """
 
     kind = "set_down"
+    lets_go_at_touch = True
 
     def __init__(
         self,

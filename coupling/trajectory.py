@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import json
+import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
@@ -140,10 +143,15 @@ class Penetration:
         return {name: {"value": value, "std": None, "unit": unit} for name, (value, unit) in values.items()}
 
     def save(self, folder: str | Path) -> Path:
-        """Write a run folder: run.toml, result.json and the series. Raises ValueError where the folder is in use."""
-        folder = Path(folder)
-        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            raise ValueError(f"{str(folder)!r} is in use: name a folder that is empty or does not exist yet")
+        """Write a run folder: run.toml, result.json and the series; returns it (`vis.write_report` makes the report).
+
+        What was computed is not lost to a name: where the folder is in use, the next free one of folder-2, folder-3
+        and so on is taken, with a warning.
+        """
+        wanted = Path(folder)
+        folder = next(path for path in _numbered(wanted) if not _in_use(path))
+        if folder != wanted:
+            warnings.warn(f"{str(wanted)!r} is in use: the run is in {str(folder)!r}", stacklevel=2)
         (folder / "series").mkdir(parents=True, exist_ok=True)
         try:
             version = metadata.version("hedgebed")
@@ -152,7 +160,7 @@ class Penetration:
         (folder / "run.toml").write_text(self._toml(version), encoding="utf-8")
         series = f"series/{self.kind}.csv"
         self.write_csv(folder / series)
-        warnings = {
+        remarks = {
             "max_time": "its time was over before it had come to rest",
             "max_depth": "it went as deep as it was allowed and was ended there",
             "stopped": "it was still bobbing when it was ended",
@@ -177,7 +185,7 @@ class Penetration:
             ],
             "bed": self.settings.get("ground_settings", {}),
             "spike": self.settings.get("spike", {}),
-            "warnings": [warnings[self.ended]] if self.ended in warnings else [],
+            "warnings": [remarks[self.ended]] if self.ended in remarks else [],
         }
         (folder / "result.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
         return folder
@@ -194,12 +202,23 @@ class Penetration:
         return "\n".join(lines) + "\n"
 
 
+def _in_use(folder: Path) -> bool:
+    return folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
+
+
+def _numbered(folder: Path) -> Iterator[Path]:
+    """The folder, then folder-2, folder-3, ..."""
+    yield folder
+    for number in itertools.count(2):
+        yield folder.with_name(f"{folder.name}-{number}")
+
+
 UNITS = {
     "macro_step": "s", "speed": "m/s", "start_depth": "m", "depth": "m", "hold": "s", "retreat_speed": "m/s",
     "mass": "kg", "load": "N", "rest_time": "s", "rest_tolerance": "1", "after_stop": "s", "max_time": "s",
     "lowering_speed": "m/s", "diameter": "m", "shaft_diameter": "m", "length": "m", "cone_angle": "degrees",
     "size": "m", "surface": "m", "time_step": "s", "gravity": "m/s2", "packing_fraction": "1", "stiffness": "N/m",
-    "damping": "N s/m", "centre": "m",
+    "damping": "N s/m", "centre": "m", "grain": "m", "young": "Pa",
 }  # fmt: skip
 """Units of what run.toml holds."""
 

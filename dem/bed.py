@@ -47,6 +47,7 @@ class Bed:
 
     Attributes:
         max_overlap: largest overlap over mean diameter of the pair since the bed was made; set it to 0 to start anew.
+        recipe: what it was prepared from, as ``prepare_bed`` was asked; empty where it was made otherwise.
         overlap_limit: the bound on it; ``advance`` raises BedFailure past it.
     """
 
@@ -162,11 +163,13 @@ class Bed:
         self.steps = 0
         self.list_count = 0
         self.grain_count = len(radii)
-        self._diameter = 2 * float(radii.mean())
+        # The same to the bit in whatever order the grains come, as a bed taken up again has them in another.
+        self._diameter = 2 * math.fsum(radii) / self.grain_count
         self._skin = _SKIN * self._diameter
         self._since_lists = 0
         self._reaction_steps = 0
         self._has_floor = False
+        self.recipe: dict[str, Any] = {}
         self.surface = math.nan
         self.packing_fraction = math.nan
         self._engine = take_engine(

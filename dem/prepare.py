@@ -23,6 +23,7 @@ from .bed import Bed, BedFailure
 from .materials import Material
 from .materials import material as find_material
 from .packing import RAIN_COLUMN, draw_radii, rain_positions
+from .stages import Preparation
 from .timestep import choose_young
 
 __all__ = ["cache_folder", "fingerprint", "prepare_bed"]
@@ -33,13 +34,6 @@ _EXPECTED_PACKING = 0.57
 _BEARING = 30.0
 # More is rained in than is kept: this much higher, and at least this many diameters.
 _SURPLUS, _SURPLUS_DIAMETERS = 0.06, 2.0
-# Settled: mean kinetic energy of a grain over m g d, and floor force over weight.
-ENERGY_RATIO, FLOOR_RATIO = 1e-5, 0.01
-_ROUGH_ENERGY_RATIO = 1e-2
-# Time constant of the drag while settling, in the time that a grain takes to fall the bed's depth.
-_DRAG = 0.1
-_LONGEST = 60.0  # settling gives up after this many fall times
-_MOST_TAPS = 40
 
 
 def cache_folder() -> Path:
@@ -93,7 +87,10 @@ def prepare_bed(
         time_step: [s]; an eighth of the contact time when None.
         precision: "float64" or "float32". arch: "cpu" or "cuda". threads: all when None.
         cache: whether to look in the cache, and to leave the bed there.
-        progress: anything with ``stage(name, total)`` and ``update(done)``, or None.
+        progress: anything with ``stage(name, total)`` and ``update(done)``, or None. A KeyboardInterrupt out of
+            ``update`` stops the preparation where it can be gone on with.
+
+    With the cache, what is under way is kept there every minute, and the next call goes on from it.
 
     The grains fall as a loose column from rest, come to rest in a drag that stands in for the long ringing of a soft
     bed, lose what lies above the level, and settle again, at the end without drag. Settled means: mean kinetic energy
@@ -140,22 +137,24 @@ def prepare_bed(
             warnings.warn(f"the cached bed {path.name} cannot be read and is made anew: {problem}", stacklevel=2)
         else:
             bed.material = stuff.softened(young)
+            bed.recipe = recipe
             return bed
-    report = _Reporter(progress)
-    bed = _rain(stuff, size, grain, spread, gravity, seed, young, max_overlap, time_step, precision, arch, threads)
+    work = Preparation(
+        _rain(stuff, size, grain, spread, gravity, seed, young, max_overlap, time_step, precision, arch, threads),
+        grain=grain,
+        depth=size[2],
+        packing=packing,
+        progress=progress,
+        path=cache_folder() / "unfinished" / path.name if cache else None,
+    )
+    work.find(arch=arch, threads=threads)
     try:
-        report.stage("rain", None)
-        _fall(bed, grain, report)
-        _settle(bed, grain, _ROUGH_ENERGY_RATIO, report, drag=True)
-        bed = _level(bed, size[2])
-        report.stage("settle", None)
-        _settle(bed, grain, ENERGY_RATIO, report, drag=True)
-        bed.measure_surface()
-        if packing is not None:
-            bed = _tap(bed, grain, packing, report)
+        bed = work.run()
     except BedFailure as failure:
-        kept = bed.save(cache_folder() / "failed" / path.name)
+        kept = work.bed.save(cache_folder() / "failed" / path.name)
         raise BedFailure(f"{failure.reason}; the bed as it was is in {kept}") from None
+    bed.material = stuff.softened(young)
+    bed.recipe = recipe
     bed = _reset(bed)
     if cache:
         try:
@@ -215,113 +214,9 @@ def _rain(stuff, size, grain, spread, gravity, seed, young, max_overlap, time_st
     )
 
 
-def _settle(bed: Bed, grain: float, ratio: float, report: _Reporter, *, drag: bool = False) -> None:
-    """Advance until the bed is at rest by ``ratio`` and the floor carries the weight.
-
-    Soft grains in a deep bed ring as one spring for long. With ``drag`` the grains settle as in a fluid until they are
-    at rest; then, without it, they must still be.
-    """
-    g = math.hypot(*bed.gravity)
-    unit = bed.weight / bed.grain_count * grain
-    fall = math.sqrt(2 * bed.size[2] / g)
-    steps = max(1, round(0.05 * fall / bed.time_step))
-    tolerance = FLOOR_RATIO if ratio == ENERGY_RATIO else 0.5
-    began = bed.time
-    first = None
-    while True:
-        bed.advance(steps, drag_time=_DRAG * fall if drag else math.inf)
-        energy = bed.kinetic_energy / bed.grain_count / unit
-        floor = abs(bed.floor_force / bed.weight - 1)
-        first = first or math.log(max(energy / ratio, math.e))
-        report.update(1 - min(1.0, max(0.0, math.log(max(energy / ratio, 1.0)) / first)))
-        if energy < ratio and floor < tolerance:
-            if not drag:
-                return
-            drag = False
-        if bed.time - began > _LONGEST * fall:
-            raise BedFailure(
-                f"the bed did not come to rest in {bed.time - began:.3g} s: energy {energy:.2g} m g d (below {ratio:g} "
-                f"was wanted), floor force off by {100 * floor:.2g} % of the weight"
-            )
-
-
-def _fall(bed: Bed, grain: float, report: _Reporter) -> None:
-    """Advance until the rain is down: the grains' energy has passed its peak and is a tenth of m g d a grain."""
-    g = math.hypot(*bed.gravity)
-    unit = bed.weight / bed.grain_count * grain
-    top = bed.grains()["position"][:, 2].max()
-    fall = math.sqrt(2 * top / g)
-    steps = max(1, round(0.03 * fall / bed.time_step))
-    peak = 0.0
-    while True:
-        bed.advance(steps)
-        energy = bed.kinetic_energy / bed.grain_count / unit
-        peak = max(peak, energy)
-        report.update(min(1.0, bed.time / fall))
-        if energy < 0.1 and energy < 0.5 * peak:
-            return
-        if bed.time > _LONGEST * fall:
-            raise BedFailure(f"the rain was not down after {bed.time:.3g} s: energy {energy:.2g} m g d a grain")
-
-
-def _level(bed: Bed, depth: float) -> Bed:
-    """Take away the grains whose centres lie above the level."""
-    grains = bed.grains()
-    above = grains["position"][:, 2] > depth
-    if not above.any():
-        return bed
-    return bed.without(above)
-
-
-def _tap(bed: Bed, grain: float, packing: float, report: _Reporter) -> Bed:
-    """Tap the bed until its packing fraction is reached; its surface sinks as it gets denser and stays nearly level.
-
-    A tap is half a sine of acceleration of the bed's frame, 3 g high, as long as a grain takes to fall its diameter.
-    """
-    if bed.packing_fraction > packing + 0.002:
-        raise ValueError(
-            f"packing = {packing} cannot be reached: this material rains in at {bed.packing_fraction:.4f} already, and "
-            f"tapping only makes it denser; ask for more, or give the grains more friction"
-        )
-    g = -bed.gravity[2]
-    length = math.sqrt(2 * grain / g)
-    report.stage("tap", None)
-    start = bed.packing_fraction
-    for _ in range(_MOST_TAPS):
-        if bed.packing_fraction >= packing - 0.0005:
-            return bed
-        pieces = 10
-        for k in range(pieces):
-            bed.set_gravity((0.0, 0.0, -g * (1 - 3 * math.sin(math.pi * (k + 0.5) / pieces))))
-            bed.advance(max(1, round(length / pieces / bed.time_step)))
-        bed.set_gravity(g)
-        _settle(bed, grain, ENERGY_RATIO, report, drag=True)
-        bed.measure_surface()
-        report.update((bed.packing_fraction - start) / max(1e-9, packing - start))
-    raise ValueError(
-        f"packing = {packing} cannot be reached: {_MOST_TAPS} taps brought the bed from {start:.4f} to "
-        f"{bed.packing_fraction:.4f}"
-    )
-
-
 def _reset(bed: Bed) -> Bed:
     """The prepared bed at time 0, with displacements counted from here."""
     bed.mark_origin()
     bed.max_overlap = 0.0
     bed.steps = 0
     return bed
-
-
-class _Reporter:
-    """Passes stages on to whatever progress the caller has."""
-
-    def __init__(self, progress: Any):
-        self._progress = progress
-
-    def stage(self, name: str, total: float | None) -> None:
-        if self._progress is not None:
-            self._progress.stage(name, 1.0 if total is None else total)
-
-    def update(self, done: float) -> None:
-        if self._progress is not None:
-            self._progress.update(done)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from .progress import Progress
 from .runfolder import RunFolder
 from .settings import PenetrateSettings, expected_grain_count
 from .softening import Softening, bearing_gradient, drop_depth, soften
+from .stopping import held_back
 from .units import Unit, deepest, expected_time, make_run, make_spike, plan_units, shown_units
 
 __all__ = ["check", "choose_softness", "fingerprint", "resume", "run"]
@@ -247,40 +248,45 @@ def prepare_bed(settings: PenetrateSettings, seed: int, young: float, progress: 
     """The bed of one seed, prepared or from the cache."""
     from dem import Bed
 
-    return Bed.prepare(
-        find_material(settings.material),
-        size=settings.bed_size,
-        grain=settings.grain,
-        spread=settings.spread,
-        packing=settings.packing,
-        gravity=settings.gravity,
-        seed=seed,
-        young=young,
-        max_overlap=settings.max_overlap,
-        time_step=settings.time_step,
-        precision=settings.precision,
-        arch=settings.arch,
-        threads=settings.threads,
-        cache=settings.cache,
-        progress=_OneStage(progress, f"bed of seed {seed}"),
-    )
+    with held_back() as asked_to_stop:
+        return Bed.prepare(
+            find_material(settings.material),
+            size=settings.bed_size,
+            grain=settings.grain,
+            spread=settings.spread,
+            packing=settings.packing,
+            gravity=settings.gravity,
+            seed=seed,
+            young=young,
+            max_overlap=settings.max_overlap,
+            time_step=settings.time_step,
+            precision=settings.precision,
+            arch=settings.arch,
+            threads=settings.threads,
+            cache=settings.cache,
+            progress=_OneStage(progress, f"bed of seed {seed}", asked_to_stop),
+        )
 
 
 class _OneStage:
-    """Shows the stages of a preparation, rain and settling, as one stage of the experiment."""
+    """Shows the stages of a preparation as one stage of the experiment; stops it where it can be gone on with."""
 
-    def __init__(self, progress: Progress, name: str, parts: int = 2) -> None:
-        self.progress, self.parts, self.part = progress, parts, -1
-        progress.stage(name, total=float(parts))
+    PARTS = ("rain", "settle", "tap")
+
+    def __init__(self, progress: Progress, name: str, asked_to_stop: Callable[[], bool]) -> None:
+        self.progress, self.asked_to_stop, self.part = progress, asked_to_stop, 0
+        progress.stage(name, total=2.0)
 
     def stage(self, name: str, total: float | None = None) -> None:
         """The next part begins."""
-        self.part = min(self.part + 1, self.parts - 1)
+        self.part = min(self.PARTS.index(name), 1)
         self.progress.update(self.part)
 
     def update(self, done: float) -> None:
-        """`done` of this part, 0 to 1."""
+        """`done` of this part, 0 to 1. Raises KeyboardInterrupt if asked to stop."""
         self.progress.update(self.part + min(1.0, max(0.0, done)))
+        if self.asked_to_stop():
+            raise KeyboardInterrupt
 
 
 def write_report(folder: Path, progress: Progress) -> None:
@@ -378,16 +384,20 @@ def _run_unit(
     def on_step(stepper: Run) -> None:
         nonlocal saved
         progress.update(stepper.fraction)
-        if time.monotonic() - saved >= settings.checkpoint_interval and not stepper.done:
+        stop = asked_to_stop()
+        if not stepper.done and (stop or time.monotonic() - saved >= settings.checkpoint_interval):
             keep(unit.id)
             saved = time.monotonic()
+        if stop and not stepper.done:
+            raise KeyboardInterrupt
 
     try:
-        series = stepper.run(
-            on_step=on_step,
-            on_frame=frames.write if frames else None,
-            frame_interval=frames.interval if frames else None,
-        )
+        with held_back() as asked_to_stop:
+            series = stepper.run(
+                on_step=on_step,
+                on_frame=frames.write if frames else None,
+                frame_interval=frames.interval if frames else None,
+            )
     except RuntimeError as error:  # the bed's: a NaN, a grain lost, an overlap past its bound
         keep(f"{unit.id}.failed")
         raise RuntimeError(

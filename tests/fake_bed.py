@@ -13,9 +13,10 @@ class FakeBed:
     """See the module. `size` [m], `surface` [m], `grain` diameter [m]."""
 
     def __init__(self, *, size=(0.06, 0.06, 0.05), surface=0.045, grain=0.002, time_step=2e-5, seed=1,
-                 hardness=100.0, power=1.0, rate=0.0, unload=5000.0, gravity=9.80665):  # fmt: skip
+                 hardness=100.0, power=1.0, rate=0.0, unload=5000.0, gravity=9.80665, proud=0.0):  # fmt: skip
         self.size, self.surface, self.grain, self.time_step, self.seed = size, surface, grain, time_step, seed
         self.hardness, self.power, self.rate, self.unload, self.gravity = hardness, power, rate, unload, gravity
+        self.proud = proud  # how far above the surface the bed is felt [m]
         self.time, self.max_overlap = 0.0, 0.0
         self.grain_count, self.packing_fraction, self.coordination_number = 200, 0.6, 5.0
         self.kinetic_energy, self.floor_force = 0.0, 1.0
@@ -37,6 +38,7 @@ class FakeBed:
 
     def law(self, depth, sinking):
         """Force [N] at `depth` [m], `sinking` [m/s], after all that was before."""
+        depth += self.proud
         if depth <= 0:
             return 0.0
         if depth >= self._deepest:
@@ -48,7 +50,7 @@ class FakeBed:
         for _ in range(steps):
             depth = self.surface - self._pose[2] - 0.5 * self._rate[2] * self.time_step
             total += self.law(depth, -self._rate[2])
-            self._deepest = max(self._deepest, depth)
+            self._deepest = max(self._deepest, depth + self.proud)
             self._pose = self._pose + self._rate * self.time_step
             self.time += self.time_step
         self._force = total / steps

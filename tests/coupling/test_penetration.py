@@ -12,6 +12,11 @@ from rigid import Spike, SpringDamper
 SPIKE = Spike(diameter=0.012, length=0.05, mass=0.5)
 
 
+def proud(bed):
+    bed.proud = 0.002
+    return bed
+
+
 def test_grounds_keep_the_contract():
     from coupling import BedGround
 
@@ -88,12 +93,26 @@ def test_set_down_ends_at_the_sinkage_that_carries_the_load():
     assert run.max_depth < 1.002 * math.sqrt(0.2 / 2e4)
 
 
+def test_a_spike_set_down_is_let_go_where_it_first_touches():
+    """Grains stick out of a bed: felt 2 mm above its surface, it carries F = K (z + 2 mm), never more than the load."""
+    bed = FakeBed(hardness=300.0, proud=0.002)
+    run = set_down(SPIKE, onto=bed, load=0.3, lowering_speed=0.1, start_depth=-0.006)
+    assert run.ended == "rest"
+    assert run.force.max() <= 0.3
+    assert run.depth[-1] == pytest.approx(0.3 / 300.0 - 0.002, rel=0.01)
+    assert np.allclose(np.diff(run.time), run.macro_step, rtol=1e-9)
+    touched = int(np.argmax(run.force > 0))
+    assert run.time[touched] == pytest.approx(-0.5 * run.macro_step, rel=1e-6)
+    assert run.settings["start_depth"] == pytest.approx(-0.006, rel=0.01)
+
+
 @pytest.mark.parametrize(
     "make",
     [
         lambda bed: Drive(SPIKE, bed, speed=0.2, depth=0.004, hold=0.002),
         lambda bed: Drop(SPIKE, bed, speed=0.1, mass=0.3, load=1.0, max_time=0.2),
         lambda bed: SetDown(SPIKE, bed, load=0.3, max_time=0.2),
+        lambda bed: SetDown(SPIKE, proud(bed), load=0.3, max_time=0.2, start_depth=-0.004),
     ],
 )
 def test_a_run_taken_up_again_gives_the_same_bits(make, tmp_path):
@@ -152,8 +171,16 @@ def test_a_saved_run_is_a_run_folder(tmp_path):
     back = Penetration.read_csv(folder / result["runs"][0]["series"], kind="driven", macro_step=run.macro_step)
     for name in ("time", "depth", "velocity", "force", "phase"):
         assert np.array_equal(getattr(back, name), getattr(run, name))
-    with pytest.raises(ValueError, match="in use"):
-        run.save(folder)
+
+
+def test_a_run_is_not_lost_to_a_folder_in_use(tmp_path):
+    run = drive(SPIKE, into=FakeBed(), speed=0.2, depth=0.004)
+    run.save(tmp_path / "first")
+    (tmp_path / "first-2").write_text("a file")
+    with pytest.warns(UserWarning, match=r"'.*first' is in use: the run is in '.*first-3'"):
+        kept = run.save(tmp_path / "first")
+    assert kept == tmp_path / "first-3"
+    assert (kept / "series" / "driven.csv").read_bytes() == (tmp_path / "first" / "series" / "driven.csv").read_bytes()
 
 
 def test_a_drop_that_bobs_ends_a_set_time_after_its_first_stop():

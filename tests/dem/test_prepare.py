@@ -9,7 +9,8 @@ import pytest
 
 import dem.prepare
 from dem import SAND, Bed
-from dem.prepare import ENERGY_RATIO, prepare_bed
+from dem.prepare import prepare_bed
+from dem.stages import ENERGY_RATIO, Preparation
 
 GRAIN = 0.004
 BED = {"size": (0.024, 0.024, 0.03), "grain": GRAIN, "seed": 3}
@@ -86,7 +87,7 @@ def test_the_same_seed_gives_the_same_bits_and_progress_is_told(made):
 
 def test_another_seed_rains_other_grains(monkeypatch):
     rained = []
-    monkeypatch.setattr(dem.prepare, "_fall", lambda bed, *_: rained.append(bed.grains()) or stop())
+    monkeypatch.setattr(Preparation, "run", lambda work: rained.append(work.bed.grains()) or stop())
     for seed in (3, 4):
         with pytest.raises(Stop):
             prepare_bed("sand", **BED | {"seed": seed}, cache=False)
@@ -133,10 +134,9 @@ def test_the_key_of_the_cache_holds_every_option(monkeypatch):
             asked.append(path.name)
             path.parent.mkdir(parents=True, exist_ok=True)
 
-    for name in ("_rain", "_level", "_tap", "_reset"):
+    for name in ("_rain", "_reset"):
         monkeypatch.setattr(dem.prepare, name, lambda *_: NoBed())
-    for name in ("_fall", "_settle"):
-        monkeypatch.setattr(dem.prepare, name, lambda *_, **__: None)
+    monkeypatch.setattr(Preparation, "run", lambda work: work.bed)
     monkeypatch.setattr(dem.prepare.runtime, "start", lambda **_: None)
 
     def name_of(material=SAND, **options):
@@ -174,8 +174,8 @@ def test_the_key_of_the_cache_holds_every_option(monkeypatch):
 def already_rained(bed, monkeypatch):
     """Preparation starts from the bed at rest, so that tapping alone is tested."""
     monkeypatch.setattr(dem.prepare, "_rain", lambda *_: bed)
-    monkeypatch.setattr(dem.prepare, "_fall", lambda *_: None)
-    monkeypatch.setattr(dem.prepare, "_level", lambda bed, _: bed)
+    for name in ("_fall", "_calm"):
+        monkeypatch.setattr(Preparation, name, lambda work: None)
     return bed.packing_fraction
 
 
@@ -192,15 +192,88 @@ def test_a_bed_is_tapped_to_the_packing_asked_for(already_rained):
 )
 def test_a_packing_out_of_reach_is_refused(already_rained, monkeypatch, packing, words):
     """Looser than the rain, and denser than tapping makes it."""
-    monkeypatch.setattr(dem.prepare, "_MOST_TAPS", 1)
+    monkeypatch.setattr(dem.stages, "_MOST_TAPS", 1)
     with pytest.raises(ValueError, match=rf"packing = {packing} cannot be reached: .*{words}"):
         prepare_bed(SAND, **BED, packing=packing, cache=False)
 
 
 def test_a_bed_that_does_not_come_to_rest_says_so(bed, monkeypatch):
-    monkeypatch.setattr(dem.prepare, "_LONGEST", 0.1)
+    monkeypatch.setattr(dem.stages, "_LONGEST", 0.1)
+    work = Preparation(bed, grain=GRAIN, depth=0.03, packing=None, progress=None, path=None)
     with pytest.raises(dem.BedFailure, match="did not come to rest"):
-        dem.prepare._settle(bed, GRAIN, 1e-30, dem.prepare._Reporter(None))
+        work._settle(1e-30, {})
+
+
+class Interrupted:
+    """Ctrl-C at the n-th word of progress."""
+
+    def __init__(self, at):
+        self.left = at
+
+    def stage(self, name, total):
+        self.name = name
+
+    def update(self, done):
+        self.left -= 1
+        if not self.left:
+            raise KeyboardInterrupt
+
+
+def test_a_preparation_that_was_stopped_goes_on_to_the_same_bits(made, monkeypatch, tmp_path):
+    """Stopped in the rain and again while it settles; what was under way is gone from the cache afterwards."""
+    monkeypatch.setenv("HEDGEBED_CACHE", str(tmp_path))
+    stages = []
+    for at in (6, 8, 9, 10):
+        interrupted = Interrupted(at)
+        with pytest.raises(KeyboardInterrupt):
+            prepare_bed(SAND, **BED, progress=interrupted)
+        stages.append(interrupted.name)
+        assert len(list((tmp_path / "unfinished").iterdir())) == 2
+    assert {"rain", "settle"} <= set(stages)
+    bed = prepare_bed(SAND, **BED)
+    assert same(bed.state(), made[1])
+    assert not list((tmp_path / "unfinished").iterdir())
+
+
+def test_a_preparation_is_kept_every_minute(made, monkeypatch, tmp_path):
+    monkeypatch.setenv("HEDGEBED_CACHE", str(tmp_path))
+    monkeypatch.setattr(dem.stages, "_KEEP_INTERVAL", 0.0)
+    kept = []
+    keep = Preparation.keep
+
+    def keep_and_stop(work):
+        keep(work)
+        kept.append(work.stage)
+        if len(kept) == 4:
+            stop()
+
+    monkeypatch.setattr(Preparation, "keep", keep_and_stop)
+    with pytest.raises(Stop):  # as kill -9 would end it
+        prepare_bed(SAND, **BED)
+    monkeypatch.setattr(Preparation, "keep", lambda work: None)
+    bed = prepare_bed(SAND, **BED)
+    assert same(bed.state(), made[1])
+
+
+@pytest.mark.parametrize("damage", ["other steps", "no notes", "no bed"])
+def test_what_was_kept_by_halves_is_not_gone_on_with(made, monkeypatch, tmp_path, damage):
+    bed = dem.Bed.from_grains(SAND, positions=[[0.012, 0.012, 0.01]], radii=[0.002], size=(0.024, 0.024, 0.03))
+    work = Preparation(bed, grain=GRAIN, depth=0.03, packing=None, progress=None, path=tmp_path / "a.npz")
+    work.stage, work.notes = "settle", {"began": 0.0, "drag": 1.0, "first": 2.0}
+    work.keep()
+    again = Preparation(bed, grain=GRAIN, depth=0.03, packing=None, progress=None, path=tmp_path / "a.npz")
+    again.find()
+    assert (again.stage, again.notes) == (work.stage, work.notes)
+    notes = tmp_path / "a.json"
+    if damage == "other steps":
+        notes.write_text(notes.read_text().replace('"steps": 0', '"steps": 1'))
+    elif damage == "no notes":
+        notes.unlink()
+    else:
+        (tmp_path / "a.npz").write_bytes(b"half")
+    again = Preparation(bed, grain=GRAIN, depth=0.03, packing=None, progress=None, path=tmp_path / "a.npz")
+    again.find()
+    assert again.stage == "rain" and not again.notes
 
 
 def test_levelling_keeps_the_contacts_of_what_stays(bed):

@@ -202,7 +202,7 @@ def test_a_run_that_is_stopped_keeps_what_it_has_done_to_the_step(fake, tmp_path
     assert signal.getsignal(number) == before
     (kept,) = (broken / "checkpoint").glob("*.npz")
     with np.load(kept) as state:
-        assert state["run.counts"][0] > 100
+        assert state["run.counts"][0] > 50
     penetrate.resume(broken)
     for path in whole.rglob("*.csv"):
         assert path.read_bytes() == (broken / path.relative_to(whole)).read_bytes(), path.name
