@@ -21,6 +21,8 @@ EFFECTS = ("inertial-drag", "depth-hardening", "plastic-sinkage", "adhesion", "s
 OUTSIDE = ("floor-vibration", "loose-mass", "shock", "load-cell-drift", "sloshing")
 _STEP = 2e-5
 
+_Columns = dict[str, np.ndarray]
+
 
 @dataclass(frozen=True)
 class Hidden:
@@ -55,14 +57,17 @@ class _Law:
                 share = (z - left) / (self.top - left)
                 force = self.spring(self.top) * max(share, 0.0) ** s["plastic_bend"]
             force += self.c * max(v, 0.0)
-            force += s.get("drag", 0.0) * self.size**2 * max(v, 0.0) ** 2 * (1.0 - math.exp(-z / s.get("drag_onset", 1.0)))
+            if "drag" in s:
+                force += s["drag"] * self.size**2 * max(v, 0.0) ** 2 * z / (z + s["drag_onset"])
             if "shaft" in s:
                 stribeck = 1.0 + 0.3 * math.exp(-abs(v) / s["shaft_speed"])
                 force += self.size * s["shaft"] * (0.4 + 0.6 * z / s["depth"]) * stribeck * way
             if "pull" in s and z < self.top:
                 back = (self.top - z) / s["pull_reach"]
                 force -= s["pull"] * self.size**2 * math.sqrt(self.top / s["depth"]) * math.tanh(back)
-        return force + s.get("slosh", 0.0) * math.sin(s.get("slosh_rate", 1.0) * t) * math.exp(-t / s.get("slosh_time", 1.0))
+        if "slosh" in s:
+            force += s["slosh"] * math.sin(s["slosh_rate"] * t) * math.exp(-t / s["slosh_time"])
+        return force
 
     def spring(self, z: float) -> float:
         """Loading curve."""
@@ -154,8 +159,10 @@ def _plan(random: np.random.Generator, *, retreat: bool, drops: bool, faster: bo
         })  # fmt: skip
     return {
         "k": k, "c": c, "mass": mass, "believed_k": believed_k, "believed_c": max(believed_c, 0.01), "doubt_k": doubt_k,
-        "doubt_c": doubt_c, "trials": trials, "returns": returns, "depth": depth, "noise_depth": float(10 ** random.uniform(-4.3, -3.6)),
-        "noise_force": k * depth * float(10 ** random.uniform(-2.6, -1.8)), "noise_accel": float(10 ** random.uniform(-1.3, -0.5)),
+        "doubt_c": doubt_c, "trials": trials, "returns": returns, "depth": depth,
+        "noise_depth": float(10 ** random.uniform(-4.3, -3.6)),
+        "noise_force": k * depth * float(10 ** random.uniform(-2.6, -1.8)),
+        "noise_accel": float(10 ** random.uniform(-1.3, -0.5)),
         "rate": float(random.choice([200.0, 500.0])), "drop_time": 0.35,
     }  # fmt: skip
 
@@ -167,7 +174,8 @@ def _shape(
     k, depth = plan["k"], plan["depth"]
     full, fastest = k * depth, max(t["speed"] for t in plan["trials"])
     bend, reach = float(random.uniform(1.2, 2.2)), float(random.uniform(0.02, 0.2)) * depth
-    layer_at, layer_kind, sign = float(random.uniform(0.3, 0.7)) * depth, float(random.random()), float(random.choice([-0.5, 1.0]))
+    layer_at, layer_kind = float(random.uniform(0.3, 0.7)) * depth, float(random.random())
+    sign = float(random.choice([-0.5, 1.0]))
     hard_kind, onset = float(random.random()), float(random.uniform(0.1, 0.5)) * depth
     rate, phase = float(random.uniform(30, 200)), float(random.uniform(0, 6))
 
@@ -179,7 +187,8 @@ def _shape(
             elif effect == "depth-hardening":
                 s |= {"hardening": amplitude, "hardening_kind": hard_kind}
             elif effect == "plastic-sinkage":
-                s |= {"plastic": amplitude / (1 + amplitude), "plastic_bend": bend}
+                s |= {"plastic": amplitude / (1 + amplitude),
+                      "plastic_bend": 1 + (bend - 1) * amplitude / (0.3 + amplitude)}  # fmt: skip
             elif effect == "adhesion":
                 s |= {"pull": amplitude * full, "pull_reach": reach}
             elif effect == "shaft-friction":
@@ -202,15 +211,15 @@ def _shape(
     return settings
 
 
-def _trial(plan: dict[str, Any], index: int, s: dict[str, float]) -> dict[str, np.ndarray]:
+def _trial(plan: dict[str, Any], index: int, s: dict[str, float]) -> _Columns:
     """A trial without noise: time, depth, and force or acceleration."""
     this = plan["trials"][index]
     size = this["diameter"] / 0.012
     law = _Law(plan["k"] * size, plan["c"] * size, size, s)
-    return _driven(plan, this, law, s) if this["driven"] else _drop(plan, this, law, s, index)
+    return _driven(plan, this, law, s) if this["driven"] else _drop(plan, this, law, s)
 
 
-def _driven(plan: dict[str, Any], this: dict[str, Any], law: _Law, s: dict[str, float]) -> dict[str, np.ndarray]:
+def _driven(plan: dict[str, Any], this: dict[str, Any], law: _Law, s: dict[str, float]) -> _Columns:
     depth, speed = plan["depth"], this["speed"]
     going = depth / speed
     total = going * (1.9 if plan["returns"] else 1.0)
@@ -237,7 +246,7 @@ def _driven(plan: dict[str, Any], this: dict[str, Any], law: _Law, s: dict[str, 
     return {"time": time, "depth": z, "other": values}
 
 
-def _drop(plan: dict[str, Any], this: dict[str, Any], law: _Law, s: dict[str, float], index: int) -> dict[str, np.ndarray]:
+def _drop(plan: dict[str, Any], this: dict[str, Any], law: _Law, s: dict[str, float]) -> _Columns:
     m, g, dt = plan["mass"], this["gravity"], _STEP
     rate = plan["rate"] * 2
     time = np.arange(0, plan["drop_time"], 1 / rate)
@@ -256,7 +265,8 @@ def _drop(plan: dict[str, Any], this: dict[str, Any], law: _Law, s: dict[str, fl
             force = law(new, half if not stuck else 0.0, t + dt, way)
             total = m * g - force
             if "shock" in s:
-                total += s["shock"] * math.exp(-0.5 * ((t / plan["drop_time"] - s["shock_time"]) / s["shock_width"]) ** 2)
+                late = (t / plan["drop_time"] - s["shock_time"]) / s["shock_width"]
+                total += s["shock"] * math.exp(-0.5 * late**2)
             if loose > 0:
                 inner_a = -(s["loose_rate"] ** 2) * inner - a
                 inner_v += dt * inner_a
@@ -274,7 +284,7 @@ def _drop(plan: dict[str, Any], this: dict[str, Any], law: _Law, s: dict[str, fl
     return {"time": time, "depth": depth, "other": acceleration}
 
 
-def _signature(plan: dict[str, Any], clean: list[dict[str, np.ndarray]], made: list[dict[str, np.ndarray]], which: list[int]) -> float:
+def _signature(plan: dict[str, Any], clean: list[_Columns], made: list[_Columns], which: list[int]) -> float:
     """Root mean square of the change over the noise, what a change of K would explain taken out."""
     change, slope = [], []
     for one, other, index in zip(clean, made, which, strict=True):
@@ -293,7 +303,7 @@ def _signature(plan: dict[str, Any], clean: list[dict[str, np.ndarray]], made: l
     return float(np.sqrt(np.mean(d**2)))
 
 
-def _record(random: np.random.Generator, plan: dict[str, Any], made: list[dict[str, np.ndarray]], coloured: bool) -> Campaign:
+def _record(random: np.random.Generator, plan: dict[str, Any], made: list[_Columns], coloured: bool) -> Campaign:
     persistence = float(random.uniform(0.3, 0.8)) if coloured else 0.0
 
     def noise(count: int, std: float) -> np.ndarray:
@@ -306,16 +316,16 @@ def _record(random: np.random.Generator, plan: dict[str, Any], made: list[dict[s
     trials, recordings = [], {}
     for index, (this, data) in enumerate(zip(plan["trials"], made, strict=True)):
         name = f"{index + 1:03d}"
-        table: dict[str, Any] = {"id": name, "mode": "driven" if this["driven"] else "drop", "gravity": this["gravity"],
-                                 "speed": this["speed"], "diameter": this["diameter"], "data": f"{name}.csv"}  # fmt: skip
-        trials.append(table)
+        mode = "driven" if this["driven"] else "drop"
+        kept = {key: this[key] for key in ("gravity", "speed", "diameter")}
+        trials.append({"id": name, "mode": mode, "data": f"{name}.csv", **kept})
         n = len(data["time"])
         column, std = ("force_N", plan["noise_force"]) if this["driven"] else ("accel_m_s2", plan["noise_accel"])
         recordings[(name, "data")] = Recording({
             "t_s": data["time"], "depth_m": data["depth"] + plan["noise_depth"] * random.standard_normal(n),
             column: data["other"] + noise(n, std),
         })  # fmt: skip
-    tables = PenetrationCampaign(**{
+    tables = PenetrationCampaign.model_validate({
         "format": "hedgehog-campaign/1", "kind": "penetration", "name": "made up",
         "spike": {"mass": plan["mass"], "diameter": 0.012, "tip": "sphere"},
         "surface": {"kind": "sand", "stiffness": plan["believed_k"], "damping": plan["believed_c"]},

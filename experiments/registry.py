@@ -107,6 +107,13 @@ EXPERIMENTS: dict[str, Experiment] = {
             settings="experiments.campaign_settings:CampaignSettings",
             module="experiments.synthesis",
         ),
+        Experiment(
+            "diagnose",
+            "Measured trials: where the model fails, which effect it lacks, how sure that is, and the gap it closes.",
+            settings="experiments.diagnose_settings:DiagnoseSettings",
+            module="experiments.diagnose.experiment",
+            subject="campaign",
+        ),
     ]
 }
 

@@ -1,4 +1,4 @@
-"""Noise that is not white, or louder than stated: seen in the fast half of a channel's modes, where no motion reaches.
+"""Noise that is not white, or louder than stated: seen in the faster modes of a channel, where little motion reaches.
 
 An autoregressive law of order one is fitted to the power of the modes of all trials (Whittle, Arkiv foer Matematik 2
 (1953), 423): S(f) = s^2 (1 - a^2) / (1 - 2 a cos(pi f) + a^2), f from 0 to 1 at half the sampling rate. Where the data
@@ -17,7 +17,7 @@ from .problem import Array
 
 __all__ = ["Colour", "find_colours", "whitener_for"]
 
-_FAST = 0.4
+_FAST = 0.15
 """Share of the band that counts as slow and is left out."""
 _SURE = 16.0
 """Twice the log likelihood that two more numbers must gain: chance 3e-4 under white noise."""
@@ -66,13 +66,17 @@ def find_colours(found: Fit) -> dict[str, Colour]:
             continue
 
         def twice(numbers: Array, power: Array = power, frequency: Array = frequency) -> float:
-            law = _power(frequency, float(np.exp(numbers[0])), float(np.tanh(numbers[1])))
+            std = float(np.exp(numbers[1])) if len(numbers) > 1 else 1.0
+            law = _power(frequency, std, float(np.tanh(numbers[0])))
             return float((np.log(law) + power / law).sum())
 
-        starts = [minimize(twice, [0.0, a], method="Nelder-Mead") for a in (0.0, 0.7)]
-        best = min(starts, key=lambda result: result.fun)
-        if float(power.sum()) - best.fun > _SURE:
-            colours[name] = Colour(name, float(np.exp(best.x[0])), float(np.clip(np.tanh(best.x[1]), -0.5, 0.97)))
+        white = float(power.sum())
+        stated = min((minimize(twice, [a], method="Nelder-Mead") for a in (0.0, 0.8)), key=lambda r: r.fun)
+        louder = minimize(twice, [stated.x[0], 0.0], method="Nelder-Mead")
+        best = louder if stated.fun - louder.fun > _SURE else stated
+        if white - best.fun > _SURE:
+            std = float(np.exp(best.x[1])) if len(best.x) > 1 else 1.0
+            colours[name] = Colour(name, std, float(np.clip(np.tanh(best.x[0]), -0.5, 0.97)))
     return colours
 
 

@@ -155,7 +155,7 @@ def _coloured(found: Fit, colours: Mapping[str, Colour]) -> Fit:
     """The same with noise of these colours; `found` has white noise."""
     if not colours:
         return found
-    return fit(replace(found.model, whitener=whitener_for(found, colours)), found.values)
+    return fit(replace(found.model, whitener=whitener_for(found, dict(colours))), found.values)
 
 
 def _colours_of(found: Fit) -> dict[str, Colour]:
@@ -226,7 +226,7 @@ def _finish(
     alternatives = tuple(next(e for e in rival.effects if e not in effects) for rival in rivals)
     rival_forms = tuple(next(f for f in rival.forms if f.effect == e)
                         for rival, e in zip(rivals, alternatives, strict=True))  # fmt: skip
-    told, shares = "", {}
+    told, shares = "", dict[str, float]()
     if verdict == "unknown":
         told, shares = depends_on(latent_table(problem, best_values, best.model.forms))
     return Diagnosis(

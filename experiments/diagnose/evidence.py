@@ -70,15 +70,32 @@ def score(found: Fit) -> float:
     return likelihood - cost
 
 
+_SIZES = (0.1, 0.4, 1.0, 3.0)
+
+
 def best_start(model: Model, form: Form, values: Values) -> Fit:
-    """The best fit of `model` (which holds `form`) over the form's starts, other values from `values`."""
+    """The best fit of `model` (which holds `form`) over the form's starts, in several sizes of the amplitude.
+
+    The other values are those given, and those of the priors: a base model that lacks an effect bends its parameters.
+    """
+    if hasattr(model.problem, "guess"):  # it tries the starts itself
+        return fit(model, values)
     starts = form.starts or ({form.amplitude: 1.0},)
-    points = [{**values, **start} for start in starts]
-    if len(points) > 2:
-        # One linear step tells which starts are worth following.
-        objectives = [fit(model, point, rounds=2).objective for point in points]
-        points = [points[k] for k in np.argsort(objectives)[:2]]
-    fits = [fit(model, point, rounds=6) for point in points]
+    amplitude = next(p for p in form.parameters if p.name == form.amplitude)
+    known = {p.name: p.value for p in model.problem.base if math.isfinite(p.std)}
+    points = []
+    for start in starts:
+        for size in _SIZES:
+            value = float(np.clip(size * start[form.amplitude], amplitude.lowest, 0.95 * amplitude.highest))
+            for others in (values, {**values, **known}) if known else (values,):
+                points.append({**others, **start, form.amplitude: value})
+    objectives = np.array([float(modes @ modes) for modes in model.evaluate(points)])
+    order = np.argsort(objectives)
+    chosen = [int(order[0])]
+    for k in order[1:]:  # the next best that is not of the same start
+        if len(chosen) < 3 and all(abs(int(k) - c) >= 2 for c in chosen):
+            chosen.append(int(k))
+    fits = [fit(model, points[k], rounds=5) for k in chosen]
     best = min(fits, key=lambda found: found.objective)
     return fit(model, best.values)
 

@@ -168,7 +168,8 @@ def fit(model: Model, start: Values | None = None, *, rounds: int = _ROUNDS) -> 
     low, high = np.array([p.lowest for p in parameters]), np.array([p.highest for p in parameters])
     middle = np.array([p.value for p in parameters])
     precision = np.array([0.0 if math.isinf(p.std) else p.std**-2 for p in parameters])
-    x = np.array([(start or {}).get(p.name, p.value) for p in parameters], dtype=float)
+    start = _begun(model, start)
+    x = np.array([start.get(p.name, p.value) for p in parameters], dtype=float)
     x = np.clip(x, low, high)
     names = [p.name for p in parameters]
 
@@ -212,6 +213,16 @@ def fit(model: Model, start: Values | None = None, *, rounds: int = _ROUNDS) -> 
     if best is None:
         best = model.evaluate([named(x)])[0]
     return Fit(model, named(x), best, jacobian, float(best @ best), penalty(x), free)
+
+
+def _begun(model: Model, start: Values | None) -> Values:
+    """Where to begin: as told, and what is not told by the problem's own search, where it has one (`guess`)."""
+    known, guess = dict(start or {}), getattr(model.problem, "guess", None)
+    if guess is None or all(p.name in known for p in model.parameters):
+        return known
+    held = model.held is not None
+    found: Values = guess(model.forms, model.trials, {**(model.held or {}), **known}, held=held)
+    return found
 
 
 def _solve(matrix: Array, right: Array) -> Array:

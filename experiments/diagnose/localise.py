@@ -62,7 +62,7 @@ def places(model: Model, values: Values, trials: Sequence[str]) -> list[Place]:
 def _runs(phase: NDArray[np.str_]) -> list[tuple[int, int]]:
     if not len(phase):
         return []
-    edges = [0, *(np.flatnonzero(phase[1:] != phase[:-1]) + 1).tolist(), len(phase)]
+    edges: list[int] = [0, *(np.flatnonzero(phase[1:] != phase[:-1]) + 1).tolist(), len(phase)]
     return list(pairwise(edges))
 
 
@@ -72,7 +72,8 @@ def _core(rest: Array) -> tuple[int, int]:
     if len(rest) < _WINDOW or energy.sum() <= 0:
         return 0, len(rest) - 1
     share = np.cumsum(energy) / energy.sum()
-    return int(np.searchsorted(share, 0.05)), int(min(np.searchsorted(share, 0.95), len(rest) - 1))
+    first, last = (int(place) for place in np.searchsorted(share, [0.05, 0.95]))
+    return first, min(last, len(rest) - 1)
 
 
 def latent_table(problem: Problem, values: Values, forms: Sequence[Form]) -> dict[str, NDArray[np.generic]]:

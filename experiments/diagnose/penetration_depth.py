@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 _INTERVALS = (1, 2, 4, 8, 16, 32, 64, 128)
 _MOST_KINKS = 10
+_GENTLE = 3  # intervals of a cubic spline that is always let free
+_ROUND = (0.01, 0.025, 0.05)  # of the record, about a kink
 _KINKED_INTERVALS = 2  # finer splines need no kinks, and the search is dear
 _KINK_GRID = 160
 
@@ -57,22 +59,22 @@ def smooth_depth(time: Array, depth: Array, std: float) -> SmoothDepth:
     span = time[-1] - time[0]
     u = (time - time[0]) / (span if span > 0 else 1.0)
     noise = max(std, 1e-9 * max(float(np.ptp(depth)), 1e-9))
-    best: tuple[float, Array, Array] | None = None
+    best: tuple[float, Array, Array, list[float], int] | None = None
     enough = 0
     for intervals in (0, *_INTERVALS):
         basis, slopes = _basis(u, intervals)
         if basis.shape[1] > max(2, len(u) // 3):
             break
         kinks = _MOST_KINKS if intervals <= _KINKED_INTERVALS else 0
-        score, basis, slopes = _with_kinks(u, depth / noise, basis, slopes, kinks)
+        score, basis, slopes, places = _with_kinks(u, depth / noise, basis, slopes, kinks)
         if best is None or score < best[0]:
-            best = (score, basis, slopes)
+            best = (score, basis, slopes, places, intervals)
         if score - np.log(len(u)) * basis.shape[1] < len(u) + 2 * np.sqrt(2 * len(u)):  # down to the noise
             enough += 1
             if enough == 3:
                 break
     assert best is not None
-    _, basis, slopes = best
+    basis, slopes = _enlarged(u, *best[1:])
     q, r = np.linalg.qr(basis)
     weights = q.T @ depth
     slope_map = np.linalg.solve(r.T, slopes.T).T / (span if span > 0 else 1.0)
@@ -89,9 +91,44 @@ def _basis(u: Array, intervals: int) -> tuple[Array, Array]:
     return spline(u), spline.derivative()(u)
 
 
-def _with_kinks(u: Array, measured: Array, basis: Array, slopes: Array, most: int) -> tuple[float, Array, Array]:
-    """The criterion, and the columns with as many kinks as it allows, each found where it helps most."""
+def _enlarged(
+    u: Array, basis: Array, slopes: Array, places: list[float], intervals: int
+) -> tuple[Array, Array]:
+    """With what the noise may hide: bends over the whole twice as fine, and rounder turns about each kink.
+
+    The criterion leaves out what a depth sensor cannot see; a force sensor in a stiff bed can, and would take it for an
+    effect. So it is let free, and its error, which `SmoothDepth` knows, is part of the likelihood.
+    """
+    columns, changes = [basis], [slopes]
+    gentle, steep = _basis(u, max(_GENTLE, 2 * intervals))
+    if gentle.shape[1] <= len(u) // 8:
+        columns.append(gentle)
+        changes.append(steep)
+    for place in places:
+        for away in _ROUND:
+            for at in (place - away, place + away):
+                if 0.01 < at < 0.99:
+                    columns.append(np.maximum(u - at, 0.0)[:, None])
+                    changes.append((u > at).astype(float)[:, None])
+    whole, steps = np.hstack(columns), np.hstack(changes)
+    kept: list[int] = []
+    q = np.zeros((len(u), 0))
+    for k in range(whole.shape[1]):  # what the columns before it hold already is left out
+        rest = whole[:, k] - q @ (q.T @ whole[:, k])
+        rest -= q @ (q.T @ rest)
+        size = float(np.linalg.norm(rest))
+        if size > 1e-4 * float(np.linalg.norm(whole[:, k])) and len(kept) < len(u) // 3:
+            kept.append(k)
+            q = np.column_stack([q, rest / size])
+    return whole[:, kept], steps[:, kept]
+
+
+def _with_kinks(
+    u: Array, measured: Array, basis: Array, slopes: Array, most: int
+) -> tuple[float, Array, Array, list[float]]:
+    """The criterion, the columns with as many kinks as it allows, each where it helps most, and where they are."""
     n = len(u)
+    places: list[float] = []
 
     q = np.linalg.qr(basis)[0]
     rest = measured - q @ (q.T @ measured)
@@ -100,10 +137,11 @@ def _with_kinks(u: Array, measured: Array, basis: Array, slopes: Array, most: in
     for _ in range(min(most, n // 6)):
         if rest @ rest < n + 3 * np.sqrt(2 * n):  # nothing left that a kink could explain
             break
-        place = _best_kink(u, q, rest, grid)
+        place, power = _best_kink(u, q, rest, grid)
         fine = place + np.linspace(-1.2, 1.2, 41) / _KINK_GRID
-        place = _best_kink(u, q, rest, fine[(fine > 0) & (fine < 1)])
-        trial = np.column_stack([basis, np.maximum(u - place, 0.0)])
+        place, power = _best_kink(u, q, rest, fine[(fine > 0) & (fine < 1)], (power,))
+        after = np.maximum(u - place, 0.0)
+        trial = np.column_stack([basis, after**power])
         column = trial[:, -1] - q @ (q.T @ trial[:, -1])
         column /= np.linalg.norm(column)
         q_new, rest_new = np.column_stack([q, column]), rest - column * (column @ rest)
@@ -111,13 +149,20 @@ def _with_kinks(u: Array, measured: Array, basis: Array, slopes: Array, most: in
         if not new < score - 4.0:
             break
         score, q, rest, basis = new, q_new, rest_new, trial
-        slopes = np.column_stack([slopes, (u > place).astype(float)])
-    return score, basis, slopes
+        places.append(place)
+        slopes = np.column_stack([slopes, (u > place).astype(float) if power == 1 else 2 * after])
+    return score, basis, slopes, places
 
 
-def _best_kink(u: Array, q: Array, rest: Array, places: Array) -> float:
-    hinges = np.maximum(u[:, None] - places[None, :], 0.0)
-    hinges = hinges - q @ (q.T @ hinges)
-    size = np.sqrt((hinges**2).sum(axis=0))
-    gain = np.where(size > 1e-9, np.abs(rest @ hinges) / np.maximum(size, 1e-12), 0.0)
-    return float(places[int(np.argmax(gain))])
+def _best_kink(u: Array, q: Array, rest: Array, places: Array, powers: tuple[int, ...] = (1, 2)) -> tuple[float, int]:
+    """Where a kink (power 1: the speed jumps) or a bend (2: it begins to change) takes most away, and which."""
+    best = (-1.0, 0.5, 1)
+    for power in powers:
+        columns = np.maximum(u[:, None] - places[None, :], 0.0) ** power
+        whole = np.sqrt((columns**2).sum(axis=0))
+        columns = columns - q @ (q.T @ columns)
+        size = np.sqrt((columns**2).sum(axis=0))
+        gain = np.where(size > 1e-6 * whole, np.abs(rest @ columns) / np.maximum(size, 1e-300), 0.0)
+        place = int(np.argmax(gain))
+        best = max(best, (float(gain[place]), float(places[place]), power))
+    return best[1], best[2]

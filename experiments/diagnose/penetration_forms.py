@@ -114,10 +114,10 @@ def _add_layering(add: _Add) -> None:
     effect, edge, width = "layering", ("layer_depth", "depth", math.log(0.15), math.log(1.25)), math.log(0.12)
     starts = tuple((a, math.log(x)) for x in (0.3, 0.55, 0.85) for a in (0.4, -0.25))
     add(effect, "slope", ("layer_slope", "spring", 0.8, -1.5, 20.0), edge, starts=starts)
-    starts = tuple((a, math.log(x), math.log(0.04)) for x in (0.3, 0.55, 0.85) for a in (0.3, -0.2))
+    sharp = tuple((a, math.log(x), math.log(0.04)) for x in (0.3, 0.55, 0.85) for a in (0.3, -0.2))
     narrow = ("layer_width", "depth", math.log(0.005), width)
-    add(effect, "factor", ("layer_factor", "plain", 0.8, -0.95, 20.0), edge, narrow, starts=starts)
-    add(effect, "step", ("layer_step", "spring force", 0.5, -2.0, 10.0), edge, narrow, starts=starts)
+    add(effect, "factor", ("layer_factor", "plain", 0.8, -0.95, 20.0), edge, narrow, starts=sharp)
+    add(effect, "step", ("layer_step", "spring force", 0.5, -2.0, 10.0), edge, narrow, starts=sharp)
     add(effect, "crust", ("layer_bump", "spring force", 0.4, 0.0, 10.0),
         ("layer_depth", "depth", math.log(0.05), math.log(1.25)),
         ("layer_width", "depth", math.log(0.02), math.log(0.2)),
@@ -128,6 +128,8 @@ def _add_drag(add: _Add, speeds_differ: bool) -> None:
     effect = "inertial-drag"
     add(effect, "square", ("drag", "drag", 0.5, 0.0, 20.0), starts=((0.1,),))
     if speeds_differ:
+        add(effect, "with an onset", ("drag_onset", "drag", 0.5, 0.0, 20.0), ("drag_reach", "depth", -3.0, 1.0),
+            starts=((0.1, -2.0), (0.1, 0.0)))  # fmt: skip
         add(effect, "growing with depth", ("drag_deep", "drag", 0.5, 0.0, 20.0), starts=((0.1,),))
         add(effect, "of the tip", ("drag_tip", "drag", 0.5, 0.0, 20.0), starts=((0.1,),))
         add(effect, "both ways", ("drag_both", "drag", 0.5, 0.0, 20.0), starts=((0.1,),))

@@ -28,7 +28,7 @@ SLOTS = (
     "hardening_early", "hardening_reach",
     "layer_depth", "layer_width", "layer_slope", "layer_step", "layer_factor", "layer_bump",
     "crater_share", "crater_bend", "unload_stiffness", "hysteresis", "hysteresis_reach",
-    "drag", "drag_deep", "drag_both", "drag_tip",
+    "drag", "drag_onset", "drag_reach", "drag_deep", "drag_both", "drag_tip",
     "shaft", "shaft_deep", "shaft_square", "shaft_viscous",
     "pull", "pull_reach", "pull_deep", "pull_short", "pull_viscous",
     "shift_depth", "shift_speed",
@@ -39,7 +39,7 @@ PHASES = ("free", "in", "rest", "out")
 
 _SLOT = {name: place for place, name in enumerate(SLOTS)}
 _NEVER_ZERO = {"reference": 0.01, "speed_scale": 1e-4, "radius_depth": 1e-4, "layer_depth": 0.01, "layer_width": 1e-3,
-               "hardening_reach": 1e-3, "hysteresis_reach": 1e-3, "pull_reach": 1e-3}  # fmt: skip
+               "hardening_reach": 1e-3, "drag_reach": 1e-3, "hysteresis_reach": 1e-3, "pull_reach": 1e-3}  # fmt: skip
 _STEP = 5e-4
 """Longest step of a drop [s]: sqrt(m / K) of a spike on sand is tens of ms, so the error is below 1e-8 of the depth;
 `fall` takes shorter ones where a lane is stiffer."""
@@ -116,6 +116,7 @@ def _kernels() -> tuple[Any, Any]:
         S["crater_share"], S["unload_stiffness"], S["hysteresis"], S["hysteresis_reach"],
     )  # fmt: skip
     DRAG, DRAG_DEEP, DRAG_BOTH, DRAG_TIP = S["drag"], S["drag_deep"], S["drag_both"], S["drag_tip"]
+    DRAG_ONSET, DRAG_REACH = S["drag_onset"], S["drag_reach"]
     SHAFT, SHAFT_DEEP, SHAFT_SQUARE, SHAFT_VISCOUS = (
         S["shaft"], S["shaft_deep"], S["shaft_square"], S["shaft_viscous"],
     )  # fmt: skip
@@ -177,6 +178,8 @@ def _kernels() -> tuple[Any, Any]:
             total += n[k, DAMPING] * sinking
             shape = ti.min(z / n[k, RADIUS_DEPTH], 1.0)
             share = n[k, DRAG] + n[k, DRAG_DEEP] * x + n[k, DRAG_TIP] * shape * (2.0 - shape)
+            if n[k, DRAG_ONSET] != 0.0:
+                share += n[k, DRAG_ONSET] * (1.0 - ti.exp(-z / n[k, DRAG_REACH]))
             total += share * sinking * sinking + n[k, DRAG_BOTH] * v * ti.abs(v)
             total += (n[k, SHAFT] + n[k, SHAFT_DEEP] * x + n[k, SHAFT_SQUARE] * x * x) * way + n[k, SHAFT_VISCOUS] * v
             if back > 0.0:
@@ -188,7 +191,7 @@ def _kernels() -> tuple[Any, Any]:
 
     @ti.kernel
     def push_all(numbers: Table, lane_path: Whole, starts: Whole, depth: Line, speed: Line, out: Table):
-        for k in range(numbers.shape[0]):
+        for k in range(numbers.shape[0]):  # type: ignore[attr-defined]
             path = lane_path[k]
             top, deepest = 0.0, 0.0
             for row in range(starts[path], starts[path + 1]):
@@ -201,7 +204,7 @@ def _kernels() -> tuple[Any, Any]:
 
     @ti.kernel
     def fall_all(numbers: Table, lane_path: Whole, starts: Whole, times: Line, speeds: Line, steps: Line, out: Cube):
-        for k in range(numbers.shape[0]):
+        for k in range(numbers.shape[0]):  # type: ignore[attr-defined]
             path = lane_path[k]
             m, g = numbers[k, MASS], numbers[k, GRAVITY]
             z, v, t, way = 0.0, speeds[path], 0.0, 1.0

@@ -174,12 +174,12 @@ class PenetrationProblem:
         """Forces [points, n] of driven trials, or motions [points, n, 4] of drops; all trials of one mode."""
         count = len(points)
         numbers = slot_table(count * len(trials))
-        lanes = np.repeat(np.arange(len(trials)), count)
+        lanes = np.repeat(np.arange(len(trials), dtype=np.int32), count)
         for place, trial in enumerate(trials):
             for k, values in enumerate(points):
                 self._numbers(values, forms, trial, numbers[place * count + k])
         numbers[:, _SLOT["shift_depth"]], numbers[:, _SLOT["shift_speed"]] = shifts
-        starts = np.concatenate([[0], np.cumsum([len(trial.time) for trial in trials])])
+        starts = np.cumsum([0, *(len(trial.time) for trial in trials)]).astype(np.int32)
         if trials[0].driven:
             depth = np.concatenate([trial.smooth.depth for trial in trials if trial.smooth is not None])
             speed = np.concatenate([trial.smooth.speed for trial in trials if trial.smooth is not None])

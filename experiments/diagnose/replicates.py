@@ -16,8 +16,13 @@ from .problem import Finding, Parameter, Problem, TrialInfo
 __all__ = ["find_scatter", "groups_of", "odd_trials", "split_trials"]
 
 _SURE = 1e-4
+_LEAST = 0.005
+"""Relative scatter below this is not the bed's: the smoothing of a depth column does as much."""
 _AT_ODDS = 20.0
 """How many times as far from its replicates as they are from one another, in mean square, a trial is at odds."""
+
+_SIZEABLE = 0.2
+"""And by which share of what the base model leaves it must differ: small errors of the path count for more there."""
 
 
 def groups_of(trials: Sequence[TrialInfo]) -> dict[tuple[object, ...], list[str]]:
@@ -95,8 +100,8 @@ def find_scatter(found: Fit) -> tuple[tuple[Parameter, ...], dict[str, float]]:
             count += len(ids) - 1
             between += float(((b - b.mean()) ** 2).sum())
             within += float((s**2).sum() * (len(ids) - 1) / len(ids))
-        if stats.chi2.sf(surprise, count) < _SURE and between > within:
-            std = math.sqrt((between - within) / count)
+        std = math.sqrt(max(between - within, 0.0) / count)
+        if stats.chi2.sf(surprise, count) < _SURE and std > _LEAST:
             model_std[kind] = std
             active = (*active, *(replace(p, std=std) for p in parameters))
     return active, model_std
@@ -118,7 +123,8 @@ def odd_trials(found: Fit) -> list[Finding]:
             others = [other for other in ids if other != id]
             mine = min(far[(id, other)] for other in others)
             theirs = float(np.median([far[(a, b)] for a in others for b in others if a != b]))
-            if mine > _AT_ODDS * max(theirs, 1.0):
+            size = float(np.median([np.mean(modes[other] ** 2) for other in others]))
+            if mine > _AT_ODDS * max(theirs, 1.0) and mine > _SIZEABLE * size:
                 what = (
                     f"trial {id} is at odds with its {len(others)} replicates, which agree with one another: in mean "
                     f"square it lies {mine / max(theirs, 1e-12):.0f} times as far from them; it is set aside"

@@ -104,16 +104,20 @@ class Search:
 
     def _enriched(self, hypothesis: Hypothesis) -> Hypothesis:
         """With a second form of one of its effects, where that helps: nature's form is between the library's."""
-        if excess(hypothesis.fit) < 0.5 * np.sqrt(2.0 * hypothesis.fit.count):
-            return hypothesis
         best = hypothesis
-        taken = {p.name for form in hypothesis.forms for p in form.parameters}
-        for form in hypothesis.fit.model.problem.forms:
-            if form.effect not in hypothesis.effects or any(p.name in taken for p in form.parameters):
-                continue
-            made = self._try(f"{_said(hypothesis)} + {form.id}", hypothesis, [form])
-            if made.score > best.score + 1.0:
-                best = made
+        for _ in range(2):
+            start = best
+            if excess(start.fit) < 0.5 * np.sqrt(2.0 * start.fit.count):
+                break
+            taken = {p.name for form in start.forms for p in form.parameters}
+            for form in start.fit.model.problem.forms:
+                if form.effect not in start.effects or any(p.name in taken for p in form.parameters):
+                    continue
+                made = self._try(f"{_said(start)} + {form.id}", start, [form])
+                if made.score > best.score + 1.0:
+                    best = made
+            if best is start:
+                break
         return best
 
     def _further(self, best: Hypothesis, first: Sequence[Hypothesis]) -> Hypothesis:

@@ -1,0 +1,124 @@
+"""A diagnosis as files: diagnosis.json, model.toml, latent.csv, and the series and tables that the report is made of.
+
+```
+diagnosis.json       the contract (diagnosis.schema.json beside this file), and how sure, in `evidence` and `gate`
+model.toml           the model with what was added: `hedgebed tumble --model` and `penetrate --model` run it
+latent.csv           where the verdict is unknown: what the model lacks, row by row
+evidence.csv         every candidate: its score, what it leaves, its parameters
+series/<trial>.<channel>.csv    t_s,measured,before,after,phase
+```
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.runfolder import write_json, write_series
+
+from .diagnosis import Diagnosis
+from .evidence import excess
+
+__all__ = ["document", "write_diagnosis"]
+
+
+def document(found: Diagnosis) -> dict[str, Any]:
+    """diagnosis.json."""
+    effects = [{"id": effect, "parameters": found.parameters(effect)} for effect in found.effects]
+    said: dict[str, Any] = {
+        "format": "hedgehog-diagnosis/1",
+        "verdict": found.verdict,
+        "effects": effects,
+        "alternatives": list(found.alternatives) if found.verdict == "ambiguous" else [],
+        "where": [
+            {"trial": p.trial, "channel": p.channel, "phase": p.phase, "from_s": p.from_s, "to_s": p.to_s,
+             "excess": p.excess}
+            for p in found.where
+        ],
+        "gap": {
+            "before": {"fit": found.before.fit, "held_out": found.before.held_out},
+            "after": {"fit": found.after.fit, "held_out": found.after.held_out},
+            "held_out_trials": list(found.held_out),
+        },
+    }  # fmt: skip
+    if found.verdict == "unknown":
+        said["latent"] = {"file": "latent.csv", "depends_on": found.depends_on, "explained": dict(found.shares)}
+    said["base"] = _base_values(found)
+    said["gate"] = {
+        "before": {"passed": found.gate_before.passed, "score": found.gate_before.score,
+                   "threshold": found.gate_before.threshold},
+        "after": {"passed": found.gate_after.passed, "score": found.gate_after.score,
+                  "threshold": found.gate_after.threshold},
+    }  # fmt: skip
+    said["evidence"] = _evidence(found)[:12]
+    said["noise"] = {c.channel: {"std": c.std, "persistence": c.persistence} for c in found.colours.values()}
+    said["model_std"] = dict(found.model_std)
+    said["findings"] = [
+        {"trial": f.trial, "what": f.what, "channel": f.channel, "from_s": f.from_s, "to_s": f.to_s,
+         "set_aside": f.set_aside}
+        for f in found.findings
+    ]  # fmt: skip
+    said["next_experiment"] = found.next_experiment
+    return said
+
+
+def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
+    """Write all files into `folder` and return diagnosis.json."""
+    problem = found.problem
+    said = document(found)
+    if found.verdict == "unknown":
+        write_series(folder / "latent.csv", found.latent())
+    problem.write_model(str(folder / "model.toml"), found.best_values, found.forms)
+    rows = _evidence(found)
+    if rows:
+        write_series(folder / "evidence.csv", {
+            "candidate": np.array([r["candidate"] for r in rows]),
+            "effects": np.array([" + ".join(r["effects"]) for r in rows]),
+            "score": np.array([r["score"] for r in rows]),
+            "chi_square_left": np.array([r["left"] for r in rows]),
+        })  # fmt: skip
+    for trial in problem.trials:
+        before = problem.compare(found.base_values, (), trial.id)
+        after = problem.compare(found.best_values, found.forms, trial.id)
+        samples = problem.samples(trial.id)
+        phases = problem.phases(found.base_values, (), trial.id)
+        for channel, columns in before.items():
+            rows_here = samples.channel == channel
+            columns = {"t_s": columns["t_s"], "measured": columns["measured"], "before": columns["model"],
+                       "after": after[channel]["model"]}  # fmt: skip
+            if len(columns["t_s"]) == int(rows_here.sum()):
+                columns |= {"std": samples.std[rows_here], "phase": phases[rows_here]}
+            write_series(folder / "series" / f"{trial.id}.{channel}.csv", columns)
+    write_json(folder / "diagnosis.json", said)
+    return said
+
+
+def _base_values(found: Diagnosis) -> dict[str, Any]:
+    """The base parameters before and after, with their standard errors."""
+    result = {}
+    for stage, fit in (("before", found.base), ("after", found.best)):
+        variance = np.diag(fit.covariance())
+        names = [p.name for p in fit.model.parameters]
+        result[stage] = {
+            p.name: {"value": fit.values[p.name], "std": float(np.sqrt(max(variance[names.index(p.name)], 0.0))),
+                     "unit": p.unit}
+            for p in found.problem.base if p.trial is None and p.name in names
+        }  # fmt: skip
+    return result
+
+
+def _evidence(found: Diagnosis) -> list[dict[str, Any]]:
+    """Every candidate that was tried, the likeliest first; scores relative to the base model [nats]."""
+    if found.choice is None:
+        return []
+    zero = found.choice.base.score
+    seen: dict[tuple[str, ...], dict[str, Any]] = {}
+    for _, hypothesis in found.choice.table:
+        key = tuple(form.id for form in hypothesis.forms)
+        row = {"candidate": " + ".join(key), "effects": list(hypothesis.effects), "score": hypothesis.score - zero,
+               "left": float(excess(hypothesis.fit) / hypothesis.fit.count)}  # fmt: skip
+        if key not in seen or row["score"] > seen[key]["score"]:
+            seen[key] = row
+    return sorted(seen.values(), key=lambda row: -row["score"])

@@ -1,0 +1,124 @@
+"""`hedgebed diagnose CAMPAIGN`: a campaign of measured trials in, a diagnosis in a run folder out."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from experiments.campaign import read_campaign
+from experiments.diagnose_settings import DiagnoseSettings
+from experiments.progress import Progress
+from experiments.runfolder import RunFolder
+from hedgebed import __version__
+
+from .diagnosis import Diagnosis, diagnose
+from .document import write_diagnosis
+from .problem import Problem
+
+__all__ = ["check", "diagnose_campaign", "resume", "run"]
+
+
+def check(settings: DiagnoseSettings) -> None:
+    """Raise ValueError, naming file and line or key, for a campaign that cannot be read or diagnosed."""
+    _make_problem(Path(settings.campaign))
+
+
+def run(settings: DiagnoseSettings, folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
+    """Diagnose into `folder` and return the result. Raises ValueError as `check` does."""
+    kept = RunFolder.ensure(Path(folder), "diagnose", settings)
+    return _carry_out(settings, kept, progress or Progress())
+
+
+def resume(folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
+    """Diagnose again from the start."""
+    kept = RunFolder.open(Path(folder))
+    return _carry_out(DiagnoseSettings(**kept.settings), kept, progress or Progress())
+
+
+def diagnose_campaign(
+    campaign: str | Path, *, thorough: bool = False, seed: int = 0, progress: Progress | None = None
+) -> Diagnosis:
+    """The diagnosis of the campaign in a folder, without files. Raises ValueError as `check` does."""
+    problem = _make_problem(Path(campaign))
+    told = progress or Progress()
+    stage = [""]
+
+    def tell(what: str, done: float) -> None:
+        if what != stage[0]:
+            stage[0] = what
+            told.stage(what, total=1.0)
+        told.update(done)
+
+    with threadpool_limits(1):  # matrices are small: threads of the linear algebra only get in each other's way
+        return diagnose(problem, thorough=thorough, seed=seed, tell=tell)
+
+
+def _make_problem(folder: Path) -> Problem:
+    campaign = read_campaign(folder)
+    name = f"experiments.diagnose.{campaign.tables.kind}_problem"
+    if find_spec(name) is None:
+        raise ValueError(f"{folder}: kind = {campaign.tables.kind!r} cannot be diagnosed yet")
+    with threadpool_limits(1):
+        return import_module(name).make_problem(campaign)
+
+
+def _carry_out(settings: DiagnoseSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
+    with folder.lock():
+        found = diagnose_campaign(settings.campaign, thorough=settings.thorough, seed=settings.seed, progress=progress)
+        for finding in found.findings:
+            progress.message(finding.what)
+        with threadpool_limits(1):
+            said = write_diagnosis(folder.path, found)
+        result = _result(found, said)
+        folder.write_result(result)
+        progress.stage("report", total=1.0)
+        from vis.diagnose import write_diagnosis_report
+
+        write_diagnosis_report(folder.path, progress=progress.update)
+    return result
+
+
+def _result(found: Diagnosis, said: dict[str, Any]) -> dict[str, Any]:
+    names = " and ".join(found.effects) or "nothing"
+    title = {
+        "none": "nothing is missing: the model with its fitted parameters explains the trials",
+        "named": f"missing: {names}",
+        "ambiguous": f"missing: {names}, or {' or '.join(found.alternatives)}: these trials cannot tell",
+        "unknown": "something is missing that no effect of the library explains"
+        + (f"; {names} for certain" if found.effects else ""),
+    }[found.verdict]
+    quantities: dict[str, Any] = {
+        f"gap_{stage}_{part}": {"value": value, "std": 0.0 if value is not None else None, "unit": "1",
+                                "note": "chi-square per sample"}
+        for stage, gap in (("before", found.before), ("after", found.after))
+        for part, value in (("fit", gap.fit), ("held_out", gap.held_out))
+    }  # fmt: skip
+    for stage in ("before", "after"):
+        for name, entry in said["base"][stage].items():
+            quantities[f"{name}_{stage}"] = entry
+    for effect in said["effects"]:
+        for name, entry in effect["parameters"].items():
+            quantities[f"{effect['id']}.{name}"] = entry
+    sentences = [said["next_experiment"]]
+    if "latent" in said:
+        sentences.insert(0, f"What is missing depends on {said['latent']['depends_on']}.")
+    sentences += [colour.sentence for colour in found.colours.values()]
+    sentences += [
+        f"Replicates differ by more than the sensors: {kind}, standard deviation {std:.3g} (relative); it is the bed's."
+        for kind, std in found.model_std.items()
+    ]
+    return {
+        "format": "hedgebed-result/1",
+        "experiment": "diagnose",
+        "version": __version__,
+        "title": title[:1].upper() + title[1:],
+        "status": "done",
+        "verdict": found.verdict,
+        "quantities": quantities,
+        "departures": {"sentences": sentences},
+        "warnings": [finding.what for finding in found.findings],
+    }

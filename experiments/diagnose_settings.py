@@ -1,0 +1,19 @@
+"""Settings of `hedgebed diagnose`."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from experiments.strict import StrictSettings
+
+__all__ = ["DiagnoseSettings"]
+
+
+class DiagnoseSettings(StrictSettings):
+    """What is diagnosed, and how much time that may take."""
+
+    campaign: str = Field(min_length=1, description="Folder of the measured trials, with campaign.toml.")
+    thorough: bool = Field(
+        False, description="Calibrate the gate by full refits to made-up data; takes as long as it takes."
+    )
+    seed: int = Field(0, ge=0, description="Seed of the made-up data by which the gate is calibrated.")
