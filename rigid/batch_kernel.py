@@ -340,6 +340,7 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                 slip_kept = ti.Vector([0.0, 0.0, 0.0])
                 h_kept = ti.Vector([0.0, 0.0, 0.0])
                 d_kept = ti.Vector([0.0, 0.0, 0.0])
+                depth_kept = ti.Vector([0.0, 0.0, 0.0])
                 for j in ti.static(range(3)):
                     n = (lowest + j - 1 + count) % count
                     bit = 1 << n
@@ -348,6 +349,7 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                     sine = low_sin * TURN_COS[j] + low_cos * TURN_SIN[j]
                     h, d = arms(cosine, sine, s.length, radius)
                     depth = h - y1
+                    depth_kept[j] = depth
                     deepest = depth
                     if ti.static(MEMORY):
                         deepest = ti.max(top[n], depth)
@@ -424,60 +426,63 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                 bound_v = 0.0
                 bound_r = 0.0
                 g_tt = tx - mean_h * tt
+                plain = True
                 if ti.static(DRY):
                     bound_v, bound_r = dry_friction(p, s)
-                    if slide_v != 0:
-                        part = bound_v * slide_v
-                        bx, by, bt = divide(mxx, mxy, myy, mxt, myt, mtt, -part * s.up_x, -part * s.up_y, 0.0)
-                        ax1 += bx
-                        ay1 += by
-                        alpha1 += bt
-                    if slide_r != 0:
-                        bx, by, bt = divide(mxx, mxy, myy, mxt, myt, mtt, 0.0, 0.0, -bound_r * slide_r)
-                        ax1 += bx
-                        ay1 += by
-                        alpha1 += bt
-                    wx, wy, wt = divide(mxx, mxy, myy, mxt, myt, mtt, s.up_x, s.up_y, 0.0)
-                    rx, ry, rt = divide(mxx, mxy, myy, mxt, myt, mtt, 0.0, 0.0, 1.0)
-                    on = ti.Vector([0.0, 0.0, 0.0])
-                    if holds:
-                        on[0] = 1.0
-                    if slide_v == 0 and bound_v > 0.0:
-                        on[1] = 1.0
-                    if slide_r == 0 and bound_r > 0.0:
-                        on[2] = 1.0
-                    g = ti.Matrix(
-                        [
-                            [tx - mean_h * tt, wx - mean_h * wt, rx - mean_h * rt],
-                            [s.up_x * tx + s.up_y * ty, s.up_x * wx + s.up_y * wy, s.up_x * rx + s.up_y * ry],
-                            [tt, wt, rt],
-                        ]
-                    )
-                    right = ti.Vector(
-                        [-(ax1 - mean_h * alpha1 + bias), -(s.up_x * ax1 + s.up_y * ay1), -alpha1]
-                    )
-                    for a in ti.static(range(3)):
-                        right[a] *= on[a]
-                        for b in ti.static(range(3)):
-                            g[a, b] *= on[a] * on[b]
-                        g[a, a] += 1.0 - on[a]
-                    push = g.inverse() @ right
-                    hold, hold_v, hold_r = push[0], push[1], push[2]
-                    ax1 += hold * tx + hold_v * wx + hold_r * rx
-                    ay1 += hold * ty + hold_v * wy + hold_r * ry
-                    alpha1 += hold * tt + hold_v * wt + hold_r * rt
-                    # Speeds that the held directions do not allow.
-                    ux1 = hx + 0.5 * dt * ax1
-                    uy1 = hy + 0.5 * dt * ay1
-                    ut1 = ht + 0.5 * dt * alpha1
-                    wrong = ti.Vector(
-                        [-(ux1 - mean_h * ut1) * on[0], -(s.up_x * ux1 + s.up_y * uy1) * on[1], -ut1 * on[2]]
-                    )
-                    back = g.inverse() @ wrong
-                    px = ux1 + back[0] * tx + back[1] * wx + back[2] * rx
-                    py = uy1 + back[0] * ty + back[1] * wy + back[2] * ry
-                    pt = ut1 + back[0] * tt + back[1] * wt + back[2] * rt
-                else:
+                    plain = bound_v + bound_r == 0.0
+                    if not plain:
+                        if slide_v != 0:
+                            part = bound_v * slide_v
+                            bx, by, bt = divide(mxx, mxy, myy, mxt, myt, mtt, -part * s.up_x, -part * s.up_y, 0.0)
+                            ax1 += bx
+                            ay1 += by
+                            alpha1 += bt
+                        if slide_r != 0:
+                            bx, by, bt = divide(mxx, mxy, myy, mxt, myt, mtt, 0.0, 0.0, -bound_r * slide_r)
+                            ax1 += bx
+                            ay1 += by
+                            alpha1 += bt
+                        wx, wy, wt = divide(mxx, mxy, myy, mxt, myt, mtt, s.up_x, s.up_y, 0.0)
+                        rx, ry, rt = divide(mxx, mxy, myy, mxt, myt, mtt, 0.0, 0.0, 1.0)
+                        on = ti.Vector([0.0, 0.0, 0.0])
+                        if holds:
+                            on[0] = 1.0
+                        if slide_v == 0 and bound_v > 0.0:
+                            on[1] = 1.0
+                        if slide_r == 0 and bound_r > 0.0:
+                            on[2] = 1.0
+                        g = ti.Matrix(
+                            [
+                                [tx - mean_h * tt, wx - mean_h * wt, rx - mean_h * rt],
+                                [s.up_x * tx + s.up_y * ty, s.up_x * wx + s.up_y * wy, s.up_x * rx + s.up_y * ry],
+                                [tt, wt, rt],
+                            ]
+                        )
+                        right = ti.Vector(
+                            [-(ax1 - mean_h * alpha1 + bias), -(s.up_x * ax1 + s.up_y * ay1), -alpha1]
+                        )
+                        for a in ti.static(range(3)):
+                            right[a] *= on[a]
+                            for b in ti.static(range(3)):
+                                g[a, b] *= on[a] * on[b]
+                            g[a, a] += 1.0 - on[a]
+                        push = g.inverse() @ right
+                        hold, hold_v, hold_r = push[0], push[1], push[2]
+                        ax1 += hold * tx + hold_v * wx + hold_r * rx
+                        ay1 += hold * ty + hold_v * wy + hold_r * ry
+                        alpha1 += hold * tt + hold_v * wt + hold_r * rt
+                        # Speeds that the held directions do not allow.
+                        ux1 = hx + 0.5 * dt * ax1
+                        uy1 = hy + 0.5 * dt * ay1
+                        ut1 = ht + 0.5 * dt * alpha1
+                        wrong = ti.Vector(
+                            [-(ux1 - mean_h * ut1) * on[0], -(s.up_x * ux1 + s.up_y * uy1) * on[1], -ut1 * on[2]]
+                        )
+                        back = g.inverse() @ wrong
+                        px = ux1 + back[0] * tx + back[1] * wx + back[2] * rx
+                        py = uy1 + back[0] * ty + back[1] * wy + back[2] * ry
+                        pt = ut1 + back[0] * tt + back[1] * wt + back[2] * rt
+                if plain:
                     if holds:
                         hold = -(ax1 - mean_h * alpha1 + bias) / g_tt
                         ax1 += hold * tx
@@ -616,15 +621,14 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                     largest_speed = ti.max(largest_speed, px * px + py * py)
                     largest_spin = ti.max(largest_spin, ti.abs(pt))
                     if ti.static(MEMORY):
-                        for n in range(count):
-                            angle = theta1 + HALF + n * BETA
-                            depth = (s.length - radius) * ti.cos(angle) + radius - y1
+                        for j in ti.static(range(3)):
+                            n = (lowest + j - 1 + count) % count
                             if (touch & (1 << n)) != 0:
-                                top[n] = ti.max(top[n], depth)
+                                top[n] = ti.max(top[n], depth_kept[j])
                                 if ti.static(HOLDS):
-                                    held[n] = ti.max(held[n], depth)
-                            elif depth < 0.0:
-                                top[n] = 0.0
+                                    held[n] = ti.max(held[n], depth_kept[j])
+                            elif depth_kept[j] < 0.0:
+                                top[n] = 0.0  # forgotten above the surface
                 # -- accept --
                 x = x1
                 y = y1

@@ -20,13 +20,17 @@ def contact_arms(cosine, sine, length, radius):
 
 def divide_mass(xx, xy, yy, xt, yt, tt, fx, fy, ft):
     """M^-1 f for the symmetric mass matrix, by L D L^T; without off-diagonal entries f / diagonal, to the bit."""
-    a = xy / xx
-    b = xt / xx
-    d2 = yy - a * xy
-    c = (yt - b * xy) / d2
-    d3 = tt - b * xt - c * (c * d2)
-    g2 = fy - a * fx
-    at = (ft - b * fx - c * g2) / d3
-    ay = g2 / d2 - c * at
-    ax = fx / xx - a * ay - b * at
+    ax = fx / xx
+    ay = fy / yy
+    at = ft / tt
+    if xy != 0.0 or xt != 0.0 or yt != 0.0:
+        a = xy / xx
+        b = xt / xx
+        d2 = yy - a * xy
+        c = (yt - b * xy) / d2
+        d3 = tt - b * xt - c * (c * d2)
+        g2 = fy - a * fx
+        at = (ft - b * fx - c * g2) / d3
+        ay = g2 / d2 - c * at
+        ax = fx / xx - a * ay - b * at
     return ax, ay, at

@@ -32,12 +32,15 @@ def inertial_side_force(s, depth, slip, sideways):
 
 def hardened(depth, force, work, exponent, reference):
     """The law's force times (z / z_0)^(n - 1); the work is exact for every law that is a power of depth."""
-    z = max(depth, 1e-12)
-    grown = force * (z / reference) ** (exponent - 1.0)
-    ratio = (z / reference) ** (exponent - 1.0)
-    stored = work * ratio
-    if exponent != 1.0 and work > 0.0:
-        stored = grown * z / (force * z / work + exponent - 1.0)
+    grown = force
+    stored = work
+    if exponent != 1.0:
+        z = max(depth, 1e-12)
+        ratio = (z / reference) ** (exponent - 1.0)
+        grown = force * ratio
+        stored = work * ratio
+        if work > 0.0:
+            stored = grown * z / (force * z / work + exponent - 1.0)
     return grown, stored
 
 
@@ -48,9 +51,14 @@ def crater_share(share):
 
 def held_back(s, depth, held, force, reach):
     """A (1 - exp(-(top - z) / d)) of pull, mobilised over the retreat from the deepest depth since it touched."""
-    back = max(held - depth, 0.0)
-    left = exp(-back / reach)
-    return force * (1.0 - left), force * (back - reach * (1.0 - left))
+    pull = 0.0
+    work = 0.0
+    if force != 0.0:
+        back = max(held - depth, 0.0)
+        left = exp(-back / reach)
+        pull = force * (1.0 - left)
+        work = force * (back - reach * (1.0 - left))
+    return pull, work
 
 
 def rate_friction_factor(s, slip, change, speed):
