@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from .tumble_forms import TumbleForm
 from .tumble_forward import SHARED, Forward
 from .tumble_steps import (
-    LENGTHS,
+    EASY,
     SETTLED,
     Answers,
     Linearised,
@@ -221,7 +221,7 @@ class Fitter:
                 gain = cost - prices[best]
                 if gain > 0:
                     u, cost, residuals = tried[best], prices[best], [r[best] for r in answer]
-                    damping = 0.0 if best < len(LENGTHS) * 2 else 1.0
+                    damping = 0.0 if best < EASY else 1.0
                 if gain > (SETTLED if horizon >= 1 else 1e-3 * cost):
                     continue
                 if gain <= 0 and damping < 1e3 and not is_flat(normal, slope):

@@ -32,11 +32,12 @@ ZERO_STD = 3.0 / np.sqrt(3.0)
 """Std of the camera's zero over the sensor's: it may be off by up to 3 of them, evenly (trials.md)."""
 LOST = 1e3
 """Residual where the model cannot stand or run [1]."""
-LENGTHS = (1.0, 0.4)
-"""Lengths at which a step is tried."""
+TRIES = ((0.0, 1.0), (0.0, 0.4), (1e-2, 1.0), (1.0, 1.0), (30.0, 1.0))
+"""Steps that are tried at once: damping on the diagonal of the normal matrix, and length."""
+EASY = 3
+"""How many of them are as good as undamped."""
 SETTLED = 0.05
 """A step that gains less than this in chi-square ends a fit."""
-_DAMPING = (0.0, 1e-2, 1.0, 30.0)  # on the diagonal of the normal matrix
 
 Point = tuple[Mapping[str, float], Array]
 """Values of shared numbers and effects' parameters, and each trial's gravity over its stated one."""
@@ -178,7 +179,7 @@ def steps_to_try(normal: Array, slope: Array, u: Array, space: Space, damping: f
     tried = []
     diagonal = np.diag(normal).copy()
     diagonal[diagonal <= 0] = 1.0
-    for add in _DAMPING:
+    for add, length in TRIES:
         free = ~(((u <= space.low) & (slope > 0)) | ((u >= space.high) & (slope < 0)))
         step = np.zeros_like(u)
         for _ in range(2):  # once more without those that run into a bound at once
@@ -192,7 +193,7 @@ def steps_to_try(normal: Array, slope: Array, u: Array, space: Space, damping: f
             if not (blocked & free).any():
                 break
             free &= ~blocked
-        tried += [np.clip(u + length * step, space.low, space.high) for length in LENGTHS]
+        tried.append(np.clip(u + length * step, space.low, space.high))
     return tried
 
 

@@ -1,0 +1,218 @@
+"""Diagnosing tumbles: the forward model, fits, the checks of data."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.campaign import Campaign, Recording, TumbleCampaign, read_model
+from experiments.diagnose.tumble_checks import checked
+from experiments.diagnose.tumble_data import CHANNELS, tumble_data
+from experiments.diagnose.tumble_fit import Fitter
+from experiments.diagnose.tumble_forms import tumble_forms
+from experiments.diagnose.tumble_forward import Forward
+from experiments.diagnose.tumble_problem import TumbleProblem, make_problem
+from experiments.diagnose.tumble_steps import ZERO_STD, Start, whiten
+from experiments.synthesis import record
+from rigid import STATES, Effect, Trial
+from rigid.sensors import SensorSet
+
+NOMINAL = {"mass": 5.3, "inertia": 0.06, "stiffness": 1.5e4, "damping": 60.0, "mu_s": 0.5, "mu_d": 0.25}
+SIGMA = {"mass": 0.002, "inertia": 0.03, "stiffness": 0.1, "damping": 0.2, "mu_s": 0.05, "mu_d": 0.05}
+CONDITIONS = (
+    {"torque": 0.22, "gravity_sim": 0.0834},
+    {"torque": 0.22, "gravity_sim": 0.147},
+    {"torque": 6.0, "gravity_sim": 0.0834, "actuator": "brake", "wheel_speed_0": 300.0},
+    {"torque": 0.125, "gravity_sim": 0.0834},
+)
+
+
+def campaign(*, effects=(), seed=None, off=0.0, conditions=CONDITIONS, duration=1.2, window=0.004) -> Campaign:
+    """Trials of the accurate integrator through the rig's sensors, true numbers `off` sigmas away from those stated."""
+    true = {name: value * (1 + off * SIGMA[name]) for name, value in NOMINAL.items()}
+    sensors = SensorSet(imu_window=window)
+    recordings, trials = {}, []
+    for number, condition in enumerate(conditions, 1):
+        gravity = condition["gravity_sim"] * (1 + 0.02 * off * (-1) ** number)
+        trial = Trial(**(condition | true | {"gravity_sim": gravity}), counterweight=5.2, effects=effects)
+        own = None if seed is None else (seed, number)
+        measured, _ = record(trial, duration=duration, sensors=sensors, seed=own)
+        id = f"{number:03d}"
+        for sensor in ("pose", "imu", "wheel"):
+            recordings[id, sensor] = Recording(getattr(measured, sensor))
+        files = {sensor: f"{id}-{sensor}.csv" for sensor in ("pose", "imu", "wheel")}
+        trials.append({"id": id, "actuator": "motor", **condition, "counterweight": 5.2, **files})
+    tables = {
+        "format": "hedgehog-campaign/1", "kind": "tumble", "name": "test",
+        "platform": {"mass": 5.3, "inertia": 0.06, "spike_length": 0.2}, "wheel": {"inertia": 1.2e-3},
+        "rig": {"counterweight": 5.2},
+        "surface": {"kind": "brick", **{key: NOMINAL[key] for key in ("stiffness", "damping", "mu_s", "mu_d")}},
+        "uncertainty": SIGMA | {"gravity_sim": 0.02},
+        "sensors": {"pose": {"std": (5e-4, 5e-4, 3e-3)}, "imu": {"std": (0.01, 0.02, 0.02), "window": window},
+                    "wheel": {"std": (0.5,)}},
+        "trial": tuple(trials),
+    }  # fmt: skip
+    return Campaign(TumbleCampaign(**tables), recordings)
+
+
+@pytest.mark.parametrize(
+    ("effects", "given"),
+    [
+        ((), {}),
+        ((Effect(id="pendulum", parameters={"length": 2.2}),), {"pendulum.length": 2.2}),
+        ((Effect(id="slope", parameters={"angle": 0.01}),), {"slope.angle": 0.01}),
+        ((Effect(id="com-offset", parameters={"x": 4e-4, "y": -3e-4}),), {"com-offset.x": 4e-4, "com-offset.y": -3e-4}),
+        (
+            (
+                Effect(id="clock-offset", parameters={"offset": 0.013}),
+                Effect(id="camera-scale", parameters={"scale": 1.02}),
+            ),
+            {"clock-offset.offset": 0.013, "camera-scale.scale": 1.02},
+        ),
+    ],
+)
+def test_the_forward_model_reads_what_the_accurate_integrator_and_the_sensors_would(effects, given):
+    """Another integrator (order 2, 0.5 ms), another way to the means. Its error adds its mean square, in units of the
+    noise, to chi-square per sample: less than a hundredth in every channel of every trial."""
+    data = tumble_data(campaign(effects=effects))
+    predicted = Forward(data).predict({name: np.array([value]) for name, value in given.items()})
+    for trial, found in zip(data.trials, predicted, strict=True):
+        gap = (found.value[0] - trial.value) / trial.std
+        for name in CHANNELS:
+            assert np.mean(gap[trial.of(name)] ** 2) < 0.01, (trial.id, name)
+
+
+def test_without_a_window_the_specific_force_is_that_of_the_instant():
+    data = tumble_data(campaign(window=0.0, conditions=CONDITIONS[:1]))
+    (found,) = Forward(data).predict({})
+    trial = data.trials[0]
+    gap = (found.value[0] - trial.value) / trial.std
+    # A sample at the very moment of a contact may fall on either side of the jump.
+    assert np.median(np.abs(gap[trial.of("ax")])) < 0.01
+    assert np.mean(np.abs(gap[trial.of("ay")]) > 0.5) < 0.03
+
+
+def test_the_whitened_sum_of_squares_is_that_of_the_noise_with_the_cameras_zero_in_it():
+    """r' C^-1 r with C = 1 + s^2 1 1' within each of x, y, theta."""
+    data = tumble_data(campaign(seed=1, conditions=CONDITIONS[:1]))
+    trial = data.trials[0]
+    value = trial.value + trial.std * np.random.default_rng(2).standard_normal(len(trial.value))
+    white = whiten(trial, value[None, :])[0]
+    raw = (trial.value - value) / trial.std
+    for name in CHANNELS:
+        r = raw[trial.of(name)]
+        zero = ZERO_STD**2 if name in ("x", "y", "theta") else 0.0
+        covariance = np.eye(len(r)) + zero * np.ones((len(r), len(r)))
+        assert white[trial.of(name)] @ white[trial.of(name)] == pytest.approx(r @ np.linalg.solve(covariance, r))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_base_model_fits_its_own_data_to_the_noise(seed):
+    """Parameters one sigma off: after a fit chi-square is the number of samples, within four of its deviations."""
+    found = make_problem(campaign(seed=seed, off=1.0))
+    ids = [trial.id for trial in found.trials]
+    values = found.guess((), ids, {})
+    (residuals,) = found.evaluate([values], (), ids)
+    total = sum(float(r @ r) for r in residuals.values())
+    count = sum(len(r) for r in residuals.values())
+    assert abs(total - count) < 4 * math.sqrt(2 * count)
+
+
+def test_growing_horizons_look_at_nothing_that_comes_later():
+    data = tumble_data(campaign(seed=1, conditions=CONDITIONS[:1]))
+    trial = data.trials[0]
+    value = trial.value.copy()
+    value[trial.time > 0.5] += 100 * trial.std[trial.time > 0.5]
+    early = whiten(trial, value[None, :], until=0.5)
+    assert np.abs(early).max() == pytest.approx(0.0, abs=1e-9)
+
+
+def test_every_effect_off_is_the_base_model_to_rounding():
+    """Two kernels, one with all effects compiled in: apart by round-off that a tumble carries on."""
+    data = tumble_data(campaign(seed=1, conditions=CONDITIONS[:2]))
+    fitter = Fitter(Forward(data))
+    forms = tumble_forms(rig=True, sinkage=3e-5, weight=0.88)
+    values = dict(fitter.forward.nominal)
+    gravity = np.ones(2)
+    bare = fitter.residuals([(values, gravity)], ())
+    dressed = fitter.residuals([(values, gravity)], forms)
+    for one, other in zip(bare, dressed, strict=True):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-9)
+
+
+def test_a_pendulum_is_found_with_its_length_and_beats_a_slope():
+    length = 1.5
+    found = make_problem(campaign(effects=(Effect(id="pendulum", parameters={"length": length}),), seed=4, off=0.5))
+    ids = [trial.id for trial in found.trials]
+    fitter = Fitter(found.forward)
+    by_id = {form.id: form for form in found.forms}
+    costs = {}
+    for name in ("pendulum:centred", "slope:plane"):
+        form = by_id[name]
+        starts = [Start(forms=(form,), values=point, scan=True, horizons=(0.3, 0.6, 1.0)) for point in form.starts]
+        costs[name] = min(fitter.fit(starts), key=lambda fit: fit.cost)
+    best = costs["pendulum:centred"]
+    assert best.cost < costs["slope:plane"].cost - 50
+    curvature, error = best.values["pendulum.curvature"], best.std["pendulum.curvature"]
+    assert abs(curvature - 1 / length) < 4 * error
+    reported = found.reported(best.values, by_id["pendulum:centred"])
+    assert reported["length"][0] == pytest.approx(1 / curvature)
+    assert ids == ["001", "002", "003", "004"]
+
+
+def test_the_latent_force_of_a_missing_pendulum_is_that_of_the_wires():
+    """In a hop the model has no force along the surface, so what is left is F_x = -m_b g x / L at the measured x."""
+    length = 2.2
+    effect = Effect(id="pendulum", parameters={"length": length})
+    found = make_problem(campaign(effects=(effect,), seed=1, conditions=CONDITIONS[2:3], duration=0.6))
+    latent = found.latent({}, (), "001")
+    trial = found.data.trials[0]
+    x = np.interp(latent["t_s"], trial.time[trial.of("x")], trial.value[trial.of("x")])
+    hop = (latent["state"] == STATES.index("hop")) & (latent["t_s"] > 0.1)
+    slope = (x[hop] @ latent["latent_force_x_N"][hop]) / (x[hop] @ x[hop])
+    error = 5.3 * 0.02 / np.sqrt(x[hop] @ x[hop])
+    assert abs(slope + 5.2 * 9.80665 / length) < 4 * error + 0.05 * 5.2 * 9.80665 / length
+
+
+def test_a_marker_that_jumps_is_set_aside_and_said():
+    made = campaign(seed=1, conditions=CONDITIONS[:1])
+    pose = made.recordings["001", "pose"]
+    x = pose["x_m"].copy()
+    x[60] += 0.05
+    columns = dict(pose.columns) | {"x_m": x}
+    data = tumble_data(Campaign(made.tables, dict(made.recordings) | {("001", "pose"): Recording(columns)}))
+    clean, findings = checked(data)
+    lost = set(data.trials[0].time[data.trials[0].of("x")]) - set(clean.trials[0].time[clean.trials[0].of("x")])
+    assert lost == {pose.time[60]}
+    assert pose.time[60] not in clean.trials[0].time[clean.trials[0].of("theta")]
+    assert [f.set_aside for f in findings] == [True]
+    assert checked(tumble_data(made))[1] == []
+
+
+def test_the_gap_puts_the_cameras_zero_at_its_most_probable_value():
+    data = tumble_data(campaign(conditions=CONDITIONS[:1]))
+    trial = data.trials[0]
+    shifted = replace(trial, value=trial.value + np.where(trial.of("x"), 2 * trial.std, 0.0))
+    total, count = TumbleProblem(replace(data, trials=(shifted,))).chi_square({}, (), "001")
+    assert total / count < 0.01
+
+
+def test_the_model_that_was_fitted_reads_back(tmp_path):
+    found = make_problem(campaign(seed=1, conditions=CONDITIONS[:1]))
+    form = next(form for form in found.forms if form.id == "pendulum:centred")
+    values = {"mu_s": 0.48, "pendulum.curvature": 0.5, "gravity_sim[001]": 0.085}
+    found.write_model(tmp_path / "model.toml", values, [form])
+    model = read_model(tmp_path / "model.toml")
+    assert model.surface.mu_s == 0.48
+    assert model.trial[0].gravity_sim == 0.085
+    assert model.effect[0].id == "pendulum"
+    assert model.effect[0].parameters == {"length": 2.0}
+
+
+def test_a_sensor_without_noise_is_refused():
+    made = campaign(conditions=CONDITIONS[:1])
+    wheel = made.tables.sensors.wheel.model_copy(update={"std": (0.0,)})
+    tables = made.tables.model_copy(update={"sensors": made.tables.sensors.model_copy(update={"wheel": wheel})})
+    with pytest.raises(ValueError, match=r"\[sensors.wheel\] std = \[0.0\]"):
+        tumble_data(Campaign(tables, made.recordings))
