@@ -267,7 +267,7 @@ class Integration:
             elif kind == "stop" and k in self.modes.direction:
                 slip = next(tip.slip for tip in self.motion.found if tip.index == k)
                 size = float(np.linalg.norm(slip))
-                if size < 1e-6 * self.speed:
+                if size < (SLOW if k in self.modes.frozen else 1e-6) * self.speed:
                     may_stick.append(k)
                 else:
                     self.modes.direction[k] = slip / size

@@ -110,7 +110,7 @@ def test_in_a_hop_the_wheels_rest_unless_told_otherwise():
         ({"torque": 0.125, "mu_s": 0.5}, None),
         ({"torque": 0.22, "mu_s": 0.25, "counterweight": 5.21}, None),
         ({"torque": 6.0, "mu_s": 0.5, "counterweight": 5.21, "actuator": "brake", "wheel_speed_0": 400.0}, None),
-        ({"torque": 0.22, "mu_s": 3.0, "damping": 600.0}, None),
+        ({"torque": 0.22, "mu_s": 3.0, "damping": 300.0}, None),
         ({"torque": 0.03, "mu_s": 0.5}, None),  # below the tipping torque
         ({"torque": 0.22, "mu_s": 0.5}, "hunt-crossley"),
         ({"torque": 0.22, "mu_s": 0.5}, "rft"),
@@ -126,7 +126,8 @@ def test_started_in_the_plane_it_moves_as_the_planar_model_does(given_, ground):
         **{"spike_length": LENGTH, "gravity_sim": 0.0834, "torque_until": 0.5, **given_},
         ground=Ground(name=ground, spikes_per_row=2.0) if ground else None,
     )
-    planar = simulate_planar(flat, duration=1.2, sample_interval=0.01, tolerance=1e-9)
+    duration = 1.2 if flat.torque > 0.05 else 0.3
+    planar = simulate_planar(flat, duration=duration, sample_interval=0.01, tolerance=1e-9)
     history = TorqueHistory.constant(
         HEDGEHOG.wheel(), flat.torque, 0.5, actuator=flat.actuator, wheel_speed_0=flat.wheel_speed_0
     )
@@ -136,7 +137,7 @@ def test_started_in_the_plane_it_moves_as_the_planar_model_does(given_, ground):
             ground=ground or "spring-damper", ground_parameters=parameters, mu_s=flat.mu_s, torques=(history,),
             counterweight=flat.counterweight,
         ),
-        duration=1.2, sample_interval=0.01, tolerance=1e-9,
+        duration=duration, sample_interval=0.01, tolerance=1e-9,
     )  # fmt: skip
     assert np.abs(space.position[:, 0] - planar.x).max() < 1e-6 * LENGTH
     assert np.abs(space.position[:, 2] - planar.y).max() < 1e-6 * LENGTH
@@ -248,7 +249,7 @@ def test_spun_about_the_vertical_it_stops_after_i_omega_over_mu_d_w_r():
 # Any motion -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(8))
 def test_any_fall_keeps_its_books_and_ends(seed):
     """Random platform, law, gravity, friction, attitude, spin, torques: energy accounted for, no loss negative."""
     random = np.random.default_rng(seed)
