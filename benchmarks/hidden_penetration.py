@@ -19,7 +19,7 @@ __all__ = ["EFFECTS", "OUTSIDE", "Hidden", "make_hidden"]
 
 EFFECTS = ("inertial-drag", "depth-hardening", "plastic-sinkage", "adhesion", "shaft-friction", "layering")
 OUTSIDE = ("floor-vibration", "loose-mass", "shock", "load-cell-drift", "sloshing")
-_STEP = 2e-5
+_STEP = 5e-6
 
 _Columns = dict[str, np.ndarray]
 

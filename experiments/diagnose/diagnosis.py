@@ -26,6 +26,8 @@ _RIGHT_FORM = 0.1
 """A model that takes away nine tenths of what the base model leaves has the right name, if not nature's exact form."""
 _MOST_FOR_COLOUR = 2.5
 """Chi-square per sample above which motion, not noise, fills the fast modes too."""
+_MARGIN = 1.5
+"""Standard deviations beyond the gate that something without a name must reach: no effect speaks for it."""
 _SMALL = 1.2
 """Chi-square per sample on held-out trials below which what is left is too small to be called unknown."""
 
@@ -132,7 +134,7 @@ def diagnose(problem: Problem, *, thorough: bool = False, seed: int = 0, tell: T
         base, colours = _coloured(_plain(base), fresh), fresh
         left = open_gate(best, seed=seed)[1]
         choice = replace(choice, best=Hypothesis(best, score(best)), left=left)
-    if choice.left.passed and not choice.best.effects:
+    if not choice.best.effects and choice.left.score < choice.left.threshold + _MARGIN:
         return _finish(problem, base, None, first, choice.left, colours, model_std, findings, held_out, "none", seed)
     tell("verdict", 0.0)
     verdict = _verdict(choice, base, held_out)

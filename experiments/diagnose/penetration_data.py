@@ -18,6 +18,8 @@ __all__ = ["Prepared", "prepare"]
 
 _FEWEST = 12
 """Rows that a trial must have to say anything."""
+_AROUND = 20
+"""Rows on either side from which a speed is taken."""
 _OUTLIER = 8.0
 """Noise standard deviations beyond which a lone reading is a fault (once in 1e15 by chance)."""
 
@@ -219,19 +221,22 @@ def _clock_jump(time: Array, depth: Array, std: float) -> int | None:
     """The row at which the clock jumps forward while the motion does not; None where it never does."""
     known = np.flatnonzero(np.isfinite(depth))
     t, d = time[known], depth[known]
-    if len(t) < 20:
+    if len(t) < 2 * _AROUND:
         return None
     gaps = np.diff(t)
     usual = float(np.median(gaps))
     for k in np.flatnonzero(gaps > 4 * usual) + 1:
-        if k < 8 or k > len(t) - 8:
+        if k < _AROUND or k > len(t) - _AROUND:
             continue
-        left = np.polyfit(t[k - 8 : k] - t[k - 1], d[k - 8 : k], 1)
-        right = np.polyfit(t[k : k + 8] - t[k], d[k : k + 8], 1)
-        if abs(left[0] - right[0]) > 0.2 * max(abs(left[0]), abs(right[0])):
+        before, after = slice(k - _AROUND, k), slice(k, k + _AROUND)
+        left, right = np.polyfit(t[before] - t[k - 1], d[before], 1), np.polyfit(t[after] - t[k], d[after], 1)
+        doubt = std * np.sqrt(12 / _AROUND) / (_AROUND * usual)  # of a slope
+        if abs(left[0] - right[0]) > 0.2 * max(abs(left[0]), abs(right[0])) + 4 * doubt:
             continue
-        moved = d[k : k + 8].mean() - right[0] * (t[k : k + 8] - t[k]).mean() - left[1]
-        if abs(moved - left[0] * gaps[k - 1]) > 10 * std and abs(moved - left[0] * usual) < 5 * std:
+        moved = right[1] - left[1]
+        if abs(moved - left[0] * gaps[k - 1]) > 12 * std + 4 * doubt * gaps[k - 1] and abs(moved - left[0] * usual) < (
+            5 * std + 4 * doubt * usual
+        ):
             return int(known[k])
     return None
 

@@ -1,0 +1,131 @@
+"""The penetration model of diagnose: forces and motions against closed forms, and what is made of the data."""
+
+import math
+
+import numpy as np
+import pytest
+from penetration_campaigns import DAMPING, GRAVITY, MASS, STIFFNESS, campaign_of, driven_trial, drop_trial
+
+from experiments.campaign import Recording, read_model
+from experiments.diagnose.fitting import Model, Whitener, fit
+from experiments.diagnose.penetration_depth import smooth_depth
+from experiments.diagnose.penetration_law import SLOTS, fall, push, slot_table
+from experiments.diagnose.penetration_problem import make_problem
+
+SLOT = {name: place for place, name in enumerate(SLOTS)}
+
+
+def lane(**numbers):
+    table = slot_table(1)
+    for name, value in {"mass": MASS, "gravity": GRAVITY, "stiffness": STIFFNESS, **numbers}.items():
+        table[0, SLOT[name]] = value
+    return table
+
+
+def drop(time, speed, **numbers):
+    starts = np.array([0, len(time)], dtype=np.int32)
+    return fall(lane(**numbers), np.zeros(1, dtype=np.int32), starts, time, np.array([speed]))[0]
+
+
+def pushed(depth, speed, **numbers):
+    starts = np.array([0, len(depth)], dtype=np.int32)
+    return push(lane(**numbers), np.zeros(1, dtype=np.int32), starts, depth, speed)[0]
+
+
+def base(z, v, top=0.0):
+    return STIFFNESS * z + DAMPING * max(v, 0.0)
+
+
+def test_a_drop_on_a_spring_is_a_sine_and_leaves_as_fast_as_it_came():
+    # m z'' = m g - K z from z = 0, v: z = g/w^2 (1 - cos wt) + v/w sin wt, w^2 = K/m; free flight above the surface.
+    rate, speed = math.sqrt(STIFFNESS / MASS), 0.8
+    time = np.arange(0.0, 0.09, 0.0005)
+    motion = drop(time, speed)
+    expected = GRAVITY / rate**2 * (1 - np.cos(rate * time)) + speed / rate * np.sin(rate * time)
+    inside = expected >= 0
+    assert np.abs(motion[inside, 0] - expected[inside]).max() < 1e-9
+    assert motion[~inside, 1][0] < 0
+    touch = 2 * (math.pi - math.atan(speed * rate / GRAVITY)) / rate
+    later = time[-1] - touch
+    assert motion[-1, 0] == pytest.approx(-speed * later + 0.5 * GRAVITY * later**2, abs=1e-9)
+    assert motion[-1, 3] == 0  # free
+
+
+def test_dry_friction_holds_a_spike_at_rest_where_neither_side_can_move_it():
+    # At rest |m g - K z| <= f.
+    motion = drop(np.arange(0.0, 1.0, 0.001), 0.5, damping=DAMPING, shaft=3.0)
+    assert motion[-1, 3] == 2 and motion[-1, 1] == 0.0 and motion[-1, 2] == 0.0
+    assert abs(MASS * GRAVITY - STIFFNESS * motion[-1, 0]) <= 3.0 + 1e-9
+
+
+def test_a_crater_pushes_back_along_the_loading_curve_pressed_into_what_is_left():
+    # Loaded to Z, the force falls from K Z to 0 at r Z along K (z - r Z) / (1 - r).
+    depth = np.concatenate([np.linspace(1e-4, 0.02, 50), np.linspace(0.02, 0.001, 50)])
+    force = pushed(depth, np.gradient(depth), crater_share=0.4)
+    back = depth[50:]
+    assert force[50:] == pytest.approx(np.maximum(STIFFNESS * (back - 0.4 * 0.02) / 0.6, 0.0), abs=1e-12)
+
+
+def test_the_fitted_stiffness_and_damping_of_exact_trials_are_the_true_ones():
+    trials = [(f"d{k}", "driven", v, driven_trial(base, speed=v, seed=k)) for k, v in enumerate((0.01, 0.1))]
+    trials += [("f", "drop", 0.8, drop_trial(base, speed=0.8, seed=7))]
+    problem = make_problem(campaign_of(trials))
+    found = fit(Model(problem, Whitener.white(problem), ("d0", "d1", "f")))
+    names = [p.name for p in found.model.parameters]
+    std = np.sqrt(np.diag(found.covariance()))
+    for name, true in (("stiffness", STIFFNESS), ("damping", DAMPING)):
+        assert abs(found.values[name] - true) < 4 * std[names.index(name)]
+    assert found.chi_square / found.count == pytest.approx(1.0, abs=4 * math.sqrt(2 / found.count))
+
+
+def test_the_smoothed_depth_is_as_wrong_as_it_says():
+    # Standard error s of a least squares fit: over many noises the mean of (error / s)^2 is 1.
+    time = np.linspace(0, 2, 500)
+    true = np.where(time < 1.2, 0.01 * time, 0.012 - 0.01 * (time - 1.2))
+    ratios = []
+    for seed in range(12):
+        noise = np.random.default_rng(seed).standard_normal(len(time))
+        smooth = smooth_depth(time, true + 2e-4 * noise, 2e-4)
+        ratios.append(np.mean(((smooth.depth - true) / smooth.depth_std) ** 2))
+    assert 0.6 < np.mean(ratios) < 1.7
+
+
+def test_a_force_that_is_held_is_thinned_and_said():
+    recording = driven_trial(base, speed=0.01)
+    held = recording["force_N"][(np.arange(400) // 8) * 8]
+    problem = make_problem(campaign_of([("d", "driven", 0.01, Recording({**recording.columns, "force_N": held}))]))
+    assert len(problem.samples("d").time) == 50
+    assert any("held" in finding.what for finding in problem.findings)
+
+
+def test_a_depth_that_jumps_and_stays_is_set_aside_from_there_on():
+    recording = drop_trial(base, speed=0.8)
+    depth = recording["depth_m"].copy()
+    depth[80:] += 0.01
+    problem = make_problem(campaign_of([("f", "drop", 0.8, Recording({**recording.columns, "depth_m": depth}))]))
+    assert (problem.samples("f").channel == "depth").sum() == 80
+    assert any(finding.set_aside and "jumps" in finding.what for finding in problem.findings)
+
+
+def test_lone_readings_and_gaps_are_left_out_and_a_clock_that_jumps_ends_the_trial():
+    recording = driven_trial(base, speed=0.01)
+    depth, force = recording["depth_m"].copy(), recording["force_N"].copy()
+    depth[100] += 0.02
+    force[10:20] = np.nan
+    time = recording.time.copy()
+    time[300:] += 0.5
+    problem = make_problem(
+        campaign_of([("d", "driven", 0.01, Recording({"t_s": time, "depth_m": depth, "force_N": force}))])
+    )
+    assert len(problem.samples("d").time) == 300 - 10 - 1
+    said = " ".join(finding.what for finding in problem.findings)
+    assert "clock jumps" in said and "far from their neighbours" in said and "gaps" in said
+
+
+def test_a_fitted_model_file_reads_back_with_its_effects(tmp_path):
+    problem = make_problem(campaign_of([("d", "driven", 0.01, driven_trial(base, speed=0.01))]))
+    form = next(form for form in problem.forms if form.id == "depth-hardening:power")
+    problem.write_model(str(tmp_path / "model.toml"), {"stiffness": 800.0, form.amplitude: 0.2}, [form])
+    model = read_model(tmp_path / "model.toml")
+    assert model.surface.stiffness == 800.0
+    assert [(effect.id, effect.parameters["hardening_power"]) for effect in model.effect] == [("depth-hardening", 0.2)]
