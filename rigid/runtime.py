@@ -23,9 +23,9 @@ def ensure(*, threads: int | None = None) -> None:
     Raises:
         RuntimeError: Taichi runs in single precision or not on the CPU: the batch needs double precision there.
     """
-    import taichi as ti
-    from taichi.lang import impl
-
+    with contextlib.redirect_stdout(io.StringIO()):  # its greeting would spoil what a script prints
+        import taichi as ti
+        from taichi.lang import impl
     if impl.get_runtime().prog is not None:
         config = impl.current_cfg()
         if impl.get_runtime().default_fp != ti.f64 or config.arch not in (ti.x64, ti.arm64):
@@ -36,7 +36,7 @@ def ensure(*, threads: int | None = None) -> None:
         return
     if threads is None:
         threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
-    with contextlib.redirect_stdout(io.StringIO()):  # its greeting would spoil what a script prints
+    with contextlib.redirect_stdout(io.StringIO()):
         ti.init(
             arch=ti.cpu, cpu_max_num_threads=threads, default_fp=ti.f64, default_ip=ti.i32, fast_math=False,
             cfg_optimization=False, log_level=ti.ERROR,
