@@ -23,9 +23,10 @@ def ensure(*, threads: int | None = None) -> None:
     Raises:
         RuntimeError: Taichi runs in single precision or not on the CPU: the batch needs double precision there.
     """
-    with contextlib.redirect_stdout(io.StringIO()):  # its greeting would spoil what a script prints
-        import taichi as ti
-        from taichi.lang import impl
+    os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")  # its greeting would spoil what a script prints
+    import taichi as ti
+    from taichi.lang import impl
+
     if impl.get_runtime().prog is not None:
         config = impl.current_cfg()
         if impl.get_runtime().default_fp != ti.f64 or config.arch not in (ti.x64, ti.arm64):
