@@ -113,7 +113,7 @@ def sentences(
         said.append(f"Going in, the bed's force grows with depth to the power {shown}; the spring's to the power 1.")
     if sinkage is not None:
         bed, law = sinkage
-        against = f", {_compared(law[0] / bed[0] - 1, 'deeper', 'less deep', 'as deep')}" if bed[0] > 0 else ""
+        against = f", {_deeper(law[0] / bed[0])}" if bed[0] > 0 else ""
         said.append(
             f"Set down under its load the spike sinks {_plain(quote(*bed, 'm', significant=2))} into the bed; the "
             f"spring-damper says {_plain(quote(*law, 'm', significant=2))}{against}."
@@ -197,6 +197,10 @@ def _compared(share: float, more: str, less: str, same: str) -> str:
     if abs(share) < 0.0005:
         return same
     return f"{_percent(share)} {more if share > 0 else less}"
+
+
+def _deeper(ratio: float) -> str:
+    return f"{ratio:.2g} times as deep" if ratio >= 2 else _compared(ratio - 1, "deeper", "less deep", "as deep")
 
 
 def _percent(value: float) -> str:

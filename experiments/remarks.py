@@ -148,9 +148,11 @@ def _at_surface(findings: Findings) -> str | None:
         return None
     out = numbers.get("surface_roughness")
     grains = f", because grains stick out of the surface by up to {_words(out)}" if out else ""
+    ratio = force["value"] / load
+    share = f"{100 * ratio:.2g} % of the load" if ratio < 0.995 else f"{ratio:.2g} times the load"
     return (
-        f"at depth 0 the bed already pushes with {_words(force)}, {100 * force['value'] / load:.2g} % of the load"
-        f"{grains}: the spring-damper knows nothing of that, and the fit leaves out what is above depth 0"
+        f"at depth 0 the bed already pushes with {_words(force)}, {share}{grains}: the spring-damper knows nothing of "
+        f"that, and the fit leaves out what is above depth 0"
     )
 
 

@@ -73,6 +73,8 @@ def quote(value: float | None, std: float | None = None, unit: str = "1", *, sig
         return "unknown"
     if std and std < 1e-4 * abs(value):
         std = None
+    if std is None and 0 < significant < 3 and math.isfinite(value) and not (unit == "1" and float(value).is_integer()):
+        value = float(f"{value:.{significant - 1}e}")  # also before the point: 549 is 550
     scale, shown = _scale(value, unit)
     if unit == "1" and float(value).is_integer() and not std:
         return _fixed(value, 0)

@@ -32,6 +32,7 @@ from vis.render import run_job
 __all__ = ["Picture", "Pictures", "make_pictures", "opengl_available"]
 
 _STILLS = 6
+_STILL_COSTS = 4.0  # in frames of the animation, as measured in software
 _ANIMATED = 48
 _CUT = "cut open along the spike's mid-plane: what is in front is left out, of the spike too"
 _SLAB = "shown are those up to four diameters behind the spike's mid-plane, the farther the darker"
@@ -118,8 +119,8 @@ def make_pictures(
     job, stills, animation = _plan(run, size, animation_size if animate else None, notes)
     if not job["stills"]:
         return Pictures(method="none", notes=[*notes, "There are no frames to draw pictures of."])
-    count = len(job["stills"]) + (len(job["animation"]["frames"]) if job["animation"] else 0)
-    counter = _Counter(count, progress)
+    moving = len(job["animation"]["frames"]) if job["animation"] else 0
+    counter = _Counter([_STILL_COSTS] * len(job["stills"]) + [1.0] * moving, progress)
     if opengl_available():
         failure = _render_apart(job, stall, counter.step)
         if failure is None:
@@ -138,13 +139,15 @@ def make_pictures(
 
 
 class _Counter:
-    def __init__(self, total: int, progress: Callable[[float], None] | None) -> None:
-        self.total, self.progress, self.done = total, progress, 0
+    """Tells how much is done; a still costs more than a frame of the animation."""
+
+    def __init__(self, costs: list[float], progress: Callable[[float], None] | None) -> None:
+        self.costs, self.progress, self.done = costs, progress, 0
 
     def step(self) -> None:
         self.done += 1
         if self.progress is not None:
-            self.progress(min(1.0, self.done / self.total))
+            self.progress(min(1.0, sum(self.costs[: self.done]) / sum(self.costs)))
 
 
 def _render_apart(job: dict[str, Any], stall: float, step: Callable[[], None]) -> str | None:

@@ -212,7 +212,7 @@ def _caveat(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> str:
     real = _REAL_GRAINS.get(str(bed.get("material")))
     parts = []
     if factor is not None and factor > 1.05:
-        parts.append(f"softened {plain(factor, 2)} times")
+        parts.append(f"softened {quote(1.001 * factor, None, '1', significant=2)} times")
     if parts and overlap is not None:
         parts[0] += f" (overlaps of up to {quote(overlap, None, '%', significant=2)} of a diameter)"
     if grain is not None and real is not None and grain > 1.5 * real:
@@ -261,7 +261,7 @@ def _answers(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, st
         text = f"Set down under its load{load}, the spike comes to rest {quantity(quantities['sinkage_dem'])} deep."
         if law is not None:
             text += f" The fitted spring-damper says {quantity(quantities['sinkage_spring_damper'])}"
-            text += f", {_more(law / sunk - 1.0, 'deeper', 'less deep')}." if sunk > 0 else "."
+            text += f", {_deeper(law / sunk)}." if sunk > 0 else "."
         text += also("set_down", "surface")
         answers.append({"question": "How far does it sink?", "answer": text})
     elif _restless(run, quantities):
@@ -612,6 +612,10 @@ def _signed_percent(share: float) -> str:
 
 def _more(share: float, above: str, below: str) -> str:
     return f"{_percent(abs(share))} {above if share > 0 else below}"
+
+
+def _deeper(ratio: float) -> str:
+    return f"{plain(ratio, 2)} times as deep" if ratio >= 2.0 else _more(ratio - 1.0, "deeper", "less deep")
 
 
 def _and(words: list[str]) -> str:

@@ -37,6 +37,8 @@ def test_quantity_takes_what_result_json_holds():
     assert quantity({"value": 4.21, "std": 0.35, "unit": "N s/m"}).replace(SPACE, " ") == "4.2 ± 0.3 N s/m"
     assert quantity({"value": 0.284, "std": None, "unit": "1"}, unit="%").replace(SPACE, " ") == "28 %"
     assert quantity({"value": 0.000546, "std": None, "unit": "m"}).replace(SPACE, " ") == "0.55 mm"
+    assert quantity({"value": 549.0, "std": None, "unit": "N/m"}).replace(SPACE, " ") == "550 N/m"
+    assert quantity({"value": 4682.0, "std": None, "unit": "1"}) == "4682"
     assert quantity({"value": 0.3, "std": 0.0, "unit": "N"}).replace(SPACE, " ") == "0.3 N"
     assert quantity({"value": None, "std": None, "unit": "m"}) == "unknown"
     assert quantity(None) == "unknown"
