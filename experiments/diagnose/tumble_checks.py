@@ -1,7 +1,7 @@
 """Data that are wrong: found, said, and set aside before anything is fitted.
 
-Looked at without a model: the camera's marker that jumps for a while (a row far from the straight line through its
-neighbours), a clock that jumps forward, long gaps. What needs the model (a trial at odds with its replicates) is the
+Looked at without a model: the marker of the camera that jumps for a while or for good (a step that no motion makes),
+a clock that jumps forward, long gaps. What needs the model (a trial at odds with its replicates) is the
 statistics' affair.
 """
 
@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from .problem import Finding
 from .tumble_data import CHANNELS, TrialData, TumbleData
@@ -18,7 +19,10 @@ from .tumble_data import CHANNELS, TrialData, TumbleData
 __all__ = ["checked"]
 
 _FAR = 12.0  # stds of the sensor: white noise does not get there
-_SHARE = 0.1  # of a channel's rows; more of them are no outliers
+_SHARE = 0.5  # of a channel's rows; more of them are not set aside
+_NEAR = 8  # rows on either side that tell how much a row usually changes
+_STEEP = 6.0  # times the usual change
+_LONG = 40  # rows that a marker may be lost for before it counts as gone for good
 
 
 def checked(data: TumbleData) -> tuple[TumbleData, list[Finding]]:
@@ -47,23 +51,36 @@ def checked(data: TumbleData) -> tuple[TumbleData, list[Finding]]:
 def _jumps(
     trial: TrialData, name: str, mine: NDArray[np.intp], keep: NDArray[np.bool_], findings: list[Finding]
 ) -> None:
-    """Single rows, or two side by side, that lie far off the line through the rows about them."""
+    """Rows between two opposite steps that no motion makes, and all that follows a step that is never taken back."""
     time, value, std = trial.time[mine], trial.value[mine], trial.std[mine[0]]
+    change = np.diff(value)
+    size = np.abs(change)
+    usual = median_filter(size, size=2 * _NEAR + 1, mode="nearest")
+    steps = np.flatnonzero(size > _FAR * np.sqrt(2) * std + _STEEP * usual)
     odd = np.zeros(len(mine), dtype=bool)
-    for k in range(len(mine)):
-        near = [j for j in (k - 4, k - 3, k - 2, k + 2, k + 3, k + 4) if 0 <= j < len(mine)]
-        if len(near) < 4:
-            continue
-        t = time[near] - time[k]
-        # Two straight lines, before and behind: a contact bends a motion, a jump leaves both at once.
-        off = []
-        for side in (t < 0, t > 0):
-            if side.sum() >= 2:
-                line = np.polyfit(t[side], value[near][side], 1)
-                off.append(abs(value[k] - line[1]))
-        bend = np.ptp(value[near]) if off else 0.0
-        odd[k] = bool(off) and min(off) > _FAR * 2 * std and min(off) > 0.5 * bend
-    if not odd.any() or odd.mean() > _SHARE:
+    k = 0
+    while k < len(steps):
+        here = steps[k]
+        back = next(
+            (e for e in steps[k + 1 :] if abs(change[e] + change[here]) < 0.5 * size[here] and e - here <= _LONG), None
+        )
+        if back is None:
+            after = time > time[here]
+            odd |= after if after.mean() <= 0.5 else ~after
+            k += 1
+        else:
+            odd[here + 1 : back + 1] = True
+            k = int(np.searchsorted(steps, back)) + 1
+    if not odd.any():
+        return
+    if odd.mean() > _SHARE:
+        findings.append(
+            Finding(
+                trial=trial.id,
+                channel=name,
+                what=f"{name} jumps so often that {100 * odd.mean():.0f} % of its rows would be lost: kept",
+            )
+        )
         return
     keep[mine[odd]] = False
     when = time[odd]
@@ -74,8 +91,8 @@ def _jumps(
             from_s=float(when[0]),
             to_s=float(when[-1]),
             set_aside=True,
-            what=f"{int(odd.sum())} row(s) of {name} lie far from the rows about them (the camera lost its marker): "
-            f"set aside",
+            what=f"{int(odd.sum())} row(s) of {name} stand apart by a jump that no motion makes (the camera lost its "
+            f"marker): set aside",
         )
     )
 

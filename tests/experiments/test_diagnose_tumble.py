@@ -190,6 +190,20 @@ def test_a_marker_that_jumps_is_set_aside_and_said():
     assert checked(tumble_data(made))[1] == []
 
 
+def test_a_marker_that_is_lost_for_a_while_or_for_good_is_set_aside():
+    made = campaign(seed=1, conditions=CONDITIONS[2:3])
+    pose = made.recordings["001", "pose"]
+    for lost in (slice(60, 75), slice(130, None)):
+        y = pose["y_m"].copy()
+        y[lost] -= 0.03
+        columns = dict(pose.columns) | {"y_m": y}
+        data = tumble_data(Campaign(made.tables, dict(made.recordings) | {("001", "pose"): Recording(columns)}))
+        clean, findings = checked(data)
+        rest = clean.trials[0].time[clean.trials[0].of("y")]
+        assert set(pose.time) - set(rest) == set(pose.time[lost])
+        assert [f.set_aside for f in findings] == [True]
+
+
 def test_the_gap_puts_the_cameras_zero_at_its_most_probable_value():
     data = tumble_data(campaign(conditions=CONDITIONS[:1]))
     trial = data.trials[0]
