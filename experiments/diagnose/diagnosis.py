@@ -22,8 +22,8 @@ __all__ = ["Diagnosis", "Gap", "diagnose"]
 
 Tell = Callable[[str, float], None]
 
-_RIGHT_FORM = 0.1
-"""A model that takes away nine tenths of what the base model leaves has the right name, if not nature's exact form."""
+_RIGHT_FORM = 0.05
+"""A model that leaves a twentieth of what the base model does has the right name, if not nature's exact form."""
 _MOST_FOR_COLOUR = 2.5
 """Chi-square per sample above which motion, not noise, fills the fast modes too."""
 _MARGIN = 1.5

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 _INTERVALS = (1, 2, 4, 8, 16, 32, 64, 128)
 _MOST_KINKS = 10
 _GENTLE = 3  # intervals of a cubic spline that is always let free
-_ROUND = (0.01, 0.025, 0.05)  # of the record, about a kink
+_ROUND = (0.008, 0.02, 0.032, 0.05)  # of the record, about a kink
 _KINKED_INTERVALS = 2  # finer splines need no kinks, and the search is dear
 _KINK_GRID = 160
 
@@ -74,11 +74,34 @@ def smooth_depth(time: Array, depth: Array, std: float) -> SmoothDepth:
             if enough == 3:
                 break
     assert best is not None
-    basis, slopes = _enlarged(u, *best[1:])
-    q, r = np.linalg.qr(basis)
-    weights = q.T @ depth
-    slope_map = np.linalg.solve(r.T, slopes.T).T / (span if span > 0 else 1.0)
-    return SmoothDepth(q @ weights, slope_map @ weights, std * q, std * slope_map)
+    basis, slopes, fixed = _enlarged(u, *best[1:])
+    means, root = _shrunk(basis, fixed, depth, noise)
+    slopes = slopes / (span if span > 0 else 1.0)
+    return SmoothDepth(basis @ means, slopes @ means, basis @ root, slopes @ root)
+
+
+def _shrunk(basis: Array, fixed: int, depth: Array, std: float) -> tuple[Array, Array]:
+    """Coefficients and a factor of their covariance, the columns after the first `fixed` ones held small by a prior.
+
+    Each of these moves the curve by as much as a normal number of one common variance; the largest variance that the
+    column makes no less likely than 2 nats below its best is taken, so that what it cannot exclude stays in the error.
+    """
+    size = np.maximum(np.abs(basis).max(axis=0), 1e-300)
+    x = basis / size
+    gram, right = x.T @ x / std**2, x.T @ depth / std**2
+    p = x.shape[1]
+    extra = np.arange(p) >= fixed
+    found: list[tuple[float, Array, Array]] = []
+    for scale in std * np.geomspace(1e-3, 3e3, 27):
+        precision = gram + np.diag(np.where(extra, scale**-2, 0.0))
+        root = np.linalg.cholesky(precision + 1e-12 * np.diag(np.diag(precision)))
+        means = np.linalg.solve(root.T, np.linalg.solve(root, right))
+        # Marginal likelihood of the column, up to what no variance changes.
+        log = 0.5 * float(right @ means) - float(np.log(np.diag(root)).sum()) - float(extra.sum()) * np.log(scale)
+        found.append((log, means, np.linalg.inv(root).T))
+    best = max(log for log, _, _ in found)
+    _, means, root = next(entry for entry in reversed(found) if entry[0] >= best - 2.0)
+    return means / size, root / size[:, None]
 
 
 def _basis(u: Array, intervals: int) -> tuple[Array, Array]:
@@ -93,23 +116,27 @@ def _basis(u: Array, intervals: int) -> tuple[Array, Array]:
 
 def _enlarged(
     u: Array, basis: Array, slopes: Array, places: list[float], intervals: int
-) -> tuple[Array, Array]:
-    """With what the noise may hide: bends over the whole twice as fine, and rounder turns about each kink.
+) -> tuple[Array, Array, int]:
+    """With what the noise may hide: rounder turns about each kink, and bends over the whole twice as fine.
+
+    Says also how many columns come before the bends.
 
     The criterion leaves out what a depth sensor cannot see; a force sensor in a stiff bed can, and would take it for an
     effect. So it is let free, and its error, which `SmoothDepth` knows, is part of the likelihood.
     """
     columns, changes = [basis], [slopes]
-    gentle, steep = _basis(u, max(_GENTLE, 2 * intervals))
-    if gentle.shape[1] <= len(u) // 8:
-        columns.append(gentle)
-        changes.append(steep)
     for place in places:
         for away in _ROUND:
             for at in (place - away, place + away):
                 if 0.01 < at < 0.99:
-                    columns.append(np.maximum(u - at, 0.0)[:, None])
-                    changes.append((u > at).astype(float)[:, None])
+                    after = np.maximum(u - at, 0.0)[:, None]
+                    columns.append(after**2)
+                    changes.append(2 * after)
+    turns = sum(column.shape[1] for column in columns)
+    gentle, steep = _basis(u, max(_GENTLE, 2 * intervals))
+    if gentle.shape[1] <= len(u) // 8:
+        columns.append(gentle)
+        changes.append(steep)
     whole, steps = np.hstack(columns), np.hstack(changes)
     kept: list[int] = []
     q = np.zeros((len(u), 0))
@@ -120,7 +147,7 @@ def _enlarged(
         if size > 1e-4 * float(np.linalg.norm(whole[:, k])) and len(kept) < len(u) // 3:
             kept.append(k)
             q = np.column_stack([q, rest / size])
-    return whole[:, kept], steps[:, kept]
+    return whole[:, kept], steps[:, kept], sum(k < turns for k in kept)
 
 
 def _with_kinks(

@@ -59,7 +59,7 @@ class PenetrationProblem:
         differ = speeds.max() > 1.05 * max(speeds.min(), 1e-12)
         self._library: Library = make_library(self._scales, retreats=self._retreats(), speeds_differ=bool(differ))
         self.forms: tuple[Form, ...] = self._library.forms
-        self._whitening: dict[str, tuple[Array, Array]] = {}
+        self._whitening: dict[str, tuple[Array, Array, Array]] = {}
         self.rewhiten({}, ())
 
     # What is fitted ---------------------------------------------------------------------------------------------------
@@ -208,8 +208,8 @@ class PenetrationProblem:
     def _residuals(self, trial: Prepared, model: Array) -> Array:
         std_depth, std_other = stds(self.tables, trial.driven)
         if trial.driven:
-            rest = (trial.other - model) / std_other
-            directions, shrink = self._whitening[trial.info.id]
+            directions, shrink, doubtful = self._whitening[trial.info.id]
+            rest = (trial.other - model) / std_other / doubtful
             rest = rest - directions @ (shrink * (directions.T @ rest)) if len(shrink) else rest
         else:
             rest = np.concatenate([
@@ -226,10 +226,17 @@ class PenetrationProblem:
         std_force = stds(self.tables, True)[1]
         for trial, by_depth, by_speed in self._slopes(values, forms, driven):
             assert trial.smooth is not None
-            factor = by_depth[:, None] * trial.smooth.depth_error + by_speed[:, None] * trial.smooth.speed_error
-            left, sizes, _ = np.linalg.svd(factor / std_force, full_matrices=False)
+            smooth = trial.smooth
+            factor = by_depth[:, None] * smooth.depth_error + by_speed[:, None] * smooth.speed_error
+            # Where the error may cross the surface or the turning point, the force is no linear function of it.
+            bend = np.abs(by_speed).max() * smooth.speed_std * (np.abs(smooth.speed) < 3 * smooth.speed_std)
+            jump = float(np.abs(by_speed).max() * np.abs(smooth.speed).max())
+            start = jump + np.abs(by_depth).max() * smooth.depth_std
+            touch = start * (np.abs(smooth.depth) < 3 * smooth.depth_std)
+            doubtful = np.sqrt(1 + (bend**2 + touch**2) / std_force**2)
+            left, sizes, _ = np.linalg.svd(factor / std_force / doubtful[:, None], full_matrices=False)
             kept = sizes > 1e-3
-            self._whitening[trial.info.id] = (left[:, kept], 1 - 1 / np.sqrt(1 + sizes[kept] ** 2))
+            self._whitening[trial.info.id] = (left[:, kept], 1 - 1 / np.sqrt(1 + sizes[kept] ** 2), doubtful)
 
     def _slopes(
         self, values: Values, forms: Sequence[Form], driven: list[Prepared]
