@@ -156,6 +156,7 @@ def _plan(random: np.random.Generator, *, retreat: bool, drops: bool, faster: bo
         trials.append({
             "driven": bool(driven), "speed": float(options[(index // 2 if style == "both" else index) % len(options)]),
             "gravity": float(gravities[index % len(gravities)]), "diameter": diameters[index // 2 % len(diameters)],
+            "shock_time": float(np.random.default_rng(index).uniform(0.15, 0.8)),
         })  # fmt: skip
     return {
         "k": k, "c": c, "mass": mass, "believed_k": believed_k, "believed_c": max(believed_c, 0.01), "doubt_k": doubt_k,
@@ -201,7 +202,7 @@ def _shape(
         elif outside == "loose-mass":
             s |= {"loose": amplitude, "loose_rate": rate}
         elif outside == "shock":
-            s |= {"shock": amplitude * full, "shock_time": 0.3 + 0.3 * phase / 6, "shock_width": 0.02}
+            s |= {"shock": amplitude * full, "shock_width": 0.02}
         elif outside == "load-cell-drift":
             s |= {"drift": amplitude * full}
         elif outside == "sloshing":
@@ -241,7 +242,7 @@ def _driven(plan: dict[str, Any], this: dict[str, Any], law: _Law, s: dict[str, 
         force.append(law(float(depth_now), float(v), float(t), math.tanh(v / slow)))
     values = np.array(force)
     if "shock" in s:
-        values = values + s["shock"] * np.exp(-0.5 * ((time / total - s["shock_time"]) / s["shock_width"]) ** 2)
+        values = values + s["shock"] * np.exp(-0.5 * ((time / total - this["shock_time"]) / s["shock_width"]) ** 2)
     values = values + s.get("drift", 0.0) * (time / total) ** 1.5
     return {"time": time, "depth": z, "other": values}
 
@@ -265,7 +266,7 @@ def _drop(plan: dict[str, Any], this: dict[str, Any], law: _Law, s: dict[str, fl
             force = law(new, half if not stuck else 0.0, t + dt, way)
             total = m * g - force
             if "shock" in s:
-                late = (t / plan["drop_time"] - s["shock_time"]) / s["shock_width"]
+                late = (t / plan["drop_time"] - this["shock_time"]) / s["shock_width"]
                 total += s["shock"] * math.exp(-0.5 * late**2)
             if loose > 0:
                 inner_a = -(s["loose_rate"] ** 2) * inner - a
