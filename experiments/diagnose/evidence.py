@@ -79,7 +79,7 @@ def best_start(model: Model, form: Form, values: Values) -> Fit:
     The other values are those given, and those of the priors: a base model that lacks an effect bends its parameters.
     """
     if hasattr(model.problem, "guess"):  # it tries the starts itself
-        return fit(model, values)
+        return fit(model, values, rounds=6)
     starts = form.starts or ({form.amplitude: 1.0},)
     amplitude = next(p for p in form.parameters if p.name == form.amplitude)
     known = {p.name: p.value for p in model.problem.base if math.isfinite(p.std)}
