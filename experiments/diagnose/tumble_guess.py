@@ -145,19 +145,19 @@ class Guesser:
         """The best fit found for each form added to `old`."""
         begun = [(form, point) for form in forms for point in form.starts]
         chosen = self._screened(fitter, old, begun, start)
-        fits = fitter.fit([self._add(start, old, form, values) for form, values in chosen], steps=7)
+        fits = fitter.fit([self._add(start, old, form, values) for form, values in chosen], steps=12 if old else 7)
         best: dict[str, Fit] = {}
         for (form, _), found in zip(chosen, fits, strict=True):
             if form.id not in best or found.cost < best[form.id].cost:
                 best[form.id] = found
+        if old:  # beside what was found already the way is short
+            return best
         effects: dict[str, float] = {}
         for form in forms:
             effects[form.effect] = min(effects.get(form.effect, np.inf), best[form.id].cost)
         followed = sorted(effects, key=lambda effect: effects[effect])[:_FOLLOWED]
         again = [(form, point) for form, point in begun if form.effect in followed]
-        fresh = Start(values={name: start.values[name] for form in old for p in form.parameters for name in (p.name,)
-                              if name in start.values})  # fmt: skip
-        starts = [self._add(fresh, old, form, point, horizons=_GROWING) for form, point in again]
+        starts = [self._add(Start(), old, form, point, horizons=_GROWING) for form, point in again]
         for (form, _), found in zip(again, fitter.fit(starts, steps=15), strict=True):
             if found.cost < best[form.id].cost:
                 best[form.id] = found
