@@ -190,6 +190,11 @@ def _gap(problem: Problem, model: Model, values: Mapping[str, float], fitted: tu
 
 
 def _with_held_out(found: Fit, held_out: tuple[str, ...]) -> dict[str, float]:
+    """Values for all trials. The gap is that of one mean bed: how replicates differ is the gate's affair."""
+    if found.model.scatter:
+        scatter = {parameter.name for parameter in found.model.scatter}
+        start = {name: value for name, value in found.values.items() if name not in scatter}
+        found = fit(replace(found.model, scatter=()), start)
     return held_out_fit(found.model, held_out, found.values)
 
 

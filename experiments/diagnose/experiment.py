@@ -106,6 +106,8 @@ def _result(found: Diagnosis, said: dict[str, Any]) -> dict[str, Any]:
     sentences = [said["next_experiment"]]
     if "latent" in said:
         sentences.insert(0, f"What is missing depends on {said['latent']['depends_on']}.")
+    more = getattr(found.problem, "remarks", None)
+    sentences += more(found.best_values, found.forms) if more is not None else []
     sentences += [colour.sentence for colour in found.colours.values()]
     sentences += [
         f"Replicates differ by more than the sensors: {kind}, standard deviation {std:.3g} (relative); it is the bed's."

@@ -22,6 +22,7 @@ from experiments.campaign import Campaign, EffectTable, PenetrationCampaign, Pen
 from .penetration_data import Prepared, prepare, stds
 from .penetration_forms import Library, Scales, make_library, physical, unit_of
 from .penetration_law import PHASES, SLOTS, fall, push, slot_table
+from .penetration_remarks import Push, remarks
 from .problem import Array, Finding, Form, Parameter, Samples, TrialInfo, Values
 
 __all__ = ["PenetrationProblem", "make_problem"]
@@ -377,6 +378,18 @@ class PenetrationProblem:
         surface = self.tables.surface.model_copy(update=own)
         model = PenetrationModel(**tables, surface=surface, notes=notes, trial=self.tables.trial, effect=effects)
         write_model(Path(path), model)
+
+    def remarks(self, values: Values, forms: Sequence[Form]) -> list[str]:
+        """Sentences on K, its spread, and whether C can be told, where it was not known beforehand; none with drops."""
+        if self.tables.uncertainty.damping < 1 or not all(trial.driven for trial in self._trials.values()):
+            return []
+        still = {**values, **{self._named("damping", diameter): 0.0 for diameter in self._diameters}}
+        pushes = [
+            Push(trial.diameter, trial.smooth.depth, trial.smooth.speed, trial.other,
+                 self._run([still], forms, [trial])[0][0])
+            for trial in self._trials.values() if trial.smooth is not None
+        ]  # fmt: skip
+        return remarks(pushes, tuple(dict.fromkeys(form.effect for form in forms)))
 
     def next_experiment(self, first: Form, second: Form, values: Values) -> str:
         """See `Problem`."""
