@@ -146,7 +146,7 @@ def impulsive_launch(tumbler: Tumbler, momentum: float) -> Launch:
     """Launch by an angular `momentum` H [N m s] given at once, against which weight and turning do not count.
 
     Sticking omega = H / (J + m l^2 cos^2 g0 + M l^2 sin^2 g0), launch at g0 = lean; sliding
-    omega = H / (J + M l^2 sin g0 (sin g0 + mu_d cos g0)), launch at tan = m / (M mu_d) (planar-model.md, closed forms).
+    omega = H / (J + M l^2 sin g0 (sin g0 + mu_d cos g0)), launch at tan = m / (M mu_d) (docs/planar.md, closed forms).
     """
     if not momentum > 0:
         raise ValueError(f"momentum is {momentum}: it must be above 0 (N m s)")

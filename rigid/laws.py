@@ -171,7 +171,7 @@ _REBOUND = Parameter(
 )  # fmt: skip
 _RADIUS = Parameter(
     name="radius", unit="m", default=0.006, lowest=0.0, highest=1.0, above_lowest=True,
-    summary="radius of the spike's ball and shaft", source="ours (planar-model.md): 12 mm across",
+    summary="radius of the spike's ball and shaft", source="ours : 12 mm across",
 )  # fmt: skip
 _SAND = katsuragi_durian(diameter=0.012, projectile_density=7850.0, bulk_density=1500.0, friction=0.6, gravity=9.80665)
 
@@ -182,9 +182,9 @@ _LAWS = (
         source="Reid et al., i-SAIRAS 2014, eqs 5 and 6",
         parameters=(
             Parameter(name="stiffness", unit="N/m", default=1.5e4, lowest=0.0, highest=_BIG, summary="K",
-                      source="ours (trials.md, brick)"),
+                      source="ours, as of brick"),
             Parameter(name="damping", unit="N s/m", default=60.0, lowest=0.0, highest=_BIG, summary="C, going in only",
-                      source="ours (trials.md, brick)"),
+                      source="ours, as of brick"),
         ),
         slots=("stiffness", "damping"), extensive=(0, 1),
         make=lambda v: (v["stiffness"], v["damping"]),
@@ -217,7 +217,7 @@ _LAWS = (
             Parameter(name="stiffness", unit="N/m^n", default=2.1e5, lowest=0.0, highest=_BIG, above_lowest=True,
                       summary="K", source="ours: as stiff as the spring of brick at a depth of 5 mm"),
             Parameter(name="damping", unit="N s/m", default=60.0, lowest=0.0, highest=_BIG, summary="C, going in only",
-                      source="ours (trials.md, brick)"),
+                      source="ours, as of brick"),
             Parameter(name="exponent", unit="1", default=1.5, lowest=0.5, highest=4.0, summary="n", source="Hertz"),
         ),
         slots=("stiffness", "damping", "exponent"), extensive=(0, 1),
@@ -278,7 +278,7 @@ _LAWS = (
             Parameter(name="surface_friction", unit="1", default=0.4, lowest=0.0, highest=2.0,
                       summary="friction coefficient of grains and spike", source="ours"),
             Parameter(name="gravity", unit="m/s2", default=9.80665, lowest=0.0, highest=100.0, above_lowest=True,
-                      summary="gravity of the grains: 1 g even in the rig", source="planar-model.md"),
+                      summary="gravity of the grains: 1 g even in the rig", source="docs/planar.md"),
             Parameter(name="inertia", unit="1", default=1.1, lowest=0.0, highest=10.0,
                       summary="lambda of the term lambda rho v_n^2",
                       source="about 1.1 for glass beads: Agarwal et al. (2021), see rigid/rft.py; from memory"),

@@ -14,6 +14,7 @@ from .dynamics import LOST, OMEGA, VX, VY, Modes, System
 __all__ = ["let_go", "resolve", "settle"]
 
 _SAME = 1e-12  # a slip speed [m/s] or rate [rad/s] below this is rounding
+_EPS = 2.0**-52
 _REST = 1e-11  # accelerations below this share of g_sim (for the rotation g_sim / l) are rounding
 
 
@@ -122,5 +123,7 @@ def settle(system: System, time: float, z: list[float], modes: Modes, rate: list
     if system.model.reads("time") or (not modes.torque_over and system.model.reads("wheel_speed")):
         return False  # what holds now may not hold later
     ax, ay, alpha = system.acceleration
-    small = _REST * system.trial.gravity_sim
+    trial = system.trial
+    shallow = min(max(system.depth(n, z), _EPS * trial.spike_length) for n in modes.touching)
+    small = max(_REST, 8 * _EPS * trial.spike_length / shallow) * trial.gravity_sim
     return max(abs(ax), abs(ay), abs(alpha) * system.s.length) <= small

@@ -12,6 +12,7 @@ from .dynamics import THETA, WHEEL, Modes, System, Y
 __all__ = ["standing", "stiffness_at_rest"]
 
 _CLOSE = 1e-13  # of the weight, and of weight x length
+_EPS = 2.0**-52
 
 
 def standing(system: System) -> tuple[list[float], Modes]:
@@ -38,7 +39,7 @@ def standing(system: System) -> tuple[list[float], Modes]:
             break
         if error <= 1e-17:
             break
-        depth = min(max(system.depth(n, z), 1e-9) for n in modes.touching)
+        depth = min(max(system.depth(n, z), 16 * _EPS * trial.spike_length) for n in modes.touching)
         e = 1e-4 * depth
         columns = []
         for k, step in ((Y, e), (THETA, e / trial.spike_length)):
@@ -57,7 +58,11 @@ def standing(system: System) -> tuple[list[float], Modes]:
         z[Y], z[THETA] = z[Y] + part * dy, z[THETA] + part * dt
     assert best is not None
     z[Y], z[THETA] = best[1], best[2]
-    if not best[0] <= 1e-9 or any(system.depth(n, z) <= 0 for n in modes.touching):
+    # In a small body's gravity the sinkage is a few steps of what a height of 0.2 m can be told by.
+    shallow = max(min(system.depth(n, z) for n in modes.touching), _EPS * trial.spike_length)
+    if not best[0] <= max(1e-9, 8 * _EPS * trial.spike_length / shallow) or any(
+        system.depth(n, z) <= 0 for n in modes.touching
+    ):
         raise ValueError(_why_not(system, "the platform tips over before the torque starts"))
     _residual(system, z, modes)
     if abs(system.stick_force) > system.stick_bound:
@@ -116,7 +121,7 @@ def _residual(system: System, z: list[float], modes: Modes) -> tuple[float, floa
 
 def stiffness_at_rest(system: System) -> tuple[float, float]:
     """Slope of a row's force over depth [N/m] and over rate [N s/m] at the depth that carries half the weight."""
-    depth = max(_sinkage(system, 0.5 * system.trial.weight), 1e-9)
+    depth = _sinkage(system, 0.5 * system.trial.weight)
     p, s, q = system.p, system.s, system.q
 
     def force(z: float, rate: float, top: float) -> float:

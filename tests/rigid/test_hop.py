@@ -39,7 +39,7 @@ def hedgehog(**given_):
     [(0.125, 0, 82.9), (0.25, 0, 76.0), (0.5, 0, 63.4), (0.125, RIG, 76.1), (0.25, RIG, 63.6), (0.5, RIG, 45.2)],
 )
 def test_a_strong_torque_launches_sliding_at_tan_m_over_m_y_mu(mu_d, counterweight, degrees):
-    """planar-model.md, closed forms; by impulse and by the equations of motion under 1 kN m."""
+    """docs/planar.md, closed forms; by impulse and by the equations of motion under 1 kN m."""
     tumbler = hedgehog(mu_s=2 * mu_d, counterweight=counterweight, gravity=0.0834)
     sudden = impulsive_launch(tumbler, 0.4)
     assert math.degrees(sudden.angle) == pytest.approx(degrees, abs=0.06)

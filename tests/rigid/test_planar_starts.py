@@ -1,4 +1,6 @@
-"""A motor whose torque takes a while: with it the platform pivots first on steel, as the paper saw at 0.125 N m.
+"""How a trial starts: at rest, and under a torque that is there at once or takes a while.
+
+A motor whose torque takes a while: with it the platform pivots first on steel, as the paper saw at 0.125 N m.
 
 From static equilibrium under a torque that is there at once, the springs have not yet moved the load to the leading
 row: both rows hold the tips, and sticking asks for F = m l c tau / (J + m l^2 c^2), c = cos(pi / 8): 0.51 N where
@@ -70,3 +72,17 @@ def test_a_stand_is_not_taken_for_rest_while_the_torque_rises(tmp_path):
     trajectory = simulate(steel(tmp_path, rise=0.1), duration=1.5)
     assert trajectory.transitions[1][0] > 0.05
     assert trajectory.theta[-1] > 0.02
+
+
+@pytest.mark.parametrize(("gravity", "stiffness"), [(1e-5, 1.5e4), (1e-6, 1.5e4), (1e-3, 1e6), (1e-2, 1e8)])
+def test_it_stands_at_rest_where_the_sinkage_is_a_nanometre_or_less(gravity, stiffness):
+    """W / 2K of 2e-10 to 3e-9 m, of a height of 0.2 m that a number tells to 3e-17 m."""
+    trial = Trial(
+        mass=MASS, inertia=0.06, spike_length=0.2, stiffness=stiffness, damping=60.0, mu_s=0.5, mu_d=0.25,
+        gravity_sim=gravity, gravity=gravity, torque=0.0, torque_until=1.0, actuator="motor", wheel_inertia=1.2e-3,
+    )  # fmt: skip
+    trajectory = simulate(trial, duration=1000.0, sample_interval=10.0)
+    assert [state for _, state, _ in trajectory.transitions] == ["stand"]
+    assert (trajectory.y == trajectory.y[0]).all() and (trajectory.theta == 0.0).all()
+    depth = 0.2 * math.cos(math.pi / 8) - trajectory.y[0]
+    assert depth == pytest.approx(MASS * gravity / (2 * stiffness), rel=1e-6, abs=6e-17)
