@@ -139,7 +139,7 @@ class Run:
             self._after(held, force)
         elif self.lets_go_at_touch and force > 0 and steps_left > 0:
             sooner = steps_left * self.macro_step
-            self._rows = [(when + sooner, *row) for when, *row in self._rows]
+            self._rows = [(when + sooner, depth, rate, push) for when, depth, rate, push in self._rows]
             self._approach = self.count
             self._after(held, force)
         if not self.done and self.time >= self.max_time - 0.5 * self.macro_step:
