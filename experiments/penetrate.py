@@ -23,6 +23,7 @@ from hedgebed import __version__
 from .findings import Findings, bed_entry, bed_quantities, compare_with, read_reference
 from .memory import memory_there
 from .progress import Progress
+from .remarks import overlap_warning, softening_note
 from .runfolder import RunFolder
 from .settings import PenetrateSettings, expected_grain_count
 from .softening import Softening, bearing_gradient, drop_depth, soften
@@ -41,6 +42,8 @@ RAIN = 2.5
 """Height of the loose column that a bed is rained from, over the bed's depth [1]."""
 SHIPPED_RESULT = Path(__file__).parent.parent / "docs" / "results" / "penetrate" / "result.json"
 """The result of the case that ships, in a checkout."""
+PLOTTED, PICTURE, ANIMATED = 10.0, 5.0, 1.0
+"""About what the plots of a report take, the pictures of one run, and a frame of the animation [s]."""
 PREPARATION = 1.5
 """What the preparation of a bed costs, in seconds of the bed's clock; from the cache next to nothing."""
 
@@ -134,9 +137,10 @@ def _check_reach(settings: PenetrateSettings) -> None:
     if rests > floor:
         key = "load" if settings.load is not None else "platform_mass"
         value = f"{settings.load:g} N" if settings.load is not None else f"{settings.platform_mass:g} kg"
+        on = "" if settings.load is not None else f", {settings.weight:.3g} N on a spike,"
         most = settings.weight * floor / rests
         raise ValueError(
-            f"{key} = {value} puts {settings.weight:.3g} N on the spike, which would sink about {rests:.2g} m, deeper "
+            f"{key} = {value}{on} puts the spike about {rests:.2g} m deep, deeper "
             f"than {deeper}: a load of at most {most:.2g} N, a larger tip_diameter or a deeper bed_size would do"
         )
     for key in ("drop_speeds", "other_drop_speeds"):
@@ -303,11 +307,9 @@ def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progres
     softening = choose_softness(settings)
     units = plan_units(settings)
     with folder.lock():
-        progress.message(
-            f"grains softened {softening.factor:.3g} times, to E = {softening.young:.3g} Pa, for overlaps of at most "
-            f"{100 * settings.max_overlap:.3g} % at {softening.pressure:.3g} Pa and {softening.speed:g} m/s; the load "
-            f"is {settings.weight:.4g} N, a dropped spike moves {settings.mass:.4g} kg"
-        )
+        progress.message(softening_note(settings, softening))
+        dropped = f", a dropped spike moves {settings.mass:.4g} kg" if settings.drop_speeds else ""
+        progress.message(f"the load is {settings.weight:.4g} N{dropped}")
         _plan(settings, units, folder, progress)
         for seed in settings.seeds:
             _run_seed(settings, seed, [unit for unit in units if unit.seed == seed], softening, folder, progress)
@@ -327,7 +329,9 @@ def _plan(settings: PenetrateSettings, units: list[Unit], folder: RunFolder, pro
         if todo:
             costs[f"bed of seed {seed}"] = PREPARATION
         costs |= {unit.title: expected_time(settings, unit, stiffness) for unit in todo}
-    progress.plan(costs | {"spring-damper": 0.05, "report": 0.5})
+    drawn = len(shown_units(units)) if settings.frame_count else 0
+    pictures = drawn * PICTURE + settings.frame_count * (drawn > 0) * ANIMATED
+    progress.plan(costs | {"spring-damper": 0.05}, seconds={"report": PLOTTED + pictures})
 
 
 def _run_seed(
@@ -490,11 +494,8 @@ def _conclude(
     overlap = max(overlaps, default=None)
     quantities = findings.quantities() | bed_quantities(facts, overlap)
     warnings = findings.warnings()
-    if overlap is not None and overlap > 0.9 * settings.max_overlap:
-        warnings.append(
-            f"grains overlapped by up to {100 * overlap:.3g} % of a diameter, within a tenth of max_overlap = "
-            f"{100 * settings.max_overlap:.3g} %, past which a run fails: a larger young would leave more room"
-        )
+    if near := overlap_warning(overlap, settings, softening):
+        warnings.append(near)
     if len(settings.seeds) < 3:
         warnings.append("fewer than three seeds: the spread between beds is not known well")
     codes = {note.get("code") for note in notes.values()} | {folder.code, fingerprint()}
