@@ -5,10 +5,15 @@ from typing import get_args
 import pytest
 
 from experiments import registry
-from experiments.reading import read_case, settings_from
+from experiments.reading import Layer, read_case, settings_from
 from experiments.registry import EXPERIMENTS, find_experiment
 
 ALL = pytest.mark.parametrize("experiment", EXPERIMENTS.values(), ids=lambda experiment: experiment.name)
+
+# A subject (the campaign that is diagnosed) has no default, so no case of it can ship.
+WITHOUT_SUBJECT = pytest.mark.parametrize(
+    "experiment", [one for one in EXPERIMENTS.values() if not one.subject], ids=lambda experiment: experiment.name
+)
 
 
 @ALL
@@ -23,9 +28,16 @@ def test_settings_are_frozen_closed_and_described(experiment):
             assert "[" in field.description, f"{name} has no unit in its description: {field.description}"
 
 
-@ALL
+@WITHOUT_SUBJECT
 def test_the_defaults_are_valid(experiment):
     settings_from(experiment.settings_class(), [])
+
+
+@pytest.mark.parametrize("experiment", [one for one in EXPERIMENTS.values() if one.subject], ids=lambda one: one.name)
+def test_a_subject_must_be_named(experiment):
+    with pytest.raises(ValueError, match=experiment.subject):
+        settings_from(experiment.settings_class(), [])
+    settings_from(experiment.settings_class(), [Layer(None, {experiment.subject: "somewhere"})])
 
 
 @ALL
@@ -34,7 +46,7 @@ def test_the_presets_ship_and_are_valid(experiment):
         settings_from(experiment.settings_class(), [read_case(registry.CASES / preset.case)])
 
 
-@ALL
+@WITHOUT_SUBJECT
 def test_the_case_that_ships_is_what_one_gets_without_a_case(experiment):
     settings_class = experiment.settings_class()
     shipped = settings_from(settings_class, [read_case(registry.CASES / f"{experiment.name}.toml")])
