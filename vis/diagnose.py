@@ -60,16 +60,17 @@ def write_diagnosis_report(folder: str | Path, *, progress: Callable[[float], No
     result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
     channels = [_read_channel(path) for path in sorted((folder / "series").glob("*.csv"))]
     worst = sorted(channels, key=lambda c: -float(np.mean(c.residual("before") ** 2)))
+    held = set(said["gap"]["held_out_trials"])
     figures = folder / "figures"
     figures.mkdir(exist_ok=True)
     drawn: dict[str, Block] = {}
     plans: list[tuple[str, str, str, Callable[[], Figure | None]]] = [
         ("trajectories", "Measured, before, after", "The channels in which the base model fails most: measured (dots), "
          "the base model with its parameters fitted (dashed), and the model with what was added (line).",
-         lambda: _draw_trajectories(_spread(worst))),
+         lambda: _draw_trajectories(_spread(worst), held)),
         ("residuals", "Residuals before and after", "The same channels: measured less model over the sensor's noise, "
          "before (orange) and after (blue); the band is two standard deviations.",
-         lambda: _draw_residuals(_spread(worst))),
+         lambda: _draw_residuals(_spread(worst), held)),
         ("evidence", "What every candidate explains", "Log evidence over the base model, tempered for misfit of form, "
          "best form of each set of effects.", lambda: _draw_evidence(said)),
         ("latent", "What no effect explains", "What the best model lacks, against what it goes with most.",
@@ -123,7 +124,7 @@ def _grid(count: int, height: float) -> tuple[Figure, list[Axes]]:
     return drawing, axes[:count]
 
 
-def _draw_trajectories(channels: Sequence[_Channel]) -> Figure | None:
+def _draw_trajectories(channels: Sequence[_Channel], held: set[str]) -> Figure | None:
     if not channels:
         return None
     drawing, axes = _grid(len(channels), 2.4)
@@ -132,14 +133,14 @@ def _draw_trajectories(channels: Sequence[_Channel]) -> Figure | None:
         axis.plot(c.time[::step], c.measured[::step], ".", color=INK, ms=2.5, label="measured")
         axis.plot(c.time, c.before, color=MODEL, ls=(0, (4, 2)), lw=1.5, label="before")
         axis.plot(c.time, c.after, color=BED, lw=1.3, label="after")
-        axis.set_title(f"{c.trial}, {c.name}")
+        axis.set_title(_title(c, held))
         axis.set_xlabel("time [s]")
         axis.set_ylabel(f"{c.name} [{_UNITS.get(c.name, '1')}]")
     axes[0].legend()
     return drawing
 
 
-def _draw_residuals(channels: Sequence[_Channel]) -> Figure | None:
+def _draw_residuals(channels: Sequence[_Channel], held: set[str]) -> Figure | None:
     if not channels:
         return None
     drawing, axes = _grid(len(channels), 2.2)
@@ -147,11 +148,15 @@ def _draw_residuals(channels: Sequence[_Channel]) -> Figure | None:
         axis.axhspan(-2, 2, color="#e9eef2", lw=0)
         axis.plot(c.time, c.residual("before"), color=MODEL, lw=0.9, label="before")
         axis.plot(c.time, c.residual("after"), color=BED, lw=0.9, label="after")
-        axis.set_title(f"{c.trial}, {c.name}")
+        axis.set_title(_title(c, held))
         axis.set_xlabel("time [s]")
         axis.set_ylabel("residual [std]")
     axes[0].legend()
     return drawing
+
+
+def _title(channel: _Channel, held: set[str]) -> str:
+    return f"{channel.trial}, {channel.name}" + (", held out" if channel.trial in held else "")
 
 
 def _draw_evidence(said: Mapping[str, Any]) -> Figure | None:
@@ -161,7 +166,8 @@ def _draw_evidence(said: Mapping[str, Any]) -> Figure | None:
         best.setdefault(name, float(row["score"]))
     if not best:
         return None
-    names = list(best)[:10][::-1]
+    singles = [name for name in best if " + " not in name]
+    names = sorted({*singles, *list(best)[:6]}, key=lambda name: best[name])
     drawing = Figure(figsize=(_WIDTH, 0.7 + 0.33 * len(names)))
     FigureCanvasAgg(drawing)
     axis = drawing.subplots()

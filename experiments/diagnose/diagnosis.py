@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .colour import Colour, find_colours, whitener_for
-from .evidence import Hypothesis, excess, held_out_fit, score, signature_matrix
+from .evidence import Hypothesis, excess, held_out_fit, inflation, score, signature_matrix
 from .fitting import Fit, Model, Whitener, fit
 from .gate import Verdict, open_gate
 from .localise import Place, depends_on, latent_table, places
@@ -84,7 +84,7 @@ class Diagnosis:
         """What diagnosis.json says of an effect: name -> value, std, unit."""
         found: dict[str, dict[str, Any]] = {}
         names = [p.name for p in self.best.model.parameters]
-        covariance = self.best.covariance()
+        covariance = inflation(self.best) ** 2 * self.best.covariance()
         for form in self.forms:
             if form.effect != effect:
                 continue

@@ -19,7 +19,7 @@ import numpy as np
 from experiments.runfolder import write_json, write_series
 
 from .diagnosis import Diagnosis
-from .evidence import excess
+from .evidence import excess, inflation
 
 __all__ = ["document", "write_diagnosis"]
 
@@ -52,7 +52,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
         "after": {"passed": found.gate_after.passed, "score": found.gate_after.score,
                   "threshold": found.gate_after.threshold},
     }  # fmt: skip
-    said["evidence"] = _evidence(found)[:12]
+    said["evidence"] = _evidence(found)
     said["noise"] = {c.channel: {"std": c.std, "persistence": c.persistence} for c in found.colours.values()}
     said["model_std"] = dict(found.model_std)
     said["findings"] = [
@@ -99,7 +99,7 @@ def _base_values(found: Diagnosis) -> dict[str, Any]:
     """The base parameters before and after, with their standard errors."""
     result = {}
     for stage, fit in (("before", found.base), ("after", found.best)):
-        variance = np.diag(fit.covariance())
+        variance = inflation(fit) ** 2 * np.diag(fit.covariance())
         names = [p.name for p in fit.model.parameters]
         result[stage] = {
             p.name: {"value": fit.values[p.name], "std": float(np.sqrt(max(variance[names.index(p.name)], 0.0))),

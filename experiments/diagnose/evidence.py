@@ -19,10 +19,11 @@ from .fitting import Fit, Model, fit
 from .gate import low_modes
 from .problem import Array, Form, Values
 
-__all__ = ["Hypothesis", "best_start", "excess", "held_out_fit", "score", "signature_matrix"]
+__all__ = ["Hypothesis", "best_start", "excess", "held_out_fit", "inflation", "score", "signature_matrix"]
 
 _MODES_EACH = 6
-"""Slow modes that a misfit of form has in one channel of one trial."""
+"""Slow modes that a misfit of form has in one channel of one trial; it is alike from trial to trial, so that their
+number is taken to grow with the square root of the number of channels."""
 _MOST_OCCAM = 7.0
 """What one form's parameters can cost at most [nats]: a misfit of form makes Laplace's volumes too small."""
 
@@ -51,9 +52,23 @@ def excess(found: Fit) -> float:
     return found.objective - (found.count - int(found.free.sum()))
 
 
+def _slow_count(found: Fit) -> float:
+    return max(10.0, _MODES_EACH * math.sqrt(len(low_modes(found.model))))
+
+
+def inflation(found: Fit) -> float:
+    """Factor on standard errors: a misfit of form, E in M slow modes, makes each of them as loud as 1 + E / M.
+
+    What chance alone brings, two standard deviations of chi-square, does not count.
+    """
+    modes = _slow_count(found)
+    left = max(excess(found) - 2 * math.sqrt(2.0 * found.count), 0.0)
+    return math.sqrt(1 + left / modes)
+
+
 def score(found: Fit) -> float:
     """Tempered log evidence, up to what is common to models of one campaign [nats]."""
-    modes = max(10.0, _MODES_EACH * float(len(low_modes(found.model))))
+    modes = _slow_count(found)
     left = excess(found)
     likelihood = -0.5 * modes * math.log1p(left / modes) if left > 0 else -0.5 * left
     parameters = found.model.parameters
@@ -71,6 +86,7 @@ def score(found: Fit) -> float:
 
 
 _SIZES = (0.1, 0.4, 1.0, 3.0)
+_FIRST = 0.2
 
 
 def best_start(model: Model, form: Form, values: Values) -> Fit:
@@ -97,7 +113,16 @@ def best_start(model: Model, form: Form, values: Values) -> Fit:
             chosen.append(int(k))
     fits = [fit(model, points[k], rounds=5) for k in chosen]
     best = min(fits, key=lambda found: found.objective)
-    return fit(model, best.values)
+    best = fit(model, best.values)
+    if getattr(model.problem, "rough", ()) and excess(best) > 6 * math.sqrt(2.0 * best.count):
+        part = model.until(_FIRST)
+        early = [float(modes @ modes) for modes in part.evaluate(points)]
+        place: Values = points[int(np.argmin(early))]
+        for share in (_FIRST, 0.4, 0.7):
+            place = fit(model.until(share), place, rounds=8).values
+        other = fit(model, place)
+        best = other if other.objective < best.objective else best
+    return best
 
 
 def signature_matrix(found: Fit, forms: Sequence[Form]) -> tuple[Array, list[Form]]:

@@ -34,6 +34,8 @@ class Whitener:
     """Rows of each channel in each trial, in the order of time."""
     weights: Mapping[str, Array]
     """One over the noise of each mode, in the order of the blocks, shape [sample_count]."""
+    kept: Mapping[str, Array] = field(default_factory=dict)
+    """Of trials that are looked at in part only: factors 0 or 1 on the residuals, shape [sample_count]."""
 
     @staticmethod
     def white(problem: Problem) -> Whitener:
@@ -48,6 +50,8 @@ class Whitener:
 
     def modes(self, trial: str, residuals: Array) -> Array:
         """Modes of the residuals of a trial, shape [sample_count]."""
+        if trial in self.kept:
+            residuals = residuals * self.kept[trial]
         parts = [dct(residuals[rows], norm="ortho") for rows in self.blocks[trial]]
         return np.concatenate(parts) * self.weights[trial]
 
@@ -89,6 +93,18 @@ class Model:
     def holding(self, values: Values) -> Model:
         """The same with all shared parameters held at these values."""
         return replace(self, held=dict(values))
+
+    def until(self, share: float) -> Model:
+        """The same, of the trials that the problem calls `rough` only the first share of their time looked at.
+
+        A motion with bounces depends on its parameters the more roughly the longer it goes on: fits that begin with its
+        beginning find their way.
+        """
+        kept = {}
+        for trial in getattr(self.problem, "rough", ()):
+            time = self.problem.samples(trial).time
+            kept[trial] = (time <= time.min() + share * np.ptp(time)).astype(float)
+        return replace(self, whitener=replace(self.whitener, kept=kept))
 
     def evaluate(self, points: Sequence[Values]) -> list[Array]:
         """Modes of all trials, one after another, at each point."""

@@ -93,7 +93,8 @@ def _scores(values: Array, mean: Array, variance: Array) -> Array:
     shape = mean**2 / variance
     log_chance = stats.gamma.logsf(values, shape, scale=variance / mean)
     normal = -stats.norm.ppf(np.clip(np.exp(log_chance), 1e-300, 1 - 1e-12))
-    far = np.sqrt(np.maximum(-2 * log_chance, 0.0))  # beyond what the normal law's table holds
+    # Beyond what the normal law's table holds, and beyond what floating point does.
+    far = np.where(np.isfinite(log_chance), np.sqrt(np.maximum(-2 * log_chance, 0.0)), values / np.sqrt(variance))
     return np.where(log_chance < -600, far, normal)
 
 

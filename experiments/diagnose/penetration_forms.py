@@ -139,18 +139,17 @@ def _add_plastic(add: _Add) -> None:
     effect = "plastic-sinkage"
     add(effect, "crater", ("crater_share", "plain", 0.5, 0.0, 0.97), starts=((0.1,), (0.4,), (0.8,)))
     add(
-        effect, "curved crater", ("crater_share", "plain", 0.5, 0.0, 0.97), ("crater_bend", "plain", -0.3, 2.5),
+        effect, "curved crater", ("crater_share", "plain", 0.5, 0.0, 0.97), ("crater_bend", "plain", 0.0, 2.5),
         starts=((0.1, 0.5), (0.4, 0.5), (0.7, 1.0), (0.7, 0.0)),
     )  # fmt: skip
     add(effect, "stiffer unloading", ("unload_stiffness", "plain", 5.0, 0.0, 200.0), starts=((0.2,), (1.0,), (6.0,)))
-    add(effect, "hysteresis", ("hysteresis", "plain", 0.5, 0.0, 1.0),
-        ("hysteresis_reach", "depth", math.log(0.02), math.log(1.0)), starts=((0.2, -2.5), (0.5, -1.0)))  # fmt: skip
 
 
 def _add_adhesion(add: _Add) -> None:
     effect, reach = "adhesion", ("pull_reach", "depth", math.log(0.005), math.log(1.0))
     add(effect, "held", ("pull", "area", 0.3, 0.0, 10.0), reach, starts=((0.05, -3.0), (0.1, -1.0)))
-    add(effect, "held by depth", ("pull_deep", "area", 0.3, 0.0, 10.0), reach, starts=((0.05, -3.0), (0.1, -1.0)))
+    add(effect, "held by depth", ("pull_deep", "area", 0.3, 0.0, 10.0), reach, ("pull_growth", "plain", 0.0, 2.0),
+        starts=((0.05, -3.0, 0.7), (0.1, -1.0, 0.7)))  # fmt: skip
     add(effect, "held and let go", ("pull_short", "area", 0.3, 0.0, 10.0), reach, starts=((0.1, -3.0), (0.1, -1.0)))
     add(effect, "viscous", ("pull_viscous", "viscous", 0.3, 0.0, 10.0), starts=((0.1,),))
 

@@ -27,10 +27,10 @@ SLOTS = (
     "hardening_power", "hardening_quadratic", "hardening_cubic", "hardening_exponential",
     "hardening_early", "hardening_reach",
     "layer_depth", "layer_width", "layer_slope", "layer_step", "layer_factor", "layer_bump",
-    "crater_share", "crater_bend", "unload_stiffness", "hysteresis", "hysteresis_reach",
+    "crater_share", "crater_bend", "unload_stiffness",
     "drag", "drag_onset", "drag_reach", "drag_deep", "drag_both", "drag_tip",
     "shaft", "shaft_deep", "shaft_square", "shaft_viscous",
-    "pull", "pull_reach", "pull_deep", "pull_short", "pull_viscous",
+    "pull", "pull_reach", "pull_deep", "pull_growth", "pull_short", "pull_viscous",
     "shift_depth", "shift_speed",
 )  # fmt: skip
 """Numbers of a lane, in order. `radius_depth`: depth at which the tip is wholly in; `speed_scale`: below it the
@@ -39,7 +39,7 @@ PHASES = ("free", "in", "rest", "out")
 
 _SLOT = {name: place for place, name in enumerate(SLOTS)}
 _NEVER_ZERO = {"reference": 0.01, "speed_scale": 1e-4, "radius_depth": 1e-4, "layer_depth": 0.01, "layer_width": 1e-3,
-               "hardening_reach": 1e-3, "drag_reach": 1e-3, "hysteresis_reach": 1e-3, "pull_reach": 1e-3}  # fmt: skip
+               "hardening_reach": 1e-3, "drag_reach": 1e-3, "pull_reach": 1e-3}  # fmt: skip
 _STEP = 5e-4
 """Longest step of a drop [s]: sqrt(m / K) of a spike on sand is tens of ms, so the error is below 1e-8 of the depth;
 `fall` takes shorter ones where a lane is stiffer."""
@@ -112,9 +112,7 @@ def _kernels() -> tuple[Any, Any]:
     LAYER_DEPTH, LAYER_WIDTH, LAYER_SLOPE = S["layer_depth"], S["layer_width"], S["layer_slope"]
     LAYER_STEP, LAYER_FACTOR, LAYER_BUMP = S["layer_step"], S["layer_factor"], S["layer_bump"]
     BEND = S["crater_bend"]
-    CRATER, UNLOAD, HYSTERESIS, HYSTERESIS_REACH = (
-        S["crater_share"], S["unload_stiffness"], S["hysteresis"], S["hysteresis_reach"],
-    )  # fmt: skip
+    CRATER, UNLOAD = S["crater_share"], S["unload_stiffness"]
     DRAG, DRAG_DEEP, DRAG_BOTH, DRAG_TIP = S["drag"], S["drag_deep"], S["drag_both"], S["drag_tip"]
     DRAG_ONSET, DRAG_REACH = S["drag_onset"], S["drag_reach"]
     SHAFT, SHAFT_DEEP, SHAFT_SQUARE, SHAFT_VISCOUS = (
@@ -123,6 +121,7 @@ def _kernels() -> tuple[Any, Any]:
     PULL, PULL_REACH, PULL_DEEP, PULL_SHORT, PULL_VISCOUS = (
         S["pull"], S["pull_reach"], S["pull_deep"], S["pull_short"], S["pull_viscous"],
     )  # fmt: skip
+    PULL_GROWTH = S["pull_growth"]
     SHIFT_DEPTH, SHIFT_SPEED = S["shift_depth"], S["shift_speed"]
     Table = ti.types.ndarray(dtype=ti.f64, ndim=2)
     Line = ti.types.ndarray(dtype=ti.f64, ndim=1)
@@ -170,8 +169,6 @@ def _kernels() -> tuple[Any, Any]:
                 stiff = n[k, STIFFNESS] * (1.0 + n[k, UNLOAD]) * (ever - z)
             spring = ti.max(loading(at, n, k) * bent - stiff, 0.0)
             x, back = z / n[k, REFERENCE], most - z
-            if n[k, HYSTERESIS] != 0.0:
-                spring *= 1.0 - n[k, HYSTERESIS] * (1.0 - ti.exp(-back / n[k, HYSTERESIS_REACH]))
             total = spring
             sinking = ti.max(v, 0.0)
             rising = ti.max(-v, 0.0)
@@ -184,7 +181,10 @@ def _kernels() -> tuple[Any, Any]:
             total += (n[k, SHAFT] + n[k, SHAFT_DEEP] * x + n[k, SHAFT_SQUARE] * x * x) * way + n[k, SHAFT_VISCOUS] * v
             if back > 0.0:
                 held = back / n[k, PULL_REACH]
-                total -= (n[k, PULL] + n[k, PULL_DEEP] * most / n[k, REFERENCE]) * (1.0 - ti.exp(-held))
+                grown = n[k, PULL]
+                if n[k, PULL_DEEP] != 0.0:
+                    grown += n[k, PULL_DEEP] * ti.pow(most / n[k, REFERENCE], n[k, PULL_GROWTH])
+                total -= grown * (1.0 - ti.exp(-held))
                 total -= n[k, PULL_SHORT] * held * ti.exp(1.0 - held)
             total -= n[k, PULL_VISCOUS] * rising
         return total

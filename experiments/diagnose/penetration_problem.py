@@ -100,6 +100,11 @@ class PenetrationProblem:
             for id in self._trials
         )}  # fmt: skip
 
+    @property
+    def rough(self) -> tuple[str, ...]:
+        """Trials whose motion bounces: the likelihood is the rougher the longer they are."""
+        return tuple(id for id, trial in self._trials.items() if not trial.driven)
+
     def _straight_stiffness(self, diameter: float) -> float:
         """F / z by least squares over the driven trials of this diameter; from the depth of drops where there is none.
 
