@@ -84,7 +84,7 @@ class Diagnosis:
         """What diagnosis.json says of an effect: name -> value, std, unit."""
         found: dict[str, dict[str, Any]] = {}
         names = [p.name for p in self.best.model.parameters]
-        covariance = inflation(self.best) ** 2 * self.best.covariance()
+        covariance = self.best.covariance(inflation=inflation(self.best))
         for form in self.forms:
             if form.effect != effect:
                 continue

@@ -99,7 +99,7 @@ def _base_values(found: Diagnosis) -> dict[str, Any]:
     """The base parameters before and after, with their standard errors."""
     result = {}
     for stage, fit in (("before", found.base), ("after", found.best)):
-        variance = inflation(fit) ** 2 * np.diag(fit.covariance())
+        variance = np.diag(fit.covariance(inflation=inflation(fit)))
         names = [p.name for p in fit.model.parameters]
         result[stage] = {
             p.name: {"value": fit.values[p.name], "std": float(np.sqrt(max(variance[names.index(p.name)], 0.0))),

@@ -154,10 +154,13 @@ class Fit:
         """Of half the objective, in units of the parameters' scales, shape [p, p]."""
         return self.jacobian.T @ self.jacobian + np.diag(self.prior_precision())
 
-    def covariance(self) -> Array:
-        """Of the values, in their units, shape [p, p]; bounds are not seen, singular directions get wide."""
+    def covariance(self, *, inflation: float = 1.0) -> Array:
+        """Of the values, in their units, shape [p, p]; bounds are not seen, singular directions get wide.
+
+        `inflation`: by how much the data are noisier than stated; the priors are not.
+        """
         scales = np.array([p.scale for p in self.model.parameters])
-        hessian = self.hessian()
+        hessian = self.jacobian.T @ self.jacobian / inflation**2 + np.diag(self.prior_precision())
         size = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
         inverse = np.linalg.pinv(hessian / np.outer(size, size), rcond=1e-12, hermitian=True)
         return inverse / np.outer(size, size) * np.outer(scales, scales)
