@@ -85,6 +85,8 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
         samples = problem.samples(trial.id)
         phases = problem.phases(found.base_values, (), trial.id)
         for channel, columns in before.items():
+            if not len(columns["t_s"]):  # a sensor that recorded nothing
+                continue
             rows_here = samples.channel == channel
             columns = {"t_s": columns["t_s"], "measured": columns["measured"], "before": columns["model"],
                        "after": after[channel]["model"]}  # fmt: skip

@@ -7,7 +7,7 @@ from importlib.resources import files
 import jsonschema
 import numpy as np
 import pytest
-from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial, saved
+from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial, drop_trial, saved
 
 from experiments.campaign import read_model
 from experiments.cli import main
@@ -129,3 +129,34 @@ def test_a_campaign_that_cannot_be_read_is_refused_and_leaves_no_folder(tmp_path
     (folder / "001.csv").unlink()
     assert main(["diagnose", str(folder), "--out", str(tmp_path / "out"), "--quiet"]) == 2
     assert not (tmp_path / "out").exists()
+
+
+def test_one_trial_alone_and_a_sensor_that_recorded_nothing_are_diagnosed(tmp_path):
+    def force(z, v):
+        return base(z, v, z)
+
+    dead = drop_trial(force, speed=0.6)
+    dead["accel_m_s2"][:] = np.nan
+    folder = saved(tmp_path / "campaign", campaign_of([("f", "drop", 0.6, dead)]))
+    assert main(["diagnose", str(folder), "--out", str(tmp_path / "out"), "--quiet"]) == 0
+    said = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert said["verdict"] == "none" and said["gap"]["before"]["held_out"] is None
+    assert any("accel" in finding["what"] for finding in said["findings"])
+
+
+@pytest.mark.slow
+def test_most_of_a_hidden_suite_is_answered_right():
+    # The aims are those of `hedgebed bench diagnose`; a dozen campaigns can only show that nothing is broken.
+    from benchmarks.hidden_penetration import make_hidden
+
+    right = 0
+    for seed in range(1000, 1012):
+        campaign, hidden = make_hidden(seed)
+        found = diagnose(make_problem(campaign))
+        if hidden.outside:
+            right += found.verdict == "unknown"
+        elif hidden.effects:
+            right += found.effects[:1] == hidden.effects[:1]
+        else:
+            right += found.verdict == "none"
+    assert right >= 10
