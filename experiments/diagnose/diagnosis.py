@@ -28,6 +28,8 @@ _MOST_FOR_COLOUR = 2.5
 """Chi-square per sample above which motion, not noise, fills the fast modes too."""
 _MARGIN = 1.5
 """Standard deviations beyond the gate that something without a name must reach: no effect speaks for it."""
+_AS_LIKELY = 1.0
+"""Nats within which a third name is said as well."""
 _SMALL = 1.2
 """Chi-square per sample on held-out trials below which what is left is too small to be called unknown."""
 
@@ -229,7 +231,7 @@ def _finish(
     before = _gap(problem, base.model, base_values, fitted, held_out)
     after = before if verdict == "none" else _gap(problem, best.model, best_values, fitted, held_out)
     where = [] if verdict == "none" else places(base.model, base_values, (*fitted, *held_out))
-    rivals = choice.alternatives[:2] if choice is not None and verdict == "ambiguous" else ()
+    rivals = _smallest(choice) if choice is not None and verdict == "ambiguous" else ()
     alternatives = tuple(next(e for e in rival.effects if e not in effects) for rival in rivals)
     rival_forms = tuple(next(f for f in rival.forms if f.effect == e)
                         for rival, e in zip(rivals, alternatives, strict=True))  # fmt: skip
@@ -243,6 +245,12 @@ def _finish(
         model_std=model_std, findings=tuple(findings), depends_on=told, shares=shares,
         next_experiment=_next(problem, best, choice, rival_forms, verdict),
     )  # fmt: skip
+
+
+def _smallest(choice: Choice) -> tuple[Hypothesis, ...]:
+    """The alternatives that are said: the likeliest, and a second one where it is about as likely as the first name."""
+    first, *others = choice.alternatives
+    return (first, *(h for h in others[:1] if h.score > choice.best.score - _AS_LIKELY))
 
 
 def _next(problem: Problem, best: Fit, choice: Choice | None, rivals: tuple[Form, ...], verdict: str) -> str:
