@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,10 +52,12 @@ def _plain(effect: str, form: str, *parameters: Parameter, starts: tuple[Mapping
     )
 
 
-def _pendulum(values: Mapping[str, Array]) -> Columns:
+def _pendulum(values: Mapping[str, Array], *, arc: bool = False) -> Columns:
     curvature = np.asarray(values["pendulum.curvature"], dtype=float)
     with np.errstate(divide="ignore"):
         columns = {"pendulum.length": np.where(curvature > 0, 1 / np.maximum(curvature, 1e-12), math.inf)}
+    if arc:
+        columns["pendulum.arc"] = np.ones_like(curvature)
     if "pendulum.offset" in values:
         columns["pendulum.offset"] = np.asarray(values["pendulum.offset"], dtype=float)
     return columns
@@ -279,6 +282,14 @@ def tumble_forms(
                     ),
                 ),
                 starts=({"pendulum.curvature": 0.3, "pendulum.offset": 0.0},),
+            ),
+            TumbleForm(
+                effect="pendulum",
+                name="true arc",
+                parameters=(curvature,),
+                amplitude="pendulum.curvature",
+                physical=partial(_pendulum, arc=True),
+                starts=({"pendulum.curvature": 0.1}, {"pendulum.curvature": 0.5}),
             ),
             _plain(
                 "rig-friction",

@@ -1,24 +1,33 @@
 """Effects on the body: the rig's wires and pulleys, the mass off the shaft, the slope, cable, bearing and motor."""
 
 import math
-from math import cos, sin
+from math import cos, sin, sqrt
 
 from .term import Parameter, Term
 
 __all__ = ["BODY_EFFECTS"]
 
 
-def pendulum_potential(s, length, offset):
-    """V = m_b g d^2 / 2 L, d the horizontal distance from under the pulleys."""
+def pendulum_potential(s, length, offset, arc):
+    """V = m_b g [(1 - c) d^2 / 2 L + c (sqrt(a^2 + d^2) - a)], d the horizontal distance from under the pulleys.
+
+    a = L - rise is the height of the pulleys above the shaft; sqrt(a^2 + d^2) - a is what the counterweight has risen.
+    """
     d = s.up_y * s.x - s.up_x * (s.y - s.stance) - offset
-    return 0.5 * s.counterweight * s.gravity * d * d / length
+    a = length - s.up_x * s.x - s.up_y * (s.y - s.stance)
+    raised = d * d / (sqrt(a * a + d * d) + a)
+    return s.counterweight * s.gravity * ((1.0 - arc) * 0.5 * d * d / length + arc * raised)
 
 
-def pendulum_force(s, length, offset):
+def pendulum_force(s, length, offset, arc):
     """-dV/dq."""
     d = s.up_y * s.x - s.up_x * (s.y - s.stance) - offset
-    pull = -s.counterweight * s.gravity * d / length
-    return pull * s.up_y, -pull * s.up_x, 0.0
+    a = length - s.up_x * s.x - s.up_y * (s.y - s.stance)
+    reach = sqrt(a * a + d * d)
+    tension = s.counterweight * s.gravity
+    side = -tension * ((1.0 - arc) * d / length + arc * d / reach)
+    down = -tension * arc * d * d / (reach * (reach + a))
+    return side * s.up_y + down * s.up_x, down * s.up_y - side * s.up_x, 0.0
 
 
 def com_offset_mass(s, x, y):
@@ -91,9 +100,12 @@ BODY_EFFECTS: tuple[Term, ...] = (
                       summary="from the pulleys down to the shaft"),
             Parameter(name="offset", unit="m", default=0.0, lowest=-1.0, highest=1.0,
                       summary="how far the pulleys stand towards +x of the start"),
+            Parameter(name="arc", unit="1", default=0.0, lowest=0.0, highest=1.0,
+                      summary="0: a long pendulum, which pulls back only; 1: the true arc, whose wires carry less too"),
         ),
         source="the rest tension times x / length of a long pendulum; the paper trusts its rig without it for 40 mm",
-        limits="tension at its rest value m_b g (the motion changes it by a_y / g, below 1 %); x far below the length",
+        limits="tension at its rest value m_b g (the motion changes it by a_y / g, below 1 %); with arc = 0 x far "
+               "below the length: at 0.0085 g the arc adds a tenth of the weight at x / length = 0.06",
         hooks={"potential": pendulum_potential, "force": pendulum_force},
     ),
     Term(

@@ -31,6 +31,20 @@ def test_pendulum_in_the_air_the_platform_swings_at_sqrt_of_m_b_g_over_m_length(
     assert rows[:, 1] == pytest.approx(0.01 * np.cos(rate * rows[:, 0]), abs=1e-10)
 
 
+def test_pendulum_on_its_arc_the_wires_carry_less():
+    # On the arc the wires' upward pull is m_b g cos(angle): at rest aside, y'' = -g_sim - m_b g (1 - cos) / (m + m_b).
+    length, aside, rise = 2.2, 0.3, 0.4
+    trial = in_rig(effects=(effect("pendulum", length=length, arc=1.0),))
+    rows = thrown(trial, [aside, System(trial).s.stance + rise, 0.0, 0.0, 0.0, 0.0], 1e-3)
+    above = length - rise
+    reach = math.hypot(above, aside)
+    pull = trial.counterweight * G
+    x_rate, y_rate = rows[-1, 4] / 1e-3, rows[-1, 5] / 1e-3
+    assert x_rate == pytest.approx(-pull * aside / reach / MASS, rel=1e-5)
+    total = MASS + trial.counterweight
+    assert y_rate == pytest.approx(-0.0085 * G - pull * (1 - above / reach) / total, rel=1e-5)
+
+
 def test_slope_gravity_leans_and_so_do_the_wires():
     a = 0.2
     rows = thrown(free(effects=(effect("slope", angle=a),)), [0.0, 0.9, 0.0, 0.0, 0.0, 0.0], 0.8)

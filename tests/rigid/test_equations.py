@@ -16,7 +16,7 @@ TORQUE, TOP = 0.3, 0.02
 WITH_ENERGY = ["pendulum", "com-offset", "slope", "pulley-inertia", "umbilical", "tip-radius", "depth-hardening",
                "plastic-sinkage", "adhesion", "inertial-drag"]  # fmt: skip
 VALUES = {
-    "pendulum": {"length": 2.2, "offset": 0.01},
+    "pendulum": {"length": 2.2, "offset": 0.01, "arc": 0.6},
     "com-offset": {"x": 0.003, "y": -0.002},
     "slope": {"angle": 0.15},
     "pulley-inertia": {"mass": 0.7},
@@ -58,7 +58,10 @@ class Derived:
             T += on["pulley-inertia"]["mass"] * dot(height) ** 2 / 2
         if "pendulum" in on:
             d = X * up[1] - (Y - length * math.cos(math.pi / 8)) * up[0] - on["pendulum"]["offset"]
-            energy += mb * true * d**2 / (2 * on["pendulum"]["length"])
+            wires, arc = on["pendulum"]["length"], on["pendulum"]["arc"]
+            above = wires - (height - length * math.cos(math.pi / 8) * up[1])
+            energy += mb * true * (1 - arc) * d**2 / (2 * wires)
+            energy += mb * true * arc * (sp.sqrt(above**2 + d**2) - above)
         if "umbilical" in on:
             energy += on["umbilical"]["stiffness"] * A**2 / 2
             D += on["umbilical"]["drag"] * W**2 / 2
