@@ -119,10 +119,15 @@ def test_energy_never_grows_in_a_dissipative_cluster():
 
 
 def test_the_floor_carries_the_weight_of_a_settled_bed():
-    """In the mean over a tenth of a second, after a rest; and nothing moves."""
+    """In the mean over a tenth of a second, once it is at rest: a grain may slide late, so rest is waited for."""
     bed = cloud.make(time_step=None)
-    for time, drag in ((0.4, 0.02), (0.1, 0.005), (0.4, np.inf), (0.1, np.inf)):
+    for time, drag in ((0.4, 0.02), (0.1, 0.005), (0.4, np.inf)):
         bed.advance(round(time / bed.time_step), drag_time=drag)
+    for _ in range(20):
+        bed.advance(round(0.1 / bed.time_step))
+        if bed.kinetic_energy < 1e-9 * bed.weight * 0.004:
+            break
+    bed.advance(round(0.1 / bed.time_step))
     assert bed.floor_force == pytest.approx(bed.weight, rel=1e-4)
     grains = bed.grains()
     assert bed.weight == pytest.approx(2600 * 4 / 3 * math.pi * (grains["radius"] ** 3).sum() * 9.81)
