@@ -150,6 +150,8 @@ def _add_adhesion(add: _Add) -> None:
     add(effect, "held", ("pull", "area", 0.3, 0.0, 10.0), reach, starts=((0.05, -3.0), (0.1, -1.0)))
     add(effect, "held by depth", ("pull_deep", "area", 0.3, 0.0, 10.0), reach, ("pull_growth", "plain", 0.0, 2.0),
         starts=((0.05, -3.0, 0.7), (0.1, -1.0, 0.7)))  # fmt: skip
+    add(effect, "held wherever it has been", ("pull_ever", "area", 0.3, 0.0, 10.0), reach,
+        ("pull_growth", "plain", 0.0, 2.0), starts=((0.05, -3.0, 0.7), (0.1, -1.0, 0.7)))  # fmt: skip
     add(effect, "held and let go", ("pull_short", "area", 0.3, 0.0, 10.0), reach, starts=((0.1, -3.0), (0.1, -1.0)))
     add(effect, "viscous", ("pull_viscous", "viscous", 0.3, 0.0, 10.0), starts=((0.1,),))
 

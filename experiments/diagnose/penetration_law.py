@@ -30,7 +30,7 @@ SLOTS = (
     "crater_share", "crater_bend", "unload_stiffness",
     "drag", "drag_onset", "drag_reach", "drag_deep", "drag_both", "drag_tip",
     "shaft", "shaft_deep", "shaft_square", "shaft_viscous",
-    "pull", "pull_reach", "pull_deep", "pull_growth", "pull_short", "pull_viscous",
+    "pull", "pull_reach", "pull_deep", "pull_growth", "pull_ever", "pull_short", "pull_viscous",
     "shift_depth", "shift_speed",
 )  # fmt: skip
 """Numbers of a lane, in order. `radius_depth`: depth at which the tip is wholly in; `speed_scale`: below it the
@@ -121,7 +121,7 @@ def _kernels() -> tuple[Any, Any]:
     PULL, PULL_REACH, PULL_DEEP, PULL_SHORT, PULL_VISCOUS = (
         S["pull"], S["pull_reach"], S["pull_deep"], S["pull_short"], S["pull_viscous"],
     )  # fmt: skip
-    PULL_GROWTH = S["pull_growth"]
+    PULL_GROWTH, PULL_EVER = S["pull_growth"], S["pull_ever"]
     SHIFT_DEPTH, SHIFT_SPEED = S["shift_depth"], S["shift_speed"]
     Table = ti.types.ndarray(dtype=ti.f64, ndim=2)
     Line = ti.types.ndarray(dtype=ti.f64, ndim=1)
@@ -186,6 +186,9 @@ def _kernels() -> tuple[Any, Any]:
                     grown += n[k, PULL_DEEP] * ti.pow(most / n[k, REFERENCE], n[k, PULL_GROWTH])
                 total -= grown * (1.0 - ti.exp(-held))
                 total -= n[k, PULL_SHORT] * held * ti.exp(1.0 - held)
+            if n[k, PULL_EVER] != 0.0 and z < ever:
+                mobilised = 1.0 - ti.exp(-(ever - z) / n[k, PULL_REACH])
+                total -= n[k, PULL_EVER] * ti.pow(ever / n[k, REFERENCE], n[k, PULL_GROWTH]) * mobilised
             total -= n[k, PULL_VISCOUS] * rising
         return total
 
