@@ -82,9 +82,8 @@ def trajectory_columns(trajectory: Trajectory) -> dict[str, Any]:
 
 
 def _quantity(value: float | None, unit: str, note: str) -> dict[str, Any]:
-    return {"value": None if value is None else float(value), "std": 0.0, "unit": unit} | (
-        {"note": note} if note else {}
-    )
+    known = {"value": None, "std": None} if value is None else {"value": float(value), "std": 0.0}
+    return known | {"unit": unit} | ({"note": note} if note else {})
 
 
 def _integrate(settings: TumbleSettings, plan: TumblePlan, *, duration: float) -> Trajectory:

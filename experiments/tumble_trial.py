@@ -170,16 +170,22 @@ def plan_tumble(settings: TumbleSettings, *, model_file: Path | None = None) -> 
     settle("wheel_inertia", platform.wheel_inertia, f"platform {platform.name}", in_model=in_model)
     surface, warnings = _settle_surface(settings, model, settle)
     _settle_gravity(settings, model, numbers)
-    settle("torque", TORQUE, "default")
+    weak = platform.motor_torque < TORQUE
+    settle("torque", platform.motor_torque if weak else TORQUE, f"motor of {platform.name}" if weak else "default")
     settle("torque_until", float("inf"), "default: as long as the trial")
     settle("wheel_speed_0", 0.0, "default")
-    if model is None:
+    try:
         warnings += _check_wheel(settings, platform, numbers)
+    except ValueError as error:
+        if model is None:
+            raise
+        # A model says nothing of its platform's motor, so this is a doubt and no refusal.
+        warnings.append(str(error))
     values: dict[str, Any] = {name: number.value for name, number in numbers.items()}
     ground = _ground(settings)
     trial = Trial(
         **values,
-        spike_count=platform.spike_count if model is None else 8,
+        spike_count=platform.spike_count,
         actuator=settings.actuator,
         ground=ground,
         effects=(*_model_effects(model, source), *_given_effects(settings.effects)),
@@ -192,8 +198,8 @@ def plan_tumble(settings: TumbleSettings, *, model_file: Path | None = None) -> 
             origin = "given" if name in ground.parameters else f"default of {ground.name}, of one spike"
             numbers[name] = Number(value, unit, origin)
     warnings += _rig_warnings(trial)
-    fastest = platform.max_wheel_speed if model is None else math.inf
-    return TumblePlan(trial, numbers, surface, _choices(settings, surface, model), tuple(warnings), fastest)
+    choices = _choices(settings, surface, model)
+    return TumblePlan(trial, numbers, surface, choices, tuple(warnings), platform.max_wheel_speed)
 
 
 def _choices(settings: TumbleSettings, surface: str, model: TumbleModel | None) -> dict[str, str]:

@@ -376,3 +376,9 @@ def test_bad_input_is_refused_by_name_and_leaves_no_folder(capsys, options, said
     assert all(words in text for words in said), text
     assert "Traceback" not in text
     assert not Path("a").exists()
+
+
+def test_a_platform_with_a_weaker_motor_is_given_its_own_torque():
+    plan = plan_tumble(TumbleSettings(platform="cubli", gravity=1.0))
+    assert (plan.trial.torque, plan.numbers["torque"].origin) == (0.1, "motor of cubli")
+    assert plan.trial.spike_count == 4
