@@ -9,67 +9,51 @@ less than a fifth of the weight.
 """
 
 import math
+from pathlib import Path
 
 import pytest
+from rigid_trials import MASS, G, free, in_rig
 
+import experiments
 from rigid import Effect, Trial, simulate
 
-G = 9.80665
-MASS = 5.3
-TERM = """
-from math import exp
-from rigid.terms import Parameter, Term
-
-def factor(s, rise):
-    return 1.0 - exp(-s.time / rise)
-
-TERM = Term(
-    id="torque-rise", summary="the torque comes up with a time constant", acts="force", source="a first-order motor",
-    limits="none", hooks={"torque_factor": factor},
-    parameters=(Parameter(name="rise", unit="s", default=1e-9, summary="its time", lowest=0.0, above_lowest=True),),
-)
-"""
+RISES = Path(experiments.__file__).parent / "terms" / "torque_rise.py"
 
 
-def steel(tmp_path, *, rise: float | None, reading: str = "pair") -> Trial:
-    weight_of = 0.0085 * G
-    counterweight = MASS * (G - weight_of) / (G + weight_of) if reading == "pair" else MASS * (G - weight_of) / G
-    effects = ()
+def steel(*, rise: float | None, reading: str = "pair") -> Trial:
+    given: dict = {"mu_s": 0.25, "torque_until": 100.0}
     if rise is not None:
-        path = tmp_path / "rise.py"
-        path.write_text(TERM)
-        effects = (Effect(id="torque-rise", parameters={"rise": rise}, file=path),)
-    return Trial(
-        mass=MASS, inertia=0.06, spike_length=0.2, stiffness=1.5e4, damping=60.0, mu_s=0.25, mu_d=0.125,
-        gravity_sim=G * (MASS - counterweight) / (MASS + counterweight), counterweight=counterweight, torque=0.125,
-        torque_until=100.0, actuator="motor", wheel_inertia=1.2e-3, wheel_speed_0=0.0, effects=effects,
-    )  # fmt: skip
+        given["effects"] = (Effect(id="torque-rise", parameters={"rise": rise}, file=RISES),)
+    if reading == "weight":
+        given["counterweight"] = MASS * (1 - 0.0085)
+        given["gravity_sim"] = G * (MASS - given["counterweight"]) / (MASS + given["counterweight"])
+    return in_rig(0.125, **given)
 
 
 def states(trial: Trial) -> list[str]:
     return [state for _, state, _ in simulate(trial, duration=1.5).transitions]
 
 
-def test_a_torque_that_is_there_at_once_makes_it_slip_at_once(tmp_path):
-    trial = steel(tmp_path, rise=None)
+def test_a_torque_that_is_there_at_once_makes_it_slip_at_once():
+    trial = steel(rise=None)
     arm = trial.spike_length * math.cos(math.pi / 8)
     held = MASS * arm * trial.torque / (trial.inertia + MASS * arm**2)
     assert held > trial.mu_s * trial.weight
     assert states(trial)[0] == "slip"
 
 
-def test_with_a_torque_that_takes_a_tenth_of_a_second_it_stands_then_pivots(tmp_path):
-    trajectory = simulate(steel(tmp_path, rise=0.1), duration=1.5)
+def test_with_a_torque_that_takes_a_tenth_of_a_second_it_stands_then_pivots():
+    trajectory = simulate(steel(rise=0.1), duration=1.5)
     assert [state for _, state, _ in trajectory.transitions][:2] == ["stand", "pivot"]
     assert math.degrees(trajectory.trajectory_angle) == pytest.approx(22.5, abs=2.5)
 
 
-def test_by_the_other_reading_of_the_gravity_it_slips_all_the_same(tmp_path):
-    assert states(steel(tmp_path, rise=0.1, reading="weight"))[:2] == ["stand", "slip"]
+def test_by_the_other_reading_of_the_gravity_it_slips_all_the_same():
+    assert states(steel(rise=0.1, reading="weight"))[:2] == ["stand", "slip"]
 
 
-def test_a_stand_is_not_taken_for_rest_while_the_torque_rises(tmp_path):
-    trajectory = simulate(steel(tmp_path, rise=0.1), duration=1.5)
+def test_a_stand_is_not_taken_for_rest_while_the_torque_rises():
+    trajectory = simulate(steel(rise=0.1), duration=1.5)
     assert trajectory.transitions[1][0] > 0.05
     assert trajectory.theta[-1] > 0.02
 
@@ -77,10 +61,7 @@ def test_a_stand_is_not_taken_for_rest_while_the_torque_rises(tmp_path):
 @pytest.mark.parametrize(("gravity", "stiffness"), [(1e-5, 1.5e4), (1e-6, 1.5e4), (1e-3, 1e6), (1e-2, 1e8)])
 def test_it_stands_at_rest_where_the_sinkage_is_a_nanometre_or_less(gravity, stiffness):
     """W / 2K of 2e-10 to 3e-9 m, of a height of 0.2 m that a number tells to 3e-17 m."""
-    trial = Trial(
-        mass=MASS, inertia=0.06, spike_length=0.2, stiffness=stiffness, damping=60.0, mu_s=0.5, mu_d=0.25,
-        gravity_sim=gravity, gravity=gravity, torque=0.0, torque_until=1.0, actuator="motor", wheel_inertia=1.2e-3,
-    )  # fmt: skip
+    trial = free(stiffness=stiffness, gravity_sim=gravity, gravity=gravity, torque_until=1.0)
     trajectory = simulate(trial, duration=1000.0, sample_interval=10.0)
     assert [state for _, state, _ in trajectory.transitions] == ["stand"]
     assert (trajectory.y == trajectory.y[0]).all() and (trajectory.theta == 0.0).all()
