@@ -32,6 +32,8 @@ _EXPECTED_PACKING = 0.57
 # Penetration resistance of sand grows with depth about sixty times as fast as its overburden (3D-RFT, Agarwal et al.
 # 2023: 0.9 MN/m3 at mu = 0.5 against 16 kN/m3); a bed is made for a tip that may go half its depth.
 _BEARING = 30.0
+# A grain that strikes the floor at the end of its fall does the bed no harm: until it is made, this is allowed.
+_RAIN_OVERLAP = 0.05
 # More is rained in than is kept: this much higher, and at least this many diameters.
 _SURPLUS, _SURPLUS_DIAMETERS = 0.06, 2.0
 
@@ -83,7 +85,8 @@ def prepare_bed(
         seed: of sizes and positions.
         young: Young's modulus of the softened grains [Pa]; chosen from ``max_overlap`` when None
             (``dem.timestep.choose_young``).
-        max_overlap: bound on overlap over diameter; also ends a later run that goes past it.
+        max_overlap: bound on overlap over diameter; also ends a later run that goes past it. While the bed is being
+            made the bound is 5 % if that is more: grains that land do so harder than they are ever pressed.
         time_step: [s]; an eighth of the contact time when None.
         precision: "float64" or "float32". arch: "cpu" or "cuda". threads: all when None.
         cache: whether to look in the cache, and to leave the bed there.
@@ -155,6 +158,7 @@ def prepare_bed(
         raise BedFailure(f"{failure.reason}; the bed as it was is in {kept}") from None
     bed.material = stuff.softened(young)
     bed.recipe = recipe
+    bed.overlap_limit = float(max_overlap)
     bed = _reset(bed)
     if cache:
         try:
@@ -197,7 +201,7 @@ def _rain(stuff, size, grain, spread, gravity, seed, young, max_overlap, time_st
     radii = draw_radii(rng, volume, grain, spread)
     positions = rain_positions(rng, radii, size[:2])
     top = float((positions[:, 2] + radii).max())
-    return Bed.from_grains(
+    bed = Bed.from_grains(
         stuff,
         positions=positions,
         radii=radii,
@@ -212,6 +216,8 @@ def _rain(stuff, size, grain, spread, gravity, seed, young, max_overlap, time_st
         arch=arch,
         threads=threads,
     )
+    bed.overlap_limit = max(bed.overlap_limit, _RAIN_OVERLAP)
+    return bed
 
 
 def _reset(bed: Bed) -> Bed:

@@ -13,8 +13,10 @@ grain's diameter) allows at the pressures and speeds of *this* run, and never st
    factor of 3.4).
 3. Hertz between two grains, F = (2/3) E* d^2 (delta/d)^1.5, E* = E / (2 (1 - nu^2)), so
        delta/d = (1.5 CHAIN p / E*)^(2/3).
-4. Apart from that, a grain of mass m that hits something rigid, the spike at its speed or the floor after the fall in
-   which the bed was rained in, v^2 = 2 g h: delta = (5 m v^2 / 4 k)^(2/5), k = (4/3) E* sqrt(R), E* = E / (1 - nu^2).
+4. Apart from that, a grain of mass m that hits something rigid at speed v: delta = (5 m v^2 / 4 k)^(2/5),
+   k = (4/3) E* sqrt(R), E* = E / (1 - nu^2). It is the spike at its speed, within `max_overlap`; and the floor after
+   the fall in which the bed was rained in, v^2 = 2 g h, within `RAIN_OVERLAP` if that is more: what a grain does to the
+   floor before there is a bed leaves no trace in it, and would make the grains of a fine run three times as stiff.
 
 The estimate is a choice made beforehand; the bed measures its largest overlap, and the result states it.
 """
@@ -28,6 +30,8 @@ from dem.timestep import CHAIN
 
 __all__ = ["Softening", "bearing_gradient", "drop_depth", "soften"]
 
+RAIN_OVERLAP = 0.05
+"""Overlap that a grain may have with the floor at the end of its fall, while the bed is made [of a diameter]."""
 INERTIA = 1.1
 """lambda: dynamic pressure over rho v^2 [1] (Agarwal et al. 2023)."""
 
@@ -91,7 +95,8 @@ def soften(
     pair = 1.5 * CHAIN * highest / max_overlap**1.5
     static = 2 * (1 - poisson**2) * pair
     mass = density * math.pi * grain**3 / 6
-    squared = max(speed**2, 2 * gravity * fall)
-    stiffness = 1.25 * mass * squared / (max_overlap * grain) ** 2.5
-    impact = 0.75 * stiffness / math.sqrt(0.5 * grain) * (1 - poisson**2)
-    return Softening(min(real_young, max(static, impact)), highest, speed, real_young)
+    struck, landed = (
+        0.75 * 1.25 * mass * squared / (bound * grain) ** 2.5 / math.sqrt(0.5 * grain) * (1 - poisson**2)
+        for squared, bound in ((speed**2, max_overlap), (2 * gravity * fall, max(max_overlap, RAIN_OVERLAP)))
+    )
+    return Softening(min(real_young, max(static, struck, landed)), highest, speed, real_young)

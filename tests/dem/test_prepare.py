@@ -56,6 +56,16 @@ def test_a_prepared_bed_is_at_rest_and_level(bed):
     assert bed.material.young < SAND.young and bed.seed == 3
 
 
+def test_rain_may_land_harder_than_the_bound_of_the_bed_it_makes(monkeypatch):
+    """A fall of 30 mm on the floor: Hertz (softening.py, 4) gives 2 % of a diameter at 20 MPa; then 1 % rules."""
+    landed = []
+    calm = Preparation._calm
+    monkeypatch.setattr(Preparation, "_calm", lambda work: landed.append(work.bed.max_overlap) or calm(work))
+    bed = prepare_bed("sand", size=(0.02, 0.02, 0.012), grain=0.003, seed=1, max_overlap=0.01, young=2e7, cache=False)
+    assert 0.01 < landed[0] < 0.05
+    assert bed.overlap_limit == 0.01 and bed.max_overlap == 0
+
+
 class Progress:
     """Keeps what it is told."""
 

@@ -291,8 +291,10 @@ def test_the_shipped_cases_are_settings():
     assert expected_grain_count(short.bed_size, short.grain, short.spread) > 20000
     assert short.tip_diameter / short.grain >= 4.999 and short.max_overlap <= 0.05 and min(short.speeds) >= 0.1
     assert full.tip_diameter / full.grain >= 9.999 and full.max_overlap <= 0.01 and min(full.speeds) < 0.1
-    finer = {"grain", "max_overlap", "speeds", "other_speeds", "other_drop_speeds", "reference", "bed_size"}
-    assert full.bed_size[:2] == short.bed_size[:2] and full.bed_size[2] > full.depth + 1.99 * full.tip_diameter
+    finer = {"grain", "max_overlap", "speeds", "other_speeds", "other_drop_speeds", "reference", "bed_size", "young"}
+    assert full.young >= penetrate.choose_softness(full.model_copy(update={"young": None})).young
+    assert min(full.bed_size[:2]) > 4.99 * full.tip_diameter
+    assert full.bed_size[2] > full.depth + 1.99 * full.tip_diameter
     assert {name for name, value in full if value != getattr(short, name)} == finer
     assert len(full.seeds) >= 3 and full.other_speeds == full.speeds and full.other_drop_speeds == full.drop_speeds
 

@@ -28,6 +28,14 @@ def test_fast_spikes_need_stiffer_grains_and_real_grains_are_the_bound():
         soften(max_overlap=0.0, **SAND)
 
 
+def test_the_fall_of_the_rain_asks_for_stiffness_only_past_five_percent():
+    """From 80 mm, 1.25 m/s: at 1 % the fall alone would ask 0.05^2.5 / 0.01^2.5 = 56 times what 5 % asks."""
+    assert soften(max_overlap=0.01, fall=0.08, **SAND).young == soften(max_overlap=0.01, **SAND).young
+    high, higher = (soften(max_overlap=0.01, fall=fall, **SAND).young for fall in (100.0, 200.0))
+    assert higher == pytest.approx(2 * high)
+    assert soften(max_overlap=0.05, fall=100.0, **SAND).young == pytest.approx(high)
+
+
 def test_small_gravity_makes_soft_grains():
     light = soften(max_overlap=0.05, **(SAND | {"gravity": 1e-4, "speed": 1e-3}))
     assert light.young < 1e-3 * soften(max_overlap=0.05, **SAND).young
