@@ -43,7 +43,7 @@ class HiddenTumble:
     effects: tuple[str, ...]
     outside: str | None
     parameters: dict[str, float]
-    """Those with fixed names (trials.md), "<effect>.<name>"."""
+    """Those with fixed names (docs/campaigns.md), "<effect>.<name>"."""
     settings: dict[str, float]
     """All numbers of what is hidden, by `hidden_tumble_motion.COLUMNS`."""
     signature: float
@@ -314,7 +314,7 @@ def _left(
 
 
 def _parameters(effects: Sequence[str], settings: Mapping[str, float]) -> dict[str, float]:
-    """Those that trials.md names."""
+    """Those that docs/campaigns.md names."""
     named = {
         "pendulum": {"pendulum.length": lambda s: 1 / s["wire_curvature"]},
         "com-offset": {"com-offset.x": lambda s: s["offset_x"], "com-offset.y": lambda s: s["offset_y"]},

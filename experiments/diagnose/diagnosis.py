@@ -36,7 +36,7 @@ _SMALL = 1.2
 
 @dataclass(frozen=True)
 class Gap:
-    """Chi-square per valid sample, as trials.md has it."""
+    """Chi-square per valid sample, as docs/campaigns.md has it."""
 
     fit: float
     held_out: float | None

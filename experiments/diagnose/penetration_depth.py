@@ -40,7 +40,7 @@ class SmoothDepth:
 
     @property
     def depth_std(self) -> Array:
-        """Standard error of the smoothed depth, s in trials.md [m], shape [n]."""
+        """Standard error of the smoothed depth, s in docs/campaigns.md [m], shape [n]."""
         return np.sqrt((self.depth_error**2).sum(axis=1))
 
     @property

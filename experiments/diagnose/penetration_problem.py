@@ -2,8 +2,8 @@
 
 Driven trials are scored on their force along the smoothed depth. The error of that depth is one smooth curve, not white
 noise, so the likelihood takes its covariance in full: force noise plus (dF/dz, dF/dv) times the error of depth and
-speed; `chi_square` has trials.md's own sum, std_force^2 + (dF/dz s)^2. Drops are integrated from their exact start and
-scored on depth and acceleration.
+speed; `chi_square` has the sum of docs/campaigns.md, std_force^2 + (dF/dz s)^2. Drops are integrated from their exact
+start and scored on depth and acceleration.
 """
 
 from __future__ import annotations
@@ -259,7 +259,7 @@ class PenetrationProblem:
         return found
 
     def chi_square(self, values: Values, forms: Sequence[Form], trial: str) -> tuple[float, int]:
-        """trials.md's sum; see `Problem`."""
+        """The sum of docs/campaigns.md; see `Problem`."""
         this = self._trials[trial]
         if not this.driven:
             (rest,) = self.evaluate([values], forms, [trial])

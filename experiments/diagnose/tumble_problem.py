@@ -167,7 +167,7 @@ class TumbleProblem:
         return np.array(STATES)[self._predict([values], forms, [trial])[0].state[0]]
 
     def reported(self, values: Values, form: Form) -> dict[str, tuple[float, str]]:
-        """The term's parameters under the fixed names of trials.md."""
+        """The term's parameters under the fixed names of docs/campaigns.md."""
         from rigid.terms import EFFECTS
 
         units = {f"{form.effect}.{p.name}": p.unit for p in EFFECTS[form.effect].parameters}
