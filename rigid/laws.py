@@ -139,7 +139,7 @@ def katsuragi_durian(
     """Stiffness [N/m] and drag [kg/m] of a ball of `diameter` [m] and density in grains of `bulk_density` [kg/m3].
 
     k D / (m g) = 12 mu (rho_g / rho_p)^(1/2) and d_1 / D = (0.25 / mu) rho_p / rho_g: Katsuragi and Durian, Physical
-    Review E 87, 052208 (2013); the two prefactors are quoted from memory, the scalings are those of its abstract.
+    Review E 87, 052208 (2013). The scalings are those of its abstract; the prefactors 12 and 0.25 are not verified.
     `friction` is the tangent of the angle of repose.
     """
     mass = math.pi / 6 * diameter**3 * projectile_density
@@ -200,7 +200,7 @@ _LAWS = (
                       summary="K", source="ours: as stiff as the spring of brick at a depth of 5 mm"),
             Parameter(name="dissipation", unit="s/m", default=0.2, lowest=0.0, highest=10.0,
                       summary="alpha: how restitution falls with the speed of impact",
-                      source="0.08 to 0.32 s/m for steel, bronze, ivory: Hunt and Crossley, from memory"),
+                      source="0.08 to 0.32 s/m for steel, bronze, ivory: Hunt and Crossley, quoted in Drake's manual"),
             Parameter(name="exponent", unit="1", default=1.5, lowest=1.0, highest=3.0, summary="n",
                       source="Hertz: 3/2 for a ball on a flat"),
         ),
@@ -252,8 +252,9 @@ _LAWS = (
                       summary="depth at which the section is full: the radius for a ball, 0 for a flat end",
                       source="geometry"),
             Parameter(name="cohesive_modulus", unit="N/m^(n+1)", default=990.0, lowest=0.0, highest=_BIG,
-                      summary="k_c", source="dry sand, Wong, Theory of Ground Vehicles, from memory"),
-            Parameter(name="frictional_modulus", unit="N/m^(n+2)", default=1.5284e6, lowest=0.0, highest=_BIG,
+                      summary="k_c",
+                      source="dry sand: Wong, Theory of Ground Vehicles (2008), Table 2.3, at second hand"),
+            Parameter(name="frictional_modulus", unit="N/m^(n+2)", default=1.52843e6, lowest=0.0, highest=_BIG,
                       above_lowest=True, summary="k_phi", source="as cohesive_modulus"),
             Parameter(name="exponent", unit="1", default=1.1, lowest=0.1, highest=2.0, summary="n",
                       source="as cohesive_modulus"),
@@ -274,14 +275,14 @@ _LAWS = (
                       summary="rho_c of the bed", source="dry sand"),
             Parameter(name="friction", unit="1", default=0.6, lowest=0.1, highest=0.9,
                       summary="internal friction coefficient of the grains",
-                      source="dry sand; the paper's fit of xi_n is for 0.1 to 0.9"),
+                      source="dry sand; the fit of xi_n is for 0.3 to 0.9"),
             Parameter(name="surface_friction", unit="1", default=0.4, lowest=0.0, highest=2.0,
                       summary="friction coefficient of grains and spike", source="ours"),
             Parameter(name="gravity", unit="m/s2", default=9.80665, lowest=0.0, highest=100.0, above_lowest=True,
                       summary="gravity of the grains: 1 g even in the rig", source="docs/planar.md"),
             Parameter(name="inertia", unit="1", default=1.1, lowest=0.0, highest=10.0,
                       summary="lambda of the term lambda rho v_n^2",
-                      source="about 1.1 for glass beads: Agarwal et al. (2021), see rigid/rft.py; from memory"),
+                      source="1.1 for plates dragged level, 1 for a wheel: Agarwal et al. (2021), see rigid/rft.py"),
             _REBOUND,
         ),
         slots=("2 pi R^3 xi_n", "pi R^2 lambda rho / 2", "radius", *(f"shape {k}" for k in range(8)), "slope", "wall"),

@@ -6,8 +6,9 @@ x1 = -z.v, x2 = -z.n, x3 = n.v (z up), whose part along the surface is bounded b
 and xi_n = rho_c g (894 mu^3 - 386 mu^2 + 89 mu) [N/m3] is the one number of the grains. The inertia of the grains adds
 lambda rho (n.v)^2 along -n (Agarwal et al., Science Advances 7 (2021), eabe0631).
 
-The 60 coefficients below are the paper's, as a public transcription of it has them (github.com/KKKobefeng/3D-RFT): with
-them a flat plate that goes straight down bears 0.875 xi_n d where the paper states 0.876.
+The 60 coefficients below are the paper's Table S1 as two public transcriptions have it. They differ in one, that of
+x3 x2^2 in f2: 0.18589 in github.com/KKKobefeng/3D-RFT, 0.18519 in the other. With the latter a flat plate that goes
+straight down bears 0.8757 xi_n d, which is the 0.876 that the paper states; with the former 0.8750.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ _COEFFICIENTS = np.array(
         (-0.00415, -0.11985, -0.05532), (0.07204, -0.25739, 0.06790), (-0.02750, -0.26834, -0.16404),
         (-0.08772, 0.02692, 0.02287), (0.01992, -0.00736, 0.02927), (-0.45961, 0.63758, 0.95406),
         (0.40799, 0.08997, -0.00131), (-0.10107, 0.21069, -0.11028), (-0.06576, 0.04748, 0.01487),
-        (0.05664, 0.20406, -0.02730), (-0.09269, 0.18589, 0.10911), (0.01892, 0.04934, -0.04097),
+        (0.05664, 0.20406, -0.02730), (-0.09269, 0.18519, 0.10911), (0.01892, 0.04934, -0.04097),
         (0.01033, 0.13527, 0.07881), (0.15120, -0.33207, -0.27519),
     ]
 )  # fmt: skip
