@@ -27,6 +27,7 @@ from .paper_settings import PaperSettings
 from .progress import Progress
 from .runfolder import RunFolder
 from .surfaces import find_surface
+from .tumble_platform import torque_within_limit
 from .tumble_settings import TumbleSettings
 from .tumble_trial import SPIKES_PER_ROW, plan_tumble
 
@@ -59,6 +60,8 @@ class Job:
     trial: Trial
     duration: float
     trusted: float
+    max_wheel_speed: float = math.inf
+    """Where a motor's torque ends [rad/s]; not known of a wheel with another inertia than the platform's."""
 
     @property
     def method(self) -> Any:
@@ -112,8 +115,17 @@ def _case_jobs(settings: PaperSettings, rig: float, turn: dict[str, Any], surfac
     duration = settings.duration if turn["actuator"] == "motor" else settings.brake_duration
 
     def job(variant: str, varied: Trial) -> Job:
+        limit = plan.max_wheel_speed if varied.wheel_inertia == trial.wheel_inertia else math.inf
         return Job(
-            f"{name}-{variant.replace(' ', '-')}", rig, torque, surface, variant, varied, duration, settings.trusted
+            f"{name}-{variant.replace(' ', '-')}",
+            rig,
+            torque,
+            surface,
+            variant,
+            varied,
+            duration,
+            settings.trusted,
+            limit,
         )
 
     yield job("nominal", trial)
@@ -135,7 +147,10 @@ def _case_jobs(settings: PaperSettings, rig: float, turn: dict[str, Any], surfac
 
 def _integrate(job: Job) -> dict[str, Any]:
     """The numbers of one job, and its rows where they are drawn."""
-    trajectory = simulate(job.trial, duration=job.duration, method=job.method, sample_interval=SAMPLE_INTERVAL)
+    trial, full = torque_within_limit(
+        job.trial, max_wheel_speed=job.max_wheel_speed, duration=job.duration, method=job.method
+    )
+    trajectory = simulate(trial, duration=job.duration, method=job.method, sample_interval=SAMPLE_INTERVAL)
     away = np.hypot(trajectory.x - trajectory.x[0], trajectory.y - trajectory.y[0])
     beyond = np.flatnonzero(away >= job.trusted)
     end = int(beyond[0]) + 1 if len(beyond) else len(away)
@@ -155,6 +170,7 @@ def _integrate(job: Job) -> dict[str, Any]:
         "transition_angle_slip": trajectory.transition_angle("slip"),
         "transition_angle_hop": trajectory.transition_angle("hop"),
         "energy_residual": trajectory.energy_residual,
+        "wheel_at_limit": full,
         "transitions": states,
         "launch": _launch(trajectory, states),
         "rows": _rows(trajectory) if job.variant in ("nominal", "low", "high", "paper") else None,

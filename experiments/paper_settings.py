@@ -33,7 +33,7 @@ class PaperSettings(StrictSettings):
     # What the paper does not give
     platform: str = Field("hedgehog", description="Platform: one that ships, or its TOML file.")
     brake_wheel_speed: Positive = Field(
-        500.0, description="Speed of the wheel at the start of a brake trial [rad/s]; ours, the paper gives none."
+        300.0, description="Speed of the wheel at the start of a brake trial [rad/s]; ours, the paper gives none."
     )
     sweep: bool = Field(True, description="Halve and double the numbers that the paper does not give, one at a time.")
 

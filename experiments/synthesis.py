@@ -38,6 +38,7 @@ from .campaign_settings import CampaignSettings
 from .progress import Progress
 from .runfolder import RunFolder
 from .surfaces import find_surface
+from .tumble_platform import torque_within_limit
 from .tumble_settings import TrialSettings, TumbleSettings
 from .tumble_trial import TumblePlan, plan_tumble
 
@@ -120,9 +121,15 @@ def _conditions(settings: CampaignSettings) -> list[_Condition]:
         for torque in settings.brake_torques
     ]
     plans = [plan_tumble(TumbleSettings(**shared, **place, **turn)) for place in where for turn in turns]
+    plans = [replace(plan, trial=_within_limit(plan, settings.duration)) for plan in plans]
     repeated = [plan for plan in plans for _ in range(settings.repeats)]
     width = max(3, len(str(len(repeated))))
     return [_Condition(f"{number:0{width}d}", plan) for number, plan in enumerate(repeated, 1)]
+
+
+def _within_limit(plan: TumblePlan, duration: float) -> Trial:
+    """The trial with its torque ended where the wheel comes to its limit: the format knows none."""
+    return torque_within_limit(plan.trial, max_wheel_speed=plan.max_wheel_speed, duration=duration)[0]
 
 
 def _sensors(settings: CampaignSettings) -> SensorSet:

@@ -18,6 +18,7 @@ from rigid.planar import Trajectory, simulate
 from .campaign import read_model
 from .progress import Progress
 from .runfolder import RunFolder, write_series
+from .tumble_platform import torque_within_limit
 from .tumble_settings import TumbleSettings
 from .tumble_trial import TumblePlan, plan_tumble
 
@@ -86,10 +87,13 @@ def _quantity(value: float | None, unit: str, note: str) -> dict[str, Any]:
     return known | {"unit": unit} | ({"note": note} if note else {})
 
 
-def _integrate(settings: TumbleSettings, plan: TumblePlan, *, duration: float) -> Trajectory:
-    return simulate(
-        plan.trial, duration=duration, method=settings.method, sample_interval=min(settings.sample_interval, duration)
+def _integrate(settings: TumbleSettings, plan: TumblePlan, *, duration: float) -> tuple[Trajectory, float | None]:
+    """The trajectory, and when the wheel comes to its limit [s], where it does."""
+    trial, full = torque_within_limit(
+        plan.trial, max_wheel_speed=plan.max_wheel_speed, duration=duration, method=settings.method
     )
+    interval = min(settings.sample_interval, duration)
+    return simulate(trial, duration=duration, method=settings.method, sample_interval=interval), full
 
 
 def write_report(folder: Path, progress: Progress) -> None:
@@ -108,11 +112,11 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
         for warning in plan.warnings:
             progress.message(f"warning: {warning}")
         progress.stage("tumble", total=1.0)
-        trajectory = _integrate(settings, plan, duration=settings.duration)
+        trajectory, full = _integrate(settings, plan, duration=settings.duration)
         progress.update(1.0)
         write_series(folder.path / "trajectory.csv", trajectory_columns(trajectory))
         folder.write_series("motion", _motion_columns(trajectory))
-        result = _result(settings, plan, trajectory)
+        result = _result(settings, plan, trajectory, full)
         folder.write_result(result)
         progress.stage("report", total=1.0)
         write_report(folder.path, progress)
@@ -158,17 +162,16 @@ def _energies(trajectory: Trajectory) -> Mapping[str, Any]:
     }
 
 
-def _result(settings: TumbleSettings, plan: TumblePlan, trajectory: Trajectory) -> dict[str, Any]:
+def _result(settings: TumbleSettings, plan: TumblePlan, trajectory: Trajectory, full: float | None) -> dict[str, Any]:
     trial = plan.trial
     stated = (
         f"rig at {trial.gravity_sim:.4g} m/s2" if trial.counterweight > 0 else f"free at {trial.gravity_sim:.4g} m/s2"
     )
     warnings = list(plan.warnings)
-    fastest = float(np.abs(trajectory.wheel_speed).max())
-    if settings.actuator == "motor" and fastest > plan.max_wheel_speed:
+    if full is not None:
         warnings.append(
-            f"the motor takes the wheel to {fastest:.4g} rad/s, beyond the {plan.max_wheel_speed:g} rad/s of "
-            f"{settings.platform}: torque_until would end it in time"
+            f"the wheel comes to its limit, max_wheel_speed = {plan.max_wheel_speed:g} rad/s, at {full:.4g} s: from "
+            f"there on the motor has no torque"
         )
     if trajectory.trajectory_angle is None:
         warnings.append("the centre never got 10 mm away from its start: there is no trajectory angle")
@@ -191,6 +194,7 @@ def _result(settings: TumbleSettings, plan: TumblePlan, trajectory: Trajectory) 
         "duration": settings.duration,
         "spike_count": trial.spike_count,
         "effects": [{"id": effect.id, "parameters": dict(effect.values)} for effect in trial.effects],
+        "wheel_at_limit": full,
         "transitions": [
             {"time": float(time), "state": state, "theta": float(theta)}
             for time, state, theta in trajectory.transitions

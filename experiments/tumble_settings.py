@@ -56,6 +56,11 @@ class TrialSettings(StrictSettings):
     wheel_inertia: Positive | None = Field(
         None, description="Inertia of the flywheel [kg m2]; the platform's if not given (hedgehog: 1.2e-3)."
     )
+    max_wheel_speed: Annotated[float, Field(gt=0)] | None = Field(
+        None,
+        description="Largest speed of the wheel [rad/s]: a motor's torque ends there; the platform's if not given "
+        "(hedgehog: 1050), unknown for another wheel_inertia and for a model.",
+    )
 
     # The rig
     rig_reading: Literal["pair", "weight"] = Field(
@@ -159,6 +164,6 @@ class TumbleSettings(TrialSettings):
         if self.actuator == "brake" and not (self.wheel_speed_0 or 0.0) > 0:
             return (
                 f"wheel_speed_0 = {self.wheel_speed_0} leaves a brake nothing to slow down: the wheel's speed at the "
-                f"start in rad/s must be given, such as 500"
+                f"start in rad/s must be given, such as 300"
             )
         return None

@@ -6,26 +6,21 @@ What is given wins over the model, the model over the surface's numbers and over
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import rigid
 from rigid.rig import STANDARD_GRAVITY, Rig
 from rigid.trial import Effect, Ground, Trial
 
 from .campaign import TumbleModel, read_model
 from .surfaces import find_surface
+from .tumble_platform import Number, check_actuation, platform_numbers, wheel_limit
 from .tumble_settings import TumbleSettings
 
-__all__ = ["DEFAULT_RIG", "Number", "PlatformNumbers", "TumblePlan", "model_trial", "plan_tumble", "platform_numbers"]
+__all__ = ["DEFAULT_RIG", "TumblePlan", "model_trial", "plan_tumble"]
 
-PLATFORMS = Path(rigid.__file__).parent / "platforms"
-"""Where the platforms are that ship."""
-SPIKE_LENGTH = 0.2
-"""Of the Hedgehog [m]: the paper's octagon is 0.4 m across."""
 TORQUE = 0.22
 """The paper's middle one [N m]."""
 DEFAULT_RIG = 0.0085
@@ -53,72 +48,6 @@ UNITS = {
 
 
 @dataclass(frozen=True)
-class Number:
-    """One number of a trial: value, unit, and where it comes from ("given", "default", "surface steel", ...)."""
-
-    value: float
-    unit: str
-    origin: str
-
-
-@dataclass(frozen=True)
-class PlatformNumbers:
-    """What the planar model takes from a platform, and what its wheel can do."""
-
-    name: str
-    mass: float
-    inertia: float
-    spike_length: float
-    spike_count: int
-    wheel_inertia: float
-    motor_torque: float
-    brake_torque: float
-    max_wheel_speed: float
-
-
-def platform_numbers(name: str) -> PlatformNumbers:
-    """The numbers of a platform that ships, by name, or of the TOML file `name`.
-
-    Raises ValueError for one there is not, and for one that is no regular polygon seen from the side.
-    """
-    if name == "hedgehog":  # straight from its file: the mesh's geometry takes longer to load than a trial lasts
-        table = tomllib.loads((PLATFORMS / "hedgehog.toml").read_text(encoding="utf-8"))
-        wheels = table["wheels"]
-        return PlatformNumbers(
-            name,
-            table["body"]["mass"],
-            table["body"]["inertia"][1],
-            SPIKE_LENGTH,
-            8,
-            wheels["inertia"],
-            wheels["motor_torque"],
-            wheels["brake_torque"],
-            wheels["max_speed"],
-        )
-    from rigid.platform_files import find_platform
-
-    platform = find_platform(name)
-    stance, wheel = platform.stance(), platform.wheel()
-    count = round(math.pi / stance.lean)
-    if abs(count * stance.lean - math.pi) > 1e-6:
-        raise ValueError(
-            f"platform = {name!r} leans {math.degrees(stance.lean):.4g} degrees over its front tips, which is no "
-            f"regular polygon: the planar model takes one whose spikes are at equal angles"
-        )
-    return PlatformNumbers(
-        name,
-        platform.mass,
-        platform.moment(),
-        stance.spike_length,
-        count,
-        wheel.inertia,
-        wheel.motor_torque,
-        wheel.brake_torque,
-        wheel.max_speed,
-    )
-
-
-@dataclass(frozen=True)
 class TumblePlan:
     """A trial, and what is said of it."""
 
@@ -130,7 +59,7 @@ class TumblePlan:
     """What else was left at its default: name -> value, as a person would type it."""
     warnings: tuple[str, ...] = ()
     max_wheel_speed: float = math.inf
-    """What the platform's wheel can do [rad/s]."""
+    """Where a motor's torque ends [rad/s]."""
 
     def sentences(self) -> list[str]:
         """One line for each number and choice that was not given: every default is said."""
@@ -174,13 +103,9 @@ def plan_tumble(settings: TumbleSettings, *, model_file: Path | None = None) -> 
     settle("torque", platform.motor_torque if weak else TORQUE, f"motor of {platform.name}" if weak else "default")
     settle("torque_until", float("inf"), "default: as long as the trial")
     settle("wheel_speed_0", 0.0, "default")
-    try:
-        warnings += _check_wheel(settings, platform, numbers)
-    except ValueError as error:
-        if model is None:
-            raise
-        # A model says nothing of its platform's motor, so this is a doubt and no refusal.
-        warnings.append(str(error))
+    own_wheel = numbers["wheel_inertia"].origin != "given"
+    limit = wheel_limit(settings.max_wheel_speed, platform, own_wheel=own_wheel, in_model=model is not None)
+    warnings += check_actuation(settings.actuator, platform, numbers, limit, in_model=model is not None)
     values: dict[str, Any] = {name: number.value for name, number in numbers.items()}
     ground = _ground(settings)
     trial = Trial(
@@ -197,43 +122,28 @@ def plan_tumble(settings: TumbleSettings, *, model_file: Path | None = None) -> 
             unit = next(parameter.unit for parameter in ground.law.parameters if parameter.name == name)
             origin = "given" if name in ground.parameters else f"default of {ground.name}, of one spike"
             numbers[name] = Number(value, unit, origin)
+    numbers["max_wheel_speed"] = limit
     warnings += _rig_warnings(trial)
     choices = _choices(settings, surface, model)
-    return TumblePlan(trial, numbers, surface, choices, tuple(warnings), platform.max_wheel_speed)
+    return TumblePlan(trial, numbers, surface, choices, tuple(warnings), limit.value)
 
 
 def _choices(settings: TumbleSettings, surface: str, model: TumbleModel | None) -> dict[str, str]:
     """The settings that are no numbers of the trial and stand at their defaults."""
+    found = {"surface": surface} if settings.surface is None and model is None else {}
     units = {"duration": " s", "sample_interval": " s"}
-    names = ("platform", "ground", "actuator", "duration", "method", "sample_interval")
+    names = ["platform", "ground", "actuator", "duration", "method", "sample_interval"]
     fields = type(settings).model_fields
-    found = {
-        name: f"{getattr(settings, name)}{units.get(name, '')}"
-        for name in names
-        if getattr(settings, name) == fields[name].default
-    }
-    return ({"surface": surface} if settings.surface is None and model is None else {}) | found
-
-
-def _check_wheel(settings: TumbleSettings, platform: PlatformNumbers, numbers: Mapping[str, Number]) -> list[str]:
-    """Refuse a torque beyond the platform's motor; say where brake or wheel are taken beyond what they can do.
-
-    A brake is an impulse in the limit, and a stronger one a fair question; what a motor cannot give never happens.
-    """
-    torque, speed = numbers["torque"].value, numbers["wheel_speed_0"].value
-    if settings.actuator == "motor" and torque > platform.motor_torque * (1 + 1e-9):
-        raise ValueError(
-            f"torque = {torque:g} N m is beyond the motor of platform = {platform.name!r}: at most "
-            f"{platform.motor_torque:g} N m would do, or actuator = brake with a wheel_speed_0, or a platform with a "
-            f"stronger one"
-        )
-    said = []
-    if settings.actuator == "brake" and torque > platform.brake_torque * (1 + 1e-9):
-        said.append(f"torque = {torque:g} N m is beyond the brake of {platform.name}, {platform.brake_torque:g} N m")
-    if speed > platform.max_wheel_speed:
-        most = platform.max_wheel_speed
-        said.append(f"wheel_speed_0 = {speed:g} rad/s is beyond the wheel of {platform.name}, {most:g} rad/s")
-    return said
+    if settings.gravity is None:
+        names.append("rig_reading")
+        if settings.rig is None:
+            found["rig"] = f"{DEFAULT_RIG:g}"
+    for name in names:
+        if getattr(settings, name) == fields[name].default:
+            found[name] = f"{getattr(settings, name)}{units.get(name, '')}"
+    if not settings.effects and model is None:
+        found["effects"] = "none"
+    return found
 
 
 def _read(path: Path) -> TumbleModel:

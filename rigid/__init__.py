@@ -1,4 +1,11 @@
-"""The platform and the surface laws of the paper's model; knows nothing of grains."""
+"""The platform and the surface laws of the paper's model; knows nothing of grains.
+
+The planar model is loaded with the package. The platforms, hop theory and the spatial model are loaded when first asked
+for, since scipy takes longer to load than a tumble to integrate.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from .batch import BatchTrajectory, simulate_batch
 from .grounds import SpringDamper, SurfaceGround
@@ -10,6 +17,25 @@ from .terms import EFFECTS, Term
 from .trajectory import STATES, Trajectory
 from .trial import Effect, Ground, Trial
 
+if TYPE_CHECKING:
+    from .actuation import Flywheel, TorqueHistory
+    from .hop import (
+        Flight,
+        Launch,
+        Tumbler,
+        brake_launch,
+        escape_speed,
+        flight,
+        impulsive_launch,
+        launch,
+        launch_speed_for,
+        least_viable_angle,
+    )
+    from .platform import Platform, Stance
+    from .platform_files import find_platform, platform_names, read_platform
+    from .spatial import SpatialTrajectory, SpatialTrial
+    from .spatial import simulate as simulate_spatial
+
 __all__ = [
     "EFFECTS",
     "GROUNDS",
@@ -17,15 +43,63 @@ __all__ = [
     "BatchTrajectory",
     "Contact",
     "Effect",
+    "Flight",
+    "Flywheel",
     "Ground",
+    "Launch",
+    "Platform",
     "Reaction",
     "Section",
+    "SpatialTrajectory",
+    "SpatialTrial",
     "SpringDamper",
     "Spike",
+    "Stance",
     "SurfaceGround",
     "Term",
+    "TorqueHistory",
     "Trajectory",
     "Trial",
+    "Tumbler",
+    "brake_launch",
+    "escape_speed",
+    "find_platform",
+    "flight",
+    "impulsive_launch",
+    "launch",
+    "launch_speed_for",
+    "least_viable_angle",
+    "platform_names",
+    "read_platform",
     "simulate",
     "simulate_batch",
+    "simulate_spatial",
 ]
+
+_LATER = {
+    "actuation": ("Flywheel", "TorqueHistory"),
+    "hop": (
+        "Flight", "Launch", "Tumbler", "brake_launch", "escape_speed", "flight", "impulsive_launch", "launch",
+        "launch_speed_for", "least_viable_angle",
+    ),
+    "platform": ("Platform", "Stance"),
+    "platform_files": ("find_platform", "platform_names", "read_platform"),
+    "spatial": ("SpatialTrajectory", "SpatialTrial", "simulate_spatial"),
+}  # fmt: skip
+_HOME = {name: module for module, names in _LATER.items() for name in names}
+_NAME_AT_HOME = {"simulate_spatial": "simulate"}
+
+
+def __getattr__(name: str) -> Any:
+    """Load what comes later, or the module that holds it."""
+    if name in _LATER:
+        return import_module(f".{name}", __name__)
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f".{_HOME[name]}", __name__), _NAME_AT_HOME.get(name, name))
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

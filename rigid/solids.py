@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import ConvexHull
 
 __all__ = [
     "Mesh",
@@ -78,6 +77,8 @@ def prism_vertices(sides: int, diameter: float, height: float) -> Array:
 
 def convex_mesh(vertices: ArrayLike) -> Mesh:
     """The closed surface of the convex hull of `vertices` [m], shape [n, 3], each of them a corner of it."""
+    from scipy.spatial import ConvexHull  # a second to load, which only those wait for who want a mesh
+
     points = np.asarray(vertices, dtype=float)
     hull = ConvexHull(points)
     faces = hull.simplices.astype(np.int64)

@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from experiments.campaign.tables import FORMAT, PlatformTable, RigTable, TumbleS
 from experiments.cli import main
 from experiments.runfolder import read_series
 from experiments.surfaces import find_surface, surface_names
+from experiments.tumble_platform import torque_within_limit
 from experiments.tumble_settings import TumbleSettings
 from experiments.tumble_trial import plan_tumble
 from rigid.planar import simulate
@@ -125,10 +127,14 @@ def test_every_default_is_printed(capsys):
         "damping = 60 N s/m (surface steel)",
         "mu_s = 0.25 (surface steel)",
         "mu_d = 0.125 (surface steel)",
+        "rig = 0.0085 (default)",
+        "rig_reading = pair (default)",
+        "effects = none (default)",
         "gravity_sim = 0.0833565 m/s2 (rig = 0.0085 by default, read as pair)",
         "counterweight = 5.21066 kg",
         "torque_until = inf s",
         "wheel_speed_0 = 0 rad/s (default)",
+        "max_wheel_speed = 1050 rad/s (platform hedgehog)",
     ):
         assert line in said, line
     assert "torque = 0.2 " not in said  # that was given
@@ -202,16 +208,45 @@ def test_a_strong_brake_slides_off_at_the_angle_of_the_closed_form(options, rati
     assert value_of("a", "transition_angle_slip") == pytest.approx(0.0, abs=1e-6)
 
 
-def test_a_brake_or_a_wheel_beyond_the_platforms_own_is_said():
-    plan = plan_tumble(TumbleSettings(torque=600.0, actuator="brake", wheel_speed_0=2000.0))
+def test_a_brake_beyond_the_platforms_own_is_said():
+    plan = plan_tumble(TumbleSettings(torque=600.0, actuator="brake", wheel_speed_0=300.0))
     assert any("beyond the brake" in warning for warning in plan.warnings)
-    assert any("beyond the wheel" in warning for warning in plan.warnings)
 
 
-def test_a_motor_that_takes_its_wheel_too_far_is_said():
-    # 0.22 N m over 1.2e-3 kg m2 takes the wheel past 1050 rad/s within 0.3 s of contact from 1040 rad/s
+def test_a_motor_has_no_torque_once_its_wheel_is_at_its_limit():
+    """From 1040 rad/s, standing: (1050 - 1040) J_w / tau = 54.5 ms, and not a row of the wheel is faster after that."""
     assert main(["tumble", "--wheel-speed-0", "1040", *SHORT, "--out", "a"]) == 0
-    assert any("torque_until" in warning for warning in result_of("a")["warnings"])
+    result = result_of("a")
+    assert result["wheel_at_limit"] == pytest.approx(10 * 1.2e-3 / 0.22, rel=1e-9)
+    assert any("max_wheel_speed = 1050 rad/s, at 0.05455 s" in warning for warning in result["warnings"])
+    wheel = read_series(Path("a/series/motion.csv"))["wheel_speed_rad_s"]
+    assert wheel.max() == pytest.approx(1050, rel=1e-9)
+    assert main(["tumble", "--wheel-speed-0", "1040", "--max-wheel-speed", "2000", *SHORT, "--out", "b"]) == 0
+    assert result_of("b")["wheel_at_limit"] is None and not any("limit" in said for said in result_of("b")["warnings"])
+
+
+def test_the_limit_of_a_wheel_is_found_across_a_hop():
+    """The torque rests in a hop: the wheel is at its limit when its time on the ground times tau / J_w is enough.
+
+    A limit in the middle of the second contact, so that the whole first hop lies before it.
+    """
+    plan = plan_tumble(TumbleSettings(surface="brick"))
+    free = simulate(plan.trial, duration=2.0)
+    changes = [(time, state) for time, state, _ in free.transitions] + [(2.0, "end")]
+    grounded = [(a, b) for (a, state), (b, _) in pairwise([(0.0, "stand"), *changes]) if state != "hop"]
+    down = next(a for a, _ in grounded if any(state == "hop" and time < a for time, state in changes))
+    after = next(b for a, b in grounded if a == down)
+    middle = 0.5 * (down + after)
+    speed = 0.22 / 1.2e-3 * sum(min(b, middle) - a for a, b in grounded if a < middle)
+    ended, time = torque_within_limit(plan.trial, max_wheel_speed=speed, duration=2.0)
+    assert time == pytest.approx(middle, abs=1e-7)
+    assert simulate(ended, duration=2.0).wheel_speed.max() == pytest.approx(speed, rel=1e-6)
+
+
+def test_the_limit_is_that_of_the_platforms_own_wheel():
+    other = plan_tumble(TumbleSettings(wheel_inertia=6e-4, wheel_speed_0=2000.0))
+    assert other.max_wheel_speed == math.inf and "not the wheel" in other.numbers["max_wheel_speed"].origin
+    assert plan_tumble(TumbleSettings(max_wheel_speed=3000.0, wheel_speed_0=2000.0)).trial.wheel_speed_0 == 2000.0
 
 
 def test_an_impulsive_brake_on_ground_that_does_not_give_way_leaves_at_half_a_spikes_angle():
@@ -353,7 +388,10 @@ def test_a_term_of_ones_own_runs_from_a_file_beside_the_model():
         (["--effects", "pendulum=2"], ["effects = 'pendulum=2'", "pendulum.length=2.2"]),
         (["--effects", "pendulum.length=-2"], ["pendulum", "length"]),
         (["--platform", "nothing"], ["nothing", "hedgehog"]),
-        (["--platform", "mascot"], ["platform = 'mascot'", "regular polygon"]),
+        (["--platform", "mascot"], ["platform = 'mascot'", "66.9 and 113 degrees apart", "simulate_spatial"]),
+        (["--wheel-speed-0", "1051"], ["wheel_speed_0 = 1051", "max_wheel_speed = 1050 rad/s (platform hedgehog)"]),
+        (["--max-wheel-speed", "100", "--wheel-speed-0", "200"], ["wheel_speed_0 = 200", "(given)"]),
+        (["--mass", "0"], ["--mass = 0", "greater than 0"]),
         (["--model", "absent.toml"], ["absent.toml", "no such file"]),
         (["--model", "bad.toml"], ["bad.toml: [platform] mass = 'heavy'", "kg"]),
         (["--model", "spike.toml"], ["spike.toml", "kind 'penetration'", "'tumble'"]),

@@ -1,0 +1,43 @@
+"""`import rigid`: what it offers, and what it does not load before it is asked for."""
+
+import subprocess
+import sys
+
+import pytest
+
+import rigid
+
+
+@pytest.mark.parametrize("name", rigid.__all__)
+def test_every_name_that_is_listed_is_there(name):
+    assert getattr(rigid, name) is not None
+    assert name in dir(rigid)
+
+
+def test_a_name_stands_for_the_very_thing_in_its_module():
+    from rigid import hop, platform, platform_files, spatial
+
+    assert rigid.Platform is platform.Platform and rigid.find_platform is platform_files.find_platform
+    assert rigid.launch is hop.launch and rigid.escape_speed is hop.escape_speed
+    assert rigid.simulate_spatial is spatial.simulate and rigid.SpatialTrial is spatial.SpatialTrial
+    assert rigid.simulate is not rigid.simulate_spatial
+
+
+def test_a_name_there_is_not_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="simulate_spatially"):
+        rigid.simulate_spatially
+
+
+def test_neither_a_compiler_nor_scipy_nor_pydantic_is_loaded_with_the_package_or_for_a_trial():
+    script = (
+        "import sys, rigid; rigid.simulate(rigid.Trial(gravity_sim=0.08, torque=0.1), duration=0.01); "
+        "print([name for name in ('taichi', 'scipy', 'pydantic', 'rigid.spatial', 'rigid.hop') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_a_platform_is_read_without_scipy():
+    script = "import sys, rigid; rigid.find_platform('hedgehog').stance(); print('scipy' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
