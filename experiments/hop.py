@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -33,6 +32,7 @@ from rigid.platform_files import find_platform
 from .hop_settings import HopSettings
 from .progress import Progress
 from .runfolder import RunFolder
+from .whole_runs import whole_run
 
 __all__ = ["check", "resume", "run"]
 
@@ -51,18 +51,6 @@ class Hop:
     """Wheel speed of a brake [rad/s], torque of a motor [N m]."""
     launch: Launch
     flight: Flight | None
-
-
-def run(settings: HopSettings, folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
-    """Find the hop, write result.json into `folder` and return it. Raises ValueError for a hop that cannot be."""
-    kept = RunFolder.ensure(Path(folder), "hop", settings)
-    return _carry_out(settings, kept, progress or Progress())
-
-
-def resume(folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
-    """Do the run in `folder` again: it takes no time."""
-    kept = RunFolder.open(Path(folder))
-    return _carry_out(HopSettings(**kept.settings), kept, progress or Progress())
 
 
 def check(settings: HopSettings) -> None:
@@ -180,7 +168,7 @@ def _result(settings: HopSettings, platform: Platform, tumbler: Tumbler, hop: Ho
     left, flown, wheel = hop.launch, hop.flight, platform.wheel()
     assert flown is not None  # it goes the distance
     by_brake = settings.actuator == "brake"
-    speed = hop.effort if by_brake else torque * left.time / wheel.inertia
+    speed = hop.effort if by_brake else min(torque * left.time / wheel.inertia, wheel.max_speed)
     radius = settings.body_radius
     escape = escape_speed(settings.gravity, radius) if radius is not None else None
     sudden = impulsive_launch(tumbler, wheel.inertia)
@@ -217,7 +205,7 @@ def _result(settings: HopSettings, platform: Platform, tumbler: Tumbler, hop: Ho
             "spike_length": tumbler.spike_length, "lean": tumbler.lean, "wheel_inertia": wheel.inertia,
             "max_wheel_speed": wheel.max_speed, "sources": dict(platform.sources),
         },
-        "warnings": _warnings(settings, left, escape, speed, wheel.max_speed),
+        "warnings": _warnings(left, escape),
     }  # fmt: skip
 
 
@@ -231,12 +219,12 @@ def _sentences(
     left = hop.launch
     way = "slides off" if left.slid else "leaves without sliding"
     how = (
-        f"Braking a wheel at {speed:.4g} rad/s ({speed * 30 / math.pi:.4g} rpm) with {torque:g} N m"
+        f"Braking a wheel at {speed:.4g} rad/s ({speed * 30 / math.pi:.4g} rpm) with {torque:g} N m,"
         if settings.actuator == "brake"
         else f"A motor at {torque:.4g} N m, whose wheel comes to {speed:.4g} rad/s ({speed * 30 / math.pi:.4g} rpm),"
     )
     said = [
-        f"{how}, the platform {way} at {left.speed:.4g} m/s, {math.degrees(left.angle):.3g} degrees above the ground.",
+        f"{how} the platform {way} at {left.speed:.4g} m/s, {math.degrees(left.angle):.3g} degrees above the ground.",
         f"Launches without sliding are viable from {math.degrees(least_viable_angle(settings.mu_s)):.3g} degrees up at "
         f"mu_s = {settings.mu_s:g}; without turning on the ground this platform would leave at "
         f"{math.degrees(tumbler.lean):.3g}.",
@@ -246,7 +234,7 @@ def _sentences(
     return said
 
 
-def _warnings(settings: HopSettings, left: Launch, escape: float | None, speed: float, max_speed: float) -> list[str]:
+def _warnings(left: Launch, escape: float | None) -> list[str]:
     warnings = ["the ground is taken as rigid: one that gives and springs back launches more steeply"]
     if escape is None:
         warnings.append("how near escape is cannot be told without body_radius: escape speed is sqrt(2 g R)")
@@ -255,6 +243,7 @@ def _warnings(settings: HopSettings, left: Launch, escape: float | None, speed: 
             f"escape is near: {left.speed:.4g} m/s is {100 * left.speed / escape:.3g} % of the escape speed, "
             f"sqrt(2 g R) = {escape:.4g} m/s"
         )
-    if speed > max_speed * (1 + 1e-9):
-        warnings.append(f"the wheel would turn at {speed:.4g} rad/s: its limit is {max_speed:g}")
     return warnings
+
+
+run, resume = whole_run("hop", HopSettings, _carry_out, check=check)

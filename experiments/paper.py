@@ -30,6 +30,7 @@ from .surfaces import find_surface
 from .tumble_platform import torque_within_limit
 from .tumble_settings import TumbleSettings
 from .tumble_trial import SPIKES_PER_ROW, plan_tumble
+from .whole_runs import whole_run
 
 __all__ = ["Job", "check", "plan_jobs", "resume", "run"]
 
@@ -67,19 +68,6 @@ class Job:
     def method(self) -> Any:
         """Of the integrator."""
         return "paper" if self.variant == "paper" else "located"
-
-
-def run(settings: PaperSettings, folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
-    """Do it all into `folder` and return the result, as result.json has it. Raises ValueError before any work."""
-    check(settings)
-    kept = RunFolder.ensure(Path(folder), "paper", settings)
-    return _carry_out(settings, kept, progress or Progress())
-
-
-def resume(folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
-    """Do it again from the start: it takes less than a minute."""
-    kept = RunFolder.open(Path(folder))
-    return _carry_out(PaperSettings(**kept.settings), kept, progress or Progress())
 
 
 def check(settings: PaperSettings) -> None:
@@ -307,3 +295,6 @@ def _quantities(cases: list[dict[str, Any]], stated: list[dict[str, Any]], met: 
             max(entry["energy_residual"] for entry in nominal.values()), "1", "largest of the located integrations"
         ),
     }
+
+
+run, resume = whole_run("paper", PaperSettings, _carry_out, check=check)

@@ -41,23 +41,11 @@ from .surfaces import find_surface
 from .tumble_platform import torque_within_limit
 from .tumble_settings import TrialSettings, TumbleSettings
 from .tumble_trial import TumblePlan, plan_tumble
+from .whole_runs import whole_run
 
 __all__ = ["check", "record", "resume", "run"]
 
 _DRAWN = ("mass", "inertia", "stiffness", "damping", "mu_s", "mu_d")
-
-
-def run(settings: CampaignSettings, folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
-    """Make the campaign in `folder` and return the result, as result.json has it. Raises ValueError before any work."""
-    check(settings)
-    kept = RunFolder.ensure(Path(folder), "campaign", settings)
-    return _carry_out(settings, kept, progress or Progress())
-
-
-def resume(folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
-    """Make the campaign of a folder again from its start."""
-    kept = RunFolder.open(Path(folder))
-    return _carry_out(CampaignSettings(**kept.settings), kept, progress or Progress())
 
 
 def check(settings: CampaignSettings) -> None:
@@ -310,3 +298,6 @@ def _result(
         "trials": rows,
         "warnings": list(plan.warnings),
     }
+
+
+run, resume = whole_run("campaign", CampaignSettings, _carry_out, check=check)

@@ -21,27 +21,12 @@ from .runfolder import RunFolder, write_series
 from .tumble_platform import torque_within_limit
 from .tumble_settings import TumbleSettings
 from .tumble_trial import TumblePlan, plan_tumble
+from .whole_runs import whole_run
 
 __all__ = ["check", "quantities_of", "resume", "run", "trajectory_columns"]
 
 MODEL_COPY = "model.toml"
 """The model that was run, in the run's folder; effects of one's own lie beside it."""
-
-
-def run(settings: TumbleSettings, folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
-    """Carry the trial out into `folder` and return the result, as result.json has it.
-
-    Raises ValueError for settings that will not do, before any work; RuntimeError where the integration cannot go on.
-    """
-    check(settings)
-    kept = RunFolder.ensure(Path(folder), "tumble", settings)
-    return _carry_out(settings, kept, progress or Progress())
-
-
-def resume(folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
-    """Do the trial of a folder again from its start: it takes no longer than to read half of it."""
-    kept = RunFolder.open(Path(folder))
-    return _carry_out(TumbleSettings(**kept.settings), kept, progress or Progress())
 
 
 def check(settings: TumbleSettings) -> None:
@@ -201,3 +186,6 @@ def _result(settings: TumbleSettings, plan: TumblePlan, trajectory: Trajectory, 
         ],
         "warnings": warnings,
     }
+
+
+run, resume = whole_run("tumble", TumbleSettings, _carry_out, check=check)

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 
 import pytest
 
@@ -48,6 +49,31 @@ def test_near_escape_it_says_so_with_the_share(tmp_path, capsys):
     ratio = result["quantities"]["escape_ratio"]["value"]
     assert ratio > 0.5
     assert any(f"{100 * ratio:.3g} % of the escape speed" in warning for warning in result["warnings"])
+
+
+def test_escape_is_near_from_half_its_speed_on(tmp_path, capsys):
+    """On a flat enough body 5 m take the same launch: radii for which it is 0.49 and 0.51 of sqrt(2 g R)."""
+    _, flat = hop(tmp_path, capsys, "--distance", "5", name="flat")
+    speed = flat["quantities"]["launch_speed"]["value"]
+    near = {}
+    for share in (0.45, 0.55):
+        radius = (speed / share) ** 2 / (2 * 1e-3)
+        _, result = hop(tmp_path, capsys, "--distance", "5", "--body-radius", f"{radius:.6g}", name=f"{share:g}")
+        ratio = result["quantities"]["escape_ratio"]["value"]
+        near[ratio > 0.5] = any("escape is near" in warning for warning in result["warnings"])
+        assert not any("cannot be told" in warning for warning in result["warnings"])
+    assert near == {True: True, False: False}
+
+
+def test_what_is_said_reads_well(tmp_path, capsys):
+    """The words that a person sees, under a brake and under a motor."""
+    _, brake = hop(tmp_path, capsys, "--distance", "5", name="a")
+    _, motor = hop(tmp_path, capsys, "--distance", "0.5", "--actuator", "motor", name="b")
+    first = [result["departures"]["sentences"][0] for result in (brake, motor)]
+    assert re.fullmatch(
+        r"Braking a wheel at \S+ rad/s \(\S+ rpm\) with 6 N m, the platform slides off at \S+ m/s, .*", first[0]
+    )
+    assert re.fullmatch(r"A motor at \S+ N m, whose wheel comes to \S+ rad/s \(\S+ rpm\), the platform .*", first[1])
 
 
 def test_a_motor_is_asked_for_its_torque(tmp_path, capsys):
