@@ -1,4 +1,5 @@
-"""Settings of `hedgebed campaign`: made-up trials over gravities and torques, seen through noisy sensors."""
+"""Settings of `hedgebed campaign`: made-up trials over gravities and torques, seen through noisy sensors; and of its
+`check`."""
 
 from __future__ import annotations
 
@@ -6,9 +7,10 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
+from .strict import StrictSettings
 from .tumble_settings import TrialSettings
 
-__all__ = ["CampaignSettings"]
+__all__ = ["CampaignSettings", "CheckSettings"]
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -30,7 +32,7 @@ class CampaignSettings(TrialSettings):
     gravities: tuple[Positive, ...] = Field((), description="Gravities of a free platform in place of rigs [m/s2].")
     motor_torques: tuple[Positive, ...] = Field((0.125, 0.22), description="Torques of motor trials [N m].")
     brake_torques: tuple[Positive, ...] = Field((6.0,), description="Torques of brake trials [N m].")
-    brake_wheel_speed: Positive = Field(500.0, description="Speed of the wheel at the start of a brake trial [rad/s].")
+    brake_wheel_speed: Positive = Field(300.0, description="Speed of the wheel at the start of a brake trial [rad/s].")
     repeats: int = Field(1, ge=1, le=1000, description="Trials of each condition [1].")
 
     # What is true
@@ -79,3 +81,9 @@ class CampaignSettings(TrialSettings):
             if len(set(values)) < len(values):
                 raise ValueError(f"{key} = {list(values)} holds a value twice: each once would do, with repeats")
         return self
+
+
+class CheckSettings(StrictSettings):
+    """What is checked."""
+
+    campaign: str = Field(min_length=1, description="Folder of the trials, with campaign.toml.")

@@ -24,6 +24,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from experiments import registry
 from experiments.progress import Progress, make_progress
@@ -272,7 +273,7 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
     parameters += [*flags, _reserved("out"), _reserved("json"), _reserved("quiet")]
     command.__signature__ = inspect.Signature(parameters, return_annotation=int)  # type: ignore[attr-defined]
     command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-    command.__name__ = experiment.name
+    command.__name__ = experiment.name.replace(" ", "_")
     return command
 
 
@@ -367,6 +368,13 @@ def _show_result(folder: RunFolder) -> None:
             "" if unit == "1" else unit,
         )
     console.print(table, markup=False)
+    for listed in result.get("tables", []):
+        shown = Table(title=listed["title"], title_justify="left", box=None, pad_edge=False)
+        for place, heading in enumerate(listed["head"]):
+            shown.add_column(heading, no_wrap=place == 0)
+        for row in listed["rows"]:
+            shown.add_row(*(Text(str(cell)) for cell in row))
+        console.print(shown, markup=False)
     for sentence in result.get("departures", {}).get("sentences", []):
         console.print(f"- {sentence}", markup=False)
     for warning in result.get("warnings", []):
@@ -410,24 +418,26 @@ def _bench(
     out: Annotated[Path | None, Parameter(help="Folder for bench.json; runs/bench-<time> if not given.")] = None,
     json: _Json = False,
     quiet: _Quiet = False,
+    **options: Annotated[str, Parameter(help="What else this benchmark takes: docs say it.")],
 ) -> int:
-    """Measure how fast it is, beside LIGGGHTS and LAMMPS where they are installed (from a checkout)."""
-    from experiments.benching import load_benchmark
+    """Measure how fast or how good it is, beside others where they are installed (from a checkout)."""
+    from experiments.benching import benchmark_options, goes_on, load_benchmark
 
     with _refusing():
         run = load_benchmark(what)
+        settings = benchmark_options(run, options)
         out = out or fresh_path("bench")
-        if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        if out.exists() and (not out.is_dir() or (any(out.iterdir()) and not goes_on(run, out))):
             raise ValueError(f"out = {str(out)!r} is in use: name a folder that is empty or does not exist yet")
         out.mkdir(parents=True, exist_ok=True)
     with _stdout_to_stderr():
         try:
             with make_progress(quiet=quiet) as progress:
-                result = run(out, progress=progress)
+                result = run(out, progress=progress, **settings)
         except RuntimeError as error:
             _say(f"failed: {error}")
             return FAILED
-        except ValueError as error:  # what a benchmark reads from the environment
+        except ValueError as error:  # a setting that cannot be, in an option or in the environment
             _say(str(error))
             return BAD_INPUT
         write_json(out / "bench.json", result)
@@ -436,6 +446,49 @@ def _bench(
     else:
         print(f"bench: {out / 'bench.json'}")
     return DONE
+
+
+def _campaign_new(
+    folder: Annotated[Path, Parameter(help="Where to write it; must be new or empty.")],
+    /,
+    *,
+    kind: Annotated[Literal["tumble", "penetration"], Parameter(help="What kind of trials.", show_default=False)],
+) -> int:
+    """Write an annotated template: campaign.toml with every key explained, and short recordings to be replaced."""
+    from experiments.campaign.templates import new_campaign
+
+    with _refusing():
+        new_campaign(folder, kind=kind)
+    print(f"campaign: {folder / 'campaign.toml'}")
+    _say(f"fill it in, then `hedgebed campaign check {folder}`")
+    return DONE
+
+
+def _campaign_from_run() -> Callable[..., int]:
+    """The function behind ``hedgebed campaign from-run``, with one parameter per setting of the sensors."""
+    from experiments.run_campaign import SpikeSensors, write_run_campaign
+
+    fields = SpikeSensors.model_fields
+
+    def command(run: Path, folder: Path, **given: Any) -> int:
+        with _refusing():
+            sensors = settings_from(SpikeSensors, [Layer(None, _as_typed(given, fields))])
+            assert isinstance(sensors, SpikeSensors)
+            campaign = write_run_campaign(run, folder, sensors=sensors)
+        print(f"campaign: {folder / 'campaign.toml'}")
+        _say(f"{len(campaign.tables.trial)} trials; `hedgebed diagnose {folder}` says what the spring-damper lacks")
+        return DONE
+
+    places = {"run": "Folder of a finished run of penetrate.", "folder": "Where to write it; must be new or empty."}
+    parameters = [
+        inspect.Parameter(
+            name, inspect.Parameter.POSITIONAL_ONLY, annotation=Annotated[Path, Parameter(help=text, negative="")]
+        )
+        for name, text in places.items()
+    ] + [_option(name, field) for name, field in fields.items()]
+    command.__signature__ = inspect.Signature(parameters, return_annotation=int)  # type: ignore[attr-defined]
+    command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    return command
 
 
 def _doctor(*, json: _Json = False) -> int:
@@ -457,7 +510,14 @@ def build_app() -> App:
         result_action="return_value",
     )
     for experiment in registry.EXPERIMENTS.values():
-        app.command(_experiment_command(experiment), name=experiment.name, help=experiment.summary)
+        *above, name = experiment.name.split(" ")
+        home = app[above[0]] if above else app
+        home.command(_experiment_command(experiment), name=name, help=experiment.summary)
+    if "campaign" in registry.EXPERIMENTS:
+        app["campaign"].command(_campaign_new, name="new")
+        app["campaign"].command(
+            _campaign_from_run(), name="from-run", help="Write a finished run of penetrate as a campaign of trials."
+        )
     app.command(_resume, name="resume")
     app.command(_bench, name="bench")
     app.command(_doctor, name="doctor")

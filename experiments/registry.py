@@ -35,6 +35,7 @@ class Experiment:
     """One experiment: its name on the command line, one line of help, and where its settings and its code are."""
 
     name: str
+    """On the command line; a second word makes it a command of the experiment that is called by the first."""
     summary: str
     settings: str  # "module:Class", a frozen pydantic model; every field with a description that gives the unit
     module: str
@@ -106,6 +107,14 @@ EXPERIMENTS: dict[str, Experiment] = {
             "Makes up a campaign of tumbles: every gravity and torque, recorded by noisy sensors, and what is true.",
             settings="experiments.campaign_settings:CampaignSettings",
             module="experiments.synthesis",
+        ),
+        Experiment(
+            "campaign check",
+            "Is a campaign fit to be diagnosed? Every fault by file and line, a table of its trials, plots of what is "
+            "in it.",
+            settings="experiments.campaign_settings:CheckSettings",
+            module="experiments.inspection",
+            subject="campaign",
         ),
         Experiment(
             "diagnose",

@@ -198,7 +198,7 @@ def _now() -> str:
 
 def fresh_path(command: str, root: Path = Path("runs")) -> Path:
     """A folder under `root` that does not exist yet: ``<command>-<date>-<time>``."""
-    stem = f"{command}-{datetime.now():%Y%m%d-%H%M%S}"
+    stem = f"{command.replace(' ', '-')}-{datetime.now():%Y%m%d-%H%M%S}"
     path, count = root / stem, 1
     while path.exists():
         count += 1

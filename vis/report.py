@@ -27,6 +27,7 @@ _OTHERS = {
     "tumble": ("vis.tumble", "write_tumble_report"),
     "paper": ("vis.paper", "write_paper_report"),
     "campaign": ("vis.campaign", "write_campaign_report"),
+    "campaign check": ("vis.inspection", "write_inspection_report"),
     "diagnose": ("vis.diagnose", "write_diagnosis_report"),
 }
 

@@ -24,11 +24,20 @@ from experiments.reading import nearest
 from experiments.runfolder import toml_value, write_text
 
 from .recording import Recording, read_recording, write_recording
-from .tables import PenetrationCampaign, PenetrationModel, TumbleCampaign, TumbleModel
+from .tables import (
+    PenetrationCampaign,
+    PenetrationModel,
+    PenetrationTrial,
+    TumbleCampaign,
+    TumbleModel,
+    TumbleTrial,
+    trial_faults,
+)
 
 __all__ = ["Campaign", "read_campaign", "read_model", "write_campaign", "write_model"]
 
 _CAMPAIGNS: dict[str, type[BaseModel]] = {"tumble": TumbleCampaign, "penetration": PenetrationCampaign}
+_ALL = frozenset(("pose", "imu", "wheel", "depth", "force", "accel"))
 _MODELS: dict[str, type[BaseModel]] = {"tumble": TumbleModel, "penetration": PenetrationModel}
 
 
@@ -55,18 +64,33 @@ def read_campaign(folder: str | Path) -> Campaign:
     """Read the campaign in `folder`.
 
     Raises ValueError, one sentence a line, naming the file, the line or key, what was found and what was expected, for
-    whatever is wrong (see `experiments.campaign.tables` and `experiments.campaign.recording`).
+    whatever is wrong, in the tables and in every file that can be found: all at once (see `experiments.campaign.tables`
+    and `experiments.campaign.recording`).
     """
     folder = Path(folder)
     if not folder.is_dir():
         raise ValueError(f"{str(folder)!r} is no folder: one with campaign.toml was expected")
-    tables = _read_tables(folder / "campaign.toml", _CAMPAIGNS)
-    assert isinstance(tables, TumbleCampaign | PenetrationCampaign)
-    recordings = {
-        (trial.id, sensor): read_recording(folder / name, trial.columns(sensor))
-        for trial in tables.trial
-        for sensor, name in trial.files.items()
-    }
+    path = folder / "campaign.toml"
+    table = _read_toml(path, _CAMPAIGNS)
+    tables, faults = _make_tables(path, table, _CAMPAIGNS)
+    if tables is None:
+        trials = _trials_that_stand(table)
+        sensors = table.get("sensors")
+        faults += [
+            f"{path}: {fault}" for fault in trial_faults(trials, set(sensors) if isinstance(sensors, dict) else _ALL)
+        ]
+    else:
+        assert isinstance(tables, TumbleCampaign | PenetrationCampaign)
+        trials = list(enumerate(tables.trial, 1))
+    recordings = {}
+    for _, trial in trials:
+        for sensor, name in trial.files.items():
+            try:
+                recordings[trial.id, sensor] = read_recording(folder / name, trial.columns(sensor))
+            except ValueError as error:
+                faults += str(error).splitlines()
+    if faults or tables is None:
+        raise ValueError("\n".join(dict.fromkeys(faults)))
     return Campaign(tables, recordings, folder)
 
 
@@ -104,6 +128,14 @@ def write_model(path: str | Path, model: TumbleModel | PenetrationModel) -> None
 
 
 def _read_tables(path: Path, kinds: Mapping[str, type[BaseModel]]) -> BaseModel:
+    tables, faults = _make_tables(path, _read_toml(path, kinds), kinds)
+    if tables is None:
+        raise ValueError("\n".join(faults))
+    return tables
+
+
+def _read_toml(path: Path, kinds: Mapping[str, type[BaseModel]]) -> dict[str, Any]:
+    """The file as TOML has it, its kind being one of `kinds`."""
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
@@ -116,12 +148,33 @@ def _read_tables(path: Path, kinds: Mapping[str, type[BaseModel]]) -> BaseModel:
     if not isinstance(kind, str) or kind not in kinds:
         found = "is missing" if kind is None else f"= {kind!r}"
         raise ValueError(f"{path}: kind {found}; {' or '.join(map(repr, kinds))} was expected")
+    return table
+
+
+def _make_tables(
+    path: Path, table: Mapping[str, Any], kinds: Mapping[str, type[BaseModel]]
+) -> tuple[BaseModel | None, list[str]]:
+    """The tables, or None and what is wrong with them, a sentence each."""
+    tables = kinds[table["kind"]]
     frozen = {key: value if key == "notes" else _tuples(value) for key, value in table.items()}
     try:
-        return kinds[kind](**frozen)
+        return tables(**frozen), []
     except ValidationError as error:
-        said = [f"{path}: {_sentence(kinds[kind], detail, table)}" for detail in error.errors()]
-        raise ValueError("\n".join(dict.fromkeys(said))) from None
+        said = [line for detail in error.errors() for line in _sentence(tables, detail, table).splitlines()]
+        return None, [f"{path}: {line}" for line in dict.fromkeys(said)]
+
+
+def _trials_that_stand(table: Mapping[str, Any]) -> list[tuple[int, Any]]:
+    """Of tables with faults, the trials that have none of their own: (number in the file, trial)."""
+    trial_class = TumbleTrial if table["kind"] == "tumble" else PenetrationTrial
+    listed = table.get("trial")
+    found = []
+    for number, raw in enumerate(listed if isinstance(listed, list) else [], 1):
+        try:
+            found.append((number, trial_class.model_validate(_tuples(raw))))
+        except ValidationError:
+            continue  # said already
+    return found
 
 
 def _tuples(value: Any) -> Any:

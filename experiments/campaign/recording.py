@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,9 @@ from numpy.typing import NDArray
 from experiments.runfolder import write_text
 
 __all__ = ["Recording", "read_recording", "write_recording"]
+
+_MOST_SAID = 5
+"""Faults of one kind that are said of one file; of the rest the number."""
 
 
 def _thousandth(value: float) -> float:
@@ -63,10 +67,65 @@ class Recording:
 def read_recording(path: Path, wanted: Sequence[tuple[str, str]]) -> Recording:
     """Read the CSV file `path`, which must hold the quantities `wanted`: (name, unit), the time first.
 
-    Raises ValueError, naming file, line and column, what was found and what was expected: for a missing file or column,
-    a quantity given twice, text in a number, an infinite number, a row of another length, a time that runs backwards or
-    is missing in a row with numbers, and a file without rows.
+    Raises ValueError, one fault a line, naming file, line and column, what was found and what was expected: for a
+    missing file or column, a quantity given twice, text in a number, an infinite number, a row of another length, a
+    time that runs backwards or is missing in a row with numbers, and a file without rows.
     """
+    header, rows = _read_cells(path)
+    faults = _header_faults(path, header)
+    if faults:
+        _refuse(faults)
+    chosen: list[tuple[int, Callable[[float], float]]] = []
+    for name, unit in wanted:
+        found = _find_column(path, header, name, unit)
+        if isinstance(found, str):
+            faults.append(found)
+        else:
+            chosen.append(found)
+    long = [
+        f"{path}, line {line}: found {len(row)} cells, expected {len(header)} as in the header"
+        for line, row in rows
+        if len(row) != len(header)
+    ]
+    faults += _cut(path, long)
+    rows = [(line, row) for line, row in rows if len(row) == len(header)]
+    odd: list[str] = []
+    parsed = [
+        [_number(path, line, header[index], row[index], convert, odd) for line, row in rows]
+        for index, convert in chosen
+    ]
+    faults += _cut(path, odd)
+    if len(chosen) < len(wanted):
+        _refuse(faults)
+    numbers = np.array(parsed, dtype=float).reshape(len(wanted), len(rows))
+    kept = np.flatnonzero(~np.isnan(numbers).all(axis=0))
+    if not len(kept) and not faults:
+        faults.append(f"{path}: holds no row of numbers, at least one was expected")
+    rows, numbers = [rows[index] for index in kept], numbers[:, kept]
+    if not odd:
+        faults += _time_faults(path, header[chosen[0][0]], [line for line, _ in rows], numbers[0])
+    if faults:
+        _refuse(faults)
+    columns = {f"{name}_{unit}": values for (name, unit), values in zip(wanted, numbers, strict=True)}
+    asked = {index for index, _ in chosen}
+    extra = {
+        name: tuple(row[index] for _, row in rows) for index, name in enumerate(header) if index not in asked and name
+    }
+    return Recording(columns, extra)
+
+
+def _refuse(faults: Sequence[str]) -> NoReturn:
+    raise ValueError("\n".join(faults))
+
+
+def _cut(path: Path, faults: Sequence[str]) -> list[str]:
+    """The first of these faults, and how many more there are."""
+    more = len(faults) - _MOST_SAID
+    return [*faults[:_MOST_SAID], *([f"{path}: and {more} more lines of that kind"] if more > 0 else [])]
+
+
+def _read_cells(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """The names of the header, and the rows with their lines."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
@@ -78,29 +137,9 @@ def read_recording(path: Path, wanted: Sequence[tuple[str, str]]) -> Recording:
     reader = csv.reader(io.StringIO(text))
     try:
         header = [name.strip() for name in next(reader, [])]
-        rows = [(reader.line_num, row) for row in reader if row]
+        return header, [(reader.line_num, row) for row in reader if row]
     except csv.Error as error:
         raise ValueError(f"{path}, line {reader.line_num}: is no CSV ({error})") from None
-    _check_header(path, header)
-    chosen = [_find_column(path, header, name, unit) for name, unit in wanted]
-    for line, row in rows:
-        if len(row) != len(header):
-            raise ValueError(f"{path}, line {line}: found {len(row)} cells, expected {len(header)} as in the header")
-    parsed = [
-        [_number(path, line, header[index], row[index], convert) for line, row in rows] for index, convert in chosen
-    ]
-    numbers = np.array(parsed, dtype=float).reshape(len(wanted), len(rows))
-    kept = np.flatnonzero(~np.isnan(numbers).all(axis=0))
-    if not len(kept):
-        raise ValueError(f"{path}: holds no row of numbers, at least one was expected")
-    rows, numbers = [rows[index] for index in kept], numbers[:, kept]
-    _check_times(path, header[chosen[0][0]], [line for line, _ in rows], numbers[0])
-    columns = {f"{name}_{unit}": values for (name, unit), values in zip(wanted, numbers, strict=True)}
-    asked = {index for index, _ in chosen}
-    extra = {
-        name: tuple(row[index] for _, row in rows) for index, name in enumerate(header) if index not in asked and name
-    }
-    return Recording(columns, extra)
 
 
 def write_recording(path: Path, recording: Recording) -> None:
@@ -115,47 +154,54 @@ def write_recording(path: Path, recording: Recording) -> None:
     write_text(path, out.getvalue())
 
 
-def _check_header(path: Path, header: list[str]) -> None:
+def _header_faults(path: Path, header: list[str]) -> list[str]:
     if not any(header):
-        raise ValueError(f"{path}, line 1: has no header, names of columns were expected")
-    for name in header:
-        if name and header.count(name) > 1:
-            raise ValueError(f"{path}, line 1: column {name!r} is there {header.count(name)} times, once was expected")
+        return [f"{path}, line 1: has no header, names of columns were expected"]
+    return [
+        f"{path}, line 1: column {name!r} is there {header.count(name)} times, once was expected"
+        for name in dict.fromkeys(header)
+        if name and header.count(name) > 1
+    ]
 
 
-def _find_column(path: Path, header: list[str], name: str, unit: str) -> tuple[int, Callable[[float], float]]:
-    """Where a quantity stands, and what converts it."""
+def _find_column(path: Path, header: list[str], name: str, unit: str) -> tuple[int, Callable[[float], float]] | str:
+    """Where a quantity stands and what converts it, or what is wrong."""
     known = {f"{name}_{there}": convert for there, convert in _UNITS[unit].items()}
     found = [column for column in header if column in known]
     if not found:
         held = ", ".join(column for column in header if column)
-        raise ValueError(f"{path}, line 1: column {' or '.join(known)} is missing; found {held}")
+        return f"{path}, line 1: column {' or '.join(known)} is missing; found {held}"
     if len(found) > 1:
-        raise ValueError(f"{path}, line 1: columns {' and '.join(found)} are the same quantity, one was expected")
+        return f"{path}, line 1: columns {' and '.join(found)} are the same quantity, one was expected"
     return header.index(found[0]), known[found[0]]
 
 
-def _number(path: Path, line: int, name: str, cell: str, convert: Callable[[float], float]) -> float:
+def _number(path: Path, line: int, name: str, cell: str, convert: Callable[[float], float], faults: list[str]) -> float:
+    """The number in a cell, NaN for a gap; what is no number goes to `faults`."""
     text = cell.strip()
     if not text:
         return math.nan
     try:
         value = float(text)
     except ValueError:
-        raise ValueError(f"{path}, line {line}: {name} = {cell!r}, a number or nan was expected") from None
+        faults.append(f"{path}, line {line}: {name} = {cell!r}, a number or nan was expected")
+        return math.nan
     if math.isinf(value):
-        raise ValueError(f"{path}, line {line}: {name} = {cell!r}, a finite number or nan was expected")
+        faults.append(f"{path}, line {line}: {name} = {cell!r}, a finite number or nan was expected")
+        return math.nan
     return convert(value)
 
 
-def _check_times(path: Path, name: str, lines: list[int], times: NDArray[np.float64]) -> None:
-    missing = np.flatnonzero(np.isnan(times))
-    if len(missing):
-        raise ValueError(f"{path}, line {lines[missing[0]]}: {name} is missing, a number was expected")
-    back = np.flatnonzero(np.diff(times) < 0)
-    if len(back):
-        at = int(back[0]) + 1
-        raise ValueError(
-            f"{path}, line {lines[at]}: {name} runs backwards, from {times[at - 1]:.10g} s to {times[at]:.10g} s; "
-            f"a time no earlier was expected"
-        )
+def _time_faults(path: Path, name: str, lines: list[int], times: NDArray[np.float64]) -> list[str]:
+    missing = [
+        f"{path}, line {lines[index]}: {name} is missing, a number was expected"
+        for index in np.flatnonzero(np.isnan(times))
+    ]
+    there = np.flatnonzero(~np.isnan(times))
+    known = times[there]
+    back = [
+        f"{path}, line {lines[there[k + 1]]}: {name} runs backwards, from {known[k]:.10g} s to {known[k + 1]:.10g} s; "
+        f"a time no earlier was expected"
+        for k in np.flatnonzero(np.diff(known) < 0)
+    ]
+    return [*_cut(path, missing), *_cut(path, back)]

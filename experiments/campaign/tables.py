@@ -7,7 +7,7 @@ rules where two could, is written down in docs/campaigns.md.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence, Set
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
@@ -38,6 +38,7 @@ __all__ = [
     "TumbleUncertainty",
     "WheelSensor",
     "WheelTable",
+    "trial_faults",
 ]
 
 FORMAT = "hedgehog-campaign/1"
@@ -387,21 +388,38 @@ class PenetrationModel(_PenetrationTables):
     effect: tuple[EffectTable, ...] = Field((), description="[[effect]]")
 
 
-def _check_trials(trials: tuple[Any, ...], sensors: Table, odd: Any) -> None:
-    """Raise ValueError for the first trial that does not fit: its id, its sensors, what `odd` says of it."""
+def _check_trials(trials: tuple[Any, ...], sensors: Table, odd: Callable[[Any], str | None]) -> None:
+    """Raise ValueError for the trials that do not fit: what `trial_faults` finds, and what `odd` says of each."""
+    named = {name for name in type(sensors).model_fields if getattr(sensors, name) is not None}
+    faults = trial_faults(list(enumerate(trials, 1)), named, odd)
+    if faults:
+        raise ValueError("\n".join(faults))
+
+
+def trial_faults(
+    trials: Sequence[tuple[int, Any]], sensors: Set[str], odd: Callable[[Any], str | None] = lambda trial: None
+) -> list[str]:
+    """What is wrong with trials (number in the file, trial): an id twice, no file, a sensor without its noise.
+
+    `sensors` are those that [sensors] has; `odd` says what else is wrong with a trial, None where nothing is.
+    """
     seen: dict[str, int] = {}
-    for number, trial in enumerate(trials, 1):
+    faults = []
+    for number, trial in trials:
         where = f"[[trial]] {number} (id {trial.id!r}): "
         if trial.id in seen:
-            raise ValueError(
+            faults.append(
                 f"{where}id = {trial.id!r} is that of [[trial]] {seen[trial.id]} too: each id once was expected"
             )
-        seen[trial.id] = number
+        seen.setdefault(trial.id, number)
         if not trial.files:
-            raise ValueError(f"{where}it names no file: at least one of {', '.join(trial.sensor_names)} was expected")
-        for sensor, key in trial.needed.items():
-            if getattr(sensors, sensor) is None:
-                raise ValueError(f"{where}{key} is given, but [sensors.{sensor}] is missing: its std was expected")
+            faults.append(f"{where}it names no file: at least one of {', '.join(trial.sensor_names)} was expected")
+        faults += [
+            f"{where}{key} is given, but [sensors.{sensor}] is missing: its std was expected"
+            for sensor, key in trial.needed.items()
+            if sensor not in sensors
+        ]
         said = odd(trial)
         if said:
-            raise ValueError(where + said)
+            faults.append(where + said)
+    return faults

@@ -1,0 +1,291 @@
+"""`hedgebed campaign check`: is a campaign fit to be diagnosed, and what is in it?
+
+What cannot be read is refused, all of it at once, by file, line and key. What can be read but is odd is found and said,
+without a model: sensors that are missing, gaps, a marker that jumped, a clock that jumped, a trial at odds with its
+replicates. `hedgebed diagnose` finds the same and sets it aside.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from hedgebed import __version__
+
+from .campaign import Campaign, PenetrationCampaign, Recording, TumbleCampaign, read_campaign
+from .campaign_settings import CheckSettings
+from .diagnose.problem import Finding
+from .progress import Progress
+from .replicas import Condition, condition_of, condition_words, odd_replicates
+from .runfolder import RunFolder
+
+__all__ = ["check", "clock_jump", "find_faults", "resume", "run"]
+
+Array = NDArray[np.float64]
+
+_LONG = 10.0
+"""A step of the time this many times the usual one is a gap."""
+_AROUND = 8
+"""Readings on either side of a gap from which speeds are taken."""
+
+
+def check(settings: CheckSettings) -> None:
+    """Raise ValueError, one sentence a line, for all that is wrong with the campaign."""
+    read_campaign(settings.campaign)
+
+
+def run(settings: CheckSettings, folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
+    """Look at the campaign, write what is in it into `folder` and return the result. Raises ValueError as `check`."""
+    kept = RunFolder.ensure(Path(folder), "campaign check", settings)
+    return _carry_out(settings, kept, progress or Progress())
+
+
+def resume(folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
+    """Look again from the start."""
+    kept = RunFolder.open(Path(folder))
+    return _carry_out(CheckSettings(**kept.settings), kept, progress or Progress())
+
+
+def find_faults(campaign: Campaign) -> list[Finding]:
+    """What is odd about the recordings, each in a plain sentence that names its trial.
+
+    Raises ValueError where no diagnosis could be made: a sensor stated to have no noise, no trial that can be used.
+    """
+    with threadpool_limits(1):  # matrices are small
+        found = _faults_of_data(campaign)
+    jumped = {finding.trial for finding in found if _jumps(finding)}
+    odd = [finding for finding in odd_replicates(campaign) if finding.trial not in jumped]
+    return [*_missing_sensors(campaign), *found, *odd]
+
+
+def _jumps(finding: Finding) -> bool:
+    return "jumps" in finding.what or "by a jump" in finding.what
+
+
+def _missing_sensors(campaign: Campaign) -> list[Finding]:
+    tables = campaign.tables
+    if not isinstance(tables, TumbleCampaign):
+        return []
+    found = []
+    for sensor in ("pose", "imu", "wheel"):
+        without = [trial.id for trial in tables.trial if sensor not in trial.files]
+        if len(without) == len(tables.trial):
+            found.append(
+                Finding(trial="", what=f"no trial has a recording of {sensor}: what only it tells stays unknown")
+            )
+        else:
+            found += [Finding(trial=id, what=f"trial {id} has no recording of {sensor}, others have") for id in without]
+    return found
+
+
+def _faults_of_data(campaign: Campaign) -> list[Finding]:
+    """What diagnose finds when it reads the recordings; a gap of a camera's or a wheel's clock is told from a jump."""
+    if isinstance(campaign.tables, PenetrationCampaign):
+        from .diagnose.penetration_data import prepare
+
+        return list(prepare(campaign)[1])
+    from .diagnose.tumble_checks import checked
+    from .diagnose.tumble_data import tumble_data
+
+    found = [_named(finding) for finding in checked(tumble_data(campaign))[1]]
+    jumps = []
+    for (trial, sensor), recording in campaign.recordings.items():
+        stds = getattr(campaign.tables.sensors, sensor).std
+        row = clock_jump(recording, dict(zip(list(recording.columns)[1:], stds, strict=True)))
+        if row is None:
+            continue
+        before, after = float(recording.time[row - 1]), float(recording.time[row])
+        what = (
+            f"trial {trial}: the clock of {sensor} jumps by {after - before:.3g} s at {before:.4g} s, where the motion "
+            f"goes on as if it had not"
+        )
+        jumps.append(Finding(trial=trial, what=what, channel=sensor, from_s=before, to_s=after))
+        channels = {"pose": ("x", "y", "theta"), "imu": ("gyro", "ax", "ay"), "wheel": ("wheel",)}[sensor]
+        found = [f for f in found if not (f.trial == trial and f.channel in channels and f.from_s == before)]
+    return _merged(found) + jumps
+
+
+def _named(finding: Finding) -> Finding:
+    """With the trial in its sentence."""
+    what = finding.what if finding.trial in finding.what else f"trial {finding.trial}: {finding.what}"
+    return replace(finding, what=what)
+
+
+def _merged(found: list[Finding]) -> list[Finding]:
+    """What is the same of several channels of one sensor as one finding."""
+    groups: dict[tuple[str, float | None, float | None, str], list[Finding]] = {}
+    for f in found:
+        pattern = re.sub(rf"\b{f.channel}\b", "*", f.what) if f.channel else f.what
+        groups.setdefault((f.trial, f.from_s, f.to_s, pattern), []).append(f)
+    merged = []
+    for (_, _, _, pattern), alike in groups.items():
+        names = [f.channel for f in alike if f.channel]
+        said = pattern.replace("*", ", ".join(names)) if len(alike) > 1 else alike[0].what
+        merged.append(replace(alike[0], what=said))
+    return merged
+
+
+def clock_jump(recording: Recording, stds: dict[str, float]) -> int | None:
+    """The row at which the clock jumps forward while the motion does not; None where it never does.
+
+    At a step of more than four times the usual one, each channel's line before it is compared with that after it: where
+    the change fits one usual step and not the time that the clock says (by 12 standard deviations), the clock is wrong,
+    unless another channel says that the time did pass. `stds`: column -> noise of the sensor.
+    """
+    time = recording.time
+    steps = np.diff(time)
+    if len(time) < 4 * _AROUND:
+        return None
+    usual = float(np.median(steps))
+    for k in np.flatnonzero(steps > 4 * usual) + 1:
+        if k < _AROUND or k > len(time) - _AROUND:
+            continue
+        said = [_time_passed(time, recording[name], std, int(k), usual) for name, std in stds.items()]
+        if False in said and True not in said:
+            return int(k)
+    return None
+
+
+def _time_passed(time: Array, values: Array, std: float, k: int, usual: float) -> bool | None:
+    """Whether a channel moved over the step before row `k` as far as its clock says; None where it cannot tell."""
+    before, after = slice(k - _AROUND, k), slice(k, k + _AROUND)
+    if not (np.isfinite(values[before]).all() and np.isfinite(values[after]).all()):
+        return None
+    left = np.polyfit(time[before] - time[k - 1], values[before], 1)
+    right = np.polyfit(time[after] - time[k], values[after], 1)
+    slope, bend = 0.5 * (left[0] + right[0]), 0.5 * abs(left[0] - right[0])
+    gap = float(time[k] - time[k - 1])
+    doubt = std * np.sqrt(12 / _AROUND) / (_AROUND * usual)  # of a slope
+    moved = right[1] - left[1]
+    stays = abs(moved - slope * usual) < 5 * std + (3 * bend + 4 * doubt) * usual
+    passes = abs(moved - slope * gap) < 5 * std + (bend + 4 * doubt) * gap
+    if stays == passes or abs(slope) * (gap - usual) < 12 * std + (bend + 4 * doubt) * gap:
+        return None
+    return bool(passes)
+
+
+# The result -----------------------------------------------------------------------------------------------------------
+
+
+def _carry_out(settings: CheckSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
+    with folder.lock():
+        campaign = read_campaign(settings.campaign)
+        progress.stage("check", total=1.0)
+        findings = find_faults(campaign)
+        recordings = []
+        trials: Sequence[Any] = campaign.tables.trial
+        for number, trial in enumerate(trials, 1):
+            for sensor in trial.files:
+                recording = campaign.recordings[trial.id, sensor]
+                name = f"{number:03d}-{sensor}"
+                folder.write_series(name, dict(recording.columns))
+                recordings.append(
+                    {"trial": trial.id, "sensor": sensor, "series": f"series/{name}.csv"} | _facts(recording)
+                )
+        result = _result(campaign, recordings, findings)
+        folder.write_result(result)
+        progress.stage("report", total=1.0)
+        write_report(folder.path, progress)
+    return result
+
+
+def write_report(folder: Path, progress: Progress) -> None:
+    """Plots and report.html of a run folder."""
+    from vis.inspection import write_inspection_report as write
+
+    write(folder, progress=progress.update)
+
+
+def _facts(recording: Recording) -> dict[str, Any]:
+    """Rows, rate [Hz], first and last time [s], and gaps (from, to) [s]: long steps, and stretches of empty cells."""
+    time = recording.time
+    steps = np.diff(time)
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    gaps = [(float(time[k]), float(time[k + 1])) for k in np.flatnonzero(steps > _LONG * usual)] if usual > 0 else []
+    empty = np.zeros(len(time), dtype=bool)
+    for name, values in recording.columns.items():
+        empty |= np.isnan(values) if name != "t_s" else False
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], empty.astype(int), [0]])))
+    gaps += [(float(time[low]), float(time[high - 1])) for low, high in zip(edges[::2], edges[1::2], strict=True)]
+    return {
+        "rows": len(time),
+        "rate": 1 / usual if usual > 0 else None,
+        "from_s": float(time[0]),
+        "to_s": float(time[-1]),
+        "empty_rows": int(empty.sum()),
+        "gaps": sorted(gaps),
+    }
+
+
+def _result(campaign: Campaign, recordings: list[dict[str, Any]], findings: list[Finding]) -> dict[str, Any]:
+    tables = campaign.tables
+    listed: Sequence[Any] = tables.trial
+    conditions: dict[str, Condition] = {trial.id: condition_of(tables, trial) for trial in listed}
+    alike = {id: sum(other == one for other in conditions.values()) for id, one in conditions.items()}
+    trials = []
+    for trial in listed:
+        own = [entry for entry in recordings if entry["trial"] == trial.id]
+        said = [finding for finding in findings if finding.trial == trial.id]
+        trials.append({
+            "id": trial.id,
+            "kind": getattr(trial, "mode", "tumble"),
+            "condition": condition_words(tables, trial),
+            "sensors": ", ".join(f"{_seen_as(tables, entry, trial)} {_rate(entry['rate'])}" for entry in own),
+            "from_s": min(entry["from_s"] for entry in own),
+            "to_s": max(entry["to_s"] for entry in own),
+            "gaps": sum(len(entry["gaps"]) for entry in own),
+            "jumps": sum(_jumps(finding) for finding in said),
+            "findings": len(said),
+            "alike": alike[trial.id],
+        })  # fmt: skip
+    head = ["trial", "condition", "sensors [Hz]", "from, to [s]", "gaps", "jumps", "found", "alike"]
+    rows = [
+        [t["id"], t["condition"], t["sensors"], f"{t['from_s']:.4g}, {t['to_s']:.4g}", t["gaps"] or "-",
+         t["jumps"] or "-", t["findings"] or "-", t["alike"]]
+        for t in trials
+    ]  # fmt: skip
+    count = len(trials)
+    return {
+        "format": "hedgebed-result/1",
+        "experiment": "campaign check",
+        "version": __version__,
+        "title": f"{tables.name}: {count} trial{'s' if count > 1 else ''}, "
+        + (f"{len(findings)} found" if findings else "nothing found"),
+        "status": "done",
+        "kind": tables.kind,
+        "quantities": {
+            "trial_count": _exact(count, ""),
+            "condition_count": _exact(len(set(conditions.values())), "trials of one condition are replicates"),
+            "row_count": _exact(sum(entry["rows"] for entry in recordings), "of all recordings together"),
+            "finding_count": _exact(len(findings), "diagnose sets aside or models what it can"),
+        },
+        "tables": [{"title": "", "head": head, "rows": rows}],
+        "trials": trials,
+        "recordings": recordings,
+        "findings": [
+            {"trial": f.trial, "what": f.what, "channel": f.channel, "from_s": f.from_s, "to_s": f.to_s}
+            for f in findings
+        ],
+        "warnings": [finding.what for finding in findings],
+    }
+
+
+def _exact(value: int, note: str) -> dict[str, Any]:
+    return {"value": value, "std": 0.0, "unit": "1"} | ({"note": note} if note else {})
+
+
+def _rate(rate: float | None) -> str:
+    return "?" if rate is None else f"{rate:.3g}" if rate < 100 else f"{rate:.0f}"
+
+
+def _seen_as(tables: TumbleCampaign | PenetrationCampaign, entry: dict[str, Any], trial: Any) -> str:
+    if isinstance(tables, TumbleCampaign):
+        return str(entry["sensor"])
+    return ", ".join(trial.needed)
