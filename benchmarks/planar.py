@@ -46,6 +46,7 @@ AMPLITUDES = {
     "plastic-sinkage": {"share": (0.05, 0.6)},
     "adhesion": {"force": (0.02, 0.4)},
     "rate-friction": {"change": (-0.4, 1.0)},
+    "wire-compliance": {"stiffness": (5e3, 4e4), "damping": (5.0, 60.0)},
 }
 """Ranges of the effects' parameters, where all terms are on."""
 

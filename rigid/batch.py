@@ -113,6 +113,13 @@ def simulate_batch(
     shown = samples if samples.shape[1] else np.full((1, 1), np.inf)
     advance(numbers, poses, shown, time_step, steps, duration, LAUNCH_DISTANCE, summary, series)
     column = {name: summary[:, k].copy() for k, name in enumerate(SUMMARY)}
+    stiff = np.flatnonzero(column["status"] == 4)
+    if len(stiff):
+        raise ValueError(
+            f"time_step = {time_step:g} s is too long for the spring or damper of an effect ("
+            f"{', '.join(term.id for term in first.terms if 'inner_mass' in term.hooks)}) in trial {stiff[0]}: at most "
+            f"{column['longest_step'][stiff[0]]:.3g} s"
+        )
     stands = column["status"] != 3
     wrong = np.flatnonzero(column["status"] == 2)
     if len(wrong):
@@ -170,10 +177,12 @@ def _one_varied(trial: Trial, vary: Mapping[str, ArrayLike] | None) -> tuple[Tri
     if count == 0:
         raise ValueError("vary holds empty arrays: at least one trial is needed")
     known = {f"{effect.id}.{name}" for effect in trial.effects for name in effect.values}
+    own = {f"{effect.id}.{p.name}": p for effect in trial.effects for p in effect.term.parameters}
+    endless = {key for key, p in own.items() if p.default == math.inf}
     for key, value in given.items():
         if key not in _FIXED and key not in known:
             raise ValueError(f"vary has {key!r}, which does not vary; there is {', '.join((*_FIXED, *sorted(known)))}")
-        if not np.isfinite(value[np.isfinite(value) | (key not in ("torque_until", "pendulum.length"))]).all():
+        if not np.isfinite(value[np.isfinite(value) | (key not in {"torque_until", *endless})]).all():
             raise ValueError(f"vary[{key!r}] holds numbers that are not finite")
         worst = (value.min(), value.max())
         for extreme in worst:  # each bound of each number is checked where it is made: by the trial itself
@@ -248,7 +257,9 @@ def _with(trial: Trial, changes: Mapping[str, float], *, quiet: set[str]) -> Tri
 def _check_stiffest(first: Trial, numbers: Array, time_step: float) -> None:
     """Refuse a step too long for the stiffest, lightest trial of the batch."""
     if first.surface.name == "spring-damper":
-        inverse = 1 / (numbers[:, 0] + numbers[:, 4]) + numbers[:, 2] ** 2 / numbers[:, 1]
+        decoupled = any("inner_mass" in term.hooks for term in first.terms)  # the counterweight, by its wires
+        carried = 0.0 if decoupled else numbers[:, 4]
+        inverse = 1 / (numbers[:, 0] + carried) + numbers[:, 2] ** 2 / numbers[:, 1]
         stiffness, damping = numbers[:, 14], numbers[:, 15]
         # The worst of each kind: the bound falls with stiffness / M and with damping / M.
         for worst in {int(np.argmax(stiffness * inverse)), int(np.argmax(damping * inverse))}:

@@ -28,9 +28,12 @@ FIXED_NUMBERS = (
 """The first columns of the trials' numbers; those of the ground's law and of the effects follow."""
 SUMMARY = (
     "trajectory_angle", "max_speed", "max_angular_velocity", "stand", "pivot", "slip", "hop", "status",
-    "x", "y", "theta", "vx", "vy", "omega", "wheel_speed", "splits",
+    "x", "y", "theta", "vx", "vy", "omega", "wheel_speed", "splits", "longest_step",
 )  # fmt: skip
-"""Columns of the summary: launch, largest speeds, theta on entering each state first (NaN: never), status, end."""
+"""Columns of the summary: launch, largest speeds, theta on entering each state first (NaN: never), status, end, and the
+longest step [s] for the coordinate that a term has of its own (NaN: there is none).
+
+Status: 0 done, 1 too deep, 2 no longer finite, 3 cannot stand, 4 the step is too long for a term's own coordinate."""
 CHANNELS = ("x", "y", "theta", "vx", "vy", "omega", "ax", "ay", "wheel_speed", "state")
 """Channels of the series."""
 
@@ -57,11 +60,13 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
     load_parameters = _loader(names, Parameters, LAW + LAW_SIZE)
     vertical, tip_radius, torque_factor = model.vertical, model.tip_radius, model.torque_factor
     inertia, applied, dry_friction = model.inertia, model.applied, model.dry_friction
+    inner_start, inner = model.inner_start, model.inner
     crater_of, contact, arms, divide = model.crater, model.contact, model.contact_arms, model.divide_mass
     MEMORY = model.has_memory
     SHEDS = model.law.has_memory or model.has("crater")
     HOLDS = model.has("hold")
     DRY = model.has("vertical_friction", "rotation_friction")
+    INNER = model.has("inner_mass")
     BETA = 2 * math.pi / count
     HALF = math.pi / count
     TURN_COS = [math.cos(k * BETA) for k in (-1, 0, 1)]
@@ -102,6 +107,7 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
     @ti.func
     def trial_state(numbers: ti.template(), i):
         s = State(time=0.0)
+        s.inner_mode = 1.0
         s.mass = numbers[i, 0]
         s.inertia = numbers[i, 1]
         s.length = numbers[i, 2]
@@ -160,6 +166,8 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                     s.theta = at_theta
                     s.cosine = ti.cos(at_theta)
                     s.sine = ti.sin(at_theta)
+                    if ti.static(INNER):
+                        s.inner = inner_start(p, s)
                     fx, fy, ft = applied(p, s)
                     load, mean_h, mu_load = 0.0, 0.0, 0.0
                     for side_of in range(2):
@@ -253,6 +261,19 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
             alpha = 0.0
             time = 0.0
             y_start = y
+            # The coordinate that a term has of its own.
+            own = 0.0
+            own_v = 0.0
+            own_a = 0.0
+            own_v1 = 0.0
+            own_a1 = 0.0
+            own_holds = 1.0
+            own_holds1 = 1.0
+            if ti.static(INNER):
+                s.x = x
+                s.y = y
+                s.theta = theta
+                own = inner_start(p, s)
             if ti.static(MEMORY):
                 for n in ti.static((0, count - 1)):
                     angle = theta + HALF + n * BETA
@@ -293,6 +314,22 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
             going = not ti.math.isnan(theta)
             if not going:
                 status = 3
+            longest = NAN
+            if ti.static(INNER):
+                s.inner = own
+                own_mass, at_rest, own_holds = inner(p, s)
+                if own_mass > 0.0:  # as `step_bound` has it for the ground
+                    s.inner = own + 1e-6 * s.length
+                    own_mass, by_place, own_holds = inner(p, s)
+                    s.inner = own
+                    s.inner_speed = 1e-3
+                    own_mass, by_speed, own_holds = inner(p, s)
+                    lightest = 1.0 / own_mass + 1.0 / s.mass
+                    longest = 0.2 / ti.sqrt(ti.max((at_rest - by_place) / (1e-6 * s.length) * lightest, 1e-12))
+                    longest = ti.min(longest, 1.0 / ti.max((at_rest - by_speed) / 1e-3 * lightest, 1e-12))
+                    if time_step > longest:
+                        status = 4
+                        going = False
             while going:
                 # -- drift to the end of the step, predict the speeds --
                 hx = vx + 0.5 * dt * ax
@@ -325,6 +362,14 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                 s.torque = 0.0
                 if driving:
                     s.torque = nominal * torque_factor(p, s)
+                if ti.static(INNER):
+                    s.inner = own + dt * (own_v + 0.5 * dt * own_a)
+                    s.inner_speed = own_v + dt * own_a
+                    own_mass, own_force, own_holds1 = inner(p, s)
+                    own_a1 = 0.0
+                    if own_mass > 0.0:
+                        own_a1 = own_force / own_mass
+                    own_v1 = own_v + 0.5 * dt * (own_a + own_a1)
                 fx, fy, ft = applied(p, s)
                 if ti.static(not DIAGONAL):
                     mxx, mxy, myy, mxt, myt, mtt = inertia(p, s)
@@ -335,7 +380,7 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                 plain_h = 0.0
                 near = 0
                 ahead = 1.0  # share of the step at which the first event happens
-                kind = 0  # 1 touch, 2 lift, 3 slip through zero, 4 static bound, 5 wheel, 6 and 7 dry, 8 and 9 held
+                kind = 0  # 1 touch, 2 lift, 3 slip through zero, 4 static bound, 5 wheel, 6 to 9 dry friction, 10 inner
                 which = 0
                 slip_kept = ti.Vector([0.0, 0.0, 0.0])
                 h_kept = ti.Vector([0.0, 0.0, 0.0])
@@ -532,6 +577,14 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                         if share < ahead or kind == 0:
                             ahead = share
                             kind = 5
+                if ti.static(INNER):
+                    if dt > 0.0 and own_holds1 < 0.0:
+                        share = 0.0
+                        if own_holds > 0.0:
+                            share = own_holds / (own_holds - own_holds1)
+                        if share < ahead or kind == 0:
+                            ahead = share
+                            kind = 10
                 margin_v1 = bound_v - ti.abs(hold_v)
                 margin_r1 = bound_r - ti.abs(hold_r)
                 if ti.static(DRY):
@@ -589,6 +642,10 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                     ax1 = ax
                     ay1 = ay
                     alpha1 = alpha
+                    if ti.static(INNER):
+                        s.inner = own
+                        own_v1 = own_v
+                        own_a1 = own_a
                 elif cut:
                     kind = cut_kind
                     which = cut_spike
@@ -641,6 +698,11 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                 ax = ax1
                 ay = ay1
                 alpha = alpha1
+                if ti.static(INNER):
+                    own = s.inner
+                    own_v = own_v1
+                    own_a = own_a1
+                    own_holds = own_holds1
                 margin = margin1
                 margin_v = margin_v1
                 margin_r = margin_r1
@@ -701,6 +763,8 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                         slide_r = 1
                         if hold_r > 0.0:
                             slide_r = -1
+                    elif kind == 10:
+                        s.inner_mode = 1.0 - s.inner_mode
                 elif settle_only:
                     fresh = 0
                 if not over and time >= until:
@@ -766,6 +830,7 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
             summary[i, 13] = omega
             summary[i, 14] = wheel
             summary[i, 15] = total_splits
+            summary[i, 16] = longest
 
     return stand, advance
 

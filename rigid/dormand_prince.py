@@ -1,7 +1,7 @@
 """Dormand and Prince's pair of orders 5 and 4, with its own interpolant, for the state of one trial.
 
 Coefficients: Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, table II.5.2 and section II.6.
-State vectors are lists of nine numbers (`rigid.dynamics`): in plain Python that is faster than arrays so short.
+State vectors are lists of nine to eleven numbers (`rigid.dynamics`): faster in plain Python than arrays so short.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def attempt(
     except (ValueError, OverflowError, ZeroDivisionError):  # far beyond what is finite: too long a step
         return Step(list(z), rates, math.inf)
     error = 0.0
-    for i in range(9):
+    for i in range(len(z)):
         off = h * sum(e * k[i] for e, k in zip(_E, rates, strict=True))
         error = max(error, abs(off) / (tolerance * (scale[i] + abs(z[i]))))
         if off != off:
@@ -86,7 +86,7 @@ def interpolant(time: float, h: float, z: list[float], step: Step) -> Interpolan
             return list(end)
         v = 1 - u
         out = []
-        for i in range(9):
+        for i in range(len(end)):
             rise = end[i] - z[i]
             bow = h * rates[0][i] - rise
             fall = rise - h * rates[6][i] - bow

@@ -23,6 +23,8 @@ __all__ = ["Contact", "Modes", "System"]
 
 X, Y, THETA, VX, VY, OMEGA, WHEEL, WORK, LOST = range(9)
 """Entries of the state vector z: pose, speeds, speed of the wheel, work of the torque, energy dissipated."""
+INNER, INNER_SPEED = 9, 10
+"""Two more where a term has a coordinate of its own (`System.inner`)."""
 
 _SLIGHT = 1e-300
 _SHIFTING = 0.1
@@ -48,12 +50,14 @@ class Modes:
     """Whether the torque has ended for good."""
     resting: bool = False
     """Whether nothing moves and nothing will."""
+    inner: int = 1
+    """Mode of the term that has a coordinate of its own: 1 at the start, else 0."""
 
     def copy(self) -> Modes:
         """A copy that can be changed."""
         return Modes(
             list(self.touching), list(self.slip), list(self.top), list(self.held), self.vertical, self.rotation,
-            self.torque_over, self.resting,
+            self.torque_over, self.resting, self.inner,
         )  # fmt: skip
 
     def deepest(self, spike: int, depth: float) -> tuple[float, float]:
@@ -130,12 +134,15 @@ class System:
         self.has_memory = self._remembers()
         self.sheds = self.has_memory and (ground.law.has_memory or model.has("crater"))
         self.has_vertical, self.has_rotation = model.has("vertical_friction"), model.has("rotation_friction")
+        s.inner_mode = 1.0
+        self.inner = bool(model.has("inner_mass") and model.inner(self.p, s)[0] > 0)
         self.mu_s, self.mu_d = trial.mu_s, trial.sliding_friction
         self.wheel_sign = 1.0 if trial.actuator == "motor" else -1.0
         # What the last evaluation found.
         self.contacts: list[Contact] = []
         self.stick_force = self.stick_load = self.stick_bound = 0.0
         self.vertical_force = self.vertical_bound = self.rotation_force = self.rotation_bound = 0.0
+        self.inner_holds = 1.0
         self.acceleration = (0.0, 0.0, 0.0)
 
     def _remembers(self) -> bool:
@@ -169,6 +176,13 @@ class System:
         s.time = time
         s.x, s.y, s.theta, s.vx, s.vy, s.omega, s.wheel_speed = z[0], z[1], z[2], z[3], z[4], z[5], z[6]
         s.cosine, s.sine = math.cos(z[THETA]), math.sin(z[THETA])
+        if self.inner:
+            s.inner, s.inner_speed = z[INNER], z[INNER_SPEED]
+
+    def inner_at_rest(self, z: Sequence[float]) -> float:
+        """Where a term's own coordinate is in equilibrium in the pose of `z`."""
+        self.s.x, self.s.y, self.s.theta = z[X], z[Y], z[THETA]
+        return float(self.model.inner_start(self.p, self.s))
 
     # -- motion ------------------------------------------------------------------------------------------------------
 
@@ -176,9 +190,10 @@ class System:
         """dz/dt at `time` [s] in these modes; what it finds on the way is kept (`contacts`, `stick_force` ...)."""
         if modes.resting:
             self.contacts, self.acceleration = [], (0.0, 0.0, 0.0)
-            return [0.0] * 9
+            return [0.0] * len(z)
         s, p, model = self.s, self.p, self.model
         self._set(time, z)
+        s.inner_mode = float(modes.inner)
         y, vx, vy, omega = z[Y], z[VX], z[VY], z[OMEGA]
         driving = bool(modes.touching) and not modes.torque_over
         s.torque = self.trial.torque * model.torque_factor(p, s) if driving else 0.0
@@ -235,7 +250,11 @@ class System:
         self.vertical_force = next(found) if vertical > 0 and not modes.vertical else 0.0
         self.rotation_force = next(found) if rotation > 0 and not modes.rotation else 0.0
         spin = self.wheel_sign * s.torque / self.trial.wheel_inertia
-        return [vx, vy, omega, a[0], a[1], a[2], spin, s.torque * omega, power]
+        rate = [vx, vy, omega, a[0], a[1], a[2], spin, s.torque * omega, power]
+        if self.inner:
+            own_mass, own_force, self.inner_holds = model.inner(p, s)
+            rate += [s.inner_speed, own_force / own_mass]
+        return rate
 
     def _stick_row(
         self, sticking: list[tuple[Contact, float, float, float]], omega: float
@@ -323,6 +342,8 @@ class System:
         xx, xy, yy, xt, yt, tt = model.inertia(p, s)
         vx, vy, w = z[VX], z[VY], z[OMEGA]
         kinetic = 0.5 * (xx * vx * vx + yy * vy * vy + tt * w * w) + xy * vx * vy + (xt * vx + yt * vy) * w
+        if self.inner:
+            kinetic += 0.5 * model.inner(p, s)[0] * s.inner_speed * s.inner_speed
         stored = 0.0
         for n in modes.touching:
             depth = max(self.depth(n, z), 0.0)

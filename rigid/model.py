@@ -12,6 +12,8 @@ the numbers of the ground's law:
 - ``applied(p, s)``: generalised force of all but contacts and dry friction;
 - ``potential(p, s)`` [J], ``losses(p, s)`` [W]: of the same;
 - ``dry_friction(p, s)``: bounds on the vertical motion [N] and on the rotation [N m];
+- ``inner_start(p, s)``, ``inner(p, s)``: of the coordinate that a term has of its own, where there is one: at rest; its
+  inertia, the force on it, and what is positive while its mode holds;
 - ``crater(p)``: share of the deepest depth at which a spike on the way up leaves the ground;
 - ``contact(p, s, q, depth, rate, slip, top, held)``: elastic normal force, dissipative normal force, stored energy,
   tangential drag, factors on mu_s and mu_d.
@@ -63,6 +65,9 @@ class State:
     gravity: float
     weight: float
     torque: float
+    inner: float
+    inner_speed: float
+    inner_mode: float
 
 
 class Model:
@@ -78,6 +83,8 @@ class Model:
     potential: Callable[..., Any]
     losses: Callable[..., Any]
     dry_friction: Callable[..., Any]
+    inner_start: Callable[..., Any]
+    inner: Callable[..., Any]
     crater: Callable[..., Any]
     contact: Callable[..., Any]
     contact_arms: Callable[..., Any]
@@ -150,7 +157,12 @@ def model_source(terms: Sequence[Term], law: SurfaceLaw) -> str:
     out += ["def dry_friction(p, s):", "    vertical = 0.0", "    rotation = 0.0"]
     out += [f"    vertical = vertical + {call}" for call in _calls(every, "vertical_friction", "s")]
     out += [f"    rotation = rotation + {call}" for call in _calls(every, "rotation_friction", "s")]
-    out += ["    return vertical, rotation\n", "def plastic_share(p):", "    left = 1.0"]
+    out += ["    return vertical, rotation\n", "def inner_start(p, s):", "    at = 0.0"]
+    out += [f"    at = {call}" for call in _calls(every, "inner_start", "s")]
+    out += ["    return at\n", "def inner(p, s):", "    mass = 0.0", "    force = 0.0", "    holds = 1.0"]
+    for hook in ("mass", "force", "holds"):
+        out += [f"    {hook} = {call}" for call in _calls(every, f"inner_{hook}", "s")]
+    out += ["    return mass, force, holds\n", "def plastic_share(p):", "    left = 1.0"]
     out += [f"    left = left * (1.0 - {call})" for call in _calls(every, "crater", "")]
     out += ["    return 1.0 - left\n", "def crater(p):"]
     if law.has_memory:
@@ -199,14 +211,20 @@ def _hooks(terms: Sequence[Term], law: SurfaceLaw) -> dict[str, Callable[..., An
 
 _GLUE = (
     "vertical", "tip_radius", "torque_factor", "inertia", "applied", "potential", "losses", "dry_friction",
-    "plastic_share", "crater", "contact",
+    "inner_start", "inner", "plastic_share", "crater", "contact",
 )  # fmt: skip
 
 
 @lru_cache(maxsize=256)
 def assemble(terms: tuple[Term, ...], ground: str, *, taichi: bool = False) -> Model:
-    """The model of these effects on the ground called `ground`, for Python or for Taichi."""
+    """The model of these effects on the ground called `ground`, for Python or for Taichi.
+
+    Raises ValueError for two effects that each have a coordinate of their own.
+    """
     law, terms = find_law(ground), tuple(term for term in terms if not term.sensor)
+    inner = [term.id for term in terms if "inner_mass" in term.hooks]
+    if len(inner) > 1:
+        raise ValueError(f"effects {' and '.join(map(repr, inner))} each have a coordinate of their own: one at most")
     text = model_source(terms, law)
     file = f"<planar model {ground} {'+'.join(term.id for term in terms) or 'base'} {id(terms):x} {taichi}>"
     linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)  # where Taichi reads it

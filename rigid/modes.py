@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from .dynamics import LOST, OMEGA, VX, VY, Modes, System
+from .dynamics import INNER_SPEED, LOST, OMEGA, VX, VY, Modes, System
 
 __all__ = ["let_go", "resolve", "settle"]
 
@@ -122,8 +122,11 @@ def settle(system: System, time: float, z: list[float], modes: Modes, rate: list
         return False
     if system.model.reads("time") or (not modes.torque_over and system.model.reads("wheel_speed")):
         return False  # what holds now may not hold later
+    if system.inner and z[INNER_SPEED] != 0.0:
+        return False
     ax, ay, alpha = system.acceleration
     trial = system.trial
     shallow = min(max(system.depth(n, z), _EPS * trial.spike_length) for n in modes.touching)
     small = max(_REST, 8 * _EPS * trial.spike_length / shallow) * trial.gravity_sim
-    return max(abs(ax), abs(ay), abs(alpha) * system.s.length) <= small
+    inner = abs(rate[INNER_SPEED]) if system.inner else 0.0
+    return max(abs(ax), abs(ay), abs(alpha) * system.s.length, inner) <= small

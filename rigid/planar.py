@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from .dynamics import LOST, OMEGA, VX, VY, WORK, Modes, System, X, Y
 from .planar_located import integrate
 from .planar_paper import integrate_fixed
-from .statics import standing, stiffness_at_rest
+from .statics import inner_slopes, standing, stiffness_at_rest
 from .trajectory import LAUNCH_DISTANCE, STATES, Tally, Trajectory
 from .trial import Trial
 
@@ -69,12 +69,18 @@ def longest_step(trial: Trial) -> float:
 
     K is the law's own slope at the depth where it carries the weight, M the least inertia that a row's tip offers.
     A fifth of sqrt(M / K), a thirtieth of the period, keeps the error of order 2 below half a percent; a damper adds
-    the bound M / C (explicit steps are stable to 2 M / C).
+    the bound M / C (explicit steps are stable to 2 M / C). The same holds for a spring and a damper that a term has of
+    its own, between its inertia and the platform's mass.
     """
-    stiffness, damping = stiffness_at_rest(System(trial))
+    system = System(trial)
+    stiffness, damping = stiffness_at_rest(system)
     # 1 / M of a tip at its largest lever.
-    inverse = 1 / (trial.mass + trial.counterweight) + trial.spike_length**2 / trial.inertia
-    return step_bound(stiffness, damping, inverse)
+    carried = 0.0 if system.inner else trial.counterweight
+    bound = step_bound(stiffness, damping, 1 / (trial.mass + carried) + trial.spike_length**2 / trial.inertia)
+    if system.inner:
+        stiffness, damping, inertia = inner_slopes(system)
+        bound = min(bound, step_bound(stiffness, damping, 1 / inertia + 1 / trial.mass))
+    return bound
 
 
 def step_bound(stiffness: float, damping: float, inverse_mass: float) -> float:
@@ -89,8 +95,13 @@ def check_step(trial: Trial, time_step: float) -> None:
     if time_step > longest:
         raise ValueError(
             f"time_step = {time_step:g} s is too long for the ground (stiffness = {trial.stiffness:g} N/m, damping = "
-            f"{trial.damping:g} N s/m): at most {longest:.3g} s follows it"
+            f"{trial.damping:g} N s/m){_springs(trial)}: at most {longest:.3g} s follows it"
         )
+
+
+def _springs(trial: Trial) -> str:
+    own = [effect for effect in trial.effects if "inner_mass" in effect.term.hooks]
+    return "".join(f" or for {effect.id} ({effect.values})" for effect in own)
 
 
 def _positive(key: str, value: Any) -> None:

@@ -51,6 +51,8 @@ def monitors(system: System, z: Sequence[float], modes: Modes) -> Watch:
             found["rotation", 0] = (modes.rotation * omega, math.nan)
         else:
             found["rotation", 1] = (system.rotation_bound - abs(system.rotation_force), math.nan)
+    if system.inner:
+        found["inner", -1] = (system.inner_holds, math.nan)
     if system.trial.actuator == "brake" and not modes.torque_over and system.trial.torque > 0:
         found["wheel", -1] = (z[WHEEL], math.nan)
     return found
@@ -79,7 +81,7 @@ def triggered(before: Watch, after: Watch) -> list[Monitor]:
 
 def precision(key: Monitor, system: System) -> float:
     """How near to zero a monitor must come: rounding of a length, a speed, a force."""
-    if key[0] in ("lift", "touch", "fresh", "again"):
+    if key[0] in ("lift", "touch", "fresh", "again", "inner"):
         return 1e-16 * system.s.length
     if key[0] in ("slip", "rate"):
         return 1e-15

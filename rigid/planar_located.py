@@ -145,7 +145,8 @@ def _scale(system: System) -> list[float]:
     rate = math.sqrt(trial.gravity_sim / length)
     energy = trial.weight * length
     wheel = max(trial.wheel_speed_0, 1.0)
-    return [0.1 * length, 0.1 * length, 0.1, length * rate, length * rate, rate, 10 * wheel, energy, energy]
+    scale = [0.1 * length, 0.1 * length, 0.1, length * rate, length * rate, rate, 10 * wheel, energy, energy]
+    return [*scale, 0.1 * length, length * rate] if system.inner else scale
 
 
 def _constant(z: list[float]) -> Interpolant:
@@ -302,6 +303,8 @@ def _switch(
             vertical = True
         elif kind == "rotation":
             rotation = True
+        elif kind == "inner":
+            modes.inner = 1 - modes.inner
         elif kind == "wheel":
             z[WHEEL], modes.torque_over = 0.0, True
     if forced:

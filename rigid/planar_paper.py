@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from .dynamics import LOST, OMEGA, THETA, VX, VY, WHEEL, WORK, Modes, System, X, Y
+from .dynamics import INNER, INNER_SPEED, LOST, OMEGA, THETA, VX, VY, WHEEL, WORK, Modes, System, X, Y
 from .modes import resolve, settle
 from .statics import standing
 
@@ -50,6 +50,9 @@ def integrate_fixed(
             z[i] += time_step * rate[i]
         for i in (X, Y, THETA):
             z[i] += time_step * z[i + 3]
+        if system.inner:
+            z[INNER_SPEED] += time_step * rate[INNER_SPEED]
+            z[INNER] += time_step * z[INNER_SPEED]
         # The books with the speeds' mean over the step.
         mean = 0.5 * (old[2] + z[OMEGA])
         z[WORK] += time_step * (rate[WORK] / old[2] * mean if old[2] else system.s.torque * mean)
@@ -94,6 +97,10 @@ def _read_modes(
                 modes.slip[n] = 1 if slip > 0 else -1
         if system.has_memory and depth <= 0:
             modes.top[n] = 0.0
+    if system.inner:
+        system.derivative(time, z, modes)
+        if system.inner_holds < 0:
+            modes.inner = 1 - modes.inner
     up_x, up_y = system.s.up_x, system.s.up_y
     vertical = bool(modes.vertical) and (up_x * old[0] + up_y * old[1]) * (up_x * z[VX] + up_y * z[VY]) <= 0
     rotation = bool(modes.rotation) and old[2] * z[OMEGA] <= 0

@@ -7,9 +7,9 @@ are found by Newton's method from the balance of forces along the normal and of 
 
 from __future__ import annotations
 
-from .dynamics import THETA, WHEEL, Modes, System, Y
+from .dynamics import INNER, THETA, WHEEL, Modes, System, Y
 
-__all__ = ["standing", "stiffness_at_rest"]
+__all__ = ["inner_slopes", "standing", "stiffness_at_rest"]
 
 _CLOSE = 1e-13  # of the weight, and of weight x length
 _EPS = 2.0**-52
@@ -23,7 +23,7 @@ def standing(system: System) -> tuple[list[float], Modes]:
     share = 0.5 * trial.weight * s.up_y
     if share <= 0:
         raise ValueError("slope.angle leaves no weight on the surface")
-    z = [0.0] * 9
+    z = [0.0] * (11 if system.inner else 9)
     z[WHEEL] = trial.wheel_speed_0
     z[Y] = s.stance - _sinkage(system, share)
     if system.radius:
@@ -85,7 +85,7 @@ def _why_not(system: System, what: str) -> str:
 
 def _sinkage(system: System, load: float) -> float:
     """Depth [m] at which one row carries `load` [N]."""
-    system._set(0.0, [0.0] * 9)
+    system._set(0.0, [0.0] * 11)
 
     def force(depth: float) -> float:
         return float(system.model.contact(system.p, system.s, system.q, depth, 0.0, 0.0, depth, depth)[0])
@@ -108,6 +108,8 @@ def _sinkage(system: System, load: float) -> float:
 def _residual(system: System, z: list[float], modes: Modes) -> tuple[float, float]:
     """Force along the normal [N] and moment [N m] that are left, friction holding x."""
     modes.top = [max(system.depth(n, z), 0.0) for n in range(system.trial.spike_count)]
+    if system.inner:
+        z[INNER] = system.inner_at_rest(z)
     bounds, system.has_vertical, system.has_rotation = (system.has_vertical, system.has_rotation), False, False
     try:
         system.derivative(0.0, z, modes)
@@ -132,3 +134,19 @@ def stiffness_at_rest(system: System) -> tuple[float, float]:
     unloading = (force(depth, 0.0, depth) - force(0.99 * depth, 0.0, depth)) / (0.01 * depth)
     speed = 0.1
     return max(loading, unloading), max(0.0, (force(depth, speed, 0.0) - force(depth, 0.0, 0.0)) / speed)
+
+
+def inner_slopes(system: System) -> tuple[float, float, float]:
+    """Stiffness [N/m], damping [N s/m] and inertia [kg] of the coordinate that a term has of its own, at rest."""
+    system._set(0.0, [0.0] * 11)
+    s, rest = system.s, system.inner_at_rest([0.0] * 11)
+
+    def force(at: float, speed: float) -> float:
+        s.inner, s.inner_speed, s.inner_mode = at, speed, 1.0
+        return float(system.model.inner(system.p, s)[1])
+
+    step, speed = 1e-6 * s.length, 1e-3
+    still = force(rest, 0.0)
+    return (still - force(rest + step, 0.0)) / step, (still - force(rest, speed)) / speed, float(
+        system.model.inner(system.p, s)[0]
+    )

@@ -15,10 +15,11 @@ from .body import BODY_EFFECTS
 from .contact import CONTACT_EFFECTS
 from .sensor import SENSOR_EFFECTS
 from .term import FIXED_ARGUMENTS, STATE_FIELDS, Parameter, Term
+from .wires import WIRE_EFFECTS
 
 __all__ = ["BASE", "EFFECTS", "FIXED_ARGUMENTS", "STATE_FIELDS", "Parameter", "Term", "find_effect", "load_effect"]
 
-EFFECTS: dict[str, Term] = {term.id: term for term in (*BODY_EFFECTS, *CONTACT_EFFECTS, *SENSOR_EFFECTS)}
+EFFECTS: dict[str, Term] = {term.id: term for term in (*BODY_EFFECTS, *WIRE_EFFECTS, *CONTACT_EFFECTS, *SENSOR_EFFECTS)}
 """All effects by id, in the order in which they are summed."""
 
 

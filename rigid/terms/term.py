@@ -23,6 +23,15 @@ the fixed ones listed below, then the term's own parameters, by name, in any num
 | `rate_force`         | s, depth, rate            | normal force [N] that dissipates, by the rate of sinking     |
 | `side_force`         | s, depth, slip            | tangential force [N] on the tip against its slip speed       |
 | `friction_factor`    | s, slip                   | factors on mu_s and mu_d [1]                                 |
+| `inner_mass`         | s                         | inertia of a coordinate of the term's own; 0: it has none    |
+| `inner_start`        | s                         | that coordinate in static equilibrium, its force then is 0   |
+| `inner_force`        | s                         | force on it: inner_mass d2(inner)/dt2                        |
+| `inner_holds`        | s                         | positive as long as the present mode holds, in m or rad      |
+
+The last four go together and are for a term with something inside that moves: one coordinate `s.inner`, its rate
+`s.inner_speed` and one of two modes, `s.inner_mode` = 1 at the start, else 0. It is integrated beside the platform's
+motion; `force`, `potential` and `loss` of the same term look at it. Where `inner_holds` passes through zero is an
+event: the mode changes there, and only there. At most one term of a model has one.
 
 Without hooks a term is a sensor's (`sensor=True`): it is declared here and applied where the sensors are.
 """
@@ -53,16 +62,24 @@ FIXED_ARGUMENTS: dict[str, tuple[str, ...]] = {
     "rate_force": ("s", "depth", "rate"),
     "side_force": ("s", "depth", "slip"),
     "friction_factor": ("s", "slip"),
+    "inner_mass": ("s",),
+    "inner_start": ("s",),
+    "inner_force": ("s",),
+    "inner_holds": ("s",),
 }
 """The hooks and what each gets before its parameters."""
 
 STATE_FIELDS = (
     "time", "x", "y", "theta", "vx", "vy", "omega", "wheel_speed", "cosine", "sine", "up_x", "up_y",
     "mass", "inertia", "length", "stance", "counterweight", "gravity", "weight", "torque",
+    "inner", "inner_speed", "inner_mode",
 )  # fmt: skip
 """What `s` holds, SI units: the state of the platform; cosine and sine of theta; the vertical's direction; then the
 trial's own numbers: mass, inertia, spike length, height of the centre over tips that only just touch at theta = 0,
-counterweight, gravity that pulls at the centre of mass, weight on the surface, and the torque that acts now."""
+counterweight, gravity that pulls at the centre of mass, weight on the surface, and the torque that acts now; last the
+coordinate of a term that has one of its own."""
+
+INNER_HOOKS = ("inner_mass", "inner_start", "inner_force", "inner_holds")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,6 +139,9 @@ class Term:
             unknown = set(arguments[len(fixed) :]) - own
             if unknown:
                 raise ValueError(f"{self.id}: {name} asks for {sorted(unknown)}; its parameters are {sorted(own)}")
+        inner = [name for name in INNER_HOOKS if name in self.hooks]
+        if inner and len(inner) < len(INNER_HOOKS):
+            raise ValueError(f"{self.id}: {', '.join(inner)} without the others of {', '.join(INNER_HOOKS)}")
 
     def arguments(self, hook: str) -> tuple[str, ...]:
         """Names of the parameters that `hook` takes, in its order."""

@@ -1,6 +1,8 @@
 """The code's accelerations against equations of motion that sympy derives from T, V, D and the virtual work."""
 
 import math
+from dataclasses import replace
+from functools import wraps
 
 import numpy as np
 import pytest
@@ -9,12 +11,14 @@ from rigid_trials import INERTIA, LENGTH, MASS, RANGES, G, counterweight, effect
 
 from rigid import Trial
 from rigid.dynamics import Modes, System
+from rigid.model import assemble
 
 X, Y, A, U, V, W = sp.symbols("x y theta vx vy omega", real=True)
 POSE, SPEED = (X, Y, A), (U, V, W)
+B, BV = sp.symbols("b b_v", real=True)  # the counterweight's descent, where its wires are springs
 TORQUE, TOP = 0.3, 0.02
 WITH_ENERGY = ["pendulum", "com-offset", "slope", "pulley-inertia", "umbilical", "tip-radius", "depth-hardening",
-               "plastic-sinkage", "adhesion", "inertial-drag"]  # fmt: skip
+               "plastic-sinkage", "adhesion", "inertial-drag", "wire-compliance"]  # fmt: skip
 VALUES = {
     "pendulum": {"length": 2.2, "offset": 0.01, "arc": 0.6},
     "com-offset": {"x": 0.003, "y": -0.002},
@@ -26,29 +30,40 @@ VALUES = {
     "plastic-sinkage": {"share": 0.25},
     "adhesion": {"force": 0.8, "reach": 3e-3},
     "inertial-drag": {"normal": 40.0, "sideways": 7.0},
+    "wire-compliance": {"stiffness": 3e3, "damping": 25.0},
 }
 
 
 class Derived:
-    """Lagrange's equations of a trial whose spikes `touching` press, all sinking (`sinking`) or all on the way up."""
+    """Lagrange's equations of a trial whose spikes `touching` press, all sinking (`sinking`) or all on the way up.
 
-    def __init__(self, trial: Trial, touching, slip, sinking):
+    `slack`: the wires are, where they are springs.
+    """
+
+    def __init__(self, trial: Trial, touching, slip, sinking, slack=False):
         on = {e.id: e.values for e in trial.effects}
         m, J, mb, length = trial.mass, trial.inertia, trial.counterweight, trial.spike_length
         lean = on.get("slope", {"angle": 0})["angle"]
         up = sp.Matrix([sp.sin(lean), sp.cos(lean)])
         r = on.get("tip-radius", {"radius": 0})["radius"]
         height = X * up[0] + Y * up[1]
-        rate = dict(zip(POSE, SPEED, strict=True))
+        wires = on.get("wire-compliance")
+        pose, speed = ((*POSE, B), (*SPEED, BV)) if wires else (POSE, SPEED)
+        rate = dict(zip(pose, speed, strict=True))
+        size = len(pose)
 
         def dot(expression):
             return sum(sp.diff(expression, q) * v for q, v in rate.items())
 
-        T = m * (U**2 + V**2) / 2 + J * W**2 / 2 + mb * dot(height) ** 2 / 2
+        T = m * (U**2 + V**2) / 2 + J * W**2 / 2 + mb * (BV if wires else dot(height)) ** 2 / 2
         energy = (m + mb) * trial.gravity_sim * height
         D = sp.Integer(0)
-        work = [sp.Integer(0), sp.Integer(0), sp.Float(TORQUE)]  # the flywheel's: tau d theta
+        work = [sp.Integer(0), sp.Integer(0), sp.Float(TORQUE), sp.Integer(0)]  # the flywheel's: tau d theta
         true = trial.gravity if mb else trial.gravity_sim
+        if wires:  # beyond the stretch at rest, at which they carry m_b g
+            stretch = B - height
+            energy += -mb * true * stretch if slack else wires["stiffness"] * stretch**2 / 2
+            D += 0 if slack else wires["damping"] * dot(stretch) ** 2 / 2
         if "com-offset" in on:
             ex, ey = on["com-offset"]["x"], on["com-offset"]["y"]
             e = sp.Matrix([ex * sp.cos(A) + ey * sp.sin(A), -ex * sp.sin(A) + ey * sp.cos(A)])
@@ -100,19 +115,20 @@ class Derived:
             for k in range(3):
                 work[k] += side * sp.diff(slide, SPEED[k])
             self.slips[n], self.loads[n] = slide, force + lost
-        M = sp.Matrix(3, 3, lambda i, k: sp.diff(T, SPEED[i], SPEED[k]))
+        M = sp.Matrix(size, size, lambda i, k: sp.diff(T, speed[i], speed[k]))
         right = sp.Matrix(
-            [sp.diff(T, POSE[k]) - dot(sp.diff(T, SPEED[k])) - sp.diff(energy, POSE[k]) - sp.diff(D, SPEED[k]) + work[k]
-             for k in range(3)]
+            [sp.diff(T, pose[k]) - dot(sp.diff(T, speed[k])) - sp.diff(energy, pose[k]) - sp.diff(D, speed[k]) + work[k]
+             for k in range(size)]
         )  # fmt: skip
-        self.numbers = sp.lambdify((*POSE, *SPEED), [M, right], "numpy")
+        given = (*POSE, *SPEED, B, BV)[: 2 * size]
+        self.numbers = sp.lambdify(given, [M, right], "numpy")
         stuck = [n for n in touching if n not in slip]
         # A spike that sticks: d(slip)/dt = 0, a row J a + bias = 0.
         self.stuck = None
         if stuck:
             s = self.slips[stuck[0]]
-            row = [sp.diff(s, v) for v in SPEED]
-            self.stuck = sp.lambdify((*POSE, *SPEED), [*row, dot(s)], "numpy")
+            row = [sp.diff(s, v) for v in speed]
+            self.stuck = sp.lambdify(given, [*row, dot(s)], "numpy")
 
     def acceleration(self, state):
         M, right = self.numbers(*state)
@@ -120,20 +136,29 @@ class Derived:
         if self.stuck is None:
             return np.linalg.solve(M, right)
         *row, bias = (float(value) for value in self.stuck(*state))
-        full = np.zeros((4, 4))
-        full[:3, :3], full[:3, 3], full[3, :3] = M, [-value for value in row], row
-        return np.linalg.solve(full, np.append(right, -bias))[:3]
+        size = len(right)
+        full = np.zeros((size + 1, size + 1))
+        full[:size, :size], full[:size, size], full[size, :size] = M, [-value for value in row], row
+        return np.linalg.solve(full, np.append(right, -bias))[:size]
 
 
-def code(trial: Trial, state, touching, slip):
+def code(trial: Trial, state, touching, slip, slack=False, terms=None):
+    """The code's accelerations, of the counterweight too where its wires are springs; `terms` for its own."""
     system = System(trial)
+    if terms is not None:
+        system.model = assemble(terms, trial.surface.name)
     modes = Modes(touching=list(touching), slip=[slip.get(n, 0) for n in range(8)], top=[TOP] * 8)
-    system.derivative(0.1, [*state, 0.0, 0.0, 0.0], modes)
-    return np.array(system.acceleration), system
+    modes.inner = 0 if slack else 1
+    rate = system.derivative(0.1, [*state[:6], 0.0, 0.0, 0.0, *state[6:]], modes)
+    return np.array([*system.acceleration, *rate[10:]]), system
 
 
-def states(rng, touching, sinking, count=6):
-    """Random states in which just these spikes are 5 to 15 mm deep, with speeds of the sign wanted."""
+def states(rng, touching, sinking, count=6, trial=None):
+    """Random states in which just these spikes are 5 to 15 mm deep, with speeds of the sign wanted.
+
+    Where the wires of `trial` are springs, the counterweight moves too.
+    """
+    system = System(trial) if trial else None
     found = []
     while len(found) < count:
         theta = rng.uniform(-0.02, 0.02) if len(touching) > 1 else rng.uniform(-0.3, 0.3)
@@ -142,7 +167,11 @@ def states(rng, touching, sinking, count=6):
         vx, vy, omega = rng.uniform(-0.3, 0.3), rng.uniform(0.02, 0.3) * (-1 if sinking else 1), rng.uniform(-0.2, 0.2)
         rates = [-(vy + omega * LENGTH * math.sin(g)) for g in angles]
         if all((rate > 0) == sinking for rate in rates):
-            found.append((rng.uniform(-0.1, 0.1), y, theta, vx, vy, omega))
+            x = rng.uniform(-0.1, 0.1)
+            own = ()
+            if system and system.inner:
+                own = (system.inner_at_rest((x, y, theta)) + rng.uniform(-0.01, 0.01), rng.uniform(-0.3, 0.3))
+            found.append((x, y, theta, vx, vy, omega, *own))
     return found
 
 
@@ -164,9 +193,36 @@ def test_sliding_accelerations_are_those_that_lagrange_s_equations_give(effects,
     touching = [0, 7]
     slip = {0: 1, 7: -1}  # the sign is the mode's, here at odds with the speeds: a harder test
     derived = Derived(trial, touching, slip, sinking)
-    for state in states(rng, touching, sinking):
+    for state in states(rng, touching, sinking, trial=trial):
         ours, _ = code(trial, state, touching, slip)
         assert ours == pytest.approx(derived.acceleration(state), rel=1e-10, abs=1e-10)
+
+
+def turned(hook):
+    """`hook` with the sign of all it gives turned."""
+
+    @wraps(hook)
+    def other(*given):
+        value = hook(*given)
+        return tuple(-part for part in value) if isinstance(value, tuple) else -value
+
+    return other
+
+
+@pytest.mark.parametrize("slack", [False, True], ids=["taut", "slack"])
+def test_a_wrong_sign_in_the_wires_shows_taut_and_slack(slack):
+    # The same comparison, and with the sign of one of the term's hooks turned: none of them passes.
+    trial, rng, touching, slip = make(("wire-compliance", "slope")), np.random.default_rng(8), [0, 7], {0: 1, 7: -1}
+    derived = Derived(trial, touching, slip, True, slack)
+    right = trial.terms[0]
+    for state in states(rng, touching, True, trial=trial):
+        expected = derived.acceleration(state)
+        ours, _ = code(trial, state, touching, slip, slack)
+        assert ours == pytest.approx(expected, rel=1e-9, abs=1e-9)
+        for hook in ("mass", "force", "inner_mass", "inner_force"):
+            wrong = replace(right, hooks={**right.hooks, hook: turned(right.hooks[hook])})
+            ours, _ = code(trial, state, touching, slip, slack, (wrong, trial.terms[1]))
+            assert np.abs(ours - expected).max() > 1e-3, hook
 
 
 @pytest.mark.parametrize(("effects", "rig"), CASES, ids=lambda v: "+".join(v) if isinstance(v, tuple) else str(v))
@@ -175,7 +231,7 @@ def test_a_spike_that_sticks_is_a_constraint_whose_force_follows_from_the_equati
     touching = [0, 7]
     slip = {0: 1}  # 7 sticks while 0 slides
     derived = Derived(trial, touching, slip, True)
-    for state in states(rng, touching, True):
+    for state in states(rng, touching, True, trial=trial):
         ours, _ = code(trial, state, touching, slip)
         assert ours == pytest.approx(derived.acceleration(state), rel=1e-9, abs=1e-9)
 
