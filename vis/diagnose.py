@@ -252,6 +252,7 @@ def _page(
             [table(("candidate", "evidence [nats]", "excess a sample"), evidence)] if evidence
             else [text("Nothing was left that a candidate could explain.")]
         )]),
+        Section("What these trials can tell apart", _told_apart(said)),
         Section("Numbers", numbers),
         Section("To do this again", [text(f"With hedgebed {result['version']}, in this folder:"),
                                      code("hedgebed diagnose run.toml")]),
@@ -264,6 +265,32 @@ def _page(
         warnings=[str(warning)[:1].upper() + str(warning)[1:] for warning in result["warnings"]],
         sections=[section for section in sections if section.blocks],
     )
+
+
+def _told_apart(said: Mapping[str, Any]) -> list[Block]:
+    """The first effect against the nearest other names, and what would tell them apart."""
+    rows = said.get("equivalence", [])
+    if len(rows) < 2:
+        return []
+    first, *others = rows
+
+    def number(value: float | None, digits: int = 3) -> str:
+        return "-" if value is None else short(value, digits)
+
+    cells = [(first["effect"], "", "", "", "", number(first["left_out"]), "")]
+    cells += [
+        (row["effect"], f"{row['angle_deg']:.0f}", number(row["distance"]), f"{row['evidence_behind']:.1f}",
+         "-" if row["left_out_behind"] is None else f"{row['left_out_behind']:.1f}", number(row["left_out"]),
+         "yes" if row["told_apart"] else "no")
+        for row in others
+    ]  # fmt: skip
+    head = ("name", "angle [degrees]", "distance [noise]", "evidence behind [nats]", "prediction behind [nats]",
+            "chi-square of what was left out", "told apart")  # fmt: skip
+    caption = (
+        f"Other names in the place of {first['effect']}. The angle is that between what the two change in the data "
+        "(0: these trials see them as one); conditions left out in turn are predicted, chi-square a sample"
+    )
+    return [table(head, cells, title=caption), listing([row["what_would_tell"] for row in others])]
 
 
 def _there(drawn: Mapping[str, Block], *names: str) -> list[Block]:

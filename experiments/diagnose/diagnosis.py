@@ -5,15 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from .colour import Colour, find_colours, whitener_for
+from .equivalence import Rival
 from .evidence import Hypothesis, excess, held_out_fit, inflation, score, signature_matrix
 from .fitting import Fit, Model, Whitener, fit
 from .gate import Verdict, open_gate
 from .localise import Place, depends_on, latent_table, places
+from .prediction import Predicted
 from .problem import Finding, Form, Problem
 from .replicates import find_scatter, odd_trials, split_trials
 from .search import Choice, choose
@@ -26,6 +29,8 @@ _RIGHT_FORM = 0.05
 """A model that leaves a twentieth of what the base model does has the right name, if not nature's exact form."""
 _MOST_FOR_COLOUR = 2.5
 """Chi-square per sample above which motion, not noise, fills the fast modes too."""
+_REFITS = 400
+"""Made-up campaigns of a thorough null."""
 _MARGIN = 1.5
 """Standard deviations beyond the gate that something without a name must reach: no effect speaks for it."""
 _AS_LIKELY = 1.0
@@ -36,7 +41,7 @@ _SMALL = 1.2
 
 @dataclass(frozen=True)
 class Gap:
-    """Chi-square per valid sample, as docs/campaigns.md has it."""
+    """Chi-square per valid sample, as docs/diagnose.md has it."""
 
     fit: float
     held_out: float | None
@@ -78,6 +83,16 @@ class Diagnosis:
         """Forms of the best model."""
         return self.best.model.forms
 
+    @property
+    def equivalence(self) -> tuple[Rival, ...]:
+        """The nearest other names, and whether these trials can tell them from the first effect."""
+        return self.choice.rivals if self.choice is not None and self.effects else ()
+
+    @property
+    def predicted(self) -> Predicted | None:
+        """What the best model leaves of conditions that were left out in turn."""
+        return self.choice.predicted if self.choice is not None and self.effects else None
+
     def latent(self) -> dict[str, Any]:
         """Columns of latent.csv."""
         return latent_table(self.problem, self.best_values, self.forms)
@@ -104,8 +119,14 @@ class Diagnosis:
         return found
 
 
-def diagnose(problem: Problem, *, thorough: bool = False, seed: int = 0, tell: Tell | None = None) -> Diagnosis:
-    """Diagnose a campaign. `tell(what, share done)` hears of progress; the same campaign gives the same answer."""
+def diagnose(
+    problem: Problem, *, thorough: bool = False, seed: int = 0, tell: Tell | None = None, gates: Path | None = None
+) -> Diagnosis:
+    """Diagnose a campaign. `tell(what, share done)` hears of progress; the same campaign gives the same answer.
+
+    `thorough`: nulls by full refits, which takes as long as it takes; they are kept in the folder `gates`, if given,
+    for the next campaign of the same design.
+    """
     tell = tell or (lambda what, done: None)
     tell("fitting the base model", 0.0)
     findings = list(problem.findings)
@@ -124,7 +145,7 @@ def diagnose(problem: Problem, *, thorough: bool = False, seed: int = 0, tell: T
     tell("is anything left?", 0.0)
     columns, _ = signature_matrix(base, problem.forms)
     _, first = open_gate(
-        base, signatures=columns, seed=seed, refit=thorough, draws=200 if thorough else 600,
+        base, signatures=columns, seed=seed, refit=thorough, draws=_REFITS if thorough else 600, folder=gates,
         tell=lambda done: tell("making the gate's null", done),
     )  # fmt: skip
     if first.passed:
@@ -136,6 +157,12 @@ def diagnose(problem: Problem, *, thorough: bool = False, seed: int = 0, tell: T
         base, colours = _coloured(_plain(base), fresh), fresh
         left = open_gate(best, seed=seed)[1]
         choice = replace(choice, best=Hypothesis(best, score(best)), left=left)
+    if thorough and choice.best.effects:
+        left = open_gate(
+            choice.best.fit, seed=seed, refit=True, draws=_REFITS, folder=gates,
+            tell=lambda done: tell("making the null of what is left", done),
+        )[1]  # fmt: skip
+        choice = replace(choice, left=left)
     if not choice.best.effects and choice.left.score < choice.left.threshold + _MARGIN:
         return _finish(problem, base, None, first, choice.left, colours, model_std, findings, held_out, "none", seed)
     tell("verdict", 0.0)

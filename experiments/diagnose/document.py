@@ -53,6 +53,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
                   "threshold": found.gate_after.threshold},
     }  # fmt: skip
     said["evidence"] = _evidence(found)
+    said["equivalence"] = _equivalence(found)
     said["noise"] = {c.channel: {"std": c.std, "persistence": c.persistence} for c in found.colours.values()}
     said["model_std"] = dict(found.model_std)
     said["findings"] = [
@@ -62,6 +63,25 @@ def document(found: Diagnosis) -> dict[str, Any]:
     ]  # fmt: skip
     said["next_experiment"] = found.next_experiment
     return said
+
+
+def _equivalence(found: Diagnosis) -> list[dict[str, Any]]:
+    """The first effect against the nearest other names: what the evidence, the design and prediction say."""
+    if not found.equivalence:
+        return []
+    first = found.best.model.forms[0]
+    mine = found.predicted
+    rows = [{"effect": found.effects[0], "left_out": None if mine is None else mine.per_sample}]
+    for rival in found.equivalence:
+        form = next(f for f in rival.hypothesis.forms if f.effect == rival.effect)
+        rows.append({
+            "effect": rival.effect, "told_apart": not rival.same, "evidence_behind": rival.behind,
+            "left_out_behind": rival.behind_left_out,
+            "left_out": None if rival.predicted is None else rival.predicted.per_sample,
+            "angle_deg": rival.angle, "distance": rival.distance, "expected": rival.expected,
+            "what_would_tell": found.problem.next_experiment(first, form, found.best.values),
+        })  # fmt: skip
+    return rows
 
 
 def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:

@@ -19,7 +19,10 @@ from .fitting import Fit, Model, fit
 from .gate import low_modes
 from .problem import Array, Form, Values
 
-__all__ = ["Hypothesis", "best_start", "excess", "held_out_fit", "inflation", "score", "signature_matrix"]
+__all__ = [
+    "Hypothesis", "best_start", "excess", "held_out_fit", "inflation", "score", "signature_matrix", "slow_count",
+    "tempered",
+]  # fmt: skip
 
 _MODES_EACH = 6
 """Slow modes that a misfit of form has in one channel of one trial; it is alike from trial to trial, so that their
@@ -52,8 +55,14 @@ def excess(found: Fit) -> float:
     return found.objective - (found.count - int(found.free.sum()))
 
 
-def _slow_count(found: Fit) -> float:
+def slow_count(found: Fit) -> float:
+    """M: how many slow modes a misfit of form is taken to have."""
     return max(10.0, _MODES_EACH * math.sqrt(len(low_modes(found.model))))
+
+
+def tempered(left: float, modes: float) -> float:
+    """Log likelihood of an excess of chi-square, taken for `modes` modes of unknown size [nats]."""
+    return -0.5 * modes * math.log1p(left / modes) if left > 0 else -0.5 * left
 
 
 def inflation(found: Fit) -> float:
@@ -61,16 +70,14 @@ def inflation(found: Fit) -> float:
 
     What chance alone brings, two standard deviations of chi-square, does not count.
     """
-    modes = _slow_count(found)
+    modes = slow_count(found)
     left = max(excess(found) - 2 * math.sqrt(2.0 * found.count), 0.0)
     return math.sqrt(1 + left / modes)
 
 
 def score(found: Fit) -> float:
     """Tempered log evidence, up to what is common to models of one campaign [nats]."""
-    modes = _slow_count(found)
-    left = excess(found)
-    likelihood = -0.5 * modes * math.log1p(left / modes) if left > 0 else -0.5 * left
+    likelihood = tempered(excess(found), slow_count(found))
     parameters = found.model.parameters
     shared = np.array([p.trial is None and "." in p.name for p in parameters])
     precision, hessian = found.prior_precision(), np.diag(found.hessian())

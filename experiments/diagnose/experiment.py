@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+from collections.abc import Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,6 +19,7 @@ from hedgebed import __version__
 
 from .diagnosis import Diagnosis, diagnose
 from .document import write_diagnosis
+from .own import load_own
 from .problem import Problem
 
 __all__ = ["check", "diagnose_campaign", "resume", "run"]
@@ -24,7 +27,7 @@ __all__ = ["check", "diagnose_campaign", "resume", "run"]
 
 def check(settings: DiagnoseSettings) -> None:
     """Raise ValueError, naming file and line or key, for a campaign that cannot be read or diagnosed."""
-    _make_problem(Path(settings.campaign))
+    _make_problem(Path(settings.campaign), settings.effect_file)
 
 
 def run(settings: DiagnoseSettings, folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
@@ -40,10 +43,14 @@ def resume(folder: str | Path, *, progress: Progress | None = None) -> dict[str,
 
 
 def diagnose_campaign(
-    campaign: str | Path, *, thorough: bool = False, seed: int = 0, progress: Progress | None = None
-) -> Diagnosis:
-    """The diagnosis of the campaign in a folder, without files. Raises ValueError as `check` does."""
-    problem = _make_problem(Path(campaign))
+    campaign: str | Path, *, thorough: bool = False, seed: int = 0, effect_file: Sequence[str | Path] = (),
+    progress: Progress | None = None,
+) -> Diagnosis:  # fmt: skip
+    """The diagnosis of the campaign in a folder, without files. Raises ValueError as `check` does.
+
+    `effect_file`: Python files with effects of one's own (`own`), which stand among the candidates.
+    """
+    problem = _make_problem(Path(campaign), effect_file)
     told = progress or Progress()
     stage = [""]
 
@@ -53,22 +60,33 @@ def diagnose_campaign(
             told.stage(what, total=1.0)
         told.update(done)
 
+    gates = None
+    if thorough:
+        from dem.prepare import cache_folder
+
+        gates = cache_folder() / "gates"
     with threadpool_limits(1):  # matrices are small: threads of the linear algebra only get in each other's way
-        return diagnose(problem, thorough=thorough, seed=seed, tell=tell)
+        return diagnose(problem, thorough=thorough, seed=seed, tell=tell, gates=gates)
 
 
-def _make_problem(folder: Path) -> Problem:
+def _make_problem(folder: Path, effect_file: Sequence[str | Path]) -> Problem:
     campaign = read_campaign(folder)
+    own = tuple(load_own(file) for file in effect_file)
     name = f"experiments.diagnose.{campaign.tables.kind}_problem"
     if find_spec(name) is None:
         raise ValueError(f"{folder}: kind = {campaign.tables.kind!r} cannot be diagnosed yet")
     with threadpool_limits(1):
-        return import_module(name).make_problem(campaign)
+        return import_module(name).make_problem(campaign, own=own)
 
 
 def _carry_out(settings: DiagnoseSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
     with folder.lock():
-        found = diagnose_campaign(settings.campaign, thorough=settings.thorough, seed=settings.seed, progress=progress)
+        found = diagnose_campaign(
+            settings.campaign, thorough=settings.thorough, seed=settings.seed, effect_file=settings.effect_file,
+            progress=progress,
+        )  # fmt: skip
+        for file in settings.effect_file:  # model.toml names it
+            shutil.copyfile(file, folder.path / Path(file).name)
         for finding in found.findings:
             progress.message(finding.what)
         with threadpool_limits(1):

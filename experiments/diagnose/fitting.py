@@ -18,7 +18,7 @@ from scipy.fft import dct
 
 from .problem import Array, Form, Parameter, Problem, Values
 
-__all__ = ["Fit", "Model", "Whitener", "fit"]
+__all__ = ["Fit", "Model", "Whitener", "fit", "linearised"]
 
 _ROUNDS = 30
 _DAMPINGS = (0.0, 1e-3, 1e-1, 10.0)
@@ -234,10 +234,17 @@ def fit(model: Model, start: Values | None = None, *, rounds: int = _ROUNDS) -> 
     return Fit(model, named(x), best, jacobian, float(best @ best), penalty(x), free)
 
 
+def linearised(model: Model, values: Values) -> tuple[Array, Array]:
+    """Modes at `values`, shape [n], and their changes per scale of each of the model's parameters, shape [n, p]."""
+    parameters = model.parameters
+    return _linearise(model, parameters, np.array([values.get(p.name, p.value) for p in parameters], dtype=float))
+
+
 def _begun(model: Model, start: Values | None) -> Values:
     """Where to begin: as told, and what is not told by the problem's own search, where it has one (`guess`)."""
     known, guess = dict(start or {}), getattr(model.problem, "guess", None)
-    if guess is None or all(p.name in known for p in model.parameters):
+    scatter = {p.name for p in model.scatter}  # a small thing beside the rest: it begins at none
+    if guess is None or all(p.name in known or p.name in scatter for p in model.parameters):
         return known
     held = model.held is not None
     found: Values = guess(model.forms, model.trials, {**(model.held or {}), **known}, held=held)

@@ -9,8 +9,13 @@ and variance stands in.
 
 from __future__ import annotations
 
+import hashlib
+import json
+import os
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from scipy import stats
@@ -23,6 +28,10 @@ __all__ = ["Gate", "Verdict", "low_modes", "open_gate"]
 LOW_MODES = 16
 """Modes of a channel that count as slow: half a period up to eight periods over its record."""
 _DRAWS = 600
+_FORMAT = 1
+"""Of the files in which nulls are kept; a change of the statistics is a change of this."""
+_OFFSET = 20.0
+"""Added to "one trial": it may be below zero, the gamma law not."""
 _LEVEL = 0.005
 """Chance that a right model is refused, of each of the two rounds of tests."""
 
@@ -106,15 +115,32 @@ def open_gate(
     draws: int = _DRAWS,
     refit: bool = False,
     tell: Callable[[float], None] | None = None,
+    folder: Path | None = None,
 ) -> tuple[Gate, Verdict]:
     """The null for this fit, and what it says of it.
 
     `signatures`: unit vectors of what candidate effects would change, the fit's own parameters projected out, shape
-    [n, k]. `refit`: make data and fit them in full, `draws` times, instead of projecting.
+    [n, k]. `refit`: make data and fit them in full, `draws` times, instead of projecting. `folder`: where nulls made by
+    refits are kept: a campaign of the same design, noise and model finds it there.
     """
-    random = np.random.default_rng(seed)
     slow = low_modes(found.model)
     columns = signatures if signatures is not None else np.zeros((found.count, 0))
+    kept = folder / f"{_key(found, columns.shape[1], seed, draws)}.json" if folder is not None and refit else None
+    gate = _read(kept)
+    if gate is None:
+        gate = _calibrated(found, slow, columns, seed=seed, draws=draws, refit=refit, tell=tell)
+        if kept is not None:
+            _write(kept, gate)
+    here = {name: float(value[0]) for name, value in _statistics(found.modes[None, :], slow, columns).items()}
+    here["one trial"] += _OFFSET
+    return gate, gate.judge(here)
+
+
+def _calibrated(
+    found: Fit, slow: Mapping[tuple[str, str], np.ndarray], columns: Array, *, seed: int, draws: int, refit: bool,
+    tell: Callable[[float], None] | None,
+) -> Gate:  # fmt: skip
+    random = np.random.default_rng(seed)
     if refit:
         made = np.stack([_refitted(found, random, tell, k / draws) for k in range(draws)])
         parts = [_statistics(made, slow, columns)]
@@ -127,8 +153,7 @@ def open_gate(
             weights = noise @ basis + more @ prior
             parts.append(_statistics(noise - weights @ basis.T, slow, columns))
     sample = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    offset = 20.0  # "one trial" may be below zero, the gamma law not
-    sample["one trial"] = sample["one trial"] + offset
+    sample["one trial"] = sample["one trial"] + _OFFSET
     names = tuple(sample)
     table = np.stack([sample[name] for name in names], axis=1)
     mean, variance = table.mean(axis=0), np.maximum(table.var(axis=0), 1e-12)
@@ -136,10 +161,42 @@ def open_gate(
     # The far quantile from the body: of the largest of several normal scores the law is close to Gumbel's.
     location, scale = stats.gumbel_r.fit(worst)
     threshold = float(max(stats.gumbel_r.ppf(1 - _LEVEL, location, scale), np.quantile(worst, 0.99)))
-    gate = Gate(names, mean, variance, threshold)
-    here = {name: float(value[0]) for name, value in _statistics(found.modes[None, :], slow, columns).items()}
-    here["one trial"] += offset
-    return gate, gate.judge(here)
+    return Gate(names, mean, variance, threshold)
+
+
+def _key(found: Fit, signature_count: int, seed: int, draws: int) -> str:
+    """Digest of what decides the null: design, noise, what is fitted; not the measured numbers."""
+    model = found.model
+    told = [
+        _FORMAT, model.problem.kind, model.problem.design, model.trials, [form.id for form in model.forms],
+        [(p.name, p.std) for p in model.scatter], signature_count, seed, draws, _LEVEL, LOW_MODES,
+        [np.round(model.whitener.weights[trial], 6).tobytes().hex() for trial in model.trials],
+    ]  # fmt: skip
+    return hashlib.sha256(json.dumps(told).encode()).hexdigest()[:24]
+
+
+def _read(path: Path | None) -> Gate | None:
+    """The null that is kept in a file; None where there is none, or none that can be read."""
+    if path is None or not path.exists():
+        return None
+    try:
+        told = json.loads(path.read_text(encoding="utf-8"))
+        return Gate(tuple(told["names"]), np.array(told["mean"]), np.array(told["variance"]), float(told["threshold"]))
+    except (OSError, ValueError, KeyError) as problem:
+        warnings.warn(f"the gate {path.name} cannot be read and is made anew: {problem}", stacklevel=2)
+        return None
+
+
+def _write(path: Path, gate: Gate) -> None:
+    told = {"names": gate.names, "mean": gate.mean.tolist(), "variance": gate.variance.tolist(),
+            "threshold": gate.threshold}  # fmt: skip
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        unfinished = path.with_suffix(f".{os.getpid()}")
+        unfinished.write_text(json.dumps(told), encoding="utf-8")
+        unfinished.replace(path)
+    except OSError as problem:
+        warnings.warn(f"the gate could not be kept: {problem}", stacklevel=2)
 
 
 def _basis(found: Fit) -> tuple[Array, Array]:

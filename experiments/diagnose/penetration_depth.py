@@ -40,7 +40,7 @@ class SmoothDepth:
 
     @property
     def depth_std(self) -> Array:
-        """Standard error of the smoothed depth, s in docs/campaigns.md [m], shape [n]."""
+        """Standard error of the smoothed depth, s in docs/diagnose.md [m], shape [n]."""
         return np.sqrt((self.depth_error**2).sum(axis=1))
 
     @property
@@ -114,9 +114,7 @@ def _basis(u: Array, intervals: int) -> tuple[Array, Array]:
     return spline(u), spline.derivative()(u)
 
 
-def _enlarged(
-    u: Array, basis: Array, slopes: Array, places: list[float], intervals: int
-) -> tuple[Array, Array, int]:
+def _enlarged(u: Array, basis: Array, slopes: Array, places: list[float], intervals: int) -> tuple[Array, Array, int]:
     """With what the noise may hide: rounder turns about each kink, and bends over the whole twice as fine.
 
     Says also how many columns come before the bends.

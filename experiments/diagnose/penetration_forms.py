@@ -34,9 +34,9 @@ class Slot:
 
     name: str
     how: str
-    """``plain``, ``depth`` (D e^value), ``spring`` (K, of this diameter), ``spring force`` (K D, of this diameter),
-    ``area`` (force by d^2), ``drag`` (force / speed^2 by d^2), ``perimeter`` (force by d), ``viscous`` (force / speed
-    by d)."""
+    """``plain``, ``depth`` (D e^value), ``speed`` (V e^value), ``spring`` (K, of this diameter), ``spring force`` (K D,
+    of this diameter), ``area`` (force by d^2), ``drag`` (force over speed^2 by d^2), ``perimeter`` (force by d),
+    ``viscous`` (force over speed by d)."""
 
 
 @dataclass(frozen=True)
@@ -163,6 +163,8 @@ def _add_shaft(add: _Add, retreats: bool) -> None:
         add(effect, "growing with depth", ("shaft_deep", "perimeter", 0.3, 0.0, 10.0), starts=((0.05,),))
         add(effect, "of the square of depth", ("shaft_square", "perimeter", 0.3, 0.0, 10.0), starts=((0.05,),))
         add(effect, "viscous", ("shaft_viscous", "viscous", 0.3, 0.0, 10.0), starts=((0.05,),))
+        add(effect, "falling with speed", ("shaft_slow", "perimeter", 0.3, 0.0, 10.0),
+            ("shaft_speed", "speed", -5.0, 1.0), starts=((0.05, -1.0), (0.05, -3.0)))  # fmt: skip
 
 
 def physical(slot: Slot, value: float, scales: Scales, *, stiffness: float, size: float) -> float:
@@ -171,6 +173,8 @@ def physical(slot: Slot, value: float, scales: Scales, *, stiffness: float, size
         return value
     if slot.how == "depth":
         return scales.depth * math.exp(value)
+    if slot.how == "speed":
+        return scales.speed * math.exp(value)
     if slot.how == "spring":
         return value * stiffness
     if slot.how == "spring force":
@@ -179,7 +183,7 @@ def physical(slot: Slot, value: float, scales: Scales, *, stiffness: float, size
     return value * scales.force * factor[slot.how]
 
 
-_UNITS = {"plain": "1", "depth": "m", "spring": "N/m", "spring force": "N", "area": "N", "drag": "kg/m",
+_UNITS = {"plain": "1", "depth": "m", "speed": "m/s", "spring": "N/m", "spring force": "N", "area": "N", "drag": "kg/m",
           "perimeter": "N", "viscous": "N s/m"}  # fmt: skip
 
 

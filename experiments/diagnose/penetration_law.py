@@ -12,13 +12,19 @@ where neither moves the spike, it rests for good.
 """
 
 # Taichi reads the annotations and the source of kernels: no `from __future__ import annotations` here.
+import linecache
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rigid.model import _for_taichi as for_taichi
 from rigid.runtime import ensure
+from rigid.terms import STATE_FIELDS, Term
+
+from .own import OwnEffect
 
 __all__ = ["PHASES", "SLOTS", "fall", "push", "slot_table"]
 
@@ -29,7 +35,7 @@ SLOTS = (
     "layer_depth", "layer_width", "layer_slope", "layer_step", "layer_factor", "layer_bump",
     "crater_share", "crater_bend", "unload_stiffness",
     "drag", "drag_onset", "drag_reach", "drag_deep", "drag_both", "drag_tip",
-    "shaft", "shaft_deep", "shaft_square", "shaft_viscous",
+    "shaft", "shaft_deep", "shaft_square", "shaft_viscous", "shaft_slow", "shaft_speed",
     "pull", "pull_reach", "pull_deep", "pull_growth", "pull_ever", "pull_short", "pull_viscous",
     "shift_depth", "shift_speed",
 )  # fmt: skip
@@ -39,22 +45,28 @@ PHASES = ("free", "in", "rest", "out")
 
 _SLOT = {name: place for place, name in enumerate(SLOTS)}
 _NEVER_ZERO = {"reference": 0.01, "speed_scale": 1e-4, "radius_depth": 1e-4, "layer_depth": 0.01, "layer_width": 1e-3,
-               "hardening_reach": 1e-3, "drag_reach": 1e-3, "pull_reach": 1e-3}  # fmt: skip
+               "hardening_reach": 1e-3, "drag_reach": 1e-3, "pull_reach": 1e-3, "shaft_speed": 1e-2}  # fmt: skip
 _STEP = 5e-4
 """Longest step of a drop [s]: sqrt(m / K) of a spike on sand is tens of ms, so the error is below 1e-8 of the depth;
 `fall` takes shorter ones where a lane is stiffer."""
 
 
-def slot_table(count: int) -> NDArray[np.float64]:
-    """Numbers of `count` lanes, shape [count, slot_count]: nothing acts, and no length is zero."""
-    table = np.zeros((count, len(SLOTS)))
+def slot_table(count: int, own: Sequence[OwnEffect] = ()) -> NDArray[np.float64]:
+    """Numbers of `count` lanes, shape [count, slot_count]: nothing acts, and no length is zero.
+
+    Behind `SLOTS` stand the parameters of effects from files, in order.
+    """
+    off = [e.off if p.name == e.amplitude else e.typical[p.name] for e in own for p in e.term.parameters]
+    table = np.zeros((count, len(SLOTS) + len(off)))
+    table[:, len(SLOTS) :] = off
     for name, value in _NEVER_ZERO.items():
         table[:, _SLOT[name]] = value
     return table
 
 
 def push(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDArray[np.int32],
-         depth: NDArray[np.float64], speed: NDArray[np.float64]) -> NDArray[np.float64]:  # fmt: skip
+         depth: NDArray[np.float64], speed: NDArray[np.float64],
+         own: tuple[OwnEffect, ...] = ()) -> NDArray[np.float64]:  # fmt: skip
     """Forces [N] of driven spikes along given paths.
 
     Args:
@@ -62,6 +74,7 @@ def push(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDA
         lane_path: Which path a lane follows, shape [lane_count].
         starts: First row of each path and the row after the last, shape [path_count + 1].
         depth, speed: The paths [m, m/s], one after another.
+        own: Effects from files, whose parameters `numbers` holds.
 
     Returns:
         Shape [lane_count, longest path]; 0 beyond a path's end.
@@ -69,12 +82,14 @@ def push(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDA
     ensure()
     longest = int(np.diff(starts).max())
     out = np.zeros((len(numbers), longest))
-    _kernels()[0](np.ascontiguousarray(numbers), lane_path.astype(np.int32), starts.astype(np.int32), depth, speed, out)
+    kernel = _kernels(tuple(effect.term for effect in own))[0]
+    kernel(np.ascontiguousarray(numbers), lane_path.astype(np.int32), starts.astype(np.int32), depth, speed, out)
     return out
 
 
 def fall(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDArray[np.int32],
-         times: NDArray[np.float64], speeds: NDArray[np.float64]) -> NDArray[np.float64]:  # fmt: skip
+         times: NDArray[np.float64], speeds: NDArray[np.float64],
+         own: tuple[OwnEffect, ...] = ()) -> NDArray[np.float64]:  # fmt: skip
     """Motions of dropped spikes, at depth 0 at t = 0.
 
     Args:
@@ -83,6 +98,7 @@ def fall(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDA
         starts: As of `push`.
         times: The trials' sample times [s], rising, one trial after another; before 0 in free flight.
         speeds: Speed at the surface of each trial [m/s].
+        own: As of `push`.
 
     Returns:
         Depth [m], speed [m/s], acceleration [m/s2] and phase (place in `PHASES`), shape [lane_count, longest, 4]. NaN
@@ -94,16 +110,49 @@ def fall(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDA
     rate = np.sqrt(np.maximum(numbers[:, _SLOT["stiffness"]], 1e-9) / numbers[:, _SLOT["mass"]])
     rate += np.abs(numbers[:, _SLOT["damping"]]) / numbers[:, _SLOT["mass"]]
     steps = np.minimum(_STEP, 0.05 / rate)
-    _kernels()[1](
+    _kernels(tuple(effect.term for effect in own))[1](
         np.ascontiguousarray(numbers), lane_path.astype(np.int32), starts.astype(np.int32), times, speeds, steps, out
     )
     return out
 
 
-@lru_cache(maxsize=1)
-def _kernels() -> tuple[Any, Any]:
+def _own_functions(own: tuple[Term, ...]) -> tuple[Any, Any]:
+    """What effects from files make of the spring's force, and the force that they add, compiled by Taichi.
+
+    The text is written out, a line a hook, as `rigid.model` does it for tumbles.
+    """
     import taichi as ti
 
+    names: dict[str, Any] = {"ti": ti}
+    spring = ["def own_spring(s, z, spring, n: ti.template(), k):", "    force = spring"]
+    force = ["def own_force(s, z, v, most, n: ti.template(), k):", "    total = 0.0"]
+    at = len(SLOTS)
+    for place, term in enumerate(own):
+        column = {p.name: f"n[k, {at + number}]" for number, p in enumerate(term.parameters)}
+        at += len(term.parameters)
+        for hook, function in term.hooks.items():
+            names[f"{hook}_{place}"] = for_taichi(function)
+            told = "".join(f", {column[argument]}" for argument in term.arguments(hook))
+            if hook == "stiffen":
+                spring += [f"    force, work = stiffen_{place}(z, force, 0.0{told})"]
+            elif hook == "rate_force":
+                force += [f"    total = total + rate_force_{place}(s, z, v{told})"]
+            else:
+                force += [f"    pull, held = hold_{place}(s, z, most{told})", "    total = total - pull"]
+    text = "\n".join([*spring, "    return force\n", *force, "    return total\n"])
+    file = f"<effects {'+'.join(term.id for term in own) or 'none'} {id(own):x}>"
+    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)  # where Taichi reads it
+    exec(compile(text, file, "exec"), names)
+    return ti.func(names["own_spring"]), ti.func(names["own_force"])
+
+
+@lru_cache(maxsize=8)
+def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
+    import taichi as ti
+
+    State = ti.types.struct(**dict.fromkeys(STATE_FIELDS, ti.f64))
+    own_spring, own_force = _own_functions(own)
+    OWN = len(own) > 0
     S = _SLOT  # compile-time constants
     MASS, GRAVITY, STIFFNESS, DAMPING = S["mass"], S["gravity"], S["stiffness"], S["damping"]
     REFERENCE, SPEED_SCALE, RADIUS_DEPTH = S["reference"], S["speed_scale"], S["radius_depth"]
@@ -115,8 +164,8 @@ def _kernels() -> tuple[Any, Any]:
     CRATER, UNLOAD = S["crater_share"], S["unload_stiffness"]
     DRAG, DRAG_DEEP, DRAG_BOTH, DRAG_TIP = S["drag"], S["drag_deep"], S["drag_both"], S["drag_tip"]
     DRAG_ONSET, DRAG_REACH = S["drag_onset"], S["drag_reach"]
-    SHAFT, SHAFT_DEEP, SHAFT_SQUARE, SHAFT_VISCOUS = (
-        S["shaft"], S["shaft_deep"], S["shaft_square"], S["shaft_viscous"],
+    SHAFT, SHAFT_DEEP, SHAFT_SQUARE, SHAFT_VISCOUS, SHAFT_SLOW, SHAFT_SPEED = (
+        S["shaft"], S["shaft_deep"], S["shaft_square"], S["shaft_viscous"], S["shaft_slow"], S["shaft_speed"],
     )  # fmt: skip
     PULL, PULL_REACH, PULL_DEEP, PULL_SHORT, PULL_VISCOUS = (
         S["pull"], S["pull_reach"], S["pull_deep"], S["pull_short"], S["pull_viscous"],
@@ -168,6 +217,9 @@ def _kernels() -> tuple[Any, Any]:
                 at = ever
                 stiff = n[k, STIFFNESS] * (1.0 + n[k, UNLOAD]) * (ever - z)
             spring = ti.max(loading(at, n, k) * bent - stiff, 0.0)
+            if ti.static(OWN):
+                s = State(mass=n[k, MASS], gravity=n[k, GRAVITY], weight=n[k, MASS] * n[k, GRAVITY], y=-z, vy=-v)
+                spring = own_spring(s, z, spring, n, k)
             x, back = z / n[k, REFERENCE], most - z
             total = spring
             sinking = ti.max(v, 0.0)
@@ -179,6 +231,8 @@ def _kernels() -> tuple[Any, Any]:
                 share += n[k, DRAG_ONSET] * (1.0 - ti.exp(-z / n[k, DRAG_REACH]))
             total += share * sinking * sinking + n[k, DRAG_BOTH] * v * ti.abs(v)
             total += (n[k, SHAFT] + n[k, SHAFT_DEEP] * x + n[k, SHAFT_SQUARE] * x * x) * way + n[k, SHAFT_VISCOUS] * v
+            if n[k, SHAFT_SLOW] != 0.0:
+                total += n[k, SHAFT_SLOW] * ti.exp(-ti.abs(v) / n[k, SHAFT_SPEED]) * way
             if back > 0.0:
                 held = back / n[k, PULL_REACH]
                 grown = n[k, PULL]
@@ -190,6 +244,9 @@ def _kernels() -> tuple[Any, Any]:
                 mobilised = 1.0 - ti.exp(-(ever - z) / n[k, PULL_REACH])
                 total -= n[k, PULL_EVER] * ti.pow(ever / n[k, REFERENCE], n[k, PULL_GROWTH]) * mobilised
             total -= n[k, PULL_VISCOUS] * rising
+            if ti.static(OWN):
+                s = State(mass=n[k, MASS], gravity=n[k, GRAVITY], weight=n[k, MASS] * n[k, GRAVITY], y=-z, vy=-v)
+                total += own_force(s, z, v, most, n, k)
         return total
 
     @ti.kernel

@@ -2,7 +2,7 @@
 
 Driven trials are scored on their force along the smoothed depth. The error of that depth is one smooth curve, not white
 noise, so the likelihood takes its covariance in full: force noise plus (dF/dz, dF/dv) times the error of depth and
-speed; `chi_square` has the sum of docs/campaigns.md, std_force^2 + (dF/dz s)^2. Drops are integrated from their exact
+speed; `chi_square` has the sum of docs/diagnose.md, std_force^2 + (dF/dz s)^2. Drops are integrated from their exact
 start and scored on depth and acceleration.
 """
 
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from experiments.campaign import Campaign, EffectTable, PenetrationCampaign, PenetrationModel, write_model
 
+from .own import PENETRATION_HOOKS, OwnEffect, own_parameters, own_starts
 from .penetration_data import Prepared, prepare, stds
 from .penetration_forms import Library, Scales, make_library, physical, unit_of
 from .penetration_law import PHASES, SLOTS, fall, push, slot_table
@@ -33,9 +34,12 @@ _BED_STD = 0.5
 """How far the bed may differ between replicates while it is asked whether it does [1]."""
 
 
-def make_problem(campaign: Campaign) -> PenetrationProblem:
-    """The problem of a campaign of kind "penetration". Raises ValueError where none of its trials can be used."""
-    return PenetrationProblem(campaign)
+def make_problem(campaign: Campaign, *, own: Sequence[OwnEffect] = ()) -> PenetrationProblem:
+    """The problem of a campaign of kind "penetration", `own` among its candidates.
+
+    Raises ValueError where none of its trials can be used, or an effect acts where a single spike has nothing.
+    """
+    return PenetrationProblem(campaign, own=own)
 
 
 class PenetrationProblem:
@@ -43,8 +47,16 @@ class PenetrationProblem:
 
     kind = "penetration"
 
-    def __init__(self, campaign: Campaign) -> None:
+    def __init__(self, campaign: Campaign, *, own: Sequence[OwnEffect] = ()) -> None:
         tables = campaign.tables
+        for effect in own:
+            other = [hook for hook in effect.term.hooks if hook not in PENETRATION_HOOKS]
+            if other:
+                raise ValueError(
+                    f"effect_file = {str(effect.file)!r}: the hook {other[0]!r} has no meaning for a spike that goes "
+                    f"straight down; {', '.join(PENETRATION_HOOKS)} have"
+                )
+        self.own = tuple(own)
         if not isinstance(tables, PenetrationCampaign):
             raise ValueError(f"kind = {tables.kind!r}: 'penetration' was expected here")
         self.tables: PenetrationCampaign = tables
@@ -59,7 +71,13 @@ class PenetrationProblem:
         speeds = np.array([s for trial in prepared for s in _speeds(trial)])
         differ = speeds.max() > 1.05 * max(speeds.min(), 1e-12)
         self._library: Library = make_library(self._scales, retreats=self._retreats(), speeds_differ=bool(differ))
-        self.forms: tuple[Form, ...] = self._library.forms
+        taken = {form.effect for form in self._library.forms}
+        for effect in own:
+            if effect.id in taken:
+                raise ValueError(f"effect_file = {str(effect.file)!r}: the id {effect.id!r} is taken; choose another")
+            taken.add(effect.id)
+        self.forms: tuple[Form, ...] = (*self._library.forms, *(_own_form(effect) for effect in own))
+        self._own_slots = {name: len(SLOTS) + place for place, name in enumerate(_own_names(own))}
         self._whitening: dict[str, tuple[Array, Array, Array]] = {}
         self.rewhiten({}, ())
 
@@ -168,9 +186,15 @@ class PenetrationProblem:
         size = trial.diameter / self._middle
         for form in forms:
             for parameter in form.parameters:
-                slot = self._library.slots[form.id][parameter.name]
                 value = values.get(parameter.name, parameter.value)
+                if form.id not in self._library.slots:
+                    into[self._own_slots[parameter.name]] = self._own_effect(form).actual(_last(parameter.name), value)
+                    continue
+                slot = self._library.slots[form.id][parameter.name]
                 into[_SLOT[slot.name]] = physical(slot, value, self._scales, stiffness=stiffness, size=size)
+
+    def _own_effect(self, form: Form) -> OwnEffect:
+        return next(effect for effect in self.own if effect.id == form.effect)
 
     def _default(self, name: str, stated: float) -> float:
         return next((parameter.value for parameter in self.base if parameter.name == name), stated)
@@ -179,7 +203,9 @@ class PenetrationProblem:
              shifts: tuple[float, float] = (0.0, 0.0)) -> list[Array]:  # fmt: skip
         """Forces [points, n] of driven trials, or motions [points, n, 4] of drops; all trials of one mode."""
         count = len(points)
-        numbers = slot_table(count * len(trials))
+        # Effects from files are compiled in where one of them is on: another kernel.
+        own = self.own if any(form.id not in self._library.slots for form in forms) else ()
+        numbers = slot_table(count * len(trials), own)
         lanes = np.repeat(np.arange(len(trials), dtype=np.int32), count)
         for place, trial in enumerate(trials):
             for k, values in enumerate(points):
@@ -189,10 +215,10 @@ class PenetrationProblem:
         if trials[0].driven:
             depth = np.concatenate([trial.smooth.depth for trial in trials if trial.smooth is not None])
             speed = np.concatenate([trial.smooth.speed for trial in trials if trial.smooth is not None])
-            out = push(numbers, lanes, starts, depth, speed)
+            out = push(numbers, lanes, starts, depth, speed, own)
         else:
             speeds = np.array([trial.table.speed or 0.0 for trial in trials])
-            out = fall(numbers, lanes, starts, np.concatenate([trial.time for trial in trials]), speeds)
+            out = fall(numbers, lanes, starts, np.concatenate([trial.time for trial in trials]), speeds, own)
         return [out[p * count : (p + 1) * count, : len(trial.time)] for p, trial in enumerate(trials)]
 
     def _models(self, points: Sequence[Values], forms: Sequence[Form], ids: Sequence[str]) -> dict[str, Array]:
@@ -259,7 +285,7 @@ class PenetrationProblem:
         return found
 
     def chi_square(self, values: Values, forms: Sequence[Form], trial: str) -> tuple[float, int]:
-        """The sum of docs/campaigns.md; see `Problem`."""
+        """The sum of docs/diagnose.md; see `Problem`."""
         this = self._trials[trial]
         if not this.driven:
             (rest,) = self.evaluate([values], forms, [trial])
@@ -318,6 +344,11 @@ class PenetrationProblem:
         stiffness = values.get(name, self._default(name, self.tables.surface.stiffness))
         found = {}
         for parameter in form.parameters:
+            if form.id not in self._library.slots:
+                name = _last(parameter.name)
+                value = self._own_effect(form).actual(name, values.get(parameter.name, parameter.value))
+                found[name] = (float(value), parameter.unit)
+                continue
             slot = self._library.slots[form.id][parameter.name]
             value = physical(
                 slot, values.get(parameter.name, parameter.value), self._scales, stiffness=stiffness, size=1.0
@@ -372,9 +403,9 @@ class PenetrationProblem:
             notes["fitted_by_diameter"] = pairs
         effects = tuple(
             EffectTable(id=form.effect, parameters={
-                "reference": self._scales.depth,
+                **({"reference": self._scales.depth} if form.id in self._library.slots else {}),
                 **{name: value for name, (value, _) in self.reported(values, form).items()},
-            })
+            }, file=None if form.id in self._library.slots else self._own_effect(form).file.name)
             for form in forms
         )  # fmt: skip
         tables = {
@@ -406,6 +437,20 @@ class PenetrationProblem:
             f"Drive the spike in and out at two speeds a factor of ten apart, to twice the depth reached here: "
             f"{first.effect} and {second.effect} part where speed, direction and depth change one at a time."
         )
+
+
+def _own_form(own: OwnEffect) -> Form:
+    parameters = own_parameters(own)
+    return Form(effect=own.id, name="own", parameters=parameters, amplitude=parameters[0].name,
+                starts=own_starts(own, parameters))  # fmt: skip
+
+
+def _own_names(own: Sequence[OwnEffect]) -> list[str]:
+    return [f"{effect.id}.{p.name}" for effect in own for p in effect.term.parameters]
+
+
+def _last(name: str) -> str:
+    return name.partition(".")[2]
 
 
 _TELLING: Mapping[frozenset[str], str] = {

@@ -60,7 +60,7 @@ class Form:
     """One functional form of one effect. With its `amplitude` at 0 it changes nothing."""
 
     effect: str
-    """Id of the effect, as in docs/campaigns.md: ``depth-hardening``."""
+    """Id of the effect, as in docs/diagnose.md: ``depth-hardening``."""
     name: str
     """Of the form: ``power``. Unique within the effect."""
     parameters: tuple[Parameter, ...]
@@ -164,7 +164,7 @@ class Problem(Protocol):
         """Take the whitening at these values from now on. Does nothing where it does not depend on them."""
 
     def chi_square(self, values: Values, forms: Sequence[Form], trial: str) -> tuple[float, int]:
-        """Sum of squared residuals with the std that docs/campaigns.md says for `gap`; number of samples."""
+        """Sum of squared residuals with the std that docs/diagnose.md says for `gap`; number of samples."""
 
     def noise(self, random: np.random.Generator, trial: str) -> Array:
         """A draw of the whitened residuals of a right model, shape [sample_count]; mostly standard normal."""

@@ -88,10 +88,8 @@ def find_scatter(found: Fit) -> tuple[tuple[Parameter, ...], dict[str, float]]:
         return active, model_std
     for kind, parameters in offered.items():
         wide = fit(replace(found.model, scatter=(*active, *parameters)), found.values)
-        precision = np.diag(wide.hessian())
-        names = {p.name: k for k, p in enumerate(wide.model.parameters)}
-        value = {p.trial: wide.values[p.name] for p in parameters if p.name in names}
-        error = {p.trial: p.scale / math.sqrt(precision[names[p.name]]) for p in parameters if p.name in names}
+        value = {p.trial: wide.values[p.name] for p in parameters if p.trial in wide.model.trials}
+        error = {p.trial: _error(wide, p) for p in parameters if p.trial in wide.model.trials}
         surprise, count, between, within = 0.0, 0, 0.0, 0.0
         for ids in groups:
             b, s = np.array([value[id] for id in ids]), np.array([error[id] for id in ids])
@@ -101,10 +99,20 @@ def find_scatter(found: Fit) -> tuple[tuple[Parameter, ...], dict[str, float]]:
             between += float(((b - b.mean()) ** 2).sum())
             within += float((s**2).sum() * (len(ids) - 1) / len(ids))
         std = math.sqrt(max(between - within, 0.0) / count)
-        if stats.chi2.sf(surprise, count) < _SURE and std > _LEAST:
+        if stats.chi2.sf(surprise, count) < _SURE and std > getattr(problem, "least_scatter", _LEAST):
             model_std[kind] = std
             active = (*active, *(replace(p, std=std) for p in parameters))
     return active, model_std
+
+
+def _error(found: Fit, parameter: Parameter) -> float:
+    """Standard error of a trial's nuisance, its other nuisances let free, what is shared held."""
+    own = [k for k, p in enumerate(found.model.parameters) if p.trial == parameter.trial]
+    names = [found.model.parameters[k].name for k in own]
+    block = found.hessian()[np.ix_(own, own)]
+    covariance = np.linalg.pinv(block, rcond=1e-12, hermitian=True)
+    here = names.index(parameter.name)
+    return parameter.scale * math.sqrt(max(float(covariance[here, here]), 1e-300))
 
 
 def odd_trials(found: Fit) -> list[Finding]:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .equivalence import Rival, compare
 from .evidence import Hypothesis, best_start, excess, score
 from .fitting import Fit, Model, fit
 from .gate import Verdict, open_gate
+from .pairs import pair_starts
+from .prediction import Predicted, folds_of, predict
 from .problem import Form
 
 __all__ = ["Choice", "Search", "choose"]
@@ -23,10 +25,19 @@ _SHARE = 0.5
 """Of the excess that is left, how much a further name must take away."""
 _SHARE_OF_BASE = 0.04
 """And of what the base model left: a misfit of the first effect's form is often some hundredths of it."""
-_CLOSE = 4.0
-"""Nats within which two names cannot be told apart."""
+_WORTH_BOTH, _SHARE_BOTH = 5.0, 0.75
+"""Nats, and share of what is left, from which a smaller further name counts too, if conditions left out say so."""
+_NEAR = 15.0
+"""Nats behind the best within which a name is asked to predict conditions left out."""
+_LEADS = 2.0
+"""Nats of evidence and prediction together by which another close name takes the lead."""
+_SHOWN = 3
+"""Rivals that are weighed."""
 _MOST = 3
 _BEST = 5
+_PAIRS = 8
+"""Pairs of effects that are looked at where no single name does, and how many of them are fitted in full."""
+_FOLLOWED = 3
 
 Tell = Callable[[str, float], None]
 
@@ -43,6 +54,10 @@ class Choice:
     """Every candidate of the first round and what was tried after it: what was added, and the fit."""
     left: Verdict
     """The gate on the best."""
+    rivals: tuple[Rival, ...] = ()
+    """The nearest other names, the likeliest first, and why they are alternatives or not."""
+    predicted: Predicted | None = None
+    """What the best leaves of conditions left out."""
 
 
 class Search:
@@ -61,11 +76,13 @@ class Search:
         first = [self._enriched(h) for h in first[:3]] + first[3:]
         first.sort(key=lambda h: -h.score)
         best = first[0] if first and first[0].score > self.base.score + _WORTH else self.base
-        if best is not self.base and not self._gate(best).passed:
+        if not self._gate(best).passed:
             best = self._further(best, first)
         best = self._backward(best)
+        best, predicted, rivals = self._settle(best, first)
         left = self._gate(best)
-        return Choice(self.base, best, self._alternatives(best, first), tuple(self.table), left)
+        same = tuple(rival.hypothesis for rival in rivals if rival.same)
+        return Choice(self.base, best, same, tuple(self.table), left, rivals, predicted)
 
     # Steps ------------------------------------------------------------------------------------------------------------
 
@@ -123,40 +140,64 @@ class Search:
     def _further(self, best: Hypothesis, first: Sequence[Hypothesis]) -> Hypothesis:
         """A second and third name, while each takes away enough of what is left."""
         while len(best.effects) < _MOST:
-            self.tell(f"beside {', '.join(best.effects)}: something is left", 0.5)
+            self.tell(f"beside {', '.join(best.effects) or 'the base model'}: something is left", 0.5)
             tried = []
             seen: set[str] = set()
-            for other in first[:_BEST] if len(best.effects) == 1 else first:
+            for other in () if not best.effects else first[:_BEST] if len(best.effects) == 1 else first:
                 name = other.effects[0]
                 if name in best.effects or name in seen:
                     continue
                 seen.add(name)
                 for form in self._best_forms(name)[:2]:
                     tried.append(self._try(f"{_said(best)} + {form.id}", best, [form]))
-            if len(best.effects) == 1:
-                tried += self._pairs(first, best)
+            if len(best.effects) < 2:
+                tried += self._pairs()
             tried.sort(key=lambda h: -h.score)
             if not tried:
                 return best
             new = self._enriched(tried[0])
-            gained = excess(best.fit) - excess(new.fit)
-            least = max(_SHARE * max(excess(best.fit), 0.0), _SHARE_OF_BASE * excess(self.base.fit))
-            if new.score < best.score + _WORTH_MORE or gained < least:
+            if not self._worth(best, new):
                 return best
             best = new
             if self._gate(best).passed:
                 return best
         return best
 
-    def _pairs(self, first: Sequence[Hypothesis], best: Hypothesis) -> list[Hypothesis]:
-        """Pairs of the best five that leave the best one out."""
+    def _worth(self, best: Hypothesis, new: Hypothesis) -> bool:
+        """Whether a further name is more than the misfit of the first one's form."""
+        left = max(excess(best.fit), 0.0)
+        gained, better = excess(best.fit) - excess(new.fit), new.score - best.score
+        if better >= _WORTH_MORE and gained >= max(_SHARE * left, _SHARE_OF_BASE * excess(self.base.fit)):
+            return True
+        if better < _WORTH_BOTH or gained < _SHARE_BOTH * left:
+            return False
+        # Nearly all that was left: a misfit of form does not predict what it has not seen.
+        folds = self._folds(best)
+        before, after = predict(best.fit, folds), predict(new.fit, folds)
+        return before is not None and after is not None and after.score > before.score + _WORTH
+
+    def _folds(self, best: Hypothesis) -> list[tuple[str, ...]]:
+        model = best.fit.model
+        return folds_of([trial for trial in model.problem.trials if trial.id in model.trials])
+
+    def _pairs(self) -> list[Hypothesis]:
+        """Pairs of effects, from where projected changes say that their fits should begin."""
+        base = self.base.fit
+        starts = pair_starts(base.model, base.values, base.model.problem.forms, most=_PAIRS)
+        rough = bool(getattr(base.model.problem, "rough", ()))
+        begun = []
+        for start in starts:
+            self.tell(f"trying {start.forms[0].effect} with {start.forms[1].effect}", 0.5)
+            model, values = base.model.with_forms(start.forms), start.values
+            for share in (0.4, 0.7) if rough else ():
+                values = fit(model.until(share), values, rounds=6).values
+            begun.append(fit(model, values, rounds=5))
+        begun.sort(key=lambda found: found.objective)
         made = []
-        for one, other in itertools.combinations(first[:_BEST], 2):
-            names = {one.effects[0], other.effects[0]}
-            if best.effects[0] in names:
-                continue
-            forms = self._best_forms(other.effects[0])[:1]
-            made.append(self._try(f"{_said(one)} + {forms[0].id}", one, forms))
+        for one in begun[:_FOLLOWED]:
+            found = fit(one.model, one.values)
+            made.append(Hypothesis(found, score(found)))
+            self.table.append((_said(made[-1]), made[-1]))
         return made
 
     def _best_forms(self, effect: str) -> list[Form]:
@@ -179,30 +220,52 @@ class Search:
             best = kept
         return _ordered(best)
 
-    def _alternatives(self, best: Hypothesis, first: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
-        """Other names that explain the campaign about as well in place of the first effect."""
-        if not best.effects:
-            return ()
+    def _rivals(self, best: Hypothesis, first: Sequence[Hypothesis]) -> tuple[Rival, ...]:
+        """The likeliest other names in place of the first effect, weighed against it."""
+        effect = best.effects[0]
+        rest = tuple(f for f in best.forms if f.effect != effect)
         found: dict[str, Hypothesis] = {}
-        if len(best.effects) == 1:
-            for other in first:
-                name = other.effects[0]
-                if name not in best.effects and other.score > best.score - _CLOSE:
-                    found.setdefault(name, other)
-        else:
-            rest = tuple(f for f in best.forms if f.effect != best.effects[0])
-            start = Hypothesis(best.fit, best.score)
-            for other in first[:_BEST]:
-                name = other.effects[0]
-                if name in best.effects:
-                    continue
-                model = start.fit.model.with_forms((*other.forms, *rest))
-                made = fit(model, {**best.fit.values, **other.fit.values})
-                rival = Hypothesis(made, score(made))
-                self.table.append((_said(rival), rival))
-                if rival.score > best.score - _CLOSE:
-                    found.setdefault(name, rival)
-        return tuple(sorted(found.values(), key=lambda h: -h.score))
+        for other in first[:_BEST]:
+            name = other.effects[0]
+            if name in best.effects or name in found:
+                continue
+            if not rest:
+                found[name] = other
+                continue
+            made = fit(best.fit.model.with_forms((*other.forms, *rest)), {**best.fit.values, **other.fit.values})
+            found[name] = Hypothesis(made, score(made))
+            self.table.append((_said(found[name]), found[name]))
+        chosen = sorted(found.items(), key=lambda item: -item[1].score)[:_SHOWN]
+        without = fit(best.fit.model.with_forms(rest), best.fit.values) if rest else self.base.fit
+        return tuple(compare(name, best, hypothesis, without) for name, hypothesis in chosen)
+
+    def _predicted(self, best: Hypothesis, rivals: Sequence[Rival]) -> tuple[Predicted | None, tuple[Rival, ...]]:
+        """With what they say of conditions left out."""
+        folds = self._folds(best)
+        self.tell("predicting conditions left out", 0.5)
+        mine = predict(best.fit, folds)
+        if mine is None:
+            return None, tuple(rivals)
+        told = []
+        for rival in rivals:
+            theirs = predict(rival.hypothesis.fit, folds) if rival.behind < _NEAR else None
+            behind = None if theirs is None else mine.score - theirs.score
+            told.append(replace(rival, predicted=theirs, behind_left_out=behind))
+        return mine, tuple(told)
+
+    def _settle(
+        self, best: Hypothesis, first: Sequence[Hypothesis]
+    ) -> tuple[Hypothesis, Predicted | None, tuple[Rival, ...]]:
+        """The best and its rivals; where the evidence does not decide, what predicts conditions left out best leads."""
+        if not best.effects:
+            return best, None, ()
+        mine, rivals = self._predicted(best, self._rivals(best, first))
+        close = [rival for rival in rivals if rival.close and rival.total < -_LEADS]
+        if close and len(best.effects) == 1:
+            winner = min(close, key=lambda rival: rival.total).hypothesis
+            best = winner
+            mine, rivals = self._predicted(best, self._rivals(best, first))
+        return best, mine, rivals
 
 
 def choose(base: Fit, *, tell: Tell, seed: int = 0) -> Choice:

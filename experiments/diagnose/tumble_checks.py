@@ -22,6 +22,10 @@ _FAR = 12.0  # stds of the sensor: white noise does not get there
 _SHARE = 0.5  # of a channel's rows; more of them are not set aside
 _NEAR = 8  # rows on either side that tell how much a row usually changes
 _STEEP = 6.0  # times the usual change
+_AROUND = 8  # rows on either side of a gap from which a slope is taken
+_SURE = 100.0  # squared standard deviations by which a clock that is right must be off
+_SENSORS = {"the camera": ("theta", "x", "y"), "the IMU": ("gyro",), "the wheel": ("wheel",)}  # what is smooth
+_ALL = {"the camera": ("theta", "x", "y"), "the IMU": ("gyro", "ax", "ay"), "the wheel": ("wheel",)}
 _LONG = 40  # rows that a marker may be lost for before it counts as gone for good
 
 
@@ -31,8 +35,9 @@ def checked(data: TumbleData) -> tuple[TumbleData, list[Finding]]:
     trials = []
     for trial in data.trials:
         keep = np.ones(len(trial.time), dtype=bool)
+        _clocks(trial, keep, findings)
         for number, name in enumerate(CHANNELS):
-            mine = np.flatnonzero(trial.channel == number)
+            mine = np.flatnonzero((trial.channel == number) & keep)
             if len(mine) < 8:
                 continue
             _gaps(trial, name, mine, findings)
@@ -95,6 +100,60 @@ def _jumps(
             f"marker): set aside",
         )
     )
+
+
+def _clocks(trial: TrialData, keep: NDArray[np.bool_], findings: list[Finding]) -> None:
+    """All rows of a sensor from the moment on at which its clock jumps forward while the motion does not.
+
+    On either side of a gap a straight line is fitted to each of the sensor's channels that are smooth. A clock that is
+    right takes the value on by slope x gap; one that jumped, by slope x the usual step.
+    """
+    for sensor, names in _SENSORS.items():
+        told = [np.flatnonzero(trial.of(name)) for name in names if trial.of(name).sum() > 2 * _AROUND]
+        if not told:
+            continue
+        clock = np.unique(trial.time[told[0]])
+        steps = np.diff(clock)
+        usual = float(np.median(steps))
+        for k in np.flatnonzero(steps > max(4 * usual, 2e-3)):
+            surprise = np.array([_surprise(trial, mine, clock[k], clock[k + 1], usual) for mine in told])
+            good = np.isfinite(surprise).all(axis=1)
+            right, jumped = surprise[good].sum(axis=0) if good.any() else (0.0, 0.0)
+            if right < _SURE or jumped > 0.05 * right or jumped > 16.0 * good.sum():
+                continue
+            whole = np.isin(trial.channel, [CHANNELS.index(name) for name in _ALL[sensor]])
+            keep &= ~(whole & (trial.time > clock[k]))
+            findings.append(Finding(
+                trial=trial.id, channel=names[0], from_s=float(clock[k + 1]), to_s=float(clock[-1]), set_aside=True,
+                what=f"the clock of {sensor} jumps forward by {steps[k] - usual:.3g} s while the motion goes on as if "
+                f"it had not: all that follows is set aside",
+            ))  # fmt: skip
+            break
+
+
+def _surprise(
+    trial: TrialData, mine: NDArray[np.intp], before: float, after: float, usual: float
+) -> tuple[float, float]:
+    """Squared standard deviations by which the value after a gap is off, for a clock that is right and one that jumped.
+
+    NaN where the slopes on either side differ: then the gap tells nothing.
+    """
+    time, value, std = trial.time[mine], trial.value[mine], float(trial.std[mine[0]])
+    left, right = np.flatnonzero(time <= before)[-_AROUND:], np.flatnonzero(time >= after)[:_AROUND]
+    if min(len(left), len(right)) < _AROUND:
+        return np.nan, np.nan
+    one, two = np.polyfit(time[left] - before, value[left], 1), np.polyfit(time[right] - after, value[right], 1)
+    doubt = std * np.sqrt(12 / _AROUND) / (_AROUND * usual)  # of a slope
+    if abs(one[0] - two[0]) > 0.3 * max(abs(one[0]), abs(two[0])) + 4 * doubt:
+        return np.nan, np.nan
+    slope, moved = 0.5 * (one[0] + two[0]), two[1] - one[1]
+    place = 2 * std * np.sqrt(2 / _AROUND)  # of a line's end
+
+    def off(gap: float) -> float:
+        bend = 0.5 * abs(one[0] - two[0]) * gap
+        return float((moved - slope * gap) ** 2 / (place**2 + (doubt * gap) ** 2 + bend**2))
+
+    return off(after - before), off(usual)
 
 
 def _gaps(trial: TrialData, name: str, mine: NDArray[np.intp], findings: list[Finding]) -> None:

@@ -8,13 +8,14 @@ typical value, with a prior of one factor of e: without one it would run away wh
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .own import OwnEffect, own_parameters, own_starts
 from .problem import Form, Parameter
 
 __all__ = ["TumbleForm", "tumble_forms"]
@@ -77,8 +78,9 @@ def _own(amplitude: str, shift: float) -> str:
 
 
 def tumble_forms(
-    *, rig: bool, sinkage: float, weight: float, friction_speed: float = 0.05, wheel_speed: float = 100.0
-) -> tuple[TumbleForm, ...]:
+    *, rig: bool, sinkage: float, weight: float, friction_speed: float = 0.05, wheel_speed: float = 100.0,
+    own: Sequence[OwnEffect] = (),
+) -> tuple[TumbleForm, ...]:  # fmt: skip
     """The library for one campaign.
 
     Args:
@@ -87,6 +89,7 @@ def tumble_forms(
         weight: on the surface [N]: amplitudes of forces are about a hundredth of it.
         friction_speed: typical sliding speed [m/s].
         wheel_speed: typical speed of the wheel [rad/s].
+        own: effects from files.
     """
     force, moment = 0.02 * weight, 0.005 * weight
     forms = [
@@ -304,4 +307,19 @@ def tumble_forms(
                 starts=({"pulley-inertia.mass": 0.1}, {"pulley-inertia.mass": 1.0}),
             ),
         ]
-    return tuple(forms)
+    return (*forms, *(_own_form(effect) for effect in own))
+
+
+def _own_form(own: OwnEffect) -> TumbleForm:
+    parameters = own_parameters(own)
+
+    def physical(values: Mapping[str, Array]) -> Columns:
+        return {
+            name: np.asarray(values[name], dtype=float) + (own.off if name == parameters[0].name else 0.0)
+            for name in (p.name for p in parameters)
+        }
+
+    return TumbleForm(
+        effect=own.id, name="own", parameters=parameters, amplitude=parameters[0].name, physical=physical,
+        starts=own_starts(own, parameters),
+    )  # fmt: skip

@@ -19,14 +19,17 @@ from numpy.typing import NDArray
 from rigid.model import parameter_names
 from rigid.terms import EFFECTS, Term
 
+from .own import OwnEffect
 from .tumble_data import CHANNELS, TrialData, TumbleData
 
-__all__ = ["Forward", "Prediction", "SHARED", "neutral"]
+__all__ = ["Forward", "OWN_TO_A_TRIAL", "Prediction", "SHARED", "neutral"]
 
 Array = NDArray[np.float64]
 
 SHARED = ("mass", "inertia", "stiffness", "damping", "mu_s", "mu_d")
 """Numbers that all trials share and that may be uncertain."""
+OWN_TO_A_TRIAL = ("gravity", "bed", "friction")
+"""Factors that every trial has of its own."""
 _SPIKES = 8
 _MOST_BYTES = 1.5e8
 """Of the sampled motion held at a time."""
@@ -46,7 +49,9 @@ class Prediction:
 
 @lru_cache(maxsize=8)
 def _moving_terms(rig: bool) -> tuple[Term, ...]:
-    return tuple(term for term in EFFECTS.values() if not term.sensor and (rig or not term.needs_rig))
+    """Effects on the motion; those with a coordinate of their own are no candidates, and would cost every lane."""
+    found = [term for term in EFFECTS.values() if not term.sensor and (rig or not term.needs_rig)]
+    return tuple(term for term in found if not any(hook.startswith("inner_") for hook in term.hooks))
 
 
 def neutral(name: str) -> float:
@@ -58,13 +63,16 @@ def neutral(name: str) -> float:
 class Forward:
     """The forward model of one campaign.
 
-    `predict` takes arrays by name: the shared numbers ("mass" ...), "gravity" (relative to each trial's stated one) and
-    effects' parameters ("pendulum.length", "clock-offset.offset"), each of shape [set_count] or, for "gravity",
-    [set_count, trial_count].
+    `predict` takes arrays by name: the shared numbers ("mass" ...), effects' parameters ("pendulum.length",
+    "clock-offset.offset"), each of shape [set_count]; and each trial's own, `OWN_TO_A_TRIAL`, of shape [set_count,
+    trial_count]: "gravity" (over its stated one), "bed" (a factor on K and C), "friction" (on mu_s and mu_d).
     """
 
-    def __init__(self, data: TumbleData, *, time_step: float = 5e-4, threads: int | None = None) -> None:
+    def __init__(
+        self, data: TumbleData, *, time_step: float = 5e-4, threads: int | None = None, own: Sequence[OwnEffect] = ()
+    ) -> None:
         self.data, self.time_step, self.threads = data, time_step, threads
+        self.own = tuple(own)
         tables = data.tables
         self.rig = tables.rig is not None
         self.nominal = {
@@ -76,9 +84,12 @@ class Forward:
         self.simulated = 0
         """How many trials have been simulated so far."""
 
-    @staticmethod
-    def neutral(name: str) -> float:
+    def neutral(self, name: str) -> float:
         """The value of "<effect>.<parameter>" that changes nothing."""
+        effect, _, parameter = name.partition(".")
+        for own in self.own:
+            if own.id == effect:
+                return own.off if parameter == own.amplitude else own.typical[parameter]
         return neutral(name)
 
     def predict(
@@ -88,7 +99,6 @@ class Forward:
         trials: Sequence[int] | None = None,
         motion: bool = False,
         horizon: float = 1.0,
-        extra: Sequence[Term] = (),
     ) -> list[Prediction]:
         """Predictions, one a trial (of `trials`, all by default), for all sets at once.
 
@@ -99,8 +109,8 @@ class Forward:
         chosen = range(len(self.data.trials)) if trials is None else trials
         count = max((np.shape(value)[0] for value in sets.values()), default=1)
         on = {name.partition(".")[0] for name in sets if "." in name}
-        moving = any(id in EFFECTS and not EFFECTS[id].sensor for id in on)
-        terms = (*(_moving_terms(self.rig) if moving else ()), *extra)
+        moving = any(id not in EFFECTS or not EFFECTS[id].sensor for id in on)
+        terms = (*_moving_terms(self.rig), *(own.term for own in self.own)) if moving else ()
         columns = self._columns(sets, count, terms)
         offset = np.asarray(sets.get("clock-offset.offset", np.zeros(count)), dtype=float)
         scale = np.asarray(sets.get("camera-scale.scale", np.ones(count)), dtype=float)
@@ -111,22 +121,23 @@ class Forward:
         return _joined(found, chosen, count)
 
     def _columns(self, sets: Mapping[str, Array], count: int, terms: tuple[Term, ...]) -> dict[str, Array]:
-        known = {f"{term.id}.{p.name}" for term in (*terms, *EFFECTS.values()) for p in term.parameters}
+        every = (*EFFECTS.values(), *(own.term for own in self.own))
+        known = {f"{term.id}.{p.name}" for term in every for p in term.parameters}
         for name in sets:
-            if name not in self.nominal and name != "gravity" and name not in known:
+            if name not in self.nominal and name not in OWN_TO_A_TRIAL and name not in known:
                 raise ValueError(f"{name!r} is no number of a tumble; there is {', '.join((*SHARED, *sorted(known)))}")
         columns = {
             name: np.broadcast_to(np.asarray(sets.get(name, value), dtype=float), (count,))
             for name, value in self.nominal.items()
         }
-        columns["gravity"] = np.broadcast_to(
-            np.asarray(sets.get("gravity", np.ones((1, len(self.data.trials)))), dtype=float),
-            (count, len(self.data.trials)),
-        )
+        each = np.ones((1, len(self.data.trials)))
+        for name in OWN_TO_A_TRIAL:
+            columns[name] = np.broadcast_to(np.asarray(sets.get(name, each), dtype=float), (count, each.size))
         for term in terms:
             for p in term.parameters:
                 name = f"{term.id}.{p.name}"
-                columns[name] = np.broadcast_to(np.asarray(sets.get(name, p.default), dtype=float), (count,))
+                off = self.neutral(name)
+                columns[name] = np.broadcast_to(np.asarray(sets.get(name, off), dtype=float), (count,))
         return columns
 
     def _chunks(self, chosen: Sequence[int], count: int) -> list[list[tuple[int, int, int]]]:
@@ -202,13 +213,14 @@ class Forward:
         length = self.data.tables.platform.spike_length
         gravity = columns["gravity"][sets, index] * trial.gravity_sim
         mass = columns["mass"][sets]
+        bed, rubs = columns["bed"][sets, index], columns["friction"][sets, index]
         fixed = (
             mass, columns["inertia"][sets], length, length * math.cos(math.pi / _SPIKES), trial.counterweight,
             gravity if trial.local_gravity is None else trial.local_gravity, (mass + trial.counterweight) * gravity,
             trial.torque, trial.torque_until, self.data.tables.wheel.inertia,
-            1.0 if trial.actuator == "motor" else -1.0, trial.wheel_speed_0, columns["mu_s"][sets],
-            np.minimum(columns["mu_d"][sets], columns["mu_s"][sets]),
-            columns["stiffness"][sets], columns["damping"][sets],
+            1.0 if trial.actuator == "motor" else -1.0, trial.wheel_speed_0,
+            rubs * columns["mu_s"][sets], rubs * np.minimum(columns["mu_d"][sets], columns["mu_s"][sets]),
+            bed * columns["stiffness"][sets], bed * columns["damping"][sets],
         )  # fmt: skip
         for k, value in enumerate(fixed):
             numbers[:, k] = value

@@ -49,7 +49,7 @@ class Guesser:
     """Guesses for one campaign. They are kept: the same question is answered once."""
 
     def __init__(self, forward: Forward, forms: Sequence[TumbleForm]) -> None:
-        self.forward = Forward(_thinned(forward.data), time_step=_STEP, threads=forward.threads)
+        self.forward = Forward(_thinned(forward.data), time_step=_STEP, threads=forward.threads, own=forward.own)
         self.forms = tuple(forms)
         self._ids = [trial.id for trial in forward.data.trials]
         self._stated = [trial.gravity_sim for trial in forward.data.trials]

@@ -16,8 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.campaign import Campaign, EffectTable, TumbleModel, write_model
+from rigid.terms import EFFECTS
 from rigid.trajectory import STATES
 
+from .own import OwnEffect
 from .problem import Finding, Form, Parameter, Samples, TrialInfo, Values
 from .tumble_data import CHANNELS, TumbleData, tumble_data
 from .tumble_forms import TumbleForm, tumble_forms
@@ -32,16 +34,28 @@ Array = NDArray[np.float64]
 
 _UNITS = {"mass": "kg", "inertia": "kg m2", "stiffness": "N/m", "damping": "N s/m", "mu_s": "1", "mu_d": "1"}
 _STEP = 0.02  # of finite differences, in sigmas: contacts make smaller ones rough
+_SCATTER_STD = 0.1
+"""How far friction and bed may differ between replicates while they are asked whether they do [1]."""
 
 
 class TumbleProblem:
     """One campaign of tumbles: a `Problem`."""
 
     kind = "tumble"
+    least_scatter = 0.01
+    """Contact makes each trial's friction and bed uncertain by some tenths of a percent; less is not asked for."""
 
-    def __init__(self, data: TumbleData, *, findings: Sequence[Finding] = (), threads: int | None = None) -> None:
+    def __init__(
+        self, data: TumbleData, *, findings: Sequence[Finding] = (), threads: int | None = None,
+        own: Sequence[OwnEffect] = (),
+    ) -> None:  # fmt: skip
+        for effect in own:
+            inner = [hook for hook in effect.term.hooks if hook.startswith("inner_")]
+            if inner:
+                raise ValueError(f"effect_file = {str(effect.file)!r}: the hook {inner[0]!r} cannot be fitted yet")
         self.data = data
-        self.forward = Forward(data, threads=threads)
+        self.own = {effect.id: effect for effect in own}
+        self.forward = Forward(data, threads=threads, own=own)
         self.findings = tuple(findings)
         self._index = {trial.id: k for k, trial in enumerate(data.trials)}
 
@@ -99,6 +113,18 @@ class TumbleProblem:
         return tuple(found)
 
     @cached_property
+    def scatter(self) -> dict[str, tuple[Parameter, ...]]:
+        """What may differ between replicates beyond the sensors: kind -> one nuisance a trial, mostly not fitted."""
+        return {
+            kind: tuple(
+                Parameter(name=f"{kind}[{trial.id}]", unit="1", value=0.0, std=_SCATTER_STD, scale=0.02, lowest=-0.5,
+                          highest=1.0, trial=trial.id, kind=kind, step=1e-3)
+                for trial in self.data.trials
+            )
+            for kind in ("friction", "bed")
+        }  # fmt: skip
+
+    @cached_property
     def forms(self) -> tuple[TumbleForm, ...]:
         """The library, scaled to this campaign."""
         weights = [
@@ -117,6 +143,7 @@ class TumbleProblem:
             sinkage=0.5 * weight / self.forward.nominal["stiffness"],
             weight=weight,
             wheel_speed=max(10.0, 0.5 * float(np.mean(wheel))),
+            own=tuple(self.own.values()),
         )
 
     @cached_property
@@ -167,10 +194,9 @@ class TumbleProblem:
         return np.array(STATES)[self._predict([values], forms, [trial])[0].state[0]]
 
     def reported(self, values: Values, form: Form) -> dict[str, tuple[float, str]]:
-        """The term's parameters under the fixed names of docs/campaigns.md."""
-        from rigid.terms import EFFECTS
-
-        units = {f"{form.effect}.{p.name}": p.unit for p in EFFECTS[form.effect].parameters}
+        """The term's parameters under the fixed names of docs/diagnose.md."""
+        term = self.own[form.effect].term if form.effect in self.own else EFFECTS[form.effect]
+        units = {f"{form.effect}.{p.name}": p.unit for p in term.parameters}
         physical = self._physical(values, form)
         return {name.partition(".")[2]: (value, units[name]) for name, value in physical.items()}
 
@@ -220,6 +246,7 @@ class TumbleProblem:
             effect=tuple(
                 EffectTable(
                     id=form.effect,
+                    file=self.own[form.effect].file.name if form.effect in self.own else None,
                     parameters={
                         name.partition(".")[2]: value
                         for name, value in self._physical(values, form).items()
@@ -266,6 +293,10 @@ class TumbleProblem:
             for name, value in self.forward.nominal.items()
         }
         columns["gravity"] = self.gravity(points)
+        for kind in ("friction", "bed"):
+            columns[kind] = np.array(
+                [[1 + values.get(f"{kind}[{t.id}]", 0.0) for t in self.data.trials] for values in points]
+            )
         for form in forms:
             assert isinstance(form, TumbleForm)
             own = {p.name: np.array([values.get(p.name, p.value) for values in points]) for p in form.parameters}
@@ -299,9 +330,9 @@ def _ours(forms: Sequence[Form]) -> list[TumbleForm]:
     return [form for form in forms if isinstance(form, TumbleForm)]
 
 
-def make_problem(campaign: Campaign) -> TumbleProblem:
-    """The problem of one campaign. Raises ValueError as `tumble_data` does."""
+def make_problem(campaign: Campaign, *, own: Sequence[OwnEffect] = ()) -> TumbleProblem:
+    """The problem of one campaign, `own` among its candidates. Raises ValueError as `tumble_data` does."""
     from .tumble_checks import checked
 
     data, findings = checked(tumble_data(campaign))
-    return TumbleProblem(data, findings=findings)
+    return TumbleProblem(data, findings=findings, own=own)

@@ -29,7 +29,7 @@ __all__ = [
 Array = NDArray[np.float64]
 
 ZERO_STD = 3.0 / np.sqrt(3.0)
-"""Std of the camera's zero over the sensor's: it may be off by up to 3 of them, evenly (docs/campaigns.md)."""
+"""Std of the camera's zero over the sensor's: it may be off by up to 3 of them, evenly (docs/diagnose.md)."""
 LOST = 1e3
 """Residual where the model cannot stand or run [1]."""
 TRIES = ((0.0, 1.0), (0.0, 0.4), (1e-2, 1.0), (1.0, 1.0), (30.0, 1.0))

@@ -25,3 +25,5 @@ TERM = Term(
         Parameter(name="rise", unit="s", default=0.1, lowest=0.0, above_lowest=True, summary="its time constant"),
     ),
 )
+FIT = {"rise": {"typical": 0.05, "off": 1e-4}}
+"""How `hedgebed diagnose --effect-file` fits it: a size that can be seen, and one that changes nothing."""

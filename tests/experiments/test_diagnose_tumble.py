@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tumble_campaigns import CONDITIONS, campaign
 
-from experiments.campaign import Campaign, Recording, TumbleCampaign, read_model
+from experiments.campaign import Campaign, Recording, read_model
 from experiments.diagnose.tumble_checks import checked
 from experiments.diagnose.tumble_data import CHANNELS, tumble_data
 from experiments.diagnose.tumble_fit import Fitter
@@ -14,46 +15,7 @@ from experiments.diagnose.tumble_forms import tumble_forms
 from experiments.diagnose.tumble_forward import Forward
 from experiments.diagnose.tumble_problem import TumbleProblem, make_problem
 from experiments.diagnose.tumble_steps import ZERO_STD, Start, whiten
-from experiments.synthesis import record
-from rigid import STATES, Effect, Trial
-from rigid.sensors import SensorSet
-
-NOMINAL = {"mass": 5.3, "inertia": 0.06, "stiffness": 1.5e4, "damping": 60.0, "mu_s": 0.5, "mu_d": 0.25}
-SIGMA = {"mass": 0.002, "inertia": 0.03, "stiffness": 0.1, "damping": 0.2, "mu_s": 0.05, "mu_d": 0.05}
-CONDITIONS = (
-    {"torque": 0.22, "gravity_sim": 0.0834},
-    {"torque": 0.22, "gravity_sim": 0.147},
-    {"torque": 6.0, "gravity_sim": 0.0834, "actuator": "brake", "wheel_speed_0": 300.0},
-    {"torque": 0.125, "gravity_sim": 0.0834},
-)
-
-
-def campaign(*, effects=(), seed=None, off=0.0, conditions=CONDITIONS, duration=1.2, window=0.004) -> Campaign:
-    """Trials of the accurate integrator through the rig's sensors, true numbers `off` sigmas away from those stated."""
-    true = {name: value * (1 + off * SIGMA[name]) for name, value in NOMINAL.items()}
-    sensors = SensorSet(imu_window=window)
-    recordings, trials = {}, []
-    for number, condition in enumerate(conditions, 1):
-        gravity = condition["gravity_sim"] * (1 + 0.02 * off * (-1) ** number)
-        trial = Trial(**(condition | true | {"gravity_sim": gravity}), counterweight=5.2, effects=effects)
-        own = None if seed is None else (seed, number)
-        measured, _ = record(trial, duration=duration, sensors=sensors, seed=own)
-        id = f"{number:03d}"
-        for sensor in ("pose", "imu", "wheel"):
-            recordings[id, sensor] = Recording(getattr(measured, sensor))
-        files = {sensor: f"{id}-{sensor}.csv" for sensor in ("pose", "imu", "wheel")}
-        trials.append({"id": id, "actuator": "motor", **condition, "counterweight": 5.2, **files})
-    tables = {
-        "format": "hedgehog-campaign/1", "kind": "tumble", "name": "test",
-        "platform": {"mass": 5.3, "inertia": 0.06, "spike_length": 0.2}, "wheel": {"inertia": 1.2e-3},
-        "rig": {"counterweight": 5.2},
-        "surface": {"kind": "brick", **{key: NOMINAL[key] for key in ("stiffness", "damping", "mu_s", "mu_d")}},
-        "uncertainty": SIGMA | {"gravity_sim": 0.02},
-        "sensors": {"pose": {"std": (5e-4, 5e-4, 3e-3)}, "imu": {"std": (0.01, 0.02, 0.02), "window": window},
-                    "wheel": {"std": (0.5,)}},
-        "trial": tuple(trials),
-    }  # fmt: skip
-    return Campaign(TumbleCampaign(**tables), recordings)
+from rigid import STATES, Effect
 
 
 @pytest.mark.parametrize(
