@@ -13,11 +13,13 @@ from typing import Any
 import numpy as np
 
 from hedgebed import __version__
-from rigid.planar import Trajectory, simulate
+from rigid.planar import PAPER_STEP, longest_step, simulate
+from rigid.trajectory import Trajectory
 
 from .campaign import read_model
 from .progress import Progress
 from .runfolder import RunFolder, write_series
+from .synthesis import check_tumble_campaign, write_tumble_campaign
 from .tumble_platform import torque_within_limit
 from .tumble_settings import TumbleSettings
 from .tumble_trial import TumblePlan, plan_tumble
@@ -32,7 +34,21 @@ MODEL_COPY = "model.toml"
 def check(settings: TumbleSettings) -> None:
     """Raise ValueError, naming key, value and what would do, for what the settings class cannot see."""
     plan = plan_tumble(settings)
+    check_tumble_campaign(settings)
+    if settings.method == "paper":
+        _check_paper_step(plan)
     _integrate(settings, plan, duration=1e-3)
+
+
+def _check_paper_step(plan: TumblePlan) -> None:
+    trial, longest = plan.trial, longest_step(plan.trial)
+    if longest < PAPER_STEP:
+        own = f"stiffness = {trial.stiffness:g} N/m and damping = {trial.damping:g} N s/m"
+        ground = own if trial.ground is None else f"ground = {trial.ground.name!r}"
+        raise ValueError(
+            f"method = 'paper' has a time_step = {PAPER_STEP:g} s, too long for {ground}: at most {longest:.3g} s "
+            f"would follow it; method = 'located' would do"
+        )
 
 
 def quantities_of(trajectory: Trajectory) -> dict[str, dict[str, Any]]:
@@ -102,6 +118,8 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
         write_series(folder.path / "trajectory.csv", trajectory_columns(trajectory))
         folder.write_series("motion", _motion_columns(trajectory))
         result = _result(settings, plan, trajectory, full)
+        made = write_tumble_campaign(settings, plan, folder.path, progress)
+        result |= {"campaign": made} if made is not None else {}
         folder.write_result(result)
         progress.stage("report", total=1.0)
         write_report(folder.path, progress)

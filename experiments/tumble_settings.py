@@ -138,6 +138,17 @@ class TumbleSettings(TrialSettings):
     )
     sample_interval: float = Field(1e-3, gt=0, le=1e-3, description="Time between rows of trajectory.csv [s].")
 
+    # Trials made up from it
+    campaign: str | None = Field(
+        None,
+        min_length=1,
+        description="Folder for made-up trials of this tumble, seen through noisy sensors, as a campaign; what is true "
+        "of them, effects and all, stays in the run's folder (truth.toml).",
+    )
+    campaign_trials: int = Field(8, ge=1, le=999, description="Trials of the campaign [1].")
+    campaign_seed: int = Field(1, ge=0, lt=2**31, description="Seed of what is true and of the noise.")
+    campaign_noise: Positive = Field(1.0, description="Noise of the sensors over that of `hedgebed campaign` [1].")
+
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
         for finding in (self._gravity(), self._actuation()):
@@ -162,8 +173,9 @@ class TumbleSettings(TrialSettings):
 
     def _actuation(self) -> str | None:
         if self.actuator == "brake" and not (self.wheel_speed_0 or 0.0) > 0:
+            found = "is not given" if self.wheel_speed_0 is None else f"= {self.wheel_speed_0:g} rad/s"
             return (
-                f"wheel_speed_0 = {self.wheel_speed_0} leaves a brake nothing to slow down: the wheel's speed at the "
-                f"start in rad/s must be given, such as 300"
+                f"wheel_speed_0 {found}: a brake slows a wheel that turns, so the wheel's speed at the start must be "
+                f"given in rad/s, such as 300"
             )
         return None
