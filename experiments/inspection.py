@@ -25,6 +25,7 @@ from .diagnose.problem import Finding
 from .progress import Progress
 from .replicas import Condition, condition_of, condition_words, odd_replicates
 from .runfolder import RunFolder
+from .whole_runs import whole_run
 
 __all__ = ["check", "clock_jump", "find_faults", "resume", "run"]
 
@@ -39,18 +40,6 @@ _AROUND = 8
 def check(settings: CheckSettings) -> None:
     """Raise ValueError, one sentence a line, for all that is wrong with the campaign."""
     read_campaign(settings.campaign)
-
-
-def run(settings: CheckSettings, folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
-    """Look at the campaign, write what is in it into `folder` and return the result. Raises ValueError as `check`."""
-    kept = RunFolder.ensure(Path(folder), "campaign check", settings)
-    return _carry_out(settings, kept, progress or Progress())
-
-
-def resume(folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
-    """Look again from the start."""
-    kept = RunFolder.open(Path(folder))
-    return _carry_out(CheckSettings(**kept.settings), kept, progress or Progress())
 
 
 def find_faults(campaign: Campaign) -> list[Finding]:
@@ -289,3 +278,6 @@ def _seen_as(tables: TumbleCampaign | PenetrationCampaign, entry: dict[str, Any]
     if isinstance(tables, TumbleCampaign):
         return str(entry["sensor"])
     return ", ".join(trial.needed)
+
+
+run, resume = whole_run("campaign check", CheckSettings, _carry_out, check=check)

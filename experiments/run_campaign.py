@@ -22,7 +22,7 @@ from pydantic import Field
 
 from hedgebed import __version__
 
-from .campaign import Campaign, PenetrationCampaign, Recording, write_campaign
+from .campaign import Campaign, PenetrationCampaign, Recording, read_campaign, write_campaign
 from .campaign.tables import (
     DepthSensor,
     PenetrationSensors,
@@ -35,7 +35,7 @@ from .runfolder import RunFolder, read_series
 from .settings import PenetrateSettings
 from .strict import StrictSettings
 
-__all__ = ["SpikeSensors", "campaign_of_run", "check_target", "write_run_campaign"]
+__all__ = ["SpikeSensors", "campaign_of_run", "check_target", "place_campaign", "write_run_campaign"]
 
 Array = NDArray[np.float64]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -67,6 +67,30 @@ def check_target(target: str | Path, *, keep_out: Path | None = None) -> Path:
             f"folder would do"
         )
     return path
+
+
+def place_campaign(target: str | Path, campaign: Campaign, *, keep_out: Path | None = None) -> Path:
+    """Write `campaign` to `target`, unless just that is there already (of a run that is resumed); return the folder.
+
+    Raises ValueError as `check_target` does, where something else is there.
+    """
+    path = Path(target)
+    try:
+        there: Campaign | None = read_campaign(path)
+    except ValueError:
+        there = None
+    if there is None or not _same(there, campaign):
+        write_campaign(check_target(path, keep_out=keep_out), campaign)
+    return path
+
+
+def _same(one: Campaign, other: Campaign) -> bool:
+    alike = one.tables == other.tables and one.recordings.keys() == other.recordings.keys()
+    return alike and all(
+        np.array_equal(one.recordings[key][name], recording[name], equal_nan=True)
+        for key, recording in other.recordings.items()
+        for name in recording.columns
+    )
 
 
 def write_run_campaign(run: str | Path, target: str | Path, *, sensors: SpikeSensors | None = None) -> Campaign:

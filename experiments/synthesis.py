@@ -1,7 +1,9 @@
-"""`hedgebed campaign`: trials that never were, with what is true of them beside what is said of them.
+"""`hedgebed campaign` and `hedgebed tumble --campaign`: trials that never were, with what is true of them beside what
+is said of them.
 
 DIR/campaign is a campaign as a laboratory would hand it over: stated numbers, uncertainties, noisy recordings.
 DIR/truth.toml is the model that made it: the true numbers, the terms beyond the base model, each trial's true gravity.
+A tumble's campaign goes where it is asked for, and the truth into the tumble's run folder.
 """
 
 from __future__ import annotations
@@ -36,6 +38,7 @@ from .campaign.tables import (
 )
 from .campaign_settings import CampaignSettings
 from .progress import Progress
+from .run_campaign import check_target, place_campaign
 from .runfolder import RunFolder
 from .surfaces import find_surface
 from .tumble_platform import torque_within_limit
@@ -43,7 +46,10 @@ from .tumble_settings import TrialSettings, TumbleSettings
 from .tumble_trial import TumblePlan, plan_tumble
 from .whole_runs import whole_run
 
-__all__ = ["check", "record", "resume", "run"]
+__all__ = ["TRUTH", "check", "check_tumble_campaign", "record", "resume", "run", "write_tumble_campaign"]
+
+TRUTH = "truth.toml"
+"""What is true, in a run folder; never in the campaign's."""
 
 _DRAWN = ("mass", "inertia", "stiffness", "damping", "mu_s", "mu_d")
 
@@ -156,36 +162,97 @@ def _true_gravity(settings: CampaignSettings, stated: float, number: int) -> flo
 def _carry_out(settings: CampaignSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
     conditions = _conditions(settings)
     first = conditions[0].plan
-    truth = _truth(settings, first.trial)
-    sensors = _sensors(settings)
-    recordings: dict[tuple[str, str], Recording] = {}
-    true_trials, rows = [], []
     with folder.lock():
         for sentence in first.sentences():
             progress.message(sentence)
-        progress.stage("trials", total=float(len(conditions)))
-        for number, condition in enumerate(conditions, 1):
-            gravity = _true_gravity(settings, condition.plan.trial.gravity_sim, number)
-            trial = replace(condition.plan.trial, gravity_sim=gravity, **truth)
-            measured, trajectory = record(
-                trial, duration=settings.duration, sensors=sensors, seed=(settings.seed, 2, number)
-            )
-            for sensor in ("pose", "imu", "wheel"):
-                recordings[condition.id, sensor] = Recording(getattr(measured, sensor))
-            true_trials.append(_trial_table(condition.id, trial))
-            rows.append(_row(condition, trial, measured, trajectory))
-            progress.update(number)
-        campaign = Campaign(_stated(settings, conditions), recordings)
+        made = _make(settings, conditions, progress)
         target = folder.path / "campaign"
         if target.exists():  # of a run that was stopped
             shutil.rmtree(target)
-        write_campaign(target, campaign)
-        write_model(folder.path / "truth.toml", _true_model(settings, first, truth, true_trials))
-        result = _result(settings, first, rows, recordings)
+        write_campaign(target, made.campaign)
+        write_model(folder.path / TRUTH, made.truth)
+        result = _result(settings, first, made)
         folder.write_result(result)
         progress.stage("report", total=1.0)
         write_report(folder.path, progress)
     return result
+
+
+@dataclass(frozen=True)
+class _Made:
+    """A campaign, what is true of it, and a row of result.json for each trial."""
+
+    campaign: Campaign
+    truth: TumbleModel
+    rows: list[dict[str, Any]]
+
+
+def _make(settings: CampaignSettings, conditions: Sequence[_Condition], progress: Progress) -> _Made:
+    """Draw what is true, and record every trial."""
+    first = conditions[0].plan
+    truth = _truth(settings, first.trial)
+    sensors = _sensors(settings)
+    recordings: dict[tuple[str, str], Recording] = {}
+    true_trials, rows = [], []
+    progress.stage("trials", total=float(len(conditions)))
+    for number, condition in enumerate(conditions, 1):
+        gravity = _true_gravity(settings, condition.plan.trial.gravity_sim, number)
+        trial = replace(condition.plan.trial, gravity_sim=gravity, **truth)
+        measured, trajectory = record(
+            trial, duration=settings.duration, sensors=sensors, seed=(settings.seed, 2, number)
+        )
+        for sensor in ("pose", "imu", "wheel"):
+            recordings[condition.id, sensor] = Recording(getattr(measured, sensor))
+        true_trials.append(_trial_table(condition.id, trial))
+        rows.append(_row(condition, trial, measured, trajectory))
+        progress.update(number)
+    campaign = Campaign(_stated(settings, conditions), recordings)
+    return _Made(campaign, _true_model(settings, first, truth, true_trials), rows)
+
+
+# A tumble's own campaign ----------------------------------------------------------------------------------------------
+
+
+def check_tumble_campaign(settings: TumbleSettings) -> None:
+    """Raise ValueError for a tumble whose campaign cannot be written, before any work."""
+    if settings.campaign is None:
+        return
+    if settings.ground != "spring-damper":
+        raise ValueError(
+            f"campaign = {settings.campaign!r} with ground = {settings.ground!r}: a campaign's surface is K, C and "
+            f"friction, so the spring-damper would do, with effects for what it lacks"
+        )
+    check_target(settings.campaign)
+
+
+def write_tumble_campaign(
+    settings: TumbleSettings, plan: TumblePlan, folder: Path, progress: Progress
+) -> dict[str, Any] | None:
+    """Write `campaign_trials` replicates of the tumble to ``settings.campaign``, and what is true of them to `folder`.
+
+    The stated numbers are the tumble's; the true ones are drawn within the uncertainties that `hedgebed campaign` has
+    by default, each trial's gravity anew. Effects are true and not stated. Returns what result.json says of it, None
+    where no campaign is asked for. Raises ValueError where the folder holds something else.
+    """
+    if settings.campaign is None:
+        return None
+    shared = {name: getattr(settings, name) for name in TrialSettings.model_fields}
+    plain = CampaignSettings()
+    factor = settings.campaign_noise
+    x, y, theta = (factor * std for std in plain.pose_std)
+    gyro, ax, ay = (factor * std for std in plain.imu_std)
+    own = CampaignSettings(
+        **shared, name=f"a tumble on {plan.surface}", rigs=() if settings.gravity is not None else plain.rigs,
+        gravities=(settings.gravity,) if settings.gravity is not None else (), seed=settings.campaign_seed,
+        repeats=settings.campaign_trials, pose_std=(x, y, theta), imu_std=(gyro, ax, ay),
+        wheel_std=factor * plain.wheel_std,
+    )  # fmt: skip
+    within = replace(plan, trial=_within_limit(plan, settings.duration))
+    made = _make(own, [_Condition(f"{n:03d}", within) for n in range(1, settings.campaign_trials + 1)], progress)
+    target = place_campaign(settings.campaign, made.campaign, keep_out=folder)
+    write_model(folder / TRUTH, made.truth)
+    progress.message(f"campaign {target}: {len(made.rows)} trials; what is true of them is in {folder / TRUTH}")
+    return {"folder": str(target), "truth": TRUTH, "trials": made.rows}
 
 
 def write_report(folder: Path, progress: Progress) -> None:
@@ -277,10 +344,9 @@ def _row(condition: _Condition, trial: Trial, measured: Measured, trajectory: An
     }
 
 
-def _result(
-    settings: CampaignSettings, plan: TumblePlan, rows: list[dict[str, Any]], recordings: dict[Any, Recording]
-) -> dict[str, Any]:
-    count = sum(len(recording) for recording in recordings.values())
+def _result(settings: CampaignSettings, plan: TumblePlan, made: _Made) -> dict[str, Any]:
+    count = sum(len(recording) for recording in made.campaign.recordings.values())
+    rows = made.rows
     return {
         "format": "hedgebed-result/1",
         "experiment": "campaign",
@@ -293,7 +359,7 @@ def _result(
             "duration": {"value": settings.duration, "std": 0.0, "unit": "s", "note": "of each trial"},
         },
         "campaign": "campaign",
-        "truth": "truth.toml",
+        "truth": TRUTH,
         "effects": [{"id": effect.id, "parameters": dict(effect.values)} for effect in plan.trial.effects],
         "trials": rows,
         "warnings": list(plan.warnings),

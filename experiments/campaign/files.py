@@ -108,7 +108,7 @@ def write_campaign(folder: str | Path, campaign: Campaign) -> Path:
             if recording is None:
                 raise ValueError(f"trial {trial.id!r} names {sensor} = {name!r}, but there is no recording of it")
             write_recording(folder / name, recording)
-    write_text(folder / "campaign.toml", _tables_toml(campaign.tables))
+    write_text(folder / "campaign.toml", _tables_toml(campaign.tables))  # last: without it there is no campaign
     return folder
 
 

@@ -11,6 +11,7 @@ from experiments.campaign import read_campaign, read_model
 from experiments.campaign_settings import CampaignSettings
 from experiments.cli import main
 from experiments.synthesis import record, run
+from experiments.tumble import resume as resume_tumble
 from experiments.tumble_trial import model_trial
 from rigid.sensors import SensorSet
 from rigid.trial import Effect
@@ -138,3 +139,37 @@ def test_bad_input_is_refused_by_name_and_leaves_no_folder(capsys, options, said
     text = capsys.readouterr().err
     assert all(words in text for words in said), text
     assert not Path("a").exists()
+
+
+def test_a_tumble_writes_trials_of_itself_and_keeps_the_truth_in_its_own_folder(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("experiments.tumble.write_report", lambda folder, progress: None)
+    tokens = ["tumble", "--surface", "brick", "--gravity", "0.1", "--torque", "0.15", "--duration", "0.6"]
+    tokens += ["--effects", "tip-radius.radius=0.01", "--campaign", "c", "--campaign-trials", "3"]
+    tokens += ["--campaign-noise", "0.5", "--out", "run", "--quiet"]
+    assert main(tokens) == 0
+    campaign, truth = read_campaign("c"), read_model("run/truth.toml")
+    trials = campaign.tables.trial
+    assert [(trial.torque, trial.gravity_sim) for trial in trials] == [(0.15, 0.1)] * 3
+    assert campaign.tables.rig is None and campaign.tables.sensors.pose.std == (0.00025, 0.00025, 0.0015)
+    assert [effect.id for effect in truth.effect] == ["tip-radius"]
+    assert len({trial.gravity_sim for trial in truth.trial}) == 3
+    assert truth.platform.inertia != campaign.tables.platform.inertia
+    said = "".join(path.read_text() for path in Path("c").iterdir())
+    assert "tip-radius" not in said and not Path("c/truth.toml").exists()
+    # what it recorded is the truth with half the usual noise
+    found = tuple(Effect(id=effect.id, parameters=effect.parameters) for effect in truth.effect)
+    bare, _ = record(model_trial(truth, truth.trial[1], effects=found), duration=0.6, sensors=SensorSet(), seed=None)
+    noise = (campaign.recording("002", "imu")["gyro_rad_s"] - bare.imu["gyro_rad_s"]) / 0.005
+    assert abs((noise**2).mean() - 1) < 5 * math.sqrt(2 / len(noise))
+    # done again into the same folder it finds its own campaign there; another's is never written over
+    assert resume_tumble("run")["campaign"]["trials"][0]["id"] == "001"
+    capsys.readouterr()
+    assert main([*tokens[:-2], "other"]) == 2
+    assert "campaign = 'c' is in use" in capsys.readouterr().err
+    assert not Path("other").exists()
+
+
+def test_a_tumble_on_another_law_has_no_campaign(capsys):
+    tokens = ["tumble", "--ground", "hunt-crossley", "--campaign", "c", "--out", "run"]
+    assert main(tokens) == 2
+    assert "the spring-damper would do" in capsys.readouterr().err
