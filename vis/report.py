@@ -14,7 +14,8 @@ from PIL import Image
 
 from vis.folder import RunFolder, from_python, read_folder
 from vis.pictures import Picture, Pictures, make_pictures
-from vis.plots import Plot, make_plots
+from vis.plot_parts import Plot
+from vis.plots import make_plots
 from vis.summary import summarise
 
 __all__ = ["write_report"]

@@ -14,7 +14,8 @@ from PIL import Image
 import vis
 from vis import style
 from vis.folder import read_folder, read_series
-from vis.plots import PLOTS, _running_mean, make_plots
+from vis.plot_drops import _running_mean
+from vis.plots import PLOTS, make_plots
 from vis.report import write_report
 from vis.summary import summarise
 
