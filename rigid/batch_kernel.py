@@ -742,8 +742,9 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                             one = 1 << n
                             if (leaving & one) != 0:
                                 sign = -hold
-                                if ti.abs(slip_kept[j]) > 1e-9:
-                                    sign = slip_kept[j]
+                                slip = vx - omega * h_kept[j]  # what the constraint leaves: not its excess before
+                                if ti.abs(slip) > 1e-12:
+                                    sign = slip
                                 if sign > 0.0:
                                     backwards &= ~one
                                 else:
