@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 import hedgebed
-from experiments.cli import _number, main
+from experiments.cli import main
+from experiments.cli_runs import _number
 
 ROOT = Path(__file__).resolve().parents[2]
 

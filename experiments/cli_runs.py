@@ -1,0 +1,126 @@
+"""Carrying a run out from the command line: its status, its exit status, and the numbers that are shown in the end."""
+
+import math
+import shutil
+import sys
+import traceback
+from collections.abc import Callable
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from experiments.cli_streams import RefusedError, say, stdout_to_stderr
+from experiments.progress import Progress, make_progress
+from experiments.runfolder import RunFolder, write_text
+from vis.numbers import digits_for
+
+__all__ = ["BAD_INPUT", "DONE", "FAILED", "STOPPED", "carry_out", "show_folder"]
+
+DONE, FAILED, BAD_INPUT, STOPPED = 0, 1, 2, 3
+"""Exit statuses of the command line."""
+
+
+def carry_out(folder: RunFolder, work: Callable[[Progress], dict[str, Any]], *, as_json: bool, quiet: bool) -> int:
+    """Do the `work` of a run whose folder is there; keep its status; show what came out."""
+    say(f"run folder {folder.path}")
+    fresh = not folder.has_work
+    with stdout_to_stderr():
+        try:
+            with folder.lock():
+                folder.set_status("running")
+                try:
+                    with make_progress(quiet=quiet) as progress:
+                        result = work(progress)
+                except KeyboardInterrupt:
+                    folder.set_status("stopped", "interrupted")
+                    raise
+                except BaseException as error:
+                    folder.set_status("failed", f"{type(error).__name__}: {error}")
+                    raise
+                if not (folder.path / "result.json").exists():
+                    folder.write_result(result)
+                folder.set_status("done")
+        except KeyboardInterrupt:
+            say(f"stopped; `hedgebed resume {folder.path}` finishes it")
+            return STOPPED
+        except RuntimeError as error:
+            say(f"failed: {error}")
+            say(f"what was finished is kept in {folder.path}; the same settings would fail the same way again")
+            return FAILED
+        except ValueError as error:
+            if fresh and not folder.has_work:  # refused before any work: leave nothing behind
+                _discard(folder)
+                raise RefusedError(str(error)) from error
+            write_text(folder.path / "traceback.txt", traceback.format_exc())
+            say(f"failed: {error}")
+            say(f"what was finished is kept in {folder.path}, and where it failed in traceback.txt there")
+            return FAILED
+        except Exception:
+            traceback.print_exc()
+            say(f"failed; what there was is in {folder.path}")
+            return FAILED
+    return show_folder(folder, as_json=as_json)
+
+
+def show_folder(folder: RunFolder, *, as_json: bool) -> int:
+    """Show the result of a finished run on stdout, as JSON or as a table; return the exit status."""
+    if as_json:
+        print((folder.path / "result.json").read_text(encoding="utf-8"), end="")
+    else:
+        _show_result(folder)
+    return DONE
+
+
+def _discard(folder: RunFolder) -> None:
+    """Remove a folder that holds nothing but what `RunFolder.create` has written."""
+    ours = {"run.toml", "status.json", "lock"}
+    if {item.name for item in folder.path.iterdir()} <= ours:
+        shutil.rmtree(folder.path)
+
+
+def _number(value: Any, std: Any = 0.0) -> str:
+    """A value to the digits its spread allows, to two where that is unknown (None), to four where it is exact."""
+    if not isinstance(value, float) or not math.isfinite(value):
+        return "-" if value is None else str(value)
+    if std is None:
+        whole = value.is_integer() and abs(value) < 1e15
+        return f"{value:.0f}" if whole else f"{value:.2g}" if abs(value) < 100 or abs(value) >= 1e6 else f"{value:.0f}"
+    if not std or not math.isfinite(std):
+        return f"{value:.4g}"
+    decimals = digits_for(std)
+    return f"{value:.{max(decimals, 0)}f}" if decimals <= 9 else f"{value:.4g}"
+
+
+def _show_result(folder: RunFolder) -> None:
+    """The numbers of result.json in a short table on stdout, the warnings, and where the report is."""
+    result = folder.read_result()
+    console = Console(file=sys.stdout, highlight=False)
+    table = Table(title=result.get("title"), title_justify="left", box=None, pad_edge=False)
+    table.add_column("quantity")
+    table.add_column("value", justify="right")
+    table.add_column("spread (std)", justify="right")
+    table.add_column("unit")
+    for name, quantity in result.get("quantities", {}).items():
+        unit = quantity.get("unit", "")
+        table.add_row(
+            name,
+            _number(quantity.get("value"), quantity.get("std")),
+            _number(quantity.get("std"), None),
+            "" if unit == "1" else unit,
+        )
+    console.print(table, markup=False)
+    for listed in result.get("tables", []):
+        shown = Table(title=listed["title"], title_justify="left", box=None, pad_edge=False)
+        for place, heading in enumerate(listed["head"]):
+            shown.add_column(heading, no_wrap=place == 0)
+        for row in listed["rows"]:
+            shown.add_row(*(Text(str(cell)) for cell in row))
+        console.print(shown, markup=False)
+    for sentence in result.get("departures", {}).get("sentences", []):
+        console.print(f"- {sentence}", markup=False)
+    for warning in result.get("warnings", []):
+        console.print(f"warning: {warning}", markup=False)
+    report = folder.path / "report.html"
+    print(f"{'report' if report.exists() else 'folder'}: {report if report.exists() else folder.path}")

@@ -1,0 +1,109 @@
+"""What the command line says and where: results to stdout, all else to stderr, faults in words, signals as Ctrl-C."""
+
+import os
+import re
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
+from types import FrameType
+
+from cyclopts import CoercionError, MissingArgumentError
+
+__all__ = [
+    "RefusedError",
+    "fault_words",
+    "refusing",
+    "say",
+    "stdout_to_stderr",
+    "terminate_like_ctrl_c",
+]
+
+
+class RefusedError(ValueError):
+    """Bad input, found before any work."""
+
+
+def say(text: str) -> None:
+    """Say `text` on stderr."""
+    for line in text.splitlines():
+        print(f"hedgebed: {line}", file=sys.stderr, flush=True)
+
+
+def fault_words(error: Exception) -> str:
+    """What was wrong with the words typed, and what would do."""
+    text = str(error)
+    if isinstance(error, MissingArgumentError) and error.argument is not None:
+        count, got = error.argument.token_count()[0], len(error.tokens_so_far)
+        if count > 1:
+            typed = " ".join(error.tokens_so_far) or "nothing"
+            about = f" ({error.argument.parameter.help.rstrip('.')})" if error.argument.parameter.help else ""
+            return f"{error.argument.name} = {typed} will not do: it takes {count} values, not {got}{about}"
+    if isinstance(error, CoercionError) and error.target_type is float and error.token and error.argument:
+        unit = re.findall(r"\[([^\[\]]+)\]", error.argument.parameter.help or "")[-1:]
+        if unit and unit[0] != "1":
+            named = _UNIT_NAMES.get(unit[0], unit[0])
+            text = f"{text.rstrip('.')}: give a plain number in {named}{_in_metres(error.token.value, unit[0])}"
+    return text
+
+
+_UNIT_NAMES = {"m": "metres", "N": "newtons", "kg": "kilograms", "s": "seconds"}
+_LENGTHS = {"mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6, "m": 1.0}
+
+
+def _in_metres(typed: str, unit: str) -> str:
+    """``, e.g. 0.016`` for ``16mm``; nothing where it is no length with a unit."""
+    found = re.fullmatch(r"\s*([0-9.]+(?:e-?[0-9]+)?)\s*([a-zµ]+)\s*", typed)
+    if unit != "m" or not found or found[2] not in _LENGTHS:
+        return ""
+    try:
+        return f", e.g. {float(found[1]) * _LENGTHS[found[2]]:.6g}"
+    except ValueError:
+        return ""
+
+
+@contextmanager
+def terminate_like_ctrl_c() -> Iterator[None]:
+    """Within, SIGTERM raises KeyboardInterrupt, as Ctrl-C does."""
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    try:
+        before = signal.signal(signal.SIGTERM, interrupt)
+    except ValueError:  # not in the main thread: whoever runs us there deals with signals
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+@contextmanager
+def refusing() -> Iterator[None]:
+    """Within, a ValueError is bad input."""
+    try:
+        yield
+    except ValueError as error:
+        raise RefusedError(str(error)) from error
+
+
+@contextmanager
+def stdout_to_stderr() -> Iterator[None]:
+    """Within, what anyone writes to stdout, libraries in C included, goes to stderr: stdout is for results."""
+    try:
+        number = sys.stdout.fileno()
+    except (OSError, ValueError):  # stdout is not a file, as where a test captures it
+        with redirect_stdout(sys.stderr):
+            yield
+        return
+    sys.stdout.flush()
+    kept = os.dup(number)
+    os.dup2(sys.stderr.fileno(), number)
+    try:
+        yield
+    finally:
+        sys.stdout.flush()
+        os.dup2(kept, number)
+        os.close(kept)
