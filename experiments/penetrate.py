@@ -20,10 +20,13 @@ import numpy as np
 from coupling import BedGround, Penetration, Run
 from hedgebed import __version__
 
+from .amended import read_law
+from .amended_runs import keep_model, kept_law, run_beside, run_without_bed
 from .findings import Findings, bed_entry, bed_quantities, compare_with, read_reference
 from .memory import memory_there
 from .progress import Progress
 from .remarks import overlap_warning, softening_note
+from .run_campaign import SpikeSensors, campaign_of, check_target, place_campaign
 from .runfolder import RunFolder
 from .settings import PenetrateSettings, expected_grain_count
 from .softening import Softening, bearing_gradient, drop_depth, soften
@@ -67,6 +70,12 @@ def resume(folder: str | Path, *, progress: Progress | None = None) -> dict[str,
 
 def check(settings: PenetrateSettings) -> None:
     """Raise ValueError, naming key, value and what would do, for what this machine or the material cannot serve."""
+    if settings.model is not None:
+        read_law(settings.model, settings)
+    if settings.campaign is not None:
+        check_target(settings.campaign)
+    if settings.ground == "spring-damper":
+        return
     find_material(settings.material)
     for seeds, speeds in ((settings.seeds[:1], settings.speeds), (settings.seeds[1:], settings.other_speeds)):
         if seeds and not speeds:
@@ -304,9 +313,12 @@ def write_report(folder: Path, progress: Progress) -> None:
 
 
 def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
+    if settings.ground == "spring-damper":
+        return run_without_bed(settings, folder, progress)
     softening = choose_softness(settings)
     units = plan_units(settings)
     with folder.lock():
+        keep_model(settings, folder.path)
         progress.message(softening_note(settings, softening))
         dropped = f", a dropped spike moves {settings.mass:.4g} kg" if settings.drop_speeds else ""
         progress.message(f"the load is {settings.weight:.4g} N{dropped}")
@@ -315,9 +327,25 @@ def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progres
             _run_seed(settings, seed, [unit for unit in units if unit.seed == seed], softening, folder, progress)
         result = _conclude(settings, units, softening, folder, progress)
         folder.write_result(result)
+        _write_campaign(settings, result, folder, progress)
         progress.stage("report", total=1.0)
         write_report(folder.path, progress)
     return result
+
+
+def _write_campaign(settings: PenetrateSettings, result: dict[str, Any], folder: RunFolder, progress: Progress) -> None:
+    """The bed's runs as a campaign, where one is asked for."""
+    if settings.campaign is None:
+        return
+    sensors = SpikeSensors(
+        rate=settings.campaign_rate,
+        depth_std=settings.campaign_depth_std,
+        force_std=settings.campaign_force_std,
+        accel_std=settings.campaign_accel_std,
+        seed=settings.campaign_seed,
+    )
+    target = place_campaign(settings.campaign, campaign_of(settings, result, folder, sensors), keep_out=folder.path)
+    progress.message(f"campaign {target}: `hedgebed diagnose {target}` says what the spring-damper lacks")
 
 
 def _plan(settings: PenetrateSettings, units: list[Unit], folder: RunFolder, progress: Progress) -> None:
@@ -504,6 +532,14 @@ def _conclude(
             "parts of this run were computed by different versions of the code: it may not repeat to the bit"
         )
     departures = findings.departures()
+    entries = findings.run_entries(notes)
+    law = kept_law(settings, folder.path)
+    if law is not None:
+        beside = run_beside(law, units, beds, findings.models, folder)
+        quantities |= beside.quantities
+        warnings += law.warnings()
+        departures["sentences"] = [*departures["sentences"], *beside.sentences]
+        entries = beside.entries(entries)
     result: dict[str, Any] = {
         "format": "hedgebed-result/1",
         "experiment": "penetrate",
@@ -512,13 +548,15 @@ def _conclude(
         "title": f"A {1e3 * settings.tip_diameter:g} mm spike in {settings.material}",
         "status": "done",
         "quantities": quantities,
-        "runs": findings.run_entries(notes),
+        "runs": entries,
         "fits": findings.fit_entries(),
         "departures": departures,
         "bed": bed_entry(facts, settings, softening),
         "spike": asdict(make_spike(settings)) | {"load": settings.weight},
         "warnings": warnings,
     }
+    if law is not None:
+        result["model"] = {"file": settings.model, "effects": list(law.effects)}
     reference = SHIPPED_RESULT if settings.reference == "shipped" else settings.reference
     if reference == SHIPPED_RESULT and not SHIPPED_RESULT.exists():
         warnings.append("the result of the shipped case is not here (docs/results of a checkout): nothing compared")

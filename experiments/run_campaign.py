@@ -35,7 +35,7 @@ from .runfolder import RunFolder, read_series
 from .settings import PenetrateSettings
 from .strict import StrictSettings
 
-__all__ = ["SpikeSensors", "campaign_of_run", "check_target", "place_campaign", "write_run_campaign"]
+__all__ = ["SpikeSensors", "campaign_of", "campaign_of_run", "check_target", "place_campaign", "write_run_campaign"]
 
 Array = NDArray[np.float64]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -118,12 +118,16 @@ def campaign_of_run(run: str | Path, *, sensors: SpikeSensors | None = None) -> 
     if folder.status != "done" or not (folder.path / "result.json").exists():
         raise ValueError(f"{str(run)!r} is not finished ({folder.status}): `hedgebed resume {run}` first")
     result = json.loads((folder.path / "result.json").read_text(encoding="utf-8"))
-    return _campaign(PenetrateSettings(**folder.settings), result, folder, sensors or SpikeSensors())
+    settings = PenetrateSettings(**folder.settings)
+    if settings.ground != "bed":
+        raise ValueError(f"{str(run)!r} is a run on ground = {settings.ground!r}: one in a bed was expected")
+    return campaign_of(settings, result, folder, sensors or SpikeSensors())
 
 
-def _campaign(
+def campaign_of(
     settings: PenetrateSettings, result: dict[str, Any], folder: RunFolder, sensors: SpikeSensors
 ) -> Campaign:
+    """The runs of a bed in `folder`, whose result is `result`, as a campaign. Raises ValueError for too low a rate."""
     runs: Sequence[dict[str, Any]] = result["runs"]
     trials, recordings = [], {}
     for number, entry in enumerate(runs):

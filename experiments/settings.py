@@ -91,6 +91,27 @@ class PenetrateSettings(StrictSettings):
     other_speeds: tuple[Positive, ...] = Field((0.2,), description="Speeds driven on the seeds after the first [m/s].")
     other_drop_speeds: tuple[Positive, ...] = Field((0.15,), description="Drops on the seeds after the first [m/s].")
 
+    # Beside it
+    ground: Literal["bed", "spring-damper"] = Field(
+        "bed", description="What the spike goes into: the bed, or, without a bed, the spring-damper of `model`."
+    )
+    model: str | None = Field(
+        None,
+        min_length=1,
+        description="A model.toml of penetration, as diagnose writes it: its law, effects and all, is run beside bed "
+        "and spring-damper.",
+    )
+    campaign: str | None = Field(
+        None,
+        min_length=1,
+        description="Folder for the bed's runs as a campaign of measured trials, seen through noisy sensors.",
+    )
+    campaign_rate: Positive = Field(1000.0, description="Rate of the campaign's samples [Hz].")
+    campaign_depth_std: Positive = Field(5e-5, description="Noise of the campaign's depth [m].")
+    campaign_force_std: Positive = Field(0.02, description="Noise of the campaign's force, driven [N].")
+    campaign_accel_std: Positive = Field(0.2, description="Noise of the campaign's acceleration, dropped [m/s2].")
+    campaign_seed: SeedNumber = Field(1, description="Seed of the campaign's noise.")
+
     # How it is computed
     max_overlap: float = Field(0.05, gt=0, le=0.1, description="Largest overlap of grains [of a diameter].")
     young: Positive | None = Field(
@@ -123,7 +144,7 @@ class PenetrateSettings(StrictSettings):
 
     @model_validator(mode="after")
     def _fits_together(self) -> PenetrateSettings:
-        for finding in (self._spike(), self._bed(), self._runs()):
+        for finding in (self._spike(), self._bed(), self._runs(), self._beside()):
             if finding:
                 raise ValueError(finding + self._perhaps_millimetres())
         return self
@@ -211,6 +232,16 @@ class PenetrateSettings(StrictSettings):
             values = getattr(self, key)
             if len(set(values)) < len(values):
                 return f"{key} = {_plain(values)} holds a value twice: each once would do"
+        return None
+
+    def _beside(self) -> str | None:
+        if self.ground == "spring-damper" and self.model is None:
+            return "ground = 'spring-damper' needs model, the model.toml whose K and C it has: none is given"
+        if self.ground == "spring-damper" and self.campaign is not None:
+            return (
+                f"campaign = {self.campaign!r} is made of a bed's runs, and ground = 'spring-damper' has no bed: "
+                f"ground = 'bed' would do"
+            )
         return None
 
     def crossing(self, time_step: float, stiffest: float = math.inf) -> str | None:

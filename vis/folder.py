@@ -69,6 +69,8 @@ class Run:
     bed: Series | None
     model: Series | None
     quantities: dict[str, Any] = field(default_factory=dict)
+    amended: Series | None = None
+    """The same run on the law of a model, with what the spring-damper lacked."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +129,10 @@ def read_folder(folder: str | Path) -> RunFolder:
     runs = []
     for entry in _dicts(result.get("runs")):
         name = str(entry.get("id", "unnamed"))
-        bed = _try_series(path, entry.get("series"), f"run {name}: the bed's series", missing)
+        bedless = result.get("ground") == "spring-damper"
+        bed = None if bedless else _try_series(path, entry.get("series"), f"run {name}: the bed's series", missing)
+        amended = f"run {name}: the series of the model's law"
+        with_model = "amended_series" in entry
         alone = "model_series" not in entry and result.get("experiment") in PYTHON_RUNS
         law = f"run {name}: the spring-damper's series"
         model = None if alone else _try_series(path, entry.get("model_series"), law, missing)
@@ -141,6 +146,7 @@ def read_folder(folder: str | Path) -> RunFolder:
                 bed=bed,
                 model=model,
                 quantities=dict(entry.get("quantities") or {}),
+                amended=_try_series(path, entry["amended_series"], amended, missing) if with_model else None,
             )
         )
     if result and not runs:

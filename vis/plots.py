@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from vis.amended import TITLE, amended_plot, is_amended
 from vis.folder import RunFolder
 from vis.plot_drag import drag_plot, gap_plot, work_plot
 from vis.plot_drops import drop_peaks_plot, drops_plot, set_down_plot, spread_plot
@@ -31,7 +32,8 @@ def make_plots(run: RunFolder, folder: str | Path | None = None) -> tuple[list[t
     target.mkdir(parents=True, exist_ok=True)
     drawn: list[tuple[Plot, Path]] = []
     missing: list[str] = []
-    for what, draw in PLOTS.items():
+    plans = PLOTS | ({TITLE: amended_plot} if is_amended(run) else {})
+    for what, draw in plans.items():
         try:
             plot = draw(run)
         except (ValueError, TypeError, KeyError, IndexError, ZeroDivisionError, FloatingPointError) as error:

@@ -12,6 +12,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from PIL import Image
 
+from vis.amended import is_amended
 from vis.folder import RunFolder, from_python, read_folder
 from vis.pictures import Picture, Pictures, make_pictures
 from vis.plot_parts import Plot
@@ -53,6 +54,8 @@ def write_report(folder: str | Path, *, pictures: bool = True, progress: Callabl
     tell = progress if progress is not None else lambda done: None
     run = read_folder(folder)
     home, name = _OTHERS.get(str(run.result.get("experiment")), ("", ""))
+    if run.result.get("ground") == "spring-damper" and is_amended(run):
+        home, name = "vis.amended", "write_amended_report"
     if home:
         return getattr(import_module(home), name)(folder, progress=progress)
     plots, undrawn = make_plots(run)

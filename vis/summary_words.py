@@ -40,6 +40,10 @@ _NAMES = {
     "sinkage_spring_damper": "sinkage at rest, spring-damper",
     "drag_gap": "drag gap, spring-damper against bed",
     "work_returned_dem": "work given back, bed",
+    "work_returned_amended": "work given back, model's law",
+    "sinkage_amended": "sinkage, model's law",
+    "force_gap_spring_damper": "off over whole driven runs, spring-damper",
+    "force_gap_amended": "off over whole driven runs, model's law",
     "work_returned_spring_damper": "work given back, spring-damper",
     "load": "load set down",
     "drop_mass": "mass dropped",
@@ -73,7 +77,8 @@ _UNITS = {
     "cone_angle": "degrees",
 }  # fmt: skip
 SHARES = {
-    "drag_gap", "model_drag_gap", "work_returned_dem", "work_returned_spring_damper", "max_overlap", "overlap",
+    "drag_gap", "model_drag_gap", "work_returned_dem", "work_returned_spring_damper", "work_returned_amended",
+    "force_gap_spring_damper", "force_gap_amended", "max_overlap", "overlap",
     "overlap_quasi_static", "overlap_impact", "spread",
 }  # fmt: skip
 

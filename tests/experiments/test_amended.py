@@ -1,0 +1,152 @@
+"""`hedgebed penetrate --model`: the law with what it lacked, against closed forms, and beside a bed that is known."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from fake_bed import FakeBed
+
+from experiments import amended_runs, penetrate
+from experiments.amended import AmendedGround, read_law
+from experiments.campaign import read_campaign
+from experiments.cli import main
+from experiments.settings import PenetrateSettings
+from experiments.units import make_run, plan_units
+
+K, C, MASS, LOAD = 120.0, 0.5, 0.3, 0.4
+MODEL = f"""
+format = "hedgehog-campaign/1"
+kind = "penetration"
+name = "a crater"
+[spike]
+mass = {MASS}
+diameter = 0.012
+[surface]
+kind = "sand"
+stiffness = {K}
+damping = {C}
+"""
+CRATER = '[[effect]]\nid = "plastic-sinkage"\nparameters = {reference = 0.01, crater_share = 0.9}\n'
+QUICK = {
+    "seeds": (1, 2), "speeds": (0.2,), "other_speeds": (0.2,), "drop_speeds": (0.1,), "other_drop_speeds": (0.1,),
+    "drop_time": 0.5, "depth": 0.01, "frame_count": 0, "mass": MASS, "load": LOAD, "lowering_speed": 0.1,
+    "substeps": 20,
+}  # fmt: skip
+STEP = 2e-5
+
+
+@pytest.fixture
+def law(tmp_path):
+    """Writes a model with these effects and reads it as a law."""
+
+    def make(effects="", *, model=MODEL, **changes):
+        path = tmp_path / "model.toml"
+        path.write_text(model + effects)
+        return read_law(path, PenetrateSettings(**(QUICK | changes)))
+
+    return make
+
+
+def runs_of(law):
+    """Every run on the plain spring-damper and on the law: kind -> (plain, amended)."""
+    units = plan_units(law.settings.model_copy(update={"seeds": (1,)}))
+    plain = {unit: make_run(law.settings, unit, law.plain(STEP)).run() for unit in units}
+    return {unit.kind: (series, law.run(unit, series)) for unit, series in plain.items()}
+
+
+def test_with_nothing_added_every_run_is_that_of_the_spring_damper(law):
+    runs = runs_of(law())
+    plain, amended = runs["driven"]
+    z, v = plain.depth, plain.velocity
+    closed = np.where(z > 0, K * z + C * np.maximum(v, 0), 0.0)  # F = K z + C max(0, dz/dt)
+    assert amended.force == pytest.approx(closed, abs=1e-12)
+    plain, amended = runs["drop"]
+    assert amended.depth == pytest.approx(plain.depth, abs=1e-4 * plain.depth.max())
+    assert list(amended.phase[:200]) == list(plain.phase[:200])
+    plain, amended = runs["set_down"]
+    assert amended.resting_depth == pytest.approx(plain.resting_depth, rel=1e-3)
+
+
+def test_out_of_a_crater_the_loading_curve_is_pressed_into_what_is_left(law):
+    plain, amended = runs_of(law(CRATER))["driven"]
+    out = plain.phase == "out"
+    z, top = plain.depth[out], plain.depth.max()
+    # back from Z the curve is read at (z - s Z) / (1 - s): steep down to s Z, and nothing below
+    assert amended.force[out] == pytest.approx(np.maximum(0.0, K * (z - 0.9 * top) / 0.1), abs=1e-9)
+
+
+def test_the_ground_remembers_and_gives_the_same_bits_after_a_restart(law):
+    ground = AmendedGround(law(CRATER), time_step=STEP, speed=0.1)
+
+    def step(ground, depth, rate):
+        return float(ground.step((0.0, 0.0, -depth), (0.0, 0.0, -rate), 1e-4).force[2])
+
+    step(ground, 0.01, 0.0)
+    inside = step(ground, 0.0095, -1e-9)
+    assert inside == pytest.approx(K * 0.0005 / 0.1, rel=1e-3)
+    kept, again = ground.state(), AmendedGround(law(CRATER), time_step=STEP, speed=0.1)
+    assert step(again, 0.0095, -1e-9) > inside  # it does not know how deep the other was
+    again.restore(kept)
+    assert step(again, 0.0095, -1e-9) == step(ground, 0.0095, -1e-9)
+    assert step(ground, -0.001, 0.0) == 0.0 and step(ground, 0.005, 0.0) == 0.0  # the crater stays
+
+
+def test_on_another_tip_a_section_goes_with_the_square_of_the_diameter_and_a_shaft_with_it(law):
+    effects = '[[effect]]\nid = "inertial-drag"\nparameters = {reference = 0.01, drag = 2.0}\n'
+    effects += '[[effect]]\nid = "shaft-friction"\nparameters = {reference = 0.01, shaft = 0.3}\n'
+    wide = law(effects, tip_diameter=0.018)
+    assert dict(wide.slots) == pytest.approx({"reference": 0.01, "drag": 4.5, "shaft": 0.45})
+    assert wide.pair == (K, C)
+    (said,) = wide.warnings()
+    assert "12 mm" in said and "18 mm" in said
+    fitted = MODEL + '[notes.fitted_by_diameter."0.018"]\nstiffness = 300.0\ndamping = 2.0\n'
+    assert law(model=fitted, tip_diameter=0.018).pair == (300.0, 2.0)
+    assert law(effects).warnings() == []
+
+
+def test_what_is_no_model_of_penetration_is_refused_by_name(law):
+    with pytest.raises(ValueError, match="crater_shape = 0"):
+        law(CRATER.replace("crater_share", "crater_shape"))
+    with pytest.raises(ValueError, match="there is no such file"):
+        penetrate.check(PenetrateSettings(**QUICK, model="nowhere.toml"))
+    with pytest.raises(ValueError, match="needs model"):
+        PenetrateSettings(**QUICK, ground="spring-damper")
+
+
+def test_without_a_bed_the_command_shows_both_laws(tmp_path, capsys):
+    (tmp_path / "model.toml").write_text(MODEL + CRATER)
+    tokens = ["penetrate", "--ground", "spring-damper", "--model", str(tmp_path / "model.toml"), "--speeds", "0.2"]
+    tokens += ["--mass", "0.3", "--load", "0.1", "--substeps", "40", "--out", str(tmp_path / "run"), "--quiet"]
+    assert main([*tokens, "--drop-speeds", "none", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    numbers = {name: entry["value"] for name, entry in result["quantities"].items()}
+    assert numbers["sinkage_amended"] == pytest.approx(0.1 / K, rel=0.01)
+    assert numbers["work_returned_amended"] < 0.2 * numbers["work_returned_spring_damper"]
+    assert "plastic-sinkage" in (tmp_path / "run" / "report.html").read_text()
+
+
+def test_beside_a_bed_that_does_not_spring_back_the_amended_law_closes_the_gap(tmp_path, monkeypatch):
+    sand = SimpleNamespace(name="sand", density=2650.0, young=7e10, poisson=0.25, friction=0.5)
+    unload = K / 0.1  # the stand-in's elastic line is that of a crater of nine tenths
+    monkeypatch.setattr(
+        penetrate, "prepare_bed",
+        lambda settings, seed, young, progress: FakeBed(
+            size=settings.bed_size, seed=seed, hardness=K, rate=C, unload=unload
+        ),
+    )  # fmt: skip
+    monkeypatch.setattr(penetrate, "find_material", lambda name: sand)
+    monkeypatch.setattr(penetrate, "bed_step", lambda settings, young: STEP)
+    monkeypatch.setattr(penetrate, "write_report", lambda folder, progress: None)
+    monkeypatch.setattr(amended_runs, "write_report", lambda folder, progress: None)
+    (tmp_path / "model.toml").write_text(MODEL + CRATER)
+    settings = PenetrateSettings(
+        **QUICK, model=str(tmp_path / "model.toml"), campaign=str(tmp_path / "c"), campaign_force_std=0.01
+    )
+    result = penetrate.run(settings, tmp_path / "run")
+    numbers = {name: entry["value"] for name, entry in result["quantities"].items()}
+    assert numbers["force_gap_amended"] < 0.03 < 0.3 < numbers["force_gap_spring_damper"]
+    assert numbers["sinkage_amended"] == pytest.approx(numbers["sinkage_dem"], rel=0.02)
+    assert (tmp_path / "run" / result["runs"][0]["amended_series"]).exists()
+    campaign = read_campaign(tmp_path / "c")
+    assert len(campaign.tables.trial) == 6 and campaign.tables.sensors.force.std == (0.01,)
