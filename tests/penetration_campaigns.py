@@ -16,8 +16,9 @@ def driven_trial(force, *, speed, depth=0.02, retreat=False, seed=0, force_std=F
     random = np.random.default_rng(seed)
     total = depth / speed * (1.8 if retreat else 1.0)
     time = np.linspace(0, total, 400)
-    z = np.where(time < depth / speed, speed * time, 2 * depth - speed * time)
-    v = np.where(time < depth / speed, speed, -speed)
+    going = (time < depth / speed) | (not retreat)
+    z = np.where(going, speed * time, 2 * depth - speed * time)
+    v = np.where(going, speed, -speed)
     top = np.maximum.accumulate(z)
     values = np.array([force(a, b, c) if a > 0 else 0.0 for a, b, c in zip(z, v, top, strict=True)])
     return Recording({

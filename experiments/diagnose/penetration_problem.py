@@ -30,6 +30,8 @@ __all__ = ["PenetrationProblem", "make_problem"]
 
 _SLOT = {name: place for place, name in enumerate(SLOTS)}
 _FAILED = 1e3
+_SHALLOW = 0.02
+"""Share of D that counts as just below the surface."""
 _BED_STD = 0.5
 """How far the bed may differ between replicates while it is asked whether it does [1]."""
 
@@ -263,7 +265,11 @@ class PenetrationProblem:
             # Where the error may cross the surface or the turning point, the force is no linear function of it.
             bend = np.abs(by_speed).max() * smooth.speed_std * (np.abs(smooth.speed) < 3 * smooth.speed_std)
             jump = float(np.abs(by_speed).max() * np.abs(smooth.speed).max())
-            start = jump + np.abs(by_depth).max() * smooth.depth_std
+            # An effect may begin with a jump at the surface: as large as the force is measured to be just below it.
+            depth_here = np.maximum(8 * smooth.depth_std, _SHALLOW * self._scales.depth)
+            shallow = (smooth.depth > 0) & (smooth.depth < depth_here)
+            below = float(np.median(np.abs(trial.other[shallow]))) if shallow.any() else 0.0
+            start = max(jump, below) + np.abs(by_depth).max() * smooth.depth_std
             touch = start * (np.abs(smooth.depth) < 3 * smooth.depth_std)
             doubtful = np.sqrt(1 + (bend**2 + touch**2) / std_force**2)
             left, sizes, _ = np.linalg.svd(factor / std_force / doubtful[:, None], full_matrices=False)

@@ -22,8 +22,9 @@ _FAR = 12.0  # stds of the sensor: white noise does not get there
 _SHARE = 0.5  # of a channel's rows; more of them are not set aside
 _NEAR = 8  # rows on either side that tell how much a row usually changes
 _STEEP = 6.0  # times the usual change
-_AROUND = 8  # rows on either side of a gap from which a slope is taken
-_SURE = 100.0  # squared standard deviations by which a clock that is right must be off
+_AROUND = 8  # rows at least, on either side of a gap, from which a slope is taken
+_SPAN = 0.08  # s that they cover
+_SURE = 25.0  # squared standard deviations by which a clock that is right must be off
 _SENSORS = {"the camera": ("theta", "x", "y"), "the IMU": ("gyro",), "the wheel": ("wheel",)}  # what is smooth
 _ALL = {"the camera": ("theta", "x", "y"), "the IMU": ("gyro", "ax", "ay"), "the wheel": ("wheel",)}
 _LONG = 40  # rows that a marker may be lost for before it counts as gone for good
@@ -58,7 +59,9 @@ def _jumps(
 ) -> None:
     """Rows between two opposite steps that no motion makes, and all that follows a step that is never taken back."""
     time, value, std = trial.time[mine], trial.value[mine], trial.std[mine[0]]
-    change = np.diff(value)
+    steps_in_time = np.diff(time)
+    lost = np.maximum(steps_in_time / max(float(np.median(steps_in_time)), 1e-12), 1.0)
+    change = np.diff(value) / lost  # where rows are missing the motion has gone on
     size = np.abs(change)
     usual = median_filter(size, size=2 * _NEAR + 1, mode="nearest")
     steps = np.flatnonzero(size > _FAR * np.sqrt(2) * std + _STEEP * usual)
@@ -139,15 +142,16 @@ def _surprise(
     NaN where the slopes on either side differ: then the gap tells nothing.
     """
     time, value, std = trial.time[mine], trial.value[mine], float(trial.std[mine[0]])
-    left, right = np.flatnonzero(time <= before)[-_AROUND:], np.flatnonzero(time >= after)[:_AROUND]
-    if min(len(left), len(right)) < _AROUND:
+    around = max(_AROUND, int(_SPAN / usual))
+    left, right = np.flatnonzero(time <= before)[-around:], np.flatnonzero(time >= after)[:around]
+    if min(len(left), len(right)) < around:
         return np.nan, np.nan
     one, two = np.polyfit(time[left] - before, value[left], 1), np.polyfit(time[right] - after, value[right], 1)
-    doubt = std * np.sqrt(12 / _AROUND) / (_AROUND * usual)  # of a slope
+    doubt = std * np.sqrt(12 / around) / (around * usual)  # of a slope
     if abs(one[0] - two[0]) > 0.3 * max(abs(one[0]), abs(two[0])) + 4 * doubt:
         return np.nan, np.nan
     slope, moved = 0.5 * (one[0] + two[0]), two[1] - one[1]
-    place = 2 * std * np.sqrt(2 / _AROUND)  # of a line's end
+    place = 2 * std * np.sqrt(2 / around)  # of a line's end
 
     def off(gap: float) -> float:
         bend = 0.5 * abs(one[0] - two[0]) * gap
