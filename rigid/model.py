@@ -99,9 +99,10 @@ class Model:
         """Whether any effect has one of these hooks."""
         return any(hook in term.hooks for term in self.terms for hook in hooks)
 
-    def reads(self, *fields: str) -> bool:
-        """Whether any effect looks at one of these fields of the state."""
-        return any(set(fields) & set(hook.__code__.co_names) for term in self.terms for hook in term.hooks.values())
+    def reads(self, *fields: str, but: str = "") -> bool:
+        """Whether any effect looks at one of these fields of the state, in any hook but the one called `but`."""
+        hooks = [hook for term in self.terms for name, hook in term.hooks.items() if name != but]
+        return any(set(fields) & set(hook.__code__.co_names) for hook in hooks)
 
     @property
     def has_memory(self) -> bool:

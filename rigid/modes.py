@@ -9,13 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from .dynamics import INNER_SPEED, LOST, OMEGA, VX, VY, Modes, System
+from .dynamics import OMEGA, VX, Modes, System
 
-__all__ = ["let_go", "resolve", "settle"]
+__all__ = ["let_go", "resolve"]
 
 _SAME = 1e-12  # a slip speed [m/s] or rate [rad/s] below this is rounding
-_EPS = 2.0**-52
-_REST = 1e-11  # accelerations below this share of g_sim (for the rotation g_sim / l) are rounding
 
 
 def _slip_rate(system: System, spike: int) -> float:
@@ -112,21 +110,3 @@ def let_go(system: System, modes: Modes) -> None:
     for contact in system.contacts:
         if modes.slip[contact.spike] == 0:
             modes.slip[contact.spike] = against if abs(contact.slip) < _SAME else (1 if contact.slip > 0 else -1)
-
-
-def settle(system: System, time: float, z: list[float], modes: Modes, rate: list[float]) -> bool:
-    """Whether everything is at rest and stays so: no speed, everything sticks, and no force is left but rounding."""
-    if not modes.touching or any(modes.slip[n] != 0 for n in modes.touching) or rate[LOST] != 0.0:
-        return False
-    if z[VX] != 0.0 or z[VY] != 0.0 or z[OMEGA] != 0.0:
-        return False
-    if system.model.reads("time") or (not modes.torque_over and system.model.reads("wheel_speed")):
-        return False  # what holds now may not hold later
-    if system.inner and z[INNER_SPEED] != 0.0:
-        return False
-    ax, ay, alpha = system.acceleration
-    trial = system.trial
-    shallow = min(max(system.depth(n, z), _EPS * trial.spike_length) for n in modes.touching)
-    small = max(_REST, 8 * _EPS * trial.spike_length / shallow) * trial.gravity_sim
-    inner = abs(rate[INNER_SPEED]) if system.inner else 0.0
-    return max(abs(ax), abs(ay), abs(alpha) * system.s.length, inner) <= small

@@ -16,8 +16,9 @@ from dataclasses import dataclass, field
 
 from .dormand_prince import Interpolant, Step, attempt, interpolant
 from .dynamics import LOST, OMEGA, THETA, VX, VY, WHEEL, Modes, System, Y
-from .modes import let_go, resolve, settle
+from .modes import let_go, resolve
 from .planar_events import KINKS, Monitor, Watch, cubic, monitors, precision, triggered
+from .rest import at_rest, comes_to_rest, resting
 from .statics import standing
 
 __all__ = ["Progress", "integrate"]
@@ -26,7 +27,6 @@ _LONGEST = 5e-3  # [s] with a spike in the ground
 _LONGEST_HOP = 2e-2  # [s] in flight
 _SHORTEST = 1e-9  # [s] below which the step no longer adapts
 _CROWD, _MOMENT = 40, 1e-6  # events, and within which time [s]
-
 
 
 @dataclass
@@ -69,18 +69,23 @@ def integrate(
     told.transitions.append((time, modes.state, z[THETA]))
     h, crowd, crowd_since = 1e-4, 0, -math.inf
     before: Watch = {}
-    fresh = True
+    fresh, quiet = True, False
     scale = _scale(system)
     while time < duration:
-        if settle(system, time, z, modes, rate):
+        if quiet or at_rest(system, z, modes, rate):
             end = duration if modes.torque_over else min(duration, trial.torque_until)
-            modes.resting = True
-            on_step(time, end, z, _constant(z), modes)
-            modes.resting, time = False, end
+            if rate[WHEEL] < 0:  # a brake ends with its wheel's speed
+                end = min(end, time - z[WHEEL] / rate[WHEEL])
+            rests = resting(time, z, rate)
+            z, modes.resting = rests(end), True
+            on_step(time, end, z, rests, modes)
+            modes.resting, time, quiet = False, end, False
             told.steps += 1
             if time >= duration:
                 break
             modes.torque_over = True
+            if trial.actuator == "brake" and time < trial.torque_until:
+                z[WHEEL] = 0.0
             rate, fresh = resolve(system, time, z, modes, vertical=True, rotation=True), True
             continue
         ends = duration if modes.torque_over else min(duration, trial.torque_until)
@@ -130,6 +135,8 @@ def integrate(
         elif any(modes.slip[n] == 0 for n in modes.touching) or system.has_vertical or system.has_rotation:
             system.hold_still(z, modes)
             rate = system.derivative(time, z, modes)
+            if comes_to_rest(system, time, z, modes, scale, tolerance):
+                rate, quiet = system.derivative(time, z, modes), True
         h = h_next
     return told
 
@@ -147,10 +154,6 @@ def _scale(system: System) -> list[float]:
     wheel = max(trial.wheel_speed_0, 1.0)
     scale = [0.1 * length, 0.1 * length, 0.1, length * rate, length * rate, rate, 10 * wheel, energy, energy]
     return [*scale, 0.1 * length, length * rate] if system.inner else scale
-
-
-def _constant(z: list[float]) -> Interpolant:
-    return lambda t: list(z)
 
 
 def _lowest(
@@ -286,13 +289,7 @@ def _switch(
             if abs(slip) < 1e-14:
                 may_stick.append(n)
         elif kind == "lift":
-            held = system.stored(n, z, modes)
-            if held > 0:  # what the ground still held when it let go
-                z[LOST] += held
-            modes.touching = [m for m in modes.touching if m != n]
-            modes.slip[n] = 0
-            if not system.sheds:
-                modes.top[n] = 0.0
+            _lift(system, z, modes, n)
         elif kind == "slip":
             may_stick.append(n)
         elif kind == "stick":
@@ -312,6 +309,15 @@ def _switch(
     return resolve(system, time, z, modes, spikes=may_stick, vertical=vertical, rotation=rotation)
 
 
+def _lift(system: System, z: list[float], modes: Modes, n: int) -> None:
+    """Spike `n` leaves the ground; what the ground still held when it let go is lost."""
+    z[LOST] += max(system.stored(n, z, modes), 0.0)
+    modes.touching = [m for m in modes.touching if m != n]
+    modes.slip[n] = 0
+    if not system.sheds:
+        modes.top[n] = 0.0
+
+
 def _set_by_speeds(system: System, z: list[float], modes: Modes) -> None:
     """After a forced step: who touches and which way they slide, read from the state as it is."""
     for n in range(system.trial.spike_count):
@@ -322,7 +328,7 @@ def _set_by_speeds(system: System, z: list[float], modes: Modes) -> None:
             modes.touch(n, h - z[Y])
             modes.slip[n] = 1 if z[VX] - z[OMEGA] * h > 0 else -1
         elif not inside and n in modes.touching:
-            modes.touching = [m for m in modes.touching if m != n]
+            _lift(system, z, modes, n)
         elif n in modes.touching and modes.slip[n]:
             slip = z[VX] - z[OMEGA] * h
             modes.slip[n] = 1 if slip > 0 else -1

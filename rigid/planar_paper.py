@@ -11,7 +11,8 @@ import math
 from collections.abc import Callable
 
 from .dynamics import INNER, INNER_SPEED, LOST, OMEGA, THETA, VX, VY, WHEEL, WORK, Modes, System, X, Y
-from .modes import resolve, settle
+from .modes import resolve
+from .rest import at_rest
 from .statics import standing
 
 __all__ = ["integrate_fixed"]
@@ -38,7 +39,11 @@ def integrate_fixed(
     count = round(duration / time_step)
     for k in range(1, count + 1):
         time = k * time_step
-        if settle(system, time, z, modes, rate):
+        if at_rest(system, z, modes, rate):
+            z[WHEEL] += time_step * rate[WHEEL]
+            if trial.actuator == "brake" and not modes.torque_over and z[WHEEL] <= 0 and trial.torque > 0:
+                z[WHEEL], modes.torque_over = 0.0, True
+                rate = resolve(system, time, z, modes, vertical=True, rotation=True)
             on_step(time, z, rate, modes)
             if not modes.torque_over and time >= trial.torque_until:
                 modes.torque_over = True

@@ -172,9 +172,42 @@ def test_events_crowded_by_force_are_answered_with_a_counted_step(monkeypatch):
     assert np.isfinite(run.x).all() and run.time[-1] == 0.3
 
 
-def test_bearing_drag_holds_the_platform_against_a_smaller_torque():
-    run = simulate(in_rig(0.05, effects=(effect("bearing-drag", torque=0.06),)), duration=10.0, sample_interval=0.1)
+def test_a_spike_that_a_counted_step_leaves_out_of_the_ground_books_what_the_ground_still_held():
+    # Adhesive ground holds A (back - d (1 - exp(-back / d))) of a tip drawn back from its deepest depth; pulled free of
+    # the surface within the step, that energy is no longer the ground's: it is lost, as where a lift-off is located.
+    import rigid.planar_located as located
+
+    force, reach, deepest, above = 0.8, 1e-4, 4e-4, 1e-6
+    trial = in_rig(effects=(effect("adhesion", force=force, reach=reach),))
+    system = System(trial)
+    modes = Modes(touching=[0, 7], slip=[1] * 8, top=[deepest] * 8, held=[deepest] * 8)
+    z = [0.0, LENGTH * math.cos(math.pi / 8) + above, 0.0, 0.01, 0.1, 0.0, 0.0, 0.0, 0.0]
+    before = sum(system.energy(0.0, z, modes))
+    located._set_by_speeds(system, z, modes)
+    assert modes.touching == [] and modes.state == "hop"
+    held = 2 * force * (deepest - reach * (1 - math.exp(-deepest / reach)))
+    assert z[8] == pytest.approx(held, rel=1e-12)
+    assert sum(system.energy(0.0, z, modes)) + z[8] == pytest.approx(before, rel=1e-12)
+
+
+def test_bearing_drag_holds_the_platform_against_a_smaller_torque_while_the_wheel_speeds_up():
+    trial = in_rig(0.05, effects=(effect("bearing-drag", torque=0.06),))
+    run = simulate(trial, duration=10.0, sample_interval=0.1)
     assert (run.theta == 0.0).all() and (run.omega == 0.0).all()
+    assert run.wheel_speed == pytest.approx(0.05 * run.time / 1.2e-3, rel=1e-12)  # J_w w' = tau
+    stepped = simulate(trial, duration=1.0, method="paper")
+    assert stepped.wheel_speed[-1] == pytest.approx(0.05 / 1.2e-3, rel=1e-9)
+
+
+def test_a_brake_that_the_bearing_bears_ends_when_its_wheel_stands():
+    # At rest all along: w = w_0 - tau t / J_w down to 0 at 1.2 s.
+    trial = in_rig(
+        0.05, actuator="brake", wheel_speed_0=50.0, effects=(effect("bearing-drag", torque=0.06),)
+    )
+    for method, slack in (("located", 1e-12), ("paper", 1e-9)):
+        run = simulate(trial, duration=2.0, method=method)
+        assert run.wheel_speed == pytest.approx(np.maximum(50.0 - 0.05 * run.time / 1.2e-3, 0.0), abs=50 * slack + 5e-9)
+        assert (run.theta == 0.0).all()
 
 
 def test_bearing_drag_slows_a_hop_at_drag_over_j_and_stops_it():
