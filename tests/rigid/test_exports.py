@@ -41,3 +41,21 @@ def test_a_platform_is_read_without_scipy():
     script = "import sys, rigid; rigid.find_platform('hedgehog').stance(); print('scipy' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
+
+
+def test_space_is_the_plane_when_started_in_it_by_what_the_package_offers():
+    """docs/platform.md: the same trial by both, rows of two tips; 1e-6 of l as in test_spatial.py."""
+    hedgehog = rigid.find_platform("hedgehog")
+    length = hedgehog.stance().spike_length
+    flat = rigid.Trial(spike_length=length, gravity_sim=0.0834, counterweight=5.21, mu_s=0.5, torque=0.22)
+    motor = rigid.TorqueHistory.constant(hedgehog.wheel(), 0.22)
+    space = rigid.SpatialTrial(
+        platform=hedgehog, gravity=0.0834, counterweight=5.21, mu_s=0.5, torques=(motor,),
+        ground_parameters={"stiffness": flat.stiffness / 2, "damping": flat.damping / 2},
+    )  # fmt: skip
+    planar = rigid.simulate(flat, duration=0.5, sample_interval=0.05, tolerance=1e-9)
+    spatial = rigid.simulate_spatial(space, duration=0.5, sample_interval=0.05, tolerance=1e-9)
+    assert abs(spatial.position[:, 0] - planar.x).max() < 1e-6 * length
+    assert abs(spatial.position[:, 2] - planar.y).max() < 1e-6 * length
+    assert abs(spatial.turn - planar.theta).max() < 2e-6
+    assert planar.theta[-1] > 0.05
