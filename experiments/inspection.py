@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from hedgebed import __version__
@@ -27,14 +26,10 @@ from .replicas import Condition, condition_of, condition_words, odd_replicates
 from .runfolder import RunFolder
 from .whole_runs import whole_run
 
-__all__ = ["check", "clock_jump", "find_faults", "resume", "run"]
-
-Array = NDArray[np.float64]
+__all__ = ["check", "find_faults", "resume", "run"]
 
 _LONG = 10.0
 """A step of the time this many times the usual one is a gap."""
-_AROUND = 8
-"""Readings on either side of a gap from which speeds are taken."""
 
 
 def check(settings: CheckSettings) -> None:
@@ -75,7 +70,7 @@ def _missing_sensors(campaign: Campaign) -> list[Finding]:
 
 
 def _faults_of_data(campaign: Campaign) -> list[Finding]:
-    """What diagnose finds when it reads the recordings; a gap of a camera's or a wheel's clock is told from a jump."""
+    """What diagnose finds when it reads the recordings."""
     if isinstance(campaign.tables, PenetrationCampaign):
         from .diagnose.penetration_data import prepare
 
@@ -83,22 +78,7 @@ def _faults_of_data(campaign: Campaign) -> list[Finding]:
     from .diagnose.tumble_checks import checked
     from .diagnose.tumble_data import tumble_data
 
-    found = [_named(finding) for finding in checked(tumble_data(campaign))[1]]
-    jumps = []
-    for (trial, sensor), recording in campaign.recordings.items():
-        stds = getattr(campaign.tables.sensors, sensor).std
-        row = clock_jump(recording, dict(zip(list(recording.columns)[1:], stds, strict=True)))
-        if row is None:
-            continue
-        before, after = float(recording.time[row - 1]), float(recording.time[row])
-        what = (
-            f"trial {trial}: the clock of {sensor} jumps by {after - before:.3g} s at {before:.4g} s, where the motion "
-            f"goes on as if it had not"
-        )
-        jumps.append(Finding(trial=trial, what=what, channel=sensor, from_s=before, to_s=after))
-        channels = {"pose": ("x", "y", "theta"), "imu": ("gyro", "ax", "ay"), "wheel": ("wheel",)}[sensor]
-        found = [f for f in found if not (f.trial == trial and f.channel in channels and f.from_s == before)]
-    return _merged(found) + jumps
+    return _merged([_named(finding) for finding in checked(tumble_data(campaign))[1]])
 
 
 def _named(finding: Finding) -> Finding:
@@ -119,45 +99,6 @@ def _merged(found: list[Finding]) -> list[Finding]:
         said = pattern.replace("*", ", ".join(names)) if len(alike) > 1 else alike[0].what
         merged.append(replace(alike[0], what=said))
     return merged
-
-
-def clock_jump(recording: Recording, stds: dict[str, float]) -> int | None:
-    """The row at which the clock jumps forward while the motion does not; None where it never does.
-
-    At a step of more than four times the usual one, each channel's line before it is compared with that after it: where
-    the change fits one usual step and not the time that the clock says (by 12 standard deviations), the clock is wrong,
-    unless another channel says that the time did pass. `stds`: column -> noise of the sensor.
-    """
-    time = recording.time
-    steps = np.diff(time)
-    if len(time) < 4 * _AROUND:
-        return None
-    usual = float(np.median(steps))
-    for k in np.flatnonzero(steps > 4 * usual) + 1:
-        if k < _AROUND or k > len(time) - _AROUND:
-            continue
-        said = [_time_passed(time, recording[name], std, int(k), usual) for name, std in stds.items()]
-        if False in said and True not in said:
-            return int(k)
-    return None
-
-
-def _time_passed(time: Array, values: Array, std: float, k: int, usual: float) -> bool | None:
-    """Whether a channel moved over the step before row `k` as far as its clock says; None where it cannot tell."""
-    before, after = slice(k - _AROUND, k), slice(k, k + _AROUND)
-    if not (np.isfinite(values[before]).all() and np.isfinite(values[after]).all()):
-        return None
-    left = np.polyfit(time[before] - time[k - 1], values[before], 1)
-    right = np.polyfit(time[after] - time[k], values[after], 1)
-    slope, bend = 0.5 * (left[0] + right[0]), 0.5 * abs(left[0] - right[0])
-    gap = float(time[k] - time[k - 1])
-    doubt = std * np.sqrt(12 / _AROUND) / (_AROUND * usual)  # of a slope
-    moved = right[1] - left[1]
-    stays = abs(moved - slope * usual) < 5 * std + (3 * bend + 4 * doubt) * usual
-    passes = abs(moved - slope * gap) < 5 * std + (bend + 4 * doubt) * gap
-    if stays == passes or abs(slope) * (gap - usual) < 12 * std + (bend + 4 * doubt) * gap:
-        return None
-    return bool(passes)
 
 
 # The result -----------------------------------------------------------------------------------------------------------
