@@ -1,149 +1,232 @@
 """`hedgebed bench diagnose`: campaigns with something hidden in them, diagnosed; what was named, what was missed.
 
-Each kind of trial has a module `benchmarks/hidden_<kind>.py` with ``make_hidden(seed) -> (campaign, Hidden)``; the code
-that diagnoses sees the campaign only. HEDGEBED_DIAGNOSE_CASES sets how many campaigns of each kind are made (40),
-HEDGEBED_DIAGNOSE_SEED the first seed (1000).
+    hedgebed bench diagnose [--kind penetration|tumble|both] [--count 40] [--seed 1] [--only WHAT] [--trials N]
+                            [--baselines yes|no] [--out DIR]
+
+The campaigns are those of `hidden_suite`. Each is written to a folder, and a process of its own that is given that
+folder and nothing else diagnoses it. DIR/cases.jsonl keeps every verdict: the same command with the same DIR goes on
+where it was stopped. A campaign is diagnosed again only where the code of the diagnosis or of the suite has changed
+since. With ``pip install .[bench]`` the baselines (`baselines`) get the same campaigns.
 """
 
 from __future__ import annotations
 
+import ast
+import hashlib
 import json
-import os
-import time
-from collections import defaultdict
-from importlib import import_module
-from importlib.util import find_spec
+import tempfile
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from functools import cache
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from rich.console import Console
-from rich.table import Table
 from threadpoolctl import threadpool_limits
 
-from experiments.diagnose.diagnosis import diagnose
+from experiments.campaign import write_campaign
 from experiments.progress import Progress
 
-__all__ = ["run", "summarise"]
+from . import baselines as others
+from .diagnose_table import show, summarise
+from .diagnose_worker import answer, begin
+from .hidden_suite import KINDS, make_case, suite
 
-_KINDS = ("penetration", "tumble")
-_BINS = ((0.0, 1.0), (1.0, 3.0), (3.0, 10.0), (10.0, float("inf")))
+__all__ = ["continues", "digest", "read_cases", "run"]
+
+Ask = Callable[[str], dict[str, Any]]
+_ROOT = Path(__file__).resolve().parent.parent
+_CODE = {
+    "code": ("experiments/diagnose", "experiments/campaign", "rigid"),
+    "suite": ("benchmarks/hidden_penetration.py", "benchmarks/hidden_tumble.py", "benchmarks/hidden_tumble_motion.py"),
+    "baselines": ("benchmarks/baselines.py", "benchmarks/baseline_rows.py", "benchmarks/baseline_motion.py"),
+}
+_FILE = "cases.jsonl"
 
 
-def run(out: Path, *, progress: Progress) -> dict[str, Any]:
-    """Make, diagnose and count; cases.jsonl in `out` grows as it goes."""
-    count, first = _whole("HEDGEBED_DIAGNOSE_CASES", 40), _whole("HEDGEBED_DIAGNOSE_SEED", 1000)
-    kinds = [kind for kind in _KINDS if find_spec(f"benchmarks.hidden_{kind}") is not None]
-    cases: list[dict[str, Any]] = []
-    for kind in kinds:
-        make = import_module(f"benchmarks.hidden_{kind}").make_hidden
-        problem_of = import_module(f"experiments.diagnose.{kind}_problem").make_problem
-        progress.stage(f"diagnose {kind}", total=count)
-        for seed in range(first, first + count):
-            case = _one(kind, seed, make, problem_of)
-            cases.append(case)
-            with (out / "cases.jsonl").open("a", encoding="utf-8") as file:
-                file.write(json.dumps(case) + "\n")
-            progress.message(f"{kind} {seed}: {case['hidden']} ({case['signature']:.2g}): {case['verdict']} "
-                             f"{' + '.join(case['effects'])} {case['alternatives'] or ''}")  # fmt: skip
-            progress.update(seed - first + 1)
-    result: dict[str, Any] = {"format": "hedgebed-bench/1", "what": "diagnose"}
-    result |= {"first_seed": first, "cases": len(cases)}
-    for kind in kinds:
-        result[kind] = summarise([case for case in cases if case["kind"] == kind])
-        _show(kind, result[kind])
+def run(
+    out: Path, *, progress: Progress, kind: str = "both", count: int = 40, seed: int = 1, only: str = "",
+    trials: int = 0, baselines: str = "yes", ask: Ask | None = None,
+) -> dict[str, Any]:  # fmt: skip
+    """Make, diagnose and count.
+
+    Args:
+        out: folder of cases.jsonl, which grows as it goes, and is where it goes on.
+        progress: what is done, and how long it has to go.
+        kind: of trials: penetration, tumble or both.
+        count: campaigns of each kind.
+        seed: of the suite.
+        only: hide this in every campaign; empty: the suite's mixture.
+        trials: of every campaign; 0: 6 to 24.
+        baselines: "yes" where the baselines are to run beside, if they are installed; "no".
+        ask: what answers for a folder; None: the diagnosis, in a process of its own.
+
+    Raises ValueError for settings that cannot be.
+    """
+    if kind not in (*KINDS, "both"):
+        raise ValueError(f"kind = {kind!r}: {', '.join(KINDS)} or both was expected")
+    if count < 1:
+        raise ValueError(f"count = {count}: at least 1 was expected")
+    if trials and not 4 <= trials <= 100:
+        raise ValueError(f"trials = {trials}: 0 (6 to 24), or 4 to 100, was expected")
+    if baselines not in ("yes", "no"):
+        raise ValueError(f"baselines = {baselines!r}: yes or no was expected")
+    kinds = KINDS if kind == "both" else (kind,)
+    plans = {one: suite(one, count, seed=seed, only=only or None, trials=trials or None) for one in kinds}
+    missing = others.missing() if baselines == "yes" else ""
+    if missing:
+        progress.message(missing)
+    wanted = baselines == "yes" and not missing
+    progress.plan({f"diagnose {one}": float(count) for one in kinds})
+    _mend(out / _FILE)
+    done = {_key(case): case for case in read_cases(out) if _current(case, "code") and _current(case, "suite")}
+    with _asking(ask) as asked:
+        for one, cases in plans.items():
+            left = [case for case in cases if not _finished(done.get(_key({"kind": one, "case": case})), wanted)]
+            progress.stage(f"diagnose {one}", total=max(len(left), 1))
+            if len(left) < len(cases):
+                progress.message(f"{one}: {len(cases) - len(left)} of {len(cases)} campaigns were done before")
+            for number, case in enumerate(left, 1):
+                record = _one(one, case, asked, done.get(_key({"kind": one, "case": case})), wanted)
+                done[_key(record)] = record
+                with (out / _FILE).open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(record) + "\n")
+                progress.message(_line(record))
+                progress.update(number)
+    result: dict[str, Any] = {"format": "hedgebed-bench/1", "what": "diagnose", "seed": seed, "count": count}
+    result |= {"date": _now(), "code": digest("code"), "suite": digest("suite"), "baselines": missing or baselines}
+    for one, cases in plans.items():
+        result[one] = summarise([done[_key({"kind": one, "case": case})] for case in cases])
+        show(one, result[one])
     return result
 
 
-def summarise(cases: list[dict[str, Any]]) -> dict[str, Any]:
-    """The figures of the aims from single cases."""
-    nulls = [c for c in cases if not c["truth"] and not c["outside"]]
-    single = [c for c in cases if len(c["truth"]) == 1 and not c["outside"]]
-    pairs = [c for c in cases if len(c["truth"]) == 2]
-    outside = [c for c in cases if c["outside"]]
-    seen = [c for c in outside if c["signature"] >= 1]
-    named = [c for c in single if c["verdict"] in ("named", "ambiguous")]
-    ambiguous = [c for c in single if c["verdict"] == "ambiguous"]
-    plain = [c for c in single if c["signature"] >= 10]
-    by_effect: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
-    for c in single:
-        low, high = next(b for b in _BINS if b[0] <= c["signature"] < b[1])
-        label = f"{low:g}-{high:g}"
-        by_effect[c["truth"][0]][label].append(float(_right(c)))
-    closed = [1 - (c["after"] - 1) / (c["before"] - 1) for c in named if _right(c) and c["before"] > 1.5]
-    return {
-        "cases": len(cases),
-        "false_alarms": _share([c["verdict"] != "none" for c in nulls]),
-        "named_right_plain": _share([_right(c) for c in plain]),
-        "named_right_when_visible": _share([_right(c) for c in single if c["signature"] >= 1]),
-        "missed_when_visible": _share([c["verdict"] == "none" for c in single if c["signature"] >= 1]),
-        "called_unknown_when_plain": _share([c["verdict"] == "unknown" for c in plain]),
-        "top1_by_effect": {
-            effect: {label: _share([bool(x) for x in v]) for label, v in bins.items()}
-            for effect, bins in by_effect.items()
-        },
-        "ambiguous_sets_hold_truth": _share([c["truth"][0] in {*c["effects"], *c["alternatives"]} for c in ambiguous]),
-        "set_size": float(np.mean([1 + len(c["alternatives"]) for c in named])) if named else None,
-        "pairs_both_named": _share([set(c["truth"]) == set(c["effects"]) for c in pairs]),
-        "pairs_one_named": _share([bool(set(c["truth"]) & set(c["effects"])) for c in pairs]),
-        "unknown_recall": _share([c["verdict"] == "unknown" for c in outside]),
-        "unknown_recall_when_visible": _share([c["verdict"] == "unknown" for c in seen]),
-        "held_out_at_most_1_2": _share([c["after"] <= 1.2 for c in named if _right(c)]),
-        "median_held_out_after": float(np.median([c["after"] for c in named if _right(c)])) if named else None,
-        "median_gap_closed": float(np.median(closed)) if closed else None,
-        "seconds": {"median": float(np.median([c["seconds"] for c in cases])),
-                    "most": float(max(c["seconds"] for c in cases)),
-                    "cpu_median": float(np.median([c["cpu"] for c in cases])),
-                    "cpu_most": float(max(c["cpu"] for c in cases))},
-    }  # fmt: skip
+def continues(out: Path) -> bool:
+    """Whether `out` holds an unfinished or finished run of this benchmark, with which it goes on."""
+    return (out / _FILE).is_file()
 
 
-def _one(kind: str, seed: int, make: Any, problem_of: Any) -> dict[str, Any]:
-    campaign, hidden = make(seed)
-    began, cpu = time.monotonic(), time.process_time()
-    with threadpool_limits(1):
-        found = diagnose(problem_of(campaign))
-    return {
-        "kind": kind, "seed": seed, "truth": list(hidden.effects), "outside": hidden.outside,
-        "hidden": " + ".join(hidden.effects) or hidden.outside or "nothing", "signature": float(hidden.signature),
-        "coloured": bool(hidden.coloured), "trials": len(campaign.tables.trial), "verdict": found.verdict,
-        "effects": list(found.effects), "alternatives": list(found.alternatives),
-        "forms": [form.id for form in found.forms],
-        "before": found.before.held_out if found.before.held_out is not None else found.before.fit,
-        "after": found.after.held_out if found.after.held_out is not None else found.after.fit,
-        "seconds": time.monotonic() - began, "cpu": time.process_time() - cpu,
-    }  # fmt: skip
+def read_cases(out: Path) -> list[dict[str, Any]]:
+    """The records in a folder's cases.jsonl, the latest last; none where there is no such file.
+
+    Raises ValueError, naming file and line, for a line that is no record; a last line that was cut short is left out.
+    """
+    path = out / _FILE
+    lines = path.read_text(encoding="utf-8").split("\n") if path.is_file() else []
+    found = []
+    for number, line in enumerate(lines, 1):
+        if not line.strip():
+            continue
+        try:
+            found.append(json.loads(line))
+        except ValueError as error:
+            if number == len(lines):  # without an end of line: the process ended while it wrote
+                break
+            raise ValueError(f"{path}, line {number}: {error}; a record of a case was expected") from None
+    return found
 
 
-def _right(case: dict[str, Any]) -> bool:
-    """Whether the first name is the truth, and nothing else is called certain."""
-    return case["verdict"] in ("named", "ambiguous") and case["effects"] == case["truth"]
+def _mend(path: Path) -> None:
+    """Take off a last line without an end, left by a process that ended while it wrote."""
+    if path.is_file() and not (data := path.read_bytes()).endswith(b"\n"):
+        path.write_bytes(data[: data.rfind(b"\n") + 1])
 
 
-def _share(flags: list[bool]) -> dict[str, Any]:
-    return {"share": float(np.mean(flags)) if flags else None, "of": len(flags)}
+@cache
+def digest(what: str) -> str:
+    """Of the sources behind a record: "code" that diagnoses, "suite" that makes up, or "baselines".
+
+    What is said about the code (comments, docstrings, how its lines are broken) does not count.
+    """
+    told = hashlib.sha256()
+    for place in _CODE[what]:
+        path = _ROOT / place
+        for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
+            told.update(_bare(file.read_text(encoding="utf-8")).encode())
+    return told.hexdigest()[:12]
 
 
-def _whole(name: str, default: int) -> int:
-    value = os.environ.get(name, str(default))
-    if not value.isdigit() or (int(value) < 1 and name.endswith("CASES")):
-        raise ValueError(f"{name} = {value!r}: a whole number was expected")
-    return int(value)
+def _bare(source: str) -> str:
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list):  # strings that stand alone are docstrings
+            node.body = [one for one in body if not (isinstance(one, ast.Expr) and isinstance(one.value, ast.Constant))]  # type: ignore[attr-defined]
+    return ast.dump(tree)
 
 
-def _show(kind: str, summary: dict[str, Any]) -> None:
-    table = Table(title=f"diagnose, {kind}: {summary['cases']} campaigns", title_justify="left", box=None)
-    table.add_column("figure")
-    table.add_column("value", justify="right")
-    table.add_column("of", justify="right")
-    for name, value in summary.items():
-        if isinstance(value, dict) and "share" in value:
-            table.add_row(name, "-" if value["share"] is None else f"{100 * value['share']:.0f} %", str(value["of"]))
-        elif isinstance(value, float):
-            table.add_row(name, f"{value:.3g}", "")
-    for effect, bins in summary["top1_by_effect"].items():
-        for label, share in sorted(bins.items()):
-            table.add_row(f"{effect}, signature {label}", f"{100 * share['share']:.0f} %", str(share["of"]))
-    for name, value in summary["seconds"].items():
-        table.add_row(f"seconds, {name}", f"{value:.3g}", "")
-    Console().print(table, markup=False)
+def _one(kind: str, case: dict[str, Any], ask: Ask, before: dict[str, Any] | None, wanted: bool) -> dict[str, Any]:
+    """One record; `before` is one that lacks the baselines only."""
+    campaign, hidden = make_case(kind, case)
+    record = before
+    if record is None:
+        with tempfile.TemporaryDirectory(prefix="hedgebed-bench-") as place:
+            write_campaign(Path(place) / "campaign", campaign)
+            said = ask(str(Path(place) / "campaign"))
+        record = {
+            "kind": kind, "case": case, "date": _now(), "code": digest("code"), "suite": digest("suite"),
+            "truth": list(hidden.effects), "outside": hidden.outside, "signature": float(hidden.signature),
+            "true_parameters": hidden.parameters if kind == "tumble" else {}, "coloured": bool(hidden.coloured),
+            "trials": len(campaign.tables.trial),
+        } | said  # fmt: skip
+    if wanted and "base_values" in record:
+        with threadpool_limits(1):
+            told = others.try_all(campaign, record["base_values"], record["fitted"], record["held_out"])
+        record = record | {"baselines": {"code": digest("baselines"), **told}}
+    return record
+
+
+def _finished(record: dict[str, Any] | None, wanted: bool) -> bool:
+    if record is None:
+        return False
+    tried = record.get("baselines", {}).get("code") == digest("baselines")
+    return tried or not wanted or "base_values" not in record
+
+
+def _current(record: dict[str, Any], what: str) -> bool:
+    return record.get(what) == digest(what)
+
+
+def _key(record: dict[str, Any]) -> str:
+    return json.dumps([record["kind"], record["case"]], sort_keys=True)
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def _line(record: dict[str, Any]) -> str:
+    truth = " + ".join(record["truth"]) or record["outside"] or "nothing"
+    said = " + ".join(record["effects"]) + "".join(f" or {name}" for name in record["alternatives"])
+    return (
+        f"{record['kind']} {record['case']['seed']}: {truth} ({record['signature']:.2g}), {record['trials']} trials: "
+        f"{record['verdict']} {said} in {record['seconds']:.0f} s"
+    )
+
+
+@contextmanager
+def _asking(ask: Ask | None) -> Iterator[Ask]:
+    """What answers for a folder: one process that goes on from case to case, a new one where it broke down."""
+    if ask is not None:
+        yield ask
+        return
+    pools: list[ProcessPoolExecutor] = []
+
+    def asked(folder: str) -> dict[str, Any]:
+        if not pools:
+            pools.append(ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=begin))
+        try:
+            return pools[0].submit(answer, folder).result()
+        except BrokenProcessPool as error:
+            pools.clear()
+            return {"verdict": "failed", "effects": [], "alternatives": [], "error": str(error), "seconds": 0.0,
+                    "cpu": 0.0}  # fmt: skip
+
+    try:
+        yield asked
+    finally:
+        for pool in pools:
+            pool.shutdown(cancel_futures=True)

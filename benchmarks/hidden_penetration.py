@@ -87,11 +87,14 @@ class _Law:
         return force
 
 
-def make_hidden(seed: int, *, kind: str | None = None, strength: float | None = None) -> tuple[Campaign, Hidden]:
+def make_hidden(
+    seed: int, *, kind: str | None = None, strength: float | None = None, trials: int | None = None
+) -> tuple[Campaign, Hidden]:
     """A campaign and what is hidden in it.
 
     `kind`: None draws one: a null (one in four), an effect, a pair, or what no library has (one in six); else
     ``null``, an effect's id, ``pair`` or one of `OUTSIDE`. `strength`: the signature aimed at, over the noise.
+    `trials`: how many; None draws 6 to 24.
     """
     random = np.random.default_rng(seed)
     kind = kind or _draw_kind(random)
@@ -100,8 +103,10 @@ def make_hidden(seed: int, *, kind: str | None = None, strength: float | None = 
     if kind == "pair":
         effects = tuple(str(e) for e in random.choice(EFFECTS, 2, replace=False))
     outside = kind if kind in OUTSIDE else None
-    plan = _plan(random, retreat=bool({"plastic-sinkage", "adhesion", "shaft-friction"} & set(effects)),
-                 drops=outside in ("loose-mass",), faster=bool({"inertial-drag"} & set(effects)))  # fmt: skip
+    plan = _plan(
+        random, retreat=bool({"plastic-sinkage", "adhesion", "shaft-friction"} & set(effects)),
+        drops=outside in ("loose-mass",), faster=bool({"inertial-drag"} & set(effects)), wanted=trials,
+    )  # fmt: skip
     coloured = random.random() < 0.3
     clean = [_trial(plan, k, {}) for k in range(len(plan["trials"]))]
     amplitude, made = 1.0, clean
@@ -131,7 +136,9 @@ def _draw_kind(random: np.random.Generator) -> str:
     return "pair" if draw < 0.5 else str(random.choice(EFFECTS))
 
 
-def _plan(random: np.random.Generator, *, retreat: bool, drops: bool, faster: bool) -> dict[str, Any]:
+def _plan(
+    random: np.random.Generator, *, retreat: bool, drops: bool, faster: bool, wanted: int | None
+) -> dict[str, Any]:
     """What is done: trials, the true K, C, what is believed of them, noise."""
     k, mass = float(np.exp(random.uniform(math.log(300), math.log(4000)))), float(random.uniform(0.2, 1.0))
     c = float(random.uniform(0.05, 0.3)) * 2 * math.sqrt(k * mass)
@@ -144,7 +151,8 @@ def _plan(random: np.random.Generator, *, retreat: bool, drops: bool, faster: bo
     style = "both" if drops or (faster and style == "driven") else style
     returns = retreat or random.random() < 0.6
     depth = float(random.uniform(0.012, 0.03))
-    count = int(random.choice([6, 8, 8, 10, 12, 16, 24]))
+    drawn = int(random.choice([6, 8, 8, 10, 12, 16, 24]))
+    count = wanted or drawn
     speeds = np.exp(np.sort(random.uniform(math.log(0.003), math.log(0.2), random.integers(2, 5))))
     drops_at = np.sort(random.uniform(0.1, 1.2, random.integers(2, 5)))
     gravities = [9.80665] if random.random() < 0.6 else [9.80665, 1.62]

@@ -1,27 +1,25 @@
 """Made-up campaigns of tumbles with something hidden in them, for `hedgebed bench diagnose`.
 
 Nothing here is shared with the code that diagnoses: the motions come from `hidden_tumble_motion`, the sensors are read
-off them here, and every effect has another functional form than the library's. What is hidden comes back beside the
-campaign, not in it: `write_suite` puts campaigns and answers into two folders.
+off them here, and every effect has another functional form than the library's where it can have one. What is hidden
+comes back beside the campaign, not in it: `hidden_suite.write_suite` puts campaigns and answers into two folders.
 """
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from experiments.campaign import Campaign, Recording, TumbleCampaign, write_campaign
+from experiments.campaign import Campaign, Recording, TumbleCampaign
 
 from .hidden_tumble_motion import COLUMNS, STEP, move
 
-__all__ = ["EFFECTS", "OUTSIDE", "HiddenTumble", "make_hidden_tumble", "suite", "write_suite"]
+__all__ = ["EFFECTS", "OUTSIDE", "HiddenTumble", "make_hidden_tumble"]
 
 EFFECTS = (
     "wheel-vibration", "pendulum", "com-offset", "slope", "tip-radius", "rig-friction", "pulley-inertia", "torque-fade",
@@ -34,6 +32,9 @@ _PRIORS = ("mass", "inertia", "stiffness", "damping", "mu_s", "mu_d")
 _GRAVITY = 9.80665
 _CHANNELS = ("x", "y", "theta", "gyro", "ax", "ay", "wheel")
 _COARSE = 5e-5  # step while an amplitude is looked for [s]
+_TRIES = 9  # of amplitudes
+_DRIFT = 0.1  # of a clock that runs wrong as well: share of its offset that is added in a second [1/s]
+_VIEW = 0.2  # from the middle of the camera's view, where its scale has changed by all of `scale_bend` [m]
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class HiddenTumble:
     effects: tuple[str, ...]
     outside: str | None
     parameters: dict[str, float]
-    """Those with fixed names (docs/campaigns.md), "<effect>.<name>"."""
+    """Those with fixed names (docs/diagnose.md), "<effect>.<name>"."""
     settings: dict[str, float]
     """All numbers of what is hidden, by `hidden_tumble_motion.COLUMNS`."""
     signature: float
@@ -110,44 +111,17 @@ def make_hidden_tumble(
     settings: dict[str, float] = {}
     signature = 0.0
     if forms:
-        clean = _measure(plan, true, gravity, {}, _COARSE)
-        amplitudes = [_amplitude(plan, true, gravity, form, strength, clean) for form in forms]
-        settings = _merged(forms, amplitudes)
-        signature = _left(plan, true, gravity, settings, clean)
+        seen = _Signature(plan, true, gravity)
+        settings = _merged(forms, [_amplitude(seen, form, strength) for form in forms])
+        signature = seen.of(settings)
     readings = _measure(plan, true, gravity, settings, STEP)
     coloured = bool(random.random() < 0.25)
-    campaign = _record(random, plan, readings, coloured, f"hidden {seed}")
+    campaign = _record(random, plan, readings, coloured, _wires(np.random.default_rng((seed, 1)), plan, settings))
     told = HiddenTumble(
         effects, outside, _parameters(effects, settings), settings, signature, coloured, len(plan.trials),
         true | {f"gravity[{k + 1:03d}]": float(g) for k, g in enumerate(gravity)},
     )  # fmt: skip
     return campaign, told
-
-
-def suite(count: int, *, seed: int = 1) -> list[dict[str, Any]]:
-    """Arguments of `make_hidden_tumble` for `count` cases: nulls 22 %, outside 17 %, pairs 8 %, the effects in turn."""
-    random = np.random.default_rng(seed)
-    kinds = ["null"] * math.ceil(0.22 * count) + [OUTSIDE[k % len(OUTSIDE)] for k in range(math.ceil(0.17 * count))]
-    kinds += ["pair"] * math.ceil(0.08 * count)
-    kinds += [EFFECTS[k % len(EFFECTS)] for k in range(max(0, count - len(kinds)))]
-    random.shuffle(kinds)
-    return [{"seed": 1000 * seed + k, "kind": kind} for k, kind in enumerate(kinds[:count])]
-
-
-def write_suite(folder: Path, answers: Path, cases: Sequence[Mapping[str, Any]]) -> None:
-    """Write the campaigns as FOLDER/<number> and what is hidden in them as ANSWERS/<number>.json.
-
-    Raises ValueError where the answers would lie within reach of whoever reads the campaigns.
-    """
-    folder, answers = folder.resolve(), answers.resolve()
-    if answers == folder or folder in answers.parents:
-        raise ValueError(f"answers = {str(answers)!r} lie within the campaigns' folder: another place was expected")
-    answers.mkdir(parents=True, exist_ok=True)
-    for number, case in enumerate(cases):
-        campaign, told = make_hidden_tumble(**case)
-        write_campaign(folder / f"{number:04d}", campaign)
-        text = json.dumps(asdict(told) | {"kind": told.kind, "case": dict(case)}, indent=1)
-        (answers / f"{number:04d}.json").write_text(text, encoding="utf-8")
 
 
 def _draw_kind(random: np.random.Generator) -> str:
@@ -178,7 +152,8 @@ def _plan(random: np.random.Generator, *, rig: bool, count: int | None) -> _Plan
     spin = float(random.choice((200.0, 300.0, 450.0)))
     conditions = [(g, t, "motor", 0.0) for g in gravities for t in motors]
     conditions += [(g, t, "brake", spin) for g in gravities for t in brakes]
-    count = count or int(random.choice((6, 8, 8, 8, 12, 16, 24)))
+    drawn = int(random.choice((6, 8, 8, 8, 12, 16, 24)))
+    count = count or drawn
     until = float(random.choice((10.0, 10.0, 0.8)))
     trials = []
     for k in range(count):
@@ -238,8 +213,8 @@ def _form(
         "plastic-sinkage": ({"plastic": 1.0}, {}, 0.3, 0.9),
         "adhesion": ({"adhesion": 1.0}, {"adhesion_reach": 0.7 * sinkage}, 0.05 * weight, 2.0 * weight),
         "bearing-drag": ({"bearing_dry": 1.0}, {"bearing_stribeck": 0.2}, 0.01 * weight, 0.1 * weight),
-        "clock-offset": ({"clock": sign}, {}, 4e-3, 0.1),
-        "camera-scale": ({"scale": sign}, {}, 0.01, 0.2),
+        "clock-offset": ({"clock": sign, "clock_drift": _DRIFT * sign if pick == 2 else 0.0}, {}, 4e-3, 0.1),
+        "camera-scale": ({"scale": sign, "scale_bend": 0.3 * sign if pick == 2 else 0.0}, {}, 0.01, 0.2),
         "floor-vibration": ({("floor_x", "floor_y")[pick % 2]: 1.0},
                             {"floor_rate": float(random.uniform(6, 20))}, 1e-5, 2e-3),
         "magnet": ({"magnet": weight}, {"magnet_x": float(random.uniform(0.03, 0.1))}, 0.1, 5.0),
@@ -259,62 +234,67 @@ def _merged(forms: Sequence[Any], amplitudes: Sequence[float]) -> dict[str, floa
     return settings
 
 
-def _amplitude(
-    plan: _Plan, true: Mapping[str, float], gravity: np.ndarray, form: Any, strength: float, clean: list[Any]
-) -> float:
-    """The amplitude whose largest change of a channel is twice `strength`: about half is explained away later."""
+class _Signature:
+    """What a change leaves of itself: see `HiddenTumble.signature`."""
+
+    def __init__(self, plan: _Plan, true: Mapping[str, float], gravity: np.ndarray) -> None:
+        self._plan, self._true, self._gravity = plan, true, gravity
+        clean = _measure(plan, true, gravity, {}, _COARSE)
+        self._base = self._stacked(clean)
+        self._channel = np.concatenate(
+            [np.full(len(one[name]), k) for one in clean for k, name in enumerate(_CHANNELS)]
+        )
+        rows, step = [], 0.1
+        for name in _PRIORS:
+            moved = dict(true) | {name: true[name] * (1 + step * plan.sigma[name])}
+            rows.append((self._stacked(_measure(plan, moved, gravity, {}, _COARSE)) - self._base) / step)
+        lifted = _measure(plan, true, gravity * (1 + step * plan.sigma_gravity), {}, _COARSE)
+        by_gravity = (self._stacked(lifted) - self._base) / step
+        edges = np.cumsum([0, *(sum(len(one[name]) for name in _CHANNELS) for one in clean)])
+        for low, high in pairwise(edges):  # a trial's gravity changes that trial
+            own = np.zeros(len(self._base))
+            own[low:high] = by_gravity[low:high]
+            rows.append(own)
+        self._matrix = np.array(rows)
+        self._normal = self._matrix @ self._matrix.T + np.eye(len(rows))
+
+    def of(self, settings: Mapping[str, float]) -> float:
+        """With these numbers of what is hidden."""
+        made = _measure(self._plan, self._true, self._gravity, settings, _COARSE)
+        change = self._stacked(made) - self._base
+        rest = change - np.linalg.solve(self._normal, self._matrix @ change) @ self._matrix
+        return max(float(np.sqrt(np.mean(rest[self._channel == k] ** 2))) for k in range(len(_CHANNELS)))
+
+    def _stacked(self, readings: list[Any]) -> np.ndarray:
+        return np.concatenate([one[name] / self._plan.std[name] for one in readings for name in _CHANNELS])
+
+
+def _amplitude(seen: _Signature, form: Any, strength: float) -> float:
+    """The amplitude whose signature comes nearest to `strength`.
+
+    A signature may jump with the amplitude, where a trial takes another branch of sticking and slipping: then one side
+    of the jump is as near as it gets.
+    """
     amplitude, most = form[2], form[3]
-    for _ in range(4):
-        made = _measure(plan, true, gravity, _merged([form], [amplitude]), _COARSE)
-        change = max(_sizes(plan, clean, made).values())
-        ratio = float(np.clip(2 * strength / max(change, 1e-9), 0.05, 20.0))
-        before, amplitude = amplitude, min(amplitude * ratio, most)
-        if abs(math.log(amplitude / before)) < 0.2:
+    below, above = 0.0, math.inf
+    found: list[tuple[float, float]] = []
+    for _ in range(_TRIES):
+        signature = max(seen.of(_merged([form], [amplitude])), 1e-9)
+        found.append((abs(math.log(signature / strength)), amplitude))
+        if found[-1][0] < 0.2 or (amplitude == most and signature < strength):
             break
-    return amplitude
-
-
-def _sizes(plan: _Plan, clean: list[Any], made: list[Any]) -> dict[str, float]:
-    """Root mean square of the change over the noise, by channel."""
-    found = {}
-    for name in _CHANNELS:
-        change = np.concatenate([(b[name] - a[name]) / plan.std[name] for a, b in zip(clean, made, strict=True)])
-        found[name] = float(np.sqrt(np.mean(change**2)))
-    return found
-
-
-def _left(
-    plan: _Plan, true: Mapping[str, float], gravity: np.ndarray, settings: Mapping[str, float], clean: list[Any]
-) -> float:
-    """The signature: see `HiddenTumble.signature`."""
-
-    def stacked(readings: list[Any]) -> np.ndarray:
-        return np.concatenate([one[name] / plan.std[name] for one in readings for name in _CHANNELS])
-
-    base = stacked(clean)
-    change = stacked(_measure(plan, true, gravity, settings, _COARSE)) - base
-    rows, step = [], 0.1
-    for name in _PRIORS:
-        moved = dict(true) | {name: true[name] * (1 + step * plan.sigma[name])}
-        rows.append((stacked(_measure(plan, moved, gravity, {}, _COARSE)) - base) / step)
-    moved_gravity = (
-        stacked(_measure(plan, true, gravity * (1 + step * plan.sigma_gravity), {}, _COARSE)) - base
-    ) / step
-    sizes = [sum(len(one[name]) for name in _CHANNELS) for one in clean]
-    edges = np.cumsum([0, *sizes])
-    for low, high in pairwise(edges):
-        own = np.zeros(len(base))
-        own[low:high] = moved_gravity[low:high]
-        rows.append(own)
-    matrix = np.array(rows)
-    found = np.linalg.solve(matrix @ matrix.T + np.eye(len(rows)), matrix @ change)
-    rest = change - found @ matrix
-    channel = np.concatenate([np.full(len(one[name]), k) for one in clean for k, name in enumerate(_CHANNELS)])
-    return max(float(np.sqrt(np.mean(rest[channel == k] ** 2))) for k in range(len(_CHANNELS)))
+        if signature < strength:
+            below = amplitude
+        else:
+            above = amplitude
+        step = amplitude * float(np.clip(strength / signature, 0.05, 20.0))
+        amplitude = step if below < step < above else math.sqrt(max(below, 1e-3 * above) * above)
+        amplitude = min(amplitude, most)
+    return min(found)[1]
 
 
 def _parameters(effects: Sequence[str], settings: Mapping[str, float]) -> dict[str, float]:
-    """Those that docs/campaigns.md names."""
+    """Those that docs/diagnose.md names."""
     named = {
         "pendulum": {"pendulum.length": lambda s: 1 / s["wire_curvature"]},
         "com-offset": {"com-offset.x": lambda s: s["offset_x"], "com-offset.y": lambda s: s["offset_y"]},
@@ -323,7 +303,7 @@ def _parameters(effects: Sequence[str], settings: Mapping[str, float]) -> dict[s
         "pulley-inertia": {"pulley-inertia.mass": lambda s: s["pulley_mass"]},
         "rig-friction": {"rig-friction.force": lambda s: s["rig_dry"]},
         "bearing-drag": {"bearing-drag.torque": lambda s: s["bearing_dry"]},
-        "clock-offset": {"clock-offset.offset": lambda s: s["clock"]},
+        "clock-offset": {"clock-offset.offset": lambda s: s["clock"] + s.get("clock_drift", 0.0)},  # after a second
         "camera-scale": {"camera-scale.scale": lambda s: 1 + s["scale"]},
     }
     return {name: float(of(settings)) for effect in effects for name, of in named.get(effect, {}).items()}
@@ -362,8 +342,7 @@ def _read(
     camera, imu, wheel = (
         np.arange(math.ceil(-plan.lead * rate), math.floor(plan.duration * rate) + 1) / rate for rate in plan.rates
     )
-    true = imu - settings.get("clock", 0.0)
-    scale = 1 + settings.get("scale", 0.0)
+    true = imu - settings.get("clock", 0.0) - settings.get("clock_drift", 0.0) * imu
     lean = settings.get("slope", 0.0)
     x, y, theta, vx, vy, omega, spin = motion[:, :7].T
     dt = time[1] - time[0]
@@ -383,16 +362,29 @@ def _read(
         found[name] = (
             np.interp(true + window / 2, whole, summed) - np.interp(true - window / 2, whole, summed)
         ) / window
-    found["x"] = scale * np.interp(camera, time, x)
-    found["y"] = scale * np.interp(camera, time, y)
+    seen_x, seen_y = np.interp(camera, time, x), np.interp(camera, time, y)
+    away = (seen_x**2 + (seen_y - y[0]) ** 2) / _VIEW**2
+    scale = 1 + settings.get("scale", 0.0) + settings.get("scale_bend", 0.0) * away
+    found["x"] = scale * seen_x
+    found["y"] = scale * seen_y
     found["theta"] = np.interp(camera, time, theta)
     found["gyro"] = np.interp(true, whole, np.concatenate([still, omega]))
     found["wheel"] = np.abs(np.interp(wheel, time, spin))
     return found
 
 
+def _wires(random: np.random.Generator, plan: _Plan, settings: Mapping[str, float]) -> float | None:
+    """Length of the wires [m], stated in half of the rig's campaigns: that says nothing of a pendulum."""
+    stated = bool(random.random() < 0.5)
+    if not plan.rig or not stated:
+        return None
+    curvature = settings.get("wire_curvature", 0.0)
+    length = (1 + 0.01 * random.standard_normal()) / curvature if curvature > 0 else random.uniform(1.5, 3.0)
+    return round(float(length), 3)
+
+
 def _record(
-    random: np.random.Generator, plan: _Plan, readings: list[dict[str, np.ndarray]], coloured: bool, name: str
+    random: np.random.Generator, plan: _Plan, readings: list[dict[str, np.ndarray]], coloured: bool, wires: float | None
 ) -> Campaign:
     persistence = float(random.uniform(0.2, 0.6)) if coloured else 0.0
 
@@ -415,10 +407,10 @@ def _record(
             {"t_s": one["imu_t"], "gyro_rad_s": taken["gyro"], "ax_m_s2": taken["ax"], "ay_m_s2": taken["ay"]}
         )
         recordings[id, "wheel"] = Recording({"t_s": one["wheel_t"], "omega_rad_s": taken["wheel"]})
-    return Campaign(_tables(plan, name), recordings)
+    return Campaign(_tables(plan, wires), recordings)
 
 
-def _tables(plan: _Plan, name: str) -> TumbleCampaign:
+def _tables(plan: _Plan, wires: float | None) -> TumbleCampaign:
     stated, std = plan.stated, plan.std
     trials = []
     for number, trial in enumerate(plan.trials, 1):
@@ -426,7 +418,7 @@ def _tables(plan: _Plan, name: str) -> TumbleCampaign:
         told = {key: value for key, value in trial.items() if key != "counterweight" or plan.rig}
         trials.append({"id": id, **told, "pose": f"{id}-pose.csv", "imu": f"{id}-imu.csv", "wheel": f"{id}-wheel.csv"})
     tables: dict[str, Any] = {
-        "format": "hedgehog-campaign/1", "kind": "tumble", "name": name,
+        "format": "hedgehog-campaign/1", "kind": "tumble", "name": "made up",
         "platform": {"mass": stated["mass"], "inertia": stated["inertia"], "spike_length": 0.2},
         "wheel": {"inertia": 1.2e-3},
         "surface": {"kind": plan.surface, "granular": plan.surface in ("sand", "gravel"),
@@ -439,4 +431,5 @@ def _tables(plan: _Plan, name: str) -> TumbleCampaign:
     }  # fmt: skip
     if plan.rig:
         tables["rig"] = {"counterweight": plan.trials[0]["counterweight"], "gravity": _GRAVITY}
+        tables["rig"] |= {} if wires is None else {"wire_length": wires}
     return TumbleCampaign(**tables)

@@ -66,7 +66,8 @@ def _kernel() -> Any:
             peak = K * top
             if bend > 0.0:
                 peak = K * top * (1.0 + bend * top)
-            loaded = peak * share * (0.7 + 0.3 * share)
+            bent = ti.min(0.3, 1.5 * plastic)  # with the crater the way back straightens out
+            loaded = peak * share * (1.0 - bent + bent * share)
         pull = 0.0
         A = p[i, NUMBER["adhesion"]]
         if A > 0.0 and depth < top:

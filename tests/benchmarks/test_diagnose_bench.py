@@ -1,17 +1,25 @@
-"""The figures of `hedgebed bench diagnose`: counted from cases whose answers are known."""
+"""The figures of `hedgebed bench diagnose`: counted from cases whose answers are known, kept from run to run."""
+
+import ast
+import json
+from pathlib import Path
 
 import numpy as np
 import pytest
+from penetration_campaigns import campaign_of, driven_trial
 
-from benchmarks.diagnose import summarise
-from benchmarks.hidden_penetration import EFFECTS, make_hidden
+import benchmarks.diagnose as bench
+from benchmarks.diagnose_table import show, summarise
+from benchmarks.hidden_penetration import EFFECTS, Hidden, make_hidden
+from experiments.benching import benchmark_options, goes_on
+from experiments.progress import Progress
 
 
-def case(truth, verdict, effects=(), *, outside=None, signature=20.0, alternatives=(), before=9.0, after=1.0):
+def case(truth, verdict, effects=(), *, outside=None, signature=20.0, alternatives=(), before=9.0, after=1.0, **more):
     return {
         "truth": list(truth), "outside": outside, "signature": signature, "verdict": verdict,
-        "effects": list(effects), "alternatives": list(alternatives), "before": before, "after": after,
-        "seconds": 1.0, "cpu": 1.0,
+        "effects": list(effects), "alternatives": list(alternatives), "before": {"fit": 8.0, "held_out": before},
+        "after": {"fit": 1.0, "held_out": after}, "seconds": 1.0, "cpu": 1.0, "trials": 8, **more,
     }  # fmt: skip
 
 
@@ -24,9 +32,119 @@ def test_alarms_names_and_unknowns_are_counted_apart():
     ])  # fmt: skip
     assert summary["false_alarms"] == {"share": 0.5, "of": 2}
     assert summary["named_right_plain"] == {"share": 0.5, "of": 2}
+    assert summary["top1_by_effect"]["adhesion"] == {
+        "10-inf": {"share": 0.5, "of": 2}, "1-3": {"share": 0.0, "of": 1}}  # fmt: skip
+    assert summary["sets_hold_truth"] == {"share": pytest.approx(2 / 3), "of": 3}
     assert summary["ambiguous_sets_hold_truth"] == {"share": 1.0, "of": 1}
     assert summary["unknown_recall"] == {"share": 0.5, "of": 2}
     assert summary["median_gap_closed"] == pytest.approx(1.0)
+    show("penetration", summary)
+
+
+def test_parameters_are_off_by_their_share_and_intervals_hold_the_truth_or_not():
+    cases = [
+        case(["slope"], "named", ["slope"], true_parameters={"slope.angle": 0.01},
+             found_parameters={"slope": {"angle": {"value": value, "std": 5e-4, "unit": "rad"}}})
+        for value in (0.0105, 0.012)
+    ]  # fmt: skip
+    told = summarise(cases)["parameters"]
+    assert told["median_relative_error"] == pytest.approx(0.125)
+    assert told["intervals_hold_truth"] == {"share": 0.5, "of": 2}
+
+
+def test_baselines_stand_beside_us_on_the_very_same_cases():
+    beside = {"alarm": True, "before": {"fit": None, "held_out": 9.0}, "after": {"fit": None, "held_out": 5.0},
+              "points_to": ["layering"], "seconds": 2.0}  # fmt: skip
+    told = summarise([
+        case(["adhesion"], "named", ["adhesion"], baselines={"code": "x", "pysindy": beside}),
+        case((), "none", signature=0.0, baselines={"code": "x", "pysindy": beside}),
+        case(["adhesion"], "named", ["layering"]),
+    ])["baselines"]  # fmt: skip
+    assert told["pysindy"]["false_alarms"] == {"share": 1.0, "of": 1}
+    assert told["pysindy"]["median_gap_closed"] == pytest.approx(0.5)
+    assert told["pysindy"]["names_right"] == {"share": 0.0, "of": 1}
+    assert told["ours"]["names_right"] == {"share": 1.0, "of": 1}
+
+
+@pytest.fixture
+def made(monkeypatch):
+    """Campaigns that cost nothing; their answers name an effect."""
+    recording = driven_trial(lambda z, v, top: 900 * z, speed=0.01)
+
+    def make(kind, case):
+        return campaign_of([("001", "driven", 0.01, recording)]), Hidden(("layering",), None, {}, 5.0, False)
+
+    monkeypatch.setattr(bench, "make_case", make)
+
+
+def answered(folder):
+    return {"verdict": "named", "effects": ["layering"], "alternatives": [], "before": {"fit": 9.0, "held_out": 9.0},
+            "after": {"fit": 1.0, "held_out": 1.0}, "found_parameters": {}, "seconds": 1.0, "cpu": 1.0}  # fmt: skip
+
+
+def test_a_bench_that_was_stopped_goes_on_and_diagnoses_nothing_twice(made, tmp_path):
+    asked = []
+
+    def ask(folder):
+        if len(asked) == 2:
+            raise KeyboardInterrupt
+        asked.append(folder)
+        return answered(folder)
+
+    settings = {"progress": Progress(), "kind": "penetration", "count": 4, "baselines": "no"}
+    with pytest.raises(KeyboardInterrupt):
+        bench.run(tmp_path, ask=ask, **settings)
+    assert goes_on(bench.run, tmp_path)
+    with (tmp_path / "cases.jsonl").open("a") as file:
+        file.write('{"kind": "penet')  # what a process leaves that is killed while it writes
+    later = []
+    result = bench.run(tmp_path, ask=lambda folder: later.append(folder) or answered(folder), **settings)
+    assert len(later) == 2
+    assert result["penetration"]["cases"] == 4
+    bench.run(tmp_path, ask=None, **settings)  # nothing is left to ask
+
+
+def test_a_campaign_is_diagnosed_again_where_the_code_has_changed(made, tmp_path, monkeypatch):
+    settings = {"progress": Progress(), "kind": "penetration", "count": 2, "baselines": "no"}
+    bench.run(tmp_path, ask=answered, **settings)
+    monkeypatch.setattr(bench, "digest", lambda what: "changed")
+    later = []
+    bench.run(tmp_path, ask=lambda folder: later.append(folder) or answered(folder), **settings)
+    assert len(later) == 2
+
+
+def test_whoever_diagnoses_is_given_a_folder_without_the_answer(made, tmp_path):
+    def ask(folder):
+        for path in Path(folder).rglob("*"):
+            assert "layering" not in path.read_text(encoding="utf-8")
+        return answered(folder)
+
+    bench.run(tmp_path, ask=ask, progress=Progress(), kind="penetration", count=1, baselines="no")
+    (record,) = bench.read_cases(tmp_path)
+    assert record["truth"] == ["layering"]
+    source = Path(bench.__file__).with_name("diagnose_worker.py").read_text(encoding="utf-8")
+    imported = {node.module or "" for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ImportFrom)}
+    assert not any("hidden" in name or name == "" for name in imported)
+
+
+def test_a_line_that_is_no_record_is_named(tmp_path):
+    (tmp_path / "cases.jsonl").write_text('{"kind": 1}\nrubbish\n{"kind": 2}\n', encoding="utf-8")
+    with pytest.raises(ValueError, match=r"cases\.jsonl, line 2"):
+        bench.read_cases(tmp_path)
+
+
+def test_options_that_a_benchmark_has_not_are_refused():
+    assert benchmark_options(bench.run, {"count": "7", "kind": "tumble"}) == {"count": 7, "kind": "tumble"}
+    with pytest.raises(ValueError, match="--cuont is no option here; did you mean 'count'"):
+        benchmark_options(bench.run, {"cuont": "7"})
+    with pytest.raises(ValueError, match="count = 'few': a whole number was expected"):
+        benchmark_options(bench.run, {"count": "few"})
+    with pytest.raises(ValueError, match="kind = 'hop'"):
+        bench.run(Path("nowhere"), progress=Progress(), kind="hop")
+
+
+def test_comments_do_not_make_code_another_one():
+    assert bench._bare('"""One."""\nx = 1  # two\n') == bench._bare("x = 1\n") != bench._bare("x = 2\n")
 
 
 def test_the_answer_is_not_in_the_campaign_and_a_seed_gives_the_same_campaign():
@@ -37,3 +155,4 @@ def test_the_answer_is_not_in_the_campaign_and_a_seed_gives_the_same_campaign():
     assert 4.0 < hidden.signature < 16.0
     first, second = campaign.recording("001", "data"), again.recording("001", "data")
     assert all(np.array_equal(first[name], second[name]) for name in first.columns)
+    assert json.loads(text)["name"] == "made up"

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from benchmarks.hidden_tumble import EFFECTS, OUTSIDE, make_hidden_tumble, suite, write_suite
+from benchmarks import hidden_penetration, hidden_tumble
+from benchmarks.hidden_suite import STRENGTHS, suite, write_suite
+from benchmarks.hidden_tumble import EFFECTS, OUTSIDE, make_hidden_tumble
 from benchmarks.hidden_tumble_motion import COLUMNS, move
 from rigid import Trial, simulate
 
@@ -37,24 +39,55 @@ def test_without_anything_hidden_the_motion_is_that_of_the_accurate_integrator()
         assert np.mean(mine[:, 7] != exact.state) < 0.02
 
 
-def test_every_kind_changes_what_the_sensors_read():
-    nothing, _ = make_hidden_tumble(3, kind="null", trials=6)
-    assert len(nothing.tables.trial) == 6
-    for kind in ("rate-friction", "clock-offset", OUTSIDE[0]):
-        campaign, told = make_hidden_tumble(3, kind=kind, strength=10.0, trials=6)
+def test_what_is_hidden_comes_out_as_strong_as_it_was_asked_for():
+    """Signatures within 30 % where they do not jump; a null has none."""
+    nothing, told = make_hidden_tumble(3, kind="null", trials=4)
+    assert (told.signature, told.kind) == (0.0, "null")
+    assert len(nothing.tables.trial) == 4
+    for kind, strength in (("clock-offset", 2.0), (OUTSIDE[1], 15.0)):
+        campaign, told = make_hidden_tumble(3, kind=kind, strength=strength, trials=4)
         assert told.kind == kind
-        assert 1.0 < told.signature < 60.0
-        assert len(campaign.recordings) == 18
+        assert 0.7 * strength < told.signature < 1.4 * strength
+        assert len(campaign.recordings) == 12
+        assert campaign.tables.name == "made up"
 
 
-def test_a_suite_has_nulls_things_outside_the_library_and_every_effect():
-    kinds = [case["kind"] for case in suite(100)]
+def test_a_small_crater_changes_little():
+    """The way back straightens out with the crater: nothing is left of it in the limit."""
+    plain, cratered = row(plastic=0.0), row(plastic=1e-4)
+    _, motions = move(np.array([plain, cratered]), 0.8)
+    assert 0 < np.abs(motions[1, :, :3] - motions[0, :, :3]).max() < 2e-4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [*EFFECTS, *OUTSIDE])
+def test_every_kind_can_be_barely_visible_and_plain(kind):
+    for strength in (1.0, 20.0):
+        _, told = make_hidden_tumble(500, kind=kind, strength=strength, trials=6)
+        assert 0.4 * strength < told.signature < 2.5 * strength
+
+
+@pytest.mark.parametrize("kind, module", [("tumble", hidden_tumble), ("penetration", hidden_penetration)])
+def test_a_suite_has_nulls_things_outside_the_library_and_every_effect(kind, module):
+    cases = suite(kind, 100)
+    kinds = [case["kind"] for case in cases]
     assert kinds.count("null") >= 20
-    assert sum(kind in OUTSIDE for kind in kinds) >= 15
-    assert set(EFFECTS) <= set(kinds)
-    assert suite(100) == suite(100)
+    assert sum(one in module.OUTSIDE for one in kinds) >= 15
+    assert kinds.count("pair") >= 5
+    assert set(module.EFFECTS) | set(module.OUTSIDE) <= set(kinds)
+    strengths = [case["strength"] for case in cases if case["kind"] in module.EFFECTS]
+    assert min(strengths) < 1.5 * STRENGTHS[0] and max(strengths) > 0.7 * STRENGTHS[1]
+    assert suite(kind, 12) == cases[:12]
+    assert suite(kind, 12, seed=2) != cases[:12]
+
+
+def test_what_is_not_there_to_hide_is_refused():
+    with pytest.raises(ValueError, match="only = 'ghost'"):
+        suite("tumble", 3, only="ghost")
+    with pytest.raises(ValueError, match="kind = 'hop'"):
+        suite("hop", 3)
 
 
 def test_answers_within_the_campaigns_folder_are_refused(tmp_path):
     with pytest.raises(ValueError, match="another place was expected"):
-        write_suite(tmp_path / "cases", tmp_path / "cases" / "answers", [])
+        write_suite(tmp_path / "cases", tmp_path / "cases" / "answers", "tumble", [])

@@ -1,0 +1,52 @@
+"""Diagnoses a campaign's folder for `hedgebed bench diagnose`, in a process that is told nothing else.
+
+This module must not import what makes campaigns up (`hidden_*`): the answers are in another process.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+import traceback
+from pathlib import Path
+from typing import Any
+
+__all__ = ["answer", "begin"]
+
+
+def begin() -> None:
+    """What a fresh process does first: what it prints belongs to the progress, not to the result."""
+    os.dup2(2, 1)
+
+
+def answer(folder: str) -> dict[str, Any]:
+    """What `hedgebed diagnose` says of the campaign in `folder`, as plain numbers and names.
+
+    A diagnosis that fails is an answer too: its verdict is "failed", and `error` says why.
+    """
+    began, spent = time.monotonic(), time.process_time()
+    try:
+        told = _diagnosed(folder)
+    except Exception:
+        told = {"verdict": "failed", "effects": [], "alternatives": [], "error": traceback.format_exc(limit=-3)}
+    return told | {"seconds": time.monotonic() - began, "cpu": time.process_time() - spent}
+
+
+def _diagnosed(folder: str) -> dict[str, Any]:
+    from experiments.diagnose.experiment import diagnose_campaign
+
+    found = diagnose_campaign(Path(folder))
+    return {
+        "verdict": found.verdict,
+        "effects": list(found.effects),
+        "alternatives": list(found.alternatives),
+        "forms": [form.id for form in found.forms],
+        "found_parameters": {effect: found.parameters(effect) for effect in found.effects},
+        "before": {"fit": found.before.fit, "held_out": found.before.held_out},
+        "after": {"fit": found.after.fit, "held_out": found.after.held_out},
+        "fitted": list(found.fitted),
+        "held_out": list(found.held_out),
+        "base_values": {name: float(value) for name, value in found.base_values.items()},
+        "depends_on": found.depends_on,
+        "findings": [finding.what for finding in found.findings],
+    }
