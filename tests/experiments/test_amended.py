@@ -150,3 +150,29 @@ def test_beside_a_bed_that_does_not_spring_back_the_amended_law_closes_the_gap(t
     assert (tmp_path / "run" / result["runs"][0]["amended_series"]).exists()
     campaign = read_campaign(tmp_path / "c")
     assert len(campaign.tables.trial) == 6 and campaign.tables.sensors.force.std == (0.01,)
+
+
+MUD = """
+from rigid.terms import Parameter, Term
+
+
+def drag(s, depth, rate, c):
+    return c * rate
+
+
+TERM = Term(id="mud", summary="mud drags both ways", acts="contact", source="ours", limits="slow",
+            hooks={"rate_force": drag},
+            parameters=(Parameter(name="c", unit="N s/m", default=0.0, lowest=0.0, summary="drag"),))
+FIT = {"c": {"typical": 2.0}}
+"""
+
+
+def test_an_effect_of_ones_own_is_part_of_the_law(law, tmp_path):
+    (tmp_path / "mud.py").write_text(MUD)
+    effect = '[[effect]]\nid = "mud"\nfile = "mud.py"\nparameters = {c = 3.0}\n'
+    plain, amended = runs_of(law(effect))["driven"]
+    z, v = plain.depth, plain.velocity
+    closed = np.where(z > 0, K * z + C * np.maximum(v, 0) + 3.0 * v, 0.0)
+    assert amended.force == pytest.approx(closed, abs=1e-9)
+    with pytest.raises(ValueError, match="c is missing"):
+        law(effect.replace("c = 3.0", ""))
