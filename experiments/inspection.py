@@ -96,7 +96,8 @@ def _merged(found: list[Finding]) -> list[Finding]:
     merged = []
     for (_, _, _, pattern), alike in groups.items():
         names = [f.channel for f in alike if f.channel]
-        said = pattern.replace("*", ", ".join(names)) if len(alike) > 1 else alike[0].what
+        together = pattern.replace("*", ", ".join(names)).replace(" has no ", " have no ")
+        said = together if len(alike) > 1 else alike[0].what
         merged.append(replace(alike[0], what=said))
     return merged
 
