@@ -620,7 +620,9 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                             ahead = share
                             kind = 9
                 # -- an event within the step: go back and come only so far --
-                if kind != 0 and dt > 0.0 and not cut and ahead < 0.999 and splits < MOST_SPLITS:
+                # (again where the shorter step shows that another one comes before the one it was cut at)
+                other = not cut or kind != cut_kind or which != cut_spike
+                if kind != 0 and dt > 0.0 and other and ahead < 0.999 and splits < MOST_SPLITS:
                     cut = True
                     cut_kind = kind
                     cut_spike = which

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.planar import AMPLITUDES
-from rigid import EFFECTS, Effect, Trial
+from benchmarks.planar_agreement import random_trial
+from rigid import Effect, Trial
 
 G = 9.80665
 MASS, INERTIA, LENGTH = 5.3, 0.06, 0.2
@@ -40,21 +41,5 @@ def drawn_effect(id: str, rng: np.random.Generator) -> Effect:
 
 
 def drawn(rng: np.random.Generator, effects: tuple[str, ...] = ()) -> Trial:
-    """A random trial: motor or brake, rig or free, both of the paper's gravities, soft to hard ground."""
-    mass, level = rng.uniform(4, 7), rng.choice([0.0085, 0.015]) * G
-    rigged = any(EFFECTS[id].needs_rig for id in effects) or rng.random() < 0.6
-    brake = rng.random() < 0.3
-    return Trial(
-        mass=mass,
-        inertia=rng.uniform(0.04, 0.09),
-        gravity_sim=level,
-        counterweight=counterweight(level, mass) if rigged else 0.0,
-        mu_s=rng.uniform(0.15, 0.8),
-        stiffness=10 ** rng.uniform(3, 4.3),
-        damping=10 ** rng.uniform(0.5, 2.2),
-        torque=6.0 if brake else rng.uniform(0.05, 0.4),
-        actuator="brake" if brake else "motor",
-        wheel_speed_0=rng.uniform(50, 400) if brake else 0.0,
-        torque_until=10.0 if rng.random() < 0.7 else rng.uniform(0.05, 0.8),
-        effects=tuple(drawn_effect(id, rng) for id in effects),
-    )
+    """A random trial as the benchmark draws it, with `RANGES` of the effects."""
+    return random_trial(rng, effects, RANGES)

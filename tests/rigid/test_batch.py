@@ -6,65 +6,80 @@ import numpy as np
 import pytest
 from rigid_trials import RANGES, drawn, effect, in_rig
 
+from benchmarks.planar_agreement import SHARE_WITHIN, compare
 from dem import runtime
-from rigid import EFFECTS, Effect, Ground, simulate, simulate_batch
-
-TIMES = np.linspace(0.0, 1.0, 101)
-# The stated agreement at 1 ms over 1 s: 99 % of random trials within the first, all within the second, unless a finer
-# step shows that the trial is at the edge of a grazing or a stick (then it converges to the accurate one).
-USUAL = {"x": 5e-5, "y": 2e-4, "theta": 1.5e-3, "vx": 1e-4, "vy": 4e-4, "omega": 3e-3}
-WORST = {"x": 5e-4, "y": 1e-3, "theta": 1e-2, "vx": 1e-3, "vy": 2e-3, "omega": 5e-2}
+from rigid import EFFECTS, Effect, Ground, Trial, simulate, simulate_batch
 
 
-def differences(trials, *, time_step=1e-3):
-    """Largest difference over the samples, by channel, for every trial that can stand."""
-    batch = simulate_batch(trials, duration=1.0, times=TIMES, time_step=time_step)
-    out = {name: [] for name in USUAL}
-    for i, trial in enumerate(trials):
-        try:
-            run = simulate(trial, duration=1.0, times=TIMES)
-        except ValueError:
-            assert not batch.stands[i]
-            continue
-        assert batch.stands[i]
-        for name in USUAL:
-            out[name].append(np.abs(batch.channel(name)[i] - getattr(run, name)).max())
-    return {name: np.array(values) for name, values in out.items()}
+def random_effects(rng, most=4):
+    """One to `most` of the effects."""
+    chosen = set(rng.permutation(list(RANGES))[: rng.integers(1, most + 1)])
+    return tuple(id for id in RANGES if id in chosen)
 
 
 def assert_agreement(trials):
-    found = differences(trials)
-    for name, values in found.items():
-        assert np.quantile(values, 0.99, method="lower") < USUAL[name], name
-    late = sorted({int(i) for name in USUAL for i in np.flatnonzero(found[name] > WORST[name])})
-    if late:
-        finer = differences([trials[i] for i in late], time_step=1.25e-4)
-        for name in USUAL:
-            assert (finer[name] < WORST[name]).all(), (name, late)
-    assert len(late) <= max(1, len(trials) // 100)
+    # The published tolerance (docs/planar.md). What lies outside must have been told why: at the edge of a graze or of
+    # a bound, which moves the accurate integrator as well, or second order, gone at a quarter of the step.
+    found = compare(trials)
+    assert found.strangers == 0
+    assert found.share("within") >= SHARE_WITHIN
+    assert found.share("unexplained") == 0
+    assert all(ratio < 6 for ratio, kind in zip(found.ratios, found.kinds, strict=True) if kind != "branch")
 
 
 @pytest.mark.slow
-def test_the_batch_agrees_with_the_accurate_integrator_on_1000_random_trials():
+def test_the_batch_keeps_its_published_tolerance_on_1000_random_trials():
     rng = np.random.default_rng(2026)
     assert_agreement([drawn(rng) for _ in range(1000)])
 
 
-def test_the_batch_agrees_with_the_accurate_integrator_on_40_random_trials():
+def test_the_batch_keeps_its_published_tolerance_on_100_random_trials():
     rng = np.random.default_rng(7)
-    assert_agreement([drawn(rng) for _ in range(40)])
+    assert_agreement([drawn(rng) for _ in range(100)])
+
+
+def test_the_batch_keeps_its_published_tolerance_on_100_trials_with_random_effects():
+    rng = np.random.default_rng(12)
+    assert_agreement([drawn(rng, random_effects(rng)) for _ in range(100)])
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("id", list(RANGES))
-def test_the_batch_agrees_with_each_effect_on(id):
-    rng = np.random.default_rng(8)
-    assert_agreement([drawn(rng, (id,)) for _ in range(40)])
-
-
-def test_the_batch_agrees_with_all_effects_on_at_once():
+def test_the_batch_keeps_its_published_tolerance_with_all_effects_on_at_once():
     rng = np.random.default_rng(9)
-    assert_agreement([drawn(rng, tuple(RANGES)) for _ in range(10)])
+    assert_agreement([drawn(rng, tuple(RANGES)) for _ in range(300)])
+
+
+def test_two_rows_whose_slip_ends_at_one_moment_slide_back_together():
+    # Both rows slide towards +x at speeds 1e-7 m/s apart, and neither can be held where they come to rest.
+    common = {"gravity_sim": 0.08336, "counterweight": 0.0}
+    trials = [
+        Trial(mass=5.366, inertia=0.06931, mu_s=0.1509, stiffness=4950.0, damping=74.47, torque=0.06897,
+              torque_until=0.2566, **common | {"counterweight": 5.275}),
+        Trial(mass=4.132, inertia=0.04735, mu_s=0.1912, stiffness=15730.0, damping=72.61, torque=0.1016,
+              torque_until=0.09428, **common | {"counterweight": 4.062}),
+        Trial(mass=6.016, inertia=0.06591, mu_s=0.168, stiffness=7298.0, damping=94.05, torque=0.05795,
+              torque_until=0.1121, **common),
+    ]  # fmt: skip
+    found = compare(trials)
+    assert (found.ratios < 0.1).all()
+
+
+def test_a_bound_that_is_reached_before_another_event_of_the_step_comes_first():
+    # A row lifts off and the one that sticks reaches its bound just before: after the lift it would hold.
+    def trial(force, friction, **numbers):
+        both = (effect("adhesion", force=force), effect("rig-friction", force=friction))
+        return Trial(gravity_sim=0.0834, effects=both, **numbers)
+
+    trials = [
+        trial(0.355, 0.0324, mass=5.78, counterweight=5.68, inertia=0.0654, mu_s=0.335, stiffness=14800.0,
+              damping=15.0, torque=0.182, torque_until=0.118),
+        trial(0.0349, 0.0234, mass=5.7, counterweight=5.6, inertia=0.0811, mu_s=0.304, stiffness=7150.0, damping=3.5,
+              torque=0.088, torque_until=0.0991),
+        trial(0.0235, 0.0324, mass=5.98, counterweight=5.88, inertia=0.0583, mu_s=0.326, stiffness=12700.0,
+              damping=4.25, torque=0.0575, torque_until=0.291),
+    ]  # fmt: skip
+    found = compare(trials)
+    assert (found.ratios < 0.5).all()
 
 
 @pytest.mark.slow
@@ -72,9 +87,7 @@ def test_the_batch_agrees_with_all_effects_on_at_once():
 def test_the_batch_agrees_on_the_other_grounds(name):
     trials = [in_rig(torque, mu_s=mu, ground=Ground(name=name, spikes_per_row=2)) for torque in (0.1, 0.2, 0.3)
               for mu in (0.3, 0.6)]  # fmt: skip
-    found = differences(trials, time_step=2.5e-4)
-    for channel, values in found.items():
-        assert (values < WORST[channel]).all(), channel
+    assert compare(trials, time_step=2.5e-4).share("within") == 1
 
 
 def test_the_summary_is_that_of_the_accurate_integrator():
