@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from .model import State, assemble, make_parameters
 from .terms import STATE_FIELDS
@@ -143,6 +144,8 @@ class System:
         self.stick_force = self.stick_load = self.stick_bound = 0.0
         self.vertical_force = self.vertical_bound = self.rotation_force = self.rotation_bound = 0.0
         self.inner_holds = 1.0
+        self.implicit: Any = None
+        """Makes implicit steps, where the ground asks for them (`rigid.implicit`)."""
         self.acceleration = (0.0, 0.0, 0.0)
 
     def _remembers(self) -> bool:

@@ -16,16 +16,18 @@ from dataclasses import dataclass, field
 
 from .dormand_prince import Interpolant, Step, attempt, interpolant
 from .dynamics import LOST, OMEGA, THETA, VX, VY, WHEEL, Modes, System, Y
+from .implicit import Implicit
 from .modes import let_go, resolve
 from .planar_events import KINKS, Monitor, Watch, cubic, monitors, precision, triggered
 from .rest import at_rest, comes_to_rest, resting
-from .statics import standing
+from .statics import standing, stiffness_at_rest
 
 __all__ = ["Progress", "integrate"]
 
 _LONGEST = 5e-3  # [s] with a spike in the ground
 _LONGEST_HOP = 2e-2  # [s] in flight
 _SHORTEST = 1e-9  # [s] below which the step no longer adapts
+_STIFF = 2e4  # [1/s]: damper over the mass that a tip offers, above which implicit steps are the quicker ones
 _CROWD, _MOMENT = 40, 1e-6  # events, and within which time [s]
 
 
@@ -71,6 +73,9 @@ def integrate(
     before: Watch = {}
     fresh, quiet = True, False
     scale = _scale(system)
+    lightest = 1 / (trial.mass + (0.0 if system.inner else trial.counterweight)) + trial.spike_length**2 / trial.inertia
+    stiff = stiffness_at_rest(system)[1] * lightest > _STIFF
+    system.implicit = Implicit(system, scale, tolerance) if stiff else None
     while time < duration:
         if quiet or at_rest(system, z, modes, rate):
             end = duration if modes.torque_over else min(duration, trial.torque_until)
@@ -95,7 +100,7 @@ def integrate(
             h = room
         if fresh:  # the last evaluation was at z
             before, fresh = monitors(system, z, modes), False
-        step = attempt(system, time, z, modes, rate, h, scale, tolerance)
+        step = _attempt(system, time, z, modes, rate, h, scale, tolerance)
         if not math.isfinite(step.error):
             if h < 1e-12:
                 raise RuntimeError(f"the motion is no longer finite at t = {time:.6g} s: {trial.describe()}")
@@ -109,14 +114,14 @@ def integrate(
         if crowd >= _CROWD and time - crowd_since <= _MOMENT:
             if h > _MOMENT:
                 h = min(_MOMENT, room)
-                step = attempt(system, time, z, modes, rate, h, scale, tolerance)
+                step = _attempt(system, time, z, modes, rate, h, scale, tolerance)
             forced, crowd = True, 0
             told.forced_steps += 1
         event: list[Monitor] = []
         if not forced:
             h, step, event = _locate(system, time, z, modes, rate, h, step, before, scale, tolerance)
         then = ends if room - h <= 0 else time + h
-        on_step(time, then, step.z, interpolant(time, h, z, step), modes)
+        on_step(time, then, step.z, _within(system, time, h, z, modes, rate, step, scale, tolerance), modes)
         time, told.steps = then, told.steps + 1
         z = list(step.z)
         rate, fresh = system.derivative(time, z, modes), True  # again: `on_step` has asked for other moments
@@ -139,6 +144,28 @@ def integrate(
                 rate, quiet = system.derivative(time, z, modes), True
         h = h_next
     return told
+
+
+def _attempt(
+    system: System, time: float, z: list[float], modes: Modes, rate: list[float], h: float, scale: Sequence[float],
+    tolerance: float,
+) -> Step:  # fmt: skip
+    """A step, implicit where the ground's damper would make explicit ones too short."""
+    if system.implicit is not None and modes.touching:
+        return system.implicit.attempt(time, z, modes, rate, h)
+    return attempt(system, time, z, modes, rate, h, scale, tolerance)
+
+
+def _within(
+    system: System, time: float, h: float, z: list[float], modes: Modes, rate: list[float], step: Step,
+    scale: Sequence[float], tolerance: float,
+) -> Interpolant:  # fmt: skip
+    """z within a step: the explicit pair's interpolant; of an implicit step, steps of other lengths."""
+    if len(step.rates) == 7 or h <= 0:
+        return interpolant(time, h, z, step)
+    return lambda t: list(step.z) if t >= time + h else _attempt(
+        system, time, z, modes, rate, t - time, scale, tolerance
+    ).z  # fmt: skip
 
 
 def _sign(value: float) -> int:
@@ -186,7 +213,7 @@ def _lowest(
             guess = low - low_rate * (high - low) / (high_rate - low_rate)
             edge = 1e-3 * (high - low)
             guess = min(max(guess, low + edge), high - edge)
-            step = attempt(system, time, z, modes, rate, guess, scale, tolerance)
+            step = _attempt(system, time, z, modes, rate, guess, scale, tolerance)
             values = monitors(system, step.z, modes)
             if key not in values:
                 break
@@ -243,7 +270,7 @@ def _locate(
                 guess = min(guess, low + (high - low) * a / (a - b))
         if iteration % 6 == 5 or not low < guess < high:
             guess = 0.5 * (low + high)
-        trial_step = attempt(system, time, z, modes, rate, guess, scale, tolerance)
+        trial_step = _attempt(system, time, z, modes, rate, guess, scale, tolerance)
         values = monitors(system, trial_step.z, modes)
         crossed = [key for key in found if signs[key] * values[key][0] < 0]
         if not crossed:

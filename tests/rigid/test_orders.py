@@ -36,6 +36,27 @@ def test_the_located_integrator_is_of_order_5_through_its_events():
         assert 4.3 < order(errors) < 5.7
 
 
+def test_on_ground_with_a_huge_damper_implicit_steps_are_of_order_5_and_give_the_explicit_ones_motion(monkeypatch):
+    # C / M is 2e4 to 1e5 per second; explicit steps are stable up to some M / C only.
+    import rigid.planar_located as located
+
+    trial = in_rig(0.22, mu_s=0.9, damping=1e5)
+    monkeypatch.setattr(located, "_STIFF", np.inf)
+    exact = end_of(trial, 0.1, tolerance=1e-11)
+    monkeypatch.undo()
+    errors = [np.abs(end_of(trial, 0.1, longest=h, tolerance=1e3) - exact).max() for h in (1e-2, 5e-3, 2.5e-3)]
+    assert 4.3 < order(errors) < 5.7
+    for torque in (0.22, 0.03):
+        ours = simulate(in_rig(torque, damping=1e5), duration=0.2, sample_interval=0.01)
+        monkeypatch.setattr(located, "_STIFF", np.inf)
+        explicit = simulate(in_rig(torque, damping=1e5), duration=0.2, sample_interval=0.01)
+        monkeypatch.undo()
+        assert ours.notes["steps"] < 100 < 500 < explicit.notes["steps"]
+        assert np.abs(ours.y - explicit.y).max() < 1e-9 and np.abs(ours.theta - explicit.theta).max() < 1e-8
+        assert np.abs(ours.ay - explicit.ay).max() < 1e-4
+        assert max(ours.energy_residual, explicit.energy_residual) < 2e-8
+
+
 def test_the_paper_s_step_is_of_order_1():
     for trial, duration in (MOTOR, BRAKE):
         exact = end_of(trial, duration)
