@@ -258,7 +258,7 @@ def _locate(
         if key[0] not in KINKS and low_values[key] <= 0:  # it is over at once
             return 0.0, Step(list(z), [rate] * 7, 0.0), [key]
     signs = {key: 1.0 if low_values[key] > 0 else -1.0 for key in found}
-    weight_low = 1.0
+    weight_low, at_low = 1.0, before
     for iteration in range(60):
         if high - low <= 1e-14 + 1e-15 * abs(time):
             break
@@ -273,9 +273,14 @@ def _locate(
         trial_step = _attempt(system, time, z, modes, rate, guess, scale, tolerance)
         values = monitors(system, trial_step.z, modes)
         crossed = [key for key in found if signs[key] * values[key][0] < 0]
+        for key in triggered(before, values):  # passed by now and back by the end of the step, so not yet looked for
+            start = at_low.get(key, (0.0, 0.0))[0]
+            if key not in found and start > 0:
+                low_values[key], signs[key] = start, 1.0
+                found, crossed = [*found, key], [*crossed, key]
         if not crossed:
             tiny = min(signs[key] * values[key][0] for key in found)
-            low, low_values = guess, {key: values[key][0] for key in found}
+            low, low_values, at_low = guess, {key: values[key][0] for key in found}, values
             weight_low = 1.0
             if tiny == 0.0:
                 high_step, high_values, high = trial_step, values, guess
