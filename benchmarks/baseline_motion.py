@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .baseline_rows import Array, touching
+from .baseline_rows import Array, fall_numbers, force_std, touching
 
 __all__ = ["held_out_gap"]
 
@@ -138,7 +138,7 @@ def _penetration(problem: Any, values: Mapping[str, float], trial: str, force: F
         extra = np.zeros(len(state["t_s"]))
         if force is not None:
             extra = force(_state(state["depth_m"], state["velocity_m_s"], state["retreat_m"]))[:, 0]
-        return (told["force"]["measured"] - told["force"]["model"] - extra) / samples.std
+        return (told["force"]["measured"] - told["force"]["model"] - extra) / force_std(problem, values, trial)
     if force is None:
         return np.concatenate([
             (told[name]["measured"] - told[name]["model"]) / samples.std[samples.channel == name]
@@ -161,18 +161,12 @@ def _fall(
     problem: Any, values: Mapping[str, float], table: Any, end: float, force: Force
 ) -> tuple[Array, Array, Array]:
     """m z'' = m g - K z - C max(0, v) - force, by the midpoint rule; time, depth, acceleration."""
-    surface, mass = problem.tables.surface, problem.tables.spike.mass
-    diameter = table.diameter if table.diameter is not None else problem.tables.spike.diameter
-
-    def number(name: str, stated: float) -> float:
-        return float(values.get(f"{name}@{diameter:g}", values.get(name, stated)))
-
-    stiffness, damping = number("stiffness", surface.stiffness), number("damping", surface.damping)
+    mass, stiffness, damping, gravity = fall_numbers(problem, values, table.id)
     top = 0.0
 
     def accelerate(z: float, v: float) -> float:
         bed = stiffness * z + damping * max(v, 0.0) if z > 0 else 0.0
-        return table.gravity - (bed + float(force(_state(z, v, max(top, z, 0.0) - z))[0, 0])) / mass
+        return gravity - (bed + float(force(_state(z, v, max(top, z, 0.0) - z))[0, 0])) / mass
 
     steps = math.ceil(end / _FALL_STEP) + 1
     time, depth, accel = _FALL_STEP * np.arange(steps + 1), np.empty(steps + 1), np.empty(steps + 1)

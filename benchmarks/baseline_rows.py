@@ -3,8 +3,9 @@
 Both kinds of trials: the base model is the one that diagnose fitted, and the residual is what it leaves. Of a tumble
 it is measured less modelled specific force and angular acceleration, at the IMU's rows, times the inertia that resists;
 the state is the measured one, smoothed by Savitzky-Golay polynomials of order 3 (camera 0.1 s, gyro and wheel 0.05 s),
-since a force belongs to where the platform was, not to where the model thought it was. Of a penetration it is a force
-beside depth, speed and the way back from the deepest point.
+since a force belongs to where the platform was, not to where the model thought it was. Of a penetration it is measured
+force (of a drop, m (g - a)) less the base model's at the smoothed depth, beside depth, speed and the way back from the
+deepest point.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
-__all__ = ["NAMES", "STANDING", "Rows", "make_rows", "touching"]
+__all__ = ["NAMES", "STANDING", "Rows", "fall_numbers", "force_std", "make_rows", "touching"]
 
 Array = NDArray[np.float64]
 
@@ -39,7 +40,10 @@ _LOUD = 6.0
 
 @dataclass(frozen=True)
 class Rows:
-    """One trial: states [row_count, state_count], targets [row_count, target_count] and their noise [target_count]."""
+    """One trial: states [row_count, state_count], targets [row_count, target_count], in the order of time.
+
+    `std`: noise of the targets [target_count], of the middle trial.
+    """
 
     trial: str
     state: Array
@@ -51,7 +55,11 @@ def make_rows(problem: Any, values: Mapping[str, float], trials: Sequence[str]) 
     """Rows of these trials. `values` are the fitted base model's. Trials without an accelerometer have none."""
     make = _tumble if problem.kind == "tumble" else _penetration
     found = [make(problem, values, trial) for trial in trials]
-    return [rows for rows in found if len(rows.state) > 20]
+    found = [rows for rows in found if len(rows.state) > 20]
+    if not found:
+        return []
+    unit = np.median([rows.std for rows in found], axis=0)  # one law must have one size in all trials
+    return [Rows(rows.trial, rows.state, rows.target, unit) for rows in found]
 
 
 def _cut(target: Array, std: Array) -> Array:
@@ -94,18 +102,21 @@ def touching(y: Array, theta: Array, tables: Any) -> Array:
 
 
 def _smooth(data: Any, channel: str, at: Array, window: float) -> tuple[Array, Array]:
-    """Smoothed value and slope of a channel at these times, from an even grid; zeros where it was not measured."""
+    """Smoothed value and slope of a tumble's channel at these times; zeros where it was not measured."""
     mine = data.of(channel)
     if mine.sum() < 10:
         return np.zeros(len(at)), np.zeros(len(at))
-    time, value = data.time[mine], data.value[mine]
+    return smooth(data.time[mine], data.value[mine], at, window)
+
+
+def smooth(time: Array, value: Array, at: Array, window: float) -> tuple[Array, Array]:
+    """Savitzky-Golay's value and slope at these times, from an even grid over `time`; `window` [s]."""
     step = float(np.median(np.diff(time)))
     grid = np.arange(time[0], time[-1] + 0.5 * step, step)
     even = np.interp(grid, time, value)
-    width = max(5, 2 * round(0.5 * window / step) + 1)
-    smoothed = savgol_filter(even, width, 3)
+    width = min(max(5, 2 * round(0.5 * window / step) + 1), len(grid) - 1 + len(grid) % 2)
     slope = savgol_filter(even, width, 3, deriv=1, delta=step)
-    return np.interp(at, grid, smoothed), np.interp(at, grid, slope)
+    return np.interp(at, grid, savgol_filter(even, width, 3)), np.interp(at, grid, slope)
 
 
 def _still(data: Any, channel: str) -> float:
@@ -118,12 +129,40 @@ def _still(data: Any, channel: str) -> float:
 
 
 def _penetration(problem: Any, values: Mapping[str, float], trial: str) -> Rows:
-    latent = problem.latent(values, (), trial)
-    depth, back = latent["depth_m"], latent["retreat_m"]
-    state = np.stack([depth, latent["velocity_m_s"], back, (depth > 0).astype(float)], axis=1)
-    samples = problem.samples(trial)
-    mass = problem.tables.spike.mass or 1.0
-    accel = samples.std[samples.channel == "accel"]
-    std = np.array([mass * accel[0] if len(accel) else samples.std[samples.channel == "force"][0]])
-    target = latent["latent_force_N"][:, None]
-    return Rows(trial, state, _cut(target, std), std)
+    told, samples = problem.compare(values, (), trial), problem.samples(trial)
+    if "force" in told:
+        latent = problem.latent(values, (), trial)
+        depth, speed, back = latent["depth_m"], latent["velocity_m_s"], latent["retreat_m"]
+        force, std = latent["latent_force_N"], float(np.median(force_std(problem, values, trial)))
+    elif "accel" in told and "depth" in told:  # m (g - a) less the bed's force at the measured depth
+        mass, stiffness, damping, gravity = fall_numbers(problem, values, trial)
+        time = told["accel"]["t_s"]
+        depth, speed = smooth(told["depth"]["t_s"], told["depth"]["measured"], time, 0.02)
+        back = np.maximum.accumulate(np.maximum(depth, 0.0)) - depth
+        bed = np.where(depth > 0, stiffness * depth + damping * np.maximum(speed, 0.0), 0.0)
+        force = mass * (gravity - told["accel"]["measured"]) - bed
+        std = mass * float(samples.std[samples.channel == "accel"][0])
+    else:
+        return Rows(trial, np.zeros((0, 4)), np.zeros((0, 1)), np.ones(1))
+    noise = np.array([std])
+    state = np.stack([depth, speed, back, (depth > 0).astype(float)], axis=1)
+    return Rows(trial, state, _cut(force[:, None], noise), noise)
+
+
+def fall_numbers(problem: Any, values: Mapping[str, float], trial: str) -> tuple[float, float, float, float]:
+    """Mass [kg], K [N/m], C [N s/m] and gravity [m/s2] of a drop at these values."""
+    tables = problem.tables
+    table = next(one for one in tables.trial if one.id == trial)
+    diameter = table.diameter if table.diameter is not None else tables.spike.diameter
+    stiffness, damping = (
+        float(values.get(f"{name}@{diameter:g}", values.get(name, getattr(tables.surface, name))))
+        for name in ("stiffness", "damping")
+    )
+    return float(tables.spike.mass), stiffness, damping, table.gravity
+
+
+def force_std(problem: Any, values: Mapping[str, float], trial: str) -> Array:
+    """Noise of a driven trial's residual force [N], shape [row_count]: the sensor's, and slope times the depth's."""
+    this = problem._trials[trial]
+    ((_, by_depth, _),) = problem._slopes(values, (), [this])
+    return np.hypot(problem.samples(trial).std, by_depth * this.smooth.depth_std)

@@ -23,10 +23,11 @@ def test_what_lacks_is_said_in_a_sentence(monkeypatch):
 
 
 def test_gains_that_are_noise_raise_an_alarm_in_one_of_twenty():
-    """A one-sided t-test at 5 %: of 2000 draws 100 +- 10 (binomial standard deviation) are called better."""
+    """Signed ranks at 5 %: of 400 draws of 16 gains 20 +- 4.4 (binomial standard deviation) are called better."""
     random = np.random.default_rng(0)
-    alarms = sum(baselines._better(random.standard_normal(6)) for _ in range(2000))
-    assert 60 < alarms < 140
+    alarms = sum(baselines._better(random.standard_normal(16)) for _ in range(400))
+    assert 7 < alarms < 33
+    assert not baselines._better(np.zeros(16))
 
 
 def test_a_learnt_force_acts_in_the_accurate_integrator_as_the_term_does():
@@ -75,7 +76,7 @@ def test_without_a_force_the_gap_is_that_of_the_base_model():
     problem = drops_and_pushes(law)
     for trial in ("001", "006"):
         total, count = problem.chi_square({}, (), trial)
-        assert held_out_gap(problem, {}, [trial], None) == pytest.approx(total / count, rel=0.25)
+        assert held_out_gap(problem, {}, [trial], None) == pytest.approx(total / count)
     time, depth, _ = _fall(problem, {}, problem.tables.trial[5], 0.1, lambda state: np.zeros((len(state), 1)))
     assert held_out_gap(problem, {}, ["006"], lambda state: np.zeros((len(state), 1))) < 1.3
     assert depth[0] == 0.0 and time[-1] >= 0.1
