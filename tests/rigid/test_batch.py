@@ -85,6 +85,19 @@ def test_a_bound_that_is_reached_before_another_event_of_the_step_comes_first():
     assert (found.ratios < 0.5).all()
 
 
+def test_a_graze_is_told_from_the_error_of_the_step():
+    graze = [  # a slip speed that comes within 1e-6 m/s of zero, and a second landing that is nearly level
+        Trial(mass=4.80029, inertia=0.045515, gravity_sim=0.1471, counterweight=4.65841, mu_s=0.63667,
+              stiffness=10637.6, damping=106.76, torque=0.333801),
+        Trial(mass=4.057, inertia=0.06368, gravity_sim=0.08336, counterweight=0.0, mu_s=0.3007, stiffness=17920.0,
+              damping=4.108, torque=0.2129),
+    ]  # fmt: skip
+    landing = Trial(mass=4.281, inertia=0.04402, gravity_sim=0.1471, counterweight=4.155, mu_s=0.6438,
+                    stiffness=19720.0, damping=83.01, torque=6.0, actuator="brake", wheel_speed_0=50.09,
+                    torque_until=0.2981)  # fmt: skip
+    assert compare([*graze, landing, in_rig(0.22)]).kinds == ("branch", "branch", "step", "within")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["hunt-crossley", "power", "katsuragi-durian", "bekker", "rft"])
 def test_the_batch_agrees_on_the_other_grounds(name):
