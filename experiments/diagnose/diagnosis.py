@@ -27,6 +27,8 @@ Tell = Callable[[str, float], None]
 
 _RIGHT_FORM = 0.05
 """A model that leaves a twentieth of what the base model does has the right name, if not nature's exact form."""
+_CLOSED = 0.15
+"""And no more than this of the gap, as it is reported."""
 _MOST_FOR_COLOUR = 2.5
 """Chi-square per sample above which motion, not noise, fills the fast modes too."""
 _REFITS = 400
@@ -235,11 +237,15 @@ def _verdict(choice: Choice, base: Fit, held_out: tuple[str, ...]) -> str:
     named = "ambiguous" if choice.alternatives else "named"
     if choice.left.passed:
         return named
-    after = _gap(problem, best.fit.model, _with_held_out(best.fit, held_out), best.fit.model.trials, held_out)
+    fitted = best.fit.model.trials
+    after = _gap(problem, best.fit.model, _with_held_out(best.fit, held_out), fitted, held_out)
     worst = max(after.fit, after.held_out or 0.0)
     if worst <= _SMALL:
         return named
-    return named if excess(best.fit) < _RIGHT_FORM * excess(base) else "unknown"
+    # Noise that is taken for coloured may hide what is left: the gap, whose noise is as stated, has to close as well.
+    before = _gap(problem, base.model, _with_held_out(base, held_out), fitted, held_out)
+    closed = after.fit - 1 < _CLOSED * (before.fit - 1)
+    return named if closed and excess(best.fit) < _RIGHT_FORM * excess(base) else "unknown"
 
 
 def _finish(

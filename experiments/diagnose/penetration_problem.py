@@ -32,6 +32,8 @@ _SLOT = {name: place for place, name in enumerate(SLOTS)}
 _FAILED = 1e3
 _SHALLOW = 0.02
 """Share of D that counts as just below the surface."""
+_BESIDE = 5
+"""Rows before and after a turn that tell the force there."""
 _BED_STD = 0.5
 """How far the bed may differ between replicates while it is asked whether it does [1]."""
 
@@ -271,7 +273,8 @@ class PenetrationProblem:
             below = float(np.median(np.abs(trial.other[shallow]))) if shallow.any() else 0.0
             start = max(jump, below) + np.abs(by_depth).max() * smooth.depth_std
             touch = start * (np.abs(smooth.depth) < 3 * smooth.depth_std)
-            doubtful = np.sqrt(1 + (bend**2 + touch**2) / std_force**2)
+            turn = _turning(smooth.speed, smooth.speed_std, trial.other, std_force)
+            doubtful = np.sqrt(1 + (bend**2 + touch**2 + turn**2) / std_force**2)
             left, sizes, _ = np.linalg.svd(factor / std_force / doubtful[:, None], full_matrices=False)
             kept = sizes > 1e-3
             self._whitening[trial.info.id] = (left[:, kept], 1 - 1 / np.sqrt(1 + sizes[kept] ** 2), doubtful)
@@ -443,6 +446,24 @@ class PenetrationProblem:
             f"Drive the spike in and out at two speeds a factor of ten apart, to twice the depth reached here: "
             f"{first.effect} and {second.effect} part where speed, direction and depth change one at a time."
         )
+
+
+def _turning(speed: Array, std: Array, force: Array, noise: float) -> Array:
+    """How far the force is in doubt where the direction of motion is: by its jump from before to after [N].
+
+    Dry friction changes sign where a spike turns; the smoothed depth tells when to within some rows only.
+    """
+    doubt = np.zeros(len(speed))
+    unsure = np.concatenate([[0], (np.abs(speed) < 3 * std).astype(int), [0]])
+    edges = np.flatnonzero(np.diff(unsure))
+    for low, high in zip(edges[::2], edges[1::2], strict=True):
+        before, after = force[max(0, low - _BESIDE) : low], force[high : high + _BESIDE]
+        if len(before) < _BESIDE or len(after) < _BESIDE:
+            continue
+        jump = abs(float(np.median(after) - np.median(before)))
+        if jump > 3 * noise:
+            doubt[max(0, low - 1) : high + 1] = jump
+    return doubt
 
 
 def _own_form(own: OwnEffect) -> Form:

@@ -26,7 +26,7 @@ _SHARE = 0.5
 _SHARE_OF_BASE = 0.04
 """And of what the base model left: a misfit of the first effect's form is often some hundredths of it."""
 _WORTH_BOTH, _SHARE_BOTH = 5.0, 0.75
-"""Nats, and share of what is left, from which a smaller further name counts too, if conditions left out say so."""
+"""Nats, and share of what is left, from which a smaller second name counts too, if conditions left out say so."""
 _NEAR = 15.0
 """Nats behind the best within which a name is asked to predict conditions left out."""
 _LEADS = 2.0
@@ -169,7 +169,8 @@ class Search:
         gained, better = excess(best.fit) - excess(new.fit), new.score - best.score
         if better >= _WORTH_MORE and gained >= max(_SHARE * left, _SHARE_OF_BASE * excess(self.base.fit)):
             return True
-        if better < _WORTH_BOTH or gained < _SHARE_BOTH * left:
+        seen = len(best.effects) < 2 and left > 2 * np.sqrt(2.0 * best.fit.count)
+        if not seen or better < _WORTH_BOTH or gained < _SHARE_BOTH * left:
             return False
         # Nearly all that was left: a misfit of form does not predict what it has not seen.
         folds = self._folds(best)
@@ -185,10 +186,15 @@ class Search:
         base = self.base.fit
         starts = pair_starts(base.model, base.values, base.model.problem.forms, most=_PAIRS)
         rough = bool(getattr(base.model.problem, "rough", ()))
+        places = [start.values for start in starts]
+        refine = getattr(base.model.problem, "refine", None)
+        if refine is not None and starts:  # a search of its own, for models whose contacts make a likelihood jump
+            self.tell("trying pairs", 0.5)
+            places = refine([(start.forms, start.values) for start in starts], base.model.trials)
         begun = []
-        for start in starts:
+        for start, values in zip(starts, places, strict=True):
             self.tell(f"trying {start.forms[0].effect} with {start.forms[1].effect}", 0.5)
-            model, values = base.model.with_forms(start.forms), start.values
+            model = base.model.with_forms(start.forms)
             for share in (0.4, 0.7) if rough else ():
                 values = fit(model.until(share), values, rounds=6).values
             begun.append(fit(model, values, rounds=5))

@@ -91,6 +91,20 @@ class Guesser:
             kept |= self._candidates(fitter, old + new[:-1], candidates, start)
         return self._told(kept[new[-1].id], trials, values)
 
+    def refine(
+        self, asked: Sequence[tuple[Sequence[TumbleForm], Values]], trials: Sequence[str]
+    ) -> list[dict[str, float]]:
+        """Values near the best for each (forms, values): from there, and from nominal numbers over growing horizons."""
+        fitter = Fitter(self.forward, trials=[self._ids.index(trial) for trial in trials])
+        starts = []
+        for forms, values in asked:
+            own = {p.name: values[p.name] for form in forms for p in form.parameters}
+            starts.append(Start(forms=tuple(forms), values=own, scan=True, horizons=_GROWING))
+            starts.append(self._start(forms, values))
+        fits = fitter.fit(starts, steps=12)
+        pairs = zip(fits[::2], fits[1::2], asked, strict=True)
+        return [self._told(min(a, b, key=lambda fit: fit.cost), trials, values) for a, b, (_, values) in pairs]
+
     def _start(self, forms: Sequence[TumbleForm], values: Values) -> Start:
         gravity = np.array(
             [values.get(f"gravity_sim[{i}]", g) / g for i, g in zip(self._ids, self._stated, strict=True)]

@@ -270,6 +270,10 @@ class TumbleProblem:
         """Values near the best, from which a local fit may begin (`tumble_guess`)."""
         return self._guesser.guess(_ours(forms), trials, values, held=held)
 
+    def refine(self, asked: Sequence[tuple[Sequence[Form], Values]], trials: Sequence[str]) -> list[dict[str, float]]:
+        """The same for several sets of forms at once, all of whose values are given (`tumble_guess`)."""
+        return self._guesser.refine([(_ours(forms), values) for forms, values in asked], trials)
+
     @cached_property
     def _guesser(self) -> Guesser:
         return Guesser(self.forward, self.forms)

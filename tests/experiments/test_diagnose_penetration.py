@@ -90,6 +90,21 @@ def test_the_smoothed_depth_is_as_wrong_as_it_says():
     assert 0.6 < np.mean(ratios) < 1.7
 
 
+def test_where_a_slow_spike_turns_the_direction_is_in_doubt_and_friction_is_no_misfit():
+    # 2 mm/s, rows 0.09 mm apart, depth to 0.1 mm: the turn is known to some rows, in which 2 x 1.5 N is 60 noises.
+    def rubbed(z, v, top):
+        return base(z, v) + math.copysign(1.5, v)
+
+    trials = [(f"{k}", "driven", 0.002, driven_trial(rubbed, speed=0.002, retreat=True, seed=k)) for k in range(3)]
+    problem = make_problem(campaign_of(trials))
+    (form,) = [form for form in problem.forms if form.id == "shaft-friction:constant"]
+    first = fit(Model(problem, Whitener.white(problem), ("0", "1", "2")))
+    problem.rewhiten(first.values, ())
+    found = fit(first.model.with_forms([form]), {**first.values, **form.starts[0]})
+    assert found.chi_square / found.count < 1.2
+    assert np.abs(found.modes).max() < 6
+
+
 def test_a_force_that_is_held_is_thinned_and_said():
     recording = driven_trial(base, speed=0.01)
     held = recording["force_N"][(np.arange(400) // 8) * 8]
