@@ -9,7 +9,23 @@ import importlib
 import os
 from typing import TYPE_CHECKING, Any
 
-__all__ = ["Ball", "Bed", "BedFailure", "Cone", "Cylinder", "MATERIALS", "Material", "Plane", "SAND", "material"]
+__all__ = [
+    "Ball",
+    "Bed",
+    "BedFailure",
+    "Cone",
+    "Cylinder",
+    "Facing",
+    "LogNormal",
+    "MATERIALS",
+    "Material",
+    "Normal",
+    "Plane",
+    "SAND",
+    "Sieve",
+    "Uniform",
+    "material",
+]
 
 # Taichi greets on stdout as it is imported; what a script prints is the script's.
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
@@ -17,13 +33,15 @@ os.environ.setdefault("TI_LOG_LEVEL", "error")
 
 if TYPE_CHECKING:
     from .bed import Bed, BedFailure
-    from .materials import MATERIALS, SAND, Material, material
+    from .materials import MATERIALS, SAND, Facing, Material, material
     from .shapes import Ball, Cone, Cylinder, Plane
+    from .sizes import LogNormal, Normal, Sieve, Uniform
 
 _ROOMS = {
     "bed": ("Bed", "BedFailure"),
-    "materials": ("MATERIALS", "Material", "SAND", "material"),
+    "materials": ("Facing", "MATERIALS", "Material", "SAND", "material"),
     "shapes": ("Ball", "Cone", "Cylinder", "Plane"),
+    "sizes": ("LogNormal", "Normal", "Sieve", "Uniform"),
 }
 
 

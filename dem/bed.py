@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from . import runtime, state
+from .cohesion import COHESIONS, jkr_range
 from .contact import effective_moduli, pair_parameters
 from .engine import MOST_PRIMITIVES, take_engine
 from .lists import MOST_BODIES
-from .materials import Material
+from .materials import Facing, Material
 from .materials import material as find_material
 from .measure import bulk_packing, surface_height
 from .shapes import Plane, Primitive
@@ -73,7 +74,7 @@ class Bed:
         young: float | None = None,
         max_overlap: float = 0.05,
         time_step: float | None = None,
-        floor: bool = True,
+        floor: bool | Facing = True,
         tensile: bool = False,
         seed: int | None = None,
         precision: str = "float64",
@@ -94,7 +95,7 @@ class Bed:
             young: Young's modulus of the (softened) grains [Pa]; the material's own when None.
             max_overlap: bound on overlap over diameter; the time step is chosen for it.
             time_step: [s]; an eighth of the contact time when None.
-            floor: whether there is a floor at z = 0.
+            floor: whether there is a floor at z = 0; a Facing where grains touch it otherwise than one another.
             tensile: whether the damping may pull at the end of a contact (as LIGGGHTS does by default).
             precision, arch, threads: see ``dem.runtime.start``.
 
@@ -138,7 +139,7 @@ class Bed:
         mass = stuff.density * 4 / 3 * math.pi * radii**3
         bed._fill(positions, velocities, spins, radii, mass)
         if floor:
-            bed._add([Plane()], (0.0, 0.0, 0.0), stuff.friction, stuff.restitution, stuff.rolling_friction, None)
+            bed._add([Plane()], (0.0, 0.0, 0.0), floor if isinstance(floor, Facing) else Facing())
         bed._make_lists()
         bed._push()
         bed._shift_velocities(-0.5)  # half a step behind the positions, where the leapfrog wants them
@@ -172,6 +173,8 @@ class Bed:
         self.recipe: dict[str, Any] = {}
         self.surface = math.nan
         self.packing_fraction = math.nan
+        young, shear = effective_moduli(stuff.young, stuff.poisson, stuff.young, stuff.poisson)
+        reach = _reach(stuff, float(radii.max()) / 2, young)
         self._engine = take_engine(
             self,
             grain_count=self.grain_count,
@@ -179,21 +182,22 @@ class Bed:
             bottom=-4 * float(radii.max()),
             height=settings["height"],
             largest_diameter=2 * float(radii.max()),
-            largest_skin=_LARGEST_SKIN * self._diameter,
+            largest_skin=_LARGEST_SKIN * self._diameter + reach,
             rolling=stuff.rolling_friction > 0,
             tensile=settings["tensile"],
+            cohesion=COHESIONS[stuff.cohesion],
             real=ti.f64 if precision == "float64" else ti.f32,
             gpu=arch == "cuda",
             threads=self._runtime.threads,
-            neighbours_per_grain=_room(radii, self._diameter, gpu=arch == "cuda"),
+            neighbours_per_grain=_room(radii, _LARGEST_SKIN * self._diameter + reach, gpu=arch == "cuda"),
         )
-        young, shear = effective_moduli(stuff.young, stuff.poisson, stuff.young, stuff.poisson)
         self._engine.grain_pair[None] = pair_parameters(
             effective_young=young,
             effective_shear=shear,
             restitution=stuff.restitution,
             friction=stuff.friction,
             rolling_friction=stuff.rolling_friction,
+            surface_energy=stuff.surface_energy,
             tensile=settings["tensile"],
         )
         turn = np.zeros((MOST_BODIES, 4))
@@ -212,6 +216,7 @@ class Bed:
         rolling_friction: float | None = None,
         young: float | None = None,
         poisson: float = 0.3,
+        surface_energy: float | None = None,
     ) -> int:
         """Put a body among the grains and return its number. It moves as it is told; see ``move_body``.
 
@@ -220,21 +225,22 @@ class Bed:
             position: of the body's origin [m].
             friction, restitution, rolling_friction: of a grain on the body; the grains' own when None.
             young, poisson: of the body; rigid when None. [Pa], [1].
+            surface_energy: of a grain and the body [J/m2], see ``dem.Facing``; the grains' own when None.
 
         Raises:
-            ValueError: no shape, too many bodies, a grain already in contact by more than the overlap bound.
+            ValueError: no shape, a number that no pair can have, too many bodies, a grain already in contact by more
+                than the overlap bound.
         """
         self._check_valid()
-        stuff = self.material
-        body = self._add(
-            shape,
-            position,
-            stuff.friction if friction is None else friction,
-            stuff.restitution if restitution is None else restitution,
-            stuff.rolling_friction if rolling_friction is None else rolling_friction,
-            young,
-            poisson,
+        facing = Facing(
+            friction=friction,
+            restitution=restitution,
+            rolling_friction=rolling_friction,
+            young=young,
+            poisson=poisson,
+            surface_energy=surface_energy,
         )
+        body = self._add(shape, position, facing)
         kept = self.max_overlap
         self._make_lists()
         self.max_overlap = 0.0
@@ -252,7 +258,7 @@ class Bed:
         self.max_overlap = max(kept, found)
         return body
 
-    def _add(self, shape, position, friction, restitution, rolling_friction, young, poisson=0.3) -> int:
+    def _add(self, shape: Sequence[Primitive], position: Sequence[float], facing: Facing) -> int:
         e = self._engine
         shape = list(shape)
         body = int(e.body_count[None])
@@ -264,18 +270,20 @@ class Bed:
         if body >= MOST_BODIES or used + len(shape) > MOST_PRIMITIVES:
             raise ValueError(f"a bed takes at most {MOST_BODIES} bodies of {MOST_PRIMITIVES} primitives in all")
         stuff = self.material
+        facing.refuse_for(stuff)
         star, shear = effective_moduli(
             stuff.young,
             stuff.poisson,
-            math.inf if young is None else young,
-            stuff.poisson if young is None else poisson,
+            math.inf if facing.young is None else facing.young,
+            stuff.poisson if facing.young is None else facing.poisson,
         )
         e.body_pair[body] = pair_parameters(
             effective_young=star,
             effective_shear=shear,
-            restitution=restitution,
-            friction=friction,
-            rolling_friction=rolling_friction,
+            restitution=_or(facing.restitution, stuff.restitution),
+            friction=_or(facing.friction, stuff.friction),
+            rolling_friction=_or(facing.rolling_friction, stuff.rolling_friction),
+            surface_energy=_or(facing.surface_energy, stuff.surface_energy),
             tensile=self._settings["tensile"],
         )
         for k, primitive in enumerate(shape):
@@ -629,9 +637,19 @@ def _check_array(name: str, array: np.ndarray, shape: tuple[int, ...]) -> None:
         )
 
 
-def _room(radii: np.ndarray, diameter: float, *, gpu: bool) -> int:
+def _or(value: float | None, default: float) -> float:
+    return default if value is None else value
+
+
+def _reach(material: Material, radius: float, effective_young: float) -> float:
+    """How far two grains of this effective radius [m] feel one another before they touch [m]; 0 but with JKR."""
+    if material.cohesion != "jkr":
+        return 0.0
+    return jkr_range(surface_energy=material.surface_energy, radius=radius, effective_young=effective_young)
+
+
+def _room(radii: np.ndarray, skin: float, *, gpu: bool) -> int:
     """Rows of the pair lists for a grain: the most that fit around it (on a GPU) or around a mean one, with spare."""
-    skin = _LARGEST_SKIN * diameter
     small, large = float(radii.min()), float(radii.max())
     # Caps of neighbours on a sphere: each takes a cone of half angle asin(r_s / (r_l + r_s + skin)).
     half = math.asin(small / (large + small + skin))

@@ -24,7 +24,8 @@ import numpy as np
 import taichi as ti
 
 from . import runtime
-from .contact import PAIR_WIDTH, contact_force, turning_torque
+from .cohesion import JKR
+from .contact import PAIR_WIDTH, adhesive_range, contact_force, turning_torque
 from .lists import (
     BOTTOM,
     CACHE_LINE,
@@ -62,12 +63,12 @@ _free: dict[tuple, list] = {}
 
 def take_engine(owner: Any, **settings: Any) -> "Engine":
     """An engine for ``owner``, set up by ``settings`` (those of ``Engine.set_up``, and ``rolling``, ``tensile``,
-    ``real``, ``gpu``, ``threads``); one that an earlier owner has left, where there is one of the shape.
+    ``cohesion``, ``real``, ``gpu``, ``threads``); one that an earlier owner has left, where there is one of the shape.
 
     Raises:
         ValueError: a bed less than three grains wide.
     """
-    fixed = {key: settings.pop(key) for key in ("rolling", "tensile", "real", "gpu", "threads")}
+    fixed = {key: settings.pop(key) for key in ("rolling", "tensile", "cohesion", "real", "gpu", "threads")}
     plan = Engine.plan(gpu=fixed["gpu"], **settings)
     shape = {key: plan.pop(key) for key in ("capacity", "cell_capacity", "chunk_capacity", "neighbours_per_grain")}
     key = (runtime.generation(), *shape.values(), *(str(value) for value in fixed.values()))
@@ -100,6 +101,7 @@ class Engine(Lists):
         neighbours_per_grain: rows of the pair lists for each.
         rolling: whether contacts carry a rolling spring.
         tensile: whether a contact's damping may pull at its end.
+        cohesion: a law of ``dem.cohesion.COHESIONS``.
         real: ti.f64 or ti.f32.
         gpu: one grain a chunk.
         threads: of the CPU.
@@ -177,6 +179,7 @@ class Engine(Lists):
         neighbours_per_grain: int,
         rolling: bool,
         tensile: bool,
+        cohesion: int,
         real,
         gpu: bool = False,
         threads: int = 1,
@@ -185,6 +188,7 @@ class Engine(Lists):
         self.real = real
         self.rolling = rolling
         self.tensile = tensile
+        self.cohesion = cohesion
         self.gpu = gpu
         F = ti.Vector.field
         self.count = ti.field(ti.i32, 8)
@@ -385,6 +389,8 @@ class Engine(Lists):
             x_j = self.position[bits & INDEX_MASK]
             sum_r = x_i.w + x_j.w
             d = self.apart(x_i, x_j, bits)
+            if ti.static(self.cohesion == JKR):
+                sum_r += adhesive_range(self.grain_pair[None], x_i.w * x_j.w / sum_r)
             touching = d.norm_sqr() < sum_r * sum_r
             self.touching[last] = s
             last += ti.select(touching, 1, 0)
@@ -422,14 +428,16 @@ class Engine(Lists):
             arm_j = x_j.w - 0.5 * overlap
             v = v_i.xyz - v_j.xyz - (arm_i * w_i.xyz + arm_j * w_j.xyz).cross(n)
             u = self.slide[s]
-            f_n, f_t, k_t, a, root = contact_force(p, n, v, overlap, radius, mass, dt, u, self.tensile)
+            f_n, f_t, k_t, a, root, load = contact_force(
+                p, n, v, overlap, radius, mass, dt, u, self.tensile, self.cohesion
+            )
             self.slide[s] = u
             f = f_n * n + f_t
             t = f_t.cross(n)
             turn = ti.Vector.zero(self.real, 3)
             if ti.static(self.rolling):
                 q = self.roll[s]
-                turn = turning_torque(p, n, w_i.xyz - w_j.xyz, f_n, k_t, a, radius, root, dt, q)
+                turn = turning_torque(p, n, w_i.xyz - w_j.xyz, load, k_t, a, radius, root, dt, q)
                 self.roll[s] = q
             self.force[i] = self.force[i] + f
             self.torque[i] = self.torque[i] + (arm_i * t + turn)
@@ -461,7 +469,7 @@ class Engine(Lists):
         distance, n, curvature, arm = self.nearest(b, x.xyz)
         overlap = x.w - distance
         result = ti.cast(0.0, self.real)
-        if overlap > 0.0:
+        if overlap > -self.body_range(b, x.w, curvature):
             v_i = self.velocity[i]
             w_i = self.spin[i]
             arm_i = x.w - overlap
@@ -470,14 +478,16 @@ class Engine(Lists):
             radius = x.w / (1.0 + x.w * curvature)
             p = self.body_pair[b]
             u = self.near_slide[s]
-            f_n, f_t, k_t, a, root = contact_force(p, n, v, overlap, radius, v_i.w, dt, u, self.tensile)
+            f_n, f_t, k_t, a, root, load = contact_force(
+                p, n, v, overlap, radius, v_i.w, dt, u, self.tensile, self.cohesion
+            )
             self.near_slide[s] = u
             f = f_n * n + f_t
             t = arm_i * f_t.cross(n)
             t_body = -arm.cross(f)
             if ti.static(self.rolling):
                 q = self.near_roll[s]
-                turn = turning_torque(p, n, w_i.xyz - body_spin, f_n, k_t, a, radius, root, dt, q)
+                turn = turning_torque(p, n, w_i.xyz - body_spin, load, k_t, a, radius, root, dt, q)
                 self.near_roll[s] = q
                 t += turn
                 t_body -= turn
@@ -609,5 +619,6 @@ class Engine(Lists):
             for s in range(c * self.count[NEAR_ROOM], self.near_end[c]):
                 i = self.near_grain[s]
                 distance, n, curvature, arm = self.nearest(self.near_body[s], self.position[i].xyz)
-                if distance < self.position[i].w:
+                r = self.position[i].w
+                if distance < r + self.body_range(self.near_body[s], r, curvature):
                     ti.atomic_add(counts[self.id[i]], 1)

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import taichi as ti
 
+from .cohesion import JKR
+from .contact import adhesive_range
 from .shapes import distance_to
 
 __all__ = ["INDEX_BITS", "INDEX_MASK", "ITEMS_PER_THREAD", "Lists", "MOST_BODIES", "SAME_IMAGE", "curve_ranks"]
@@ -102,6 +104,14 @@ class Lists:
                 curvature = c_k
         normal = rotate(q, normal)
         return best, normal, curvature, d - best * normal
+
+    @ti.func
+    def body_range(self, b, r, curvature):
+        """How far from body b a grain of radius r still feels it [m]; 0 but with JKR."""
+        result = ti.cast(0.0, self.real)
+        if ti.static(self.cohesion == JKR):
+            result = adhesive_range(self.body_pair[b], r / (1.0 + r * curvature))
+        return result
 
     @ti.func
     def cell_of(self, x):
@@ -274,6 +284,8 @@ class Lists:
                                 d.x += ti.cast(mi, self.real) * self.box[PERIOD_X]
                                 d.y += ti.cast(mj, self.real) * self.box[PERIOD_Y]
                                 reach = x_i.w + x_j.w + skin
+                                if ti.static(self.cohesion == JKR):
+                                    reach += adhesive_range(self.grain_pair[None], x_i.w * x_j.w / (x_i.w + x_j.w))
                                 if d.norm_sqr() < reach * reach:
                                     if s < base + self.count[CHUNK_ROOM]:
                                         self.list_pair(s, i, j, j | ((mi + 1 + 3 * (mj + 1)) << INDEX_BITS))
@@ -310,7 +322,7 @@ class Lists:
         for i in range(start, end):
             x = self.position[i]
             for b in range(self.body_count[None]):
-                reach = x.w + skin
+                reach = x.w + skin + self.body_range(b, x.w, 0.0)
                 distance = 2.0 * reach
                 if self.from_body(b, x.xyz).norm_sqr() < (self.body_extent[b] + reach) ** 2:
                     distance, n, curvature, arm = self.nearest(b, x.xyz)

@@ -1,4 +1,4 @@
-"""Grain materials: the numbers of single grains, each with where it comes from."""
+"""Grain materials: the numbers of single grains, each with where it comes from; and those of what grains meet."""
 
 from __future__ import annotations
 
@@ -6,12 +6,21 @@ import difflib
 import math
 from dataclasses import dataclass, field, replace
 
-__all__ = ["MATERIALS", "Material", "SAND", "material"]
+__all__ = ["COHESIONS", "Facing", "MATERIALS", "Material", "SAND", "material"]
+
+COHESIONS = ("none", "dmt", "jkr")
+"""The laws of cohesion, see ``dem.cohesion``."""
+LEAST_RESTITUTION = 0.01
 
 
 @dataclass(frozen=True)
 class Material:
-    """What a grain is made of. SI units; ratios are dimensionless.
+    """What a grain is made of, and how two grains of it touch. SI units; ratios are dimensionless.
+
+    Attributes:
+        friction, restitution, rolling_friction: of two grains on one another.
+        cohesion: "none", "dmt" or "jkr" (``dem.cohesion``).
+        surface_energy: gamma [J/m2], half the work of adhesion of two grains; 0 without cohesion.
 
     Raises:
         ValueError: a number that no material can have, with the key and what would do.
@@ -24,6 +33,8 @@ class Material:
     friction: float
     restitution: float
     rolling_friction: float = 0.0
+    cohesion: str = "none"
+    surface_energy: float = 0.0
     sources: dict[str, str] = field(default_factory=dict, compare=False)
 
     def __post_init__(self):
@@ -37,15 +48,70 @@ class Material:
                 refuse(key, "finite")
         if not 0 <= self.poisson < 0.5:
             refuse("poisson", "at least 0 and below 0.5")
-        if not 0.01 <= self.restitution <= 1:
-            refuse("restitution", "between 0.01 and 1")
+        if not LEAST_RESTITUTION <= self.restitution <= 1:
+            refuse("restitution", f"between {LEAST_RESTITUTION} and 1")
         for key in ("friction", "rolling_friction"):
             if not 0 <= getattr(self, key) < math.inf:
                 refuse(key, "0 or more")
+        if self.cohesion not in COHESIONS:
+            near = difflib.get_close_matches(str(self.cohesion).lower(), COHESIONS, n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise ValueError(
+                f"material {self.name!r}: cohesion = {self.cohesion!r} is no law; there is {', '.join(COHESIONS)}{hint}"
+            )
+        if self.cohesion == "none":
+            if self.surface_energy != 0:
+                refuse("surface_energy", "0 without a law of cohesion; set cohesion to 'dmt' or 'jkr' [J/m2]")
+        elif not 0 < self.surface_energy < math.inf:
+            refuse("surface_energy", f"positive with cohesion {self.cohesion!r} [J/m2]")
 
     def softened(self, young: float) -> Material:
         """The same material with another Young's modulus [Pa]."""
         return replace(self, young=young)
+
+
+@dataclass(frozen=True)
+class Facing:
+    """How a grain touches something else than a grain: the floor, a wall, a body. None: as two grains touch.
+
+    Attributes:
+        friction, restitution, rolling_friction: of a grain on it [1].
+        young: of what it is made of [Pa]; rigid when None. poisson: [1].
+        surface_energy: of the pair [J/m2], half its work of adhesion; 0 for what grains do not stick to.
+
+    Raises:
+        ValueError: a number that no pair can have, with the key and what would do.
+    """
+
+    friction: float | None = None
+    restitution: float | None = None
+    rolling_friction: float | None = None
+    young: float | None = None
+    poisson: float = 0.3
+    surface_energy: float | None = None
+
+    def __post_init__(self):
+        def refuse(key, bounds):
+            raise ValueError(f"{key} = {getattr(self, key)} must {bounds}")
+
+        for key in ("friction", "rolling_friction", "surface_energy"):
+            value = getattr(self, key)
+            if value is not None and not 0 <= value < math.inf:
+                refuse(key, "be 0 or more")
+        if self.restitution is not None and not LEAST_RESTITUTION <= self.restitution <= 1:
+            refuse("restitution", f"lie between {LEAST_RESTITUTION} and 1")
+        if self.young is not None and not self.young > 0:
+            refuse("young", "be positive [Pa], or None for what is rigid")
+        if not 0 <= self.poisson < 0.5:
+            refuse("poisson", "be at least 0 and below 0.5")
+
+    def refuse_for(self, material: Material) -> None:
+        """Raise ValueError for a surface energy, where the material has no law of cohesion."""
+        if self.surface_energy and material.cohesion == "none":
+            raise ValueError(
+                f"surface_energy = {self.surface_energy} J/m2 needs a law: the material {material.name!r} has cohesion "
+                f"'none'; give it 'dmt' or 'jkr'"
+            )
 
 
 SAND = Material(

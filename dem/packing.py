@@ -1,4 +1,4 @@
-"""Size distributions and first positions."""
+"""How many grains of which size, and their first positions."""
 
 from __future__ import annotations
 
@@ -7,26 +7,51 @@ from collections.abc import Sequence
 
 import numpy as np
 
-__all__ = ["RAIN_COLUMN", "draw_radii", "rain_positions"]
+from .sizes import Sizes, Uniform, sizes_of
+
+__all__ = ["RAIN_COLUMN", "draw_radii", "rain_column", "rain_positions"]
 
 RAIN_COLUMN = 2.5
 """Upper bound of the rain's column over the depth of the levelled bed [1]: what a grain can fall."""
 
 
-def draw_radii(rng: np.random.Generator, volume: float, grain: float, spread: float) -> np.ndarray:
-    """Radii of grains whose volumes add up to a solid volume.
-
-    Diameters are uniform within grain (1 +- spread), whose mean cube is grain^3 (1 + spread^2).
+def draw_radii(
+    rng: np.random.Generator, volume: float, grain: float | Sizes, spread: float | None = None
+) -> np.ndarray:
+    """Radii of grains whose volumes add up to a solid volume, but for chance.
 
     Args:
-        volume: of solid [m3]. grain: mean diameter [m]. spread: [1].
+        volume: of solid [m3].
+        grain: a distribution of ``dem.sizes``, or a mean diameter [m].
+        spread: with a mean diameter: uniform within this share of it [1]; 0.15 when None.
 
     Returns:
         Radii [m], shape [grain_count]; at least one.
+
+    Raises:
+        ValueError: a volume that is not positive, or what ``dem.sizes.sizes_of`` refuses.
     """
-    expected = math.pi / 6 * grain**3 * (1 + spread**2)
-    count = max(1, round(volume / expected))
-    return 0.5 * grain * (1 + spread * rng.uniform(-1, 1, count))
+    if not (math.isfinite(volume) and volume > 0):
+        raise ValueError(f"volume = {volume} must be positive [m3]")
+    sizes = sizes_of(grain, spread)
+    count = max(1, round(volume / (math.pi / 6 * sizes.mean_cube)))
+    if isinstance(sizes, Uniform):
+        # In this order of products since the first beds, whose bits it keeps.
+        return 0.5 * sizes.mean * (1 + sizes.spread * rng.uniform(-1, 1, count))
+    return 0.5 * sizes.draw(rng, count)
+
+
+def rain_column(sizes: Sizes) -> float:
+    """Upper bound of the rain's column over the depth of the levelled bed [1].
+
+    ``RAIN_COLUMN`` as long as sizes are alike. The lattice has a site of the largest grain's size for every grain, so a
+    wide distribution makes a column that is higher by the ratio of the largest to the mean cube over that of a uniform
+    one (spread 0.15).
+    """
+    if isinstance(sizes, Uniform):
+        return RAIN_COLUMN
+    like = Uniform(1.0)
+    return RAIN_COLUMN * max(1.0, (sizes.bounds[1] ** 3 / sizes.mean_cube) / (like.bounds[1] ** 3 / like.mean_cube))
 
 
 def rain_positions(rng: np.random.Generator, radii: np.ndarray, period: Sequence[float]) -> np.ndarray:

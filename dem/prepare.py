@@ -12,7 +12,7 @@ import math
 import os
 import warnings
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +20,10 @@ import numpy as np
 
 from . import runtime
 from .bed import Bed, BedFailure
-from .materials import Material
+from .materials import Facing, Material
 from .materials import material as find_material
-from .packing import RAIN_COLUMN, draw_radii, rain_positions
+from .packing import draw_radii, rain_column, rain_positions
+from .sizes import Sizes, Uniform, describe, sizes_of
 from .stages import Preparation
 from .timestep import choose_young
 
@@ -59,14 +60,15 @@ def prepare_bed(
     material: str | Material,
     *,
     size: Sequence[float],
-    grain: float,
-    spread: float = 0.15,
+    grain: float | Sizes,
+    spread: float | None = None,
     packing: float | None = None,
     gravity: float = 9.81,
     seed: int = 1,
     young: float | None = None,
     max_overlap: float = 0.05,
     time_step: float | None = None,
+    floor: Facing | None = None,
     precision: str = "float64",
     arch: str = "cpu",
     threads: int | None = None,
@@ -78,8 +80,8 @@ def prepare_bed(
     Args:
         material: a name or a Material.
         size: lateral periods (x, y) and depth after levelling (z) [m].
-        grain: mean diameter [m].
-        spread: diameters are uniform within +- this share of the mean [1].
+        grain: mean diameter [m], or a distribution of ``dem.sizes``.
+        spread: with a mean diameter: diameters are uniform within +- this share of it [1]; 0.15 when None.
         packing: bulk packing fraction [1]; the bed is tapped until it is reached. As rained when None.
         gravity: of the grains, downwards [m/s2].
         seed: of sizes and positions.
@@ -88,6 +90,7 @@ def prepare_bed(
         max_overlap: bound on overlap over diameter; also ends a later run that goes past it. While the bed is being
             made the bound is 5 % if that is more: grains that land do so harder than they are ever pressed.
         time_step: [s]; an eighth of the contact time when None.
+        floor: how grains touch the floor; as one another when None.
         precision: "float64" or "float32". arch: "cpu" or "cuda". threads: all when None.
         cache: whether to look in the cache, and to leave the bed there.
         progress: anything with ``stage(name, total)`` and ``update(done)``, or None. A KeyboardInterrupt out of
@@ -101,32 +104,37 @@ def prepare_bed(
 
     Raises:
         ValueError: an unknown material, a size or grain that is not positive, grains too large for the bed, a spread
-            outside 0 to 0.5, a packing that cannot be reached, a time step too long.
+            outside 0 to 0.5 or beside a distribution, a packing that cannot be reached, a time step too long.
         BedFailure: the bed did not come to rest.
     """
     stuff = find_material(material)
-    _check(size, grain, spread, packing, gravity, seed, max_overlap)
+    sizes = sizes_of(grain, spread)
+    grain = sizes.mean
+    _check(size, grain, packing, gravity, seed, max_overlap)
     size = tuple(float(s) for s in size)
     if young is None:
         bulk = _EXPECTED_PACKING * stuff.density
         young = choose_young(
             stuff,
             pressure=(1 + _BEARING) * bulk * gravity * size[2],
-            speed=math.sqrt(2 * gravity * RAIN_COLUMN * size[2]),
+            speed=math.sqrt(2 * gravity * rain_column(sizes) * size[2]),
             max_overlap=max_overlap,
+            diameter=grain,
         )
     recipe = {
         "code": fingerprint(),
         "material": {f.name: getattr(stuff, f.name) for f in fields(stuff) if f.name != "sources"},
         "size": size,
         "grain": float(grain),
-        "spread": float(spread),
+        "spread": sizes.spread if isinstance(sizes, Uniform) else None,
+        "sizes": describe(sizes),
         "packing": packing,
         "gravity": float(gravity),
         "seed": int(seed),
         "young": float(young),
         "max_overlap": float(max_overlap),
         "time_step": time_step,
+        "floor": None if floor is None else asdict(floor),
         "precision": precision,
         "arch": arch,
     }
@@ -143,7 +151,7 @@ def prepare_bed(
             bed.recipe = recipe
             return bed
     work = Preparation(
-        _rain(stuff, size, grain, spread, gravity, seed, young, max_overlap, time_step, precision, arch, threads),
+        _rain(stuff, size, sizes, gravity, seed, young, max_overlap, time_step, floor, precision, arch, threads),
         grain=grain,
         depth=size[2],
         packing=packing,
@@ -169,17 +177,13 @@ def prepare_bed(
     return bed
 
 
-def _check(size, grain, spread, packing, gravity, seed, max_overlap) -> None:
+def _check(size, grain, packing, gravity, seed, max_overlap) -> None:
     if not 0 < max_overlap <= 0.2:
         raise ValueError(f"max_overlap = {max_overlap} must be above 0 and at most 0.2 of a diameter")
     if int(seed) != seed or seed < 0:
         raise ValueError(f"seed = {seed} must be a whole number, 0 or more")
     if len(size) != 3 or not all(math.isfinite(s) and s > 0 for s in size):
         raise ValueError(f"size = {tuple(size)} must be three positive lengths [m]")
-    if not (math.isfinite(grain) and grain > 0):
-        raise ValueError(f"grain = {grain} must be a positive diameter [m]")
-    if not 0 <= spread <= 0.5:
-        raise ValueError(f"spread = {spread} must be between 0 and 0.5 of the mean diameter")
     if packing is not None and not 0.5 < packing <= 0.64:
         raise ValueError(
             f"packing = {packing} is no packing fraction of spheres at rest; leave it out or ask for 0.55 to 0.64"
@@ -193,12 +197,12 @@ def _check(size, grain, spread, packing, gravity, seed, max_overlap) -> None:
             )
 
 
-def _rain(stuff, size, grain, spread, gravity, seed, young, max_overlap, time_step, precision, arch, threads) -> Bed:
+def _rain(stuff, size, sizes, gravity, seed, young, max_overlap, time_step, floor, precision, arch, threads) -> Bed:
     """The grains in the air, at rest, in a loose column."""
-    rng = np.random.default_rng(seed)
+    rng, grain = np.random.default_rng(seed), sizes.mean
     fill = max(size[2] * (1 + _SURPLUS), size[2] + _SURPLUS_DIAMETERS * grain)
     volume = 0.60 * fill * size[0] * size[1]
-    radii = draw_radii(rng, volume, grain, spread)
+    radii = draw_radii(rng, volume, sizes)
     positions = rain_positions(rng, radii, size[:2])
     top = float((positions[:, 2] + radii).max())
     bed = Bed.from_grains(
@@ -211,6 +215,7 @@ def _rain(stuff, size, grain, spread, gravity, seed, young, max_overlap, time_st
         young=young,
         max_overlap=max_overlap,
         time_step=time_step,
+        floor=True if floor is None else floor,
         seed=seed,
         precision=precision,
         arch=arch,

@@ -18,9 +18,11 @@ if TYPE_CHECKING:
 
 __all__ = ["STATE_FORMAT", "adopt", "put_back", "read_file", "take", "write_file"]
 
-STATE_FORMAT = "hedgebed-bed/1"
+STATE_FORMAT = "hedgebed-bed/2"
+# Before there was cohesion; its files can still be read.
+STATE_FORMATS = ("hedgebed-bed/1", STATE_FORMAT)
 
-MATERIAL_NUMBERS = ("density", "young", "poisson", "friction", "restitution", "rolling_friction")
+MATERIAL_NUMBERS = ("density", "young", "poisson", "friction", "restitution", "rolling_friction", "surface_energy")
 GRAIN_FIELDS = ("position", "velocity", "spin", "force", "torque", "origin", "listed", "id")
 BODY_FIELDS = (
     "body_position",
@@ -39,7 +41,7 @@ BODY_FIELDS = (
 )
 LIST_NAMES = ("pair_count", "pair", "slide", "near_count", "near_grain", "near_body", "near_slide", "near_roll")
 NAMES = (*GRAIN_FIELDS, *BODY_FIELDS, *LIST_NAMES, "numbers", "reals")
-ABOUT = ("material", "material_numbers", "size", "height", "tensile", "seed", "precision")
+ABOUT = ("material", "material_numbers", "cohesion", "size", "height", "tensile", "seed", "precision")
 
 
 def take(bed: Bed) -> dict[str, np.ndarray]:
@@ -124,6 +126,7 @@ def write_file(bed: Bed, path: Path) -> None:
         "format": np.array(STATE_FORMAT),
         "material": np.array(stuff.name),
         "material_numbers": np.array([getattr(stuff, key) for key in MATERIAL_NUMBERS]),
+        "cohesion": np.array(stuff.cohesion),
         "size": np.array(bed.size),
         "height": np.array(bed._settings["height"]),
         "tensile": np.array(bed._settings["tensile"]),
@@ -150,8 +153,12 @@ def read_file(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray], str]:
         raise ValueError(f"{path}: no such file; a bed saved by Bed.save was expected") from None
     except (zipfile.BadZipFile, ValueError, OSError, EOFError) as problem:
         raise ValueError(f"{path} is not a bed saved by hedgebed ({problem})") from None
-    if str(stored.get("format", "")) != STATE_FORMAT:
-        raise ValueError(f"{path}: format is {stored.get('format', 'missing')}, {STATE_FORMAT!r} was expected")
+    found = str(stored.get("format", "missing"))
+    if found not in STATE_FORMATS:
+        raise ValueError(f"{path}: format is {found}, {STATE_FORMAT!r} was expected")
+    if found == STATE_FORMATS[0] and "material_numbers" in stored:
+        stored["material_numbers"] = np.append(stored["material_numbers"], 0.0)
+        stored["cohesion"] = np.array("none")
     lacking = [key for key in (*ABOUT, *(f"state.{name}" for name in NAMES)) if key not in stored]
     if lacking:
         raise ValueError(f"{path} is not a whole bed saved by hedgebed: it lacks {', '.join(lacking)}")
@@ -159,7 +166,7 @@ def read_file(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray], str]:
     state = {name[6:]: value for name, value in stored.items() if name.startswith("state.")}
     seed = int(stored["seed"])
     settings = {
-        "material": Material(str(stored["material"]), **numbers),
+        "material": Material(str(stored["material"]), cohesion=str(stored["cohesion"]), **numbers),
         "size": tuple(float(v) for v in stored["size"]),
         "gravity": tuple(float(v) for v in state["reals"][2:5]),
         "time_step": float(state["reals"][0]),

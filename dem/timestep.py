@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 
+from .cohesion import jkr_contact
 from .contact import effective_moduli
 from .materials import Material
 
@@ -21,9 +22,9 @@ CHAIN = 4.0
 def contact_time(material: Material, *, diameter: float, max_overlap: float) -> float:
     """Half a period of the stiffest contact that the overlap bound allows [s].
 
-    pi sqrt(m* / S_n), S_n = 2 E* sqrt(R* delta) at delta = max_overlap d, for two grains and for a grain on a rigid
-    plane, whichever is shorter. A Hertzian collision that reaches this overlap lasts 1.28 times as long, and one that
-    reaches a tenth of it 2.3 times.
+    pi sqrt(m* / S_n), S_n = 2 E* a with a = sqrt(R* delta) (or JKR's) at delta = max_overlap d, for two grains and for
+    a grain on a rigid plane, whichever is shorter. A Hertzian collision that reaches this overlap lasts 1.28 times as
+    long, and one that reaches a tenth of it 2.3 times.
 
     Args:
         diameter: of the smallest grain [m].
@@ -37,7 +38,10 @@ def contact_time(material: Material, *, diameter: float, max_overlap: float) -> 
         (math.inf, diameter / 2, mass),
     ):
         young, _ = effective_moduli(material.young, material.poisson, other, material.poisson)
-        times.append(math.pi * math.sqrt(reduced / (2 * young * math.sqrt(radius * delta))))
+        a = math.sqrt(radius * delta)
+        if material.cohesion == "jkr":
+            a, _ = jkr_contact(delta, surface_energy=material.surface_energy, radius=radius, effective_young=young)
+        times.append(math.pi * math.sqrt(reduced / (2 * young * a)))
     return min(times)
 
 
@@ -60,7 +64,9 @@ def time_step_for(material: Material, *, diameter: float, max_overlap: float, wa
     return wanted
 
 
-def choose_young(material: Material, *, pressure: float, speed: float, max_overlap: float) -> float:
+def choose_young(
+    material: Material, *, pressure: float, speed: float, max_overlap: float, diameter: float | None = None
+) -> float:
     """The softest Young's modulus that keeps overlaps within the bound [Pa]; never above the material's own.
 
     Two needs, the larger of which rules: a bed under pressure, whose mean contact force is about p d^2 and its largest
@@ -70,8 +76,16 @@ def choose_young(material: Material, *, pressure: float, speed: float, max_overl
     Args:
         pressure: the largest on the grains [Pa]. speed: of the fastest collision [m/s].
         max_overlap: the bound, over diameter [1].
+        diameter: of the grains [m]; only cohesion needs it, whose pull on a plane, 2 pi gamma d, presses as well.
+
+    Raises:
+        ValueError: cohesion, and no diameter.
     """
     pressed = 1.5 * CHAIN * pressure / max_overlap**1.5
+    if material.cohesion != "none":
+        if diameter is None:
+            raise ValueError(f"diameter is needed for grains with cohesion {material.cohesion!r}")
+        pressed += 1.5 * (2 * math.pi * material.surface_energy / diameter) / max_overlap**1.5
     struck = 15 * math.pi / 96 * material.density * speed**2 / max_overlap**2.5
     effective = max(pressed, struck)
     return min(material.young, 2 * (1 - material.poisson**2) * effective)

@@ -1,6 +1,6 @@
 """A bed of 300 grains in eight chunks that falls onto its floor and a ball: for tests of bits, here and elsewhere.
 
-As a script, in a process of its own:  falling_bed.py WHAT FILE STEPS THREADS [EVERY]
+As a script, in a process of its own:  falling_bed.py WHAT FILE STEPS THREADS [EVERY [COHESION]]
     fresh   makes the bed, advances it and saves it
     resume  loads the bed and advances it to that many steps in all
 Saves every EVERY steps when given, and says the number of steps after each save.
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,15 +22,15 @@ GRAINS_PER_CHUNK = 37
 STUFF = Material("grain", 2600, 1e7, 0.25, 0.5, 0.6, 0.15)
 
 
-def make(threads=None, precision="float64"):
-    """The bed at time 0, with a ball-tipped cylinder that is pulled through it at a slant."""
+def make(threads=None, precision="float64", cohesion="none"):
+    """The bed at time 0, with a ball-tipped cylinder that is pulled through it at a slant; at Bond number 1 or 0."""
     dem.engine.GRAINS_PER_CHUNK = GRAINS_PER_CHUNK
     rng = np.random.default_rng(7)
     i = np.arange(300)
     positions = np.column_stack([i % 8, i // 8 % 8, i // 64]) * [0.0044, 0.0044, 0.0042] + [0.001, 0.002, 0.0026]
     positions += rng.uniform(-1, 1, (300, 3)) * 0.00015
     bed = Bed.from_grains(
-        STUFF,
+        replace(STUFF, cohesion=cohesion, surface_energy=0.0 if cohesion == "none" else 0.06),
         positions=positions,
         radii=0.0019 * rng.uniform(0.85, 1.15, 300),
         velocities=rng.normal(0, 0.1, (300, 3)),
@@ -61,7 +62,8 @@ def main() -> None:
     what, path, steps, threads = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])
     every = int(sys.argv[5]) if len(sys.argv) > 5 else steps
     dem.engine.GRAINS_PER_CHUNK = GRAINS_PER_CHUNK
-    bed = make(threads) if what == "fresh" else Bed.load(path, threads=threads)
+    cohesion = sys.argv[6] if len(sys.argv) > 6 else "none"
+    bed = make(threads, cohesion=cohesion) if what == "fresh" else Bed.load(path, threads=threads)
     while bed.steps < steps:
         bed.advance(min(every, steps - bed.steps))
         bed.save(path)

@@ -9,6 +9,7 @@ import itertools
 import math
 
 import numpy as np
+from scipy.optimize import brentq
 
 
 class NaiveBed:
@@ -38,10 +39,11 @@ class NaiveBed:
         share = 1 if rigid else 2
         young = s.young / (1 - s.poisson**2) / share
         shear = s.young / (2 * (2 - s.poisson) * (1 + s.poisson)) / share
-        a = math.sqrt(radius * overlap)
+        a, spring, pull, more = attraction(s, young, radius, overlap)
         s_n, s_t = 2 * young * a, 8 * shear * a
         u, q = self.history.get(key, (np.zeros(3), np.zeros(3)))
-        f_n = max(0.0, 4 / 3 * young * a * overlap - self.damping * math.sqrt(mass * s_n) * (v @ n))
+        normal = max(-pull, spring - self.damping * math.sqrt(mass * s_n) * (v @ n))
+        f_n = normal + more * pull  # what presses the surfaces together
         v_t = v - (v @ n) * n
         u = u + v_t * dt
         u = u - (u @ n) * n
@@ -56,7 +58,16 @@ class NaiveBed:
         bound = 3 * math.pi / 16 * s.friction * a * f_n
         twist, twisting = capped(k, 0.6 * math.sqrt(inertia * k), (q @ n) * n, (spin @ n) * n, bound)
         self.new[key] = (u, roll + twist)
-        return f_n * n + f_t, rolling + twisting
+        return normal * n + f_t, rolling + twisting
+
+    def reach(self, radius, rigid):
+        """Where a JKR pair parts: d(a) = a^2 / R - sqrt(2 pi w a / E) is least at a^3 = pi w R^2 / 8 E."""
+        s = self.stuff
+        if s.cohesion != "jkr":
+            return 0.0
+        young = s.young / (1 - s.poisson**2) / (1 if rigid else 2)
+        a = (math.pi * 2 * s.surface_energy * radius**2 / (8 * young)) ** (1 / 3)
+        return 3 * a**2 / radius
 
     def push(self, dt):
         n = len(self.r)
@@ -68,7 +79,7 @@ class NaiveBed:
                 d = self.x[i] - self.x[j] + [a * self.period[0], b * self.period[1], 0.0]
                 length = np.linalg.norm(d)
                 overlap = self.r[i] + self.r[j] - length
-                if overlap > 0:
+                if overlap > -self.reach(self.r[i] * self.r[j] / (self.r[i] + self.r[j]), False):
                     normal = d / length
                     arm_i, arm_j = self.r[i] - overlap / 2, self.r[j] - overlap / 2
                     v = self.v[i] - self.v[j] - np.cross(arm_i * self.w[i] + arm_j * self.w[j], normal)
@@ -89,7 +100,7 @@ class NaiveBed:
 
     def meet_floor(self, i, dt):
         normal, overlap = np.array([0.0, 0.0, 1.0]), self.r[i] - self.x[i, 2]
-        if overlap > 0:
+        if overlap > -self.reach(self.r[i], True):
             arm = self.r[i] - overlap
             v = self.v[i] - np.cross(arm * self.w[i], normal)
             f, turn = self.contact((i, "floor"), normal, v, self.w[i], overlap, self.r[i], self.m[i], True, dt)
@@ -103,7 +114,7 @@ class NaiveBed:
             d = self.x[i] - ball["position"] + [a * self.period[0], b * self.period[1], 0.0]
             length = np.linalg.norm(d)
             overlap = self.r[i] + ball["radius"] - length
-            if overlap > 0:
+            if overlap > -self.reach(self.r[i] * ball["radius"] / (self.r[i] + ball["radius"]), True):
                 normal, arm = d / length, self.r[i] - overlap
                 lever = ball["radius"] * normal
                 at_ball = ball["velocity"] + np.cross(ball["spin"], lever)
@@ -124,6 +135,30 @@ class NaiveBed:
             if self.ball is not None:
                 self.ball["position"] = self.ball["position"] + self.dt * self.ball["velocity"]
             self.push(self.dt)
+
+
+def attraction(material, young, radius, overlap):
+    """Contact radius, force at rest, pull-off force, and how many of these go into the load of friction's bound."""
+    w = 2 * material.surface_energy
+    if material.cohesion == "jkr":
+        least = (math.pi * w * radius**2 / (8 * young)) ** (1 / 3)
+        most = least + 2 * math.sqrt(radius * abs(overlap)) + 20 * least
+        a = brentq(
+            lambda a: a**2 / radius - math.sqrt(2 * math.pi * w * a / young) - overlap,
+            least,
+            most,
+            xtol=1e-18,
+            rtol=1e-15,
+        )
+        return (
+            a,
+            4 * young * a**3 / (3 * radius) - math.sqrt(8 * math.pi * w * young * a**3),
+            1.5 * math.pi * w * radius,
+            2,
+        )
+    a = math.sqrt(radius * overlap)
+    pull = 2 * math.pi * w * radius
+    return a, 4 / 3 * young * a * overlap - pull, pull, 1
 
 
 def capped(stiffness, damping, stretch, rate, bound):

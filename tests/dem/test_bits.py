@@ -69,6 +69,40 @@ def test_one_thread_in_another_process_gives_the_same_bits(one_thread, two_threa
     assert finish(one_thread[0]) == two_threads[1]
 
 
+@pytest.mark.parametrize("cohesion", ["dmt", "jkr"])
+def test_cohesive_grains_keep_their_bits_too(cohesion, tmp_path):
+    """One thread elsewhere, two here; and from a file of the middle."""
+    elsewhere_too = elsewhere("fresh", tmp_path / "other.npz", 300, 1, 100, cohesion)
+    bed = falling_bed.make(2, cohesion=cohesion)
+    digests, loaded = {}, {}
+    for step in (100, 200, 300):
+        bed.advance(100)
+        digests[step] = falling_bed.digest(bed)
+        if step == 100:
+            bed.save(tmp_path / "bed.npz")
+    assert (bed.grains()["coordination"] > 0).mean() > 0.2
+    again = Bed.load(tmp_path / "bed.npz", threads=2)
+    assert again.material == bed.material and again.material.cohesion == cohesion
+    for step in (200, 300):
+        again.advance(100)
+        loaded[step] = falling_bed.digest(again)
+    assert loaded == {step: digests[step] for step in (200, 300)}
+    assert finish(elsewhere_too) == digests
+
+
+def test_a_file_from_before_cohesion_is_read(two_threads, tmp_path):
+    """Format 1: six numbers of the material and no word of cohesion."""
+    bed, digests, _, middle = two_threads
+    with np.load(middle) as file:
+        old = {name: file[name] for name in file.files if name != "cohesion"}
+    assert str(old["format"]) == "hedgebed-bed/2" and old["material_numbers"][-1] == 0
+    old |= {"format": np.array("hedgebed-bed/1"), "material_numbers": old["material_numbers"][:-1]}
+    np.savez(tmp_path / "old.npz", **old)
+    again = Bed.load(tmp_path / "old.npz", threads=2)
+    assert again.material == bed.material
+    assert falling_bed.digest(again) == digests[400]
+
+
 def test_restore_goes_on_to_the_same_bits(two_threads):
     bed, digests, states, _ = two_threads
     bed.restore(states[500])

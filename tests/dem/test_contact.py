@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from dem import MATERIALS, SAND, Bed, Material, material
+from dem import MATERIALS, SAND, Bed, Facing, Material, material
+from dem.cohesion import jkr_contact
 from dem.contact import damping_factor, effective_moduli, pair_parameters
 from dem.timestep import CHAIN, choose_young, contact_time, time_step_for
 
@@ -115,6 +116,28 @@ def test_the_young_chosen_bears_the_largest_force_of_a_bed_under_pressure():
     assert 2 / 3 * star * 0.05**1.5 == pytest.approx(CHAIN * 1e4)
 
 
+def test_the_young_chosen_bears_the_pull_of_cohesion():
+    """On a plane 4 pi gamma d / 2, as a pressure over d^2; and it asks for the diameter."""
+    sticky = Material("sticky", 2600, 1e12, 0.25, 0.5, 0.5, 0.1, "jkr", 0.5)
+    young = choose_young(sticky, pressure=0.0, speed=0.0, max_overlap=0.05, diameter=0.002)
+    star = young / (1 - 0.25**2) / 2
+    assert 2 / 3 * star * 0.002**2 * 0.05**1.5 == pytest.approx(4 * math.pi * 0.5 * 0.001)
+    with pytest.raises(ValueError, match="diameter is needed for grains with cohesion 'jkr'"):
+        choose_young(sticky, pressure=0.0, speed=0.0, max_overlap=0.05)
+
+
+def test_jkrs_wider_contact_shortens_the_contact_time():
+    """pi sqrt(m / 2 E* a) with JKR's a at the bound, on a rigid plane."""
+    sticky = Material("sticky", 2600, 1e7, 0.25, 0.5, 0.5, 0.1, "jkr", 1.0)
+    star = 1e7 / (1 - 0.0625)
+    a, _ = jkr_contact(1e-4, surface_energy=1.0, radius=1e-3, effective_young=star)
+    mass = 2600 * math.pi * 0.002**3 / 6
+    assert contact_time(sticky, diameter=0.002, max_overlap=0.05) == pytest.approx(
+        math.pi * math.sqrt(mass / (2 * star * a))
+    )
+    assert a > 1.05 * math.sqrt(1e-3 * 1e-4)
+
+
 def test_the_young_chosen_is_never_above_the_materials_own():
     assert choose_young(SAND, pressure=0.0, speed=1000.0, max_overlap=0.01) == SAND.young
 
@@ -141,11 +164,48 @@ GOOD = {"name": "x", "density": 1.0, "young": 1.0, "poisson": 0.2, "friction": 0
         ("friction", -0.1),
         ("friction", math.inf),
         ("rolling_friction", -0.1),
+        ("surface_energy", 0.05),
     ],
 )
 def test_a_material_that_cannot_be_is_refused_by_key_and_value(key, value):
     with pytest.raises(ValueError, match=rf"material 'x': {key} = {value} must be"):
         Material(**GOOD | {key: value})
+
+
+def test_an_unknown_law_of_cohesion_is_refused_and_the_nearest_offered():
+    with pytest.raises(ValueError, match=r"cohesion = 'JRK' is no law; there is none, dmt, jkr; did you mean 'jkr'\?"):
+        Material(**GOOD, cohesion="JRK", surface_energy=0.1)
+    with pytest.raises(ValueError, match=r"cohesion = 'glue' is no law; there is none, dmt, jkr$"):
+        Material(**GOOD, cohesion="glue")
+    for value in (0.0, -0.1, math.nan, math.inf):
+        with pytest.raises(ValueError, match=f"surface_energy = {value} must be positive with cohesion 'jkr'"):
+            Material(**GOOD, cohesion="jkr", surface_energy=value)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("friction", -0.1, "be 0 or more"),
+        ("rolling_friction", math.inf, "be 0 or more"),
+        ("surface_energy", -1.0, "be 0 or more"),
+        ("restitution", 1.01, "lie between 0.01 and 1"),
+        ("restitution", 0.0, "lie between 0.01 and 1"),
+        ("young", 0.0, "be positive"),
+        ("poisson", 0.5, "be at least 0 and below 0.5"),
+        ("poisson", math.nan, "be at least 0 and below 0.5"),
+    ],
+)
+def test_a_facing_that_cannot_be_is_refused_by_key_and_value(key, value, words):
+    with pytest.raises(ValueError, match=rf"{key} = {value} must {words}"):
+        Facing(**{key: value})
+
+
+def test_a_facing_sticks_only_where_grains_have_a_law_for_it():
+    with pytest.raises(
+        ValueError, match=r"surface_energy = 0.1 J/m2 needs a law: the material 'sand' has cohesion 'none'"
+    ):
+        Facing(surface_energy=0.1).refuse_for(SAND)
+    Facing(surface_energy=0.0).refuse_for(SAND)
 
 
 def test_materials_are_found_by_name_and_the_nearest_is_offered():

@@ -1,5 +1,7 @@
 """Lists, chunks, periodic images and history against a plain double loop; layouts and skins agree."""
 
+from dataclasses import replace
+
 import cloud
 import numpy as np
 import pytest
@@ -22,13 +24,20 @@ def layout(request, engines, monkeypatch):
     return request.param
 
 
-@pytest.fixture(scope="module")
-def reference():
+COHESIVE = {
+    "none": cloud.STUFF,
+    "dmt": replace(cloud.STUFF, cohesion="dmt", surface_energy=5.0),
+    "jkr": replace(cloud.STUFF, cohesion="jkr", surface_energy=5.0),
+}
+"""Laws of cohesion; at this surface energy JKR's range is 0.6 % of a diameter."""
+
+
+def computed(material):
     """The cloud and its ball after thirty steps of the plain loop."""
     positions, radii, velocities, spins = cloud.initial()
     ball = {name: np.array(value, dtype=float) for name, value in cloud.BALL.items()}
     naive = NaiveBed(
-        cloud.STUFF,
+        material,
         positions,
         radii,
         velocities,
@@ -44,12 +53,30 @@ def reference():
     return naive
 
 
+@pytest.fixture(scope="module")
+def reference():
+    return computed(cloud.STUFF)
+
+
 def test_forces_and_motion_are_those_of_a_plain_double_loop(layout, reference):
     """Forces of the first instant, and everything after thirty steps, to round-off; the reaction on the ball too."""
     bed = cloud.make(ball=True)
     assert bed._engine.chunk_count == {"one chunk": 1, "seven chunks": 7, "a chunk a grain": 64}[layout]
     assert bed._engine.nx == 3
     assert bed.coordination_number > 3
+    agrees(bed, reference)
+
+
+@pytest.mark.parametrize("cohesion", ["dmt", "jkr"])
+def test_forces_of_cohesive_grains_are_those_of_a_plain_double_loop(cohesion, monkeypatch):
+    """In seven chunks; JKR's equation for the contact radius is solved by bisection there."""
+    monkeypatch.setattr(dem.engine, "GRAINS_PER_CHUNK", 9)
+    bed = cloud.make(ball=True, material=COHESIVE[cohesion])
+    assert bed.coordination_number > 3
+    agrees(bed, computed(COHESIVE[cohesion]))
+
+
+def agrees(bed, reference):
     first = bed.grains()
     assert np.abs(first["force"] - reference.first).max() <= 1e-11 * np.abs(reference.first).max()
     bed.advance(STEPS - 1)

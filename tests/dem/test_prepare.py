@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import dem.prepare
-from dem import SAND, Bed
+from dem import SAND, Bed, Facing, LogNormal, Normal
 from dem.prepare import prepare_bed
 from dem.stages import ENERGY_RATIO, Preparation
 
@@ -159,6 +159,10 @@ def test_the_key_of_the_cache_holds_every_option(monkeypatch):
     numbers = {"density": 2600, "poisson": 0.2, "friction": 0.4, "restitution": 0.6, "rolling_friction": 0.2}
     others = [name_of(replace(SAND, **{key: value})) for key, value in numbers.items()]
     others += [
+        name_of(replace(SAND, cohesion=law, surface_energy=g)) for law, g in (("dmt", 1.0), ("jkr", 1.0), ("jkr", 2.0))
+    ]
+    others += [name_of(grain=grain) for grain in (Normal(GRAIN, 0.1), Normal(GRAIN, 0.2), LogNormal(GRAIN, 0.1))]
+    others += [
         name_of(**{key: value})
         for key, value in {
             "size": (0.024, 0.024, 0.031),
@@ -170,6 +174,7 @@ def test_the_key_of_the_cache_holds_every_option(monkeypatch):
             "young": 2e7,
             "max_overlap": 0.01,
             "time_step": 1e-6,
+            "floor": Facing(friction=0.2),
             "precision": "float32",
             "arch": "cuda",
         }.items()
@@ -319,6 +324,9 @@ def test_levelling_keeps_the_contacts_of_what_stays(bed):
         ({"grain": 0.005}, "size: x = 0.024 m is less than 6 grains of 0.005 m; .*0.03 m"),
         ({"size": (0.024, 0.024, 0.015)}, "size: z = 0.015 m is less than 4 grains"),
         ({"spread": 0.6}, "spread = 0.6"),
+        ({"grain": Normal(0.004, 0.1), "spread": 0.1}, "spread = 0.1 is for a mean diameter; Normal has a width"),
+        ({"grain": "fine"}, "grain = 'fine' must be a mean diameter"),
+        ({"floor": Facing(surface_energy=1.0)}, "surface_energy = 1.0 J/m2 needs a law"),
         ({"packing": 0.9}, "packing = 0.9 is no packing fraction"),
         ({"gravity": 0.0}, "gravity = 0.0 must be positive"),
         ({"max_overlap": 0.3}, "max_overlap = 0.3"),
