@@ -1,222 +1,34 @@
-"""The batched integrator, compiled by Taichi: one trial a lane, the same terms as the accurate integrator.
-
-Method: velocity Verlet (kick, drift, kick) with the speed-dependent forces taken at the predicted end speeds, one
-evaluation a step, order 2. A step in which a spike touches, leaves, slips through zero or reaches its static bound, or
-in which the wheel or the torque stops, is cut at that moment (found to the second order), the modes change, and the
-rest of the step follows: so events cost no order. Sticking is the same constraint as in `rigid.dynamics`, its speed
-taken out exactly at the end of every step.
-
-Of the spikes only the lowest and its two neighbours are looked at; a trial that sinks so deep that a fourth would touch
-is marked (`status`), and left to the accurate integrator.
-"""
+"""The motion of a batch from its start to the end; the method is told in the package's docstring."""
 
 # Taichi reads the annotations and the source of kernels: no `from __future__ import annotations` here.
-import linecache
-import math
-from functools import lru_cache
+from types import SimpleNamespace
 from typing import Any
 
-from .model import assemble, parameter_names
-from .terms import STATE_FIELDS, Term
+from .changes import make_switch
+from .dry import make_dry
+from .samples import make_records
 
-__all__ = ["CHANNELS", "FIXED_NUMBERS", "SUMMARY", "batch_kernel"]
-
-FIXED_NUMBERS = (
-    "mass", "inertia", "length", "stance", "counterweight", "gravity", "weight", "torque", "torque_until",
-    "wheel_inertia", "wheel_sign", "wheel_speed_0", "mu_s", "mu_d",
-)  # fmt: skip
-"""The first columns of the trials' numbers; those of the ground's law and of the effects follow."""
-SUMMARY = (
-    "trajectory_angle", "max_speed", "max_angular_velocity", "stand", "pivot", "slip", "hop", "status",
-    "x", "y", "theta", "vx", "vy", "omega", "wheel_speed", "splits", "longest_step",
-)  # fmt: skip
-"""Columns of the summary: launch, largest speeds, theta on entering each state first (NaN: never), status, end, and the
-longest step [s] for the coordinate that a term has of its own (NaN: there is none).
-
-Status: 0 done, 1 too deep, 2 no longer finite, 3 cannot stand, 4 the step is too long for a term's own coordinate."""
-CHANNELS = ("x", "y", "theta", "vx", "vy", "omega", "ax", "ay", "wheel_speed", "state")
-"""Channels of the series."""
+__all__ = ["make_advance"]
 
 MOST_SPLITS = 12
 """Cuts of one step; beyond, modes change at its end."""
-_NEAR = 1e-12
 
 
-@lru_cache(maxsize=64)
-def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
-    """The kernels for these effects on this ground, for platforms with `count` rows of spikes.
-
-    `stand(numbers, poses)` finds y and theta at rest (theta NaN: cannot stand); `advance(numbers, poses, times,
-    time_step, steps, end, launch, summary, series)` does the rest. See `rigid.batch`.
-    """
+def make_advance(parts: SimpleNamespace) -> Any:
+    """The kernel `advance(numbers, poses, times, time_step, steps, end, launch, summary, series)`."""
     import taichi as ti
 
-    model = assemble(terms, ground, taichi=True)
-    names = parameter_names(terms)
-    State = ti.types.struct(**dict.fromkeys(STATE_FIELDS, ti.f64))
-    Parameters = ti.types.struct(**dict.fromkeys(names, ti.f64))
-    LAW = len(FIXED_NUMBERS)
-    LAW_SIZE = len(model.law.slots)
-    load_parameters = _loader(names, Parameters, LAW + LAW_SIZE)
-    vertical, tip_radius, torque_factor = model.vertical, model.tip_radius, model.torque_factor
-    inertia, applied, dry_friction = model.inertia, model.applied, model.dry_friction
-    inner_start, inner = model.inner_start, model.inner
-    crater_of, contact, arms, divide = model.crater, model.contact, model.contact_arms, model.divide_mass
-    MEMORY = model.has_memory
-    SHEDS = model.law.has_memory or model.has("crater")
-    HOLDS = model.has("hold")
-    DRY = model.has("vertical_friction", "rotation_friction")
-    INNER = model.has("inner_mass")
-    BETA = 2 * math.pi / count
-    HALF = math.pi / count
-    TURN_COS = [math.cos(k * BETA) for k in (-1, 0, 1)]
-    TURN_SIN = [math.sin(k * BETA) for k in (-1, 0, 1)]
-    TWICE_COS, TWICE_SIN = math.cos(2 * BETA), math.sin(2 * BETA)
-    DIAGONAL = not model.has("mass", "up")  # then the mass matrix is the base model's, constant and diagonal
-    SINE = [(-1) ** k / math.factorial(2 * k + 1) for k in range(8)]
-    COSINE = [(-1) ** k / math.factorial(2 * k) for k in range(9)]
-    NAN = math.nan
-
-    @ti.func
-    def small_sine(a):
-        b = a * a
-        value = SINE[7]
-        for k in ti.static(range(6, -1, -1)):
-            value = value * b + SINE[k]
-        return value * a
-
-    @ti.func
-    def small_cosine(a):
-        b = a * a
-        value = COSINE[8]
-        for k in ti.static(range(7, -1, -1)):
-            value = value * b + COSINE[k]
-        return value
-
-    @ti.func
-    def state_of(touch, stick):
-        state = 3
-        if touch != 0:
-            state = 2
-            if stick != 0:
-                state = 1
-                if (stick & (stick - 1)) != 0:
-                    state = 0
-        return state
-
-    @ti.func
-    def trial_state(numbers: ti.template(), i):
-        s = State(time=0.0)
-        s.inner_mode = 1.0
-        s.mass = numbers[i, 0]
-        s.inertia = numbers[i, 1]
-        s.length = numbers[i, 2]
-        s.stance = numbers[i, 3]
-        s.counterweight = numbers[i, 4]
-        s.gravity = numbers[i, 5]
-        s.weight = numbers[i, 6]
-        return s
-
-    @ti.kernel
-    def stand(
-        numbers: ti.types.ndarray(dtype=ti.f64, ndim=2),
-        poses: ti.types.ndarray(dtype=ti.f64, ndim=2),
-    ):
-        ti.loop_config(block_dim=64)
-        for i in range(numbers.shape[0]):
-            s = trial_state(numbers, i)
-            p = load_parameters(numbers, i)
-            q = ti.Vector([numbers[i, LAW + k] for k in ti.static(range(LAW_SIZE))])
-            s.up_x, s.up_y = vertical(p)
-            radius = tip_radius(p)
-            s.cosine = 1.0
-            share = 0.5 * s.weight * s.up_y
-            low, high = 0.0, s.length
-            for _ in range(200):  # the depth at which a row carries half the weight
-                middle = 0.5 * (low + high)
-                elastic, lost, stored, side, factor_s, factor_d = contact(
-                    p, s, q, middle, 0.0, 0.0, middle, middle
-                )
-                if elastic < share:
-                    low = middle
-                else:
-                    high = middle
-            y = (s.length - radius) * ti.cos(HALF) + radius - high
-            theta = 0.0
-            depth = high
-            error = 1e300
-            best_y, best_theta, best, friction, bound = y, theta, 1e300, 0.0, 0.0
-            sound = high < 0.999 * s.length
-            for _ in range(40):  # Newton on the balance of forces along the normal and of moments
-                ry = ti.Vector([0.0, 0.0, 0.0, 0.0, 0.0])
-                rt = ti.Vector([0.0, 0.0, 0.0, 0.0, 0.0])
-                e = 1e-4 * ti.max(depth, 1e-9)
-                least = 1e300
-                for m in range(5):
-                    at_y, at_theta = y, theta
-                    if m == 1:
-                        at_y = y + e
-                    if m == 2:
-                        at_y = y - e
-                    if m == 3:
-                        at_theta = theta + e / s.length
-                    if m == 4:
-                        at_theta = theta - e / s.length
-                    s.y = at_y
-                    s.theta = at_theta
-                    s.cosine = ti.cos(at_theta)
-                    s.sine = ti.sin(at_theta)
-                    if ti.static(INNER):
-                        s.inner = inner_start(p, s)
-                    fx, fy, ft = applied(p, s)
-                    load, mean_h, mu_load = 0.0, 0.0, 0.0
-                    for side_of in range(2):
-                        angle = at_theta + HALF * (1.0 - 2.0 * side_of)
-                        h, d = arms(ti.cos(angle), ti.sin(angle), s.length, radius)
-                        z = h - at_y
-                        in_z = ti.max(z, 1e-300)
-                        elastic, lost, stored, side, factor_s, factor_d = contact(
-                            p, s, q, in_z, 0.0, 0.0, in_z, in_z
-                        )
-                        press = ti.max(elastic, 0.0)
-                        fy += elastic
-                        ft += elastic * d
-                        load += press
-                        mean_h += press * h
-                        mu_load += factor_s * press
-                        if m == 0:
-                            least = ti.min(least, z)
-                    mean_h = mean_h / ti.max(load, 1e-300)
-                    ry[m] = fy
-                    rt[m] = ft + fx * mean_h
-                    if m == 0:
-                        friction = ti.abs(fx)
-                        bound = numbers[i, 12] * mu_load
-                depth = least
-                error = ti.max(ti.abs(ry[0]) / s.weight, ti.abs(rt[0]) / (s.weight * s.length))
-                if error < best:
-                    best, best_y, best_theta = error, y, theta
-                    sound = least > 0.0 and friction <= bound
-                if error < 1e-16:
-                    break
-                a = (ry[1] - ry[2]) / (2.0 * e)
-                b = (ry[3] - ry[4]) / (2.0 * e) * s.length
-                c = (rt[1] - rt[2]) / (2.0 * e)
-                d2 = (rt[3] - rt[4]) / (2.0 * e) * s.length
-                det = a * d2 - b * c
-                if det == 0.0:
-                    break
-                dy = -(d2 * ry[0] - b * rt[0]) / det
-                dt = -(a * rt[0] - c * ry[0]) / det
-                part = 1.0
-                if error > 1e-3:
-                    part = ti.min(1.0, ti.max(0.5 * depth / (ti.abs(dy) + ti.abs(dt) * s.length), 1e-2))
-                y += part * dy
-                theta += part * dt
-            poses[i, 0] = best_y
-            poses[i, 1] = best_theta
-            if not sound or best > 1e-9:
-                poses[i, 1] = NAN
+    vertical, tip_radius, torque_factor = parts.vertical, parts.tip_radius, parts.torque_factor
+    inertia, applied, dry_friction, inner_start = parts.inertia, parts.applied, parts.dry_friction, parts.inner_start
+    inner, crater_of, contact, arms, divide = parts.inner, parts.crater_of, parts.contact, parts.arms, parts.divide
+    MEMORY, HOLDS, DRY, INNER, BETA, HALF = parts.MEMORY, parts.HOLDS, parts.DRY, parts.INNER, parts.BETA, parts.HALF
+    TURN_COS, TURN_SIN, TWICE_COS, TWICE_SIN = parts.TURN_COS, parts.TURN_SIN, parts.TWICE_COS, parts.TWICE_SIN
+    DIAGONAL, NAN, NEAR, LAW, LAW_SIZE = parts.DIAGONAL, parts.NAN, parts.NEAR, parts.LAW, parts.LAW_SIZE
+    load_parameters, small_sine, small_cosine = parts.load_parameters, parts.small_sine, parts.small_cosine
+    state_of, trial_state, count = parts.state_of, parts.trial_state, parts.count
+    switch = make_switch(parts)
+    record, summarise = make_records()
+    hold_dry, dry_events = make_dry(parts)
 
     @ti.kernel
     def advance(
@@ -476,57 +288,10 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                     bound_v, bound_r = dry_friction(p, s)
                     plain = bound_v + bound_r == 0.0
                     if not plain:
-                        if slide_v != 0:
-                            part = bound_v * slide_v
-                            bx, by, bt = divide(mxx, mxy, myy, mxt, myt, mtt, -part * s.up_x, -part * s.up_y, 0.0)
-                            ax1 += bx
-                            ay1 += by
-                            alpha1 += bt
-                        if slide_r != 0:
-                            bx, by, bt = divide(mxx, mxy, myy, mxt, myt, mtt, 0.0, 0.0, -bound_r * slide_r)
-                            ax1 += bx
-                            ay1 += by
-                            alpha1 += bt
-                        wx, wy, wt = divide(mxx, mxy, myy, mxt, myt, mtt, s.up_x, s.up_y, 0.0)
-                        rx, ry, rt = divide(mxx, mxy, myy, mxt, myt, mtt, 0.0, 0.0, 1.0)
-                        on = ti.Vector([0.0, 0.0, 0.0])
-                        if holds:
-                            on[0] = 1.0
-                        if slide_v == 0 and bound_v > 0.0:
-                            on[1] = 1.0
-                        if slide_r == 0 and bound_r > 0.0:
-                            on[2] = 1.0
-                        g = ti.Matrix(
-                            [
-                                [tx - mean_h * tt, wx - mean_h * wt, rx - mean_h * rt],
-                                [s.up_x * tx + s.up_y * ty, s.up_x * wx + s.up_y * wy, s.up_x * rx + s.up_y * ry],
-                                [tt, wt, rt],
-                            ]
-                        )
-                        right = ti.Vector(
-                            [-(ax1 - mean_h * alpha1 + bias), -(s.up_x * ax1 + s.up_y * ay1), -alpha1]
-                        )
-                        for a in ti.static(range(3)):
-                            right[a] *= on[a]
-                            for b in ti.static(range(3)):
-                                g[a, b] *= on[a] * on[b]
-                            g[a, a] += 1.0 - on[a]
-                        push = g.inverse() @ right
-                        hold, hold_v, hold_r = push[0], push[1], push[2]
-                        ax1 += hold * tx + hold_v * wx + hold_r * rx
-                        ay1 += hold * ty + hold_v * wy + hold_r * ry
-                        alpha1 += hold * tt + hold_v * wt + hold_r * rt
-                        # Speeds that the held directions do not allow.
-                        ux1 = hx + 0.5 * dt * ax1
-                        uy1 = hy + 0.5 * dt * ay1
-                        ut1 = ht + 0.5 * dt * alpha1
-                        wrong = ti.Vector(
-                            [-(ux1 - mean_h * ut1) * on[0], -(s.up_x * ux1 + s.up_y * uy1) * on[1], -ut1 * on[2]]
-                        )
-                        back = g.inverse() @ wrong
-                        px = ux1 + back[0] * tx + back[1] * wx + back[2] * rx
-                        py = uy1 + back[0] * ty + back[1] * wy + back[2] * ry
-                        pt = ut1 + back[0] * tt + back[1] * wt + back[2] * rt
+                        hold_dry(
+                            s, mxx, mxy, myy, mxt, myt, mtt, bound_v, bound_r, slide_v, slide_r, holds, mean_h, bias,
+                            tx, ty, tt, hx, hy, ht, dt, ax1, ay1, alpha1, px, py, pt, hold, hold_v, hold_r,
+                        )  # fmt: skip
                 if plain:
                     if holds:
                         hold = -(ax1 - mean_h * alpha1 + bias) / g_tt
@@ -564,7 +329,7 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                     share = 0.0
                     if margin > 0.0:
                         share = margin / (margin - margin1)
-                    if dt == 0.0 and margin1 > -_NEAR * bound:
+                    if dt == 0.0 and margin1 > -NEAR * bound:
                         share = 2.0
                     if share < ahead or (kind == 0 and share <= 1.0):
                         ahead = share
@@ -588,37 +353,10 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                 margin_v1 = bound_v - ti.abs(hold_v)
                 margin_r1 = bound_r - ti.abs(hold_r)
                 if ti.static(DRY):
-                    if slide_v != 0 and dt > 0.0:
-                        speed = (s.up_x * px + s.up_y * py) * slide_v
-                        change = (s.up_x * ax1 + s.up_y * ay1) * slide_v
-                        if speed < 0.0:
-                            share = 0.0
-                            if change < 0.0:
-                                share = 1.0 - ti.min(speed / (change * dt), 1.0)
-                            if share < ahead or kind == 0:
-                                ahead = share
-                                kind = 6
-                    if slide_r != 0 and dt > 0.0 and pt * slide_r < 0.0:
-                        share = 0.0
-                        if alpha1 * slide_r < 0.0:
-                            share = 1.0 - ti.min(pt / (alpha1 * dt), 1.0)
-                        if share < ahead or kind == 0:
-                            ahead = share
-                            kind = 7
-                    if slide_v == 0 and bound_v > 0.0 and margin_v1 < -_NEAR * bound_v:
-                        share = 0.0
-                        if margin_v > 0.0:
-                            share = margin_v / (margin_v - margin_v1)
-                        if share < ahead or kind == 0:
-                            ahead = share
-                            kind = 8
-                    if slide_r == 0 and bound_r > 0.0 and margin_r1 < -_NEAR * bound_r:
-                        share = 0.0
-                        if margin_r > 0.0:
-                            share = margin_r / (margin_r - margin_r1)
-                        if share < ahead or kind == 0:
-                            ahead = share
-                            kind = 9
+                    dry_events(
+                        s, dt, slide_v, slide_r, bound_v, bound_r, margin_v, margin_r, margin_v1, margin_r1, px, py, pt,
+                        ax1, ay1, alpha1, ahead, kind,
+                    )  # fmt: skip
                 # -- an event within the step: go back and come only so far --
                 # (again where the shorter step shows that another one comes before the one it was cut at)
                 other = not cut or kind != cut_kind or which != cut_spike
@@ -654,22 +392,10 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                 # -- samples, launch, largest speeds --
                 if dt > 0.0:
                     while sample < samples and times[row, ti.min(sample, samples - 1)] <= time + dt:
-                        u = (times[row, sample] - time) / dt
-                        v = 1.0 - u
-                        f0 = v * v * (1.0 + 2.0 * u)
-                        f1 = u * u * (3.0 - 2.0 * u)
-                        g0 = dt * u * v * v
-                        g1 = -dt * u * u * v
-                        series[i, sample, 0] = f0 * x + f1 * x1 + g0 * vx + g1 * px
-                        series[i, sample, 1] = f0 * y + f1 * y1 + g0 * vy + g1 * py
-                        series[i, sample, 2] = f0 * theta + f1 * theta1 + g0 * omega + g1 * pt
-                        series[i, sample, 3] = vx + u * (dt * ax + u * (px - vx - dt * ax))
-                        series[i, sample, 4] = vy + u * (dt * ay + u * (py - vy - dt * ay))
-                        series[i, sample, 5] = omega + u * (dt * alpha + u * (pt - omega - dt * alpha))
-                        series[i, sample, 6] = v * ax + u * ax1
-                        series[i, sample, 7] = v * ay + u * ay1
-                        series[i, sample, 8] = v * wheel + u * wheel1
-                        series[i, sample, 9] = state_of(touch, stick)
+                        record(
+                            series, i, sample, (times[row, sample] - time) / dt, dt, x, y, theta, vx, vy, omega, ax, ay,
+                            alpha, wheel, x1, y1, theta1, px, py, pt, ax1, ay1, alpha1, wheel1, state_of(touch, stick),
+                        )  # fmt: skip
                         sample += 1
                     if ti.math.isnan(best_angle):
                         far = x1 * x1 + (y1 - y_start) * (y1 - y_start)
@@ -713,61 +439,10 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                 again = False
                 if kind != 0:
                     again = True
-                    bit = 1 << which
-                    newcomers = fresh & stick
-                    fresh = 0
-                    if kind == 1:
-                        touch |= bit
-                        if ti.static(HOLDS):
-                            held[which] = 0.0
-                        slip = vx - omega * ((s.length - radius) * ti.cos(theta + HALF + which * BETA) + radius)
-                        stick &= ~bit
-                        if slip > 0.0:
-                            backwards &= ~bit
-                        else:
-                            backwards |= bit
-                    elif kind == 2:
-                        touch &= ~bit
-                        stick &= ~bit
-                        if ti.static(MEMORY and not SHEDS):
-                            top[which] = 0.0
-                    elif kind == 3:
-                        stick |= bit
-                        fresh = bit
-                    elif kind == 4:
-                        leaving = stick
-                        if newcomers != 0 and newcomers != stick:
-                            leaving = newcomers
-                        stick &= ~leaving
-                        for j in ti.static(range(3)):
-                            n = (lowest + j - 1 + count) % count
-                            one = 1 << n
-                            if (leaving & one) != 0:
-                                sign = -hold
-                                slip = vx - omega * h_kept[j]  # what the constraint leaves: not its excess before
-                                if ti.abs(slip) > 1e-12:
-                                    sign = slip
-                                if sign > 0.0:
-                                    backwards &= ~one
-                                else:
-                                    backwards |= one
-                    elif kind == 5:
-                        wheel = 0.0
-                        over = True
-                    elif kind == 6:
-                        slide_v = 0
-                    elif kind == 7:
-                        slide_r = 0
-                    elif kind == 8:
-                        slide_v = 1
-                        if hold_v > 0.0:
-                            slide_v = -1
-                    elif kind == 9:
-                        slide_r = 1
-                        if hold_r > 0.0:
-                            slide_r = -1
-                    elif kind == 10:
-                        s.inner_mode = 1.0 - s.inner_mode
+                    switch(
+                        kind, which, lowest, touch, stick, backwards, fresh, slide_v, slide_r, over, wheel, s, top,
+                        held, theta, vx, omega, radius, h_kept, hold, hold_v, hold_r,
+                    )  # fmt: skip
                 elif settle_only:
                     fresh = 0
                 if not over and time >= until:
@@ -806,46 +481,14 @@ def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
                     going = False
             # -- the end --
             while sample < samples and times[row, ti.min(sample, samples - 1)] <= end * (1.0 + 1e-12):
-                series[i, sample, 0] = x
-                series[i, sample, 1] = y
-                series[i, sample, 2] = theta
-                series[i, sample, 3] = vx
-                series[i, sample, 4] = vy
-                series[i, sample, 5] = omega
-                series[i, sample, 6] = ax
-                series[i, sample, 7] = ay
-                series[i, sample, 8] = wheel
-                series[i, sample, 9] = state_of(touch, stick)
+                record(
+                    series, i, sample, 0.0, 0.0, x, y, theta, vx, vy, omega, ax, ay, alpha, wheel, x, y, theta, vx, vy,
+                    omega, ax, ay, alpha, wheel, state_of(touch, stick),
+                )  # fmt: skip
                 sample += 1
-            summary[i, 0] = best_angle
-            summary[i, 1] = ti.sqrt(largest_speed)
-            summary[i, 2] = largest_spin
-            summary[i, 3] = theta_stand
-            summary[i, 4] = theta_pivot
-            summary[i, 5] = theta_slip
-            summary[i, 6] = theta_hop
-            summary[i, 7] = status
-            summary[i, 8] = x
-            summary[i, 9] = y
-            summary[i, 10] = theta
-            summary[i, 11] = vx
-            summary[i, 12] = vy
-            summary[i, 13] = omega
-            summary[i, 14] = wheel
-            summary[i, 15] = total_splits
-            summary[i, 16] = longest
+            summarise(
+                summary, i, best_angle, largest_speed, largest_spin, theta_stand, theta_pivot, theta_slip, theta_hop,
+                status, x, y, theta, vx, vy, omega, wheel, total_splits, longest,
+            )  # fmt: skip
 
-    return stand, advance
-
-
-def _loader(names: tuple[str, ...], kind: Any, first: int) -> Any:
-    """A Taichi function that reads the effects' parameters of trial i."""
-    import taichi as ti
-
-    fields = ", ".join(f"{name}=numbers[i, {first + k}]" for k, name in enumerate(names))
-    text = f"def load(numbers: ti.template(), i):\n    return Parameters({fields})\n"
-    file = f"<parameters {' '.join(names)}>"
-    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
-    scope: dict[str, Any] = {"ti": ti, "Parameters": kind}
-    exec(compile(text, file, "exec"), scope)
-    return ti.func(scope["load"])
+    return advance
