@@ -153,6 +153,7 @@ class SparseLaw:
         self._weights: Array = np.zeros((0, 0))
         self._scale: Array = np.zeros(0)
         self._names: list[str] = []
+        self._range: tuple[Array, Array] = (np.zeros(0), np.zeros(0))
         self.terms: list[tuple[str, str, float]] = []
 
     def fit(self, rows: Sequence[Rows]) -> SparseLaw:
@@ -162,6 +163,8 @@ class SparseLaw:
         self._thresholds = self._choose(rows)
         self._weights = self._solve(*self._columns(rows), self._thresholds)
         library = self._library(states)
+        targets = np.concatenate([one.target / one.std for one in rows])
+        self._range = (targets.min(axis=0), targets.max(axis=0))  # polynomials run away beyond what was seen
         size = np.sqrt(np.mean((library[:, :, None] * self._weights[None]) ** 2, axis=0))  # [term, target]
         found = [(target, name, float(size[k, j])) for j, target in enumerate(STANDING[self._kind])
                  for k, name in enumerate(self._names) if self._weights[k, j] != 0]  # fmt: skip
@@ -170,7 +173,7 @@ class SparseLaw:
 
     def predict(self, state: Array) -> Array:
         """See `Regressor`."""
-        return self._library(state) @ self._weights
+        return np.clip(self._library(state) @ self._weights, *self._range)
 
     def _choose(self, rows: Sequence[Rows]) -> list[float]:
         """For each target the threshold with the least error on trials left out; infinite for no term."""
@@ -182,6 +185,7 @@ class SparseLaw:
             learnt = self._columns(others)
             for k, threshold in enumerate(every):
                 guess = library @ self._solve(*learnt, [threshold] * count)
+                guess = np.clip(guess, learnt[1].min(axis=0), learnt[1].max(axis=0))
                 errors[k] += np.mean((target - guess) ** 2, axis=0)
         return [every[int(np.argmin(errors[:, j]))] for j in range(count)]
 
@@ -209,7 +213,7 @@ class SparseLaw:
         told = list(told)
         scaled = state / self._scale
         flag = scaled[:, -1:] * self._scale[-1]
-        smooth = scaled[:, :-1]
+        smooth = scaled[:, :-1] if self._kind == "tumble" else scaled[:, :-1] * flag
         columns = [np.prod(smooth[:, None, :] ** powers[None], axis=2)]
         for place, name in enumerate(names[:-1]):
             if name in ("vx", "vy", "omega", "v"):
@@ -222,10 +226,11 @@ class SparseLaw:
             columns += [flag * np.tanh(smooth[:, 3:4] / 0.05)]
             told += ["touch*sign(vx)"]
         else:
-            columns += [flag, flag * np.tanh(smooth[:, 1:2] / 0.05), (smooth[:, 2:3] > 0.02).astype(float)]
-            told += ["inside", "inside*sign(v)", "on the way back"]
+            columns += [(smooth[:, 2:3] > 0.02).astype(float)]
+            told += ["on the way back"]
         self._names = told
-        return np.concatenate(columns, axis=1)
+        library = np.concatenate(columns, axis=1)
+        return library if self._kind == "tumble" else library * flag  # a bed pushes where the spike is in it
 
 
 @cache
@@ -325,7 +330,7 @@ _POINTS: Mapping[str, Sequence[tuple[str, str, str]]] = {
     "plastic-sinkage": (("force", "back", ""),),
     "adhesion": (("force", "back", ""),),
     "shaft-friction": (("force", "sign(v)", ""),),
-    "layering": (("force", "inside", ""), ("force", "1", ""), ("force", "z^2", ""), ("force", "z^3", "")),
+    "layering": (("force", "1", ""), ("force", "z^2", ""), ("force", "z^3", "")),
 }  # fmt: skip
 """Generously: every effect that could make this the loudest term. Effects of contact and sensors leave no term of their
 own (tip-radius, pulley-inertia, clock-offset, camera-scale): nothing points to them."""
