@@ -71,7 +71,7 @@ def attempt(
 def _combine(z: Sequence[float], h: float, weights: Sequence[float], rates: list[list[float]]) -> list[float]:
     used = [(h * w, k) for w, k in zip(weights, rates, strict=False) if w]
     if len(used) == 1:
-        (a, k), = used
+        ((a, k),) = used
         return [x + a * p for x, p in zip(z, k, strict=True)]
     return [x + sum([a * k[i] for a, k in used]) for i, x in enumerate(z)]
 

@@ -14,6 +14,7 @@ Monitor = tuple[str, int]
 Watch = dict[Monitor, tuple[float, float]]
 """Each monitor's value and rate (NaN where it is not known)."""
 
+
 def monitors(system: System, z: Sequence[float], modes: Modes) -> Watch:
     """Quantities that are positive within the modes, with their rates where known (else NaN).
 

@@ -147,6 +147,8 @@ def inner_slopes(system: System) -> tuple[float, float, float]:
 
     step, speed = 1e-6 * s.length, 1e-3
     still = force(rest, 0.0)
-    return (still - force(rest + step, 0.0)) / step, (still - force(rest, speed)) / speed, float(
-        system.model.inner(system.p, s)[0]
+    return (
+        (still - force(rest + step, 0.0)) / step,
+        (still - force(rest, speed)) / speed,
+        float(system.model.inner(system.p, s)[0]),
     )

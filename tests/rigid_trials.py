@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import wraps
+
 import numpy as np
 
 from benchmarks.planar import AMPLITUDES
@@ -34,6 +36,17 @@ def free(torque: float = 0.0, *, mu_s: float = 0.5, level: float = 0.0085, **oth
 
 def effect(id: str, **parameters: float) -> Effect:
     return Effect(id=id, parameters=parameters)
+
+
+def turned(hook):
+    """`hook` with the sign of all it gives turned."""
+
+    @wraps(hook)
+    def other(*given):
+        value = hook(*given)
+        return tuple(-part for part in value) if isinstance(value, tuple) else -value
+
+    return other
 
 
 def drawn_effect(id: str, rng: np.random.Generator) -> Effect:

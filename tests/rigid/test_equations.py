@@ -2,12 +2,11 @@
 
 import math
 from dataclasses import replace
-from functools import wraps
 
 import numpy as np
 import pytest
 import sympy as sp
-from rigid_trials import INERTIA, LENGTH, MASS, RANGES, G, counterweight, effect
+from rigid_trials import INERTIA, LENGTH, MASS, RANGES, G, counterweight, effect, turned
 
 from rigid import Trial
 from rigid.dynamics import Modes, System
@@ -196,17 +195,6 @@ def test_sliding_accelerations_are_those_that_lagrange_s_equations_give(effects,
     for state in states(rng, touching, sinking, trial=trial):
         ours, _ = code(trial, state, touching, slip)
         assert ours == pytest.approx(derived.acceleration(state), rel=1e-10, abs=1e-10)
-
-
-def turned(hook):
-    """`hook` with the sign of all it gives turned."""
-
-    @wraps(hook)
-    def other(*given):
-        value = hook(*given)
-        return tuple(-part for part in value) if isinstance(value, tuple) else -value
-
-    return other
 
 
 @pytest.mark.parametrize("slack", [False, True], ids=["taut", "slack"])

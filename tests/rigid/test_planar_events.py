@@ -201,9 +201,7 @@ def test_bearing_drag_holds_the_platform_against_a_smaller_torque_while_the_whee
 
 def test_a_brake_that_the_bearing_bears_ends_when_its_wheel_stands():
     # At rest all along: w = w_0 - tau t / J_w down to 0 at 1.2 s.
-    trial = in_rig(
-        0.05, actuator="brake", wheel_speed_0=50.0, effects=(effect("bearing-drag", torque=0.06),)
-    )
+    trial = in_rig(0.05, actuator="brake", wheel_speed_0=50.0, effects=(effect("bearing-drag", torque=0.06),))
     for method, slack in (("located", 1e-12), ("paper", 1e-9)):
         run = simulate(trial, duration=2.0, method=method)
         assert run.wheel_speed == pytest.approx(np.maximum(50.0 - 0.05 * run.time / 1.2e-3, 0.0), abs=50 * slack + 5e-9)
@@ -334,7 +332,7 @@ def test_a_step_too_long_for_the_ground_is_refused_by_name():
         simulate(in_rig(0.2), duration=0.1, times=[0.0, 0.2])
 
 
-OWN = '''
+OWN = """
 from math import cos
 
 from rigid.terms import Parameter, Term
@@ -363,7 +361,7 @@ TERM = Term(
     limits="small angles",
     hooks={"force": force},
 )
-'''
+"""
 
 
 def test_a_tip_that_touches_in_its_own_crater_is_held_by_nothing_yet():

@@ -1,10 +1,11 @@
 """Wires that are springs: the counterweight moves on its own, and what a term with a coordinate of its own may be."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigid_trials import MASS, G, effect, free, in_rig
+from rigid_trials import MASS, G, effect, free, in_rig, turned
 
 from rigid import simulate, simulate_batch
 from rigid.dynamics import INNER, LOST, VY, Modes, System, X, Y
@@ -127,6 +128,16 @@ def test_the_books_close_taut_and_slack_to_the_tolerance():
         assert residuals[0] < 5e-6 and residuals[1] < 5e-8
     run = simulate(slackening(40.0), duration=1.0)
     assert run.notes["events"] > 10 and run.notes["forced_steps"] == 0
+
+
+@pytest.mark.parametrize("hook", ["potential", "loss", "force", "inner_force"])
+def test_a_wrong_sign_in_the_wires_opens_the_books(hook, monkeypatch):
+    # That of `mass` keeps them closed: it is for the equations (tests/rigid/test_equations.py) to show.
+    right = EFFECTS["wire-compliance"]
+    wrong = replace(right, hooks={**right.hooks, hook: turned(right.hooks[hook])})
+    monkeypatch.setitem(EFFECTS, "wire-compliance", wrong)
+    run = simulate(in_rig(0.22, effects=(wires(1.3e4, 20.0),)), duration=0.3, sample_interval=0.01)
+    assert run.energy_residual > 5e-5
 
 
 def test_the_batch_and_the_paper_s_step_converge_at_their_orders_through_slack_and_taut():
