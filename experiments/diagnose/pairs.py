@@ -18,7 +18,7 @@ import numpy as np
 from .fitting import Model, linearised
 from .problem import Array, Form, Values
 
-__all__ = ["PairStart", "pair_starts"]
+__all__ = ["FormsStart", "next_starts", "pair_starts"]
 
 _SIZES = (0.1, 0.4, 1.0, 3.0)
 """Amplitudes at which changes are taken, over those of a form's starts."""
@@ -29,38 +29,26 @@ _BEGINNING = 0.4
 
 
 @dataclass(frozen=True)
-class PairStart:
-    """Two forms of two effects, and where their fit may begin."""
+class FormsStart:
+    """Forms to add, one or two of as many effects, and where their fit may begin."""
 
-    forms: tuple[Form, Form]
+    forms: tuple[Form, ...]
     values: Values
     promised: float
     """Chi-square that would be left if changes added up."""
 
 
-def pair_starts(model: Model, values: Values, forms: Sequence[Form], *, most: int) -> list[PairStart]:
+def pair_starts(model: Model, values: Values, forms: Sequence[Form], *, most: int) -> list[FormsStart]:
     """The likeliest start of each of the `most` likeliest pairs of effects, beside what `model` holds at `values`."""
-    part = model.until(_BEGINNING)
-    parameters = part.parameters
-    modes, jacobian = linearised(part, values)
-    middle = np.array([p.value for p in parameters])
-    scales = np.array([p.scale for p in parameters])
-    x = np.array([values[p.name] for p in parameters])
-    precision = np.array([0.0 if np.isinf(p.std) else (p.scale / p.std) ** 2 for p in parameters])
-    whose, points, columns = _changes(part, values, modes, forms)
+    seen = _Projected(model, values, forms)
+    whose = seen.whose
     if len(whose) < 2:
         return []
-    # What a refit of the base parameters takes out: the normal matrix, priors included.
-    inverse = np.linalg.pinv(jacobian.T @ jacobian + np.diag(precision), rcond=1e-12, hermitian=True)
-    slope = jacobian.T @ modes + precision * (x - middle) / scales
-    cross = jacobian.T @ columns
-    gram = columns.T @ columns - cross.T @ inverse @ cross
-    along = columns.T @ modes - cross.T @ inverse @ slope
-    left, sizes = _best_sizes(gram, along)
+    left, sizes = _best_sizes(seen.gram, seen.along)
     effects = np.array([form.effect for form in whose])
     left[effects[:, None] == effects[None, :]] = np.inf
     left[np.tril_indices(len(left))] = np.inf
-    found: dict[tuple[str, str], PairStart] = {}
+    found: dict[tuple[str, str], FormsStart] = {}
     for flat in np.argsort(left, axis=None):
         i, j = divmod(int(flat), len(whose))
         if not np.isfinite(left[i, j]) or len(found) >= most:
@@ -68,15 +56,58 @@ def pair_starts(model: Model, values: Values, forms: Sequence[Form], *, most: in
         pair = (str(effects[i]), str(effects[j]))
         if pair in found:
             continue
-        a, b = sizes[0][i, j], sizes[1][i, j]
-        shift = -inverse @ (slope + a * cross[:, i] + b * cross[:, j])
+        start = seen.start((i, j), (sizes[0][i, j], sizes[1][i, j]))
+        found[pair] = FormsStart((whose[i], whose[j]), start, float(left[i, j]))
+    return list(found.values())
+
+
+def next_starts(model: Model, values: Values, forms: Sequence[Form], *, most: int) -> list[FormsStart]:
+    """The likeliest start of each of the `most` likeliest single effects, beside what `model` holds at `values`."""
+    seen = _Projected(model, values, forms)
+    own = np.maximum(np.diag(seen.gram), 1e-300)
+    sizes = np.clip(-seen.along / own, _LEAST, _MOST)
+    left = sizes**2 * own + 2 * sizes * seen.along
+    found: dict[str, FormsStart] = {}
+    for k in np.argsort(left).tolist():
+        form = seen.whose[k]
+        if form.effect not in found and len(found) < most:
+            found[form.effect] = FormsStart((form,), seen.start((k,), (sizes[k],)), float(left[k]))
+    return list(found.values())
+
+
+class _Projected:
+    """Changes that forms make at several amplitudes, with what the model's own parameters take up projected out."""
+
+    def __init__(self, model: Model, values: Values, forms: Sequence[Form]) -> None:
+        part = model.until(_BEGINNING)
+        self.values, self.parameters = values, part.parameters
+        modes, jacobian = linearised(part, values)
+        middle = np.array([p.value for p in self.parameters])
+        scales = np.array([p.scale for p in self.parameters])
+        self.x = np.array([values[p.name] for p in self.parameters])
+        precision = np.array([0.0 if np.isinf(p.std) else (p.scale / p.std) ** 2 for p in self.parameters])
+        self.whose, self.points, columns = _changes(part, values, modes, forms)
+        # What a refit of the model's parameters takes out: the normal matrix, priors included.
+        normal = jacobian.T @ jacobian + np.diag(precision)
+        self.inverse = np.linalg.pinv(normal, rcond=1e-12, hermitian=True)
+        self.slope = jacobian.T @ modes + precision * (self.x - middle) / scales
+        self.cross = jacobian.T @ columns
+        self.gram = columns.T @ columns - self.cross.T @ self.inverse @ self.cross
+        """Products of the changes, shape [k, k]."""
+        self.along = columns.T @ modes - self.cross.T @ self.inverse @ self.slope
+        """Products of the changes with what is left, shape [k]."""
+
+    def start(self, which: Sequence[int], sizes: Sequence[float]) -> dict[str, float]:
+        """Values with these changes made, and the model's parameters moved as a refit would."""
+        taken = self.slope + sum(size * self.cross[:, k] for k, size in zip(which, sizes, strict=True))
         moved = {
             p.name: float(np.clip(now + p.scale * step, p.lowest, p.highest))
-            for p, now, step in zip(parameters, x, shift, strict=True)
+            for p, now, step in zip(self.parameters, self.x, -self.inverse @ taken, strict=True)
         }
-        start = {**values, **moved, **_scaled(whose[i], points[i], a), **_scaled(whose[j], points[j], b)}
-        found[pair] = PairStart((whose[i], whose[j]), start, float(left[i, j]))
-    return list(found.values())
+        start = {**self.values, **moved}
+        for k, size in zip(which, sizes, strict=True):
+            start |= _scaled(self.whose[k], self.points[k], size)
+        return start
 
 
 def _changes(

@@ -11,7 +11,7 @@ from .equivalence import Rival, compare
 from .evidence import Hypothesis, best_start, excess, score
 from .fitting import Fit, Model, fit
 from .gate import Verdict, open_gate
-from .pairs import pair_starts
+from .pairs import FormsStart, next_starts, pair_starts
 from .prediction import Predicted, folds_of, predict
 from .problem import Form
 
@@ -159,6 +159,8 @@ class Search:
             if not self._worth(best, new):
                 return best
             best = new
+            if len(best.effects) == 2 and not self._gate(best).passed:
+                best = self._enriched(self._swapped(best))
             if self._gate(best).passed:
                 return best
         return best
@@ -184,20 +186,33 @@ class Search:
     def _pairs(self) -> list[Hypothesis]:
         """Pairs of effects, from where projected changes say that their fits should begin."""
         base = self.base.fit
-        starts = pair_starts(base.model, base.values, base.model.problem.forms, most=_PAIRS)
-        rough = bool(getattr(base.model.problem, "rough", ()))
+        self.tell("trying pairs", 0.5)
+        return self._begun(base.model, pair_starts(base.model, base.values, base.model.problem.forms, most=_PAIRS))
+
+    def _swapped(self, best: Hypothesis) -> Hypothesis:
+        """With one of its names exchanged, where another promises more beside the rest."""
+        found = [best]
+        for effect in best.effects:
+            self.tell(f"others in the place of {effect}", 0.5)
+            rest = tuple(form for form in best.forms if form.effect != effect)
+            beside = fit(best.fit.model.with_forms(rest), best.fit.values, rounds=5)
+            others = [form for form in beside.model.problem.forms if form.effect not in best.effects]
+            found += self._begun(beside.model, next_starts(beside.model, beside.values, others, most=_FOLLOWED))
+        return max(found, key=lambda h: h.score)
+
+    def _begun(self, model: Model, starts: Sequence[FormsStart]) -> list[Hypothesis]:
+        """Fits of what `starts` add to `model`; the most promising in full."""
+        rough = bool(getattr(model.problem, "rough", ()))
         places = [start.values for start in starts]
-        refine = getattr(base.model.problem, "refine", None)
+        refine = getattr(model.problem, "refine", None)
         if refine is not None and starts:  # a search of its own, for models whose contacts make a likelihood jump
-            self.tell("trying pairs", 0.5)
-            places = refine([(start.forms, start.values) for start in starts], base.model.trials)
+            places = refine([((*model.forms, *start.forms), start.values) for start in starts], model.trials)
         begun = []
         for start, values in zip(starts, places, strict=True):
-            self.tell(f"trying {start.forms[0].effect} with {start.forms[1].effect}", 0.5)
-            model = base.model.with_forms(start.forms)
+            longer = model.with_forms((*model.forms, *start.forms))
             for share in (0.4, 0.7) if rough else ():
-                values = fit(model.until(share), values, rounds=6).values
-            begun.append(fit(model, values, rounds=5))
+                values = fit(longer.until(share), values, rounds=6).values
+            begun.append(fit(longer, values, rounds=5))
         begun.sort(key=lambda found: found.objective)
         made = []
         for one in begun[:_FOLLOWED]:
