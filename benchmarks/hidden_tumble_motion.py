@@ -223,7 +223,9 @@ def _kernel() -> Any:
                 fy -= hold * uy
                 dry = p[i, NUMBER["bearing_dry"]]
                 ft -= dry * ti.tanh(om / 2e-3) * (1.0 + p[i, NUMBER["bearing_stribeck"]] * ti.exp(-ti.abs(om) / 0.3))
-                ft -= p[i, NUMBER["cable_spring"]] * ti.sin(th) + p[i, NUMBER["cable_cubic"]] * th * ti.abs(th)
+                # softening: a spring that goes with sin(theta) would be a centre of mass off the shaft, to the letter
+                ft -= p[i, NUMBER["cable_spring"]] * th / (1.0 + 0.2 * ti.abs(th))
+                ft -= p[i, NUMBER["cable_cubic"]] * th * ti.abs(th)
                 ft -= p[i, NUMBER["cable_drag"]] * ti.abs(om) ** 0.7 * ti.math.sign(om)
                 # outside the library
                 A = p[i, NUMBER["magnet"]]
