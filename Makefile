@@ -24,7 +24,8 @@ test: $(VENV)/.installed-test  ## ruff, mypy and the tests, with coverage
 slow: $(VENV)/.installed-test  ## the tests that take longer: physics against closed forms, kill and resume
 	$(BIN)/python -m pytest -m slow $(ARGS)
 
-validate: slow  ## the same as slow
+validate: $(VENV)/.installed  ## the bed against closed forms, published figures and other codes; writes docs/validation.md
+	$(BIN)/hedgebed validate $(ARGS)
 
 bench: $(VENV)/.installed  ## race the bed against LIGGGHTS and LAMMPS, as far as they are installed (WHAT=bed)
 	$(BIN)/hedgebed bench $(WHAT) $(ARGS)

@@ -123,6 +123,12 @@ EXPERIMENTS: dict[str, Experiment] = {
             module="experiments.diagnose.experiment",
             subject="campaign",
         ),
+        Experiment(
+            "validate",
+            "Verifies the bed: closed forms, published figures and other codes, beside what comes out.",
+            settings="experiments.validate_settings:ValidateSettings",
+            module="experiments.validate.experiment",
+        ),
     ]
 }
 

@@ -1,0 +1,208 @@
+"""`hedgebed validate`: runs the verification suite into a run folder, case by case; finished cases are kept."""
+
+from __future__ import annotations
+
+import math
+import time
+import traceback
+from collections.abc import Sequence
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+from experiments.progress import Progress
+from experiments.runfolder import RunFolder, write_text
+from experiments.validate_settings import ValidateSettings
+from hedgebed import __version__
+
+from .case import Case, Outcome
+from .document import markdown
+from .suite import SUITE, chosen, fingerprint, fingerprint_of
+
+__all__ = ["check", "fingerprint", "resume", "run", "run_case"]
+
+_ROOT = Path(__file__).resolve().parents[2]
+
+
+def run(settings: ValidateSettings, folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
+    """Run the suite into `folder` and return the result, as result.json has it. Raises ValueError as `check` does."""
+    check(settings)
+    kept = RunFolder.ensure(Path(folder), "validate", settings, code=fingerprint())
+    return _carry_out(settings, kept, progress or Progress())
+
+
+def resume(folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
+    """Go on: cases that this code has finished are kept, others are run."""
+    kept = RunFolder.open(Path(folder))
+    return _carry_out(ValidateSettings(**kept.settings), kept, progress or Progress())
+
+
+def check(settings: ValidateSettings) -> None:
+    """Raise ValueError, naming key, value and what would do, for a case there is not or a file that cannot be "
+    "written."""
+    chosen(settings.only, quick=settings.quick)
+    if settings.document is not None and not Path(settings.document).resolve().parent.is_dir():
+        raise ValueError(f"document = {settings.document!r} lies in a folder that does not exist: make it first")
+
+
+def run_case(case: Case, tell: Any = None) -> tuple[Outcome, float]:
+    """What a case finds, and the time it took [s]; an error of the bed is a failure of the case."""
+    if case.compute is None:
+        raise ValueError(f"case {case.id!r} cannot be run yet: it waits for {case.waits_for}")
+    began = time.monotonic()
+    try:
+        found = case.compute(tell or (lambda done: None))
+    except Exception as error:  # the others go on
+        found = Outcome(remarks=[f"It ended with {type(error).__name__}: {error}", traceback.format_exc(limit=-3)])
+    return found, time.monotonic() - began
+
+
+def _carry_out(settings: ValidateSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
+    wanted = chosen(settings.only, quick=settings.quick)
+    records: dict[str, dict[str, Any]] = {}
+    with folder.lock():
+        work = [case for case in wanted if case.compute is not None]
+        for case in work:
+            if folder.is_done(case.id) and folder.done_data(case.id)["code"] == fingerprint_of(case):
+                records[case.id] = folder.done_data(case.id)
+        left = [case for case in work if case.id not in records]
+        progress.plan({case.title: case.seconds for case in left})
+        for case in left:
+            progress.stage(case.title, total=1.0)
+            record = _record(folder, case, progress)
+            progress.message(f"{record['status']:>7}  {case.id}{_said(record)}")
+            records[case.id] = record
+        entire = not settings.only and not settings.quick
+        result = _result([_row(case, records, wanted) for case in SUITE], entire)
+        folder.write_result(result)
+        text = markdown(result, command=_command(settings))
+        write_text(folder.path / "validation.md", text)
+        document = _document(settings, entire)
+        if document is not None:
+            write_text(document, text)
+        progress.stage("report", total=1.0)
+        from vis.validation import write_validation_report
+
+        write_validation_report(folder.path, progress=progress.update)
+        return result
+
+
+def _record(folder: RunFolder, case: Case, progress: Progress) -> dict[str, Any]:
+    """Run a case; its record, kept unless it was skipped."""
+    found, seconds = run_case(case, progress.update)
+    plots = []
+    for k, plot in enumerate(found.plots, 1):
+        points = [
+            (curve.label, float(x), float(y)) for curve in plot.curves for x, y in zip(curve.x, curve.y, strict=True)
+        ]
+        labels, x, y = zip(*points, strict=True)
+        series = folder.write_series(
+            f"{case.id}-{k}", {"curve": [label.replace(",", ";") for label in labels], "x": x, "y": y}
+        )
+        plots.append(
+            {
+                "title": plot.title,
+                "x": plot.x,
+                "y": plot.y,
+                "log": plot.log,
+                "series": series,
+                "lines": [curve.label.replace(",", ";") for curve in plot.curves if not curve.ours],
+            }
+        )
+    record = {
+        "status": found.status,
+        "skipped": found.skipped,
+        "comparisons": [one.as_dict() for one in found.comparisons],
+        "plots": plots,
+        "remarks": list(found.remarks),
+        "seconds": seconds,
+        "date": date.today().isoformat(),
+        "code": fingerprint_of(case),
+    }
+    if found.status != "skipped":
+        folder.mark_done(case.id, record)
+    return record
+
+
+def _said(record: dict[str, Any]) -> str:
+    """What is worth a line while it runs."""
+    worst = worst_of(record["comparisons"])
+    if record["skipped"]:
+        return f": {record['skipped']}"
+    if worst is None:
+        return f": {record['remarks'][0]}" if record["remarks"] else ""
+    return f": {worst['quantity']} {worst['ours']:.5g}, wanted {worst['reference']:.5g}"
+
+
+def worst_of(comparisons: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
+    """The comparison that takes the largest share of its band."""
+    return max(comparisons, key=lambda one: math.inf if one["share"] is None else one["share"], default=None)
+
+
+def _row(case: Case, records: dict[str, dict[str, Any]], wanted: Sequence[Case]) -> dict[str, Any]:
+    head = dict(case.head())
+    if case.compute is None:
+        return head | {"status": "not yet", "waits_for": case.waits_for}
+    if case not in wanted:
+        return head | {"status": "not run"}
+    record = records[case.id]
+    return (
+        head
+        | record
+        | {"reason": case.reason if record["status"] == "fail" else "", "worst": worst_of(record["comparisons"])}
+    )
+
+
+STATUSES = ("pass", "fail", "skipped", "not run", "not yet")
+
+
+def _result(rows: list[dict[str, Any]], entire: bool) -> dict[str, Any]:
+    counts = {status: sum(row["status"] == status for row in rows) for status in STATUSES}
+    words = [f"{counts['pass']} pass", f"{counts['fail']} fail"]
+    words += [f"{counts[key]} {key}" for key in STATUSES[2:] if counts[key]]
+    sentences = [f"{row['id']} fails: {_why(row)}" for row in rows if row["status"] == "fail"]
+    sentences += [f"{row['id']} is skipped: {row['skipped']}" for row in rows if row["status"] == "skipped"]
+    return {
+        "format": "hedgebed-result/1",
+        "experiment": "validate",
+        "version": __version__,
+        "code": fingerprint(),
+        "title": f"Verification of the bed: {', '.join(words)}",
+        "status": "done",
+        "entire": entire,
+        "date": date.today().isoformat(),
+        "quantities": {
+            f"cases_{status.replace(' ', '_')}": {"value": count, "std": 0.0, "unit": "1"}
+            for status, count in counts.items()
+        },
+        "cases": rows,
+        "departures": {"sentences": sentences},
+        "warnings": [] if entire else ["not the whole suite: see which cases were not run"],
+    }
+
+
+def _why(row: dict[str, Any]) -> str:
+    worst = row["worst"]
+    said = (
+        f"{worst['quantity']} is {worst['ours']:.4g}, {worst['reference']:.4g} was wanted"
+        if worst
+        else "it ended with an error"
+    )
+    return f"{said} ({row['reason']})" if row["reason"] else said
+
+
+def _document(settings: ValidateSettings, entire: bool) -> Path | None:
+    """Where the table goes beside the run folder."""
+    if settings.document is not None:
+        return Path(settings.document)
+    docs = _ROOT / "docs"
+    return docs / "validation.md" if entire and docs.is_dir() and (_ROOT / "pyproject.toml").is_file() else None
+
+
+def _command(settings: ValidateSettings) -> str:
+    words = ["hedgebed validate"]
+    if settings.only:
+        words += ["--only", *settings.only]
+    if settings.quick:
+        words.append("--quick")
+    return " ".join(words)
