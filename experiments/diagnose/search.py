@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .equivalence import Rival, compare
+from .equivalence import CLOSE, Rival, compare
 from .evidence import Hypothesis, best_start, excess, score
 from .fitting import Fit, Model, fit
 from .gate import Verdict, open_gate
@@ -80,6 +80,8 @@ class Search:
             best = self._further(best, first)
         best = self._backward(best)
         best, predicted, rivals = self._settle(best, first)
+        if len(best.effects) == 2 and not any(rival.same for rival in rivals):
+            best, predicted, rivals = self._second(best) or (best, predicted, rivals)
         left = self._gate(best)
         same = tuple(rival.hypothesis for rival in rivals if rival.same)
         return Choice(self.base, best, same, tuple(self.table), left, rivals, predicted)
@@ -220,6 +222,28 @@ class Search:
             made.append(Hypothesis(found, score(found)))
             self.table.append((_said(made[-1]), made[-1]))
         return made
+
+    def _second(self, best: Hypothesis) -> tuple[Hypothesis, Predicted | None, tuple[Rival, ...]] | None:
+        """The same with the second name first, where it is the second that cannot be told from another; else None."""
+        kept, doubtful = best.effects
+        close: dict[str, Hypothesis] = {}
+        for _, tried in self.table:
+            others = [effect for effect in tried.effects if effect != kept]
+            if kept not in tried.effects or len(others) != 1 or others[0] == doubtful:
+                continue
+            if tried.score > max(best.score - CLOSE, close[others[0]].score if others[0] in close else -np.inf):
+                close[others[0]] = tried
+        if not close:
+            return None
+        forms = {effect: tuple(f for f in best.forms if f.effect == effect) for effect in best.effects}
+        model = best.fit.model
+        turned = Hypothesis(
+            fit(model.with_forms((*forms[doubtful], *forms[kept])), best.fit.values, rounds=3), best.score
+        )
+        without = fit(model.with_forms(forms[kept]), best.fit.values)
+        chosen = sorted(close.items(), key=lambda item: -item[1].score)[:_SHOWN]
+        mine, rivals = self._predicted(turned, [compare(name, turned, h, without) for name, h in chosen])
+        return (turned, mine, rivals) if any(rival.same for rival in rivals) else None
 
     def _best_forms(self, effect: str) -> list[Form]:
         """Forms of an effect, in the order of how well they did alone."""
