@@ -21,7 +21,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import cache
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from pathlib import Path
 from typing import Any
 
@@ -227,6 +227,10 @@ def _asking(ask: Ask | None) -> Iterator[Ask]:
 
     try:
         yield asked
+    except BaseException:  # stopped: do not wait for the diagnosis under way
+        for child in active_children():
+            child.kill()
+        raise
     finally:
         for pool in pools:
             pool.shutdown(cancel_futures=True)
