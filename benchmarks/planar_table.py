@@ -103,7 +103,7 @@ def _final(trial: Trial, duration: float, longest: float, tolerance: float) -> n
 
 def draw_orders(path: Path) -> None:
     """Error at the end of a tumble over the step, three integrators, two trials with events."""
-    figure, axes = plt.subplots(1, 2, figsize=(9, 4), sharey=True)
+    figure, axes = plt.subplots(1, 2, figsize=(9, 4.4), sharey=True, layout="constrained")
     trials = (
         ("motor, 0.125 N m on brick, 0.4 s: slips, sticks, a row lifts off", case(0.0085, 0.125, 0.5), 0.4),
         ("brake, 6 N m on steel, 0.1 s: slips, the wheel stops, hops", case(0.0085, 6.0, 0.25), 0.1),
@@ -124,8 +124,8 @@ def draw_orders(path: Path) -> None:
         axis.title.set_fontsize(9)
         axis.grid(alpha=0.3)
     axes[0].set_ylabel("largest error in x, y, theta and their rates (SI)")
-    axes[0].legend(fontsize=8, loc="lower left")
-    figure.tight_layout()
+    # Below the axes: within them it would cover points.
+    figure.legend(*axes[0].get_legend_handles_labels(), fontsize=8, ncols=3, loc="outside lower center")
     figure.savefig(path, dpi=120)
     plt.close(figure)
 

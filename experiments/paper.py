@@ -1,17 +1,17 @@
 """`hedgebed paper`: the trials of Reid, Roveda, Nesnas and Pavone (i-SAIRAS 2014) with our model.
 
 Every gravity, torque and surface, with friction as it is and at both ends of its band, by the located integrator and by
-the paper's fixed step; then the numbers that the paper does not give, halved and doubled. What the paper's text states
-is compared in `experiments.paper_claims`.
+the paper's fixed step; then what the paper does not give, varied (`experiments.paper_variants`). What the paper's text
+states is compared in `experiments.paper_claims`.
 """
 
 from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -20,31 +20,23 @@ import numpy as np
 
 from hedgebed import __version__
 from rigid.planar import simulate
-from rigid.trial import Effect, Ground, Trial
+from rigid.trial import Trial
 
-from .paper_claims import claims
+from .paper_claims import claims, first_lasting
 from .paper_settings import PaperSettings
+from .paper_variants import HARD, variants
 from .progress import Progress
 from .runfolder import RunFolder
 from .surfaces import find_surface
 from .tumble_platform import torque_within_limit
 from .tumble_settings import TumbleSettings
-from .tumble_trial import SPIKES_PER_ROW, plan_tumble
+from .tumble_trial import plan_tumble
 from .whole_runs import whole_run
 
 __all__ = ["Job", "check", "plan_jobs", "resume", "run"]
 
 SAMPLE_INTERVAL = 5e-3
 """Between the rows that are kept [s]; numbers come from the integration itself."""
-SWEPT = ("inertia", "wheel_inertia", "stiffness", "damping", "wheel_speed_0")
-"""What the paper does not give."""
-FACTORS = (0.5, 2.0)
-TORQUE_RISE, RISE = Path(__file__).parent / "terms" / "torque_rise.py", 0.1
-"""A term, and its time constant [s]: what a step of the torque hides."""
-GRAINS_LAW, GRAINS_SURFACE = "katsuragi-durian", "sand"
-"""A law that gives back next to nothing, and the surface that its own parameters are for."""
-HARD = ("steel", "brick")
-"""The surfaces of Figures 5 to 7."""
 
 
 @dataclass(frozen=True)
@@ -57,12 +49,15 @@ class Job:
     torque: float
     surface: str
     variant: str
-    """"nominal", "low" or "high" friction, "paper" (the fixed step), another law, or what was swept ("inertia x2")."""
+    """"nominal", "low" or "high" friction, "paper" (the fixed step), or the name of a `paper_variants.Variant`."""
     trial: Trial
     duration: float
     trusted: float
     max_wheel_speed: float = math.inf
     """Where a motor's torque ends [rad/s]; not known of a wheel with another inertia than the platform's."""
+    kind: str = ""
+    varied: Mapping[str, Any] = field(default_factory=dict)
+    """As `paper_variants.Variant` has them."""
 
     @property
     def method(self) -> Any:
@@ -102,35 +97,28 @@ def _case_jobs(settings: PaperSettings, rig: float, turn: dict[str, Any], surfac
     name = f"{surface}-{rig:g}g-{torque:g}Nm"
     duration = settings.duration if turn["actuator"] == "motor" else settings.brake_duration
 
-    def job(variant: str, varied: Trial) -> Job:
-        limit = plan.max_wheel_speed if varied.wheel_inertia == trial.wheel_inertia else math.inf
+    def job(variant: str, changed: Trial, kind: str = "", varied: Mapping[str, Any] | None = None) -> Job:
+        limit = plan.max_wheel_speed if changed.wheel_inertia == trial.wheel_inertia else math.inf
         return Job(
             f"{name}-{variant.replace(' ', '-')}",
             rig,
             torque,
             surface,
             variant,
-            varied,
+            changed,
             duration,
             settings.trusted,
             limit,
+            kind,
+            varied or {},
         )
 
     yield job("nominal", trial)
     for variant, factor in (("low", 1 - settings.friction_band), ("high", 1 + settings.friction_band)):
         yield job(variant, replace(trial, mu_s=factor * trial.mu_s, mu_d=factor * trial.sliding_friction))
     yield job("paper", trial)
-    if surface == GRAINS_SURFACE and turn["actuator"] == "brake":
-        grains = Ground(name=GRAINS_LAW, spikes_per_row=SPIKES_PER_ROW)
-        yield job(GRAINS_LAW, replace(trial, ground=grains))
-    if surface == "steel" and rig == settings.rigs[0] and torque == min(settings.motor_torques):
-        rising = Effect(id="torque-rise", parameters={"rise": RISE}, file=TORQUE_RISE)
-        yield job(f"torque rise {RISE:g} s", replace(trial, effects=(rising,)))
-    if settings.sweep and surface in HARD and rig == settings.rigs[0]:
-        for key in SWEPT:
-            value = getattr(trial, key)
-            for factor in FACTORS if value else ():
-                yield job(f"{key} x{factor:g}", replace(trial, **{key: factor * value}))
+    for other in variants(settings, trial, surface=surface, first_rig=rig == settings.rigs[0]):
+        yield job(other.name, other.trial, other.kind, other.varied)
 
 
 def _integrate(job: Job) -> dict[str, Any]:
@@ -151,6 +139,8 @@ def _integrate(job: Job) -> dict[str, Any]:
         "actuator": job.trial.actuator,
         "surface": job.surface,
         "variant": job.variant,
+        "kind": job.kind,
+        "varied": dict(job.varied),
         "trajectory_angle": trajectory.trajectory_angle,
         "max_speed": float(speed.max()),
         "max_angular_velocity": float(np.abs(trajectory.omega[:end]).max()),
@@ -244,7 +234,14 @@ def _carry_out(settings: PaperSettings, folder: RunFolder, progress: Progress) -
 
 def _result(settings: PaperSettings, jobs: Sequence[Job], found: list[dict[str, Any]]) -> dict[str, Any]:
     cases = [entry for entry in found if entry["variant"] in ("nominal", "low", "high", "paper")]
-    swept = [entry for entry in found if " x" in entry["variant"]]
+
+    def of_kind(kind: str) -> list[dict[str, Any]]:
+        kept = [entry for entry in found if entry["kind"] == kind]
+        return [
+            {**{key: entry[key] for key in entry if key != "transitions"}, "first_state": first_lasting(entry)}
+            for entry in kept
+        ]
+
     stated = claims(settings, found, jobs)
     met = [claim for claim in stated if claim["met"] is not None]
     guesses = sorted({job.surface for job in jobs if find_surface(job.surface).guess})
@@ -261,8 +258,11 @@ def _result(settings: PaperSettings, jobs: Sequence[Job], found: list[dict[str, 
         "brake_wheel_speed": settings.brake_wheel_speed,
         "surfaces": {name: asdict(find_surface(name)) for name in settings.surfaces},
         "claims": stated,
+        "integrations": len(jobs),
         "cases": cases,
-        "sweep": [{key: value for key, value in entry.items() if key != "transitions"} for entry in swept],
+        "sweep": of_kind("sweep"),
+        "sliding": of_kind("sliding"),
+        "grains": of_kind("grains"),
         "warnings": warnings,
     }
 

@@ -11,14 +11,16 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from rigid.trial import Trial
+
 from .paper_settings import PaperSettings
 
-__all__ = ["AGREEMENT", "claims", "friction_of_a_rigid_pivot"]
+__all__ = ["AGREEMENT", "claims", "first_lasting", "friction_of_a_rigid_pivot", "sliding_angle"]
 
 AGREEMENT = 5.0
 """Degrees within which the paper calls transition angles in agreement."""
 BRIEF = 0.1
-"""A slip that is over before this [s] is that of the torque setting in."""
+"""A state that is over before this [s] is not the one in which a platform moves, but the torque setting in."""
 
 
 def claims(settings: PaperSettings, cases: Sequence[dict[str, Any]], jobs: Sequence[Any]) -> list[dict[str, Any]]:
@@ -33,9 +35,9 @@ def claims(settings: PaperSettings, cases: Sequence[dict[str, Any]], jobs: Seque
         if surface in settings.surfaces:
             found += [_grows(settings, table, surface, rig) for rig in settings.rigs]
             for torque in settings.brake_torques:
-                found.append(
-                    _angle(table, surface, settings.rigs[0], torque, 60.0, "the angle grows to about 60 degrees")
-                )
+                at_most = _angle(table, surface, settings.rigs[0], torque, 60.0, "the angle grows to about 60 degrees")
+                at_most["note"] += _of_sliding(table, trials, surface, settings.rigs[0], torque, 60.0)
+                found.append(at_most)
     for torque in settings.brake_torques:
         found += [_slips_at_once(settings, table, rig, torque) for rig in settings.rigs]
     hops = _hops(settings, table)
@@ -50,7 +52,7 @@ def claims(settings: PaperSettings, cases: Sequence[dict[str, Any]], jobs: Seque
     return found
 
 
-def friction_of_a_rigid_pivot(trial: Any) -> float:
+def friction_of_a_rigid_pivot(trial: Trial) -> float:
     """Friction coefficient [1] that a pivot on a rigid ground asks for as the torque sets in.
 
     About the front tip at gamma = pi / n: (J + m l^2 cos^2 + M_y l^2 sin^2) alpha = tau - W l sin, the tip's forces
@@ -61,6 +63,15 @@ def friction_of_a_rigid_pivot(trial: Any) -> float:
     heavy = trial.mass + trial.counterweight
     alpha = (trial.torque - trial.weight * sine) / (trial.inertia + trial.mass * cosine**2 + heavy * sine**2)
     return trial.mass * cosine * alpha / (trial.weight + heavy * sine * alpha)
+
+
+def sliding_angle(trial: Trial) -> float:
+    """Launch angle [rad] of a platform that slides throughout under a strong torque: tan = m / (M_y mu_d).
+
+    Friction mu_d N speeds up m along the surface, N lifts M_y = m + m_b (the weight is small beside N). pi / 2 without
+    friction.
+    """
+    return math.atan2(trial.mass, (trial.mass + trial.counterweight) * trial.sliding_friction)
 
 
 def _claim(
@@ -113,6 +124,29 @@ def _angle(table: dict[Any, Any], surface: str, rig: float, torque: float, state
     )
 
 
+def _varied(table: dict[Any, Any], surface: str, rig: float, torque: float, kind: str) -> list[dict[str, Any]]:
+    """The cases of one gravity, torque and surface in which something was varied."""
+    found = [case for (*where, _), case in table.items() if where == [surface, rig, torque]]
+    return [case for case in found if case["kind"] == kind]
+
+
+def _of_sliding(
+    table: dict[Any, Any], trials: dict[Any, Any], surface: str, rig: float, torque: float, stated: float
+) -> str:
+    """What sliding friction has to do with a launch angle."""
+    trial = trials[surface, rig, torque]
+    heavy = (trial.mass + trial.counterweight) * math.tan(math.radians(stated))
+    note = (
+        f"; sliding all the way leaves at tan = m / (M_y mu_d), {math.degrees(sliding_angle(trial)):.1f} degrees for "
+        f"mu_d = {trial.sliding_friction:g}, and the paper gives no mu_d: {stated:g} degrees would ask for "
+        f"{trial.mass / heavy:.3f}, mu_s being {trial.mu_s:g}"
+    )
+    others = _varied(table, surface, rig, torque, "sliding")
+    known = [(case["varied"]["ratio"], _degrees(case["trajectory_angle"])) for case in others]
+    told = [f"{angle:.1f} at {ratio:g}" for ratio, angle in known if angle is not None]
+    return note + (f"; with mu_d / mu_s varied {', '.join(told)}" if told else "")
+
+
 def _grows(settings: PaperSettings, table: dict[Any, Any], surface: str, rig: float) -> dict[str, Any]:
     torques = sorted((*settings.motor_torques, *settings.brake_torques))
     angles = [_degrees(table[surface, rig, torque, "nominal"]["trajectory_angle"]) for torque in torques]
@@ -163,48 +197,70 @@ def _hops(settings: PaperSettings, table: dict[Any, Any]) -> dict[str, Any] | No
 
 
 def _pivots_first(table: dict[Any, Any], trials: dict[Any, Any], rig: float, torque: float) -> dict[str, Any]:
-    lasting = _first_lasting(table["steel", rig, torque, "nominal"])
+    lasting = first_lasting(table["steel", rig, torque, "nominal"])
     rises = [case for (*_, variant), case in table.items() if variant.startswith("torque rise")]
-    risen = "".join(f"; with a {case['variant']} it would {_first_lasting(case)} first" for case in rises)
+    risen = "".join(f"; with a {case['variant']} it would {first_lasting(case)} first" for case in rises)
     trial = trials["steel", rig, torque]
     asked = friction_of_a_rigid_pivot(trial)
+    others = _varied(table, "steel", rig, torque, "sliding")
+    told = [f"{first_lasting(case)} at {case['varied']['ratio']:g}" for case in others]
+    slid = f"; with mu_d / mu_s varied, first {', '.join(told)}" if told else ""
     return _claim(
         f"the platform pivots first (steel, {rig:g} g, {torque:g} N m)",
         "pivot",
-        "pivot" if lasting == "pivot" else f"{lasting} at once",
+        lasting,
         met=lasting == "pivot",
-        judged=f"the first state but for a slip of less than {BRIEF:g} s as the torque sets in",
+        judged=f"the first state that lasts {BRIEF:g} s",
         note=f"on rigid ground a pivot would ask for a friction coefficient of {asked:.3f}, of the {trial.mu_s:g} "
         f"there is; on springs the front spike takes the weight over only in time, and a slip that has begun has "
-        f"mu_d = {trial.sliding_friction:g} to hold it{risen}",
+        f"mu_d = {trial.sliding_friction:g}, ours, to hold it{slid}{risen}",
     )
 
 
-def _first_lasting(case: dict[str, Any]) -> str:
-    """The first state in which the platform moves, but for a brief slip as the torque sets in; stand if none."""
+def first_lasting(case: dict[str, Any]) -> str:
+    """The first state in which the platform moves for `BRIEF` or longer; stand if there is none."""
     transitions = case["transitions"]
     ends = [time for time, _, _ in transitions[1:]] + [math.inf]
-    for (_, state, _), end in zip(transitions, ends, strict=True):
-        if state != "stand" and not (state == "slip" and end <= BRIEF):
+    for (begin, state, _), end in zip(transitions, ends, strict=True):
+        if state != "stand" and end - begin >= BRIEF:
             return str(state)
     return "stand"
 
 
 def _negative(table: dict[Any, Any], surface: str, rig: float, torque: float) -> dict[str, Any]:
     angle = _degrees(table[surface, rig, torque, "nominal"]["trajectory_angle"])
-    note = "on the spring-damper, which gives back what it took as grains do not"
-    other = table.get((surface, rig, torque, "katsuragi-durian"))
-    if other is not None and other["trajectory_angle"] is not None:
-        leaves = _degrees(other["trajectory_angle"])
-        note += f"; with ground = katsuragi-durian, which does not either, {leaves:.1f} degrees"
     return _claim(
         f"on grains a brake trial sinks and leaves at a negative angle ({_where(surface, rig, torque)})",
         "below 0 degrees",
         "never 10 mm away" if angle is None else f"{angle:.1f} degrees",
         met=angle is not None and angle < 0,
         judged="sign of the trajectory angle",
-        note=note,
+        note=_of_grounds(_varied(table, surface, rig, torque, "grains")),
     )
+
+
+def _of_grounds(others: Sequence[dict[str, Any]]) -> str:
+    """What other grounds do to a brake trial on grains; the first of them has the surface's own stiffness."""
+    known = [(case["varied"], _degrees(case["trajectory_angle"])) for case in others]
+    told = [(varied, angle) for varied, angle in known if angle is not None]
+    note = "on the spring-damper, which gives back what it took, and too stiff a one for the platform to sink in far"
+    if not told:
+        return note
+
+    own, leaves = told[0]
+    note += (
+        f"; {own['law']} as stiff as the surface ({own['stiffness']:.4g} N/m a row), rebound {own['rebound']:g}: "
+        f"{leaves:+.1f} degrees"
+    )
+    if len(told) == 1:
+        return note
+    by_stiffness: dict[str, list[str]] = {}
+    for varied, angle in sorted(told, key=lambda pair: (pair[0]["stiffness"] or math.inf, -pair[0]["rebound"])):
+        stiff = varied["law"] if varied["stiffness"] is None else f"{varied['stiffness']:.4g} N/m"
+        by_stiffness.setdefault(stiff, []).append(f"{angle:+.1f} at {varied['rebound']:g}")
+    listed = "; ".join(f"{stiff} {', '.join(angles)}" for stiff, angles in by_stiffness.items())
+    below = sum(angle < 0 for _, angle in told)
+    return f"{note}; {below} of {len(told)} grounds leave below 0, by stiffness of a row and rebound: {listed}"
 
 
 def _transitions(settings: PaperSettings, table: dict[Any, Any], torque: float) -> dict[str, Any]:

@@ -35,7 +35,11 @@ class PaperSettings(StrictSettings):
     brake_wheel_speed: Positive = Field(
         300.0, description="Speed of the wheel at the start of a brake trial [rad/s]; ours, the paper gives none."
     )
-    sweep: bool = Field(True, description="Halve and double the numbers that the paper does not give, one at a time.")
+    sweep: bool = Field(
+        True,
+        description="Halve and double the numbers that the paper does not give, one at a time, vary mu_d / mu_s, and "
+        "put other grounds under the brake trials on grains.",
+    )
 
     # How it is computed
     duration: Positive = Field(5.0, le=60, description="How long a motor trial lasts [s].")

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from vis.page import Page, Section, Tile, code, figure, table, text, write_page
+from vis.paper_assumed import grains_blocks, ours, sliding_blocks
 from vis.paper_measures import figure_8, figure_sweep
 from vis.paper_paths import figure_5, figure_6, figure_7
 from vis.paper_run import Case, Drawn, PaperRun
@@ -80,12 +81,14 @@ def _page(paper: PaperRun, blocks: Mapping[str, Any]) -> Page:
         for name, s in result["surfaces"].items()
     ]
     platform = result["platform"]
+    count = result.get("integrations", len(paper.cases) + len(paper.sweep))
+    assumed = [*([blocks["sweep"]] if "sweep" in blocks else []), *sliding_blocks(paper), *grains_blocks(paper)]
     moved = math.degrees(quantities["step_angle_gap"]["value"])
     speed = result.get("brake_wheel_speed")
     spun = f", a wheel at {speed:g} rad/s before it is braked" if speed is not None else ""
     return Page(
         title=str(result["title"]),
-        lead=[f"hedgebed {result['version']}", "paper", f"{len(paper.cases) + len(paper.sweep)} integrations"],
+        lead=[f"hedgebed {result['version']}", "paper", f"{count} integrations"],
         tiles=[
             Tile("Statements met", f"{met} of {compared}", "those of the text that can be compared"),
             Tile("Cases", str(quantities["case_count"]["value"]), "gravities × torques × surfaces"),
@@ -106,7 +109,7 @@ def _page(paper: PaperRun, blocks: Mapping[str, Any]) -> Page:
             ),
             Section("What the text states, and what comes out", [table(head, claims, words=True)]),
             Section("The figures", [blocks[name] for name in _FIGURES if name in blocks and name != "sweep"]),
-            Section("What the paper does not give", [blocks["sweep"]] if "sweep" in blocks else []),
+            Section("What the paper does not give", assumed),
             Section(
                 "Every case",
                 [
@@ -134,8 +137,8 @@ def _page(paper: PaperRun, blocks: Mapping[str, Any]) -> Page:
                 [
                     text(
                         f"Platform: {platform['mass']:g} kg, J = {platform['inertia']:g} kg m², l = "
-                        f"{platform['spike_length']:g} m, J_w = {platform['wheel_inertia']:g} kg m²{spun}; J, "
-                        "J_w, that speed, K and C are ours, as the paper gives none."
+                        f"{platform['spike_length']:g} m, J_w = {platform['wheel_inertia']:g} kg m²{spun}. "
+                        + ours(result)
                     ),
                     table(("surface", "K [N/m]", "C [N s/m]", "mu_s", "mu_d", "source"), surfaces, words=True),
                 ],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
@@ -81,16 +82,20 @@ def figure_sweep(paper: PaperRun) -> Drawn | None:
         return None
     keys = in_order(entry["variant"].split(" x")[0] for entry in paper.sweep)
     rig = paper.sweep[0]["rig"]
+    sliding = paper.result.get("sliding", [])
+    ratios = sorted({entry["varied"]["ratio"] for entry in sliding})
+    places = [*keys, "sliding"] if sliding else keys
     words = {
         "inertia": "inertia J", "wheel_inertia": "wheel inertia", "stiffness": "stiffness K", "damping": "damping C",
         "wheel_speed_0": "brake's wheel speed",
+        "sliding": "friction mu_d / mu_s",
     }  # fmt: skip
     measures = (
         ("trajectory_angle", "trajectory angle [degrees]"),
         ("transition_angle_hop", "θ at the first hop [degrees]"),
     )
     with styled():
-        drawing = new_figure(WIDTH, 4.6)
+        drawing = new_figure(WIDTH, 5.2)
         axes = drawing.subplots(len(paper.hard), 2, sharey=True, sharex="col", squeeze=False)
         for i, surface in enumerate(paper.hard):
             for j, (measure, label) in enumerate(measures):
@@ -108,17 +113,32 @@ def figure_sweep(paper: PaperRun) -> Drawn | None:
                         mark = ">" if float(factor) > 1 else "<"
                         value = math.degrees(entry[measure])
                         axis.plot(value, keys.index(key), mark, color=paper.colour(torque), ms=6)
+                    for entry in sliding:
+                        where = (entry["surface"], entry["rig"], entry["torque"])
+                        if where == (surface, rig, torque) and entry[measure] is not None:
+                            size = _diamond(entry["varied"]["ratio"], ratios)
+                            value = math.degrees(entry[measure])
+                            axis.plot(value, len(keys), "D", color=paper.colour(torque), ms=size)
                 if i == len(paper.hard) - 1:
                     axis.set_xlabel(label)
-            axes[i, 0].set_yticks(range(len(keys)), [words.get(key, key) for key in keys])
-            axes[i, 0].set_ylim(len(keys) - 0.5, -0.5)
+            axes[i, 0].set_yticks(range(len(places)), [words.get(key, key) for key in places])
+            axes[i, 0].set_ylim(len(places) - 0.5, -0.5)
         marks = [
             Line2D([], [], color=INK, marker=mark, ls="", ms=6, label=label)
             for mark, label in (("<", "halved"), (">", "doubled"))
         ]
+        marks += [
+            Line2D([], [], color=INK, marker="D", ls="", ms=_diamond(ratio, ratios), label=f"mu_d = {ratio:g} mu_s")
+            for ratio in ratios
+        ]
         legend_above(drawing, [*paper.handles(), *marks], columns=5)
     caption = (
-        f"At {rig:g} g: the numbers that the paper does not give, halved and doubled one at a time; the line is the "
-        "value as it is."
+        f"At {rig:g} g: the numbers that the paper does not give, one at a time; the line is the value as it is, with "
+        "mu_d half of mu_s on steel and brick."
     )
     return "What the paper does not give", caption, drawing
+
+
+def _diamond(ratio: float, ratios: Sequence[float]) -> float:
+    """Size of the mark of a ratio [points]: the larger the ratio, the larger."""
+    return 3.0 + 3.5 * ratios.index(ratio) / max(len(ratios) - 1, 1)

@@ -12,9 +12,10 @@ STEEL, BRICK = 0.25, 0.5
 LEVELS = pytest.mark.parametrize("level", [0.0085, 0.015])
 
 
-def tumble(torque, mu_s, level=0.0085, duration=2.0):
+def tumble(torque, mu_s, level=0.0085, duration=2.0, mu_d=None):
     spinning = {"actuator": "brake", "wheel_speed_0": 300.0} if torque == 6.0 else {}
-    return simulate(in_rig(torque, mu_s=mu_s, level=level, **spinning), duration=duration, sample_interval=5e-3)
+    trial = in_rig(torque, mu_s=mu_s, mu_d=mu_d, level=level, **spinning)
+    return simulate(trial, duration=duration, sample_interval=5e-3)
 
 
 def degrees(run):
@@ -37,9 +38,55 @@ def test_the_angle_grows_with_torque(mu_s, level):
     assert angles[0] < angles[1] < angles[2]
 
 
-def test_the_angle_grows_to_about_60_degrees():
-    assert 55 < degrees(tumble(0.22, STEEL)) < 65
-    assert 55 < degrees(tumble(6.0, BRICK)) < 65
+def sliding(mu_d):
+    """Launch angle [degrees] of one that slides throughout, under a strong torque: tan = m / ((m + m_b) mu_d)."""
+    counterweight = in_rig(6.0, mu_s=STEEL).counterweight
+    return math.degrees(math.atan2(MASS, (MASS + counterweight) * mu_d))
+
+
+def test_at_6_nm_on_brick_the_angle_is_the_papers_60_degrees_within_five():
+    assert degrees(tumble(6.0, BRICK)) == pytest.approx(60, abs=5)
+
+
+def test_at_6_nm_on_steel_the_angle_is_the_closed_forms_76_degrees_and_not_the_papers_60():
+    # tan = m / (M_y mu_d) with mu_d = mu_s / 2, which is ours: the paper gives none. The weight is small beside the
+    # load; it and the turn over the first 10 mm take half a degree.
+    angle = degrees(tumble(6.0, STEEL))
+    assert sliding(0.5 * STEEL) == pytest.approx(76.1, abs=0.05)
+    assert angle == pytest.approx(sliding(0.5 * STEEL), abs=1)
+    assert not 55 < angle < 65
+
+
+def test_at_0_22_nm_on_steel_the_angle_lies_between_those_of_the_other_torques():
+    # The paper says no more of it than that the angle grows with torque, to about 60 degrees at the largest. Ours is
+    # at the end of that already: 61.6, another sign that steel slides too easily here.
+    low, middle, high = (degrees(tumble(torque, STEEL)) for torque in (0.125, 0.22, 6.0))
+    assert low < middle < high
+    assert middle == pytest.approx(61.6, abs=0.1)
+
+
+def test_no_one_ratio_of_mu_d_to_mu_s_brings_steel_and_brick_to_60_degrees_within_five():
+    # By the closed form steel would take a ratio above 0.94, brick one below 0.71.
+    ratios = [0.5 + 0.01 * k for k in range(51)]
+    fits = {mu_s: {k for k, r in enumerate(ratios) if abs(sliding(r * mu_s) - 60) <= 5} for mu_s in (STEEL, BRICK)}
+    assert fits[STEEL] and fits[BRICK] and not fits[STEEL] & fits[BRICK]
+    # With mu_d = mu_s the model is where the closed form is on steel, and as far from the paper on brick.
+    assert degrees(tumble(6.0, STEEL, mu_d=STEEL)) == pytest.approx(sliding(STEEL), abs=1)
+    assert degrees(tumble(6.0, BRICK, mu_d=BRICK)) == pytest.approx(sliding(BRICK), abs=1)
+
+
+def first_that_lasts(run):
+    """The first state but stand that lasts 0.1 s."""
+    ends = [time for time, _, _ in run.transitions[1:]] + [math.inf]
+    pairs = zip(run.transitions, ends, strict=True)
+    return next(name for (begin, name, _), end in pairs if name != "stand" and end - begin >= 0.1)
+
+
+def test_steel_at_0_125_nm_slips_where_the_paper_saw_a_pivot_unless_sliding_takes_no_friction_away():
+    assert first_that_lasts(tumble(0.125, STEEL)) == "slip"
+    held = tumble(0.125, STEEL, mu_d=STEEL)
+    assert first_that_lasts(held) == "pivot"
+    assert degrees(held) == pytest.approx(22.5 - math.degrees(0.01 / (2 * LENGTH)), abs=0.5)
 
 
 @LEVELS
