@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+from vis.columns import template
 
 __all__ = ["Block", "Page", "Section", "Tile", "code", "figure", "listing", "table", "text", "write_page"]
 
@@ -89,20 +89,13 @@ def figure(path: Path, *, title: str, caption: str, half: bool = False, show_fil
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], *, title: str = "", words: bool = False) -> Block:
-    """A table; the first column is text, the others numbers unless `words`."""
+    """A table; the first column is text, the others numbers unless `words`; `vis.columns` says which wrap."""
     return Block(kind="table", title=title, head=tuple(head), rows=tuple(tuple(row) for row in rows), words=words)
 
 
 def write_page(path: Path, page: Page) -> Path:
     """Write the page to `path`, all of it or nothing, and return it."""
-    environment = Environment(
-        loader=PackageLoader("vis"),
-        autoescape=select_autoescape(["html"]),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     temporary = path.with_name(f"{path.name}.part")
-    temporary.write_text(environment.get_template("page.html").render(page=page), encoding="utf-8")
+    temporary.write_text(template("page.html").render(page=page), encoding="utf-8")
     temporary.replace(path)
     return path

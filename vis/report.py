@@ -7,12 +7,11 @@ import io
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from PIL import Image
 
 from vis.amended import is_amended
+from vis.columns import template
 from vis.folder import RunFolder, from_python, read_folder
 from vis.pictures import Picture, Pictures, make_pictures
 from vis.plot_parts import Plot
@@ -27,6 +26,7 @@ _NEEDS |= {"Drops": "drop", "Peaks of the drops": "drop"}
 #: Experiment -> module and function of its own report.
 _OTHERS = {
     "tumble": ("vis.tumble", "write_tumble_report"),
+    "hop": ("vis.hop", "write_hop_report"),
     "paper": ("vis.paper", "write_paper_report"),
     "campaign": ("vis.campaign", "write_campaign_report"),
     "campaign check": ("vis.inspection", "write_inspection_report"),
@@ -75,7 +75,7 @@ def write_report(folder: str | Path, *, pictures: bool = True, progress: Callabl
     context["picture_notes"] = drawn.notes
     report = run.path / "report.html"
     temporary = report.with_name("report.html.part")
-    temporary.write_text(_template().render(**context), encoding="utf-8")
+    temporary.write_text(template("report.html").render(**context), encoding="utf-8")
     temporary.replace(report)
     tell(1.0)
     return report
@@ -87,17 +87,6 @@ def _asked_for(run: RunFolder, undrawn: str) -> bool:
     if why != "no data." or not run.runs:
         return True
     return not from_python(run) and (what not in _NEEDS or bool(run.of_kind(_NEEDS[what])))
-
-
-def _template() -> Any:
-    environment = Environment(
-        loader=PackageLoader("vis"),
-        autoescape=select_autoescape(["html"]),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("report.html")
 
 
 def _figure(plot: Plot, path: Path) -> dict[str, str]:
