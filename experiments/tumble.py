@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hedgebed import __version__
-from rigid.planar import PAPER_STEP, longest_step, simulate
+from rigid.planar import PAPER_STEP, check_step, simulate
 from rigid.trajectory import Trajectory
 
 from .campaign import read_model
@@ -41,14 +41,10 @@ def check(settings: TumbleSettings) -> None:
 
 
 def _check_paper_step(plan: TumblePlan) -> None:
-    trial, longest = plan.trial, longest_step(plan.trial)
-    if longest < PAPER_STEP:
-        own = f"stiffness = {trial.stiffness:g} N/m and damping = {trial.damping:g} N s/m"
-        ground = own if trial.ground is None else f"ground = {trial.ground.name!r}"
-        raise ValueError(
-            f"method = 'paper' has a time_step = {PAPER_STEP:g} s, too long for {ground}: at most {longest:.3g} s "
-            f"would follow it; method = 'located' would do"
-        )
+    try:
+        check_step(plan.trial, PAPER_STEP)
+    except ValueError as error:
+        raise ValueError(f"method = 'paper': {error}; method = 'located' would do") from None
 
 
 def quantities_of(trajectory: Trajectory) -> dict[str, dict[str, Any]]:

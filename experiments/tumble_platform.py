@@ -19,7 +19,15 @@ from rigid.platform_files import find_platform
 from rigid.trajectory import Trajectory
 from rigid.trial import Trial
 
-__all__ = ["Number", "PlatformNumbers", "check_actuation", "platform_numbers", "torque_within_limit", "wheel_limit"]
+__all__ = [
+    "Number",
+    "PlatformNumbers",
+    "check_actuation",
+    "defaults_said",
+    "platform_numbers",
+    "torque_within_limit",
+    "wheel_limit",
+]
 
 SPIKE_LENGTHS = {"hedgehog": 0.2}
 """l [m] where the paper gives it: its octagon is 0.4 m across, and the edge of 0.153 m is rounded."""
@@ -32,6 +40,16 @@ class Number:
     value: float
     unit: str
     origin: str
+
+
+def defaults_said(choices: Mapping[str, str], numbers: Mapping[str, Number]) -> list[str]:
+    """One line for each choice at its default and each number that was not given: every default is said."""
+    lines = [f"{name} = {value} (default)" for name, value in choices.items()]
+    for name, number in numbers.items():
+        if number.origin != "given":
+            unit = "" if number.unit == "1" else f" {number.unit}"
+            lines.append(f"{name} = {number.value:.6g}{unit} ({number.origin})")
+    return lines
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from rigid.trial import Effect, Ground, Trial
 
 from .campaign import TumbleModel, read_model
 from .surfaces import find_surface
-from .tumble_platform import Number, check_actuation, platform_numbers, wheel_limit
+from .tumble_platform import Number, check_actuation, defaults_said, platform_numbers, wheel_limit
 from .tumble_settings import TumbleSettings
 
 __all__ = ["DEFAULT_RIG", "TumblePlan", "model_trial", "plan_tumble"]
@@ -63,12 +63,7 @@ class TumblePlan:
 
     def sentences(self) -> list[str]:
         """One line for each number and choice that was not given: every default is said."""
-        lines = [f"{name} = {value} (default)" for name, value in self.choices.items()]
-        for name, number in self.numbers.items():
-            if number.origin != "given":
-                unit = "" if number.unit == "1" else f" {number.unit}"
-                lines.append(f"{name} = {number.value:.6g}{unit} ({number.origin})")
-        return lines
+        return defaults_said(self.choices, self.numbers)
 
 
 def plan_tumble(settings: TumbleSettings, *, model_file: Path | None = None) -> TumblePlan:
@@ -122,6 +117,7 @@ def plan_tumble(settings: TumbleSettings, *, model_file: Path | None = None) -> 
             unit = next(parameter.unit for parameter in ground.law.parameters if parameter.name == name)
             origin = "given" if name in ground.parameters else f"default of {ground.name}, of one spike"
             numbers[name] = Number(value, unit, origin)
+    numbers["spike_count"] = Number(trial.spike_count, "1", f"rows of platform {platform.name}")
     numbers["max_wheel_speed"] = limit
     warnings += _rig_warnings(trial)
     choices = _choices(settings, surface, model)

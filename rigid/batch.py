@@ -224,6 +224,7 @@ def _check_together(numbers: Array) -> None:
     mass, inertia, length, counterweight = numbers[:, 0], numbers[:, 1], numbers[:, 2], numbers[:, 4]
     for name, wrong in (
         ("inertia must not exceed mass spike_length^2", inertia > mass * length**2),
+        ("inertia must exceed wheel_inertia", numbers[:, 9] >= inertia),
         ("counterweight must be below mass", counterweight >= mass),
         ("mu_d must not exceed mu_s", numbers[:, 13] > numbers[:, 12]),
     ):
@@ -249,6 +250,11 @@ def _with(trial: Trial, changes: Mapping[str, float], *, quiet: set[str]) -> Tri
         plain["mu_s"] = max(trial.mu_s, plain["mu_d"])
     if "inertia" in plain and "mass" in quiet:
         plain["mass"] = max(trial.mass, plain["inertia"] / trial.spike_length**2)
+    if "inertia" in plain and "wheel_inertia" in quiet:
+        plain["wheel_inertia"] = min(trial.wheel_inertia, 0.5 * plain["inertia"])
+    if "wheel_inertia" in plain and "inertia" in quiet:
+        most = plain.get("mass", trial.mass) * trial.spike_length**2
+        plain.setdefault("inertia", min(max(trial.inertia, 2 * plain["wheel_inertia"]), most))
     if "counterweight" in plain and "mass" in quiet:
         plain["mass"] = max(trial.mass, 1.01 * plain["counterweight"])
     return replace(trial, effects=tuple(effects), **plain)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bisect
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -72,15 +72,20 @@ def longest_step(trial: Trial) -> float:
     the bound M / C (explicit steps are stable to 2 M / C). The same holds for a spring and a damper that a term has of
     its own, between its inertia and the platform's mass.
     """
+    return min(_bounds(trial))
+
+
+def _bounds(trial: Trial) -> tuple[float, float]:
+    """The longest steps [s] for the ground, and for the spring and damper that a term has of its own."""
     system = System(trial)
     stiffness, damping = stiffness_at_rest(system)
     # 1 / M of a tip at its largest lever.
     carried = 0.0 if system.inner else trial.counterweight
-    bound = step_bound(stiffness, damping, 1 / (trial.mass + carried) + trial.spike_length**2 / trial.inertia)
-    if system.inner:
-        stiffness, damping, inertia = inner_slopes(system)
-        bound = min(bound, step_bound(stiffness, damping, 1 / inertia + 1 / trial.mass))
-    return bound
+    ground = step_bound(stiffness, damping, 1 / (trial.mass + carried) + trial.spike_length**2 / trial.inertia)
+    if not system.inner:
+        return ground, math.inf
+    stiffness, damping, inertia = inner_slopes(system)
+    return ground, step_bound(stiffness, damping, 1 / inertia + 1 / trial.mass)
 
 
 def step_bound(stiffness: float, damping: float, inverse_mass: float) -> float:
@@ -90,18 +95,27 @@ def step_bound(stiffness: float, damping: float, inverse_mass: float) -> float:
 
 
 def check_step(trial: Trial, time_step: float) -> None:
-    """Raises ValueError where `time_step` [s] is too long for the ground's stiffness or damping."""
-    longest = longest_step(trial)
+    """Raises ValueError, naming what is too stiff, where `time_step` [s] is too long for the ground or for a term."""
+    ground, inner = _bounds(trial)
+    longest = min(ground, inner)
     if time_step > longest:
-        raise ValueError(
-            f"time_step = {time_step:g} s is too long for the ground (stiffness = {trial.stiffness:g} N/m, damping = "
-            f"{trial.damping:g} N s/m){_springs(trial)}: at most {longest:.3g} s follows it"
-        )
+        what = _ground_words(trial) if ground <= inner else _spring_words(trial)
+        raise ValueError(f"time_step = {time_step:g} s is too long for {what}: at most {longest:.3g} s would follow it")
 
 
-def _springs(trial: Trial) -> str:
+def _ground_words(trial: Trial) -> str:
+    if trial.ground is None:
+        return f"the ground, stiffness = {trial.stiffness:g} N/m and damping = {trial.damping:g} N s/m"
+    return f"ground = {trial.ground.name!r}, {_values(trial.ground.law.values(trial.ground.parameters))}"
+
+
+def _spring_words(trial: Trial) -> str:
     own = [effect for effect in trial.effects if "inner_mass" in effect.term.hooks]
-    return "".join(f" or for {effect.id} ({effect.values})" for effect in own)
+    return " and ".join(f"effect {effect.id!r}, {_values(effect.values)}" for effect in own)
+
+
+def _values(values: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} = {value:g}" for name, value in values.items())
 
 
 def _positive(key: str, value: Any) -> None:

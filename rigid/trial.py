@@ -85,9 +85,9 @@ class Ground:
 class Trial:
     """One tumble. The names are those of a measured trial; SI units; stiffness and damping are a row's.
 
-    Raises ValueError, naming the key, the value found and what was expected: for mass or inertia that no body can have,
-    a counterweight that is not lighter than the platform, friction with mu_d above mu_s, and a brake without a spinning
-    wheel.
+    Raises ValueError, naming the key, the value found and what was expected: for mass or inertia that no body can have
+    (above m l^2, or not above J_w), a counterweight that is not lighter than the platform, friction with mu_d above
+    mu_s, and a brake without a spinning wheel.
     """
 
     mass: float = 5.3
@@ -146,6 +146,16 @@ class Trial:
             raise ValueError(
                 f"inertia = {self.inertia:g} kg m2 must not exceed mass spike_length^2 = {most:g} kg m2: no body of "
                 f"{self.mass:g} kg within {self.spike_length:g} m has more"
+            )
+        if self.wheel_inertia >= most:
+            raise ValueError(
+                f"wheel_inertia = {self.wheel_inertia:g} kg m2 must be below mass spike_length^2 = {most:g} kg m2, the "
+                f"most that a whole platform of {self.mass:g} kg within {self.spike_length:g} m can have"
+            )
+        if self.wheel_inertia >= self.inertia:
+            raise ValueError(
+                f"inertia = {self.inertia:g} kg m2 must exceed wheel_inertia = {self.wheel_inertia:g} kg m2: it leaves "
+                f"this wheel's spin out, but holds the two wheels across it, J_w / 2 each at least, and all the rest"
             )
         if self.counterweight >= self.mass:
             raise ValueError(

@@ -135,6 +135,7 @@ def test_every_default_is_printed(capsys):
         "torque_until = inf s",
         "wheel_speed_0 = 0 rad/s (default)",
         "max_wheel_speed = 1050 rad/s (platform hedgehog)",
+        "spike_count = 8 (rows of platform hedgehog)",
     ):
         assert line in said, line
     assert "torque = 0.2 " not in said  # that was given
@@ -373,6 +374,9 @@ def test_a_term_of_ones_own_runs_from_a_file_beside_the_model():
         (["--gravity", "0.1", "--counterweight", "5"], ["counterweight = 5.0 belongs to a rig"]),
         (["--gravity", "0.1", "--rig-reading", "weight"], ["rig_reading = weight belongs to a rig"]),
         (["--inertia", "0.5"], ["inertia = 0.5 kg m2", "no body"]),
+        (["--inertia", "0.0005"], ["inertia = 0.0005 kg m2 must exceed wheel_inertia = 0.0012 kg m2"]),
+        (["--wheel-inertia", "0.06"], ["inertia = 0.06 kg m2 must exceed wheel_inertia = 0.06 kg m2"]),
+        (["--wheel-inertia", "5"], ["wheel_inertia = 5 kg m2", "mass spike_length^2 = 0.212 kg m2"]),
         (["--mass", "-1"], ["--mass = -1.0", "greater than 0", "[kg]"]),
         (["--mass", "nan"], ["--mass", "finite"]),
         (["--torque", "-0.1"], ["--torque = -0.1", "greater than or equal to 0"]),
@@ -397,6 +401,10 @@ def test_a_term_of_ones_own_runs_from_a_file_beside_the_model():
         (["--model", "spike.toml"], ["spike.toml", "kind 'penetration'", "'tumble'"]),
         (["--model", "free.toml"], ["gravity must be given", "no [rig]"]),
         (["--stiffness", "1e9", "--method", "paper"], ["time_step = 0.001 s", "stiffness = 1e+09", "'located'"]),
+        (["--effects", "wire-compliance.stiffness=1e7", "--method", "paper"],
+         ["time_step = 0.001 s", "'wire-compliance', stiffness = 1e+07", "'located'"]),
+        (["--ground", "power", "--ground-parameters", "stiffness=1e12", "--method", "paper"],
+         ["ground = 'power', stiffness = 1e+12"]),
         (["--sample-interval", "0.01"], ["--sample-interval = 0.01", "[s]"]),
         (["--duration", "0"], ["--duration = 0"]),
         (["--spike-lenght", "0.2"], ["--spike-lenght", "--spike-length"]),

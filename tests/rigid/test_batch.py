@@ -174,6 +174,8 @@ def test_bad_input_is_refused_by_name():
         ({"vary": {"mass": np.array([5.3, -1.0])}}, "mass"),
         ({"vary": {"mass": np.ones(2), "mu_s": np.ones(3)}}, "one length"),
         ({"vary": {"inertia": np.array([0.06, 0.3])}}, "inertia"),
+        ({"vary": {"inertia": np.array([0.06, 1e-3])}}, "wheel_inertia"),
+        ({"vary": {"inertia": np.array([0.06, 0.05]), "wheel_inertia": np.array([1e-3, 0.055])}}, "trial 1"),
         ({"vary": {"mu_s": np.array([0.5, 0.2]), "mu_d": np.array([0.3, 0.3])}}, "mu_d"),
         ({"vary": {"stiffness": np.array([1e4, 1e6])}}, "time_step"),
         ({"time_step": 5e-3}, "time_step"),

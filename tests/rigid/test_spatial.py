@@ -120,7 +120,7 @@ def test_in_a_hop_the_wheels_rest_unless_told_otherwise():
 def test_started_in_the_plane_it_moves_as_the_planar_model_does(given_, ground):
     """A planar row is two tips side by side. Two codes, two integrators, events located in both.
 
-    How far a tumble lets differences grow after its events sets the bound: 1e-6 of l, and of a radian.
+    How far a tumble lets differences grow after its events sets the bound: 1e-6 of l, and 2e-6 rad.
     """
     flat = Trial(
         **{"spike_length": LENGTH, "gravity_sim": 0.0834, "torque_until": 0.5, **given_},
