@@ -1,7 +1,8 @@
 """Hop theory as a tool: the wheel speed that a hop over a distance takes, the launch, the flight, how near escape is.
 
 The launch is that of `rigid.hop`, on rigid ground. Under a brake the torque is known and the wheel's speed is sought,
-under a motor the torque; a motor's wheel then turns as fast as it has become when the platform leaves.
+under a motor the torque; a motor's wheel then turns as fast as it has become when the platform leaves. The planar model
+then does the same hop from ground that gives (`experiments.hop_on_surface`): both stand in the result.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +19,6 @@ from hedgebed import __version__
 from rigid.hop import (
     Flight,
     Launch,
-    Tumbler,
     brake_launch,
     escape_speed,
     flight,
@@ -26,19 +27,20 @@ from rigid.hop import (
     launch_speed_for,
     least_viable_angle,
 )
-from rigid.platform import Platform
-from rigid.platform_files import find_platform
+from rigid.planar import simulate
+from rigid.trial import Trial
 
+from .hop_numbers import HopPlan, brake_words, plan_hop
+from .hop_on_surface import SurfaceHop, flight_path, hop_on_surface, hop_trial
 from .hop_settings import HopSettings
+from .hop_words import sentences, warnings
 from .progress import Progress
-from .runfolder import RunFolder
+from .runfolder import RunFolder, write_series
+from .tumble import trajectory_columns
 from .whole_runs import whole_run
 
 __all__ = ["check", "resume", "run"]
 
-NEAR_ESCAPE = 0.5
-"""From this share of the escape speed on it is said to be near: a quarter of the energy, and high enough a hop to see
-how gravity falls with height."""
 SCAN = 80
 """Points between the least and the most that the actuator can do, to find where the distance lies."""
 
@@ -55,65 +57,79 @@ class Hop:
 
 def check(settings: HopSettings) -> None:
     """Raise ValueError, naming key, value and what would do, for a platform there is not or a hop that cannot be."""
-    _find(settings)
+    plan, hop, torque = _find(settings)
+    trial = _trial(settings, plan, hop, torque)
+    if trial is not None:
+        simulate(trial, duration=1e-3)  # that it can stand on this ground
+
+
+def write_report(folder: Path, progress: Progress) -> None:
+    """Plots and report.html of a run folder."""
+    from vis.hop import write_hop_report as write
+
+    write(folder, progress=progress.update)
 
 
 def _carry_out(settings: HopSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
     with folder.lock():
+        plan, hop, torque = _find(settings)
+        for sentence in plan.sentences():
+            progress.message(sentence)
         progress.stage("hop", total=1.0)
-        result = _result(settings, *_find(settings))
-        folder.write_result(result)
+        given = _on_surface(settings, plan, hop, torque)
         progress.update(1.0)
+        _write_series(settings, folder, hop, given)
+        result = _result(settings, plan, hop, torque, given)
+        folder.write_result(result)
+        progress.stage("report", total=1.0)
+        write_report(folder.path, progress)
     return result
 
 
 # Finding the hop ------------------------------------------------------------------------------------------------------
 
 
-def _find(settings: HopSettings) -> tuple[Platform, Tumbler, Hop, float]:
-    """The platform, its numbers, the hop over the distance, and the torque [N m]."""
-    platform = find_platform(settings.platform)
-    stance, wheel = platform.stance(), platform.wheel()
-    tumbler = Tumbler(
-        mass=platform.mass, inertia=platform.moment(), spike_length=stance.spike_length, lean=stance.lean,
-        gravity=settings.gravity, mu_s=settings.mu_s, mu_d=settings.mu_d,
-    )  # fmt: skip
+def _find(settings: HopSettings) -> tuple[HopPlan, Hop, float]:
+    """The numbers, the hop over the distance, and the torque [N m]."""
+    plan = plan_hop(settings)
+    tumbler, wheel = plan.tumbler, plan.wheel
     if settings.actuator == "brake":
-        torque = settings.torque or wheel.brake_torque
+        torque = plan.numbers["torque"].value
+        by = brake_words(wheel)
         if torque > wheel.brake_torque * (1 + 1e-12):
             raise ValueError(
-                f"torque = {torque:g} N m: the brake of {platform.name} gives at most {wheel.brake_torque:g} N m"
+                f"torque = {torque:g} N m: {by} of {plan.platform.name} gives at most {wheel.brake_torque:g} N m"
             )
         if torque <= tumbler.tipping_torque:
-            raise ValueError(_does_not_tip("torque", torque, tumbler))
+            raise ValueError(_does_not_tip("torque", torque, plan))
 
         def leave(speed: float) -> Launch | None:
             return brake_launch(tumbler, wheel.inertia * speed, torque)
 
         least, most = 1e-4 * wheel.max_speed, wheel.max_speed
-        what = f"the brake's {torque:g} N m on a wheel at {most:g} rad/s, its largest speed,"
-        hop = _search(settings, leave, least, most, what)
-        return platform, tumbler, hop, torque
+        what = f"{by}'s {torque:g} N m, slowing a wheel at {most:g} rad/s, its largest speed,"
+        return plan, _search(settings, plan, leave, least, most, what), torque
     most = wheel.motor_torque
     if most <= tumbler.tipping_torque:
-        raise ValueError(_does_not_tip("the motor's torque", most, tumbler))
+        raise ValueError(_does_not_tip("the motor's torque", most, plan))
 
     def drive(torque: float) -> Launch | None:
         return launch(tumbler, torque, wheel.inertia * wheel.max_speed / torque)
 
-    hop = _search(settings, drive, tumbler.tipping_torque * (1 + 1e-6), most, f"the motor's {most:g} N m, its largest,")
-    return platform, tumbler, hop, hop.effort
+    least, what = tumbler.tipping_torque * (1 + 1e-6), f"the motor's {most:g} N m, its largest,"
+    hop = _search(settings, plan, drive, least, most, what)
+    return plan, hop, hop.effort
 
 
-def _does_not_tip(key: str, torque: float, tumbler: Tumbler) -> str:
+def _does_not_tip(key: str, torque: float, plan: HopPlan) -> str:
     return (
-        f"{key} = {torque:g} N m does not tip the platform at gravity = {tumbler.gravity:g} m/s2: more than "
-        f"W l sin(lean) = {tumbler.tipping_torque:.4g} N m would"
+        f"{key} = {torque:g} N m does not tip the platform at gravity = {plan.tumbler.gravity:g} m/s2: more than "
+        f"W l sin(lean) = {plan.tumbler.tipping_torque:.4g} N m would"
     )
 
 
 def _search(
-    settings: HopSettings, leave: Callable[[float], Launch | None], least: float, most: float, what: str
+    settings: HopSettings, plan: HopPlan, leave: Callable[[float], Launch | None], least: float, most: float, what: str
 ) -> Hop:
     """The smallest effort from `least` to `most` whose hop goes the distance. Raises ValueError where none does."""
 
@@ -143,7 +159,7 @@ def _search(
         way = f"hops {reach:.4g} m at most" if reach > 0 else "does not make it leave the ground"
         raise ValueError(
             f"distance = {settings.distance:g} m is too far: {what} {way} at gravity = {settings.gravity:g} m/s2 and "
-            f"mu_s = {settings.mu_s:g}"
+            f"mu_s = {plan.tumbler.mu_s:g}"
         )
     low, high = float(efforts[max(first - 1, 0)]), float(efforts[first])
     while high - low > 1e-13 * high and low < (middle := 0.5 * (low + high)) < high:  # halving gets over jumps too
@@ -156,16 +172,47 @@ def _search(
             raise ValueError(f"distance = {settings.distance:g} m cannot be hopped: the next stronger hop escapes")
         raise ValueError(
             f"distance = {settings.distance:g} m is too short: whatever leaves the ground at all goes {shortest:.4g} m "
-            f"at least, at gravity = {settings.gravity:g} m/s2 and mu_s = {settings.mu_s:g}"
+            f"at least, at gravity = {settings.gravity:g} m/s2 and mu_s = {plan.tumbler.mu_s:g}"
         )
     return found
 
 
-# What is said of it ---------------------------------------------------------------------------------------------------
+# On ground that gives -------------------------------------------------------------------------------------------------
 
 
-def _result(settings: HopSettings, platform: Platform, tumbler: Tumbler, hop: Hop, torque: float) -> dict[str, Any]:
-    left, flown, wheel = hop.launch, hop.flight, platform.wheel()
+def _trial(settings: HopSettings, plan: HopPlan, hop: Hop, torque: float) -> Trial | None:
+    return hop_trial(plan, torque=torque, wheel_speed=hop.effort if settings.actuator == "brake" else None)
+
+
+def _on_surface(settings: HopSettings, plan: HopPlan, hop: Hop, torque: float) -> SurfaceHop | None:
+    """The same hop by the planar model; None for a platform that it does not take."""
+    trial = _trial(settings, plan, hop, torque)
+    if trial is None:
+        return None
+    assert hop.flight is not None
+    longest = 2 * hop.launch.time + 0.5 + 0.5 * hop.flight.time
+    return hop_on_surface(trial, expected_time=hop.launch.time, longest=longest, radius=settings.body_radius)
+
+
+def _write_series(settings: HopSettings, folder: RunFolder, hop: Hop, given: SurfaceHop | None) -> None:
+    """The flights of theory and model, and the model's way on the ground."""
+    flights: dict[str, tuple[Launch, Flight]] = {}
+    assert hop.flight is not None
+    flights["flight"] = hop.launch, hop.flight
+    if given is not None:
+        write_series(folder.path / "trajectory.csv", trajectory_columns(given.trajectory))
+        if given.launch is not None and given.flight is not None:
+            flights["flight.model"] = given.launch, given.flight
+    for name, (left, flown) in flights.items():
+        along, height = flight_path(left, flown, gravity=settings.gravity, radius=settings.body_radius)
+        folder.write_series(name, {"along_m": along, "height_m": height})
+
+
+# The result -----------------------------------------------------------------------------------------------------------
+
+
+def _result(settings: HopSettings, plan: HopPlan, hop: Hop, torque: float, given: SurfaceHop | None) -> dict[str, Any]:
+    left, flown, wheel, tumbler = hop.launch, hop.flight, plan.wheel, plan.tumbler
     assert flown is not None  # it goes the distance
     by_brake = settings.actuator == "brake"
     speed = hop.effort if by_brake else min(torque * left.time / wheel.inertia, wheel.max_speed)
@@ -183,7 +230,7 @@ def _result(settings: HopSettings, platform: Platform, tumbler: Tumbler, hop: Ho
         "launch_speed": _quantity(left.speed, "m/s", "of the centre"),
         "launch_angle": _quantity(left.angle, "rad", "from the horizontal"),
         "least_viable_angle": _quantity(
-            least_viable_angle(settings.mu_s), "rad", "pi/2 - atan(mu_s): flattest sudden launch without sliding"
+            least_viable_angle(tumbler.mu_s), "rad", "pi/2 - atan(mu_s): flattest sudden launch without sliding"
         ),
         "spin": _quantity(left.spin, "rad/s", "turning rate in flight"),
         "flight_time": _quantity(flown.time, "s", "back to the height of launch"),
@@ -191,59 +238,61 @@ def _result(settings: HopSettings, platform: Platform, tumbler: Tumbler, hop: Ho
         "distance": _quantity(flown.distance, "m", "along the ground"),
         "escape_speed": _quantity(escape, "m/s", "sqrt(2 g R)" if escape else "unknown without body_radius"),
         "escape_ratio": _quantity(left.speed / escape if escape else None, "1", "launch speed over escape speed"),
-    }
+    } | _model_quantities(left, flown, given, escape)
     return {
         "format": "hedgebed-result/1",
         "experiment": "hop",
         "version": __version__,
-        "title": f"{platform.name}: a hop of {settings.distance:g} m at {settings.gravity:g} m/s2",
+        "title": f"{plan.platform.name}: a hop of {settings.distance:g} m at {settings.gravity:g} m/s2",
         "status": "done",
         "quantities": quantities,
-        "departures": {"sentences": _sentences(settings, tumbler, hop, torque, speed, wheel.inertia)},
-        "platform": {
-            "name": platform.name, "mass": platform.mass, "inertia": tumbler.inertia,
-            "spike_length": tumbler.spike_length, "lean": tumbler.lean, "wheel_inertia": wheel.inertia,
-            "max_wheel_speed": wheel.max_speed, "sources": dict(platform.sources),
+        "numbers": {
+            name: {"value": number.value, "unit": number.unit, "origin": number.origin}
+            for name, number in plan.numbers.items()
         },
-        "warnings": _warnings(left, escape),
+        "actuator": settings.actuator,
+        "surface": plan.surface,
+        "departures": {"sentences": sentences(plan, left, flown, given, torque=torque, speed=speed, by_brake=by_brake)},
+        "platform": {
+            "name": plan.platform.name, "mass": plan.platform.mass, "inertia": tumbler.inertia,
+            "spike_length": tumbler.spike_length, "lean": tumbler.lean, "wheel_inertia": wheel.inertia,
+            "max_wheel_speed": wheel.max_speed, "sources": dict(plan.platform.sources),
+        },
+        "warnings": [*plan.warnings, *warnings(plan, left, flown, given, escape)],
     }  # fmt: skip
+
+
+def _model_quantities(
+    left: Launch, flown: Flight, given: SurfaceHop | None, escape: float | None
+) -> dict[str, dict[str, Any]]:
+    """What the planar model makes of the same wheel and torque, and how many times theory's that is."""
+    other = given.launch if given is not None else None
+    flight_of = given.flight if given is not None else None
+    where = "planar model, on ground that gives"
+    if given is None:
+        where += ": not for this platform"
+    elif other is None:
+        where += ": it does not leave the ground"
+    elif flight_of is None:
+        where += ": it escapes"
+    return {
+        "model_launch_speed": _quantity(other.speed if other else None, "m/s", where),
+        "model_launch_angle": _quantity(other.angle if other else None, "rad", where),
+        "model_flight_time": _quantity(flight_of.time if flight_of else None, "s", where),
+        "model_peak_height": _quantity(flight_of.height if flight_of else None, "m", where),
+        "model_distance": _quantity(flight_of.distance if flight_of else None, "m", where),
+        "speed_factor": _quantity(other.speed / left.speed if other else None, "1", "model_launch_speed over theory's"),
+        "distance_factor": _quantity(
+            flight_of.distance / flown.distance if flight_of else None, "1", "model_distance over theory's"
+        ),
+        "model_escape_ratio": _quantity(
+            other.speed / escape if other and escape else None, "1", "model_launch_speed over escape speed"
+        ),
+    }
 
 
 def _quantity(value: float | None, unit: str, note: str) -> dict[str, Any]:
     return {"value": value, "std": None if value is None else 0.0, "unit": unit, "note": note}
-
-
-def _sentences(
-    settings: HopSettings, tumbler: Tumbler, hop: Hop, torque: float, speed: float, wheel_inertia: float
-) -> list[str]:
-    left = hop.launch
-    way = "slides off" if left.slid else "leaves without sliding"
-    how = (
-        f"Braking a wheel at {speed:.4g} rad/s ({speed * 30 / math.pi:.4g} rpm) with {torque:g} N m,"
-        if settings.actuator == "brake"
-        else f"A motor at {torque:.4g} N m, whose wheel comes to {speed:.4g} rad/s ({speed * 30 / math.pi:.4g} rpm),"
-    )
-    said = [
-        f"{how} the platform {way} at {left.speed:.4g} m/s, {math.degrees(left.angle):.3g} degrees above the ground.",
-        f"Launches without sliding are viable from {math.degrees(least_viable_angle(settings.mu_s)):.3g} degrees up at "
-        f"mu_s = {settings.mu_s:g}; without turning on the ground this platform would leave at "
-        f"{math.degrees(tumbler.lean):.3g}.",
-    ]
-    if settings.actuator == "brake" and left.time < wheel_inertia * speed / torque * (1 - 1e-9):
-        said.append("It leaves before the wheel has come to rest: a faster wheel would not take it farther.")
-    return said
-
-
-def _warnings(left: Launch, escape: float | None) -> list[str]:
-    warnings = ["the ground is taken as rigid: one that gives and springs back launches more steeply"]
-    if escape is None:
-        warnings.append("how near escape is cannot be told without body_radius: escape speed is sqrt(2 g R)")
-    elif left.speed >= NEAR_ESCAPE * escape:
-        warnings.append(
-            f"escape is near: {left.speed:.4g} m/s is {100 * left.speed / escape:.3g} % of the escape speed, "
-            f"sqrt(2 g R) = {escape:.4g} m/s"
-        )
-    return warnings
 
 
 run, resume = whole_run("hop", HopSettings, _carry_out, check=check)

@@ -30,14 +30,26 @@ class HopSettings(BaseModel):
         None,
         description="Torque on the platform [N m]; if not given the brake's largest, or whatever the motor needs.",
     )
-    mu_s: NotNegative = Field(0.5, description="Coefficient of static friction of tips and ground [1].")
+    surface: str = Field(
+        "brick", description="Material: steel, brick, sand or jsc1a; its friction, and what gives way under the tips."
+    )
+    mu_s: NotNegative | None = Field(
+        None, description="Static friction of tips and ground [1]; the surface's if not given (brick: 0.5)."
+    )
     mu_d: NotNegative | None = Field(
-        None, description="Coefficient of sliding friction [1]; half of `mu_s` if not given."
+        None,
+        description="Sliding friction [1]; the surface's if not given (brick: 0.25), half of mu_s where that is.",
+    )
+    stiffness: Positive | None = Field(
+        None, description="K of a row of tips [N/m]; the surface's if not given (brick: 1.5e4). Hop theory has none."
+    )
+    damping: NotNegative | None = Field(
+        None, description="C of a row of tips, while going in [N s/m]; the surface's if not given (brick: 60)."
     )
 
     @model_validator(mode="after")
     def _fits_together(self) -> HopSettings:
-        if self.mu_d is not None and self.mu_d > self.mu_s:
+        if self.mu_s is not None and self.mu_d is not None and self.mu_d > self.mu_s:
             raise ValueError(f"mu_d = {self.mu_d:g} is above mu_s = {self.mu_s:g}: at most that would do")
         if self.actuator == "motor" and self.torque is not None:
             raise ValueError(

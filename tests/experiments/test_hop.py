@@ -7,8 +7,24 @@ import re
 import pytest
 
 from experiments.cli import BAD_INPUT, DONE, main
-from rigid.hop import Tumbler, brake_launch, flight
+from experiments.hop_on_surface import flight_path
+from rigid.hop import Launch, Tumbler, brake_launch, flight
+from rigid.planar import simulate
 from rigid.platform_files import PLATFORM_FOLDER, find_platform
+from rigid.trial import Trial
+from vis import write_report
+
+
+@pytest.fixture(autouse=True)
+def _unreported(monkeypatch, request):
+    """Only what asks for it with ``reported`` draws a report."""
+    if "reported" not in request.fixturenames:
+        monkeypatch.setattr("experiments.hop.write_report", lambda folder, progress: None)
+
+
+@pytest.fixture
+def reported():
+    """The report is drawn."""
 
 
 def hop(tmp_path, capsys, *options, name="run"):
@@ -45,24 +61,127 @@ def test_without_a_radius_it_says_that_it_cannot_tell(tmp_path, capsys):
 
 
 def test_near_escape_it_says_so_with_the_share(tmp_path, capsys):
+    """Of the faster of the two launches; from 12 m on a body of 20 m radius springy ground takes it past escape."""
     _, result = hop(tmp_path, capsys, "--distance", "12", "--body-radius", "20")
-    ratio = result["quantities"]["escape_ratio"]["value"]
-    assert ratio > 0.5
-    assert any(f"{100 * ratio:.3g} % of the escape speed" in warning for warning in result["warnings"])
+    value = {key: quantity["value"] for key, quantity in result["quantities"].items()}
+    assert 0.5 < value["escape_ratio"] < 1 < value["model_escape_ratio"]
+    assert value["model_distance"] is None
+    said = f"it escapes: {value['model_launch_speed']:.4g} m/s on brick"
+    assert any(
+        said in warning and f"{100 * value['model_escape_ratio']:.3g} % of the escape speed" in warning
+        for warning in result["warnings"]
+    )
 
 
 def test_escape_is_near_from_half_its_speed_on(tmp_path, capsys):
-    """On a flat enough body 5 m take the same launch: radii for which it is 0.49 and 0.51 of sqrt(2 g R)."""
+    """The larger launch decides: radii for which the model's is 0.45 and 0.55 of sqrt(2 g R), theory's below half."""
     _, flat = hop(tmp_path, capsys, "--distance", "5", name="flat")
-    speed = flat["quantities"]["launch_speed"]["value"]
+    speed = flat["quantities"]["model_launch_speed"]["value"]
     near = {}
     for share in (0.45, 0.55):
         radius = (speed / share) ** 2 / (2 * 1e-3)
         _, result = hop(tmp_path, capsys, "--distance", "5", "--body-radius", f"{radius:.6g}", name=f"{share:g}")
-        ratio = result["quantities"]["escape_ratio"]["value"]
+        assert result["quantities"]["escape_ratio"]["value"] < 0.4
+        ratio = result["quantities"]["model_escape_ratio"]["value"]
         near[ratio > 0.5] = any("escape is near" in warning for warning in result["warnings"])
         assert not any("cannot be told" in warning for warning in result["warnings"])
     assert near == {True: True, False: False}
+
+
+# On ground that gives
+
+
+def test_springy_ground_throws_a_sliding_platform_faster_at_the_same_angle(tmp_path, capsys):
+    """The command of the issue: 76 degrees, tan(angle) = 1 / mu_d, on both; the speed of an integration of its own."""
+    _, result = hop(tmp_path, capsys, "--gravity", "1e-3", "--distance", "5", "--body-radius", "300")
+    value = {key: quantity["value"] for key, quantity in result["quantities"].items()}
+    trial = Trial(
+        mass=5.3, inertia=0.06, spike_length=find_platform("hedgehog").stance().spike_length, mu_s=0.5,
+        gravity_sim=1e-3, gravity=1e-3, stiffness=1.5e4, damping=60.0, torque=6.0, actuator="brake",
+        wheel_speed_0=value["wheel_speed"],
+    )  # fmt: skip
+    fallen = simulate(trial, duration=0.2)  # it leaves at 55 ms, and no tip has come down again
+    assert fallen.state_names[-1] == "hop"
+    speed = math.hypot(fallen.vx[-1], fallen.vy[-1] + 1e-3 * (0.2 - fallen.transitions[-1][0]))
+    assert value["model_launch_speed"] == pytest.approx(speed, rel=1e-9)
+    assert value["model_launch_angle"] == pytest.approx(math.atan(1 / 0.25), abs=2e-3)
+    assert value["launch_angle"] == pytest.approx(math.atan(1 / 0.25), abs=2e-3)
+    assert value["speed_factor"] == pytest.approx(value["model_launch_speed"] / value["launch_speed"])
+    assert value["distance_factor"] == pytest.approx(value["speed_factor"] ** 2, rel=0.01)  # v^2 sin(2 angle) / g
+    assert any("sliding tips keep the angle" in sentence for sentence in result["departures"]["sentences"])
+    assert any("times the distance" in warning for warning in result["warnings"])
+
+
+def test_springy_ground_throws_tips_that_hold_up_more_steeply(tmp_path, capsys):
+    """Sticking: 22.5 degrees on rigid ground, 41 degrees at a tenth of critical damping (docs/planar.md)."""
+    _, result = hop(tmp_path, capsys, "--mu-s", "20", "--mu-d", "20", "--distance", "5")
+    value = {key: quantity["value"] for key, quantity in result["quantities"].items()}
+    assert math.degrees(value["launch_angle"]) == pytest.approx(22.5, abs=1.0)
+    assert math.degrees(value["model_launch_angle"]) > 35
+    assert any("leave more steeply" in sentence for sentence in result["departures"]["sentences"])
+
+
+def test_ground_that_hardly_gives_and_gives_nothing_back_is_rigid_ground(tmp_path, capsys):
+    """K = 1e8 N/m damped far beyond critical: theory and model agree, and no warning compares them."""
+    _, result = hop(tmp_path, capsys, "--stiffness", "1e8", "--damping", "1e6", "--distance", "5")
+    assert result["quantities"]["speed_factor"]["value"] == pytest.approx(1, abs=0.01)
+    assert not any("times the distance" in warning for warning in result["warnings"])
+
+
+@pytest.mark.parametrize("radius", [None, 20.0])
+def test_the_path_that_is_drawn_begins_and_ends_on_the_ground_and_peaks_where_the_flight_does(radius):
+    """Kepler's ellipse about a round body, with the vis-viva peak of `flight`."""
+    left = Launch(speed=0.12, angle=1.2, spin=0.0, slid=True)
+    flown = flight(left.speed, left.angle, gravity=1e-3, radius=radius)
+    along, height = flight_path(left, flown, gravity=1e-3, radius=radius, count=201)
+    assert (along[0], along[-1]) == (0, pytest.approx(flown.distance))
+    assert height[[0, -1]] == pytest.approx([0, 0], abs=1e-12)
+    assert height[100] == height.max() == pytest.approx(flown.height, rel=1e-9)
+    steep = math.atan2(height[1], along[1])
+    assert steep == pytest.approx(left.angle, abs=0.02)
+
+
+def test_every_default_is_printed(tmp_path, capsys):
+    assert main(["hop", "--mu-s", "0.4", "--out", str(tmp_path / "run")]) == DONE
+    said = capsys.readouterr().err
+    for line in (
+        "gravity = 0.001 m/s2 (default)", "distance = 5 m (default)", "body_radius = none, a flat ground (default)",
+        "platform = hedgehog (default)", "actuator = brake (default)", "surface = brick (default)",
+        "torque = 6 N m (the brake of platform hedgehog, at its largest)", "mu_d = 0.2 (default: half of mu_s)",
+        "stiffness = 15000 N/m (surface brick)", "damping = 60 N s/m (surface brick)",
+        "mass = 5.3 kg (platform hedgehog)", "inertia = 0.06 kg m2 (platform hedgehog)",
+        "wheel_inertia = 0.0012 kg m2 (platform hedgehog)", "max_wheel_speed = 1050 rad/s (platform hedgehog)",
+        "spike_length = 0.199904 m (platform hedgehog)", "lean = 0.392699 rad (platform hedgehog)",
+    ):  # fmt: skip
+        assert line in said, line
+    assert "mu_s = 0.4 " not in said  # that was given
+
+
+def test_a_surface_brings_its_friction(tmp_path, capsys):
+    _, result = hop(tmp_path, capsys, "--surface", "steel", "--distance", "2")
+    assert math.degrees(result["quantities"]["launch_angle"]["value"]) == pytest.approx(82.9, abs=0.1)  # mu_d = 0.125
+    assert result["numbers"]["mu_d"] == {"value": 0.125, "unit": "1", "origin": "surface steel"}
+
+
+def test_the_report_stands_on_its_own(tmp_path, capsys, reported):
+    hop(tmp_path, capsys, "--distance", "5")
+    page = (tmp_path / "run" / "report.html").read_text()
+    assert page.count("data:image/png") == 2
+    assert "http://" not in page and "https://" not in page and "<script" not in page
+    (tmp_path / "run" / "report.html").unlink()
+    assert write_report(tmp_path / "run").read_text() == page
+
+
+def test_a_motor_slows_the_wheel_where_there_is_no_brake_and_unequal_sides_have_no_model(tmp_path, capsys, reported):
+    """mascot.toml has no brake_torque: its motor's 0.1 N m slow the wheel."""
+    status, error = hop(tmp_path, capsys, "--platform", "mascot", "--distance", "500")
+    assert status == BAD_INPUT and "the motor's 0.1 N m, slowing a wheel" in error and "brake" not in error
+    status, result = hop(tmp_path, capsys, "--platform", "mascot", "--distance", "0.01")
+    assert status == DONE
+    assert "with 0.1 N m by the motor," in result["departures"]["sentences"][0]
+    assert result["quantities"]["model_distance"]["value"] is None
+    assert any("MASCOT has not" in warning for warning in result["warnings"])
+    assert (tmp_path / "run" / "report.html").exists()
 
 
 def test_what_is_said_reads_well(tmp_path, capsys):
@@ -96,6 +215,9 @@ def test_a_motor_is_asked_for_its_torque(tmp_path, capsys):
         (("--platform", "roomba"), "'roomba'"),
         (("--gravity", "-1"), "gravity"),
         (("--mu-s", "0.2", "--mu-d", "0.3"), "mu_d = 0.3"),
+        (("--mu-d", "0.6"), "mu_d = 0.6 is above mu_s = 0.5 (surface brick)"),
+        (("--surface", "snow"), "surface = 'snow'"),
+        (("--stiffness", "0.01"), "stand"),
     ],
 )
 def test_a_hop_that_cannot_be_is_refused_before_there_is_a_folder(tmp_path, capsys, options, said):
