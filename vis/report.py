@@ -27,7 +27,6 @@ _NEEDS |= {"Drops": "drop", "Peaks of the drops": "drop"}
 _OTHERS = {
     "tumble": ("vis.tumble", "write_tumble_report"),
     "hop": ("vis.hop", "write_hop_report"),
-    "hop": ("vis.hop", "write_hop_report"),
     "paper": ("vis.paper", "write_paper_report"),
     "campaign": ("vis.campaign", "write_campaign_report"),
     "campaign check": ("vis.inspection", "write_inspection_report"),
