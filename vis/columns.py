@@ -17,6 +17,8 @@ __all__ = ["Columns", "columns", "template"]
 #: Characters: up to here a cell stays on one line; beyond the next, it is a sentence; beyond the next, it may stand
 #: beneath its row, where the table has so many columns; a single word beyond the last is broken anywhere (a path).
 ONE_LINE, SENTENCE, BENEATH, WORD = 28, 60, 120, 30
+#: Characters up to which a number and its bracket stay on one line.
+BRACKET = 16
 BENEATH_COLUMNS, MANY_COLUMNS = 5, 8
 #: Numbers of several parts, "7.1 (6.9 to 7.3; 7.1)": the bracket goes below, and breaks after , or ; only.
 _INSIDE_PART = re.compile(r"(?<![,;]) (?!\()")
@@ -68,10 +70,11 @@ def _kept_whole(cell: str, kind: str) -> str:
 
 def _kind(cells: Sequence[str]) -> str:
     longest = max(len(cell) for cell in cells)
-    if longest <= ONE_LINE:
+    numbers = all(len(set(_LETTERS.findall(cell)) - {"none"}) < 2 for cell in cells)
+    if longest <= (BRACKET if numbers and any(" (" in cell for cell in cells) else ONE_LINE):
         return ""
     broken = " anywhere" if max((len(word) for cell in cells for word in cell.split()), default=0) > WORD else ""
-    if all(len(set(_LETTERS.findall(cell)) - {"none"}) < 2 for cell in cells):
+    if numbers:
         return f"words{broken}" if broken else "parts"
     return ("prose" if longest > SENTENCE else "words") + broken
 
