@@ -31,7 +31,7 @@ from rigid.planar import simulate
 from rigid.trial import Trial
 
 from .hop_numbers import HopPlan, brake_words, plan_hop
-from .hop_on_surface import SurfaceHop, flight_path, hop_on_surface, hop_trial
+from .hop_on_surface import SurfaceHop, flight_path, hop_on_surface, hop_trial, wheel_speed_on_surface
 from .hop_settings import HopSettings
 from .hop_words import sentences, warnings
 from .progress import Progress
@@ -76,10 +76,10 @@ def _carry_out(settings: HopSettings, folder: RunFolder, progress: Progress) -> 
         for sentence in plan.sentences():
             progress.message(sentence)
         progress.stage("hop", total=1.0)
-        given = _on_surface(settings, plan, hop, torque)
+        given, wanted = _on_surface(settings, plan, hop, torque)
         progress.update(1.0)
         _write_series(settings, folder, hop, given)
-        result = _result(settings, plan, hop, torque, given)
+        result = _result(settings, plan, hop, torque, given, wanted)
         folder.write_result(result)
         progress.stage("report", total=1.0)
         write_report(folder.path, progress)
@@ -184,14 +184,25 @@ def _trial(settings: HopSettings, plan: HopPlan, hop: Hop, torque: float) -> Tri
     return hop_trial(plan, torque=torque, wheel_speed=hop.effort if settings.actuator == "brake" else None)
 
 
-def _on_surface(settings: HopSettings, plan: HopPlan, hop: Hop, torque: float) -> SurfaceHop | None:
-    """The same hop by the planar model; None for a platform that it does not take."""
+def _on_surface(
+    settings: HopSettings, plan: HopPlan, hop: Hop, torque: float
+) -> tuple[SurfaceHop | None, float | None]:
+    """The same hop by the planar model, and the braked wheel's speed that would go the distance there.
+
+    None for a platform that the model does not take; None for a motor, and where no wheel speed does.
+    """
     trial = _trial(settings, plan, hop, torque)
     if trial is None:
-        return None
+        return None, None
     assert hop.flight is not None
-    longest = 2 * hop.launch.time + 0.5 + 0.5 * hop.flight.time
-    return hop_on_surface(trial, expected_time=hop.launch.time, longest=longest, radius=settings.body_radius)
+    longest, radius = 2 * hop.launch.time + 0.5 + 0.5 * hop.flight.time, settings.body_radius
+    given = hop_on_surface(trial, expected_time=hop.launch.time, longest=longest, radius=radius)
+    if settings.actuator == "motor":
+        return given, None
+    most = plan.wheel.max_speed
+    return given, wheel_speed_on_surface(
+        trial, given, distance=settings.distance, max_speed=most, longest=longest, radius=radius
+    )
 
 
 def _write_series(settings: HopSettings, folder: RunFolder, hop: Hop, given: SurfaceHop | None) -> None:
@@ -211,7 +222,9 @@ def _write_series(settings: HopSettings, folder: RunFolder, hop: Hop, given: Sur
 # The result -----------------------------------------------------------------------------------------------------------
 
 
-def _result(settings: HopSettings, plan: HopPlan, hop: Hop, torque: float, given: SurfaceHop | None) -> dict[str, Any]:
+def _result(
+    settings: HopSettings, plan: HopPlan, hop: Hop, torque: float, given: SurfaceHop | None, sought: float | None
+) -> dict[str, Any]:
     left, flown, wheel, tumbler = hop.launch, hop.flight, plan.wheel, plan.tumbler
     assert flown is not None  # it goes the distance
     by_brake = settings.actuator == "brake"
@@ -238,7 +251,8 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, torque: float, given
         "distance": _quantity(flown.distance, "m", "along the ground"),
         "escape_speed": _quantity(escape, "m/s", "sqrt(2 g R)" if escape else "unknown without body_radius"),
         "escape_ratio": _quantity(left.speed / escape if escape else None, "1", "launch speed over escape speed"),
-    } | _model_quantities(left, flown, given, escape)
+    } | _model_quantities(left, flown, given, escape, sought)
+    said = sentences(plan, left, flown, given, torque=torque, speed=speed, by_brake=by_brake, sought=sought)
     return {
         "format": "hedgebed-result/1",
         "experiment": "hop",
@@ -252,7 +266,7 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, torque: float, given
         },
         "actuator": settings.actuator,
         "surface": plan.surface,
-        "departures": {"sentences": sentences(plan, left, flown, given, torque=torque, speed=speed, by_brake=by_brake)},
+        "departures": {"sentences": said},
         "platform": {
             "name": plan.platform.name, "mass": plan.platform.mass, "inertia": tumbler.inertia,
             "spike_length": tumbler.spike_length, "lean": tumbler.lean, "wheel_inertia": wheel.inertia,
@@ -263,7 +277,7 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, torque: float, given
 
 
 def _model_quantities(
-    left: Launch, flown: Flight, given: SurfaceHop | None, escape: float | None
+    left: Launch, flown: Flight, given: SurfaceHop | None, escape: float | None, sought: float | None
 ) -> dict[str, dict[str, Any]]:
     """What the planar model makes of the same wheel and torque, and how many times theory's that is."""
     other = given.launch if given is not None else None
@@ -288,6 +302,7 @@ def _model_quantities(
         "model_escape_ratio": _quantity(
             other.speed / escape if other and escape else None, "1", "model_launch_speed over escape speed"
         ),
+        "model_wheel_speed": _quantity(sought, "rad/s", "of a brake: goes the distance by the planar model"),
     }
 
 

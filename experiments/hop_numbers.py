@@ -55,6 +55,9 @@ def plan_hop(settings: HopSettings) -> HopPlan:
         value = getattr(settings, name)
         numbers[name] = Number(value, unit, "default" if value == HopSettings.model_fields[name].default else "given")
 
+    if settings.body_radius is not None:
+        numbers["body_radius"] = Number(settings.body_radius, "m", "given")
+
     def settle(name: str, unit: str, default: float, origin: str) -> float:
         given = getattr(settings, name, None)
         numbers[name] = Number(default, unit, origin) if given is None else Number(given, unit, "given")

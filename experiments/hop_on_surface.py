@@ -7,7 +7,7 @@ leave more steeply, tips that slide keep the angle that friction sets and leave 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -20,10 +20,12 @@ from rigid.trial import Trial
 
 from .hop_numbers import HopPlan
 
-__all__ = ["SurfaceHop", "flight_path", "hop_on_surface", "hop_trial"]
+__all__ = ["SurfaceHop", "flight_path", "hop_on_surface", "hop_trial", "wheel_speed_on_surface"]
 
 ROWS = 600
 """Rows of the launch that are kept."""
+CLOSE = 1e-4
+"""How close, as a share, the sought wheel speed brings the model to the distance."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,6 +101,32 @@ def hop_on_surface(trial: Trial, *, expected_time: float, longest: float, radius
         return SurfaceHop(launch=None, flight=None, trajectory=trajectory)
     flown = flight(launch.speed, angle, gravity=trial.gravity_sim, radius=radius)
     return SurfaceHop(launch=launch, flight=flown, trajectory=trajectory)
+
+
+def wheel_speed_on_surface(
+    trial: Trial, start: SurfaceHop, *, distance: float, max_speed: float, longest: float, radius: float | None
+) -> float | None:
+    """The speed [rad/s] of a braked wheel whose hop from this ground goes `distance` [m], to 1e-4 of it.
+
+    The launch speed of a short brake is as the wheel's, and the distance as its square: from the hop `start` that
+    `trial` makes, the wheel's speed is scaled by sqrt(distance / found) until it fits. None where that does not lead
+    there within `max_speed` [rad/s]: the platform leaves before a faster wheel has stopped, or not at all.
+    """
+    speed, found = trial.wheel_speed_0, start
+    for _ in range(20):
+        if found.launch is None:
+            return None
+        reached = found.flight.distance if found.flight is not None else math.inf
+        if reached <= 0:
+            return None
+        if abs(reached / distance - 1) <= CLOSE:
+            return speed
+        speed *= min(max(math.sqrt(distance / reached), 0.7), 1.5)
+        if speed > max_speed:
+            return None
+        faster = replace(trial, wheel_speed_0=speed)
+        found = hop_on_surface(faster, expected_time=found.launch.time, longest=longest, radius=radius)
+    return None
 
 
 def flight_path(

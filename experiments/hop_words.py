@@ -20,9 +20,17 @@ SAME_ANGLE = math.radians(1.0)
 
 
 def sentences(
-    plan: HopPlan, left: Launch, flown: Flight, given: SurfaceHop | None, *, torque: float, speed: float, by_brake: bool
+    plan: HopPlan,
+    left: Launch,
+    flown: Flight,
+    given: SurfaceHop | None,
+    *,
+    torque: float,
+    speed: float,
+    by_brake: bool,
+    sought: float | None = None,
 ) -> list[str]:
-    """What a person wants to be told of the hop."""
+    """What a person wants to be told; `sought` is the wheel speed [rad/s] for the distance on ground that gives."""
     mu_s = plan.tumbler.mu_s
     way = "slides off" if left.slid else "leaves without sliding"
     turning = f"{speed:.4g} rad/s ({speed * 30 / math.pi:.4g} rpm)"
@@ -45,7 +53,13 @@ def sentences(
     ]
     if by_brake and left.time < plan.wheel.inertia * speed / torque * (1 - 1e-9):
         said.append("It leaves before the wheel has come to rest: a faster wheel would not take it farther.")
-    return [*said, _on_ground(plan, left, flown, given)]
+    said.append(_on_ground(plan, left, flown, given))
+    if by_brake and sought is None and given is not None:
+        most = f"{plan.wheel.max_speed:g} rad/s"
+        said.append(f"No wheel speed up to {most} was found that goes {flown.distance:.4g} m from {plan.surface}.")
+    if sought is not None and abs(sought / speed - 1) > 0.5 * ALIKE:
+        said.append(f"By the planar model {sought:.4g} rad/s would go {flown.distance:.4g} m on {plan.surface}.")
+    return said
 
 
 def warnings(plan: HopPlan, left: Launch, flown: Flight, given: SurfaceHop | None, escape: float | None) -> list[str]:

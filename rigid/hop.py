@@ -11,7 +11,8 @@ and while they slide back under F = mu_d N
     (J + M l^2 s (s + mu_d c)) omega' = tau - l (s + mu_d c) (W - M l c omega^2)
 
 with N = W + M y'', y'' = l (s omega' - c omega^2). The platform leaves where N comes to 0. This is the planar model
-(Reid et al., i-SAIRAS 2014, from its energies) for K to infinity; a ground that gives launches more steeply.
+(Reid et al., i-SAIRAS 2014, from its energies) for K to infinity; a ground that gives launches more steeply where tips
+hold, and faster where they slide.
 
 Angles. What the ground gives in a sudden launch is one impulse within its cone of friction, so a launch whose tips do
 not slide cannot be flatter than pi/2 - atan(mu_s): these are the viable hop angles, the question of Koenig, Pavone,

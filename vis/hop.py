@@ -151,7 +151,7 @@ def _page(result: Mapping[str, Any], drawn: list[Block]) -> Page:
         Tile(
             f"Distance from {result['surface']}",
             _said(result, "model_distance"),
-            "the same wheel, planar model",
+            "the same wheel",
             second=True,
         ),
     ]

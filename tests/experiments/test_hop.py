@@ -3,11 +3,12 @@
 import json
 import math
 import re
+from dataclasses import replace
 
 import pytest
 
 from experiments.cli import BAD_INPUT, DONE, main
-from experiments.hop_on_surface import flight_path
+from experiments.hop_on_surface import flight_path, hop_on_surface
 from rigid.hop import Launch, Tumbler, brake_launch, flight
 from rigid.planar import simulate
 from rigid.platform_files import PLATFORM_FOLDER, find_platform
@@ -108,6 +109,10 @@ def test_springy_ground_throws_a_sliding_platform_faster_at_the_same_angle(tmp_p
     assert value["launch_angle"] == pytest.approx(math.atan(1 / 0.25), abs=2e-3)
     assert value["speed_factor"] == pytest.approx(value["model_launch_speed"] / value["launch_speed"])
     assert value["distance_factor"] == pytest.approx(value["speed_factor"] ** 2, rel=0.01)  # v^2 sin(2 angle) / g
+    slower = replace(trial, wheel_speed_0=value["model_wheel_speed"])  # that goes 5 m from this ground
+    there = hop_on_surface(slower, expected_time=0.02, longest=1.0, radius=300.0)
+    assert there.flight.distance == pytest.approx(5.0, rel=1e-4)
+    assert value["model_wheel_speed"] < 0.7 * value["wheel_speed"]
     assert any("sliding tips keep the angle" in sentence for sentence in result["departures"]["sentences"])
     assert any("times the distance" in warning for warning in result["warnings"])
 
@@ -119,6 +124,14 @@ def test_springy_ground_throws_tips_that_hold_up_more_steeply(tmp_path, capsys):
     assert math.degrees(value["launch_angle"]) == pytest.approx(22.5, abs=1.0)
     assert math.degrees(value["model_launch_angle"]) > 35
     assert any("leave more steeply" in sentence for sentence in result["departures"]["sentences"])
+
+
+def test_soft_ground_has_no_wheel_speed_for_what_it_cannot_throw(tmp_path, capsys):
+    """On the sand's 82 N/m it turns in place before it leaves: 2 m at most, whatever the wheel, so none is named."""
+    _, result = hop(tmp_path, capsys, "--surface", "sand", "--distance", "5")
+    assert result["quantities"]["distance_factor"]["value"] < 0.4
+    assert result["quantities"]["model_wheel_speed"]["value"] is None
+    assert any("No wheel speed up to 1050 rad/s" in sentence for sentence in result["departures"]["sentences"])
 
 
 def test_ground_that_hardly_gives_and_gives_nothing_back_is_rigid_ground(tmp_path, capsys):
