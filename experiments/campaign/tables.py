@@ -252,6 +252,22 @@ class TumbleCampaign(_TumbleTables):
     trial: tuple[TumbleTrial, ...] = Field(min_length=1, description="at least one [[trial]]")
 
     @model_validator(mode="after")
+    def _body_fits(self) -> TumbleCampaign:
+        body, wheel = self.platform, self.wheel.inertia
+        most = body.mass * body.spike_length**2
+        if body.inertia > most:
+            raise ValueError(
+                f"[platform] inertia = {body.inertia:g} is above mass spike_length^2 = {most:g}, what a body has at "
+                f"most: up to that was expected (kg m2)"
+            )
+        if wheel >= body.inertia:
+            raise ValueError(
+                f"[wheel] inertia = {wheel:g} is not below [platform] inertia = {body.inertia:g}, that of body and "
+                f"wheels together: less was expected (kg m2)"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _trials_fit(self) -> TumbleCampaign:
         _check_trials(self.trial, self.sensors, self._odd_trial)
         return self

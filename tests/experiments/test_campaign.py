@@ -204,6 +204,8 @@ def test_a_model_needs_no_trials_but_a_campaign_does(tmp_path):
         ('actuator = "brake"', 'actuator = "hand"', ["[[trial]] 2 (id '002') actuator = 'hand'", "'motor' or 'brake'"]),
         ("wheel_speed_0 = 500.0", "", ["[[trial]] 2 (id '002')", "nothing to brake", "rad/s"]),
         ("wheel_speed_0 = 500.0", "speed = 1.0", ["[[trial]] 2 (id '002') speed = 1.0 is an unknown key"]),
+        ("inertia = 0.06 ", "inertia = 0.3 ", ["[platform] inertia = 0.3 is above mass spike_length^2 = 0.212"]),
+        ("inertia = 0.06 ", "inertia = 0.0005 ", ["[wheel] inertia = 0.0012 is not below [platform] inertia = 0.0005"]),
         ("gravity_sim = 0.0834\ntorque = 6", "torque = 6", ["gravity_sim is missing", "m/s2"]),
         ("gravity_sim = 0.0834\ntorque = 6", "gravity_sim = 9.9\ntorque = 6", ["gravity_sim = 9.9 is not below"]),
         ("counterweight = 5.21   #", "counterweight = 6.0 #", ["(id '002')", "counterweight = 6 is not below", "lift"]),
