@@ -65,13 +65,28 @@ $(VENV)/bin/python:
 	    exit 1; \
 	fi
 
+# Taichi's library is linked with that of X11, which a bare Debian lacks, even where nothing is ever shown.
+define WITH_X11
+@if ! $(BIN)/python -c 'import ctypes; ctypes.CDLL("libX11.so.6")' 2>/dev/null && [ "$$(uname -s)" = Linux ]; then \
+    if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+        echo "installing libx11-6, which Taichi wants"; \
+        { apt-get -q update && DEBIAN_FRONTEND=noninteractive apt-get -qy install --no-install-recommends libx11-6; } \
+            >/dev/null 2>&1 || { echo "libX11.so.6 is missing and could not be installed: apt install libx11-6" >&2; exit 1; }; \
+    else \
+        echo "Taichi needs libX11.so.6, which this machine lacks. On Debian: apt install libx11-6" >&2; exit 1; \
+    fi; \
+fi
+endef
+
 # Stamps: installed again only when pyproject.toml has changed. The package itself is installed in place (-e).
 $(VENV)/.installed: pyproject.toml | $(VENV)/bin/python
 	@echo "installing hedgebed and what it needs into $(VENV) (the first time about 1.3 GB)"
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	$(WITH_X11)
 	@touch $@
 
 $(VENV)/.installed-test: pyproject.toml | $(VENV)/bin/python
 	@echo "installing hedgebed, what it needs and what tests it into $(VENV) (the first time about 1.3 GB)"
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[test]'
+	$(WITH_X11)
 	@touch $(VENV)/.installed $@
