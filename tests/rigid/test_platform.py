@@ -1,6 +1,7 @@
 """The platforms: geometry, mesh, inertia; the files that ship and files that are wrong."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -185,3 +186,12 @@ def test_a_platform_there_is_not_is_refused_with_those_there_are():
 
 def test_a_file_of_ones_own_is_read(tmp_path):
     assert find_platform(write(tmp_path, ("mass = 5.3", "mass = 6.1"))).mass == 6.1
+
+
+def test_the_file_in_the_docs_is_a_platform(tmp_path):
+    """Tips reach l = edge / (2 sin(pi/8)) = 0.18 m within the digits shown."""
+    text = (Path(__file__).parents[2] / "docs" / "platform.md").read_text(encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(text.split("```toml\n")[1].split("```")[0], encoding="utf-8")
+    platform = read_platform(tmp_path / "mine.toml")
+    assert platform.mass == 4.2
+    assert platform.stance().spike_length == pytest.approx(0.18, abs=1e-4)
