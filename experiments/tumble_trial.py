@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rigid.rig import STANDARD_GRAVITY, Rig
+from rigid.terms import EFFECTS
 from rigid.trial import Effect, Ground, Trial
 
 from .campaign import TumbleModel, read_model
@@ -267,9 +268,14 @@ def _given_effects(texts: tuple[str, ...]) -> tuple[Effect, ...]:
         if dot:
             values[parameter.strip()] = _assignment("effects", text)[1]
     try:
-        return tuple(Effect(id=name, parameters=values) for name, values in found.items())
+        effects = tuple(Effect(id=name, parameters=values) for name, values in found.items())
     except ValueError as error:
         raise ValueError(f"effects: {error}") from None
+    for effect in effects:
+        if not found[effect.id]:  # every effect is off by its defaults
+            numbers = ", ".join(f"{effect.id}.{p.name}=... [{p.unit}]" for p in EFFECTS[effect.id].parameters)
+            raise ValueError(f"effects = {effect.id!r} alone changes nothing: give {numbers}")
+    return effects
 
 
 def model_trial(tables: Any, trial: Any, *, effects: tuple[Effect, ...] = ()) -> Trial:

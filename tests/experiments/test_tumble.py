@@ -388,6 +388,7 @@ def test_a_term_of_ones_own_runs_from_a_file_beside_the_model():
         (["--ground", "power", "--ground-parameters", "exponent"], ["'exponent' has no =", "exponent=1.5"]),
         (["--ground-parameters", "exponent=2"], ["ground_parameters", "stiffness and damping"]),
         (["--effects", "magic"], ["effect 'magic' is unknown", "pendulum"]),
+        (["--effects", "com-offset"], ["'com-offset' alone changes nothing", "com-offset.x=... [m]", "com-offset.y"]),
         (["--effects", "pendulum.size=2"], ["size", "length"]),
         (["--effects", "pendulum=2"], ["effects = 'pendulum=2'", "pendulum.length=2.2"]),
         (["--effects", "pendulum.length=-2"], ["pendulum", "length"]),
