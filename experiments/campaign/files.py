@@ -71,6 +71,8 @@ def read_campaign(folder: str | Path) -> Campaign:
     if not folder.is_dir():
         raise ValueError(f"{str(folder)!r} is no folder: one with campaign.toml was expected")
     path = folder / "campaign.toml"
+    if not path.exists() and (within := folder / "campaign").joinpath("campaign.toml").exists():
+        raise ValueError(f"{str(folder)!r} is a run folder: its campaign is {str(within)!r}")
     table = _read_toml(path, _CAMPAIGNS)
     tables, faults = _make_tables(path, table, _CAMPAIGNS)
     if tables is None:

@@ -288,3 +288,7 @@ def test_a_campaign_there_is_not_is_refused(tmp_path):
     (tmp_path / "empty").mkdir()
     with pytest.raises(ValueError, match=r"campaign\.toml: there is no such file"):
         read_campaign(tmp_path / "empty")
+    (tmp_path / "run").mkdir()
+    tumble_folder(tmp_path / "run" / "campaign")
+    with pytest.raises(ValueError, match=r"run' is a run folder: its campaign is '.*campaign'"):
+        read_campaign(tmp_path / "run")
