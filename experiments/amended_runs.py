@@ -19,6 +19,7 @@ from hedgebed import __version__
 
 from .amended import AmendedLaw, read_law
 from .campaign import read_model
+from .kept_runs import write_run
 from .progress import Progress
 from .runfolder import RunFolder
 from .settings import PenetrateSettings
@@ -79,7 +80,7 @@ def run_beside(law: AmendedLaw, units: Sequence[Unit], beds: Runs, models: Runs,
     """
     runs = {unit.id: law.run(unit, beds[unit.id] if unit.kind == "driven" else models[unit.id]) for unit in units}
     for name, series in runs.items():
-        _write(folder, f"{name}.amended", series)
+        write_run(folder, f"{name}.amended", series)
     driven = [unit.id for unit in units if unit.kind == "driven"]
     plain, amended = (_gap(driven, beds, others) for others in (models, runs))
     note = "rms difference over the bed's rms force, driven runs, in, at rest and out"
@@ -112,8 +113,8 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
         for done, unit in enumerate(units, 1):
             plain[unit.id] = make_run(settings, unit, law.plain(step)).run()
             runs[unit.id] = law.run(unit, plain[unit.id])
-            _write(folder, unit.id, plain[unit.id])
-            _write(folder, f"{unit.id}.amended", runs[unit.id])
+            write_run(folder, unit.id, plain[unit.id])
+            write_run(folder, f"{unit.id}.amended", runs[unit.id])
             progress.update(done)
         driven = [unit.id for unit in units if unit.kind == "driven"]
         stiffness, damping = law.pair
@@ -166,19 +167,6 @@ def _entry(unit: Unit, plain: Penetration, amended: Penetration) -> dict[str, An
         "ended": amended.ended,
         "quantities": numbers,
     }
-
-
-def _write(folder: RunFolder, name: str, series: Penetration) -> None:
-    folder.write_series(
-        name,
-        {
-            "t_s": series.time,
-            "depth_m": series.depth,
-            "velocity_m_s": series.velocity,
-            "force_N": series.force,
-            "phase": series.phase,
-        },
-    )
 
 
 def _standing(law: AmendedLaw, units: Sequence[Unit], runs: Runs) -> dict[str, dict[str, Any]]:

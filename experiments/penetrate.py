@@ -10,19 +10,20 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from coupling import BedGround, Penetration, Run
+from coupling import BedGround, Run
 from hedgebed import __version__
 
 from .amended import read_law
 from .amended_runs import keep_model, kept_law, run_beside, run_without_bed
 from .findings import Findings, bed_entry, bed_quantities, compare_with, read_reference
+from .kept_runs import read_run, write_run
 from .memory import memory_there
 from .progress import Progress
 from .remarks import overlap_warning, softening_note
@@ -571,39 +572,6 @@ def _conclude(
             if not entry["moved"]:
                 warnings.append(f"reference = {settings.reference!r} has no run of a kind and speed made here too")
     return result
-
-
-# Series of finished runs ----------------------------------------------------------------------------------------------
-
-
-def write_run(folder: RunFolder, name: str, series: Penetration) -> None:
-    """Keep a run's rows in series/<name>.csv."""
-    folder.write_series(
-        name,
-        {
-            "t_s": series.time,
-            "depth_m": series.depth,
-            "velocity_m_s": series.velocity,
-            "force_N": series.force,
-            "phase": series.phase,
-        },
-    )
-
-
-def read_run(folder: RunFolder, name: str, note: Mapping[str, Any]) -> Penetration:
-    """A finished run, from its rows and from what was noted of it, to the bit."""
-    columns = folder.read_series(name)
-    return Penetration(
-        kind=note["kind"],
-        time=columns["t_s"],
-        depth=columns["depth_m"],
-        velocity=columns["velocity_m_s"],
-        force=columns["force_N"],
-        phase=columns["phase"],
-        macro_step=note["macro_step"],
-        ended=note["ended"],
-        settings=dict(note["settings"]),
-    )
 
 
 def _bed_facts(bed: Any, seed: int, softening: Softening) -> dict[str, Any]:

@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+import vis
 from experiments.cli import main
 from experiments.validate import experiment
 from experiments.validate.case import Case, Comparison, Curve, Outcome, Plot
@@ -69,6 +70,7 @@ def test_a_table_and_a_page_show_every_case(suite, tmp_path, capsys):
     assert "skipped: there is no code" in text and "not yet: walls" in text
     page = (tmp_path / "run" / "report.html").read_text()
     assert "A line, drawn" in page and "data:image/png" in page and "it is known to be bad" in page
+    assert vis.write_report(tmp_path / "run").read_text() == page  # the page of any folder, made again
     assert "bad fails: c is 1.5, 1 was wanted" in " ".join(capsys.readouterr().out.split())
 
 
