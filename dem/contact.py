@@ -30,8 +30,10 @@ In time. Velocities live half a step behind positions.
 - The force of the step in which a pair came to touch stands for the time from the touch to half a step later. Hertz's
   dashpot starts as d^(1/4), so its mean over that time is 4/5 (f + 1/2)^(5/4) / f^(1/4) of what it is at the step's
   end, f the share of the step for which the pair has touched.
-- The slip of a step is taken across the normal at the step's middle, where the velocity is, and the spring is carried
-  from the plane of the last normal into that of this one by the shortest rotation (to second order in the step).
+- The slip of a step is taken across the normal m at the step's middle, where the velocity is, with the arms of then,
+  and laid into the plane of n. With m = n - h v_t, h = dt / 2 |x_i - x_j| and v_t what of v = v_i - v_j is across n, it
+  is (1 + h v n) v_t - W x n, W the spins times their arms, but for terms of second order in h and for -h (W n) v_t x n,
+  which is left out: nor is the spring turned with a pair that turns about its own normal.
 The dashpots of friction, rolling and twisting see the half-step velocity.
 """
 
@@ -149,9 +151,8 @@ def adhesive_range(p: ti.template(), radius):
 def contact_force(
     p: ti.template(),
     n,
-    middle,
     v_n,
-    v,
+    v_t,
     overlap,
     radius,
     mass,
@@ -162,11 +163,10 @@ def contact_force(
 ):
     """Force on the first of a pair, without rolling.
 
-    ``p`` the pair's parameters, ``n`` the unit normal towards the first, ``middle`` the normal half a step before, of
-    which only n + (what is across n) counts; ``v_n`` the rate at which the first moves away, half a step before [m/s];
-    ``v`` its velocity relative to the other at the contact point then [m/s]; ``overlap`` [m], ``radius``, ``mass`` the
-    effective ones, ``dt`` the time since the last force; 0 where forces are computed anew, which leaves the history
-    alone. ``u`` the history, updated in place: tangential displacement [m] and ``past`` [kg m/s], 0 for a new contact.
+    ``p`` the pair's parameters, ``n`` the unit normal towards the first, ``v_n`` the rate at which the first moves away
+    and ``v_t`` the slip, across n, both half a step before [m/s]; ``overlap`` [m], ``radius``, ``mass`` the effective
+    ones, ``dt`` the time since the last force; 0 where forces are computed anew, which leaves the history alone. ``u``
+    the history, updated in place: tangential displacement [m] and ``past`` [kg m/s], 0 for a new contact.
     Returns (normal force [N], tangential force vector [N], tangential stiffness [N/m], contact radius [m], sqrt(m*
     S_n), load that presses the surfaces together [N]).
     """
@@ -206,9 +206,8 @@ def contact_force(
 
     k_t = p[_EIGHT_G] * a
     c_t = p[_TANGENTIAL_DAMPING] * root
-    v_t = v - v.dot(n) * middle
-    stretch = u.xyz
-    stretch = stretch - stretch.dot(n) * middle + dt * v_t
+    stretch = u.xyz + dt * v_t
+    stretch -= stretch.dot(n) * n
     f_t, share = bounded(k_t, c_t, stretch, v_t, p[_FRICTION] * ti.abs(load))
     u.xyz = share * stretch
     return f_n, f_t, k_t, a, root, load

@@ -428,15 +428,17 @@ class Engine(Lists):
             mass = v_i.w * v_j.w * (length * sum_r * inverse)
             arm_i = x_i.w - 0.5 * overlap
             arm_j = x_j.w - 0.5 * overlap
-            # Half a step ago, where the velocities are: the normal, and the arms.
+            # The slip as ``dem.contact`` says it: across the normal half a step ago, n - h v_t, with the arms of then.
             v = v_i.xyz - v_j.xyz
             v_n = v.dot(n)
-            middle = n - (0.5 * dt * by_length) * (v - v_n * n)
+            v_t = v - v_n * n
+            h = 0.5 * dt * by_length
             back = 0.25 * dt * v_n
-            v -= ((arm_i - back) * w_i.xyz + (arm_j - back) * w_j.xyz).cross(middle)
+            turning = (arm_i - back) * w_i.xyz + (arm_j - back) * w_j.xyz
+            v_t = (1.0 + h * v_n) * v_t - turning.cross(n)
             u = self.slide[s]
             f_n, f_t, k_t, a, root, load = contact_force(
-                p, n, middle, v_n, v, overlap, radius, mass, dt, u, self.tensile, self.cohesion
+                p, n, v_n, v_t, overlap, radius, mass, dt, u, self.tensile, self.cohesion
             )
             self.slide[s] = u
             f = f_n * n + f_t
@@ -489,11 +491,12 @@ class Engine(Lists):
             middle = n - 0.5 * dt * turning
             v += 0.5 * dt * body_spin.cross(path)
             v -= (arm_i - 0.5 * dt * v_n) * (w_i.xyz - body_spin).cross(middle)
+            v_t = v - v.dot(n) * middle
             radius = x.w / (1.0 + x.w * curvature)
             p = self.body_pair[b]
             u = self.near_slide[s]
             f_n, f_t, k_t, a, root, load = contact_force(
-                p, n, middle, v_n, v, overlap, radius, v_i.w, dt, u, self.tensile, self.cohesion
+                p, n, v_n, v_t, overlap, radius, v_i.w, dt, u, self.tensile, self.cohesion
             )
             self.near_slide[s] = u
             f = f_n * n + f_t

@@ -33,10 +33,10 @@ class NaiveBed:
             self.push(0.0)
             self.ball = ball
 
-    def contact(self, key, n, middle, v_n, v, spin, overlap, radius, mass, rigid, dt):
+    def contact(self, key, n, v_n, v_t, spin, overlap, radius, mass, rigid, dt):
         """Force, and turning torque, on the first of the pair; the law as ``dem.contact``'s docstring states it.
 
-        ``middle`` the normal half a step before, when it moved away at ``v_n`` and slid with ``v``.
+        ``v_n``, ``v_t``: how fast it moved away and slid half a step before.
         """
         s = self.stuff
         share = 1 if rigid else 2
@@ -57,8 +57,7 @@ class NaiveBed:
         normal = (spring - damping * rate) / (1 + 0.5 * dt * damping / mass)
         normal = max(-pull, normal)
         f_n = normal + more * pull  # what presses the surfaces together
-        v_t = v - (v @ n) / (middle @ n) * middle
-        u = u - (u @ n) / (middle @ n) * middle + v_t * dt
+        u = u - (u @ n) * n + v_t * dt
         u, f_t = capped(s_t, self.damping * math.sqrt(s_t / s_n) * math.sqrt(mass * s_n), u, v_t, s.friction * f_n)
         q = q + spin * dt
         inertia = 0.4 * mass * radius**2
@@ -99,11 +98,12 @@ class NaiveBed:
                     v = self.v[i] - self.v[j]
                     middle, v_n, back = halfway(d, v, normal, dt)
                     arms = (arm_i - back / 2) * self.w[i] + (arm_j - back / 2) * self.w[j]
-                    v = v - np.cross(arms, middle)
+                    along = v - v_n * normal
+                    v_t = along + v_n * (normal - middle) - np.cross(arms, normal)
                     radius = self.r[i] * self.r[j] / (self.r[i] + self.r[j])
                     mass = self.m[i] * self.m[j] / (self.m[i] + self.m[j])
                     spin = self.w[i] - self.w[j]
-                    f, turn = self.contact((i, j), normal, middle, v_n, v, spin, overlap, radius, mass, False, dt)
+                    f, turn = self.contact((i, j), normal, v_n, v_t, spin, overlap, radius, mass, False, dt)
                     self.f[i] += f
                     self.f[j] -= f
                     self.t[i] += np.cross(-arm_i * normal, f) + turn
@@ -122,7 +122,7 @@ class NaiveBed:
             v_n = self.v[i, 2]
             v = self.v[i] - np.cross((arm - 0.5 * dt * v_n) * self.w[i], normal)
             f, turn = self.contact(
-                (i, "floor"), normal, normal, v_n, v, self.w[i], overlap, self.r[i], self.m[i], True, dt
+                (i, "floor"), normal, v_n, v - v_n * normal, self.w[i], overlap, self.r[i], self.m[i], True, dt
             )
             self.f[i] += f
             self.t[i] += np.cross(-arm * normal, f) + turn
@@ -143,7 +143,8 @@ class NaiveBed:
                 v = v - np.cross(ball["spin"], d - 0.5 * dt * (self.v[i] - ball["velocity"]) - (arm - back) * middle)
                 radius = self.r[i] * ball["radius"] / (self.r[i] + ball["radius"])
                 spin = self.w[i] - ball["spin"]
-                f, turn = self.contact((i, "ball"), normal, middle, v_n, v, spin, overlap, radius, self.m[i], True, dt)
+                v_t = v - (v @ normal) / (middle @ normal) * middle
+                f, turn = self.contact((i, "ball"), normal, v_n, v_t, spin, overlap, radius, self.m[i], True, dt)
                 self.f[i] += f
                 self.t[i] += np.cross(-arm * normal, f) + turn
                 self.on_ball -= f

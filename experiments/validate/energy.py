@@ -168,10 +168,10 @@ def keep_book(bed: Bed, steps: int, *, every: int = 20) -> Book:
         f_t, torque = np.zeros_like(normals), np.zeros_like(normals)
         # Half a step ago, where the velocities are, the normal was this and the arm longer by what it has lost since.
         middle = normals - 0.5 * took * (path - v_n[:, None] * normals) / length[:, None]
-        flat = _into_plane(normals, middle)
+        flat = _in_plane(normals)
         if mu > 0:
             back = arm - 0.25 * took * v_n
-            v_t = flat(path - np.cross(back[:, None] * (w[i] + w[j]), middle))
+            v_t = path - v_n[:, None] * middle - np.cross(back[:, None] * (w[i] + w[j]), normals)
             v_t = np.where(touching[:, None], v_t, 0.0)
             f_t = slide.load(k_t, factor * math.sqrt(4 * shear / star) * root, v_t, mu * f_n, took, flat)
         if mu_r > 0:
@@ -205,9 +205,8 @@ def keep_book(bed: Bed, steps: int, *, every: int = 20) -> Book:
     return Book(columns[0], dict(zip(names, columns[1:], strict=True)), worst / largest if largest else 0.0)
 
 
-def _into_plane(normals: Array, middle: Array) -> Callable[[Array], Array]:
-    """From the plane of the last normal into that of this one, along the normal half way."""
-    return lambda u: u - (u * normals).sum(axis=1)[:, None] * middle
+def _in_plane(normals: Array) -> Callable[[Array], Array]:
+    return lambda u: u - (u * normals).sum(axis=1)[:, None] * normals
 
 
 def _as_it_is(u: Array) -> Array:
