@@ -201,15 +201,15 @@ def contact_force(
         load += pull
     if ti.static(cohesion == JKR):
         load += 2.0 * pull
-    if dt > 0.0:
-        u.w = 0.5 * (momentum + dt * f_n)
 
     k_t = p[_EIGHT_G] * a
     c_t = p[_TANGENTIAL_DAMPING] * root
     stretch = u.xyz + dt * v_t
     stretch -= stretch.dot(n) * n
     f_t, share = bounded(k_t, c_t, stretch, v_t, p[_FRICTION] * ti.abs(load))
-    u.xyz = share * stretch
+    if dt > 0.0:
+        u.xyz = share * stretch
+        u.w = 0.5 * (momentum + dt * f_n)
     return f_n, f_t, k_t, a, root, load
 
 
@@ -268,5 +268,6 @@ def turning_torque(p: ti.template(), n, spin, load, k_t, a, radius, root, dt, q:
         twist = -m_n / k_w
     else:
         m_n = ti.min(bound, ti.max(-bound, m_n - c_w * spin_n))
-    q = share * roll + twist * n
+    if dt > 0.0:
+        q = share * roll + twist * n
     return m + m_n * n
