@@ -7,13 +7,13 @@ lists or grids.
 Normal (Hertz; Thornton, Cummins & Cleary 2013, Powder Technology 233:30 for the damping):
     F_n = max(0, 4/3 E* a d + c_n sqrt(m* S_n) d'),  a = sqrt(R* d),  S_n = 2 E* a,
     d the overlap, with c_n from the restitution asked for (``damping_factor``).
-Tangential (Mindlin 1949, no-slip stiffness; total force bounded by Coulomb's law):
-    F_t = -(S_t u + c_n sqrt(S_t / S_n) sqrt(m* S_n) u'),  S_t = 8 G* a,  |F_t| <= mu F_n.
+Tangential (Mindlin 1949, no-slip stiffness; Coulomb's law bounds the spring, and the dashpot acts while it sticks):
+    F_t = -S_t u,  |S_t u| set back to mu F_n where it is more;
+    else F_t = -(S_t u + c_n sqrt(S_t / S_n) sqrt(m* S_n) u'), |F_t| <= mu F_n;  S_t = 8 G* a.
 Rolling (elastic-plastic spring-dashpot, Ai et al. 2011, Powder Technology 206:269, with the stiffness S_t R*^2 of the
 tangential spring at the rolling radius):
-    M = -(k_r q + c_r q'),  q' the relative rolling rate,  |M| <= mu_r R* F_n.
-    The bound holds for spring and dashpot together, and the spring is set back to what it allows; a grain at rest is
-    held by the spring alone, so it does not creep.
+    M = -(k_r q + c_r q'),  q' the relative rolling rate; the spring bounded by mu_r R* F_n in the same way.
+    A grain at rest is held by the spring alone, so it does not creep.
 Twisting, where there is rolling resistance: the same form about the normal, with Marshall's 2009 stiffness S_t a^2 / 2
 (J. Comput. Phys. 228:1541) and the torque of a fully sliding Hertzian contact as bound, 3 pi / 16 mu a F_n (Johnson
 1985, section 7.4), so that a grain does not spin on one contact for ever.
@@ -21,6 +21,20 @@ Cohesion (``dem.cohesion``): DMT takes 2 pi w R* off the normal force, JKR has a
 Damping never makes a pair pull more than its pull-off force; without cohesion that is the cut at zero. In the bounds of
 friction, rolling and twisting the load that presses the surfaces together stands for F_n: F_n + 2 pi w R* with DMT, F_n
 + 2 (3/2 pi w R*) with JKR (Thornton 1991, J. Phys. D 24:1942; Marshall 2009).
+
+In time. Velocities live half a step behind positions.
+- The normal dashpot wants d' at the time of the force. A contact remembers ``past`` = (m* v + dt F) / 2 of the step
+  before; with a = (v - v_before) / dt the last relative acceleration, whoever caused it, and the change of the pair's
+  own force F, v + dt a / 2 + dt (F - F_before) / 2 m* = 3/2 v + (dt F / 2 - past) / m*. F then stands on both sides,
+  linearly. Of a pair alone this is the velocity after half a kick by F itself; at rest it is zero.
+- The force of the step in which a pair came to touch stands for the time from the touch to half a step later. Hertz's
+  dashpot starts as d^(1/4), so its mean over that time is 4/5 (f + 1/2)^(5/4) / f^(1/4) of what it is at the step's
+  end, f the share of the step for which the pair has touched.
+- The slip of a step is taken across the normal m at the step's middle, where the velocity is, with the arms of then,
+  and laid into the plane of n. With m = n - h v_t, h = dt / 2 |x_i - x_j| and v_t what of v = v_i - v_j is across n, it
+  is (1 + h v n) v_t - W x n, W the spins times their arms, but for terms of second order in h and for -h (W n) v_t x n,
+  which is left out: nor is the spring turned with a pair that turns about its own normal.
+The dashpots of friction, rolling and twisting see the half-step velocity.
 """
 
 import math
@@ -137,7 +151,8 @@ def adhesive_range(p: ti.template(), radius):
 def contact_force(
     p: ti.template(),
     n,
-    v,
+    v_n,
+    v_t,
     overlap,
     radius,
     mass,
@@ -148,10 +163,12 @@ def contact_force(
 ):
     """Force on the first of a pair, without rolling.
 
-    ``p`` the pair's parameters, ``n`` the unit normal towards the first, ``v`` the relative velocity of the first at
-    the contact point [m/s], ``overlap`` [m], ``radius``, ``mass`` the effective ones, ``u`` the tangential
-    displacement [m], updated in place. Returns (normal force [N], tangential force vector [N], tangential stiffness
-    [N/m], contact radius [m], sqrt(m* S_n), load that presses the surfaces together [N]).
+    ``p`` the pair's parameters, ``n`` the unit normal towards the first, ``v_n`` the rate at which the first moves away
+    and ``v_t`` the slip, across n, both half a step before [m/s]; ``overlap`` [m], ``radius``, ``mass`` the effective
+    ones, ``dt`` the time since the last force; 0 where forces are computed anew, which leaves the history alone. ``u``
+    the history, updated in place: tangential displacement [m] and ``past`` [kg m/s], 0 for a new contact.
+    Returns (normal force [N], tangential force vector [N], tangential stiffness [N/m], contact radius [m], sqrt(m*
+    S_n), load that presses the surfaces together [N]).
     """
     a = ti.sqrt(radius * overlap)
     spring = a * 0.0
@@ -159,34 +176,68 @@ def contact_force(
         a, spring = jkr_force(p[_TWO_E], p[_PI_W], overlap, radius)
     s_n = p[_TWO_E] * a
     root = ti.sqrt(mass * s_n)
-    v_n = v.dot(n)
-    if ti.static(cohesion != JKR):
-        spring = (2.0 / 3.0) * s_n * overlap
-    f_n = spring - p[_DAMPING] * root * v_n
-    load = f_n
+    pull = a * 0.0
     if ti.static(cohesion == JKR):
         pull = 1.5 * p[_PI_W] * radius
-        if ti.static(not tensile):
-            f_n = ti.max(f_n, -pull)
-        load = f_n + 2.0 * pull
     else:
-        if ti.static(not tensile):
-            f_n = ti.max(f_n, 0.0)
-        load = f_n
+        spring = (2.0 / 3.0) * s_n * overlap
         if ti.static(cohesion == DMT):
-            f_n -= 2.0 * p[_PI_W] * radius
+            pull = 2.0 * p[_PI_W] * radius
+            spring -= pull
+    c_n = p[_DAMPING] * root
+    momentum = mass * v_n
+    past = u.w
+    if past == 0.0 or dt == 0.0:
+        past = 0.5 * momentum
+        if ti.static(cohesion != JKR):
+            # Apart a step ago, but for round-off; not so where forces begin with overlaps.
+            if overlap < -1.001 * v_n * dt and u.w == 0.0:
+                c_n *= _first_touch(overlap / (-v_n * dt))
+    f_n = (mass * spring - c_n * (1.5 * momentum - past)) / (mass + 0.5 * dt * c_n)
+    if ti.static(not tensile):
+        f_n = ti.max(f_n, -pull)
+    load = f_n
+    if ti.static(cohesion == DMT):
+        load += pull
+    if ti.static(cohesion == JKR):
+        load += 2.0 * pull
+
     k_t = p[_EIGHT_G] * a
     c_t = p[_TANGENTIAL_DAMPING] * root
-    v_t = v - v_n * n
-    u += v_t * dt
-    u -= u.dot(n) * n
-    f_t = -(k_t * u + c_t * v_t)
-    bound = p[_FRICTION] * ti.abs(load)
-    square = f_t.norm_sqr()
-    if square > bound * bound:
-        f_t *= bound / ti.sqrt(square)
-        u = -(f_t + c_t * v_t) / k_t
+    stretch = u.xyz + dt * v_t
+    stretch -= stretch.dot(n) * n
+    f_t, share = bounded(k_t, c_t, stretch, v_t, p[_FRICTION] * ti.abs(load))
+    if dt > 0.0:
+        u.xyz = share * stretch
+        u.w = 0.5 * (momentum + dt * f_n)
     return f_n, f_t, k_t, a, root, load
+
+
+@ti.func
+def _first_touch(share):
+    """The mean of d^(1/4) from the touch to half a step on, over its value now; ``share`` of a step since the touch."""
+    f = ti.max(share, 1e-6)
+    return 0.8 * (f + 0.5) * ti.sqrt(ti.sqrt((f + 0.5) / f))
+
+
+@ti.func
+def bounded(stiffness, damping, stretch, rate, bound):
+    """Force of a spring that slides at a bound and of a dashpot while it does not; and the share of the stretch left.
+
+    With the dashpot the force stays within the bound as well.
+    """
+    force = -stiffness * stretch
+    share = bound * 0.0 + 1.0
+    square = force.norm_sqr()
+    if square > bound * bound:
+        share = bound / ti.sqrt(square)
+        force *= share
+    else:
+        force -= damping * rate
+        square = force.norm_sqr()
+        if square > bound * bound:
+            force *= bound / ti.sqrt(square)
+    return force, share
 
 
 @ti.func
@@ -200,26 +251,23 @@ def turning_torque(p: ti.template(), n, spin, load, k_t, a, radius, root, dt, q:
     """
     q += spin * dt
     spin_n = spin.dot(n)
-    roll_rate = spin - spin_n * n
     twist = q.dot(n)
     roll = q - twist * n
     force = ti.abs(load)
 
     k_r = k_t * radius * radius
     c_r = p[_TURNING_DAMPING] * root * radius * radius
-    m = -(k_r * roll + c_r * roll_rate)
-    bound = p[_ROLLING] * radius * force
-    square = m.norm_sqr()
-    if square > bound * bound:
-        m *= bound / ti.sqrt(square)
-        roll = -(m + c_r * roll_rate) / k_r
+    m, share = bounded(k_r, c_r, roll, spin - spin_n * n, p[_ROLLING] * radius * force)
 
     k_w = 0.5 * k_t * a * a
     c_w = 0.7071067811865476 * p[_TURNING_DAMPING] * root * radius * a
-    m_n = -(k_w * twist + c_w * spin_n)
     bound = 0.1875 * ti.math.pi * p[_FRICTION] * a * force
+    m_n = -k_w * twist
     if ti.abs(m_n) > bound:
         m_n = ti.select(m_n > 0.0, bound, -bound)
-        twist = -(m_n + c_w * spin_n) / k_w
-    q = roll + twist * n
+        twist = -m_n / k_w
+    else:
+        m_n = ti.min(bound, ti.max(-bound, m_n - c_w * spin_n))
+    if dt > 0.0:
+        q = share * roll + twist * n
     return m + m_n * n

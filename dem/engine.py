@@ -212,18 +212,19 @@ class Engine(Lists):
         self.cell_start = ti.field(ti.i32, cell_capacity + 1)
         self.cell_fill = ti.field(ti.i32, cell_capacity)
         # Pair lists: chunk c owns the rows from c times its room, those of a grain lie together. ``first`` is the
-        # grain a row belongs to, ``pair`` its neighbour's code, ``touching`` the rows in contact in this step.
+        # grain a row belongs to, ``pair`` its neighbour's code, ``touching`` the rows in contact in this step,
+        # ``slide`` the contact's history: x y z of the tangential spring, and what the normal dashpot remembers.
         room = n * neighbours_per_grain + 8 * chunk_capacity
         self.pair_start = ti.field(ti.i32, n)
         self.pair_end = ti.field(ti.i32, n)
         self.pair = ti.field(ti.i32, room)
         self.first = ti.field(ti.i32, room)
         self.touching = ti.field(ti.i32, room)
-        self.slide = F(3, real, room)
+        self.slide = F(4, real, room)
         self.old_start = ti.field(ti.i32, n)
         self.old_end = ti.field(ti.i32, n)
         self.old_pair = ti.field(ti.i32, room)
-        self.old_slide = F(3, real, room)
+        self.old_slide = F(4, real, room)
         if rolling:
             self.roll = F(3, real, room)
             self.old_roll = F(3, real, room)
@@ -232,13 +233,13 @@ class Engine(Lists):
         self.near_end = ti.field(ti.i32, chunk_capacity)
         self.near_grain = ti.field(ti.i32, near)
         self.near_body = ti.field(ti.i32, near)
-        self.near_slide = F(3, real, near)
+        self.near_slide = F(4, real, near)
         self.near_roll = F(3, real, near)
         self.near_first = ti.field(ti.i32, n)
         self.old_near_end = ti.field(ti.i32, chunk_capacity)
         self.old_near_grain = ti.field(ti.i32, near)
         self.old_near_body = ti.field(ti.i32, near)
-        self.old_near_slide = F(3, real, near)
+        self.old_near_slide = F(4, real, near)
         self.old_near_roll = F(3, real, near)
         # Who computes which chunk, each counter in a cache line of its own.
         self.cpu_items = threads * ITEMS_PER_THREAD
@@ -397,7 +398,7 @@ class Engine(Lists):
             if touching != (code < 0):
                 self.pair[s] = ~code
                 if code < 0:
-                    self.slide[s] = ti.Vector.zero(self.real, 3)
+                    self.slide[s] = ti.Vector.zero(self.real, 4)
                     if ti.static(self.rolling):
                         self.roll[s] = ti.Vector.zero(self.real, 3)
         p = self.grain_pair[None]
@@ -420,16 +421,24 @@ class Engine(Lists):
             mass = v_i.w + v_j.w
             # One division for three reciprocals.
             inverse = 1.0 / (length * sum_r * mass)
-            n = d * (sum_r * mass * inverse)
+            by_length = sum_r * mass * inverse
+            n = d * by_length
             by_sum = length * mass * inverse
             radius = x_i.w * x_j.w * by_sum
             mass = v_i.w * v_j.w * (length * sum_r * inverse)
             arm_i = x_i.w - 0.5 * overlap
             arm_j = x_j.w - 0.5 * overlap
-            v = v_i.xyz - v_j.xyz - (arm_i * w_i.xyz + arm_j * w_j.xyz).cross(n)
+            # The slip as ``dem.contact`` says it: across the normal half a step ago, n - h v_t, with the arms of then.
+            v = v_i.xyz - v_j.xyz
+            v_n = v.dot(n)
+            v_t = v - v_n * n
+            h = 0.5 * dt * by_length
+            back = 0.25 * dt * v_n
+            turning = (arm_i - back) * w_i.xyz + (arm_j - back) * w_j.xyz
+            v_t = (1.0 + h * v_n) * v_t - turning.cross(n)
             u = self.slide[s]
             f_n, f_t, k_t, a, root, load = contact_force(
-                p, n, v, overlap, radius, mass, dt, u, self.tensile, self.cohesion
+                p, n, v_n, v_t, overlap, radius, mass, dt, u, self.tensile, self.cohesion
             )
             self.slide[s] = u
             f = f_n * n + f_t
@@ -474,12 +483,20 @@ class Engine(Lists):
             w_i = self.spin[i]
             arm_i = x.w - overlap
             body_spin = self.body_spin[b]
-            v = v_i.xyz - arm_i * w_i.xyz.cross(n) - self.body_velocity[b] - body_spin.cross(arm)
+            # As the body sees the grain; then half a step ago, where the velocities are: the normal, and the arms.
+            path = v_i.xyz - self.body_velocity[b]
+            v = path - body_spin.cross(arm + arm_i * n)
+            v_n = v.dot(n)
+            turning = body_spin.cross(n) + (curvature / (1.0 + curvature * arm_i)) * (v - v_n * n)
+            middle = n - 0.5 * dt * turning
+            v += 0.5 * dt * body_spin.cross(path)
+            v -= (arm_i - 0.5 * dt * v_n) * (w_i.xyz - body_spin).cross(middle)
+            v_t = v - v.dot(n) * middle
             radius = x.w / (1.0 + x.w * curvature)
             p = self.body_pair[b]
             u = self.near_slide[s]
             f_n, f_t, k_t, a, root, load = contact_force(
-                p, n, v, overlap, radius, v_i.w, dt, u, self.tensile, self.cohesion
+                p, n, v_n, v_t, overlap, radius, v_i.w, dt, u, self.tensile, self.cohesion
             )
             self.near_slide[s] = u
             f = f_n * n + f_t
@@ -498,7 +515,7 @@ class Engine(Lists):
                 self.pushes[c, b][k + 3] += t_body[k]
             result = overlap / (2.0 * x.w)
         else:
-            self.near_slide[s] = ti.Vector.zero(self.real, 3)
+            self.near_slide[s] = ti.Vector.zero(self.real, 4)
             self.near_roll[s] = ti.Vector.zero(self.real, 3)
         return result
 

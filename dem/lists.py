@@ -306,12 +306,14 @@ class Lists:
             sign = -sign
         if old >= 0:
             self.pair[s] = ~code
-            self.slide[s] = sign * self.old_slide[old]
+            slide = self.old_slide[old]
+            slide.xyz = sign * slide.xyz  # its last entry is the same from either side
+            self.slide[s] = slide
             if ti.static(self.rolling):
                 self.roll[s] = sign * self.old_roll[old]
         else:
             self.pair[s] = code
-            self.slide[s] = ti.Vector.zero(self.real, 3)
+            self.slide[s] = ti.Vector.zero(self.real, 4)
             if ti.static(self.rolling):
                 self.roll[s] = ti.Vector.zero(self.real, 3)
 
@@ -330,7 +332,7 @@ class Lists:
                     if s < base + self.count[NEAR_ROOM]:
                         self.near_grain[s] = i
                         self.near_body[s] = b
-                        self.near_slide[s] = ti.Vector.zero(self.real, 3)
+                        self.near_slide[s] = ti.Vector.zero(self.real, 4)
                         self.near_roll[s] = ti.Vector.zero(self.real, 3)
                         o = self.near_first[self.came_from[i]]
                         while o >= 0:

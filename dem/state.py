@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 __all__ = ["STATE_FORMAT", "adopt", "put_back", "read_file", "take", "write_file"]
 
-STATE_FORMAT = "hedgebed-bed/2"
-# Before there was cohesion; its files can still be read.
-STATE_FORMATS = ("hedgebed-bed/1", STATE_FORMAT)
+STATE_FORMAT = "hedgebed-bed/3"
+# Before there was cohesion, and before contacts remembered their last step; these files can still be read.
+STATE_FORMATS = ("hedgebed-bed/1", "hedgebed-bed/2", STATE_FORMAT)
 
 MATERIAL_NUMBERS = ("density", "young", "poisson", "friction", "restitution", "rolling_friction", "surface_energy")
 GRAIN_FIELDS = ("position", "velocity", "spin", "force", "torque", "origin", "listed", "id")
@@ -164,6 +164,9 @@ def read_file(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray], str]:
         raise ValueError(f"{path} is not a whole bed saved by hedgebed: it lacks {', '.join(lacking)}")
     numbers: dict[str, Any] = dict(zip(MATERIAL_NUMBERS, map(float, stored["material_numbers"]), strict=True))
     state = {name[6:]: value for name, value in stored.items() if name.startswith("state.")}
+    if found != STATE_FORMAT:
+        for key in ("slide", "near_slide"):  # 0: as of a contact that has just begun
+            state[key] = np.pad(state[key], ((0, 0), (0, 1)))
     seed = int(stored["seed"])
     settings = {
         "material": Material(str(stored["material"]), cohesion=str(stored["cohesion"]), **numbers),
@@ -222,6 +225,15 @@ def adopt(bed: Bed, state: dict[str, np.ndarray], *, keep: np.ndarray | None = N
     bed.steps = int(state["numbers"][0])
     bed._make_lists()
     bed._push()
+    # Computed anew they would lack what dashpots know of the step before: only where a contact has gone.
+    lost = np.zeros(len(ids), dtype=bool)
+    apart = stay[first] != stay[second]
+    lost[first[apart]] = lost[second[apart]] = True
+    row = np.empty(bed.grain_count, dtype=np.int64)
+    row[new_id[ids[stay]]] = np.flatnonzero(stay)
+    row = row[e.read("id")]
+    for name in ("force", "torque"):
+        e.write(name, np.where(lost[row, None], e.read(name), state[name][row].astype(dtype)))
     bed.measure_surface()
 
 

@@ -33,20 +33,31 @@ class NaiveBed:
             self.push(0.0)
             self.ball = ball
 
-    def contact(self, key, n, v, spin, overlap, radius, mass, rigid, dt):
-        """Force, and turning torque, on the first of the pair; the law as ``dem.contact``'s docstring states it."""
+    def contact(self, key, n, v_n, v_t, spin, overlap, radius, mass, rigid, dt):
+        """Force, and turning torque, on the first of the pair; the law as ``dem.contact``'s docstring states it.
+
+        ``v_n``, ``v_t``: how fast it moved away and slid half a step before.
+        """
         s = self.stuff
         share = 1 if rigid else 2
         young = s.young / (1 - s.poisson**2) / share
         shear = s.young / (2 * (2 - s.poisson) * (1 + s.poisson)) / share
         a, spring, pull, more = attraction(s, young, radius, overlap)
         s_n, s_t = 2 * young * a, 8 * shear * a
-        u, q = self.history.get(key, (np.zeros(3), np.zeros(3)))
-        normal = max(-pull, spring - self.damping * math.sqrt(mass * s_n) * (v @ n))
+        u, q, before = self.history.get(key, (np.zeros(3), np.zeros(3), None))
+        damping = self.damping * math.sqrt(mass * s_n)
+        new = before is None
+        old_v, old_f = (v_n, 0.0) if new or dt == 0 else before
+        if new and s.cohesion != "jkr" and overlap < -1.001 * v_n * dt:
+            share = overlap / (-v_n * dt)
+            damping *= (share + 0.5) ** 1.25 / 1.25 / share**0.25
+        # The force that the velocity at its own time makes: F = spring - damping (v + half of the last change of v +
+        # half a kick by what F is more than it was).
+        rate = v_n + 0.5 * (v_n - old_v) - 0.5 * dt * old_f / mass
+        normal = (spring - damping * rate) / (1 + 0.5 * dt * damping / mass)
+        normal = max(-pull, normal)
         f_n = normal + more * pull  # what presses the surfaces together
-        v_t = v - (v @ n) * n
-        u = u + v_t * dt
-        u = u - (u @ n) * n
+        u = u - (u @ n) * n + v_t * dt
         u, f_t = capped(s_t, self.damping * math.sqrt(s_t / s_n) * math.sqrt(mass * s_n), u, v_t, s.friction * f_n)
         q = q + spin * dt
         inertia = 0.4 * mass * radius**2
@@ -57,7 +68,9 @@ class NaiveBed:
         k = s_t * a * a / 2
         bound = 3 * math.pi / 16 * s.friction * a * f_n
         twist, twisting = capped(k, 0.6 * math.sqrt(inertia * k), (q @ n) * n, (spin @ n) * n, bound)
-        self.new[key] = (u, roll + twist)
+        if dt > 0:
+            before = (v_n, normal)
+        self.new[key] = (u, roll + twist, before)
         return normal * n + f_t, rolling + twisting
 
     def reach(self, radius, rigid):
@@ -82,11 +95,15 @@ class NaiveBed:
                 if overlap > -self.reach(self.r[i] * self.r[j] / (self.r[i] + self.r[j]), False):
                     normal = d / length
                     arm_i, arm_j = self.r[i] - overlap / 2, self.r[j] - overlap / 2
-                    v = self.v[i] - self.v[j] - np.cross(arm_i * self.w[i] + arm_j * self.w[j], normal)
+                    v = self.v[i] - self.v[j]
+                    middle, v_n, back = halfway(d, v, normal, dt)
+                    arms = (arm_i - back / 2) * self.w[i] + (arm_j - back / 2) * self.w[j]
+                    along = v - v_n * normal
+                    v_t = along + v_n * (normal - middle) - np.cross(arms, normal)
                     radius = self.r[i] * self.r[j] / (self.r[i] + self.r[j])
                     mass = self.m[i] * self.m[j] / (self.m[i] + self.m[j])
                     spin = self.w[i] - self.w[j]
-                    f, turn = self.contact((i, j), normal, v, spin, overlap, radius, mass, False, dt)
+                    f, turn = self.contact((i, j), normal, v_n, v_t, spin, overlap, radius, mass, False, dt)
                     self.f[i] += f
                     self.f[j] -= f
                     self.t[i] += np.cross(-arm_i * normal, f) + turn
@@ -102,8 +119,11 @@ class NaiveBed:
         normal, overlap = np.array([0.0, 0.0, 1.0]), self.r[i] - self.x[i, 2]
         if overlap > -self.reach(self.r[i], True):
             arm = self.r[i] - overlap
-            v = self.v[i] - np.cross(arm * self.w[i], normal)
-            f, turn = self.contact((i, "floor"), normal, v, self.w[i], overlap, self.r[i], self.m[i], True, dt)
+            v_n = self.v[i, 2]
+            v = self.v[i] - np.cross((arm - 0.5 * dt * v_n) * self.w[i], normal)
+            f, turn = self.contact(
+                (i, "floor"), normal, v_n, v - v_n * normal, self.w[i], overlap, self.r[i], self.m[i], True, dt
+            )
             self.f[i] += f
             self.t[i] += np.cross(-arm * normal, f) + turn
             self.on_floor -= f
@@ -117,11 +137,14 @@ class NaiveBed:
             if overlap > -self.reach(self.r[i] * ball["radius"] / (self.r[i] + ball["radius"]), True):
                 normal, arm = d / length, self.r[i] - overlap
                 lever = ball["radius"] * normal
-                at_ball = ball["velocity"] + np.cross(ball["spin"], lever)
-                v = self.v[i] - np.cross(arm * self.w[i], normal) - at_ball
+                v = self.v[i] - ball["velocity"]  # from centre to centre
+                middle, v_n, back = halfway(d, v, normal, dt)
+                v = v - np.cross((arm - back) * self.w[i], middle)
+                v = v - np.cross(ball["spin"], d - 0.5 * dt * (self.v[i] - ball["velocity"]) - (arm - back) * middle)
                 radius = self.r[i] * ball["radius"] / (self.r[i] + ball["radius"])
                 spin = self.w[i] - ball["spin"]
-                f, turn = self.contact((i, "ball"), normal, v, spin, overlap, radius, self.m[i], True, dt)
+                v_t = v - (v @ normal) / (middle @ normal) * middle
+                f, turn = self.contact((i, "ball"), normal, v_n, v_t, spin, overlap, radius, self.m[i], True, dt)
                 self.f[i] += f
                 self.t[i] += np.cross(-arm * normal, f) + turn
                 self.on_ball -= f
@@ -161,11 +184,17 @@ def attraction(material, young, radius, overlap):
     return a, 4 / 3 * young * a * overlap - pull, pull, 1
 
 
+def halfway(d, v, n, dt):
+    """The normal half a step before, to second order; the rate of the distance; its change since."""
+    v_n = v @ n
+    return n - 0.5 * dt * (v - v_n * n) / np.linalg.norm(d), v_n, 0.5 * dt * v_n
+
+
 def capped(stiffness, damping, stretch, rate, bound):
-    """A spring and dashpot that slide at a bound: the spring's stretch afterwards, and the force."""
+    """A spring that slides at a bound, a dashpot while it does not: the spring's stretch afterwards, and the force."""
+    pull = stiffness * np.linalg.norm(stretch)
+    if pull > bound:
+        stretch = stretch * (bound / pull)
+        return stretch, -stiffness * stretch
     force = -(stiffness * stretch + damping * rate)
-    size = np.linalg.norm(force)
-    if size > bound:
-        force = force * (bound / size)
-        stretch = -(force + damping * rate) / stiffness
-    return stretch, force
+    return stretch, force * min(1.0, bound / max(np.linalg.norm(force), 1e-300))

@@ -65,18 +65,43 @@ class _Springs:
         return 0.5 * float(self.stiffness @ (self.stretch**2).sum(axis=1))
 
     def load(self, stiffness: Array, damping: Array, rate: Array, bound: Array, dt: float, project: Callable) -> Array:
-        """A step on: the force of each, shape [pair, 3]. ``project`` keeps the stretch in the contact's plane."""
+        """A step on: the force of each, shape [pair, 3]. ``project`` brings the stretch into the contact's plane."""
         self.stiffness = stiffness
-        stretch = project(self.stretch + rate * dt)
-        force = -(stiffness[:, None] * stretch + damping[:, None] * rate)
-        size = np.linalg.norm(force, axis=1)
-        slides = size > bound
-        force *= np.where(slides, bound / np.where(size > 0, size, 1.0), 1.0)[:, None]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            held = -(force + damping[:, None] * rate) / stiffness[:, None]
-        self.stretch = np.where(slides[:, None], held, stretch)
+        self.stretch = project(self.stretch) + rate * dt
+        pull = stiffness * np.linalg.norm(self.stretch, axis=1)
+        slides = pull > bound
+        self.stretch *= np.where(slides, bound / np.where(slides, pull, 1.0), 1.0)[:, None]
         self.stretch[stiffness == 0] = 0.0
-        return force
+        force = -stiffness[:, None] * self.stretch
+        force -= np.where(slides, 0.0, damping)[:, None] * rate
+        size = np.linalg.norm(force, axis=1)
+        return force * np.where(size > bound, bound / np.where(size > 0, size, 1.0), 1.0)[:, None]
+
+
+class _Dashpot:
+    """The normal dashpot of each pair, which sees the velocity at the time of its force, shapes [pair].
+
+    In the step of the first touch it is the mean over the time from the touch to half a step later.
+    """
+
+    def __init__(self, count: int, mass: float):
+        self.mass = mass
+        self.rate, self.force = np.zeros(count), np.zeros(count)
+        self.touched = np.zeros(count, dtype=bool)
+
+    def load(self, spring: Array, damping: Array, rate: Array, overlap: Array, dt: float) -> Array:
+        """A step on: the normal force of each. ``rate`` [m/s] of the distance, half a step before."""
+        touching = overlap > 0
+        came = np.where(rate < 0, -rate * dt, 0.0)
+        fresh = touching & ~self.touched & (overlap < 1.001 * came)
+        share = np.where(fresh, overlap, 1.0) / np.where(fresh, came, 1.0)
+        damping = damping * np.where(fresh, 0.8 * (share + 0.5) ** 1.25 / share**0.25, 1.0)
+        last = np.where(self.touched, self.rate, rate)
+        ahead = rate + 0.5 * (rate - last) - 0.5 * dt / self.mass * np.where(self.touched, self.force, 0.0)
+        force = (spring - damping * ahead) / (1 + 0.5 * dt / self.mass * damping)
+        self.force = np.where(touching, np.maximum(0.0, force), 0.0)
+        self.rate, self.touched = rate, touching
+        return self.force
 
 
 class _Forces:
@@ -111,6 +136,7 @@ def keep_book(bed: Bed, steps: int, *, every: int = 20) -> Book:
     factor, mu, mu_r = damping_factor(stuff.restitution), stuff.friction, stuff.rolling_friction
     i, j = np.triu_indices(count, 1)
     slide, roll, twist = (_Springs(len(i)) for _ in range(3))
+    dashpot = _Dashpot(len(i), mass)
     lost, half_w = np.zeros(3), start["spin"]
     before: tuple[_Forces, Array, Array] | None = None
     worst = largest = 0.0
@@ -134,15 +160,19 @@ def keep_book(bed: Bed, steps: int, *, every: int = 20) -> Book:
         arm, a = r - overlap / 2, np.sqrt(radius * overlap)
         s_n, k_t = 2 * star * a, 8 * shear * a
         root = np.sqrt(mass * s_n)
-        speed = v[i] - v[j] - np.cross(arm[:, None] * (w[i] + w[j]), normals)
-        v_n = (speed * normals).sum(axis=1)
+        path = v[i] - v[j]
+        v_n = (path * normals).sum(axis=1)
         elastic = 2 / 3 * s_n * overlap
-        f_n = np.where(touching, np.maximum(0.0, elastic - factor * root * v_n), 0.0)
-        f_t, torque = np.zeros_like(normals), np.zeros_like(normals)
         took = dt if step else 0.0
+        f_n = dashpot.load(elastic, factor * root, v_n, overlap, took)
+        f_t, torque = np.zeros_like(normals), np.zeros_like(normals)
+        # Half a step ago, where the velocities are, the normal was this and the arm longer by what it has lost since.
+        middle = normals - 0.5 * took * (path - v_n[:, None] * normals) / length[:, None]
         flat = _in_plane(normals)
         if mu > 0:
-            v_t = np.where(touching[:, None], speed - v_n[:, None] * normals, 0.0)
+            back = arm - 0.25 * took * v_n
+            v_t = path - v_n[:, None] * middle - np.cross(back[:, None] * (w[i] + w[j]), normals)
+            v_t = np.where(touching[:, None], v_t, 0.0)
             f_t = slide.load(k_t, factor * math.sqrt(4 * shear / star) * root, v_t, mu * f_n, took, flat)
         if mu_r > 0:
             spin = np.where(touching[:, None], w[i] - w[j], 0.0)
@@ -150,10 +180,12 @@ def keep_book(bed: Bed, steps: int, *, every: int = 20) -> Book:
             share = 2 * TURNING_DAMPING_RATIO * math.sqrt(0.4 * mass) * radius
             k_r, k_w = k_t * radius**2, 0.5 * k_t * a * a
             # One angle is kept for both, so that what the normal turns into changes hands.
-            roll.stretch = twist.stretch = roll.stretch + twist.stretch
-            torque = roll.load(k_r, share * np.sqrt(k_r), spin - along, mu_r * radius * f_n, took, flat)
+            angle = roll.stretch + twist.stretch
+            twist.stretch = (angle * normals).sum(axis=1)[:, None] * normals
+            roll.stretch = angle - twist.stretch
+            torque = roll.load(k_r, share * np.sqrt(k_r), spin - along, mu_r * radius * f_n, took, _as_it_is)
             bound = 3 * math.pi / 16 * mu * a * f_n
-            torque += twist.load(k_w, share * np.sqrt(k_w), along, bound, took, _along(normals))
+            torque += twist.load(k_w, share * np.sqrt(k_w), along, bound, took, _as_it_is)
         total = np.zeros((count, 3))
         np.add.at(total, i, f_n[:, None] * normals + f_t)
         np.add.at(total, j, -f_n[:, None] * normals - f_t)
@@ -177,5 +209,5 @@ def _in_plane(normals: Array) -> Callable[[Array], Array]:
     return lambda u: u - (u * normals).sum(axis=1)[:, None] * normals
 
 
-def _along(normals: Array) -> Callable[[Array], Array]:
-    return lambda u: (u * normals).sum(axis=1)[:, None] * normals
+def _as_it_is(u: Array) -> Array:
+    return u

@@ -177,11 +177,10 @@ def _worst(found: np.ndarray, wanted: float) -> float:
 
 
 SMALL_ANGLES = (
-    "only at 10 degrees, where the contact sticks and swings back: the spin comes from the small difference of "
-    "two tangential "
-    "velocities, and e_t, from which it follows, is within the band. The step is not the cause (below); a law "
-    "with micro-slip "
-    "(Mindlin & Deresiewicz 1953) in place of the no-slip spring has not been tried"
+    "only at 5 and 10 degrees, where the contact sticks and swings back: the spin comes from the small difference of "
+    "two tangential velocities, and e_t, from which it follows, is within the band. At 5 degrees the quoted spin and "
+    "e_t contradict one another by as much as ours is off (below). The step is not the cause (below); a law with "
+    "micro-slip (Mindlin & Deresiewicz 1953) in place of the no-slip spring has not been tried"
 )
 CASES = [
     Case(

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from dem import Bed, Material
+from dem.contact import damping_factor, effective_moduli
 
 from .case import Case, Comparison, Curve, Outcome, Plot, compared
 from .spheres import RADIUS, SIXTEEN, mass_of, plane_modulus, row_of_grains
@@ -100,7 +101,12 @@ def _sliding(tell: Callable[[float], None]) -> Outcome:
         spins.append(grains["spin"] @ (-0.8, 0.6, 0))
         tell(part / 1.2)
     t, speed, spin = np.array(times)[:, None], np.array(speeds), np.array(spins)
-    slides, rolls = t < 0.99 * turning, t > 1.1 * turning
+    # The tangential spring, stretched to mu F_n / S_t when sliding ends, rings for a while: m* = 2/7 m, so its dashpot
+    # takes 4 m / 7 c_t for a fall by e, here 0.2 ms.
+    a = math.sqrt(RADIUS * (MASS * GRAVITY / rigid_stiffness()) ** (2 / 3))
+    stiffness = 8 * effective_moduli(YOUNG, POISSON, math.inf, POISSON)[1] * a
+    ringing = 4 * MASS / (7 * damping_factor(bed.material.restitution) * math.sqrt(MASS * stiffness))
+    slides, rolls = t < 0.99 * turning, t > turning + 8 * ringing
     gap = np.abs(speed / (u0 - mu * GRAVITY * t) - 1)[slides].max()
     # Each grain slides until its own time, and no longer: where its speed meets 5/7 of the first.
     stop = u0 * (2 / 7) / (-np.polyfit(t[:20, 0], speed[:20, -1], 1)[0])
