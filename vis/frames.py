@@ -5,7 +5,7 @@
     frames/driven-0.1-seed1_spike_0000.vtu    a body as a triangle mesh in place
 
 The default name, "frames", has no prefix: `frames/frames.pvd`, `frames/grains_0000.vtu`. Reals are float32, blocks are
-zlib-compressed and appended raw. Every file is written beside its place and moved there, the PVD last, so a run that is
+zlib-compressed, in base64. Every file is written beside its place and moved there, the PVD last, so a run that is
 killed leaves frames that open.
 """
 
@@ -312,8 +312,8 @@ def _write_vtu(
     writer = vtkXMLUnstructuredGridWriter()
     writer.SetFileName(str(temporary))
     writer.SetInputData(grid)
-    writer.SetDataModeToAppended()
-    writer.EncodeAppendedDataOff()
+    # Not appended raw, a quarter smaller: meshio 5.3.5 cannot read that on Pythons whose base64 reads on after padding.
+    writer.SetDataModeToBinary()
     writer.SetCompressorTypeToZLib()
     if not writer.Write():
         raise OSError(f"{temporary} could not be written")
