@@ -1,6 +1,15 @@
 """The time step, from the contact time; and how stiff grains must be for an overlap bound.
 
 All formulas are Hertz's (Johnson 1985, chapters 4 and 11), with the smallest grain of the bed. d is its diameter.
+
+How long a step may be. In a lattice of like grains, each with z neighbours at one overlap, what swings fastest obeys
+the step of ``dem.contact`` linearised. With x the change of a contact's overlap, v its rate half a step before, f its
+force, in units of m*, S_n and w = sqrt(S_n / m*); q = w dt, c the damping factor, N = z / 3:
+    v' = v + q N f,  x' = x + q v',  (1 + q c / 2) f' = -x' - c (3/2 v' - v / 2 - q f / 2).
+An eigenvalue comes to -1 where N q^2 + 4 (N - 1) c q = 4. Alone (N = 1) a pair is stable up to q = 2 with any damping,
+as its own force is solved for; what the neighbours do is seen half a step late, and that is what 4 (N - 1) c q says.
+Where contacts stick, spins of one sense are stiffer: each contact slips at twice r times the spin, against S_t = K S_n
+and a dashpot that sees the half-step velocity. There 5/3 z (K q^2 + 2 c sqrt(K) q) = 4, K = 2 (1 - nu) / (2 - nu).
 """
 
 from __future__ import annotations
@@ -8,13 +17,19 @@ from __future__ import annotations
 import math
 
 from .cohesion import jkr_contact
-from .contact import effective_moduli
+from .contact import damping_factor, effective_moduli
 from .materials import Material
 
-__all__ = ["CHAIN", "choose_young", "contact_time", "time_step_for"]
+__all__ = ["CHAIN", "choose_young", "contact_time", "longest_step", "stable_step", "time_step_for"]
 
 STEPS_PER_CONTACT = 8
 FEWEST_STEPS_PER_CONTACT = 5
+# All at the overlap bound: as many as like spheres can have; and, of those that stick, what a dense bed of rough grains
+# has in the mean.
+NEIGHBOURS, STICKING_NEIGHBOURS = 12, 6
+_SHEAR_RATIO = 6 / 7  # K at nu = 1/4; from 1 at 0 to 2/3 at 1/2
+# The half-period of two grains over that of a grain on a rigid plane, which is the contact time.
+_PAIR = 2**0.25
 # The largest of some hundred loaded contacts over their mean: a drive to 20 mm in sand measured 3.4.
 CHAIN = 4.0
 
@@ -45,21 +60,60 @@ def contact_time(material: Material, *, diameter: float, max_overlap: float) -> 
     return min(times)
 
 
+def stable_step(restitution: float, *, neighbours: float = NEIGHBOURS, sticking: bool = False) -> float:
+    """The longest stable step of a lattice of like grains, over the half-period pi sqrt(m* / S_n) of its contacts [1].
+
+    See the module. The restitution is brought about by damping that does not pull (``damping_factor``).
+
+    Args:
+        neighbours: z, of each grain, in all directions alike; 3 is a pair alone.
+        sticking: with friction's springs, for spins of one sense; without, for the normal forces.
+
+    Raises:
+        ValueError: from ``damping_factor``.
+    """
+    c, n = damping_factor(restitution), neighbours / 3
+    # a q^2 + 2 b q = 4
+    a, b = n, 2 * c * (n - 1)
+    if sticking:
+        a, b = 5 * n * _SHEAR_RATIO, 5 * n * c * math.sqrt(_SHEAR_RATIO)
+    return 4 / (b + math.sqrt(b * b + 4 * a)) / math.pi
+
+
+def longest_step(material: Material, *, diameter: float, max_overlap: float) -> float:
+    """The longest step that a user may ask for [s].
+
+    A fifth of the contact time, and no longer than is stable where a grain's contacts are all at the overlap bound:
+    twelve that slide freely or, with friction, six that stick.
+    """
+    shares = [stable_step(material.restitution)]
+    if material.friction > 0:
+        shares.append(stable_step(material.restitution, neighbours=STICKING_NEIGHBOURS, sticking=True))
+    return min(1 / FEWEST_STEPS_PER_CONTACT, _PAIR * min(shares)) * contact_time(
+        material, diameter=diameter, max_overlap=max_overlap
+    )
+
+
 def time_step_for(material: Material, *, diameter: float, max_overlap: float, wanted: float | None = None) -> float:
     """The time step [s]: an eighth of the shortest contact time, or the one wanted if it is short enough.
 
+    For grains so strongly damped that an eighth may be unstable (e below 0.48 with friction, below 0.3 without), the
+    longest that is stable.
+
     Raises:
-        ValueError: the step wanted is not positive, or longer than a fifth of the contact time.
+        ValueError: the step wanted is not positive, or longer than ``longest_step``.
     """
     shortest = contact_time(material, diameter=diameter, max_overlap=max_overlap)
+    longest = longest_step(material, diameter=diameter, max_overlap=max_overlap)
+    own = min(shortest / STEPS_PER_CONTACT, longest)
     if wanted is None:
-        return shortest / STEPS_PER_CONTACT
-    longest = shortest / FEWEST_STEPS_PER_CONTACT
+        return own
     if not 0 < wanted <= longest:
         raise ValueError(
-            f"time_step = {wanted:g} s is outside 0 to {longest:.3g} s, a fifth of the shortest contact time "
-            f"({shortest:.3g} s for grains of {diameter:g} m with E = {material.young:.3g} Pa at an overlap of "
-            f"{100 * max_overlap:g} %); leave it out to have {shortest / STEPS_PER_CONTACT:.3g} s"
+            f"time_step = {wanted:g} s is outside 0 to {longest:.3g} s, the longest that is resolved and stable "
+            f"({longest / shortest:.3g} of the shortest contact time, {shortest:.3g} s, for grains of {diameter:g} m "
+            f"with E = {material.young:.3g} Pa and restitution {material.restitution:g} at an overlap of "
+            f"{100 * max_overlap:g} %); leave it out to have {own:.3g} s"
         )
     return wanted
 

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from dem import MATERIALS, SAND, Bed, Facing, Material, material
 from dem.cohesion import jkr_contact
 from dem.contact import damping_factor, effective_moduli, pair_parameters
-from dem.timestep import CHAIN, choose_young, contact_time, time_step_for
+from dem.timestep import CHAIN, choose_young, contact_time, longest_step, time_step_for
 
 
 def rebound(factor):
@@ -78,12 +78,27 @@ def test_a_collision_lasts_longer_than_the_time_that_the_step_is_taken_from():
 
 
 def test_the_step_is_an_eighth_of_the_contact_time_and_a_longer_one_is_refused():
+    """A fifth of the contact time where nothing is damped; what six sticking contacts bear for e = 0.5, mu > 0."""
+    smooth = Material("smooth", 2600, 1e8, 0.25, 0.0, 1.0)
     shortest = contact_time(STUFF, diameter=0.002, max_overlap=0.05)
-    assert time_step_for(STUFF, diameter=0.002, max_overlap=0.05) == pytest.approx(shortest / 8)
-    assert time_step_for(STUFF, diameter=0.002, max_overlap=0.05, wanted=shortest / 5.01) == shortest / 5.01
-    for wanted in (shortest / 4.99, 1.0, 0.0, -1e-6, math.nan):
-        with pytest.raises(ValueError, match=r"time_step = .* s is outside 0 to .* a fifth of the shortest contact"):
-            time_step_for(STUFF, diameter=0.002, max_overlap=0.05, wanted=wanted)
+    for stuff, longest in ((smooth, shortest / 5), (STUFF, 0.1307 * shortest)):
+        given = {"diameter": 0.002, "max_overlap": 0.05}
+        assert time_step_for(stuff, **given) == shortest / 8
+        assert longest_step(stuff, **given) == pytest.approx(longest, rel=1e-3)
+        assert time_step_for(stuff, wanted=0.998 * longest, **given) == 0.998 * longest
+        for wanted in (1.002 * longest, 1.0, 0.0, -1e-6, math.nan):
+            with pytest.raises(ValueError, match=r"time_step = .* s is outside 0 to .* s, the longest that"):
+                time_step_for(stuff, wanted=wanted, **given)
+
+
+@pytest.mark.parametrize("restitution", [0.5, 0.6, 0.9, 1.0])
+def test_the_beds_own_step_is_an_eighth_unless_damping_is_strong(restitution):
+    for friction in (0.0, 0.5):
+        stuff = Material("grain", 2600, 1e8, 0.25, friction, restitution)
+        given = {"diameter": 0.002, "max_overlap": 0.05}
+        assert time_step_for(stuff, **given) == contact_time(stuff, **given) / 8
+        dead = Material("dead", 2600, 1e8, 0.25, friction, 0.2)
+        assert time_step_for(dead, **given) == longest_step(dead, **given) < contact_time(stuff, **given) / 11
 
 
 @pytest.mark.parametrize("bound", [0.01, 0.05])

@@ -175,6 +175,7 @@ def test_the_restitution_is_that_asked_for_with_the_beds_own_step_too():
             height=RADIUS + gaps * speed * time / count,
             gravity=(0.0, 0.0, 0.0),
             restitution=e,
+            friction=0.0,
             velocities=np.tile([0.0, 0.0, -speed], (16, 1)),
             max_overlap=1.2 * overlap / (2 * RADIUS),
             time_step=time / count,
