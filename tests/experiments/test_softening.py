@@ -1,8 +1,11 @@
 """The modulus goes with pressure and overlap as Hertz says, and never above the real grains'."""
 
+import math
 
 import pytest
 
+from dem import Material
+from dem.timestep import choose_young
 from experiments.softening import bearing_gradient, drop_depth, soften
 
 SAND = {"grain": 0.0024, "density": 2650.0, "poisson": 0.25, "friction": 0.5, "real_young": 7e10, "gravity": 9.81,
@@ -19,6 +22,16 @@ def test_overlap_to_the_power_of_minus_three_halves():
     """delta/d = (1.5 CHAIN p / E*)^(2/3)."""
     soft, stiff = (soften(max_overlap=overlap, **SAND).young for overlap in (0.05, 0.0125))
     assert stiff / soft == pytest.approx(8.0)
+
+
+def test_grains_that_stick_are_as_stiff_as_their_pull_asks_for():
+    """Weightless and slow, 4 pi gamma R on a plane is F = 2/3 E* d^2 (delta/d)^1.5 at the bound, as ``dem`` has it."""
+    bare = SAND | {"gravity": 0.0, "speed": 0.0}
+    young = soften(max_overlap=0.05, surface_energy=0.5, **bare).young
+    star = young / (2 * (1 - 0.25**2))
+    assert 2 / 3 * star * 0.0024**2 * 0.05**1.5 == pytest.approx(4 * math.pi * 0.5 * 0.0012)
+    sticky = Material("sticky", 2650, 7e10, 0.25, 0.5, 0.5, 0.1, "dmt", 0.5)
+    assert young == pytest.approx(choose_young(sticky, pressure=0.0, speed=0.0, max_overlap=0.05, diameter=0.0024))
 
 
 def test_fast_spikes_need_stiffer_grains_and_real_grains_are_the_bound():
