@@ -223,6 +223,7 @@ def choose_softness(settings: PenetrateSettings) -> Softening:
         ),
         fall=RAIN * settings.bed_size[2],
         pressure=settings.weight / area,
+        surface_energy=material.surface_energy,
     )
     if settings.young is None:
         return chosen
