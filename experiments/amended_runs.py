@@ -21,6 +21,7 @@ from .amended import AmendedLaw, read_law
 from .campaign import read_model
 from .kept_runs import write_run
 from .progress import Progress
+from .reporting import write_report
 from .runfolder import RunFolder
 from .settings import PenetrateSettings
 from .units import Unit, make_run, make_spike, plan_units
@@ -145,13 +146,6 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
         progress.stage("report", total=1.0)
         write_report(folder.path, progress)
     return result
-
-
-def write_report(folder: Path, progress: Progress) -> None:
-    """Plots and report.html of a run without a bed."""
-    from vis.amended import write_amended_report as write
-
-    write(folder, progress=progress.update)
 
 
 def _entry(unit: Unit, plain: Penetration, amended: Penetration) -> dict[str, Any]:

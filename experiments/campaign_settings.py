@@ -25,15 +25,17 @@ class CampaignSettings(TrialSettings):
     name: str = Field("made up", min_length=1, description="Name of the campaign.")
 
     # The conditions
-    rigs: tuple[Positive, ...] = Field(
+    rig: tuple[Positive, ...] = Field(
         (0.0085, 0.015),
-        description="g_sim of the rig [9.80665 m/s2], one after another; none where gravities are given.",
+        description="g_sim of the offloading rig [9.80665 m/s2], one after another; not asked where gravity is given.",
     )
-    gravities: tuple[Positive, ...] = Field((), description="Gravities of a free platform in place of rigs [m/s2].")
+    gravity: tuple[Positive, ...] = Field(
+        (), description="Gravities of a free platform, without a rig [m/s2], one after another."
+    )
     motor_torques: tuple[Positive, ...] = Field((0.125, 0.22), description="Torques of motor trials [N m].")
     brake_torques: tuple[Positive, ...] = Field((6.0,), description="Torques of brake trials [N m].")
     brake_wheel_speed: Positive = Field(300.0, description="Speed of the wheel at the start of a brake trial [rad/s].")
-    repeats: int = Field(1, ge=1, le=1000, description="Trials of each condition [1].")
+    trials: int = Field(1, ge=1, le=1000, description="Trials of each condition [1].")
 
     # What is true
     seed: SeedNumber = Field(1, description="Seed of every draw.")
@@ -65,21 +67,23 @@ class CampaignSettings(TrialSettings):
     def _conditions_fit_together(self) -> Self:
         if not self.motor_torques and not self.brake_torques:
             raise ValueError("motor_torques and brake_torques are both empty: at least one torque would do")
-        if not self.rigs and not self.gravities:
-            raise ValueError("rigs and gravities are both empty: at least one gravity would do")
-        if self.gravities and self.counterweight is not None:
+        if not self.rig and not self.gravity:
+            raise ValueError("rig and gravity are both empty: at least one gravity would do")
+        if self.gravity and self.counterweight is not None:
             raise ValueError(
-                f"counterweight = {self.counterweight:g} belongs to a rig, and gravities are those of a free platform"
+                f"counterweight = {self.counterweight:g} belongs to a rig, and gravity is that of a free platform"
             )
         if self.ground != "spring-damper":
             raise ValueError(
                 f"ground = {self.ground!r} has no place in a campaign, whose surface is K, C and friction: the "
                 f"spring-damper would do, with effects for what it lacks"
             )
-        for key in ("rigs", "gravities", "motor_torques", "brake_torques"):
+        for key in ("rig", "gravity", "motor_torques", "brake_torques"):
             values = getattr(self, key)
             if len(set(values)) < len(values):
-                raise ValueError(f"{key} = {list(values)} holds a value twice: each once would do, with repeats")
+                raise ValueError(
+                    f"{key} = {list(values)} holds a value twice: each once would do, with trials for how often"
+                )
         return self
 
 

@@ -14,11 +14,20 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
+from pydantic import BaseModel
 
 from experiments import registry
 from experiments.cli_options import as_typed, option_of, reserved_option
 from experiments.cli_runs import BAD_INPUT, DONE, FAILED, STOPPED, carry_out, show_folder
-from experiments.cli_streams import RefusedError, fault_words, refusing, say, stdout_to_stderr, terminate_like_ctrl_c
+from experiments.cli_streams import (
+    RefusedError,
+    fault_words,
+    is_number,
+    refusing,
+    say,
+    stdout_to_stderr,
+    terminate_like_ctrl_c,
+)
 from experiments.progress import Progress, make_progress
 from experiments.reading import Layer, find_case, read_case, settings_from
 from experiments.registry import Experiment, find_experiment
@@ -64,8 +73,10 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
         case: Path | None = None, *, out: Path | None = None, json: bool = False, quiet: bool = False, **given: Any
     ) -> int:
         with refusing():
-            if experiment.subject and case is not None and not case.is_file():
+            if experiment.subject and case is not None and (not case.is_file() or case.suffix == ".npz"):
                 case, given[experiment.subject] = None, str(case)
+            if case is not None and is_number(str(case)):
+                raise ValueError(_stray(str(case), settings_class))
             layers = [read_case(registry.CASES / preset.case) for preset in presets if given.pop(preset.option, False)]
             layers += [read_case(find_case(case, registry.CASES))] if case is not None else []
             typed = Layer(None, as_typed(given, settings_class.model_fields))
@@ -93,7 +104,7 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
     first = reserved_option("case")
     if experiment.subject:
         about = Parameter(help=fields[experiment.subject].description, negative="", show_default=False)
-        first = first.replace(annotation=Annotated[Path | None, about])
+        first = first.replace(name=experiment.subject, annotation=Annotated[Path | None, about])
     parameters = [first]
     parameters += [option_of(name, field) for name, field in fields.items() if name != experiment.subject]
     parameters += [*flags, reserved_option("out"), reserved_option("json"), reserved_option("quiet")]
@@ -101,6 +112,12 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
     command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     command.__name__ = experiment.name.replace(" ", "_")
     return command
+
+
+def _stray(word: str, settings_class: type[BaseModel]) -> str:
+    """What to do about a number that belongs to no option, as the second of ``--mu-s 0.4 0.5``."""
+    several = "; to try several values, --sweep KEY=FROM:TO:STEP" if "sweep" in settings_class.model_fields else ""
+    return f"{word} belongs to no option: an option that describes one number takes one{several}"
 
 
 # Commands ------------------------------------------------------------------------------------------------------------
@@ -212,6 +229,20 @@ def _campaign_from_run() -> Callable[..., int]:
     return command
 
 
+def _effects(
+    names: Annotated[
+        tuple[str, ...], Parameter(help="Only these; with all their parameters, source and limits.", negative="")
+    ] = (),
+    /,
+) -> int:
+    """List the terms beyond the base model, as `tumble` and `campaign` take them with --effects."""
+    from experiments.effects import show_effects
+
+    with refusing():
+        show_effects(names)
+    return DONE
+
+
 def _doctor(*, json: _Json = False) -> int:
     """Say what this machine has and what to install where something lacks."""
     from experiments.doctor import examine, show
@@ -225,11 +256,17 @@ def build_app() -> App:
     """The command line as a cyclopts App; a command returns its exit status."""
     app = App(
         name="hedgebed",
-        help="A spike in a bed of grains, beside the spring-damper that stands in for it. SI units throughout.",
+        help="Robots that hop and tumble on asteroids: their spikes in beds of grains, the spring-damper that stands "
+        "in for those, the platform's tumbles and hops, and what measured trials lack. SI units throughout.",
         help_format="plaintext",
         version=__version__,
         result_action="return_value",
     )
+    if "bed make" in registry.EXPERIMENTS:
+        from experiments.bed_commands import add_bed_commands
+
+        app.command(App(name="bed", help="Beds prepared as in a laboratory: made, listed, shown, shared, refined."))
+        add_bed_commands(app["bed"])
     for experiment in registry.EXPERIMENTS.values():
         *above, name = experiment.name.split(" ")
         home = app[above[0]] if above else app
@@ -241,5 +278,6 @@ def build_app() -> App:
         )
     app.command(_resume, name="resume")
     app.command(_bench, name="bench")
+    app.command(_effects, name="effects")
     app.command(_doctor, name="doctor")
     return app

@@ -93,26 +93,41 @@ def _number(value: Any, std: Any = 0.0) -> str:
     return f"{value:.{max(decimals, 0)}f}" if decimals <= 9 else f"{value:.4g}"
 
 
+def _spread(quantity: Any) -> bool:
+    """Whether several runs tell how much a quantity varies: 0 stands for what is exact, or was computed once."""
+    std = quantity.get("std")
+    return isinstance(std, float) and math.isfinite(std) and std > 0
+
+
+def _unit(unit: str, value: Any) -> str:
+    """The unit; beside an angle in radians the same in degrees."""
+    if unit == "rad" and isinstance(value, int | float) and math.isfinite(value):
+        return f"rad   {math.degrees(value):.4g} degrees"
+    return "" if unit == "1" or value is None else unit
+
+
 def _show_result(folder: RunFolder) -> None:
     """The numbers of result.json in a short table on stdout, the warnings, and where the report is."""
     result = folder.read_result()
     console = Console(file=sys.stdout, highlight=False)
-    table = Table(title=result.get("title"), title_justify="left", box=None, pad_edge=False)
+    console.print(result.get("title", ""), markup=False, style="italic")
+    table = Table(box=None, pad_edge=False)
     table.add_column("quantity")
     table.add_column("value", justify="right")
-    table.add_column("spread (std)", justify="right")
+    quantities = result.get("quantities", {})
+    spreads = any(_spread(quantity) for quantity in quantities.values())
+    if spreads:
+        table.add_column("spread (std)", justify="right")
     table.add_column("unit")
-    for name, quantity in result.get("quantities", {}).items():
-        unit = quantity.get("unit", "")
-        table.add_row(
-            name,
-            _number(quantity.get("value"), quantity.get("std")),
-            _number(quantity.get("std"), None),
-            "" if unit == "1" else unit,
-        )
-    console.print(table, markup=False)
+    for name, quantity in quantities.items():
+        value, std = quantity.get("value"), quantity.get("std")
+        cells = [_number(std, None) if std != 0 else "exact"] if spreads else []
+        table.add_row(name, _number(value, std), *cells, _unit(quantity.get("unit", ""), value))
+    if quantities:
+        console.print(table, markup=False)
     for listed in result.get("tables", []):
-        shown = Table(title=listed["title"], title_justify="left", box=None, pad_edge=False)
+        console.print(listed["title"], markup=False, style="italic")
+        shown = Table(box=None, pad_edge=False)
         for place, heading in enumerate(listed["head"]):
             shown.add_column(heading, no_wrap=place == 0)
         for row in listed["rows"]:

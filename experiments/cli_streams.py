@@ -13,6 +13,7 @@ from cyclopts import CoercionError, MissingArgumentError
 __all__ = [
     "RefusedError",
     "fault_words",
+    "is_number",
     "refusing",
     "say",
     "stdout_to_stderr",
@@ -45,6 +46,15 @@ def fault_words(error: Exception) -> str:
             named = _UNIT_NAMES.get(unit[0], unit[0])
             text = f"{text.rstrip('.')}: give a plain number in {named}{_in_metres(error.token.value, unit[0])}"
     return text
+
+
+def is_number(word: str) -> bool:
+    """Whether `word` is a number."""
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
 
 
 _UNIT_NAMES = {"m": "metres", "N": "newtons", "kg": "kilograms", "s": "seconds"}

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 from rigid.actuation import Flywheel
 from rigid.hop import Tumbler
 from rigid.platform import Platform
 from rigid.platform_files import find_platform
+from rigid.trial import Trial
 
-from .hop_settings import HopSettings
-from .surfaces import find_surface
-from .tumble_platform import Number, defaults_said, platform_numbers
+from .hop_settings import DEFAULT_DISTANCE, HopSettings
+from .settled import Number, Settled, defaults_said, settle_limits, settle_platform, settle_surface
+from .tumble_platform import platform_numbers
 
-__all__ = ["HopPlan", "brake_words", "plan_hop"]
+__all__ = ["HopPlan", "plan_hop"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,6 +26,8 @@ class HopPlan:
 
     platform: Platform
     wheel: Flywheel
+    brake: str
+    """What slows the wheel, in words: a platform file without a brake_torque lets the motor do it."""
     tumbler: Tumbler
     surface: str
     stiffness: float
@@ -32,10 +36,17 @@ class HopPlan:
     """C of a row [N s/m]."""
     spike_count: int | None
     """Rows of tips for the planar model; None where they are not at equal angles."""
+    distance: float | None
+    """How far to hop [m]; None where that is what is asked."""
     numbers: Mapping[str, Number]
     choices: Mapping[str, str]
     """What else stands at its default: name -> value."""
     warnings: tuple[str, ...] = ()
+
+    @property
+    def ground(self) -> str:
+        """The ground that gives, in words."""
+        return f"{self.surface} (K = {self.stiffness:g} N/m, C = {self.damping:g} N s/m a row)"
 
     def sentences(self) -> list[str]:
         """One line for each number and choice that was not given: every default is said."""
@@ -45,69 +56,73 @@ class HopPlan:
 def plan_hop(settings: HopSettings) -> HopPlan:
     """The numbers that `settings` stand for.
 
-    Raises ValueError, naming the setting, for a platform or a surface there is not, a torque beyond the platform's, and
-    numbers that cannot be.
+    Raises ValueError, naming the setting, for a platform or a surface there is not, a torque or a wheel speed beyond
+    the platform's, and numbers that cannot be.
     """
-    platform, material = find_platform(settings.platform), find_surface(settings.surface)
-    stance, wheel = platform.stance(), platform.wheel()
-    numbers: dict[str, Number] = {}
-    for name, unit in (("gravity", "m/s2"), ("distance", "m")):
-        value = getattr(settings, name)
-        numbers[name] = Number(value, unit, "default" if value == HopSettings.model_fields[name].default else "given")
-
-    if settings.body_radius is not None:
-        numbers["body_radius"] = Number(settings.body_radius, "m", "given")
-
-    def settle(name: str, unit: str, default: float, origin: str) -> float:
-        given = getattr(settings, name, None)
-        numbers[name] = Number(default, unit, origin) if given is None else Number(given, unit, "given")
-        return numbers[name].value
-
-    said = f"platform {settings.platform}"
-    mass = settle("mass", "kg", platform.mass, said)
-    inertia = settle("inertia", "kg m2", platform.moment(), said)
-    length = settle("spike_length", "m", stance.spike_length, said)
-    lean = settle("lean", "rad", stance.lean, said)
-    settle("wheel_inertia", "kg m2", wheel.inertia, said)
-    settle("max_wheel_speed", "rad/s", wheel.max_speed, said)
+    platform, of_platform = find_platform(settings.platform), platform_numbers(settings.platform, in_plane=False)
+    numbers = Settled(settings)
+    default = HopSettings.model_fields["gravity"].default
+    numbers["gravity"] = Number(settings.gravity, "m/s2", "default" if settings.gravity == default else "given")
+    if settings.asks_for == "distance":
+        numbers.settle("distance", DEFAULT_DISTANCE, "default")
+    for name in ("body_radius", "wheel_speed_0"):
+        if getattr(settings, name) is not None:
+            numbers.settle(name, math.nan, "given")
+    settle_platform(numbers, of_platform)
+    numbers.settle("lean", of_platform.lean, f"platform {of_platform.name}")
+    settle_limits(numbers, of_platform)
+    own, brake = platform.wheel(), _brake_words(platform.wheel())
     if settings.actuator == "brake":
-        settle("torque", "N m", wheel.brake_torque, f"{brake_words(wheel)} of {said}, at its largest")
-    of_surface = f"surface {material.name}"
-    stiffness = settle("stiffness", "N/m", material.stiffness, of_surface)
-    damping = settle("damping", "N s/m", material.damping, of_surface)
-    mu_s = settle("mu_s", "1", material.mu_s, of_surface)
-    mu_d = (
-        settle("mu_d", "1", material.mu_d, of_surface)
-        if settings.mu_s is None
-        else settle("mu_d", "1", 0.5 * mu_s, "default: half of mu_s")
-    )
-    if mu_d > mu_s:
-        raise ValueError(f"mu_d = {mu_d:g} is above mu_s = {mu_s:g} ({numbers['mu_s'].origin}): at most that would do")
+        numbers.settle("torque", own.brake_torque, f"{brake} of platform {of_platform.name}, at its largest")
+    elif settings.torque is not None:
+        numbers.settle("torque", settings.torque, "given")
+    surface, warnings = settle_surface(numbers, settings.surface)
+    wheel = replace(
+        own, inertia=numbers.value("wheel_inertia"), max_speed=numbers.value("max_wheel_speed"),
+        motor_torque=numbers.value("max_motor_torque"),
+    )  # fmt: skip
+    _check(settings, numbers, platform, brake)
     tumbler = Tumbler(
-        mass=mass, inertia=inertia, spike_length=length, lean=lean, gravity=settings.gravity, mu_s=mu_s, mu_d=mu_d
-    )
+        mass=numbers.value("mass"), inertia=numbers.value("inertia"), spike_length=numbers.value("spike_length"),
+        lean=of_platform.lean, gravity=settings.gravity, mu_s=numbers.value("mu_s"), mu_d=numbers.value("mu_d"),
+    )  # fmt: skip
     choices = {
         name: str(getattr(settings, name))
-        for name in ("platform", "actuator", "surface")
+        for name in ("platform", "actuator")
         if getattr(settings, name) == HopSettings.model_fields[name].default
     }
+    if settings.surface is None:
+        choices["surface"] = surface
     if settings.body_radius is None:
         choices["body_radius"] = "none, a flat ground"
-    guess = f"stiffness, damping and friction of {material.name} are {material.source}"
     return HopPlan(
-        platform=platform, wheel=wheel, tumbler=tumbler, surface=material.name, stiffness=stiffness, damping=damping,
-        spike_count=_spike_count(settings.platform), numbers=numbers, choices=choices,
-        warnings=(guess,) if material.guess else (),
+        platform=platform, wheel=wheel, brake=brake, tumbler=tumbler, surface=surface,
+        stiffness=numbers.value("stiffness"), damping=numbers.value("damping"), spike_count=of_platform.spike_count,
+        distance=numbers.value("distance") if settings.asks_for == "distance" else None, numbers=numbers,
+        choices=choices, warnings=tuple(warnings),
     )  # fmt: skip
 
 
-def brake_words(wheel: Flywheel) -> str:
-    """What slows the wheel. A platform file without a brake_torque lets the motor do it."""
+def _check(settings: HopSettings, numbers: Settled, platform: Platform, brake: str) -> None:
+    """Refuse numbers that no body can have, as a tumble does, and torque and wheel speed beyond their limits."""
+    body = ("mass", "inertia", "spike_length", "wheel_inertia", "stiffness", "damping", "mu_s", "mu_d")
+    own: dict[str, Any] = {name: numbers.value(name) for name in body}
+    Trial(gravity_sim=settings.gravity, gravity=settings.gravity, **own)
+    fastest, strongest = numbers["max_wheel_speed"], numbers["max_motor_torque"]
+    if settings.wheel_speed_0 is not None and settings.wheel_speed_0 > fastest.value:
+        raise ValueError(
+            f"wheel_speed_0 = {settings.wheel_speed_0:g} rad/s is beyond max_wheel_speed = {fastest.value:g} rad/s "
+            f"({fastest.origin}): at most that would do, or a max_wheel_speed above it"
+        )
+    if settings.torque is None:
+        return
+    by_brake = settings.actuator == "brake"
+    most = platform.wheel().brake_torque if by_brake else strongest.value
+    if settings.torque > most * (1 + 1e-12):
+        whose = f"{brake if by_brake else 'the motor'} of {platform.name}"
+        more = "" if by_brake else ", or a max_motor_torque above it"
+        raise ValueError(f"torque = {settings.torque:g} N m: {whose} gives at most {most:g} N m: that would do{more}")
+
+
+def _brake_words(wheel: Flywheel) -> str:
     return "the brake" if wheel.brake_torque > wheel.motor_torque or math.isinf(wheel.brake_torque) else "the motor"
-
-
-def _spike_count(name: str) -> int | None:
-    try:
-        return platform_numbers(name).spike_count
-    except ValueError:  # its rows are not at equal angles
-        return None

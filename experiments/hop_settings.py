@@ -2,58 +2,69 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-__all__ = ["HopSettings"]
+from .platform_settings import PlatformSettings, Positive
+from .strict import StrictSettings
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+__all__ = ["DEFAULT_DISTANCE", "HopSettings"]
+
+DEFAULT_DISTANCE = 5.0
+"""Of a hop that is told neither distance nor wheel speed nor torque of a motor [m]."""
 
 
-class HopSettings(BaseModel):
-    """A hop over a wanted distance: what the flywheel must do, how the platform leaves and how it flies."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
+class _Question(StrictSettings):
+    """What is asked of a hop: the means for a distance, or how far given means go."""
 
     gravity: Positive = Field(1e-3, description="Gravity at the surface [m/s2].")
-    distance: Positive = Field(5.0, description="How far to hop, along the ground [m].")
+    distance: Positive | None = Field(
+        None,
+        description="How far to hop, along the ground [m]; 5 if neither it nor wheel_speed_0, nor a motor's torque, is "
+        "given.",
+    )
+    wheel_speed_0: Positive | None = Field(
+        None, description="In place of a distance: speed of the wheel before the brake [rad/s]; says how far that goes."
+    )
     body_radius: Positive | None = Field(
         None, description="Radius of the body [m]; a flat ground, and nothing said of escape, if not given."
     )
-    platform: str = Field("hedgehog", description="A platform that ships, or the path of a .toml file of one's own.")
     actuator: Literal["brake", "motor"] = Field(
         "brake", description="A brake on a spinning wheel, or a motor from rest."
     )
     torque: Positive | None = Field(
         None,
-        description="Torque on the platform [N m]; if not given the brake's largest, or whatever the motor needs.",
-    )
-    surface: str = Field(
-        "brick", description="Material: steel, brick, sand or jsc1a; its friction, and what gives way under the tips."
-    )
-    mu_s: NotNegative | None = Field(
-        None, description="Static friction of tips and ground [1]; the surface's if not given (brick: 0.5)."
-    )
-    mu_d: NotNegative | None = Field(
-        None,
-        description="Sliding friction [1]; the surface's if not given (brick: 0.25), half of mu_s where that is.",
-    )
-    stiffness: Positive | None = Field(
-        None, description="K of a row of tips [N/m]; the surface's if not given (brick: 1.5e4). Hop theory has none."
-    )
-    damping: NotNegative | None = Field(
-        None, description="C of a row of tips, while going in [N s/m]; the surface's if not given (brick: 60)."
+        description="Torque on the platform [N m]: of a brake its largest if not given; of a motor, given in place of "
+        "a distance, says how far that goes.",
     )
 
+
+class HopSettings(PlatformSettings, _Question):
+    """A hop: what the flywheel must do for a distance, or how far it goes; how the platform leaves and flies."""
+
     @model_validator(mode="after")
-    def _fits_together(self) -> HopSettings:
-        if self.mu_s is not None and self.mu_d is not None and self.mu_d > self.mu_s:
-            raise ValueError(f"mu_d = {self.mu_d:g} is above mu_s = {self.mu_s:g}: at most that would do")
-        if self.actuator == "motor" and self.torque is not None:
+    def _one_question(self) -> Self:
+        if self.wheel_speed_0 is not None and self.actuator == "motor":
             raise ValueError(
-                f"torque = {self.torque:g} N m with actuator = 'motor': the distance decides what the motor must give, "
-                f"so leave one of the two out"
+                f"wheel_speed_0 = {self.wheel_speed_0:g} rad/s is that of a wheel that a brake slows, and actuator = "
+                f"'motor' drives its wheel from rest: torque in place of distance would do"
+            )
+        if self.wheel_speed_0 is not None and self.distance is not None:
+            raise ValueError(
+                f"wheel_speed_0 = {self.wheel_speed_0:g} rad/s and distance = {self.distance:g} m are both given: the "
+                f"one decides the other, so leave one of the two out"
+            )
+        if self.actuator == "motor" and self.torque is not None and self.distance is not None:
+            raise ValueError(
+                f"torque = {self.torque:g} N m with actuator = 'motor' and distance = {self.distance:g} m: the one "
+                f"decides the other, so leave one of the two out"
             )
         return self
+
+    @property
+    def asks_for(self) -> Literal["distance", "wheel_speed", "torque"]:
+        """What was given: a distance to go, or the means to see how far they go."""
+        if self.wheel_speed_0 is not None:
+            return "wheel_speed"
+        return "torque" if self.actuator == "motor" and self.torque is not None else "distance"

@@ -6,7 +6,7 @@ import math
 
 from rigid.hop import Flight, Launch, least_viable_angle
 
-from .hop_numbers import HopPlan, brake_words
+from .hop_numbers import HopPlan
 from .hop_on_surface import SurfaceHop
 
 __all__ = ["NEAR_ESCAPE", "sentences", "warnings"]
@@ -22,7 +22,7 @@ SAME_ANGLE = math.radians(1.0)
 def sentences(
     plan: HopPlan,
     left: Launch,
-    flown: Flight,
+    flown: Flight | None,
     given: SurfaceHop | None,
     *,
     torque: float,
@@ -46,7 +46,7 @@ def sentences(
     )
     said = [
         f"{how} the platform {way} at {left.speed:.4g} m/s, {math.degrees(left.angle):.3g} degrees above the ground"
-        f"{slides}.",
+        f"{slides}{_lands(flown)}.",
         f"Launches without sliding are viable from {math.degrees(least_viable_angle(mu_s)):.3g} degrees up at "
         f"mu_s = {mu_s:g}; without turning on the ground this platform would leave at "
         f"{math.degrees(plan.tumbler.lean):.3g}.",
@@ -54,15 +54,17 @@ def sentences(
     if by_brake and left.time < plan.wheel.inertia * speed / torque * (1 - 1e-9):
         said.append("It leaves before the wheel has come to rest: a faster wheel would not take it farther.")
     said.append(_on_ground(plan, left, flown, given))
-    if by_brake and sought is None and given is not None:
-        most = f"{plan.wheel.max_speed:g} rad/s"
-        said.append(f"No wheel speed up to {most} was found that goes {flown.distance:.4g} m from {plan.surface}.")
-    if sought is not None and abs(sought / speed - 1) > 0.5 * ALIKE:
-        said.append(f"By the planar model {sought:.4g} rad/s would go {flown.distance:.4g} m on {plan.surface}.")
+    if by_brake and plan.distance is not None and sought is None and given is not None:
+        most = "" if math.isinf(plan.wheel.max_speed) else f" up to {plan.wheel.max_speed:g} rad/s"
+        said.append(f"No wheel speed{most} was found that goes {plan.distance:.4g} m from {plan.surface}.")
+    if sought is not None and plan.distance is not None and abs(sought / speed - 1) > 0.5 * ALIKE:
+        said.append(f"By the planar model {sought:.4g} rad/s would go {plan.distance:.4g} m on {plan.surface}.")
     return said
 
 
-def warnings(plan: HopPlan, left: Launch, flown: Flight, given: SurfaceHop | None, escape: float | None) -> list[str]:
+def warnings(
+    plan: HopPlan, left: Launch, flown: Flight | None, given: SurfaceHop | None, escape: float | None
+) -> list[str]:
     """What must not be overlooked: how far off rigid ground is, and escape, of the faster of the two launches."""
     found = []
     other = given.launch if given is not None else None
@@ -72,11 +74,13 @@ def warnings(plan: HopPlan, left: Launch, flown: Flight, given: SurfaceHop | Non
             f"model has rows of tips at equal angles, and {plan.platform.name} has not"
         )
     elif other is None:
-        found.append(f"on {_ground(plan)} the planar model does not leave the ground")
+        found.append(f"on {plan.ground} the planar model does not leave the ground")
+    elif plan.distance is None or flown is None:
+        pass  # what each ground makes of the given wheel is the answer, not a warning
     elif given.flight is not None and abs(given.flight.distance / flown.distance - 1) > ALIKE:
         off = given.flight.distance / flown.distance
         found.append(
-            f"the wheel speed is that of rigid ground: on {_ground(plan)} the same one goes "
+            f"the wheel speed is that of rigid ground: on {plan.ground} the same one goes "
             f"{given.flight.distance:.4g} m, {off:.3g} times the distance"
         )
     if escape is None:
@@ -84,7 +88,7 @@ def warnings(plan: HopPlan, left: Launch, flown: Flight, given: SurfaceHop | Non
         return found
     fastest = max(left.speed, other.speed if other is not None else 0.0)
     if fastest >= NEAR_ESCAPE * escape:
-        whose = "" if fastest == left.speed else f" on {_ground(plan)}"
+        whose = "" if fastest == left.speed else f" on {plan.ground}"
         what = "it escapes" if fastest >= escape else "escape is near"
         found.append(
             f"{what}: {fastest:.4g} m/s{whose} is {100 * fastest / escape:.3g} % of the escape speed, "
@@ -94,14 +98,16 @@ def warnings(plan: HopPlan, left: Launch, flown: Flight, given: SurfaceHop | Non
 
 
 def _by(plan: HopPlan) -> str:
-    return "" if brake_words(plan.wheel) == "the brake" else " by the motor"
+    return "" if plan.brake == "the brake" else " by the motor"
 
 
-def _ground(plan: HopPlan) -> str:
-    return f"{plan.surface} (K = {plan.stiffness:g} N/m, C = {plan.damping:g} N s/m a row)"
+def _lands(flown: Flight | None) -> str:
+    if flown is None:
+        return "; it escapes"
+    return f"; it lands {flown.distance:.4g} m away after {flown.time:.4g} s"
 
 
-def _on_ground(plan: HopPlan, left: Launch, flown: Flight, given: SurfaceHop | None) -> str:
+def _on_ground(plan: HopPlan, left: Launch, flown: Flight | None, given: SurfaceHop | None) -> str:
     """Theory and model side by side, and why they differ, as far as the numbers say so."""
     if given is None:
         return (
@@ -109,15 +115,16 @@ def _on_ground(plan: HopPlan, left: Launch, flown: Flight, given: SurfaceHop | N
         )
     other, flight = given.launch, given.flight
     if other is None:
-        return f"All this is on rigid ground. On {_ground(plan)} the same torque does not make it leave the ground."
-    goes = (
-        "escapes"
-        if flight is None
-        else f"goes {flight.distance:.4g} m, {flight.distance / flown.distance:.3g} times as far as the "
-        f"{flown.distance:.4g} m of rigid ground"
-    )
+        return f"All this is on rigid ground. On {plan.ground} the same torque does not make it leave the ground."
+    if flight is None:
+        goes = "escapes"
+    else:
+        goes = f"goes {flight.distance:.4g} m"
+        if flown is not None:
+            times = flight.distance / flown.distance
+            goes += f", {times:.3g} times as far as the {flown.distance:.4g} m of rigid ground"
     compared = (
-        f"All this is on rigid ground. On {_ground(plan)} the planar model leaves with the same wheel at "
+        f"All this is on rigid ground. On {plan.ground} the planar model leaves with the same wheel at "
         f"{other.speed:.4g} m/s, {other.speed / left.speed:.3g} times as fast, at {math.degrees(other.angle):.3g} "
         f"degrees, and {goes}"
     )

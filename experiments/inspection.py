@@ -10,7 +10,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from .campaign_settings import CheckSettings
 from .diagnose.problem import Finding
 from .progress import Progress
 from .replicas import Condition, condition_of, condition_words, odd_replicates
+from .reporting import write_report
 from .runfolder import RunFolder
 from .whole_runs import whole_run
 
@@ -125,13 +125,6 @@ def _carry_out(settings: CheckSettings, folder: RunFolder, progress: Progress) -
         progress.stage("report", total=1.0)
         write_report(folder.path, progress)
     return result
-
-
-def write_report(folder: Path, progress: Progress) -> None:
-    """Plots and report.html of a run folder."""
-    from vis.inspection import write_inspection_report as write
-
-    write(folder, progress=progress.update)
 
 
 def _facts(recording: Recording) -> dict[str, Any]:

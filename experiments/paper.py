@@ -13,7 +13,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field, replace
 from multiprocessing import get_context
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,6 +25,7 @@ from .paper_claims import claims, first_lasting
 from .paper_settings import PaperSettings
 from .paper_variants import HARD, variants
 from .progress import Progress
+from .reporting import write_report
 from .runfolder import RunFolder
 from .surfaces import find_surface
 from .tumble_platform import torque_within_limit
@@ -204,13 +204,6 @@ def _all(jobs: Sequence[Job], workers: int, progress: Progress) -> list[dict[str
             found.append(result)
             progress.update(number)
     return found
-
-
-def write_report(folder: Path, progress: Progress) -> None:
-    """Figures and report.html of a run folder."""
-    from vis.paper import write_paper_report as write
-
-    write(folder, progress=progress.update)
 
 
 def _carry_out(settings: PaperSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:

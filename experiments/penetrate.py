@@ -27,6 +27,7 @@ from .kept_runs import read_run, write_run
 from .memory import memory_there
 from .progress import Progress
 from .remarks import overlap_warning, softening_note
+from .reporting import write_report
 from .run_campaign import SpikeSensors, campaign_of, check_target, place_campaign
 from .runfolder import RunFolder
 from .settings import PenetrateSettings, expected_grain_count
@@ -302,13 +303,6 @@ class _OneStage:
         self.progress.update(self.part + min(1.0, max(0.0, done)))
         if self.asked_to_stop():
             raise KeyboardInterrupt
-
-
-def write_report(folder: Path, progress: Progress) -> None:
-    """Pictures, plots and report.html of a run folder."""
-    from vis.report import write_report as write
-
-    write(folder, progress=progress.update)
 
 
 # Carrying it out ------------------------------------------------------------------------------------------------------

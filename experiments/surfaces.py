@@ -9,9 +9,12 @@ from pathlib import Path
 
 from .reading import nearest
 
-__all__ = ["Surface", "find_surface", "surface_names"]
+__all__ = ["DEFAULT_SURFACE", "Surface", "find_surface", "surface_names"]
 
 FILE = Path(__file__).parent / "surfaces.toml"
+DEFAULT_SURFACE = "brick"
+"""The surface of every command that is told none: of the paper's two hard ones the rougher, as rock is, and that
+on which most of what the paper states comes out (docs/tumble.md)."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -38,6 +38,7 @@ from .campaign.tables import (
 )
 from .campaign_settings import CampaignSettings
 from .progress import Progress
+from .reporting import write_report
 from .run_campaign import check_target, place_campaign
 from .runfolder import RunFolder
 from .surfaces import find_surface
@@ -51,13 +52,19 @@ __all__ = ["TRUTH", "check", "check_tumble_campaign", "record", "resume", "run",
 TRUTH = "truth.toml"
 """What is true, in a run folder; never in the campaign's."""
 
+MOST_ROWS = 24
+"""Trials that the terminal shows."""
+
 _DRAWN = ("mass", "inertia", "stiffness", "damping", "mu_s", "mu_d")
 
 
 def check(settings: CampaignSettings) -> None:
     """Raise ValueError, naming key, value and what would do, for what the settings class cannot see."""
-    _conditions(settings)
+    conditions = _conditions(settings)
     _sensors(settings)
+    for number, condition in enumerate(conditions, 1):
+        for trial in (condition.plan.trial, _true_trial(settings, condition, number, _truth(settings, conditions))):
+            simulate(trial, duration=1e-3)  # that it can stand
 
 
 def record(
@@ -105,10 +112,10 @@ def _conditions(settings: CampaignSettings) -> list[_Condition]:
     """Every trial as stated, in the order of its id."""
     shared = {name: getattr(settings, name) for name in TrialSettings.model_fields}
     where: Sequence[dict[str, float]]
-    if settings.gravities:
-        where = [{"gravity": value} for value in settings.gravities]
+    if settings.gravity:
+        where = [{"gravity": value} for value in settings.gravity]
     else:
-        where = [{"rig": value} for value in settings.rigs]
+        where = [{"rig": value} for value in settings.rig]
     turns: list[dict[str, Any]] = [{"torque": torque, "actuator": "motor"} for torque in settings.motor_torques]
     turns += [
         {"torque": torque, "actuator": "brake", "wheel_speed_0": settings.brake_wheel_speed}
@@ -116,7 +123,7 @@ def _conditions(settings: CampaignSettings) -> list[_Condition]:
     ]
     plans = [plan_tumble(TumbleSettings(**shared, **place, **turn)) for place in where for turn in turns]
     plans = [replace(plan, trial=_within_limit(plan, settings.duration)) for plan in plans]
-    repeated = [plan for plan in plans for _ in range(settings.repeats)]
+    repeated = [plan for plan in plans for _ in range(settings.trials)]
     width = max(3, len(str(len(repeated))))
     return [_Condition(f"{number:0{width}d}", plan) for number, plan in enumerate(repeated, 1)]
 
@@ -139,8 +146,9 @@ def _sensors(settings: CampaignSettings) -> SensorSet:
     )
 
 
-def _truth(settings: CampaignSettings, stated: Trial) -> dict[str, Any]:
+def _truth(settings: CampaignSettings, conditions: Sequence[_Condition]) -> dict[str, Any]:
     """The true values of what all trials share, drawn within the stated uncertainties."""
+    stated = conditions[0].plan.trial
     values: dict[str, Any] = {name: getattr(stated, name) for name in _DRAWN} | {"mu_d": stated.sliding_friction}
     if settings.exact:
         return values
@@ -152,11 +160,13 @@ def _truth(settings: CampaignSettings, stated: Trial) -> dict[str, Any]:
     return values
 
 
-def _true_gravity(settings: CampaignSettings, stated: float, number: int) -> float:
-    if settings.exact:
-        return stated
-    stream = np.random.default_rng([settings.seed, 1, number])
-    return stated * (1 + settings.sigma_gravity_sim * float(np.clip(stream.standard_normal(), -3, 3)))
+def _true_trial(settings: CampaignSettings, condition: _Condition, number: int, truth: dict[str, Any]) -> Trial:
+    """The trial as it truly is, its gravity drawn anew."""
+    gravity = condition.plan.trial.gravity_sim
+    if not settings.exact:
+        stream = np.random.default_rng([settings.seed, 1, number])
+        gravity *= 1 + settings.sigma_gravity_sim * float(np.clip(stream.standard_normal(), -3, 3))
+    return replace(condition.plan.trial, gravity_sim=gravity, **truth)
 
 
 def _carry_out(settings: CampaignSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
@@ -171,7 +181,7 @@ def _carry_out(settings: CampaignSettings, folder: RunFolder, progress: Progress
             shutil.rmtree(target)
         write_campaign(target, made.campaign)
         write_model(folder.path / TRUTH, made.truth)
-        result = _result(settings, first, made)
+        result = _result(settings, first, made, folder.path)
         folder.write_result(result)
         progress.stage("report", total=1.0)
         write_report(folder.path, progress)
@@ -190,14 +200,13 @@ class _Made:
 def _make(settings: CampaignSettings, conditions: Sequence[_Condition], progress: Progress) -> _Made:
     """Draw what is true, and record every trial."""
     first = conditions[0].plan
-    truth = _truth(settings, first.trial)
+    truth = _truth(settings, conditions)
     sensors = _sensors(settings)
     recordings: dict[tuple[str, str], Recording] = {}
     true_trials, rows = [], []
     progress.stage("trials", total=float(len(conditions)))
     for number, condition in enumerate(conditions, 1):
-        gravity = _true_gravity(settings, condition.plan.trial.gravity_sim, number)
-        trial = replace(condition.plan.trial, gravity_sim=gravity, **truth)
+        trial = _true_trial(settings, condition, number, truth)
         measured, trajectory = record(
             trial, duration=settings.duration, sensors=sensors, seed=(settings.seed, 2, number)
         )
@@ -242,9 +251,9 @@ def write_tumble_campaign(
     x, y, theta = (factor * std for std in plain.pose_std)
     gyro, ax, ay = (factor * std for std in plain.imu_std)
     own = CampaignSettings(
-        **shared, name=f"a tumble on {plan.surface}", rigs=() if settings.gravity is not None else plain.rigs,
-        gravities=(settings.gravity,) if settings.gravity is not None else (), seed=settings.campaign_seed,
-        repeats=settings.campaign_trials, pose_std=(x, y, theta), imu_std=(gyro, ax, ay),
+        **shared, name=f"a tumble on {plan.surface}", rig=() if settings.gravity is not None else plain.rig,
+        gravity=(settings.gravity,) if settings.gravity is not None else (), seed=settings.campaign_seed,
+        trials=settings.campaign_trials, pose_std=(x, y, theta), imu_std=(gyro, ax, ay),
         wheel_std=factor * plain.wheel_std,
     )  # fmt: skip
     within = replace(plan, trial=_within_limit(plan, settings.duration))
@@ -253,13 +262,6 @@ def write_tumble_campaign(
     write_model(folder / TRUTH, made.truth)
     progress.message(f"campaign {target}: {len(made.rows)} trials; what is true of them is in {folder / TRUTH}")
     return {"folder": str(target), "truth": TRUTH, "trials": made.rows}
-
-
-def write_report(folder: Path, progress: Progress) -> None:
-    """Plots and report.html of a run folder."""
-    from vis.campaign import write_campaign_report as write
-
-    write(folder, progress=progress.update)
 
 
 def _trial_table(name: str, trial: Trial) -> TumbleTrial:
@@ -344,7 +346,26 @@ def _row(condition: _Condition, trial: Trial, measured: Measured, trajectory: An
     }
 
 
-def _result(settings: CampaignSettings, plan: TumblePlan, made: _Made) -> dict[str, Any]:
+def _table(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """The trials as the terminal shows them."""
+    head = ["trial", "g_sim [m/s2]", "torque [N m]", "angle [degrees]", "speed [m/s]", "states"]
+    shown = [
+        [
+            row["id"],
+            f"{row['gravity_sim']:.4g}",
+            f"{row['torque']:g} {row['actuator']}",
+            "-" if row["trajectory_angle"] is None else f"{math.degrees(row['trajectory_angle']):.1f}",
+            f"{row['max_speed']:.3g}",
+            " ".join(row["states"][:4]) + (" ..." if len(row["states"]) > 4 else ""),
+        ]
+        for row in rows[:MOST_ROWS]
+    ]
+    if len(rows) > MOST_ROWS:
+        shown.append(["...", f"{len(rows) - MOST_ROWS} more, in result.json", "", "", "", ""])
+    return {"title": "What truly happens in the trials", "head": head, "rows": shown}
+
+
+def _result(settings: CampaignSettings, plan: TumblePlan, made: _Made, folder: Path) -> dict[str, Any]:
     count = sum(len(recording) for recording in made.campaign.recordings.values())
     rows = made.rows
     return {
@@ -360,6 +381,13 @@ def _result(settings: CampaignSettings, plan: TumblePlan, made: _Made) -> dict[s
         },
         "campaign": "campaign",
         "truth": TRUTH,
+        "tables": [_table(rows)],
+        "departures": {
+            "sentences": [
+                f"{folder / 'campaign'} is what a laboratory would hand over, for `hedgebed diagnose`; {TRUTH} beside "
+                f"it is what made it."
+            ]
+        },
         "effects": [{"id": effect.id, "parameters": dict(effect.values)} for effect in plan.trial.effects],
         "trials": rows,
         "warnings": list(plan.warnings),

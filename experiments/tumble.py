@@ -18,11 +18,14 @@ from rigid.trajectory import Trajectory
 
 from .campaign import read_model
 from .progress import Progress
+from .reporting import write_report
 from .runfolder import RunFolder, write_series
 from .synthesis import check_tumble_campaign, write_tumble_campaign
 from .tumble_platform import torque_within_limit
 from .tumble_settings import TumbleSettings
+from .tumble_sweep import check_sweep, middle_of_sweep, run_sweep
 from .tumble_trial import TumblePlan, plan_tumble
+from .tumble_words import tumble_sentences
 from .whole_runs import whole_run
 
 __all__ = ["check", "quantities_of", "resume", "run", "trajectory_columns"]
@@ -33,7 +36,8 @@ MODEL_COPY = "model.toml"
 
 def check(settings: TumbleSettings) -> None:
     """Raise ValueError, naming key, value and what would do, for what the settings class cannot see."""
-    plan = plan_tumble(settings)
+    check_sweep(settings)
+    plan = plan_tumble(middle_of_sweep(settings))
     check_tumble_campaign(settings)
     if settings.method == "paper":
         _check_paper_step(plan)
@@ -51,12 +55,24 @@ def quantities_of(trajectory: Trajectory) -> dict[str, dict[str, Any]]:
     """The numbers that every tumble has, as result.json holds them; a value is null where there is none."""
     angle = "first point 10 mm from the start, atan2(dy, dx); null if never reached"
     entry = "theta at the first entry; null if there is none"
+    trial = trajectory.trial
+    base = " of the base model, effects left out" if trial.effects else ""
     return {
         "trajectory_angle": _quantity(trajectory.trajectory_angle, "rad", angle),
         "max_speed": _quantity(trajectory.max_speed, "m/s", "of the centre"),
+        "time_of_max_speed": _quantity(trajectory.time_of_max_speed, "s", "when the centre is that fast"),
         "max_angular_velocity": _quantity(trajectory.max_angular_velocity, "rad/s", ""),
         "transition_angle_slip": _quantity(trajectory.transition_angle("slip"), "rad", entry),
         "transition_angle_hop": _quantity(trajectory.transition_angle("hop"), "rad", entry),
+        "tipping_torque": _quantity(
+            trial.tipping_torque, "N m", f"least that tips it where it comes up slowly{base}: W l sin(pi / n), n rows"
+        ),
+        "slip_torque": _quantity(
+            trial.slip_torque,
+            "N m",
+            f"least that makes it slip at rest where it is there at once{base}: mu_s W (J + m h^2) / (m h), h = "
+            f"l cos(pi / n)",
+        ),
         "energy_residual": _quantity(
             trajectory.energy_residual,
             "1",
@@ -93,17 +109,10 @@ def _integrate(settings: TumbleSettings, plan: TumblePlan, *, duration: float) -
     return simulate(trial, duration=duration, method=settings.method, sample_interval=interval), full
 
 
-def write_report(folder: Path, progress: Progress) -> None:
-    """Plots and report.html of a run folder."""
-    from vis.tumble import write_tumble_report as write
-
-    write(folder, progress=progress.update)
-
-
 def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
     with folder.lock():
         copied = _keep_model(settings, folder)
-        plan = plan_tumble(settings, model_file=copied)
+        plan = plan_tumble(middle_of_sweep(settings), model_file=copied)
         for sentence in plan.sentences():
             progress.message(sentence)
         for warning in plan.warnings:
@@ -114,12 +123,24 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
         write_series(folder.path / "trajectory.csv", trajectory_columns(trajectory))
         folder.write_series("motion", _motion_columns(trajectory))
         result = _result(settings, plan, trajectory, full)
+        if settings.sweep:
+            progress.message("the numbers above are those of the middle of the sweep")
+            progress.stage("sweep")
+            _add_sweep(result, settings, folder)
         made = write_tumble_campaign(settings, plan, folder.path, progress)
         result |= {"campaign": made} if made is not None else {}
         folder.write_result(result)
         progress.stage("report", total=1.0)
         write_report(folder.path, progress)
     return result
+
+
+def _add_sweep(result: dict[str, Any], settings: TumbleSettings, folder: RunFolder) -> None:
+    """Integrate the sweep and put what came out beside the trial in its middle."""
+    swept = run_sweep(settings, folder)
+    result["departures"]["sentences"] += swept["sweep"]["sentences"]
+    result["title"] += ", in the middle of a sweep of " + " and ".join(settings.sweep)
+    result |= swept
 
 
 def _keep_model(settings: TumbleSettings, folder: RunFolder) -> Path | None:
@@ -181,6 +202,7 @@ def _result(settings: TumbleSettings, plan: TumblePlan, trajectory: Trajectory, 
         "title": f"A tumble on {plan.surface}: {trial.torque:g} N m, {stated}",
         "status": "done",
         "quantities": quantities_of(trajectory),
+        "departures": {"sentences": tumble_sentences(trajectory)},
         "trial": {
             name: {"value": number.value, "unit": number.unit, "origin": number.origin}
             for name, number in plan.numbers.items()

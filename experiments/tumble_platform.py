@@ -1,15 +1,14 @@
-"""What a platform gives a tumble: its numbers in the plane, and how far its motor, brake and wheel can go.
+"""What a platform gives a tumble: its numbers in the plane, and a motor's torque that ends at the wheel's limit.
 
 The wheel's limit is one rule, here as in `rigid.spatial`: a start above it is refused, and a motor whose wheel comes to
-it gives no more torque. It is the limit of the platform's own wheel; of another nothing is known.
+it gives no more torque.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -19,37 +18,10 @@ from rigid.platform_files import find_platform
 from rigid.trajectory import Trajectory
 from rigid.trial import Trial
 
-__all__ = [
-    "Number",
-    "PlatformNumbers",
-    "check_actuation",
-    "defaults_said",
-    "platform_numbers",
-    "torque_within_limit",
-    "wheel_limit",
-]
+__all__ = ["PlatformNumbers", "platform_numbers", "torque_within_limit"]
 
 SPIKE_LENGTHS = {"hedgehog": 0.2}
 """l [m] where the paper gives it: its octagon is 0.4 m across, and the edge of 0.153 m is rounded."""
-
-
-@dataclass(frozen=True)
-class Number:
-    """One number of a trial: value, unit, and where it comes from ("given", "default", "surface steel", ...)."""
-
-    value: float
-    unit: str
-    origin: str
-
-
-def defaults_said(choices: Mapping[str, str], numbers: Mapping[str, Number]) -> list[str]:
-    """One line for each choice at its default and each number that was not given: every default is said."""
-    lines = [f"{name} = {value} (default)" for name, value in choices.items()]
-    for name, number in numbers.items():
-        if number.origin != "given":
-            unit = "" if number.unit == "1" else f" {number.unit}"
-            lines.append(f"{name} = {number.value:.6g}{unit} ({number.origin})")
-    return lines
 
 
 @dataclass(frozen=True)
@@ -60,30 +32,46 @@ class PlatformNumbers:
     mass: float
     inertia: float
     spike_length: float
-    spike_count: int
+    lean: float
+    """Angle from the vertical of the line from the leading tips to the centre, at rest [rad]."""
+    spike_count: int | None
+    """Rows of tips at equal angles; None where they are not."""
     wheel_inertia: float
     motor_torque: float
     brake_torque: float
     max_wheel_speed: float
 
+    @property
+    def max_motor_torque(self) -> float:
+        """What the motor gives at most [N m], by the name of the setting."""
+        return self.motor_torque
 
-def platform_numbers(name: str) -> PlatformNumbers:
+
+def platform_numbers(name: str, *, in_plane: bool = True) -> PlatformNumbers:
     """The numbers of a platform that ships, by name, or of the TOML file `name`.
 
-    Raises ValueError for one there is not, and for one that is no regular polygon seen from the side.
+    Raises ValueError for one there is not and, unless `in_plane` is false, for one that is no regular polygon seen from
+    the side.
     """
     platform = find_platform(name)
-    wheel = platform.wheel()
+    wheel, stance = platform.wheel(), platform.stance()
+    try:
+        count: int | None = _spike_count(name, platform)
+    except ValueError:
+        if in_plane:
+            raise
+        count = None
     return PlatformNumbers(
-        name,
-        platform.mass,
-        platform.moment(),
-        SPIKE_LENGTHS.get(name, platform.stance().spike_length),
-        _spike_count(name, platform),
-        wheel.inertia,
-        wheel.motor_torque,
-        wheel.brake_torque,
-        wheel.max_speed,
+        name=name,
+        mass=platform.mass,
+        inertia=platform.moment(),
+        spike_length=SPIKE_LENGTHS.get(name, stance.spike_length),
+        lean=stance.lean,
+        spike_count=count,
+        wheel_inertia=wheel.inertia,
+        motor_torque=wheel.motor_torque,
+        brake_torque=wheel.brake_torque,
+        max_wheel_speed=wheel.max_speed,
     )
 
 
@@ -109,51 +97,6 @@ def _spike_count(name: str, platform: Platform) -> int:
             f"such a platform"
         )
     return len(rows)
-
-
-def wheel_limit(given: float | None, platform: PlatformNumbers, *, own_wheel: bool, in_model: bool) -> Number:
-    """The largest speed of the wheel [rad/s]: as given, else that of the platform's own wheel, else unknown (inf)."""
-    if given is not None:
-        return Number(given, "rad/s", "given")
-    if in_model:
-        return Number(math.inf, "rad/s", "a model says nothing of it")
-    if not own_wheel:
-        return Number(math.inf, "rad/s", f"wheel_inertia is given: not the wheel of {platform.name}")
-    return Number(platform.max_wheel_speed, "rad/s", f"platform {platform.name}")
-
-
-def check_actuation(
-    actuator: Literal["motor", "brake"],
-    platform: PlatformNumbers,
-    numbers: Mapping[str, Number],
-    limit: Number,
-    *,
-    in_model: bool = False,
-) -> list[str]:
-    """What has to be said of torque and wheel.
-
-    A brake beyond the platform's own is no more than said: it is an impulse in the limit. So is a motor's torque of a
-    model, which says nothing of its platform's motor (`in_model`). Raises ValueError, naming the setting, for a torque
-    beyond the motor, and for a wheel that starts beyond its limit.
-    """
-    torque, speed = numbers["torque"].value, numbers["wheel_speed_0"].value
-    if speed > limit.value:
-        raise ValueError(
-            f"wheel_speed_0 = {speed:g} rad/s is beyond max_wheel_speed = {limit.value:g} rad/s ({limit.origin}): at "
-            f"most that would do, or a max_wheel_speed above it"
-        )
-    if actuator == "motor" and torque > platform.motor_torque * (1 + 1e-9):
-        beyond = (
-            f"torque = {torque:g} N m is beyond the motor of platform = {platform.name!r}: at most "
-            f"{platform.motor_torque:g} N m would do, or actuator = brake with a wheel_speed_0, or a platform with a "
-            f"stronger one"
-        )
-        if not in_model:
-            raise ValueError(beyond)
-        return [beyond]
-    if actuator == "brake" and torque > platform.brake_torque * (1 + 1e-9):
-        return [f"torque = {torque:g} N m is beyond the brake of {platform.name}, {platform.brake_torque:g} N m"]
-    return []
 
 
 def torque_within_limit(

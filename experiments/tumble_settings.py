@@ -6,60 +6,30 @@ A number that is not given comes from `model` where there is one, else from the 
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from .strict import StrictSettings
+from .platform_settings import NotNegative, PlatformSettings, Positive
+from .sweep_ranges import parse_sweep
 
 __all__ = ["TrialSettings", "TumbleSettings"]
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
-
-class TrialSettings(StrictSettings):
+class TrialSettings(PlatformSettings):
     """What every trial of a platform on spikes shares: surface, platform, rig, terms."""
 
     # The surface
     surface: str | None = Field(
-        None, description="Material: steel, brick, sand or jsc1a; of the model, else steel, if not given."
+        None, description="Material: steel, brick, sand or jsc1a; of the model, else brick, if not given."
     )
-    ground: str = Field("spring-damper", description="Law that computes the surface's force, by name.")
+    ground: str = Field(
+        "spring-damper",
+        description="Law that computes the surface's force: spring-damper, hunt-crossley, power, katsuragi-durian, "
+        "bekker or rft.",
+    )
     ground_parameters: tuple[str, ...] = Field(
         (), description="Parameters of another law than the spring-damper, of one spike, as name=value in SI."
-    )
-    stiffness: Positive | None = Field(
-        None, description="K of a row of spikes [N/m]; the surface's if not given (steel: 1.5e4)."
-    )
-    damping: NotNegative | None = Field(
-        None, description="C of a row of spikes, while going in [N s/m]; the surface's if not given (steel: 60)."
-    )
-    mu_s: NotNegative | None = Field(None, description="Static friction [1]; the surface's if not given (steel: 0.25).")
-    mu_d: NotNegative | None = Field(
-        None, description="Sliding friction [1]; the surface's if not given (steel: 0.125), half of mu_s where that is."
-    )
-
-    # The platform
-    platform: str = Field(
-        "hedgehog", description="Platform that gives what is not given here: one that ships, or its TOML file."
-    )
-    mass: Positive | None = Field(None, description="Mass [kg]; the platform's if not given (hedgehog: 5.3).")
-    inertia: Positive | None = Field(
-        None,
-        description="Inertia about the axis of rotation, without the wheel's own [kg m2]; the platform's if not given "
-        "(hedgehog: 0.06).",
-    )
-    spike_length: Positive | None = Field(
-        None, description="Centre to tip of a spike [m]; the platform's if not given (hedgehog: 0.2)."
-    )
-    wheel_inertia: Positive | None = Field(
-        None, description="Inertia of the flywheel [kg m2]; the platform's if not given (hedgehog: 1.2e-3)."
-    )
-    max_wheel_speed: Annotated[float, Field(gt=0)] | None = Field(
-        None,
-        description="Largest speed of the wheel [rad/s]: a motor's torque ends there; the platform's if not given "
-        "(hedgehog: 1050), unknown for another wheel_inertia and for a model.",
     )
 
     # The rig
@@ -77,7 +47,9 @@ class TrialSettings(StrictSettings):
         None, description="A model.toml: its tables stand under what is given here, its effects are added."
     )
     effects: tuple[str, ...] = Field(
-        (), description="Terms beyond the base model, as id or id.parameter=value in SI (pendulum.length=2.2)."
+        (),
+        description="Terms beyond the base model, as id.parameter=value in SI (pendulum.length=2.2); `hedgebed "
+        "effects` lists them.",
     )
 
     # How long
@@ -92,8 +64,6 @@ class TrialSettings(StrictSettings):
         return self
 
     def _ground(self) -> str | None:
-        if self.mu_s is not None and self.mu_d is not None and self.mu_d > self.mu_s:
-            return f"mu_d = {self.mu_d:g} is above mu_s = {self.mu_s:g}: at most that would do"
         if self.ground == "spring-damper":
             if self.ground_parameters:
                 return (
@@ -132,6 +102,13 @@ class TumbleSettings(TrialSettings):
         None, description="Speed of the wheel at the start [rad/s]; 0 for a motor; a brake must be given one."
     )
 
+    # Over a range
+    sweep: tuple[str, ...] = Field(
+        (),
+        description="Do it over a range of one number, or of two: KEY=FROM:TO:STEP, such as mu_s=0.3:0.6:0.1 or "
+        "pendulum.length=2:2.4:0.1.",
+    )
+
     # How it is computed
     method: Literal["located", "paper"] = Field(
         "located", description="Integrator: transitions located in time, or the paper's fixed step of 1 ms."
@@ -151,10 +128,23 @@ class TumbleSettings(TrialSettings):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
-        for finding in (self._gravity(), self._actuation()):
+        for finding in (self._sweep(), self._gravity(), self._actuation()):
             if finding:
                 raise ValueError(finding)
         return self
+
+    def _sweep(self) -> str | None:
+        for key in self._swept():
+            in_effects = next((text.partition("=")[2] for text in self.effects if text.startswith(f"{key}=")), None)
+            given = in_effects if "." in key else getattr(self, key)
+            if given is not None:
+                return f"{key} = {given} is given and swept: one of them would do"
+        if self.sweep and self.campaign is not None:
+            return f"campaign = {self.campaign!r} with a sweep: a campaign is of one tumble, so one of them would do"
+        return None
+
+    def _swept(self) -> list[str]:
+        return [each.key for each in parse_sweep(self.sweep)]
 
     def _gravity(self) -> str | None:
         if self.rig is not None and self.gravity is not None:
@@ -172,7 +162,7 @@ class TumbleSettings(TrialSettings):
         return None
 
     def _actuation(self) -> str | None:
-        if self.actuator == "brake" and not (self.wheel_speed_0 or 0.0) > 0:
+        if self.actuator == "brake" and not (self.wheel_speed_0 or 0.0) > 0 and "wheel_speed_0" not in self._swept():
             found = "is not given" if self.wheel_speed_0 is None else f"= {self.wheel_speed_0:g} rad/s"
             return (
                 f"wheel_speed_0 {found}: a brake slows a wheel that turns, so the wheel's speed at the start must be "

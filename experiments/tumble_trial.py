@@ -16,8 +16,16 @@ from rigid.terms import EFFECTS
 from rigid.trial import Effect, Ground, Trial
 
 from .campaign import TumbleModel, read_model
-from .surfaces import find_surface
-from .tumble_platform import Number, check_actuation, defaults_said, platform_numbers, wheel_limit
+from .settled import (
+    Number,
+    Settled,
+    check_actuation,
+    defaults_said,
+    settle_limits,
+    settle_platform,
+    settle_surface,
+)
+from .tumble_platform import platform_numbers
 from .tumble_settings import TumbleSettings
 
 __all__ = ["DEFAULT_RIG", "TumblePlan", "model_trial", "plan_tumble"]
@@ -26,26 +34,8 @@ TORQUE = 0.22
 """The paper's middle one [N m]."""
 DEFAULT_RIG = 0.0085
 """The paper's lower gravity [9.80665 m/s2]."""
-DEFAULT_SURFACE = "steel"
 SPIKES_PER_ROW = 2.0
 """The platform stands on two rows of two."""
-
-UNITS = {
-    "mass": "kg",
-    "inertia": "kg m2",
-    "spike_length": "m",
-    "wheel_inertia": "kg m2",
-    "stiffness": "N/m",
-    "damping": "N s/m",
-    "mu_s": "1",
-    "mu_d": "1",
-    "gravity_sim": "m/s2",
-    "gravity": "m/s2",
-    "counterweight": "kg",
-    "torque": "N m",
-    "torque_until": "s",
-    "wheel_speed_0": "rad/s",
-}
 
 
 @dataclass(frozen=True)
@@ -75,35 +65,21 @@ def plan_tumble(settings: TumbleSettings, *, model_file: Path | None = None) -> 
     """
     source = model_file if model_file is not None else Path(settings.model) if settings.model is not None else None
     model = _read(source) if source is not None else None
-    numbers: dict[str, Number] = {}
-
-    def settle(name: str, default: float, origin: str, *, in_model: float | None = None) -> float:
-        given = getattr(settings, name, None)
-        if given is not None:
-            numbers[name] = Number(given, UNITS[name], "given")
-        elif in_model is not None:
-            numbers[name] = Number(in_model, UNITS[name], "model")
-        else:
-            numbers[name] = Number(default, UNITS[name], origin)
-        return numbers[name].value
-
+    numbers = Settled(settings)
     platform = platform_numbers(settings.platform)
-    for name in ("mass", "inertia", "spike_length"):
-        in_model = getattr(model.platform, name) if model is not None else None
-        settle(name, getattr(platform, name), f"platform {platform.name}", in_model=in_model)
-    in_model = model.wheel.inertia if model is not None else None
-    settle("wheel_inertia", platform.wheel_inertia, f"platform {platform.name}", in_model=in_model)
-    surface, warnings = _settle_surface(settings, model, settle)
+    settle_platform(numbers, platform, model=model)
+    surface, warnings = settle_surface(numbers, settings.surface, model=model)
     _settle_gravity(settings, model, numbers)
     weak = platform.motor_torque < TORQUE
-    settle("torque", platform.motor_torque if weak else TORQUE, f"motor of {platform.name}" if weak else "default")
-    settle("torque_until", float("inf"), "default: as long as the trial")
-    settle("wheel_speed_0", 0.0, "default")
-    own_wheel = numbers["wheel_inertia"].origin != "given"
-    limit = wheel_limit(settings.max_wheel_speed, platform, own_wheel=own_wheel, in_model=model is not None)
-    warnings += check_actuation(settings.actuator, platform, numbers, limit, in_model=model is not None)
+    torque, origin = (platform.motor_torque, f"motor of {platform.name}") if weak else (TORQUE, "default")
+    numbers.settle("torque", torque, origin)
+    numbers.settle("torque_until", math.inf, "default: as long as the trial")
+    numbers.settle("wheel_speed_0", 0.0, "default")
     values: dict[str, Any] = {name: number.value for name, number in numbers.items()}
+    settle_limits(numbers, platform, in_model=model is not None)
+    warnings += check_actuation(settings.actuator, platform, numbers)
     ground = _ground(settings)
+    assert platform.spike_count is not None  # or it would have been refused
     trial = Trial(
         **values,
         spike_count=platform.spike_count,
@@ -119,10 +95,9 @@ def plan_tumble(settings: TumbleSettings, *, model_file: Path | None = None) -> 
             origin = "given" if name in ground.parameters else f"default of {ground.name}, of one spike"
             numbers[name] = Number(value, unit, origin)
     numbers["spike_count"] = Number(trial.spike_count, "1", f"rows of platform {platform.name}")
-    numbers["max_wheel_speed"] = limit
     warnings += _rig_warnings(trial)
     choices = _choices(settings, surface, model)
-    return TumblePlan(trial, numbers, surface, choices, tuple(warnings), limit.value)
+    return TumblePlan(trial, numbers, surface, choices, tuple(warnings), numbers.value("max_wheel_speed"))
 
 
 def _choices(settings: TumbleSettings, surface: str, model: TumbleModel | None) -> dict[str, str]:
@@ -150,27 +125,7 @@ def _read(path: Path) -> TumbleModel:
     return model
 
 
-def _settle_surface(settings: TumbleSettings, model: TumbleModel | None, settle: Any) -> tuple[str, list[str]]:
-    """Settle K, C and friction; return the material's name and what has to be said of it."""
-    numbers: Any
-    warnings: list[str] = []
-    if settings.surface is None and model is not None:
-        numbers, name, origin = model.surface, model.surface.kind, "model"
-    else:
-        numbers = found = find_surface(settings.surface or DEFAULT_SURFACE)
-        name, origin = found.name, f"surface {found.name}"
-        warnings = [f"stiffness, damping and friction of {name} are {found.source}"] if found.guess else []
-    for key in ("stiffness", "damping", "mu_s"):
-        settle(key, getattr(numbers, key), origin)
-    if settings.mu_s is not None:
-        settle("mu_d", 0.5 * settings.mu_s, "default: half of mu_s")
-    else:
-        sliding = numbers.mu_d if numbers.mu_d is not None else 0.5 * numbers.mu_s
-        settle("mu_d", sliding, origin)
-    return name, warnings
-
-
-def _settle_gravity(settings: TumbleSettings, model: TumbleModel | None, numbers: dict[str, Number]) -> None:
+def _settle_gravity(settings: TumbleSettings, model: TumbleModel | None, numbers: Settled) -> None:
     """Settle gravity_sim, local gravity and counterweight, in the rig or free of it."""
     if settings.gravity is not None:
         numbers["gravity_sim"] = Number(settings.gravity, "m/s2", "given")

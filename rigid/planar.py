@@ -160,8 +160,8 @@ class _Recorder:
         arrays["state"] = arrays["state"].astype(np.int8)
         return Trajectory(
             trial=self.system.trial, method=method, transitions=tuple(transitions), trajectory_angle=tally.angle,
-            max_speed=tally.max_speed, max_angular_velocity=tally.max_spin, energy_residual=tally.residual,
-            notes=notes, **arrays,
+            max_speed=tally.max_speed, time_of_max_speed=tally.time_of_max_speed,
+            max_angular_velocity=tally.max_spin, energy_residual=tally.residual, notes=notes, **arrays,
         )  # fmt: skip
 
 
@@ -189,9 +189,9 @@ def _simulate_located(trial: Trial, duration: float, samples: list[float], toler
             system.derivative(t, z, modes)
             energy = system.energy(t, z, modes)
             recorder.sample(t, z, modes, energy)
-            tally.see(z[VX], z[VY], z[OMEGA], sum(energy), z[WORK], z[LOST])
+            tally.see(t, z[VX], z[VY], z[OMEGA], sum(energy), z[WORK], z[LOST])
         recorder.next = end
-        tally.see(z1[VX], z1[VY], z1[OMEGA], sum(system.energy(t1, z1, modes)), z1[WORK], z1[LOST])
+        tally.see(t1, z1[VX], z1[VY], z1[OMEGA], sum(system.energy(t1, z1, modes)), z1[WORK], z1[LOST])
 
     went = integrate(system, duration=duration, tolerance=tolerance, on_step=on_step, start=(z0, modes0))
     notes = {
@@ -212,7 +212,7 @@ def _simulate_fixed(trial: Trial, duration: float, samples: list[float], time_st
         energy = system.energy(time, z, modes)
         if tally is None:
             tally = Tally(trial, z[X], z[Y], sum(energy))
-        tally.see(z[VX], z[VY], z[OMEGA], sum(energy), z[WORK], z[LOST])
+        tally.see(time, z[VX], z[VY], z[OMEGA], sum(energy), z[WORK], z[LOST])
         away = tally.distance(z[X], z[Y])
         if tally.angle is None and away >= LAUNCH_DISTANCE:
             before = last[0][1]

@@ -8,6 +8,7 @@ are found by Newton's method from the balance of forces along the normal and of 
 from __future__ import annotations
 
 from .dynamics import INNER, THETA, WHEEL, Modes, System, Y
+from .trial import Trial
 
 __all__ = ["inner_slopes", "standing", "stiffness_at_rest"]
 
@@ -80,7 +81,16 @@ def _why_not(system: System, what: str) -> str:
     given = {effect.id: effect.values for effect in system.trial.effects}
     told = ", ".join(f"{id}.{name} = {value:g}" for id, own in given.items() for name, value in own.items())
     ground = ", ".join(f"{value:g}" for value in system.q)
-    return f"it cannot stand: {what} ({told or 'no effects'}; ground {system.trial.surface.name} of {ground})"
+    limit = f"; {_offset_that_tips(system.trial)}" if "com-offset" in given else ""
+    return f"it cannot stand: {what} ({told or 'no effects'}; ground {system.trial.surface.name} of {ground}){limit}"
+
+
+def _offset_that_tips(trial: Trial) -> str:
+    """How far the centre of mass may be ahead of the shaft or behind it: m g x = W l sin(pi / n) empties a row."""
+    limit = trial.tipping_torque / (trial.mass * trial.pull_at_mass)
+    return (
+        f"on level ground com-offset.x up to {1e3 * limit:.3g} mm would do, W l sin(pi / {trial.spike_count}) / (m g)"
+    )
 
 
 def _sinkage(system: System, load: float) -> float:

@@ -58,6 +58,8 @@ class Trajectory:
     """atan2(dy, dx) of the centre from its start to the first point 10 mm away [rad]; None if never reached."""
     max_speed: float
     """Largest speed of the centre [m/s]."""
+    time_of_max_speed: float
+    """When it is that fast [s], to a step or a sample, whichever is nearer."""
     max_angular_velocity: float
     """Largest |omega| [rad/s]."""
     energy_residual: float
@@ -94,7 +96,7 @@ class Tally:
     def __init__(self, trial: Trial, x: float, y: float, energy: float) -> None:
         self.start, self.energy = (x, y), energy
         self.scale = trial.weight * trial.spike_length
-        self.max_speed = self.max_spin = self.worst = self.most_work = 0.0
+        self.max_speed = self.max_spin = self.worst = self.most_work = self.time_of_max_speed = 0.0
         self.angle: float | None = None
 
     def distance(self, x: float, y: float) -> float:
@@ -105,9 +107,11 @@ class Tally:
         """The centre is LAUNCH_DISTANCE away for the first time."""
         self.angle = math.atan2(y - self.start[1], x - self.start[0])
 
-    def see(self, vx: float, vy: float, omega: float, energy: float, work: float, lost: float) -> None:
+    def see(self, time: float, vx: float, vy: float, omega: float, energy: float, work: float, lost: float) -> None:
         """One moment."""
-        self.max_speed = max(self.max_speed, math.hypot(vx, vy))
+        speed = math.hypot(vx, vy)
+        if speed > self.max_speed:
+            self.max_speed, self.time_of_max_speed = speed, time
         self.max_spin = max(self.max_spin, abs(omega))
         self.most_work = max(self.most_work, abs(work))
         self.worst = max(self.worst, abs(energy - self.energy - work + lost))

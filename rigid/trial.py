@@ -183,7 +183,11 @@ class Trial:
                 raise ValueError(f"effect {effect.id!r} needs a rig: counterweight = 0 must be above 0 (kg)")
         offset = self.effect_values("com-offset")
         if offset and self.mass * (offset["x"] ** 2 + offset["y"] ** 2) >= self.inertia:
-            raise ValueError(f"com-offset {offset} is too far for inertia = {self.inertia:g} kg m2 about the shaft")
+            raise ValueError(
+                f"com-offset.x = {offset['x']:g} m, com-offset.y = {offset['y']:g} m are too far off the shaft for "
+                f"inertia = {self.inertia:g} kg m2 about it: less than sqrt(J / m) = "
+                f"{math.sqrt(self.inertia / self.mass):.4g} m together would do"
+            )
 
     def _number(self, key: str, *, above: bool = False) -> None:
         value = getattr(self, key)
@@ -209,6 +213,27 @@ class Trial:
     def weight(self) -> float:
         """W [N] on the surface."""
         return (self.mass + self.counterweight) * self.gravity_sim
+
+    @property
+    def height(self) -> float:
+        """Of the centre above the tips that it stands on [m]: l cos(pi / n) for n rows of spikes."""
+        return self.spike_length * math.cos(math.pi / self.spike_count)
+
+    @property
+    def tipping_torque(self) -> float:
+        """Least torque that tips the base model from rest [N m] where it comes up slowly: W l sin(pi / n)."""
+        return self.weight * self.spike_length * math.sin(math.pi / self.spike_count)
+
+    @property
+    def slip_torque(self) -> float:
+        """Least torque that makes the base model slip at rest [N m] where it is there at once.
+
+        The springs have not moved yet: the platform turns about the line of its feet, h below the centre, and holding
+        them takes m h tau / (J + m h^2) of mu_s W. So mu_s W (J + m h^2) / (m h), in the rig too, where x has no more
+        inertia than m.
+        """
+        h = self.height
+        return self.mu_s * self.weight * (self.inertia + self.mass * h * h) / (self.mass * h)
 
     @property
     def pull_at_mass(self) -> float:

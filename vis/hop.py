@@ -30,14 +30,15 @@ _DPI = 130
 def write_hop_report(folder: str | Path, *, progress: Callable[[float], None] | None = None) -> Path:
     """Make figures/ and report.html of the folder of a hop, and return the report.
 
-    Raises FileNotFoundError where the folder has no result.json or series/flight.csv.
+    Raises FileNotFoundError where the folder has no result.json.
     """
     tell = progress if progress is not None else lambda done: None
     folder = Path(folder)
     result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
     figures = folder / "figures"
     figures.mkdir(exist_ok=True)
-    drawn = [_flights(folder, result, figures)]
+    flights = any((folder / "series").glob("flight*.csv"))
+    drawn = [_flights(folder, result, figures)] if flights else []
     tell(0.5)
     if (folder / "trajectory.csv").exists():
         drawn.append(_launch(folder, result, figures))
@@ -61,12 +62,14 @@ def _axes(width: float, height: float, columns: int = 1) -> tuple[Figure, list[A
 
 def _flights(folder: Path, result: Mapping[str, Any], figures: Path) -> Block:
     """Height against the way along the ground, theory's and the model's, both axes in one scale."""
-    theory, _ = read_columns(folder / "series" / "flight.csv")
-    other = folder / "series" / "flight.model.csv"
+    first, other = folder / "series" / "flight.csv", folder / "series" / "flight.model.csv"
     with styled():
         drawing, (axis,) = _axes(8.6, 4.2)
-        axis.plot(theory["along_m"], theory["height_m"], color=BED)
-        handles = [Line2D([], [], color=BED, label="hop theory, rigid ground")]
+        handles = []
+        if first.exists():
+            theory, _ = read_columns(first)
+            axis.plot(theory["along_m"], theory["height_m"], color=BED)
+            handles = [Line2D([], [], color=BED, label="hop theory, rigid ground")]
         if other.exists():
             model, _ = read_columns(other)
             axis.plot(model["along_m"], model["height_m"], color=MODEL, ls=_DASHES)
@@ -78,11 +81,13 @@ def _flights(folder: Path, result: Mapping[str, Any], figures: Path) -> Block:
         axis.set_aspect("equal")
         drawing.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.075, 1.0), ncols=2)
         drawing.savefig(figures / "flights.png", dpi=_DPI)
-    missing = "" if other.exists() else " The planar model has no flight that ends: see the warnings."
+    missing = "" if first.exists() else " From rigid ground it escapes: see the warnings."
+    missing += "" if other.exists() else " The planar model has no flight that ends: see the warnings."
+    sought = "sought for rigid ground" if result.get("asks_for", "distance") == "distance" else "the same on both"
     return figure(
         figures / "flights.png",
         title="The flight",
-        caption=f"One scale both ways. The wheel is sought for rigid ground; what gives way springs back.{missing}",
+        caption=f"One scale both ways. The wheel is {sought}; what gives way springs back.{missing}",
     )
 
 

@@ -6,6 +6,7 @@ import csv
 import json
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from PIL import Image, ImageDraw
 from vis.numbers import quantity, short
 from vis.page import Block, Page, Section, Tile, code, figure, table, text, write_page
 from vis.style import BED, GREY, INK, MODEL, styled
+from vis.tumble_sweep import sweep_section
 
 __all__ = ["STATES", "read_columns", "state_runs", "write_tumble_report"]
 
@@ -61,6 +63,9 @@ def write_tumble_report(folder: str | Path, *, progress: Callable[[float], None]
     moving = _animate(folder / "animation.gif", result, numbers, states)
     tell(0.9)
     page = _page(folder, result, drawn, moving, len(numbers["t_s"]))
+    if "sweep" in result:
+        swept, _ = read_columns(folder / result["sweep"]["file"])
+        page = replace(page, sections=[sweep_section(result, figures, swept), *page.sections])
     report = write_page(folder / "report.html", page)
     tell(1.0)
     return report

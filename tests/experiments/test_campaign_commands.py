@@ -113,7 +113,7 @@ def test_of_a_thousand_faults_of_one_kind_five_are_said_and_the_number(tmp_path)
 def tumbles(tmp_path_factory):
     """Five trials alike, of a motor on brick."""
     settings = CampaignSettings(
-        rigs=(0.0085,), motor_torques=(0.22,), brake_torques=(), duration=1.0, repeats=5, surface="brick"
+        rig=(0.0085,), motor_torques=(0.22,), brake_torques=(), duration=1.0, trials=5, surface="brick"
     )
     folder = tmp_path_factory.mktemp("made")
     with pytest.MonkeyPatch.context() as patch:

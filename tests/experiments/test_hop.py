@@ -11,7 +11,7 @@ from experiments.cli import BAD_INPUT, DONE, main
 from experiments.hop_on_surface import flight_path, hop_on_surface
 from rigid.hop import Launch, Tumbler, brake_launch, flight
 from rigid.planar import simulate
-from rigid.platform_files import PLATFORM_FOLDER, find_platform
+from rigid.platform_files import PLATFORM_FOLDER
 from rigid.trial import Trial
 from vis import write_report
 
@@ -39,11 +39,7 @@ def test_the_wheel_speed_takes_the_hedgehog_the_distance(tmp_path, capsys):
     status, result = hop(tmp_path, capsys, "--gravity", "1e-3", "--distance", "5", "--body-radius", "300")
     assert status == DONE
     value = {key: quantity["value"] for key, quantity in result["quantities"].items()}
-    platform = find_platform("hedgehog")
-    stance = platform.stance()
-    tumbler = Tumbler(
-        mass=5.3, inertia=0.06, spike_length=stance.spike_length, lean=math.pi / 8, gravity=1e-3, mu_s=0.5, mu_d=0.25
-    )
+    tumbler = Tumbler(mass=5.3, inertia=0.06, spike_length=0.2, lean=math.pi / 8, gravity=1e-3, mu_s=0.5, mu_d=0.25)
     left = brake_launch(tumbler, 1.2e-3 * value["wheel_speed"], 6.0)
     assert flight(left.speed, left.angle, gravity=1e-3, radius=300.0).distance == pytest.approx(5.0, rel=1e-6)
     assert value["distance"] == pytest.approx(5.0, rel=1e-6)
@@ -97,7 +93,7 @@ def test_springy_ground_throws_a_sliding_platform_faster_at_the_same_angle(tmp_p
     _, result = hop(tmp_path, capsys, "--gravity", "1e-3", "--distance", "5", "--body-radius", "300")
     value = {key: quantity["value"] for key, quantity in result["quantities"].items()}
     trial = Trial(
-        mass=5.3, inertia=0.06, spike_length=find_platform("hedgehog").stance().spike_length, mu_s=0.5,
+        mass=5.3, inertia=0.06, spike_length=0.2, mu_s=0.5,
         gravity_sim=1e-3, gravity=1e-3, stiffness=1.5e4, damping=60.0, torque=6.0, actuator="brake",
         wheel_speed_0=value["wheel_speed"],
     )  # fmt: skip
@@ -164,7 +160,7 @@ def test_every_default_is_printed(tmp_path, capsys):
         "stiffness = 15000 N/m (surface brick)", "damping = 60 N s/m (surface brick)",
         "mass = 5.3 kg (platform hedgehog)", "inertia = 0.06 kg m2 (platform hedgehog)",
         "wheel_inertia = 0.0012 kg m2 (platform hedgehog)", "max_wheel_speed = 1050 rad/s (platform hedgehog)",
-        "spike_length = 0.199904 m (platform hedgehog)", "lean = 0.392699 rad (platform hedgehog)",
+        "spike_length = 0.2 m (platform hedgehog)", "lean = 0.392699 rad (platform hedgehog)",
     ):  # fmt: skip
         assert line in said, line
     assert "mu_s = 0.4 " not in said  # that was given
@@ -208,6 +204,65 @@ def test_what_is_said_reads_well(tmp_path, capsys):
     assert re.fullmatch(r"A motor at \S+ N m, whose wheel comes to \S+ rad/s \(\S+ rpm\), the platform .*", first[1])
 
 
+# Asked by what the flywheel does
+
+
+def test_a_wheel_speed_that_is_given_goes_as_far_as_the_distance_it_was_found_for(tmp_path, capsys):
+    _, sought = hop(tmp_path, capsys, "--distance", "5", "--body-radius", "300", name="a")
+    value = {key: quantity["value"] for key, quantity in sought["quantities"].items()}
+    speed = repr(value["wheel_speed"])
+    status, result = hop(tmp_path, capsys, "--wheel-speed-0", speed, "--body-radius", "300", name="b")
+    found = {key: quantity["value"] for key, quantity in result["quantities"].items()}
+    assert status == DONE and found["model_wheel_speed"] is None and "distance" not in result["numbers"]
+    assert found["distance"] == pytest.approx(5.0, rel=1e-6)
+    for name in set(value) - {"model_wheel_speed", "distance"}:
+        assert found[name] == pytest.approx(value[name], rel=1e-5), name
+    assert not any("times the distance" in warning for warning in result["warnings"])
+
+
+def test_a_wheel_speed_that_escapes_has_no_landing_and_says_so(tmp_path, capsys, reported):
+    status, result = hop(tmp_path, capsys, "--wheel-speed-0", "300", "--body-radius", "5")
+    value = {key: quantity["value"] for key, quantity in result["quantities"].items()}
+    assert status == DONE and value["escape_ratio"] > 1
+    assert value["distance"] is value["flight_time"] is value["distance_factor"] is None
+    assert "it escapes" in result["departures"]["sentences"][0]
+    assert any(warning.startswith("it escapes") for warning in result["warnings"])
+    assert (tmp_path / "run" / "report.html").exists()
+
+
+def test_a_motors_torque_that_is_given_goes_as_far_as_the_distance_it_was_found_for(tmp_path, capsys):
+    _, sought = hop(tmp_path, capsys, "--actuator", "motor", "--distance", "0.5", name="a")
+    torque = sought["quantities"]["torque"]["value"]
+    _, result = hop(tmp_path, capsys, "--actuator", "motor", "--torque", repr(torque), name="b")
+    assert result["quantities"]["distance"]["value"] == pytest.approx(0.5, rel=1e-6)
+
+
+def test_a_body_of_ones_own_takes_the_closed_forms_wheel_speed(tmp_path, capsys):
+    """The names of `tumble`: H = J_w omega_0 of a brake that takes no time, on ground that slides (rigid.hop)."""
+    own = ("--mass", "4", "--inertia", "0.03", "--spike-length", "0.15", "--wheel-inertia", "2e-3")
+    _, result = hop(tmp_path, capsys, *own, "--distance", "1")
+    value = {key: quantity["value"] for key, quantity in result["quantities"].items()}
+    s, c = math.sin(math.pi / 8), math.cos(math.pi / 8)
+    up = math.sqrt(1e-3 * 1.0 / (2 * 0.25)) / 1.0  # distance = 2 vx vy / g with vx = mu_d vy
+    spin = up / (0.15 * s)
+    assert value["wheel_speed_impulsive"] == pytest.approx(spin * (0.03 + 4 * 0.15**2 * s * (s + 0.25 * c)) / 2e-3)
+    assert value["wheel_speed"] == pytest.approx(value["wheel_speed_impulsive"], rel=0.05)
+    assert result["numbers"]["max_wheel_speed"]["value"] is None  # of that wheel nothing is known
+    assert result["numbers"]["mass"] == {"value": 4.0, "unit": "kg", "origin": "given"}
+
+
+def test_a_distance_too_far_says_what_each_ground_allows(tmp_path, capsys):
+    """Between the two limits the wheel speed for the ground that gives is named, and goes there."""
+    _, error = hop(tmp_path, capsys, "--distance", "5000")
+    assert re.search(
+        r"on rigid ground .* hops \S+ m at most .*; on brick .* the planar model hops \S+ m at most", error
+    )
+    _, error = hop(tmp_path, capsys, "--distance", "40")
+    speed = re.search(r"goes that far with a wheel at (\S+) rad/s: --wheel-speed-0", error)[1]
+    _, result = hop(tmp_path, capsys, "--wheel-speed-0", speed)
+    assert result["quantities"]["model_distance"]["value"] == pytest.approx(40, rel=1e-2)
+
+
 def test_a_motor_is_asked_for_its_torque(tmp_path, capsys):
     status, result = hop(tmp_path, capsys, "--actuator", "motor", "--distance", "0.5")
     assert status == DONE
@@ -223,7 +278,14 @@ def test_a_motor_is_asked_for_its_torque(tmp_path, capsys):
         (("--distance", "30", "--body-radius", "20"), "escapes"),
         (("--actuator", "motor", "--distance", "1"), "0.22 N m"),
         (("--torque", "7"), "at most 6 N m"),
-        (("--torque", "1", "--actuator", "motor"), "torque = 1 N m"),
+        (("--torque", "1", "--actuator", "motor"), "torque = 1 N m: the motor of Hedgehog gives at most 0.22 N m"),
+        (("--torque", "0.2", "--actuator", "motor", "--distance", "2"), "leave one of the two out"),
+        (("--wheel-speed-0", "100", "--distance", "2"), "leave one of the two out"),
+        (("--wheel-speed-0", "100", "--actuator", "motor"), "torque in place of distance would do"),
+        (("--wheel-speed-0", "1100"), "beyond max_wheel_speed = 1050 rad/s (platform hedgehog)"),
+        (("--wheel-speed-0", "0.001"), "does not make the platform leave rigid ground"),
+        (("--inertia", "0.5"), "inertia = 0.5 kg m2 must not exceed mass spike_length^2"),
+        (("--wheel-inertia", "0.1"), "inertia = 0.06 kg m2 must exceed wheel_inertia = 0.1"),
         (("--gravity", "9.81", "--torque", "1"), "does not tip"),
         (("--platform", "roomba"), "'roomba'"),
         (("--gravity", "-1"), "gravity"),

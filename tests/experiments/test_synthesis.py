@@ -32,12 +32,12 @@ def reported():
 
 
 def quick(**changes):
-    values = {"rigs": (0.0085,), "motor_torques": (0.22,), "brake_torques": (), "duration": 0.8}
+    values = {"rig": (0.0085,), "motor_torques": (0.22,), "brake_torques": (), "duration": 0.8}
     return CampaignSettings(**(values | changes))
 
 
 def test_it_writes_a_campaign_that_reads_back(tmp_path):
-    settings = quick(rigs=(0.0085, 0.015), brake_torques=(6.0,), repeats=2, surface="brick", wire_length=2.2)
+    settings = quick(rig=(0.0085, 0.015), brake_torques=(6.0,), trials=2, surface="brick", wire_length=2.2)
     run(settings, tmp_path / "a")
     campaign = read_campaign(tmp_path / "a" / "campaign")
     trials = campaign.tables.trial
@@ -88,7 +88,7 @@ def test_the_same_seed_gives_the_same_files_and_another_others(tmp_path):
 
 def test_the_truth_lies_within_what_is_stated_and_not_on_it_unless_asked(tmp_path):
     for name, exact in (("drawn", False), ("exact", True)):
-        run(quick(exact=exact, repeats=3), tmp_path / name)
+        run(quick(exact=exact, trials=3), tmp_path / name)
         stated = read_campaign(tmp_path / name / "campaign").tables
         truth = read_model(tmp_path / name / "truth.toml")
         ratios = [
@@ -107,7 +107,7 @@ def test_the_truth_lies_within_what_is_stated_and_not_on_it_unless_asked(tmp_pat
 
 
 def test_free_of_the_rig_there_is_no_counterweight(tmp_path):
-    run(quick(gravities=(0.05,), rigs=(), exact=True), tmp_path / "a")
+    run(quick(gravity=(0.05,), rig=(), exact=True), tmp_path / "a")
     campaign = read_campaign(tmp_path / "a" / "campaign")
     assert campaign.tables.rig is None
     rest = campaign.recording("001", "imu")
@@ -116,7 +116,7 @@ def test_free_of_the_rig_there_is_no_counterweight(tmp_path):
 
 
 def test_the_command_line_makes_one_with_a_report(reported, tmp_path, capsys):
-    tokens = ["campaign", "--rigs", "0.0085", "--motor-torques", "0.22", "--brake-torques", "6", "--duration", "0.3"]
+    tokens = ["campaign", "--rig", "0.0085", "--motor-torques", "0.22", "--brake-torques", "6", "--duration", "0.3"]
     assert main([*tokens, "--quiet", "--json", "--out", "a"]) == 0
     assert json.loads(capsys.readouterr().out)["quantities"]["trial_count"]["value"] == 2
     page = Path("a/report.html").read_text()
@@ -129,7 +129,7 @@ def test_the_command_line_makes_one_with_a_report(reported, tmp_path, capsys):
         (["--motor-torques", "0.5"], ["torque = 0.5", "at most 0.22"]),
         (["--motor-torques", "0.1", "0.1"], ["motor_torques", "twice"]),
         (["--pose-std", "0.1", "-0.1", "0.1"], ["--pose-std[1] = -0.1", "greater than or equal to 0"]),
-        (["--gravities", "0.1", "--counterweight", "5"], ["counterweight = 5", "free platform"]),
+        (["--gravity", "0.1", "--counterweight", "5"], ["counterweight = 5", "free platform"]),
         (["--ground", "bekker"], ["ground = 'bekker'", "spring-damper"]),
         (["--effects", "magic"], ["'magic'"]),
     ],

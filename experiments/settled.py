@@ -1,0 +1,173 @@
+"""Numbers of a trial as they are settled: what is given wins over a model, a model over surface and platform.
+
+Each keeps where it comes from, so that a run can print every default.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from .surfaces import DEFAULT_SURFACE, find_surface
+from .tumble_platform import PlatformNumbers
+
+__all__ = [
+    "UNITS",
+    "Number",
+    "Settled",
+    "check_actuation",
+    "defaults_said",
+    "settle_limits",
+    "settle_platform",
+    "settle_surface",
+]
+
+UNITS = {
+    "mass": "kg",
+    "inertia": "kg m2",
+    "spike_length": "m",
+    "lean": "rad",
+    "wheel_inertia": "kg m2",
+    "max_wheel_speed": "rad/s",
+    "max_motor_torque": "N m",
+    "stiffness": "N/m",
+    "damping": "N s/m",
+    "mu_s": "1",
+    "mu_d": "1",
+    "gravity_sim": "m/s2",
+    "gravity": "m/s2",
+    "counterweight": "kg",
+    "torque": "N m",
+    "torque_until": "s",
+    "wheel_speed_0": "rad/s",
+    "distance": "m",
+    "body_radius": "m",
+}
+
+
+@dataclass(frozen=True)
+class Number:
+    """One number of a trial: value, unit, and where it comes from ("given", "default", "surface steel", ...)."""
+
+    value: float
+    unit: str
+    origin: str
+
+
+class Settled(dict[str, Number]):
+    """The numbers by name, in the order in which they were settled."""
+
+    def __init__(self, settings: Any) -> None:
+        super().__init__()
+        self._settings = settings
+
+    def settle(self, name: str, default: float, origin: str, *, in_model: float | None = None) -> float:
+        """Settle `name`: as the settings give it, else as the model has it, else `default` from `origin`."""
+        given = getattr(self._settings, name, None)
+        if given is not None:
+            self[name] = Number(float(given), UNITS[name], "given")
+        elif in_model is not None:
+            self[name] = Number(in_model, UNITS[name], "model")
+        else:
+            self[name] = Number(default, UNITS[name], origin)
+        return self[name].value
+
+    def value(self, name: str) -> float:
+        """The number called `name`."""
+        return self[name].value
+
+
+def defaults_said(choices: Mapping[str, str], numbers: Mapping[str, Number]) -> list[str]:
+    """One line for each choice at its default and each number that was not given: every default is said."""
+    lines = [f"{name} = {value} (default)" for name, value in choices.items()]
+    for name, number in numbers.items():
+        if number.origin != "given":
+            lines.append(f"{name} = {_said(name, number)} ({number.origin})")
+    return lines
+
+
+def _said(name: str, number: Number) -> str:
+    if math.isinf(number.value):
+        return "no end" if name == "torque_until" else "no limit known"
+    return f"{number.value:.6g}" + ("" if number.unit == "1" else f" {number.unit}")
+
+
+def settle_platform(numbers: Settled, platform: PlatformNumbers, *, model: Any = None) -> None:
+    """Settle mass, inertia and spike length of the platform, and its wheel's inertia. `model`: a `TumbleModel`."""
+    origin = f"platform {platform.name}"
+    for name in ("mass", "inertia", "spike_length"):
+        in_model = getattr(model.platform, name) if model is not None else None
+        numbers.settle(name, getattr(platform, name), origin, in_model=in_model)
+    in_model = model.wheel.inertia if model is not None else None
+    numbers.settle("wheel_inertia", platform.wheel_inertia, origin, in_model=in_model)
+
+
+def settle_limits(numbers: Settled, platform: PlatformNumbers, *, in_model: bool = False) -> None:
+    """Settle how fast the wheel may turn and what the motor gives at most: as given, else those of the platform.
+
+    They are limits of the platform's own wheel with its motor; of another wheel, or a model's, nothing is known (inf).
+    """
+    own = numbers.value("wheel_inertia") == platform.wheel_inertia
+    for name in ("max_wheel_speed", "max_motor_torque"):
+        if in_model:
+            numbers.settle(name, math.inf, "a model says nothing of it")
+        elif not own:
+            numbers.settle(name, math.inf, f"wheel_inertia is given: not the wheel of {platform.name}")
+        else:
+            numbers.settle(name, getattr(platform, name), f"platform {platform.name}")
+
+
+def settle_surface(numbers: Settled, surface: str | None, *, model: Any = None) -> tuple[str, list[str]]:
+    """Settle K, C and friction; return the material's name and what has to be said of it. `model`: a `TumbleModel`.
+
+    Raises ValueError for a surface there is not, and for more sliding than static friction.
+    """
+    material: Any
+    warnings: list[str] = []
+    if surface is None and model is not None:
+        material, name, origin = model.surface, model.surface.kind, "model"
+    else:
+        material = found = find_surface(surface or DEFAULT_SURFACE)
+        name, origin = found.name, f"surface {found.name}"
+        warnings = [f"stiffness, damping and friction of {name} are {found.source}"] if found.guess else []
+    for key in ("stiffness", "damping", "mu_s"):
+        numbers.settle(key, getattr(material, key), origin)
+    if numbers["mu_s"].origin == "given":
+        numbers.settle("mu_d", 0.5 * numbers.value("mu_s"), "default: half of mu_s")
+    else:
+        sliding = material.mu_d if material.mu_d is not None else 0.5 * material.mu_s
+        numbers.settle("mu_d", sliding, origin)
+    mu_s, mu_d = numbers["mu_s"], numbers["mu_d"]
+    if mu_d.value > mu_s.value:
+        raise ValueError(f"mu_d = {mu_d.value:g} is above mu_s = {mu_s.value:g} ({mu_s.origin}): at most that would do")
+    return name, warnings
+
+
+def check_actuation(
+    actuator: Literal["motor", "brake"], platform: PlatformNumbers, numbers: Mapping[str, Number]
+) -> list[str]:
+    """What has to be said of torque and wheel.
+
+    A brake beyond the platform's own is no more than said: it is an impulse in the limit. Raises ValueError, naming the
+    setting, for a torque beyond the motor, and for a wheel that starts beyond its limit.
+    """
+    torque, speed = numbers["torque"].value, numbers["wheel_speed_0"].value
+    fastest, strongest = numbers["max_wheel_speed"], numbers["max_motor_torque"]
+    if speed > fastest.value:
+        raise ValueError(
+            f"wheel_speed_0 = {speed:g} rad/s is beyond max_wheel_speed = {fastest.value:g} rad/s ({fastest.origin}): "
+            f"at most that would do, or a max_wheel_speed above it"
+        )
+    if actuator == "motor" and torque > strongest.value * (1 + 1e-9):
+        whose = (
+            f"the motor of platform = {platform.name!r}" if strongest.origin != "given" else "max_motor_torque (given)"
+        )
+        raise ValueError(
+            f"torque = {torque:g} N m is beyond {whose}: at most {strongest.value:g} N m would do, or a "
+            f"max_motor_torque above it, or actuator = brake with a wheel_speed_0"
+        )
+    if actuator == "brake" and torque > platform.brake_torque * (1 + 1e-9):
+        return [f"torque = {torque:g} N m is beyond the brake of {platform.name}, {platform.brake_torque:g} N m"]
+    return []

@@ -1,0 +1,233 @@
+"""`hedgebed tumble --sweep KEY=FROM:TO:STEP`: the same tumble over a range of one number, or over two.
+
+All trials are integrated at once by the batched model (`rigid.simulate_batch`). The trial in the middle is the run's
+own, integrated accurately; it and the corners tell how far the batch is off.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigid.planar import PAPER_STEP, longest_step, simulate
+from rigid.trial import Trial
+
+from .runfolder import RunFolder, write_series
+from .sweep_ranges import SweepRange, parse_sweep, unit_of
+from .tumble_platform import torque_within_limit
+from .tumble_settings import TumbleSettings
+from .tumble_trial import plan_tumble
+
+__all__ = ["SWEEP_FILE", "check_sweep", "middle_of_sweep", "run_sweep"]
+
+SWEEP_FILE = "sweep.csv"
+MOST_ROWS = 24
+"""Rows that the terminal shows."""
+COLUMNS = {
+    "trajectory_angle": "rad",
+    "max_speed": "m/s",
+    "max_angular_velocity": "rad/s",
+    "transition_angle_slip": "rad",
+    "transition_angle_hop": "rad",
+}
+"""Of each trial, by the names of a tumble's quantities."""
+SUFFIXES = {"1": "", "9.80665 m/s2": "_g"}
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Point:
+    """One trial of a sweep."""
+
+    values: tuple[float, ...]
+    trial: Trial
+
+
+def middle_of_sweep(settings: TumbleSettings) -> TumbleSettings:
+    """The settings of the trial in the middle; `settings` themselves without a sweep."""
+    ranges = parse_sweep(settings.sweep)
+    if not ranges:
+        return settings
+    return _at(settings, ranges, tuple(each.values[(len(each.values) - 1) // 2] for each in ranges))
+
+
+def check_sweep(settings: TumbleSettings) -> None:
+    """Raise ValueError, naming the point, where a trial of the sweep cannot be. Without a sweep there is none."""
+    if not settings.sweep:
+        return
+    if settings.method != "located":
+        raise ValueError(f"method = {settings.method!r} with a sweep, which the batched model does: 'located' would do")
+    _plan(settings)
+
+
+def run_sweep(settings: TumbleSettings, folder: RunFolder) -> dict[str, Any]:
+    """Integrate the sweep, write sweep.csv and return what result.json says of it; nothing without a sweep."""
+    if not settings.sweep:
+        return {}
+    from rigid.batch import simulate_batch
+
+    ranges, points = parse_sweep(settings.sweep), _plan(settings)
+    corners = _corners(ranges)
+    time_step = min(PAPER_STEP, *(0.999 * longest_step(points[place].trial) for place in corners))
+    batch = simulate_batch([point.trial for point in points], duration=settings.duration, time_step=time_step)
+    found: dict[str, Array] = {
+        "trajectory_angle": batch.trajectory_angle,
+        "max_speed": batch.max_speed,
+        "max_angular_velocity": batch.max_angular_velocity,
+        "transition_angle_slip": batch.transition_angles["slip"],
+        "transition_angle_hop": batch.transition_angles["hop"],
+    }
+    keys = {
+        _column(each.key, unit_of(each.key)): np.array([point.values[k] for point in points])
+        for k, each in enumerate(ranges)
+    }
+    write_series(folder.path / SWEEP_FILE, keys | {_column(name, COLUMNS[name]): found[name] for name in found})
+    fallen = int((~batch.stands).sum())
+    gaps = _gaps(settings.duration, points, found, [*corners, _middle(ranges)])
+    return {
+        "sweep": {
+            "file": SWEEP_FILE,
+            "keys": [
+                {"key": each.key, "unit": unit_of(each.key), "column": column, "values": list(each.values)}
+                for each, column in zip(ranges, keys, strict=True)
+            ],
+            "trials": len(points),
+            "cannot_stand": fallen,
+            "time_step": time_step,
+            "gaps": gaps,
+            "sentences": _sentences(settings, ranges, points, fallen, gaps),
+        },
+        "tables": [_table(ranges, points, found)],
+    }
+
+
+# Its trials -----------------------------------------------------------------------------------------------------------
+
+
+def _plan(settings: TumbleSettings) -> list[_Point]:
+    """Every trial, the last key running fastest."""
+    ranges = parse_sweep(settings.sweep)
+    points = []
+    for values in itertools.product(*(each.values for each in ranges)):
+        try:
+            plan = plan_tumble(_at(settings, ranges, values))
+        except ValueError as error:
+            where = ", ".join(f"{each.key} = {value:g}" for each, value in zip(ranges, values, strict=True))
+            raise ValueError(f"sweep: at {where}: {_plain(error)}") from None
+        limit = plan.max_wheel_speed
+        trial, _ = torque_within_limit(plan.trial, max_wheel_speed=limit, duration=settings.duration)
+        points.append(_Point(values, trial))
+    return points
+
+
+def _plain(error: ValueError) -> str:
+    """What was wrong: of pydantic's own errors the sentence alone."""
+    errors = getattr(error, "errors", None)
+    if errors is None:
+        return str(error)
+    return "; ".join(str(detail["msg"]).removeprefix("Value error, ") for detail in errors())
+
+
+def _at(settings: TumbleSettings, ranges: Sequence[SweepRange], values: Sequence[float]) -> TumbleSettings:
+    """The settings of one trial."""
+    changed: dict[str, Any] = settings.model_dump() | {"sweep": ()}
+    for each, value in zip(ranges, values, strict=True):
+        if each.is_effect:
+            changed["effects"] = (*changed["effects"], f"{each.key}={value!r}")
+        else:
+            changed[each.key] = value
+    return TumbleSettings(**changed)
+
+
+def _corners(ranges: Sequence[SweepRange]) -> list[int]:
+    """Numbers of the trials at the ends of every range."""
+    counts = [len(each.values) for each in ranges]
+    ends = itertools.product(*({0, count - 1} for count in counts))
+    return sorted(int(np.ravel_multi_index(end, counts)) for end in ends)
+
+
+def _middle(ranges: Sequence[SweepRange]) -> int:
+    counts = [len(each.values) for each in ranges]
+    return int(np.ravel_multi_index([(count - 1) // 2 for count in counts], counts))
+
+
+# What it says ---------------------------------------------------------------------------------------------------------
+
+
+def _gaps(duration: float, points: Sequence[_Point], found: dict[str, Array], places: Sequence[int]) -> dict[str, Any]:
+    """Largest differences from the accurate integrator over the trials `places`; None where either has no number."""
+    most: dict[str, float] = dict.fromkeys(("trajectory_angle", "max_speed", "max_angular_velocity"), 0.0)
+    checked = 0
+    for place in dict.fromkeys(places):
+        if math.isnan(found["max_speed"][place]):
+            continue
+        run = simulate(points[place].trial, duration=duration, sample_interval=min(1e-2, duration))
+        checked += 1
+        for name in most:
+            accurate, ours = getattr(run, name), float(found[name][place])
+            if accurate is not None and not math.isnan(ours):
+                most[name] = max(most[name], abs(accurate - ours))
+    return {"checked": checked} | most
+
+
+def _column(name: str, unit: str) -> str:
+    suffix = SUFFIXES.get(unit, "_" + unit.replace(" ", "_").replace("/", "_"))
+    return f"{name}{suffix}"
+
+
+def _table(ranges: Sequence[SweepRange], points: Sequence[_Point], found: dict[str, Array]) -> dict[str, Any]:
+    """The trials as the terminal shows them, thinned out evenly where they are many."""
+    shown = list(range(len(points)))
+    if len(points) > MOST_ROWS:
+        shown = sorted({round(k) for k in np.linspace(0, len(points) - 1, MOST_ROWS)})
+    units = [unit_of(each.key) for each in ranges]
+    head = [each.key + ("" if unit == "1" else f" [{unit}]") for each, unit in zip(ranges, units, strict=True)]
+    head += ["angle [degrees]", "speed [m/s]", "turning [rad/s]", "slips from", "hops from"]
+    rows = []
+    for place in shown:
+        angle, slip, hop = (
+            _degrees(float(found[name][place]))
+            for name in ("trajectory_angle", "transition_angle_slip", "transition_angle_hop")
+        )
+        speed, turning = (_number(float(found[name][place])) for name in ("max_speed", "max_angular_velocity"))
+        rows.append([*(f"{value:g}" for value in points[place].values), angle, speed, turning, slip, hop])
+    some = f", {len(rows)} of {len(points)} trials" if len(rows) < len(points) else ""
+    return {"title": f"The sweep{some}", "head": head, "rows": rows}
+
+
+def _sentences(
+    settings: TumbleSettings, ranges: Sequence[SweepRange], points: Sequence[_Point], fallen: int, gaps: dict[str, Any]
+) -> list[str]:
+    middle = points[_middle(ranges)].values
+    where = ", ".join(f"{each.key} = {value:g}" for each, value in zip(ranges, middle, strict=True))
+    said = [f"All but the sweep's table is of its middle, {where}; all {len(points)} trials are in {SWEEP_FILE}."]
+    if gaps["checked"]:
+        angle = math.degrees(gaps["trajectory_angle"])
+        said.append(
+            f"The batched model is off the accurate one by at most {angle:.2g} degrees in the trajectory angle and "
+            f"{gaps['max_speed']:.2g} m/s in the largest speed, at {gaps['checked']} trials (corners and middle)."
+        )
+    if any(each.key == "mu_s" for each in ranges) and settings.mu_d is None and not _sweeps(ranges, "mu_d"):
+        said.append("mu_d is half of mu_s throughout.")
+    if fallen:
+        said.append(f"{fallen} of them cannot stand before the torque starts, and have no numbers.")
+    return said
+
+
+def _sweeps(ranges: Sequence[SweepRange], key: str) -> bool:
+    return any(each.key == key for each in ranges)
+
+
+def _degrees(angle: float) -> str:
+    return "-" if math.isnan(angle) else f"{math.degrees(angle):.1f}"
+
+
+def _number(value: float) -> str:
+    return "-" if math.isnan(value) else f"{value:.4g}"

@@ -1,0 +1,32 @@
+"""What is said of a tumble in the end: the way through its states, and when it was fastest."""
+
+from __future__ import annotations
+
+import math
+
+from rigid.trajectory import Trajectory
+
+__all__ = ["MOST", "tumble_sentences"]
+
+MOST = 8
+"""Changes of state that are told one by one."""
+
+
+def tumble_sentences(trajectory: Trajectory) -> list[str]:
+    """The states in their order, each with when and at which angle it was entered; and when the centre was fastest."""
+    told = [
+        f"{state} at {time:.4g} s, {_degrees(theta)}" if time > 0 else f"{state} at once"
+        for time, state, theta in trajectory.transitions[:MOST]
+    ]
+    more = len(trajectory.transitions) - MOST
+    rest = f" -> {more} more change{'s' if more > 1 else ''} of state (in result.json)" if more > 0 else ""
+    said = [f"{' -> '.join(told)}{rest}."]
+    if trajectory.max_speed > 0:
+        when = trajectory.time_of_max_speed
+        state = [name for time, name, _ in trajectory.transitions if time < when or time == 0][-1]
+        said.append(f"Fastest at {when:.4g} s ({state}): {trajectory.max_speed:.4g} m/s.")
+    return said
+
+
+def _degrees(theta: float) -> str:
+    return f"{math.degrees(theta):.3g} degrees"

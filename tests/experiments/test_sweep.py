@@ -1,0 +1,112 @@
+"""`hedgebed tumble --sweep`: trials over a range are those that one tumble after another would give."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.cli import main
+from experiments.runfolder import read_series
+from experiments.sweep_ranges import parse_sweep
+from experiments.tumble_settings import TumbleSettings
+from experiments.tumble_sweep import middle_of_sweep
+from experiments.tumble_trial import plan_tumble
+from rigid.planar import simulate
+
+
+@pytest.fixture(autouse=True)
+def _somewhere_else(tmp_path, monkeypatch, request):
+    """Runs go to `tmp_path`; only what asks for it with ``reported`` draws a report."""
+    monkeypatch.chdir(tmp_path)
+    if "reported" not in request.fixturenames:
+        monkeypatch.setattr("experiments.tumble.write_report", lambda folder, progress: None)
+
+
+@pytest.fixture
+def reported():
+    """The report is drawn."""
+
+
+def test_a_sweep_is_its_tumbles_one_by_one(capsys, reported):
+    """Two keys, one of an effect; speeds and angles of the batch within its stated tolerance (docs/planar.md)."""
+    tokens = ["tumble", "--sweep", "mu_s=0.3:0.5:0.1", "com-offset.x=2e-4:6e-4:4e-4", "--duration", "0.8"]
+    assert main([*tokens, "--quiet", "--out", "a"]) == 0
+    shown = capsys.readouterr().out
+    result, rows = json.loads(Path("a/result.json").read_text()), read_series(Path("a/sweep.csv"))
+    assert list(rows)[:3] == ["mu_s", "com-offset.x_m", "trajectory_angle_rad"]
+    assert [*zip(rows["mu_s"], rows["com-offset.x_m"], strict=True)] == [
+        (mu_s, offset) for mu_s in (0.3, 0.4, 0.5) for offset in (2e-4, 6e-4)
+    ]
+    for place, (mu_s, offset) in enumerate(zip(rows["mu_s"], rows["com-offset.x_m"], strict=True)):
+        plan = plan_tumble(TumbleSettings(mu_s=float(mu_s), effects=(f"com-offset.x={offset}",)))
+        run = simulate(plan.trial, duration=0.8)
+        assert rows["trajectory_angle_rad"][place] == pytest.approx(run.trajectory_angle, abs=1e-3)
+        assert rows["max_speed_m_s"][place] == pytest.approx(run.max_speed, abs=5e-4)
+        assert rows["max_angular_velocity_rad_s"][place] == pytest.approx(run.max_angular_velocity, abs=3e-3)
+        assert rows["transition_angle_hop_rad"][place] == pytest.approx(run.transition_angle("hop"), abs=2e-3)
+    # the run's own trial is the one in the middle, as told, and the gaps are those of corners and middle
+    assert result["trial"]["mu_s"] == {"value": 0.4, "unit": "1", "origin": "given"}
+    middle = rows["max_speed_m_s"][2]
+    assert result["quantities"]["max_speed"]["value"] == pytest.approx(middle, abs=5e-4)
+    assert result["sweep"]["gaps"]["checked"] == 5 and result["sweep"]["gaps"]["max_speed"] < 5e-4
+    angle = math.degrees(rows["trajectory_angle_rad"][0])
+    assert f"{angle:.1f}" in shown and "mu_s = 0.4" in shown and "mu_d is half of mu_s throughout" in shown
+    page = Path("a/report.html").read_text()
+    assert "Over mu_s and com-offset.x" in page and page.count("data:image/png") == 4
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("mu_s=0.3:0.6:0.1", (0.3, 0.4, 0.5, 0.6)),
+        ("mu-s=0.3:0.59:0.1", (0.3, 0.4, 0.5)),
+        ("torque=0.1:0.1:1", (0.1,)),
+        ("pendulum.length=2:3:0.25", (2.0, 2.25, 2.5, 2.75, 3.0)),
+    ],
+)
+def test_a_range_holds_its_ends_as_far_as_the_step_leads(text, values):
+    (found,) = parse_sweep((text,))
+    assert found.values == values
+
+
+def test_the_middle_of_a_sweep_is_a_tumble_of_its_own():
+    settings = TumbleSettings(sweep=("wheel_speed_0=100:300:50",), actuator="brake", torque=6.0)
+    assert middle_of_sweep(settings).wheel_speed_0 == 200.0 and middle_of_sweep(settings).sweep == ()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--sweep", "mu_s"], ["sweep = 'mu_s' is no range", "mu_s=0.3:0.6:0.1"]),
+        (["--sweep", "mu_s=0.3:0.6"], ["is no range"]),
+        (["--sweep", "mu_s=0.3:inf:0.1"], ["is no range"]),
+        (["--sweep", "mu_s=0.6:0.3:0.1"], ["goes nowhere"]),
+        (["--sweep", "mus=0.3:0.6:0.1"], ["mus is no number that can be swept", "'mu_s'"]),
+        (["--sweep", "pendulum.lenght=1:2:1"], ["lenght is no parameter of pendulum", "'length'"]),
+        (["--sweep", "camera-scale.scale=1:2:1"], ["alters a sensor"]),
+        (["--sweep", "mu_s=0.3:0.6:1e-5"], ["at most 2500"]),
+        (["--sweep", "mu_s=0.3:0.6:0.1", "mu_s=0.1:0.2:0.1"], ["mu_s twice"]),
+        (["--sweep", "mu_s=0.3:0.6:0.1", "--mu-s", "0.4"], ["mu_s = 0.4 is given and swept"]),
+        (["--sweep", "pendulum.length=2:3:1", "--effects", "pendulum.length=2"], ["pendulum.length = 2 is given and"]),
+        (["--sweep", "mu_s=0.3:0.6:0.1", "--mu-d", "0.4"], ["at mu_s = 0.3: mu_d = 0.4 is above mu_s = 0.3"]),
+        (["--sweep", "torque=0.1:0.3:0.1"], ["at torque = 0.3", "at most 0.22 N m"]),
+        (["--sweep", "mu_s=0.3:0.6:0.1", "--method", "paper"], ["method = 'paper'", "'located' would do"]),
+        (["--sweep", "mu_s=0.3:0.6:0.1", "--campaign", "c"], ["campaign = 'c' with a sweep"]),
+    ],
+)
+def test_a_sweep_that_cannot_be_is_refused_before_there_is_a_folder(capsys, options, said):
+    assert main(["tumble", *options, "--out", "a"]) == 2
+    text = capsys.readouterr().err
+    assert all(words in text for words in said), text
+    assert not Path("a").exists()
+
+
+def test_a_trial_of_a_sweep_that_cannot_stand_has_no_numbers_and_is_counted():
+    """1.3 mm off the shaft takes the rig's restoring moment away (docs/planar.md): 0, 1 and 2 mm."""
+    tokens = ["tumble", "--sweep", "com-offset.x=-0.002:0.002:0.001", "--duration", "0.1", "--quiet", "--out", "a"]
+    assert main(tokens) == 0
+    rows = read_series(Path("a/sweep.csv"))
+    assert np.isnan(rows["max_speed_m_s"]).tolist() == [True, False, False, False, True]
+    assert json.loads(Path("a/result.json").read_text())["sweep"]["cannot_stand"] == 2
