@@ -23,16 +23,17 @@ from .bed import Bed, BedFailure
 from .materials import Facing, Material
 from .materials import material as find_material
 from .packing import draw_radii, rain_column, rain_positions
+from .recipe import check_packing
 from .sizes import Sizes, Uniform, describe, sizes_of
 from .stages import Preparation
 from .timestep import choose_young
 
-__all__ = ["cache_folder", "fingerprint", "prepare_bed"]
+__all__ = ["BEARING", "cache_folder", "check_options", "fingerprint", "prepare_bed", "rain", "soft_enough"]
 
 _EXPECTED_PACKING = 0.57
 # Penetration resistance of sand grows with depth about sixty times as fast as its overburden (3D-RFT, Agarwal et al.
 # 2023: 0.9 MN/m3 at mu = 0.5 against 16 kN/m3); a bed is made for a tip that may go half its depth.
-_BEARING = 30.0
+BEARING = 30.0
 # A grain that strikes the floor at the end of its fall does the bed no harm: until it is made, this is allowed.
 _RAIN_OVERLAP = 0.05
 # More is rained in than is kept: this much higher, and at least this many diameters.
@@ -82,7 +83,8 @@ def prepare_bed(
         size: lateral periods (x, y) and depth after levelling (z) [m].
         grain: mean diameter [m], or a distribution of ``dem.sizes``.
         spread: with a mean diameter: diameters are uniform within +- this share of it [1]; 0.15 when None.
-        packing: bulk packing fraction [1]; the bed is tapped until it is reached. As rained when None.
+        packing: bulk packing fraction [1]; the bed is tapped until it is reached, and where it is denser than that
+            loosened from below first. As rained when None.
         gravity: of the grains, downwards [m/s2].
         seed: of sizes and positions.
         young: Young's modulus of the softened grains [Pa]; chosen from ``max_overlap`` when None
@@ -110,17 +112,12 @@ def prepare_bed(
     stuff = find_material(material)
     sizes = sizes_of(grain, spread)
     grain = sizes.mean
-    _check(size, grain, packing, gravity, seed, max_overlap)
+    check_options(size, grain, gravity, seed, max_overlap)
+    if packing is not None:
+        check_packing(packing, sizes, cohesive=stuff.cohesion != "none")
     size = tuple(float(s) for s in size)
     if young is None:
-        bulk = _EXPECTED_PACKING * stuff.density
-        young = choose_young(
-            stuff,
-            pressure=(1 + _BEARING) * bulk * gravity * size[2],
-            speed=math.sqrt(2 * gravity * rain_column(sizes) * size[2]),
-            max_overlap=max_overlap,
-            diameter=grain,
-        )
+        young = soft_enough(stuff, size=size, sizes=sizes, gravity=gravity, max_overlap=max_overlap)
     recipe = {
         "code": fingerprint(),
         "material": {f.name: getattr(stuff, f.name) for f in fields(stuff) if f.name != "sources"},
@@ -177,17 +174,28 @@ def prepare_bed(
     return bed
 
 
-def _check(size, grain, packing, gravity, seed, max_overlap) -> None:
+def soft_enough(
+    material: Material, *, size: Sequence[float], sizes: Sizes, gravity: float, max_overlap: float
+) -> float:
+    """Young's modulus that a bed is given where none is asked for [Pa]: for the rain, and a tip in half its depth."""
+    bulk = _EXPECTED_PACKING * material.density
+    return choose_young(
+        material,
+        pressure=(1 + BEARING) * bulk * gravity * size[2],
+        speed=math.sqrt(2 * gravity * rain_column(sizes) * size[2]),
+        max_overlap=max_overlap,
+        diameter=sizes.mean,
+    )
+
+
+def check_options(size, grain, gravity, seed, max_overlap) -> None:
+    """Refuse what no bed can be made from, whatever is done with it later. Raises ValueError."""
     if not 0 < max_overlap <= 0.2:
         raise ValueError(f"max_overlap = {max_overlap} must be above 0 and at most 0.2 of a diameter")
     if int(seed) != seed or seed < 0:
         raise ValueError(f"seed = {seed} must be a whole number, 0 or more")
     if len(size) != 3 or not all(math.isfinite(s) and s > 0 for s in size):
         raise ValueError(f"size = {tuple(size)} must be three positive lengths [m]")
-    if packing is not None and not 0.5 < packing <= 0.64:
-        raise ValueError(
-            f"packing = {packing} is no packing fraction of spheres at rest; leave it out or ask for 0.55 to 0.64"
-        )
     if not (math.isfinite(gravity) and gravity > 0):
         raise ValueError(f"gravity = {gravity} must be positive [m/s2]; nothing settles without it")
     for name, length, least in (("x", size[0], 6), ("y", size[1], 6), ("z", size[2], 4)):
@@ -198,10 +206,43 @@ def _check(size, grain, packing, gravity, seed, max_overlap) -> None:
 
 
 def _rain(stuff, size, sizes, gravity, seed, young, max_overlap, time_step, floor, precision, arch, threads) -> Bed:
-    """The grains in the air, at rest, in a loose column."""
+    """The grains in the air, at rest, in a loose column, for a bed that is cut level."""
+    fill = max(size[2] * (1 + _SURPLUS), size[2] + _SURPLUS_DIAMETERS * sizes.mean)
+    return rain(
+        stuff,
+        volume=0.60 * fill * size[0] * size[1],
+        size=size,
+        sizes=sizes,
+        gravity=gravity,
+        seed=seed,
+        young=young,
+        max_overlap=max_overlap,
+        time_step=time_step,
+        floor=floor,
+        precision=precision,
+        arch=arch,
+        threads=threads,
+    )
+
+
+def rain(
+    stuff: Material,
+    *,
+    volume: float,
+    size: Sequence[float],
+    sizes: Sizes,
+    gravity: float,
+    seed: int,
+    young: float,
+    max_overlap: float,
+    time_step: float | None,
+    floor: Facing | None,
+    precision: str,
+    arch: str,
+    threads: int | None,
+) -> Bed:
+    """Grains of this solid volume [m3] in the air, at rest, in a loose column; the rest as in ``prepare_bed``."""
     rng, grain = np.random.default_rng(seed), sizes.mean
-    fill = max(size[2] * (1 + _SURPLUS), size[2] + _SURPLUS_DIAMETERS * grain)
-    volume = 0.60 * fill * size[0] * size[1]
     radii = draw_radii(rng, volume, sizes)
     positions = rain_positions(rng, radii, size[:2])
     top = float((positions[:, 2] + radii).max())

@@ -8,9 +8,12 @@ import time
 from pathlib import Path
 from typing import Any
 
-from .bed import Bed, BedFailure
+import numpy as np
 
-__all__ = ["ENERGY_RATIO", "FLOOR_RATIO", "Preparation"]
+from .bed import Bed, BedFailure
+from .recipe import FLUFF
+
+__all__ = ["ENERGY_RATIO", "FLOOR_RATIO", "Preparation", "lift_apart"]
 
 # Settled: mean kinetic energy of a grain over m g d, and floor force over weight.
 ENERGY_RATIO, FLOOR_RATIO = 1e-5, 0.01
@@ -19,6 +22,20 @@ _ROUGH_ENERGY_RATIO = 1e-2
 _DRAG = 0.1
 _LONGEST = 60.0  # settling gives up after this many fall times
 _MOST_TAPS = 40
+# A tap is this many g high, or, where one would overshoot, half as high again and again, but not below the last.
+_TAP, _SOFTEST_TAP = 3.0, 0.2
+# The packing asked for is reached from this much below, and not passed by more than that.
+_SHORT, _PAST = 0.0005, 0.002
+# Taps gain less and less (as the logarithm of their number): so many tell what the others can still bring; a bed that
+# gains less than this in so many is called the densest that taps reach.
+_TELLING_TAPS, _NOTHING_GAINED = 8, 0.002
+# A fluffed bed sinks back at this share of sqrt(g d) at most.
+_SINK = 0.1
+# The energy of grains that sink is half the square of that; below this they have sunk [m g d a grain].
+_SUNK = 1e-3
+# It is stirred first: velocities at random, of this standard deviation over sqrt(g d), for the time in which a grain
+# with that speed goes so many diameters. Without, it comes down in the order in which it was.
+_STIR, _STIR_WAY = 1.0, 2.0
 _KEEP_INTERVAL = 60.0  # between two times that it is kept [s of waiting]
 
 
@@ -26,8 +43,9 @@ class Preparation:
     """A bed on its way from a loose column in the air to one that is level and at rest.
 
     Its stages: ``rain`` until the grains are down; ``calm`` in a drag, then cut level; ``settle`` in the drag, at the
-    end without; ``tap`` until a packing fraction is reached, where one is asked for. What a stage remembers is in
-    ``notes``, so that a preparation that was kept goes on to the same bits.
+    end without; ``tap`` until a packing fraction is reached, where one is asked for, loosened from below first
+    where the bed is denser than that. What a stage remembers is in ``notes`` (what JSON takes), so that a preparation
+    that was kept goes on to the same bits.
     """
 
     def __init__(
@@ -36,7 +54,7 @@ class Preparation:
         """``path``: where it is kept now and then (.npz, and .json beside it); None: nowhere."""
         self.bed = bed
         self.stage = "rain"
-        self.notes: dict[str, float] = {}
+        self.notes: dict[str, Any] = {}
         self._grain, self._depth, self._packing = grain, depth, packing
         self._progress = progress
         self._path = path
@@ -65,7 +83,7 @@ class Preparation:
             self.bed.save(self._path)
             notes = {"stage": self.stage, "notes": self.notes, "steps": self.bed.steps}
             self._path.with_suffix(".json").write_text(json.dumps(notes))
-            self._kept = time.monotonic()
+            self._kept = self._now()
 
     def find(self, **options: Any) -> None:
         """Go back to what was kept, if there is something whole; options are those of ``Bed.load``."""
@@ -76,7 +94,7 @@ class Preparation:
             kept = json.loads(self._path.with_suffix(".json").read_text())
             if kept["steps"] != bed.steps:  # ended between the two files
                 return
-            stage, notes = str(kept["stage"]), {str(k): float(v) for k, v in kept["notes"].items()}
+            stage, notes = str(kept["stage"]), dict(kept["notes"])
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             return
         self.bed, self.stage, self.notes = bed, stage, notes
@@ -87,6 +105,10 @@ class Preparation:
             self._path.unlink(missing_ok=True)
             self._path.with_suffix(".json").unlink(missing_ok=True)
 
+    @staticmethod
+    def _now() -> float:
+        return time.monotonic()
+
     def _pause(self, done: float) -> None:
         """Between two pieces of the work: say how far it is, keep it if it is time."""
         try:
@@ -95,7 +117,7 @@ class Preparation:
         except KeyboardInterrupt:
             self.keep()
             raise
-        if time.monotonic() - self._kept >= _KEEP_INTERVAL:
+        if self._now() - self._kept >= _KEEP_INTERVAL:
             self.keep()
 
     # ------------------------------------------------------------------ the stages
@@ -105,6 +127,12 @@ class Preparation:
         """Mean kinetic energy of a grain over m g d [1]."""
         bed = self.bed
         return bed.kinetic_energy / bed.weight / self._grain
+
+    @property
+    def _floor_share(self) -> float:
+        """What the floor carries over the weight, of both the part across the floor [1]."""
+        bed = self.bed
+        return bed.floor_force / (bed.weight * (-bed.gravity[2] / math.hypot(*bed.gravity)))
 
     @property
     def _fall_time(self) -> float:
@@ -140,8 +168,10 @@ class Preparation:
         self._settle(ENERGY_RATIO, self.notes)
         self.bed.measure_surface()
 
-    def _settle(self, ratio: float, notes: dict[str, float], *, pausing: bool = True) -> None:
-        """Advance until the bed is at rest by ``ratio`` and the floor carries the weight.
+    def _settle(
+        self, ratio: float, notes: dict[str, Any], *, pausing: bool = True, longest: float | None = None
+    ) -> None:
+        """Advance until the bed is at rest by ``ratio`` and the floor carries the weight; ``longest`` in fall times.
 
         Soft grains in a deep bed ring as one spring for long. So the grains settle as in a fluid until they are at
         rest; then, without it, they must still be.
@@ -154,14 +184,14 @@ class Preparation:
         while True:
             bed.advance(steps, drag_time=_DRAG * fall if notes["drag"] else math.inf)
             energy = self._energy
-            floor = abs(bed.floor_force / bed.weight - 1)
+            floor = abs(self._floor_share - 1)
             notes["first"] = notes["first"] or math.log(max(energy / ratio, math.e))
             if energy < ratio and floor < tolerance:
                 if not notes["drag"]:
                     return
                 notes["drag"] = 0.0
             waited = bed.time - notes["began"]
-            if waited > _LONGEST * fall:
+            if waited > (_LONGEST if longest is None else longest) * fall:
                 raise BedFailure(
                     f"the bed did not come to rest in {waited:.3g} s: energy {energy:.2g} m g d (below {ratio:g} "
                     f"was wanted), floor force off by {100 * floor:.2g} % of the weight"
@@ -170,34 +200,121 @@ class Preparation:
                 self._pause(1 - min(1.0, max(0.0, math.log(max(energy / ratio, 1.0)) / notes["first"])))
 
     def _tap(self) -> None:
-        """Tap the bed until its packing fraction is reached; its surface sinks meanwhile and stays nearly level.
+        """To the packing fraction asked for, where one is."""
+        if self._packing is not None:
+            self._reach(self._packing, self.notes)
 
-        A tap is half a sine of acceleration of the bed's frame, 3 g high, as long as a grain falls for its diameter.
+    def _reach(self, packing: float, notes: dict[str, Any]) -> None:
+        """To a packing fraction from either side: loosened from below where the bed is denser, then tapped."""
+        bed = self.bed
+        notes.setdefault("start", bed.packing_fraction)
+        if "fluff" in notes or (not notes.get("taps") and bed.packing_fraction > packing + _PAST):
+            self._fluff(FLUFF, notes.setdefault("fluff", {}))
+            if bed.packing_fraction > packing + _PAST:
+                raise ValueError(
+                    f"packing = {packing:g} cannot be reached: this material rains in at {notes['start']:.4f} and "
+                    f"loosened from below still lies at {bed.packing_fraction:.4f}; ask for that or more, or give the "
+                    f"grains more friction, rolling friction or cohesion"
+                )
+            notes["fluffed"] = notes.pop("fluff")
+        self._tap_to(packing, notes)
+
+    def _fluff(self, times: float, notes: dict[str, Any]) -> None:
+        """Lift the bed apart to ``times`` its height, as a flow through the floor does, and let it sink back slowly.
+
+        It sinks in a drag in which grains fall at a tenth of sqrt(g d) at most, and must then be at rest without it.
         """
-        bed, notes, packing = self.bed, self.notes, self._packing
-        if packing is None:
-            return
+        bed, g = self.bed, math.hypot(*self.bed.gravity)
+        drag = _SINK * math.sqrt(self._grain / g)
         if not notes:
-            notes |= {"start": bed.packing_fraction, "taps": 0.0}
-            if bed.packing_fraction > packing + 0.002:
-                raise ValueError(
-                    f"packing = {packing} cannot be reached: this material rains in at {bed.packing_fraction:.4f} "
-                    f"already, and tapping only makes it denser; ask for more, or give the grains more friction"
-                )
-        g = -bed.gravity[2]
-        length = math.sqrt(2 * self._grain / g)
-        pieces = 10
-        while bed.packing_fraction < packing - 0.0005:
-            if notes["taps"] == _MOST_TAPS:
-                raise ValueError(
-                    f"packing = {packing} cannot be reached: {_MOST_TAPS} taps brought the bed from "
-                    f"{notes['start']:.4f} to {bed.packing_fraction:.4f}"
-                )
-            for k in range(pieces):
-                bed.set_gravity((0.0, 0.0, -g * (1 - 3 * math.sin(math.pi * (k + 0.5) / pieces))))
-                bed.advance(max(1, round(length / pieces / bed.time_step)))
-            bed.set_gravity(g)
+            height = bed.surface
+            lift_apart(bed, times, speed=_STIR * math.sqrt(g * self._grain), seed=bed.seed or 0)
+            gravity, way = bed.gravity, _STIR_WAY * math.sqrt(self._grain / g) / _STIR
+            bed.set_gravity(0.0)  # the flow carries them
+            bed.advance(round(way / bed.time_step))
+            bed.set_gravity(gravity)
+            notes |= {"began": bed.time, "lasts": (times - 1) * height / (g * drag), "settle": {}}
+        steps = max(1, round(0.02 * notes["lasts"] / bed.time_step))
+        while not notes["settle"]:
+            bed.advance(steps, drag_time=drag)
+            share = (bed.time - notes["began"]) / notes["lasts"]
+            if share > 1 and self._energy < _SUNK:
+                break
+            if share > _LONGEST:
+                raise BedFailure(f"the loosened bed did not sink back in {bed.time - notes['began']:.3g} s")
+            self._pause(min(1.0, share))
+        self._settle(ENERGY_RATIO, notes["settle"])
+        bed.measure_surface()
+
+    def _tap_to(self, packing: float | None, notes: dict[str, Any]) -> None:
+        """Tap the bed until its packing fraction is reached, or (None) until taps gain nothing more.
+
+        The surface sinks meanwhile and stays nearly level. A tap is half a sine of acceleration of the bed's frame, 3 g
+        high, as long as a grain falls for its diameter; one that goes too far is taken back and made half as high.
+        """
+        bed = self.bed
+        if "taps" not in notes:
+            notes |= {"taps": 0, "height": _TAP, "trace": [bed.packing_fraction]}
+        trace = notes["trace"]
+        while packing is None or bed.packing_fraction < packing - _SHORT:
+            gained = trace[-1] - trace[-1 - _TELLING_TAPS] if len(trace) > _TELLING_TAPS else math.inf
+            if packing is None and (gained < _NOTHING_GAINED or notes["taps"] >= 2 * _MOST_TAPS):
+                return
+            if packing is not None:
+                self._refuse_dense(packing, gained / _TELLING_TAPS, notes)
+            before = bed.state()
+            self._tap_once(notes["height"])
             self._settle(ENERGY_RATIO, {}, pausing=False)
             bed.measure_surface()
             notes["taps"] += 1
-            self._pause(min(1.0, (bed.packing_fraction - notes["start"]) / max(1e-9, packing - notes["start"])))
+            if packing is not None and bed.packing_fraction > packing + _PAST and notes["height"] > _SOFTEST_TAP:
+                bed.restore(before)
+                notes["height"] /= 2
+            else:
+                trace.append(bed.packing_fraction)
+            way = (packing or 1.1 * trace[0]) - trace[0]
+            self._pause(min(1.0, max(0.0, (bed.packing_fraction - trace[0]) / max(1e-9, way))))
+
+    def _refuse_dense(self, packing: float, rate: float, notes: dict[str, Any]) -> None:
+        """Raise ValueError where the taps left cannot bring the packing: each gains less than those before."""
+        left, found = _MOST_TAPS - notes["taps"], self.bed.packing_fraction
+        hoped = found + max(0.0, rate) * left + _PAST
+        if left > 0 and hoped >= packing:
+            return
+        more = f"; the {left} left would bring it to {hoped:.4f} at most" if left > 0 else ""
+        raise ValueError(
+            f"packing = {packing:g} cannot be reached: {notes['taps']} taps brought the bed from "
+            f"{notes['trace'][0]:.4f} to {found:.4f}{more}; ask for less, or give the grains less friction"
+        )
+
+    def _tap_once(self, height: float) -> None:
+        """One tap, so many g high [1]."""
+        bed = self.bed
+        g = -bed.gravity[2]
+        length = math.sqrt(2 * self._grain / g)
+        pieces = 10
+        for k in range(pieces):
+            bed.set_gravity((0.0, 0.0, -g * (1 - height * math.sin(math.pi * (k + 0.5) / pieces))))
+            bed.advance(max(1, round(length / pieces / bed.time_step)))
+        bed.set_gravity(g)
+
+
+def lift_apart(bed: Bed, times: float, *, speed: float, seed: int) -> None:
+    """Every grain at ``times`` its height, clear of one another, and moving at random, as in a flow from below.
+
+    ``speed``: standard deviation of each component of the velocity [m/s]; their mean is zero.
+    """
+    e = bed._engine
+    position, order = e.read("position"), e.read("id")
+    position[:, 2] *= times
+    e.write("position", position)
+    velocity = e.read("velocity")
+    random = np.random.default_rng(seed).normal(0.0, speed, (len(order), 3))
+    velocity[:, :3] = (random - random.mean(axis=0))[order]
+    e.write("velocity", velocity)
+    spin = e.read("spin")
+    spin[:, :3] = 0
+    e.write("spin", spin)
+    bed._make_lists()
+    bed._push()
+    bed._shift_velocities(-0.5)
