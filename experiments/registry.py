@@ -124,6 +124,19 @@ EXPERIMENTS: dict[str, Experiment] = {
             subject="campaign",
         ),
         Experiment(
+            "bed make",
+            "Prepares a bed as in a laboratory: rain, level, fluff, compact, cut, tilt; a report of every stage.",
+            settings="experiments.bed_settings:BedSettings",
+            module="experiments.bed_make",
+        ),
+        Experiment(
+            "bed refine",
+            "The same bed with smaller grains, beside the one it is made from.",
+            settings="experiments.bed_settings:BedRefineSettings",
+            module="experiments.bed_refine",
+            subject="bed",
+        ),
+        Experiment(
             "validate",
             "Verifies the bed: closed forms, published figures and other codes, beside what comes out.",
             settings="experiments.validate_settings:ValidateSettings",

@@ -28,6 +28,7 @@ COLOURS: dict[str, tuple[str, float]] = {
     "displacement": ("displacement since the start [mm]", 1e3),
     "speed": ("speed [mm/s]", 1e3),
     "force": ("net contact force [mN]", 1e3),
+    "coordination": ("contacts of the grain [1]", 1.0),
 }
 Place = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 

@@ -31,6 +31,8 @@ _OTHERS = {
     "campaign": ("vis.campaign", "write_campaign_report"),
     "campaign check": ("vis.inspection", "write_inspection_report"),
     "diagnose": ("vis.diagnose", "write_diagnosis_report"),
+    "bed make": ("vis.bed", "write_bed_report"),
+    "bed refine": ("vis.bed", "write_bed_report"),
     "validate": ("vis.validation", "write_validation_report"),
 }
 

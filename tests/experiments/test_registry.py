@@ -49,7 +49,7 @@ def test_the_presets_ship_and_are_valid(experiment):
 @WITHOUT_SUBJECT
 def test_the_case_that_ships_is_what_one_gets_without_a_case(experiment):
     settings_class = experiment.settings_class()
-    shipped = settings_from(settings_class, [read_case(registry.CASES / f"{experiment.name}.toml")])
+    shipped = settings_from(settings_class, [read_case(registry.CASES / f"{experiment.name.replace(' ', '-')}.toml")])
     assert shipped == settings_from(settings_class, [])
 
 

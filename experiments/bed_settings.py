@@ -1,0 +1,76 @@
+"""Settings of `hedgebed bed make` and `hedgebed bed refine`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from dem.recipe import check_stages, parse_stage
+from dem.sizes import Uniform
+
+from .settings import STANDARD_GRAVITY
+from .strict import StrictSettings
+
+__all__ = ["BedRefineSettings", "BedSettings"]
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+SeedNumber = Annotated[int, Field(ge=0, lt=2**31)]
+_NAME = "Name under which the bed is kept on the shelf (HEDGEBED_BEDS); in the run's folder alone if not given."
+
+
+class BedSettings(StrictSettings):
+    """A bed prepared as in a laboratory, stage by stage."""
+
+    material: str = Field("sand", description="Grain material, by name.")
+    stages: tuple[str, ...] = Field(
+        ("rain", "level"),
+        min_length=1,
+        description="What is done, in this order: rain, level[:HEIGHT], fluff[:TIMES], compact:PACKING[@lid], "
+        "compact:densest, packing:PACKING, cut:WIDTH, tilt:DEGREES.",
+    )
+    size: tuple[Positive, Positive, Positive] = Field(
+        (0.04, 0.04, 0.03), description="Bed: both widths (periodic) and depth of grains [m]."
+    )
+    grain: Positive = Field(0.004, description="Mean grain diameter [m].")
+    spread: float = Field(0.15, ge=0, le=0.5, description="Grain diameters are uniform within 1 +- this [1].")
+    gravity: Positive = Field(STANDARD_GRAVITY, description="Gravity of the grains [m/s2].")
+    seed: SeedNumber = Field(1, description="Seed of sizes and positions.")
+    name: str | None = Field(None, min_length=1, description=_NAME)
+    max_overlap: float = Field(0.05, gt=0, le=0.1, description="Largest overlap of grains [of a diameter].")
+    young: Positive | None = Field(
+        None, description="Young's modulus of the grains [Pa]; softened to `max_overlap` if not given."
+    )
+    time_step: Positive | None = Field(None, description="Step of the grains [s]; from the contact time if not given.")
+    precision: Literal["float64", "float32"] = Field("float64", description="Arithmetic of the bed.")
+    arch: Literal["cpu", "cuda"] = Field("cpu", description="Where the bed is computed.")
+    threads: int | None = Field(None, ge=1, le=1024, description="CPU threads; all there are if not given.")
+
+    @model_validator(mode="after")
+    def _can_be(self) -> BedSettings:
+        from dem.materials import material
+
+        stages = [parse_stage(stage) for stage in self.stages]
+        check_stages(
+            stages,
+            size=self.size,
+            grain=self.grain,
+            sizes=Uniform(self.grain, self.spread),
+            cohesive=material(self.material).cohesion != "none",
+        )
+        return self
+
+
+class BedRefineSettings(StrictSettings):
+    """The same bed with smaller grains: the same material, size, gravity and stages, brought to the same packing."""
+
+    bed: str = Field(description="The bed: a file, the folder of a run of bed make, or a name on the shelf.")
+    grain: Positive | None = Field(None, description="Mean grain diameter [m]; half of the bed's own if not given.")
+    keep: Literal["strength", "bond", "surface-energy"] = Field(
+        "strength",
+        description="What stays the same of grains that stick: their strength (pull-off over d^2), their Bond number "
+        "(pull-off over weight), or the surface energy.",
+    )
+    seed: SeedNumber | None = Field(None, description="Seed of sizes and positions; the bed's own if not given.")
+    name: str | None = Field(None, min_length=1, description=_NAME)
+    threads: int | None = Field(None, ge=1, le=1024, description="CPU threads; all there are if not given.")
