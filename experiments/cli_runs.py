@@ -126,7 +126,8 @@ def _show_result(folder: RunFolder) -> None:
     if quantities:
         console.print(table, markup=False)
     for listed in result.get("tables", []):
-        console.print(listed["title"], markup=False, style="italic")
+        if listed["title"]:
+            console.print(listed["title"], markup=False, style="italic")
         shown = Table(box=None, pad_edge=False)
         for place, heading in enumerate(listed["head"]):
             shown.add_column(heading, no_wrap=place == 0)

@@ -207,7 +207,7 @@ def _sentences(
 ) -> list[str]:
     middle = points[_middle(ranges)].values
     where = ", ".join(f"{each.key} = {value:g}" for each, value in zip(ranges, middle, strict=True))
-    said = [f"All but the sweep's table is of its middle, {where}; all {len(points)} trials are in {SWEEP_FILE}."]
+    said = [f"All but the table is of the trial in the middle, {where}; all {len(points)} trials are in {SWEEP_FILE}."]
     if gaps["checked"]:
         angle = math.degrees(gaps["trajectory_angle"])
         said.append(
