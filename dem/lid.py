@@ -28,7 +28,7 @@ class Lid:
         """``grain``: mean diameter [m]; ``drag_time``: of the drag in which the grains come to rest under it [s]."""
         self.bed, self.notes = bed, notes
         g = math.hypot(*bed.gravity)
-        self._speed = _SPEED * math.sqrt(g * grain)
+        self.speed = _SPEED * math.sqrt(g * grain)
         self._fall_time, self._drag_time = fall_time, drag_time
         self._area = bed.size[0] * bed.size[1]
         if "body" not in notes:
@@ -42,10 +42,11 @@ class Lid:
         """What the grains push it up with [N]."""
         return float(self.bed.reaction(self.notes["body"])[0][2])
 
-    def piece(self, pressure: float, energy: Any) -> bool:
+    def piece(self, pressure: float, energy: Any, *, stay: bool = False) -> bool:
         """One piece of the work; whether the lid has pressed and is off again.
 
         Args:
+            stay: it stays on, pressing; ``notes["lifting"]`` says that the pressure is there.
             pressure: wanted [Pa].
             energy: a function that gives the grains' mean kinetic energy over m g d [1].
 
@@ -53,9 +54,11 @@ class Lid:
             BedFailure: the pressure is not met in time.
         """
         bed, notes, target = self.bed, self.notes, pressure * self._area
+        if stay and notes["lifting"]:
+            return False
         for _ in range(20):
             if notes["lifting"]:
-                bed.move_body(notes["body"], velocity=(0.0, 0.0, self._speed))
+                bed.move_body(notes["body"], velocity=(0.0, 0.0, self.speed))
                 bed.advance(_STEPS, drag_time=self._drag_time)
                 if self._force == 0.0:
                     self._take_off()
@@ -63,12 +66,14 @@ class Lid:
                 continue
             bed.advance(_STEPS, drag_time=self._drag_time)
             lacking = (target - self._force) / target
-            bed.move_body(notes["body"], velocity=(0.0, 0.0, -self._speed * max(-1.0, min(1.0, lacking))))
+            bed.move_body(notes["body"], velocity=(0.0, 0.0, -self.speed * max(-1.0, min(1.0, lacking))))
             calm = abs(lacking) < _NEAR and energy() < _CALM
             notes["held"] = notes["held"] + _STEPS * bed.time_step if calm else 0.0
             if notes["held"] > _HOLDS * self._fall_time:
                 bed.measure_surface()
                 notes |= {"lifting": 1.0, "packing_under_it": bed.packing_fraction}
+                if stay:
+                    return False
         waited = bed.time - notes["began"]
         if waited > _LONGEST * self._fall_time:
             raise BedFailure(

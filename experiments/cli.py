@@ -267,9 +267,12 @@ def build_app() -> App:
 
         app.command(App(name="bed", help="Beds prepared as in a laboratory: made, listed, shown, shared, refined."))
         add_bed_commands(app["bed"])
+        app["bed"].command(App(name="test", help="Tests as a laboratory makes them of a bed."))
     for experiment in registry.EXPERIMENTS.values():
         *above, name = experiment.name.split(" ")
-        home = app[above[0]] if above else app
+        home = app
+        for word in above:
+            home = home[word]
         home.command(_experiment_command(experiment), name=name, help=experiment.summary)
     if "campaign" in registry.EXPERIMENTS:
         app["campaign"].command(_campaign_new, name="new")

@@ -261,9 +261,13 @@ def bed_step(settings: PenetrateSettings, young: float) -> float:
 
 
 def prepare_bed(settings: PenetrateSettings, seed: int, young: float, progress: Progress) -> Any:
-    """The bed of one seed, prepared or from the cache."""
+    """The bed of one seed: the one that is given, or prepared, or from the cache."""
     from dem import Bed
 
+    if settings.bed is not None:
+        from dem.bedfile import find_bed
+
+        return Bed.load(find_bed(settings.bed), arch=settings.arch, threads=settings.threads)
     with held_back() as asked_to_stop:
         return Bed.prepare(
             find_material(settings.material),

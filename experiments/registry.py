@@ -137,6 +137,13 @@ EXPERIMENTS: dict[str, Experiment] = {
             subject="bed",
         ),
         Experiment(
+            "bed test shear",
+            "A bed sheared under a lid at several pressures: peak and critical friction angle, cohesion.",
+            settings="experiments.bed_shear_settings:BedShearSettings",
+            module="experiments.bed_shear",
+            subject="bed",
+        ),
+        Experiment(
             "validate",
             "Verifies the bed: closed forms, published figures and other codes, beside what comes out.",
             settings="experiments.validate_settings:ValidateSettings",

@@ -32,6 +32,12 @@ class PenetrateSettings(StrictSettings):
     """A spike driven into, dropped on and set down on a bed of grains, beside the spring-damper fitted to it."""
 
     # The bed
+    bed: str | None = Field(
+        None,
+        min_length=1,
+        description="A bed of `hedgebed bed make`: its file, its run's folder, or its name on the shelf. Decides "
+        "material, bed_size, grain, spread, gravity, seeds and softness; a bed is prepared if not given.",
+    )
     material: str = Field("sand", description="Grain material, by name.")
     bed_size: tuple[Positive, Positive, Positive] = Field(
         (0.072, 0.072, 0.0508), description="Bed: both widths (periodic) and depth of grains [m]."
@@ -133,6 +139,16 @@ class PenetrateSettings(StrictSettings):
         description="A result.json to compare stiffness, damping and sinkage with, or 'shipped' for that of the case "
         "that ships; none if not given.",
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _bed_decides(cls, given: Any) -> Any:
+        """A bed that is there already has a size, grains and a gravity."""
+        if isinstance(given, dict) and isinstance(given.get("bed"), str) and given["bed"]:
+            from .bed_given import settings_of_bed
+
+            return settings_of_bed(given)
+        return given
 
     @model_validator(mode="before")
     @classmethod

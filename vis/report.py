@@ -33,6 +33,7 @@ _OTHERS = {
     "diagnose": ("vis.diagnose", "write_diagnosis_report"),
     "bed make": ("vis.bed", "write_bed_report"),
     "bed refine": ("vis.bed", "write_bed_report"),
+    "bed test shear": ("vis.bed_shear", "write_shear_report"),
     "validate": ("vis.validation", "write_validation_report"),
 }
 

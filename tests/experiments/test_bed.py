@@ -6,13 +6,16 @@ from contextlib import contextmanager
 import pytest
 
 import experiments.bed_work
+from dem import Bed
 from dem.bedfile import read_preparation
+from dem.shearing import shear_bed
 from experiments import bed_make, bed_refine
 from experiments.bed_settings import BedRefineSettings, BedSettings
 from experiments.cli import BAD_INPUT, DONE, FAILED, STOPPED, main
 from experiments.runfolder import read_series
+from experiments.settings import PenetrateSettings
 
-MAKE = ["bed", "make", "--stages", "rain", "--size", "0.024", "0.024", "0.016", "--threads", "1", "--quiet"]
+MAKE = ["bed", "make", "--stages", "rain", "--size", "0.024", "0.024", "0.02", "--threads", "1", "--quiet"]
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +88,7 @@ def test_refining_keeps_the_recipe_and_asks_for_the_packing_that_was_there(shelf
     options, coarse = bed_refine.refined_options(BedRefineSettings(bed="rained"))
     assert options["grain"].mean == 0.002 and options["grain"].spread == 0.15
     assert options["stages"] == ["rain", f"packing:{coarse.reports[-1].packing_fraction:.4f}"]
-    assert options["size"] == (0.024, 0.024, 0.016) and options["seed"] == 1
+    assert options["size"] == (0.024, 0.024, 0.02) and options["seed"] == 1
     bed_refine.check(BedRefineSettings(bed="rained"))
     with pytest.raises(ValueError, match=r"grain = 0.004 m is not smaller than the bed's own, 0.004 m"):
         bed_refine.check(BedRefineSettings(bed="rained", grain=0.004))
@@ -101,8 +104,6 @@ def test_refining_keeps_the_recipe_and_asks_for_the_packing_that_was_there(shelf
 
 
 def test_a_bed_that_does_not_say_how_it_was_made_is_not_refined(shelf, tmp_path):
-    from dem import Bed
-
     Bed.load(shelf / "rained.npz", threads=1).save(tmp_path / "plain.npz")
     with pytest.raises(ValueError, match="does not say how it was prepared"):
         bed_refine.check(BedRefineSettings(bed=str(tmp_path / "plain.npz")))
@@ -132,6 +133,53 @@ def test_a_packing_that_turns_out_to_be_out_of_reach_fails_with_what_was_reached
     monkeypatch.setattr(experiments.bed_work, "prepare_as", unreachable)
     assert main([*MAKE, "--out", str(tmp_path / "run")]) == FAILED
     assert "packing = 0.63 cannot be reached" in capsys.readouterr().err
+
+
+def test_a_spike_goes_into_a_bed_that_was_made(made, shelf, tmp_path):
+    """--bed decides size, grains, gravity, seed and softness; the run starts from that very bed."""
+    options = ["penetrate", "--bed", "rained", "--tip-diameter", "0.006", "--depth", "0.0045", "--allow-coarse"]
+    options += ["--speeds", "0.15", "--other-speeds", "none", "--drop-speeds", "none", "--threads", "1", "--quiet"]
+    options += [
+        "--shaft-length",
+        "0.03",
+        "--frame-count",
+        "0",
+        "--load",
+        "0.05",
+        "--rest-time",
+        "0.005",
+        "--retreat-speed",
+        "0.2",
+    ]
+    assert main([*options, "--out", str(tmp_path / "run")]) == DONE
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    of_bed = json.loads((made / "run" / "result.json").read_text())["quantities"]
+    for name in ("packing_fraction", "grain_count", "coordination_number", "young", "time_step"):
+        assert result["quantities"][name]["value"] == of_bed[name]["value"], name
+    with pytest.raises(ValueError, match=r"grain = 0.003 beside bed = 'rained', whose own is 0.00"):
+        PenetrateSettings(bed="rained", grain=0.003, tip_diameter=0.006, allow_coarse=True)
+    with pytest.raises(ValueError, match="bed = 'rainde' is no file"):
+        PenetrateSettings(bed="rainde")
+
+
+def test_a_bed_is_sheared_from_the_command_line(shelf, tmp_path):
+    """The servo holds the pressure; the strength lies between that of slick grains and that of interlocked ones."""
+    words = ["bed", "test", "shear", "rained", "--pressures", "2", "4", "--way", "4", "--inertial-number", "0.02"]
+    assert main([*words, "--threads", "1", "--quiet", "--out", str(tmp_path / "run")]) == DONE
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    for run in result["runs"]:
+        assert run["normal"] == pytest.approx(run["pressure"], rel=0.15)
+        assert 0.2 < run["critical"] / run["normal"] <= run["peak"] / run["normal"] < 1.5
+    assert result["quantities"]["critical_friction_angle"]["std"] is None  # two runs: no error can be told
+    assert (tmp_path / "run" / "figures" / "mohr-coulomb.png").exists()
+    assert "Mohr-Coulomb" in (tmp_path / "run" / "report.html").read_text()
+
+
+def test_a_lid_that_presses_harder_than_the_grains_bear_is_refused(shelf):
+    bed = Bed.load(shelf / "rained.npz", threads=1)
+    floor = bed.weight / (bed.size[0] * bed.size[1])
+    with pytest.raises(ValueError, match="is more than 8 times what lies on the bed's floor"):
+        shear_bed(bed, pressure=9 * floor, way=0.004, inertial_number=0.01, grain=0.004)
 
 
 def test_the_settings_and_the_stages_are_what_the_bed_is_made_from():

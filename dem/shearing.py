@@ -1,0 +1,130 @@
+"""A bed sheared under a lid: shear and normal stress, and how the bed dilates, against the lid's way.
+
+The bed is periodic sideways, so it is sheared as one layer without ends. Lid and floor are planes with so much friction
+and rolling friction that the grains on them neither slide nor roll: those are the rough walls of a shear box.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .bed import FLOOR, Bed, BedFailure
+from .contact import effective_moduli, pair_parameters
+from .lid import Lid
+from .shapes import Plane
+
+__all__ = ["MOST_PRESSURE", "Shearing", "roughen_floor", "shear_bed"]
+
+# Friction and rolling friction of a grain on lid and floor [1]: ten times what any grain has.
+_ROUGH = 10.0
+# Steps between two looks of the servo, and its fastest speed over the lid's sideways.
+_STEPS, _SERVO = 20, 0.5
+# A lid may press this many times what lies on the floor: more makes overlaps grow past their bound at the rough walls.
+MOST_PRESSURE = 8.0
+
+
+@dataclass(frozen=True)
+class Shearing:
+    """One shear run. All arrays of shape [n].
+
+    Attributes:
+        way: the lid's, sideways [m]. height: of the lid over where it was when the shearing began [m].
+        shear, normal: what the grains push the lid with over the bed's area [Pa].
+        pressure: asked for [Pa]. speed: of the lid [m/s]. inertial_number: speed / height d sqrt(density / pressure).
+        packing_fraction: before the lid came.
+    """
+
+    way: np.ndarray
+    height: np.ndarray
+    shear: np.ndarray
+    normal: np.ndarray
+    pressure: float
+    speed: float
+    inertial_number: float
+    packing_fraction: float
+
+
+def roughen_floor(bed: Bed) -> None:
+    """Give the floor so much friction and rolling friction that grains neither slide nor roll on it."""
+    bed._engine.body_pair[FLOOR] = _rough_pair(bed)
+
+
+def _rough_pair(bed: Bed) -> list[float]:
+    stuff = bed.material
+    young, shear = effective_moduli(stuff.young, stuff.poisson, math.inf, stuff.poisson)
+    return pair_parameters(
+        effective_young=young,
+        effective_shear=shear,
+        restitution=stuff.restitution,
+        friction=_ROUGH,
+        rolling_friction=_ROUGH,
+        surface_energy=stuff.surface_energy,
+        tensile=bed._settings["tensile"],
+    )
+
+
+def shear_bed(
+    bed: Bed,
+    *,
+    pressure: float,
+    way: float,
+    inertial_number: float,
+    grain: float,
+    tell: Callable[[float], None] = lambda share: None,
+) -> Shearing:
+    """Press a rough lid on a bed and move it sideways, the pressure held by a servo. The bed is used up by it.
+
+    Args:
+        pressure: on the lid [Pa]. way: of the lid [m]. grain: mean diameter [m].
+        inertial_number: sets the speed [1]; below 1e-2 the strength hardly depends on it (GDR MiDi 2004).
+        tell: called with the share done, 0 to 1.
+
+    Raises:
+        ValueError: a pressure, a way or a number that is not positive.
+        BedFailure: the pressure is not met, or the bed's own reasons.
+    """
+    for name, value in (("pressure", pressure), ("way", way), ("inertial_number", inertial_number)):
+        if not (math.isfinite(value) and value > 0):
+            raise ValueError(f"{name} = {value} must be positive")
+    floor = bed.weight / (bed.size[0] * bed.size[1])
+    if pressure > MOST_PRESSURE * floor * (1 + 1e-9):
+        raise ValueError(
+            f"pressure = {pressure:g} Pa is more than {MOST_PRESSURE:g} times what lies on the bed's floor, for which "
+            f"its grains are too soft: at most {MOST_PRESSURE * floor:.4g} Pa would do, or a deeper bed"
+        )
+    roughen_floor(bed)
+    packing, area = bed.packing_fraction, bed.size[0] * bed.size[1]
+    g = math.hypot(*bed.gravity)
+    fall = math.sqrt(2 * bed.size[2] / g)
+    top = float((bed.grains()["position"][:, 2] + bed.grains()["radius"]).max())
+    body = bed.add_body(
+        [Plane(normal=(0.0, 0.0, -1.0))],
+        position=(0.0, 0.0, top + 0.01 * grain),
+        friction=_ROUGH,
+        rolling_friction=_ROUGH,
+    )
+    notes: dict[str, float] = {"body": body, "began": bed.time, "held": 0.0, "lifting": 0.0}
+    lid = Lid(bed, notes, grain=grain, fall_time=fall, drag_time=0.1 * fall)
+    while not notes["lifting"]:
+        lid.piece(pressure, lambda: bed.kinetic_energy / bed.weight / grain, stay=True)
+        tell(0.0)
+    start = bed.body_position(body)
+    height = float(start[2])
+    speed = inertial_number * height / grain * math.sqrt(pressure / bed.material.density)
+    servo, rows = max(lid.speed, _SERVO * speed), []
+    while (gone := float(bed.body_position(body)[0] - start[0])) < way:
+        bed.advance(_STEPS)
+        force = bed.reaction(body)[0]
+        lacking = max(-1.0, min(1.0, (pressure * area - force[2]) / (pressure * area)))
+        bed.move_body(body, velocity=(speed, 0.0, -servo * lacking))
+        rows.append((gone, float(bed.body_position(body)[2] - height), -force[0] / area, force[2] / area))
+        if len(rows) % 20 == 0:
+            tell(min(1.0, gone / way))
+    if not rows:
+        raise BedFailure("the lid did not move")
+    gone_by, height_by, shear, normal = np.array(rows).T
+    return Shearing(gone_by, height_by, shear, normal, pressure, speed, inertial_number, packing)

@@ -1,0 +1,226 @@
+"""`hedgebed bed test shear`: peak and critical friction angle and cohesion of a bed, by a lid at several pressures.
+
+Peak: the largest shear stress, smoothed over half a diameter of the lid's way. Critical: the mean over the second half
+of the way, with the standard error of five parts of it. Mohr-Coulomb: a straight line through the runs' stresses.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dem.bedfile import find_bed, load_prepared
+from dem.shearing import Shearing, shear_bed
+from hedgebed import __version__
+
+from .bed_shear_settings import BedShearSettings
+from .progress import Progress
+from .runfolder import RunFolder
+from .whole_runs import whole_run
+
+__all__ = ["Strength", "check", "fit_line", "resume", "run", "strength_of"]
+
+_SMOOTH = 0.5
+"""Way of the lid over which the peak's stress is averaged [mean diameters]."""
+_PARTS = 5
+"""Parts of the second half of the way, whose scatter gives the standard error."""
+
+
+@dataclass(frozen=True)
+class Strength:
+    """Of one run: normal stress, peak and critical shear stress with its standard error [Pa], way at the peak [m]."""
+
+    normal: float
+    peak: float
+    critical: float
+    critical_error: float
+    peak_way: float
+
+
+def strength_of(run: Shearing, grain: float) -> Strength:
+    """Peak and critical shear stress of a run, at its mean normal stress.
+
+    The servo lets the normal stress vary a little, and the shear stress varies with it: their ratio is averaged.
+    """
+    normal = float(run.normal.mean())
+    count = max(1, round(_SMOOTH * grain / max(1e-12, (run.way[-1] - run.way[0]) / max(1, len(run.way) - 1))))
+    count = min(count, len(run.way))
+    kernel = np.ones(count) / count
+    smooth = np.convolve(run.shear, kernel, "valid") / np.convolve(run.normal, kernel, "valid")
+    top = int(np.argmax(smooth))
+    parts = [
+        part.mean() / other.mean()
+        for part, other in zip(
+            np.array_split(run.shear[len(run.way) // 2 :], _PARTS),
+            np.array_split(run.normal[len(run.way) // 2 :], _PARTS),
+            strict=True,
+        )
+    ]
+    return Strength(
+        normal=normal,
+        peak=normal * float(smooth[top]),
+        critical=normal * float(np.mean(parts)),
+        critical_error=normal * float(np.std(parts, ddof=1)) / math.sqrt(_PARTS),
+        peak_way=float(run.way[min(top + count // 2, len(run.way) - 1)]),
+    )
+
+
+def fit_line(normal: np.ndarray, shear: np.ndarray) -> tuple[float, float, float | None, float | None]:
+    """Least squares of shear = cohesion + tan(angle) normal: (cohesion, tan, their standard errors; None for two)."""
+    slope, start = np.polyfit(normal, shear, 1)
+    if len(normal) < 3:
+        return float(start), float(slope), None, None
+    rest = shear - start - slope * normal
+    variance = float(rest @ rest) / (len(normal) - 2)
+    spread = float(((normal - normal.mean()) ** 2).sum())
+    error = math.sqrt(variance / spread)
+    return float(start), float(slope), math.sqrt(variance * (1 / len(normal) + normal.mean() ** 2 / spread)), error
+
+
+def check(settings: BedShearSettings) -> None:
+    """Raise ValueError for what is no bed, or one that does not lie level."""
+    from dem.state import read_file
+
+    stored, _, _ = read_file(find_bed(settings.bed))
+    if stored["gravity"][0] or stored["gravity"][1]:
+        raise ValueError(f"bed = {settings.bed!r} is tilted: a level one would do")
+
+
+def _carry_out(settings: BedShearSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
+    path = find_bed(settings.bed)
+    runs: list[Shearing] = []
+    with folder.lock():
+        progress.plan({f"{p:g} times the weight": 1.0 for p in settings.pressures}, seconds={"report": 3.0})
+        grain = 0.0
+        for pressure in settings.pressures:
+            name = f"shear-{pressure:g}"
+            progress.stage(f"{pressure:g} times the weight", total=1.0)
+            prepared = load_prepared(path, threads=settings.threads)
+            bed = prepared.bed
+            assert bed is not None
+            grain = 2 * float(bed.grains()["radius"].mean())
+            if folder.is_done(name):
+                runs.append(_read(folder, name))
+                continue
+            runs.append(
+                shear_bed(
+                    bed,
+                    pressure=pressure * bed.weight / (bed.size[0] * bed.size[1]),
+                    way=settings.way * grain,
+                    inertial_number=settings.inertial_number,
+                    grain=grain,
+                    tell=progress.update,
+                )
+            )
+            _write(folder, name, runs[-1])
+        result = _result(settings, runs, grain, prepared.recipe, bed)
+        folder.write_result(result)
+        progress.stage("report", total=1.0)
+        from vis.bed_shear import write_shear_report
+
+        write_shear_report(folder.path, progress=progress.update)
+    return result
+
+
+_COLUMNS = {"way": "way_m", "height": "height_m", "shear": "shear_Pa", "normal": "normal_Pa"}
+_NUMBERS = ("pressure", "speed", "inertial_number", "packing_fraction")
+
+
+def _write(folder: RunFolder, name: str, run: Shearing) -> None:
+    folder.write_series(name, {column: getattr(run, key) for key, column in _COLUMNS.items()})
+    folder.mark_done(name, {key: getattr(run, key) for key in _NUMBERS})
+
+
+def _read(folder: RunFolder, name: str) -> Shearing:
+    columns, numbers = folder.read_series(name), folder.done_data(name)
+    kept: dict[str, Any] = {key: columns[column] for key, column in _COLUMNS.items()}
+    return Shearing(**kept, **numbers)
+
+
+def _result(
+    settings: BedShearSettings, runs: list[Shearing], grain: float, recipe: dict[str, Any], bed: Any
+) -> dict[str, Any]:
+    strengths = [strength_of(run, grain) for run in runs]
+    normal = np.array([s.normal for s in strengths])
+    quantities: dict[str, Any] = {}
+    for kind in ("peak", "critical"):
+        start, slope, start_error, slope_error = fit_line(normal, np.array([getattr(s, kind) for s in strengths]))
+        to_degrees = math.degrees(1) / (1 + slope**2)
+        quantities |= {
+            f"{kind}_friction_angle": {
+                "value": math.degrees(math.atan(slope)),
+                "std": None if slope_error is None else slope_error * to_degrees,
+                "unit": "degrees",
+                "note": "slope of the line through the runs; std: standard error of the fit",
+            },
+            f"{kind}_cohesion": {"value": start, "std": start_error, "unit": "Pa", "note": "where that line begins"},
+            f"{kind}_ratio": {
+                "value": float(np.mean([getattr(s, kind) / s.normal for s in strengths])),
+                "std": float(np.std([getattr(s, kind) / s.normal for s in strengths], ddof=1)),
+                "unit": "1",
+                "note": "shear over normal stress, mean of the runs; std: between them",
+            },
+        }
+    quantities["packing_fraction"] = {"value": runs[0].packing_fraction, "std": None, "unit": "1", "note": "of the bed"}
+    head = [
+        "normal [Pa]",
+        "peak [Pa]",
+        "at [d]",
+        "critical [Pa]",
+        "+- [Pa]",
+        "peak ratio",
+        "critical ratio",
+        "dilates [d]",
+    ]
+    rows = [
+        [
+            f"{s.normal:.0f}",
+            f"{s.peak:.0f}",
+            f"{s.peak_way / grain:.1f}",
+            f"{s.critical:.0f}",
+            f"{s.critical_error:.0f}",
+            f"{s.peak / s.normal:.3f}",
+            f"{s.critical / s.normal:.3f}",
+            f"{run.height[-1] / grain:.2f}",
+        ]
+        for s, run in zip(strengths, runs, strict=True)
+    ]
+    warnings = []
+    if min(bed.size[:2]) < 12 * grain or bed.surface < 8 * grain:
+        warnings.append(
+            f"the bed is {bed.size[0] / grain:.3g} x {bed.size[1] / grain:.3g} x {bed.surface / grain:.3g} grains: so "
+            f"small a bed has peaks of chance in its stress, and the peak strength is read too high"
+        )
+    if len(runs) < 3:
+        warnings.append("fewer than three pressures: the line through them has no error that could be told")
+    return {
+        "format": "hedgebed-result/1",
+        "experiment": "bed test shear",
+        "version": __version__,
+        "title": f"{settings.bed}: sheared under a lid",
+        "status": "done",
+        "quantities": quantities,
+        "tables": [{"title": "Run by run", "head": head, "rows": rows}],
+        "runs": [
+            {
+                "id": f"shear-{pressure:g}",
+                "series": f"series/shear-{pressure:g}.csv",
+                "pressure": run.pressure,
+                "speed": run.speed,
+                "normal": s.normal,
+                "peak": s.peak,
+                "critical": s.critical,
+                "critical_error": s.critical_error,
+            }
+            for pressure, run, s in zip(settings.pressures, runs, strengths, strict=True)
+        ],
+        "grain": grain,
+        "bed": {"file": str(settings.bed), "recipe": recipe},
+        "warnings": warnings,
+    }
+
+
+run, resume = whole_run("bed test shear", BedShearSettings, _carry_out, check=check)
