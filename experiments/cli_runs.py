@@ -93,6 +93,10 @@ def _number(value: Any, std: Any = 0.0) -> str:
     return f"{value:.{max(decimals, 0)}f}" if decimals <= 9 else f"{value:.4g}"
 
 
+_NARROW = 24
+"""Characters of a first column that is not broken into lines."""
+
+
 def _spread(quantity: Any) -> bool:
     """Whether several runs tell how much a quantity varies: 0 stands for what is exact, or was computed once."""
     std = quantity.get("std")
@@ -130,7 +134,8 @@ def _show_result(folder: RunFolder) -> None:
             console.print(listed["title"], markup=False, style="italic")
         shown = Table(box=None, pad_edge=False)
         for place, heading in enumerate(listed["head"]):
-            shown.add_column(heading, no_wrap=place == 0)
+            narrow = all(len(str(row[place])) <= _NARROW for row in listed["rows"])
+            shown.add_column(heading, no_wrap=place == 0 and narrow)
         for row in listed["rows"]:
             shown.add_row(*(Text(str(cell)) for cell in row))
         console.print(shown, markup=False)

@@ -99,10 +99,9 @@ def _by_motor(plan: HopPlan, settings: HopSettings) -> _Means:
     tumbler, wheel = plan.tumbler, plan.wheel
     most, limit = wheel.motor_torque, "its largest"
     if math.isinf(most):
-        # tau beta = (J + M l^2) omega^2 / 2 from the torque's work over the lean, gravity aside.
-        speed = launch_speed_for(_wanted(plan), tumbler.lean, gravity=settings.gravity, radius=settings.body_radius)
-        lever = tumbler.inertia + tumbler.mass_y * tumbler.spike_length**2
-        work = 0.5 * lever * (speed / tumbler.spike_length) ** 2
+        # The work H omega / 2 of a launch that takes no time, done over the lean, and as much as tips it.
+        speed = _impulsive_speed(plan, settings)
+        work = 0.5 * wheel.inertia * speed * impulsive_launch(tumbler, wheel.inertia).spin * speed
         most, limit = BEYOND * (work / tumbler.lean + tumbler.tipping_torque), "no limit known"
     if most <= tumbler.tipping_torque:
         raise ValueError(_does_not_tip("the motor's torque", most, plan))

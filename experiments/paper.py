@@ -212,7 +212,7 @@ def _carry_out(settings: PaperSettings, folder: RunFolder, progress: Progress) -
     with folder.lock():
         progress.plan({"trials": float(len(jobs)), "report": 0.1 * len(jobs)})
         progress.stage("trials", total=float(len(jobs)))
-        progress.message(f"{len(jobs)} integrations on {workers} processes")
+        progress.message(f"{len(jobs)} integrations on {workers} process{'es' if workers > 1 else ''}")
         found = _all(jobs, workers, progress)
         for entry in found:
             rows = entry.pop("rows")
@@ -251,6 +251,7 @@ def _result(settings: PaperSettings, jobs: Sequence[Job], found: list[dict[str, 
         "brake_wheel_speed": settings.brake_wheel_speed,
         "surfaces": {name: asdict(find_surface(name)) for name in settings.surfaces},
         "claims": stated,
+        "tables": [_table(stated)],
         "integrations": len(jobs),
         "cases": cases,
         "sweep": of_kind("sweep"),
@@ -258,6 +259,13 @@ def _result(settings: PaperSettings, jobs: Sequence[Job], found: list[dict[str, 
         "grains": of_kind("grains"),
         "warnings": warnings,
     }
+
+
+def _table(stated: list[dict[str, Any]]) -> dict[str, Any]:
+    """What the text states beside what comes out, as the terminal shows it."""
+    inside = {True: "yes", False: "no", None: "-"}
+    rows = [[claim["statement"], claim["ours"], inside[claim["met"]]] for claim in stated]
+    return {"title": "What the paper's text states", "head": ["statement", "ours", "inside"], "rows": rows}
 
 
 def _quantities(cases: list[dict[str, Any]], stated: list[dict[str, Any]], met: list[dict[str, Any]]) -> dict[str, Any]:

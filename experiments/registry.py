@@ -86,7 +86,7 @@ EXPERIMENTS: dict[str, Experiment] = {
         ),
         Experiment(
             "hop",
-            "The wheel speed that a hop over a distance takes: launch, flight, and how near escape is.",
+            "The wheel speed that a hop over a distance takes, or how far one goes; launch, flight, escape.",
             settings="experiments.hop_settings:HopSettings",
             module="experiments.hop",
         ),

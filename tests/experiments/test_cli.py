@@ -13,7 +13,9 @@ import pytest
 
 import hedgebed
 from experiments.cli import main
-from experiments.cli_runs import _number
+from experiments.cli_runs import _number, show_folder
+from experiments.runfolder import RunFolder
+from rigid.terms import EFFECTS
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -299,6 +301,47 @@ def test_bench_without_a_checkout_says_so(dig, capsys, monkeypatch, tmp_path):
     monkeypatch.setattr(experiments.benching, "__file__", str(tmp_path / "experiments" / "benching.py"))
     assert main(["bench"]) == 2
     assert "checkout" in capsys.readouterr().err
+
+
+def test_effects_are_listed_each_with_what_to_give(capsys):
+    assert main(["effects"]) == 0
+    shown = capsys.readouterr().out
+    for term in EFFECTS.values():
+        assert term.id in shown
+        for parameter in term.parameters:
+            assert f"{term.id}.{parameter.name}" in shown
+    assert main(["effects", "pendulum"]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert (
+        EFFECTS["pendulum"].limits in shown
+        and "[m] from the pulleys down to the shaft (infinite if not given)" in shown
+    )
+    assert main(["effects", "pendlum"]) == 2
+    assert "did you mean 'pendulum'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", [["diagnose"], ["campaign", "check"]])
+def test_a_command_about_a_campaign_asks_for_one(command, capsys):
+    assert main([*command, "--help"]) == 0
+    shown = capsys.readouterr().out
+    assert "CAMPAIGN" in shown and "CASE" not in shown
+
+
+def test_where_nothing_varies_no_spread_is_shown(dig, capsys):
+    """A spread of 0 is of what is exact, or was computed once; with several runs it says so beside the others."""
+    assert main(["dig", "--out", "a"]) == 0
+    assert "spread (std)" in capsys.readouterr().out
+    folder = RunFolder.open(Path("a"))
+    result = folder.read_result()
+    result["quantities"] |= {"length": {"value": 1.0, "std": 0.0, "unit": "m"}}
+    folder.write_result(result)
+    show_folder(folder, as_json=False)
+    assert "exact" in capsys.readouterr().out
+    result["quantities"]["depth"]["std"] = None
+    folder.write_result(result)
+    show_folder(folder, as_json=False)
+    shown = capsys.readouterr().out
+    assert "spread" not in shown and "exact" not in shown and "length" in shown
 
 
 # As a program

@@ -248,6 +248,8 @@ def test_a_body_of_ones_own_takes_the_closed_forms_wheel_speed(tmp_path, capsys)
     assert value["wheel_speed_impulsive"] == pytest.approx(spin * (0.03 + 4 * 0.15**2 * s * (s + 0.25 * c)) / 2e-3)
     assert value["wheel_speed"] == pytest.approx(value["wheel_speed_impulsive"], rel=0.05)
     assert result["numbers"]["max_wheel_speed"]["value"] is None  # of that wheel nothing is known
+    _, result = hop(tmp_path, capsys, *own, "--distance", "3", "--actuator", "motor", name="motor")
+    assert result["quantities"]["distance"]["value"] == pytest.approx(3.0, rel=1e-6)
     assert result["numbers"]["mass"] == {"value": 4.0, "unit": "kg", "origin": "given"}
 
 
