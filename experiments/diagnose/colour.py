@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.fft import idct
 from scipy.optimize import minimize
 
 from .fitting import Fit, Whitener
@@ -21,6 +22,10 @@ _FAST = 0.15
 """Share of the band that counts as slow and is left out."""
 _SURE = 16.0
 """Twice the log likelihood that two more numbers must gain: chance 3e-4 under white noise."""
+_PIECES, _PIECE = 8, 24
+"""Pieces of a recording, and samples of one at least, over which noise has to be alike."""
+_ALIKE = 0.5
+"""Share of the excess, and of the correlation, that half of all pieces must show."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +52,11 @@ class Colour:
 
 
 def find_colours(found: Fit) -> dict[str, Colour]:
-    """Channels whose noise is not as stated. `found` must have been fitted with `Whitener.white`."""
+    """Channels whose noise is not as stated. `found` must have been fitted with `Whitener.white`.
+
+    Noise is there all the time. What a model lacks comes in some trials and at some times, in touches of the ground
+    most of all, and reaches the fast modes as well: a law that not half of all pieces show is no noise's.
+    """
     powers: dict[str, list[Array]] = {}
     places: dict[str, list[Array]] = {}
     model = found.model
@@ -71,13 +80,40 @@ def find_colours(found: Fit) -> dict[str, Colour]:
             return float((np.log(law) + power / law).sum())
 
         white = float(power.sum())
+        pieces = _pieces(found, name)
         stated = min((minimize(twice, [a], method="Nelder-Mead") for a in (0.0, 0.8)), key=lambda r: r.fun)
         louder = minimize(twice, [stated.x[0], 0.0], method="Nelder-Mead")
-        best = louder if stated.fun - louder.fun > _SURE else stated
-        if white - best.fun > _SURE:
+        for best in (louder, stated) if stated.fun - louder.fun > _SURE else (stated,):
             std = float(np.exp(best.x[1])) if len(best.x) > 1 else 1.0
-            colours[name] = Colour(name, std, float(np.clip(np.tanh(best.x[0]), -0.5, 0.97)))
+            colour = Colour(name, std, float(np.clip(np.tanh(best.x[0]), -0.5, 0.97)))
+            if white - best.fun > _SURE and _steady(colour, *pieces):
+                colours[name] = colour
+                break
     return colours
+
+
+def _pieces(found: Fit, channel: str) -> tuple[float, float]:
+    """Medians, over the pieces of all recordings of a channel, of the mean square and the lag-one correlation."""
+    model, squares, lags = found.model, [], []
+    for trial, rows in model.rows().items():
+        channels = list(dict.fromkeys(model.problem.samples(trial).channel.tolist()))
+        for name, block in zip(channels, model.whitener.block_slices(trial), strict=True):
+            if name != channel or block.stop - block.start < 2:
+                continue
+            residual = idct(found.modes[rows][block], norm="ortho")
+            for piece in np.array_split(residual, max(1, min(_PIECES, len(residual) // _PIECE))):
+                square = float(np.mean(piece**2))
+                squares.append(square)
+                lags.append(float(np.mean(piece[1:] * piece[:-1])) / max(square, 1e-300))
+    return float(np.median(squares)), float(np.median(lags))
+
+
+def _steady(colour: Colour, square: float, lag: float) -> bool:
+    """Whether pieces of this median mean square and correlation are what the colour would make."""
+    louder = colour.std**2 - 1
+    if louder > 0.1 and square - 1 < _ALIKE * louder:
+        return False
+    return abs(colour.persistence) < 0.1 or lag * np.sign(colour.persistence) > _ALIKE * abs(colour.persistence)
 
 
 def whitener_for(found: Fit, colours: dict[str, Colour]) -> Whitener:

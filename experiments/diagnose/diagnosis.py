@@ -10,25 +10,22 @@ from typing import Any
 
 import numpy as np
 
+from .bounds import Bound, bounds_met
 from .colour import Colour, find_colours, whitener_for
 from .equivalence import Rival
-from .evidence import Hypothesis, excess, held_out_fit, inflation, score, signature_matrix
-from .fitting import Fit, Model, Whitener, fit
-from .gate import Verdict, open_gate
+from .evidence import SMALL, Hypothesis, excess, held_out_fit, inflation, score, signature_matrix
+from .fitting import Fit, Model, Whitener, fit, settled
+from .gate import Verdict, held_out_gate, open_gate
 from .localise import Place, depends_on, latent_table, places
-from .prediction import Predicted
-from .problem import Finding, Form, Problem
-from .replicates import find_scatter, odd_trials, split_trials
+from .prediction import Predicted, folds_of, predict
+from .problem import Finding, Form, Parameter, Problem
+from .replicates import find_scatter, groups_of, odd_trials, split_trials
 from .search import Choice, choose
 
 __all__ = ["Diagnosis", "Gap", "diagnose"]
 
 Tell = Callable[[str, float], None]
 
-_RIGHT_FORM = 0.05
-"""A model that leaves a twentieth of what the base model does has the right name, if not nature's exact form."""
-_CLOSED = 0.15
-"""And no more than this of the gap, as it is reported."""
 _MOST_FOR_COLOUR = 2.5
 """Chi-square per sample above which motion, not noise, fills the fast modes too."""
 _REFITS = 400
@@ -37,8 +34,12 @@ _MARGIN = 1.5
 """Standard deviations beyond the gate that something without a name must reach: no effect speaks for it."""
 _AS_LIKELY = 1.0
 """Nats within which a third name is said as well."""
-_SMALL = 1.2
-"""Chi-square per sample on held-out trials below which what is left is too small to be called unknown."""
+_AS_LOUD, _RIGHT_FORM = 2.0, 0.02
+"""Chi-square per sample up to which a misfit of form is no louder than the sensors; and the share of what the base
+model leaves that it may be."""
+_CERTAIN = 0.5
+"""Share of what the base model leaves, fitted and predicted, that a name must take away to be certain beside something
+that has no name."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,8 @@ class Diagnosis:
     held_out: tuple[str, ...]
     gate_before: Verdict
     gate_after: Verdict
+    gate_held_out: Verdict | None
+    """The best model's on the trials held out; None where there are none, or where no model was chosen."""
     choice: Choice | None
     colours: Mapping[str, Colour]
     model_std: Mapping[str, float]
@@ -95,6 +98,16 @@ class Diagnosis:
         """What the best model leaves of conditions that were left out in turn."""
         return self.choice.predicted if self.choice is not None and self.effects else None
 
+    @property
+    def bounds_before(self) -> tuple[Bound, ...]:
+        """Parameters of the fitted base model that ended at a bound or far from what was stated."""
+        return bounds_met(self.base)
+
+    @property
+    def bounds_after(self) -> tuple[Bound, ...]:
+        """The same of the best model."""
+        return bounds_met(self.best)
+
     def latent(self) -> dict[str, Any]:
         """Columns of latent.csv."""
         return latent_table(self.problem, self.best_values, self.forms)
@@ -104,9 +117,11 @@ class Diagnosis:
         found: dict[str, dict[str, Any]] = {}
         names = [p.name for p in self.best.model.parameters]
         covariance = self.best.covariance(inflation=inflation(self.best))
+        of_form: Callable[[Form], Mapping[str, float]] = getattr(self.problem, "form_std", lambda form: {})
         for form in self.forms:
             if form.effect != effect:
                 continue
+            loose = of_form(form)
             here = self.problem.reported(self.best.values, form)
             slopes: dict[str, np.ndarray] = {name: np.zeros(len(names)) for name in here}
             for k, p in enumerate(self.best.model.parameters):
@@ -115,7 +130,7 @@ class Diagnosis:
                 for name in here:
                     slopes[name][k] = (moved[name][0] - here[name][0]) / step
             for name, (value, unit) in here.items():
-                variance = float(slopes[name] @ covariance @ slopes[name])
+                variance = float(slopes[name] @ covariance @ slopes[name]) + (loose.get(name, 0.0) * value) ** 2
                 std = math.sqrt(max(variance, 0.0))
                 found[name] = {"value": float(value), "std": std if math.isfinite(std) else 0.0, "unit": unit}
         return found
@@ -130,6 +145,8 @@ def diagnose(
     for the next campaign of the same design.
     """
     tell = tell or (lambda what, done: None)
+    if hasattr(problem, "prepare"):
+        problem.prepare(tell)
     tell("fitting the base model", 0.0)
     findings = list(problem.findings)
     fitted, held_out = split_trials(problem.trials)
@@ -150,9 +167,17 @@ def diagnose(
         base, signatures=columns, seed=seed, refit=thorough, draws=_REFITS if thorough else 600, folder=gates,
         tell=lambda done: tell("making the gate's null", done),
     )  # fmt: skip
+    told = _Told(problem, first, findings, held_out)
     if first.passed:
-        return _finish(problem, base, None, first, first, colours, model_std, findings, held_out, "none", seed)
+        return told.finish(base, None, colours, model_std, "none")
     choice = choose(base, tell=tell, seed=seed)
+    if choice.best.effects:  # with the motion out of the way replicates are compared once more
+        scatter, again = _scatter(choice.best.fit, held_out)
+        if set(again) != set(model_std):
+            tell("replicates are found to differ otherwise: choosing again", 0.0)
+            model_std = again
+            base = _rescattered(base, scatter)
+            choice = choose(base, tell=tell, seed=seed)
     fresh = _colours_of(_plain(choice.best.fit))
     if _differ(fresh, colours):  # seen only now that the motion is out of the way: weigh once more
         best = _coloured(_plain(choice.best.fit), fresh)
@@ -165,11 +190,14 @@ def diagnose(
             tell=lambda done: tell("making the null of what is left", done),
         )[1]  # fmt: skip
         choice = replace(choice, left=left)
-    if not choice.best.effects and choice.left.score < choice.left.threshold + _MARGIN:
-        return _finish(problem, base, None, first, choice.left, colours, model_std, findings, held_out, "none", seed)
+    strained = any(bound.strains for bound in bounds_met(base))
+    if not choice.best.effects and not strained and choice.left.score < choice.left.threshold + _MARGIN:
+        return told.finish(base, None, colours, model_std, "none", last=choice.left)
     tell("verdict", 0.0)
-    verdict = _verdict(choice, base, held_out)
-    return _finish(problem, base, choice, first, choice.left, colours, model_std, findings, held_out, verdict, seed)
+    choice = replace(choice, best=replace(choice.best, fit=settled(choice.best.fit)))
+    held = _held_out_verdict(choice.best.fit, held_out, seed) if held_out else None
+    verdict = _verdict(choice, held, held_out)
+    return told.finish(base, choice, colours, model_std, verdict, held=held)
 
 
 def _whitened_fit(model: Model) -> Fit:
@@ -198,9 +226,22 @@ def _colours_of(found: Fit) -> dict[str, Colour]:
     return find_colours(found)
 
 
-def _scatter(base: Fit, held_out: tuple[str, ...]) -> tuple[Any, dict[str, float]]:
-    whole = fit(base.model.on((*base.model.trials, *held_out)), base.values)
-    return find_scatter(whole)
+def _scatter(found: Fit, held_out: tuple[str, ...]) -> tuple[tuple[Parameter, ...], dict[str, float]]:
+    """Asked of all trials, and of the model without any scatter so far."""
+    model = replace(found.model, scatter=())
+    if all(len(ids) < 2 for ids in groups_of(model.problem.trials).values()):
+        return (), {}
+    return find_scatter(fit(model.on((*model.trials, *held_out)), _unscattered(found)))
+
+
+def _rescattered(found: Fit, scatter: tuple[Parameter, ...]) -> Fit:
+    """The same with this scatter and no other."""
+    return fit(replace(found.model, scatter=scatter), _unscattered(found))
+
+
+def _unscattered(found: Fit) -> dict[str, float]:
+    scatter = {parameter.name for parameter in found.model.scatter}
+    return {name: value for name, value in found.values.items() if name not in scatter}
 
 
 def _differ(one: Mapping[str, Colour], other: Mapping[str, Colour]) -> bool:
@@ -220,64 +261,99 @@ def _gap(problem: Problem, model: Model, values: Mapping[str, float], fitted: tu
     return Gap(per_sample(fitted), per_sample(held_out) if held_out else None)
 
 
-def _with_held_out(found: Fit, held_out: tuple[str, ...]) -> dict[str, float]:
-    """Values for all trials. The gap is that of one mean bed: how replicates differ is the gate's affair."""
+def _values_of_all(found: Fit, held_out: tuple[str, ...]) -> dict[str, float]:
+    """One set of numbers for all trials: what is shared as it was fitted, the held-out trials' own nuisances refitted.
+
+    The gap is that of one mean bed, how replicates differ is the gate's affair: where that was fitted, the fitted
+    trials' own nuisances are refitted without it.
+    """
+    model, values = replace(found.model, scatter=()), _unscattered(found)
     if found.model.scatter:
-        scatter = {parameter.name for parameter in found.model.scatter}
-        start = {name: value for name, value in found.values.items() if name not in scatter}
-        found = fit(replace(found.model, scatter=()), start)
-    return held_out_fit(found.model, held_out, found.values)
+        values = held_out_fit(model, model.trials, values)
+    return held_out_fit(model, held_out, values)
 
 
-def _verdict(choice: Choice, base: Fit, held_out: tuple[str, ...]) -> str:
-    best = choice.best
-    if not best.effects:
+def _held_out_verdict(found: Fit, held_out: tuple[str, ...], seed: int) -> Verdict:
+    """The gate on trials that took no part, with the scatter of replicates where it was found."""
+    return held_out_gate(found, held_out, held_out_fit(found.model, held_out, found.values), seed=seed)
+
+
+def _verdict(choice: Choice, held: Verdict | None, held_out: tuple[str, ...]) -> str:
+    """A name stands where its model leaves nothing, on the trials that were fitted and on those that were not, or too
+    little to speak of, or what a form that is not nature's leaves; and where it needs no number that the campaign all
+    but excludes. Else something is unknown."""
+    found = choice.best.fit
+    if not choice.best.effects or any(bound.strains for bound in bounds_met(found)):
         return "unknown"
-    problem = base.model.problem
-    named = "ambiguous" if choice.alternatives else "named"
-    if choice.left.passed:
-        return named
-    fitted = best.fit.model.trials
-    after = _gap(problem, best.fit.model, _with_held_out(best.fit, held_out), fitted, held_out)
-    worst = max(after.fit, after.held_out or 0.0)
-    if worst <= _SMALL:
-        return named
-    # Noise that is taken for coloured may hide what is left: the gap, whose noise is as stated, has to close as well.
-    before = _gap(problem, base.model, _with_held_out(base, held_out), fitted, held_out)
-    closed = after.fit - 1 < _CLOSED * (before.fit - 1)
-    return named if closed and excess(best.fit) < _RIGHT_FORM * excess(base) else "unknown"
+    passed = choice.left.passed and (held is None or held.passed)
+    if not passed:
+        after = _gap(found.model.problem, found.model, _values_of_all(found, held_out), found.model.trials, held_out)
+        passed = max(after.fit, after.held_out or 0.0) <= SMALL or _of_form(choice, held_out)
+    return ("ambiguous" if choice.alternatives else "named") if passed else "unknown"
 
 
-def _finish(
-    problem: Problem, base: Fit, choice: Choice | None, first: Verdict, last: Verdict, colours: Mapping[str, Colour],
-    model_std: Mapping[str, float], findings: list[Finding], held_out: tuple[str, ...], verdict: str, seed: int,
-) -> Diagnosis:  # fmt: skip
-    del seed
-    best = choice.best.fit if choice is not None else base
-    fitted = base.model.trials
-    base_values, best_values = _with_held_out(base, held_out), _with_held_out(best, held_out)
-    effects = choice.best.effects if choice is not None else ()
-    if verdict == "unknown" and choice is not None and effects:
-        # Only what takes away most of the excess is certain when something else is there that has no name.
-        certain = excess(best) < 0.5 * excess(base)
-        effects = effects if certain else ()
-    before = _gap(problem, base.model, base_values, fitted, held_out)
-    after = before if verdict == "none" else _gap(problem, best.model, best_values, fitted, held_out)
-    where = [] if verdict == "none" else places(base.model, base_values, (*fitted, *held_out))
-    rivals = _smallest(choice) if choice is not None and verdict == "ambiguous" else ()
-    alternatives = tuple(next(e for e in rival.effects if e not in effects) for rival in rivals)
-    rival_forms = tuple(next(f for f in rival.forms if f.effect == e)
-                        for rival, e in zip(rivals, alternatives, strict=True))  # fmt: skip
-    told, shares = "", dict[str, float]()
-    if verdict == "unknown":
-        told, shares = depends_on(latent_table(problem, best_values, best.model.forms))
-    return Diagnosis(
-        verdict=verdict, problem=problem, base=base, best=best, base_values=base_values, best_values=best_values,
-        effects=effects, alternatives=alternatives, rivals=rival_forms, where=tuple(where), before=before, after=after,
-        fitted=fitted, held_out=held_out, gate_before=first, gate_after=last, choice=choice, colours=colours,
-        model_std=model_std, findings=tuple(findings), depends_on=told, shares=shares,
-        next_experiment=_next(problem, best, choice, rival_forms, verdict),
-    )  # fmt: skip
+def _of_form(choice: Choice, held_out: tuple[str, ...]) -> bool:
+    """Whether what is left is no louder than the sensors, on either part of the trials, and next to nothing beside what
+    the base model leaves: nature's form is never quite the library's."""
+    found = choice.best.fit
+    left = [found.chi_square / found.count]
+    if held_out:
+        (modes,) = found.model.on(held_out).evaluate([held_out_fit(found.model, held_out, found.values)])
+        left.append(float(modes @ modes) / len(modes))
+    return max(left) <= _AS_LOUD and excess(found) < _RIGHT_FORM * excess(choice.base.fit)
+
+
+@dataclass(frozen=True)
+class _Told:
+    """What is known before anything is chosen."""
+
+    problem: Problem
+    first: Verdict
+    findings: list[Finding]
+    held_out: tuple[str, ...]
+
+    def finish(
+        self, base: Fit, choice: Choice | None, colours: Mapping[str, Colour], model_std: Mapping[str, float],
+        verdict: str, *, last: Verdict | None = None, held: Verdict | None = None,
+    ) -> Diagnosis:  # fmt: skip
+        """The diagnosis, its gaps and places."""
+        base = settled(base)
+        problem, held_out, fitted = self.problem, self.held_out, base.model.trials
+        best = choice.best.fit if choice is not None else base
+        base_values, best_values = _values_of_all(base, held_out), _values_of_all(best, held_out)
+        effects = choice.best.effects if choice is not None else ()
+        if verdict == "unknown" and choice is not None and effects:
+            effects = effects if _certain(base, choice) else ()
+        before = _gap(problem, base.model, base_values, fitted, held_out)
+        after = before if verdict == "none" else _gap(problem, best.model, best_values, fitted, held_out)
+        where = [] if verdict == "none" else places(base.model, base_values, (*fitted, *held_out))
+        rivals = _smallest(choice) if choice is not None and verdict == "ambiguous" else ()
+        alternatives = tuple(next(e for e in rival.effects if e not in effects) for rival in rivals)
+        rival_forms = tuple(next(f for f in rival.forms if f.effect == e)
+                            for rival, e in zip(rivals, alternatives, strict=True))  # fmt: skip
+        told, shares = "", dict[str, float]()
+        if verdict == "unknown":
+            told, shares = depends_on(latent_table(problem, best_values, best.model.forms))
+        return Diagnosis(
+            verdict=verdict, problem=problem, base=base, best=best, base_values=base_values, best_values=best_values,
+            effects=effects, alternatives=alternatives, rivals=rival_forms, where=tuple(where), before=before,
+            after=after, fitted=fitted, held_out=held_out, gate_before=self.first,
+            gate_after=last or (choice.left if choice is not None else self.first), gate_held_out=held, choice=choice,
+            colours=colours, model_std=model_std, findings=tuple(self.findings), depends_on=told, shares=shares,
+            next_experiment=_next(problem, best, choice, rival_forms, verdict),
+        )  # fmt: skip
+
+
+def _certain(base: Fit, choice: Choice) -> bool:
+    """Whether what was found is there for certain although something else is too: it takes most of what the base model
+    leaves away, of what was fitted and of conditions left out in turn."""
+    if excess(choice.best.fit) >= _CERTAIN * excess(base):
+        return False
+    trials = [trial for trial in base.model.problem.trials if trial.id in base.model.trials]
+    predicted = predict(base, folds_of(trials)) if choice.predicted is not None else None
+    if predicted is None or choice.predicted is None:
+        return True
+    return choice.predicted.chi_square - choice.predicted.count < _CERTAIN * (predicted.chi_square - predicted.count)
 
 
 def _smallest(choice: Choice) -> tuple[Hypothesis, ...]:

@@ -52,6 +52,14 @@ def document(found: Diagnosis) -> dict[str, Any]:
         "after": {"passed": found.gate_after.passed, "score": found.gate_after.score,
                   "threshold": found.gate_after.threshold},
     }  # fmt: skip
+    if found.gate_held_out is not None:
+        said["gate"]["held_out"] = {"passed": found.gate_held_out.passed, "score": found.gate_held_out.score,
+                                    "threshold": found.gate_held_out.threshold}  # fmt: skip
+    said["at_bounds"] = {
+        stage: [{"parameter": b.parameter, "value": b.value, "unit": b.unit, "sigmas": b.sigmas, "at_bound": b.at_bound}
+                for b in bounds]
+        for stage, bounds in (("before", found.bounds_before), ("after", found.bounds_after))
+    }  # fmt: skip
     said["evidence"] = _evidence(found)
     said["equivalence"] = _equivalence(found)
     said["noise"] = {c.channel: {"std": c.std, "persistence": c.persistence} for c in found.colours.values()}

@@ -20,10 +20,12 @@ from .gate import low_modes
 from .problem import Array, Form, Values
 
 __all__ = [
-    "Hypothesis", "best_start", "excess", "held_out_fit", "inflation", "score", "signature_matrix", "slow_count",
-    "tempered",
+    "SMALL", "Hypothesis", "best_start", "excess", "held_out_fit", "inflation", "score", "signature_matrix",
+    "slow_count", "tempered",
 ]  # fmt: skip
 
+SMALL = 1.2
+"""Chi-square per sample up to which what is left is too small to be called unknown, or to be given a name."""
 _MODES_EACH = 6
 """Slow modes that a misfit of form has in one channel of one trial; it is alike from trial to trial, so that their
 number is taken to grow with the square root of the number of channels."""
@@ -96,13 +98,14 @@ _SIZES = (0.1, 0.4, 1.0, 3.0)
 _FIRST = 0.2
 
 
-def best_start(model: Model, form: Form, values: Values) -> Fit:
+def best_start(model: Model, form: Form, values: Values, *, rounds: int = 6) -> Fit:
     """The best fit of `model` (which holds `form`) over the form's starts, in several sizes of the amplitude.
 
     The other values are those given, and those of the priors: a base model that lacks an effect bends its parameters.
+    `rounds`: steps, where the problem looks for the best start itself.
     """
-    if hasattr(model.problem, "guess"):  # it tries the starts itself
-        return fit(model, values, rounds=6)
+    if hasattr(model.problem, "guess"):
+        return fit(model, values, rounds=rounds)
     starts = form.starts or ({form.amplitude: 1.0},)
     amplitude = next(p for p in form.parameters if p.name == form.amplitude)
     known = {p.name: p.value for p in model.problem.base if math.isfinite(p.std)}

@@ -131,6 +131,18 @@ def _result(found: Diagnosis, said: dict[str, Any]) -> dict[str, Any]:
         f"Replicates differ by more than the sensors: {kind}, standard deviation {std:.3g} (relative); it is the bed's."
         for kind, std in found.model_std.items()
     ]
+    warnings = [finding.what for finding in found.findings]
+    for model, bounds, meaning in (
+        ("the base model", found.bounds_before, "it bends them because it lacks something"),
+        ("the best model", found.bounds_after if found.forms else (), "it does not explain the data"),
+    ):
+        strained = [bound.words for bound in bounds if bound.strains]
+        if strained:
+            warnings.append(f"fitted by {model} as far from what was stated as no true number is: "
+                            f"{', '.join(strained)}; {meaning}")  # fmt: skip
+        ends = [bound.words for bound in bounds if not bound.strains]
+        if ends:
+            warnings.append(f"fitted by {model} to the end of its range: {', '.join(ends)}")
     return {
         "format": "hedgebed-result/1",
         "experiment": "diagnose",
@@ -140,5 +152,5 @@ def _result(found: Diagnosis, said: dict[str, Any]) -> dict[str, Any]:
         "verdict": found.verdict,
         "quantities": quantities,
         "departures": {"sentences": sentences},
-        "warnings": [finding.what for finding in found.findings],
+        "warnings": warnings,
     }

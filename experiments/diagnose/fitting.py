@@ -18,10 +18,12 @@ from scipy.fft import dct
 
 from .problem import Array, Form, Parameter, Problem, Values
 
-__all__ = ["Fit", "Model", "Whitener", "fit", "linearised"]
+__all__ = ["Fit", "Model", "Whitener", "fit", "linearised", "settled"]
 
 _ROUNDS = 30
 _DAMPINGS = (0.0, 1e-3, 1e-1, 10.0)
+_SETTLING = 3
+"""Rounds in which the steps of a settled Jacobian are found."""
 _ENOUGH = 0.02
 """Change of chi-square below which a fit has ended: a hundredth of what one sigma is worth."""
 
@@ -240,12 +242,63 @@ def linearised(model: Model, values: Values) -> tuple[Array, Array]:
     return _linearise(model, parameters, np.array([values.get(p.name, p.value) for p in parameters], dtype=float))
 
 
+def settled(found: Fit) -> Fit:
+    """The same with its Jacobian taken over steps that are worth a standard deviation of the data, both ways.
+
+    A fit's own steps are hundredths of what was stated or of a typical size. Where data tell a thousand times more,
+    such a step reaches over the next branch of sticking and slipping, and a jump is taken for a slope: standard errors
+    would come out far too small.
+    """
+    model, names = found.model, [p.name for p in found.model.parameters]
+    parameters = model.parameters
+    steps = np.array([p.step if p.step is not None else 1e-4 * p.scale for p in parameters])
+    low, high = np.array([p.lowest for p in parameters]), np.array([p.highest for p in parameters])
+    x = np.array([found.values[name] for name in names])
+    groups, rows = _groups(parameters), model.rows()
+    slopes = np.zeros_like(found.jacobian)
+    for _ in range(_SETTLING):
+        points = []
+        for members in groups:
+            for sign in (1.0, -1.0):
+                point = dict(found.values)
+                for k in members:
+                    point[names[k]] = float(np.clip(x[k] + sign * steps[k], low[k], high[k]))
+                points.append(point)
+        there = model.evaluate([found.values, *points])
+        now, made = there[0], there[1:]
+        for place, members in enumerate(groups):
+            for k in members:
+                where = slice(None) if parameters[k].trial is None else rows[parameters[k].trial or ""]
+                sides = []
+                both = slice(2 * place, 2 * place + 2)
+                for point, modes in zip(points[both], made[both], strict=True):
+                    moved = point[names[k]] - x[k]
+                    if moved:
+                        sides.append((modes[where] - now[where]) / moved)
+                sizes = [float(np.linalg.norm(side)) for side in sides]
+                # A jump on one side is that side's: the other one tells the slope.
+                slope = np.mean(sides, axis=0) if max(sizes) < 2 * min(sizes) else sides[int(np.argmin(sizes))]
+                slopes[:, k] = 0.0
+                slopes[where, k] = slope * parameters[k].scale
+                steps[k] = min(steps[k], 1.0 / max(min(sizes), 1e-300))
+    return replace(found, jacobian=slopes)
+
+
+def _groups(parameters: Sequence[Parameter]) -> list[list[int]]:
+    """Which parameters can be changed together: nuisances of one kind, each of a trial of its own."""
+    groups: dict[str, list[int]] = {}
+    for k, p in enumerate(parameters):
+        groups.setdefault(f"kind {p.kind}" if p.trial is not None and p.kind else f"one {p.name}", []).append(k)
+    return list(groups.values())
+
+
 def _begun(model: Model, start: Values | None) -> Values:
     """Where to begin: as told, and what is not told by the problem's own search, where it has one (`guess`)."""
     known, guess = dict(start or {}), getattr(model.problem, "guess", None)
     scatter = {p.name for p in model.scatter}  # a small thing beside the rest: it begins at none
     if guess is None or all(p.name in known or p.name in scatter for p in model.parameters):
         return known
+    known = {name: value for name, value in known.items() if name not in scatter}  # what another model needed of it
     held = model.held is not None
     found: Values = guess(model.forms, model.trials, {**(model.held or {}), **known}, held=held)
     return found
@@ -261,12 +314,10 @@ def _linearise(model: Model, parameters: Sequence[Parameter], x: Array) -> tuple
     """Modes at `x`, and their changes per scale of each parameter; nuisances of one kind are changed together."""
     names = [p.name for p in parameters]
     base = {name: float(value) for name, value in zip(names, x, strict=True)}
-    groups: dict[str, list[int]] = {}
-    for k, p in enumerate(parameters):
-        groups.setdefault(f"kind {p.kind}" if p.trial is not None and p.kind else f"one {p.name}", []).append(k)
+    groups = _groups(parameters)
     points = [base]
     steps = np.zeros(len(parameters))
-    for members in groups.values():
+    for members in groups:
         point = dict(base)
         for k in members:
             p = parameters[k]
@@ -277,7 +328,7 @@ def _linearise(model: Model, parameters: Sequence[Parameter], x: Array) -> tuple
     modes = model.evaluate(points)
     jacobian = np.zeros((len(modes[0]), len(parameters)))
     rows = model.rows()
-    for place, members in enumerate(groups.values(), 1):
+    for place, members in enumerate(groups, 1):
         change = modes[place] - modes[0]
         for k in members:
             p = parameters[k]

@@ -5,6 +5,10 @@ ones) with what a refit would take out of it taken out. Near the best fit a refi
 so that a thousand refits cost one; `thorough` makes new data and refits in full instead, for models whose contacts make
 a likelihood rough. No table of a distribution is used, but for the tails, where a gamma law of the bootstrap's own mean
 and variance stands in.
+
+How far the parameters have gone from what was stated is a statistic too: a model that fits only with numbers that the
+priors all but exclude does not explain the data. Trials that were held out have a gate of their own (`held_out_gate`),
+whose null holds the noise and what the fitted parameters leave uncertain.
 """
 
 from __future__ import annotations
@@ -13,22 +17,23 @@ import hashlib
 import json
 import os
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import stats
 
-from .fitting import Fit, Model, fit
+from .fitting import Fit, Model, fit, linearised
 from .problem import Array, Values
 
-__all__ = ["Gate", "Verdict", "low_modes", "open_gate"]
+__all__ = ["Gate", "Verdict", "held_out_gate", "low_modes", "open_gate"]
 
 LOW_MODES = 16
 """Modes of a channel that count as slow: half a period up to eight periods over its record."""
 _DRAWS = 600
-_FORMAT = 1
+_FORMAT = 2
 """Of the files in which nulls are kept; a change of the statistics is a change of this."""
 _OFFSET = 20.0
 """Added to "one trial": it may be below zero, the gamma law not."""
@@ -133,7 +138,40 @@ def open_gate(
             _write(kept, gate)
     here = {name: float(value[0]) for name, value in _statistics(found.modes[None, :], slow, columns).items()}
     here["one trial"] += _OFFSET
+    here["parameters"] = _moved(found)
     return gate, gate.judge(here)
+
+
+def held_out_gate(found: Fit, trials: Sequence[str], values: Values, *, seed: int = 0, draws: int = _DRAWS) -> Verdict:
+    """Whether `found` predicts `trials`, which it was not fitted to, at `values` (their own nuisances refitted).
+
+    The null: white noise, and shared parameters drawn as uncertain as the fit leaves them, with what the trials' own
+    nuisances take up taken out.
+    """
+    model = found.model.on(trials)
+    modes, jacobian = linearised(model, values)
+    slow = low_modes(model)
+    shared = np.array([p.trial is None for p in model.parameters], dtype=bool)
+    scales = np.array([p.scale for p in model.parameters])
+    names = [p.name for p in found.model.parameters]
+    rows = [names.index(p.name) for p in model.parameters if p.trial is None]
+    covariance = found.covariance()[np.ix_(rows, rows)] / np.outer(scales[shared], scales[shared])
+    free = found.free[rows]  # what a bound holds is not uncertain
+    covariance = covariance * np.outer(free, free)
+    sizes, turns = np.linalg.eigh(covariance)
+    spread = jacobian[:, shared] @ (turns * np.sqrt(np.maximum(sizes, 0.0)))
+    priors = np.array([0.0 if np.isinf(p.std) else p.scale / p.std for p in model.parameters])[~shared]
+    basis, prior = _split_basis(np.vstack([jacobian[:, ~shared], np.diag(priors)]), len(modes))
+    random = np.random.default_rng(seed)
+    parts, nothing = [], np.zeros((len(modes), 0))
+    for _ in range(0, draws, 100):
+        noise = random.standard_normal((100, len(modes))) + random.standard_normal((100, len(rows))) @ spread.T
+        more = random.standard_normal((100, prior.shape[0]))
+        parts.append(_statistics(noise - (noise @ basis + more @ prior) @ basis.T, slow, nothing))
+    gate = _gate_of(parts)
+    here = {name: float(value[0]) for name, value in _statistics(modes[None, :], slow, nothing).items()}
+    here["one trial"] += _OFFSET
+    return gate.judge(here)
 
 
 def _calibrated(
@@ -141,19 +179,45 @@ def _calibrated(
     tell: Callable[[float], None] | None,
 ) -> Gate:  # fmt: skip
     random = np.random.default_rng(seed)
+    basis, prior = _basis(found)
+    stated = _stated(found)
     if refit:
         made = np.stack([_refitted(found, random, tell, k / draws) for k in range(draws)])
         parts = [_statistics(made, slow, columns)]
     else:
         parts = []
-        basis, prior = _basis(found)
-        for _ in range(0, draws, 100):
-            noise = random.standard_normal((100, found.count))
-            more = random.standard_normal((100, prior.shape[0]))
-            weights = noise @ basis + more @ prior
+    moved = []
+    for _ in range(0, draws, 100):
+        noise = random.standard_normal((100, found.count))
+        more = random.standard_normal((100, prior.shape[0]))
+        weights = noise @ basis + more @ prior
+        moved.append((((more - weights @ prior.T)[:, stated]) ** 2).sum(axis=1) + 1.0)
+        if not refit:
             parts.append(_statistics(noise - weights @ basis.T, slow, columns))
+    return _gate_of(parts, {"parameters": np.concatenate(moved)[:draws]})
+
+
+def _stated(found: Fit) -> NDArray[np.bool_]:
+    """Which parameters are the base model's own, with a prior that was stated; those of effects have none but ours."""
+    own = {p.name for p in found.model.problem.base}
+    return np.array([p.name in own and not np.isinf(p.std) for p in found.model.parameters], dtype=bool)
+
+
+def _moved(found: Fit) -> float:
+    """Squared standard deviations by which the base model's numbers are off what was stated, and one."""
+    off = [
+        (found.values[p.name] - p.value) / p.std
+        for p, counts in zip(found.model.parameters, _stated(found), strict=True)
+        if counts
+    ]
+    return float(np.sum(np.square(off))) + 1.0
+
+
+def _gate_of(parts: Sequence[Mapping[str, Array]], more: Mapping[str, Array] | None = None) -> Gate:
+    """The gate that draws of statistics make."""
     sample = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     sample["one trial"] = sample["one trial"] + _OFFSET
+    sample |= {name: values[: len(sample["all"])] for name, values in (more or {}).items()}
     names = tuple(sample)
     table = np.stack([sample[name] for name in names], axis=1)
     mean, variance = table.mean(axis=0), np.maximum(table.var(axis=0), 1e-12)
@@ -201,13 +265,16 @@ def _write(path: Path, gate: Gate) -> None:
 
 def _basis(found: Fit) -> tuple[Array, Array]:
     """An orthonormal basis of what a refit takes out of data and priors: rows of the data [n, p], of the priors."""
-    free = found.free
-    priors = np.sqrt(found.prior_precision())
-    joint = np.vstack([found.jacobian, np.diag(priors)])[:, free]
+    joint = np.vstack([found.jacobian, np.diag(np.sqrt(found.prior_precision()))])
+    return _split_basis(joint[:, found.free], found.count)
+
+
+def _split_basis(joint: Array, count: int) -> tuple[Array, Array]:
+    """An orthonormal basis of the columns of `joint`: its first `count` rows, and the others."""
     joint = joint / np.maximum(np.linalg.norm(joint, axis=0), 1e-300)
     left, sizes, _ = np.linalg.svd(joint, full_matrices=False)
     left = left[:, sizes > 1e-9 * max(float(sizes.max(initial=0.0)), 1e-300)]
-    return left[: found.count], left[found.count :]
+    return left[:count], left[count:]
 
 
 def _refitted(found: Fit, random: np.random.Generator, tell: Callable[[float], None] | None, done: float) -> Array:

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from scipy import stats
 
+from .evidence import inflation
 from .fitting import Fit, fit
 from .gate import low_modes
 from .problem import Finding, Parameter, Problem, TrialInfo
@@ -76,7 +77,8 @@ def find_scatter(found: Fit) -> tuple[tuple[Parameter, ...], dict[str, float]]:
     """Nuisances that the replicates call for, their priors estimated, and what is written as model_std.
 
     Each trial's own bed (or whatever the problem offers) is fitted; within a condition these must agree within their
-    errors, whatever effect the model lacks, since that is the same for all replicates.
+    errors. What the model lacks is the same for all replicates as long as it is small; where it is not, each trial's
+    factors are bent by it in their own way: errors are those of noise as loud as what is left (`inflation`).
     """
     problem: Problem = found.model.problem
     offered: dict[str, tuple[Parameter, ...]] = getattr(problem, "scatter", {})
@@ -89,7 +91,8 @@ def find_scatter(found: Fit) -> tuple[tuple[Parameter, ...], dict[str, float]]:
     for kind, parameters in offered.items():
         wide = fit(replace(found.model, scatter=(*active, *parameters)), found.values)
         value = {p.trial: wide.values[p.name] for p in parameters if p.trial in wide.model.trials}
-        error = {p.trial: _error(wide, p) for p in parameters if p.trial in wide.model.trials}
+        louder = inflation(wide)
+        error = {p.trial: louder * _error(wide, p) for p in parameters if p.trial in wide.model.trials}
         surprise, count, between, within = 0.0, 0, 0.0, 0.0
         for ids in groups:
             b, s = np.array([value[id] for id in ids]), np.array([error[id] for id in ids])

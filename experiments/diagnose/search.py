@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .equivalence import CLOSE, Rival, compare
-from .evidence import Hypothesis, best_start, excess, score
+from .evidence import SMALL, Hypothesis, best_start, excess, score
 from .fitting import Fit, Model, fit
 from .gate import Verdict, open_gate
 from .pairs import FormsStart, next_starts, pair_starts
@@ -25,6 +25,10 @@ _SHARE = 0.5
 """Of the excess that is left, how much a further name must take away."""
 _SHARE_OF_BASE = 0.04
 """And of what the base model left: a misfit of the first effect's form is often some hundredths of it."""
+_WORTH_ALONE = 16.0
+"""Nats from which a further name counts where there is but one condition, so that no prediction can be asked for."""
+_BEHIND = 30.0
+"""Nats behind the best beyond which a candidate is not fitted to the end: its chi-square is seven times as large."""
 _WORTH_BOTH, _SHARE_BOTH = 5.0, 0.75
 """Nats, and share of what is left, from which a smaller second name counts too, if conditions left out say so."""
 _NEAR = 15.0
@@ -91,12 +95,12 @@ class Search:
     def _gate(self, hypothesis: Hypothesis) -> Verdict:
         return open_gate(hypothesis.fit, seed=self.seed)[1]
 
-    def _try(self, what: str, start: Hypothesis, forms: Sequence[Form]) -> Hypothesis:
+    def _try(self, what: str, start: Hypothesis, forms: Sequence[Form], *, rounds: int = 6) -> Hypothesis:
         """`start` with `forms` added, all refitted."""
         model: Model = start.fit.model.with_forms((*start.forms, *forms))
         alone = self._alone.get(forms[0].id)
         if alone is None:
-            found = best_start(model, forms[0], start.fit.values)
+            found = best_start(model, forms[0], start.fit.values, rounds=rounds)
         else:  # where it stood alone is a good place to begin from beside others, and a small amplitude is another
             amplitude = forms[0].amplitude
             values = {**{p.name: alone.fit.values[p.name] for p in forms[0].parameters}, **start.fit.values}
@@ -112,13 +116,29 @@ class Search:
 
     def _singles(self) -> list[Hypothesis]:
         """The best form of each effect, the likeliest effect first."""
-        forms = self.base.fit.model.problem.forms
-        best: dict[str, Hypothesis] = {}
+        model = self.base.fit.model
+        forms = model.problem.forms
+        guess = getattr(model.problem, "guess", None)
+        if guess is not None and forms:  # which looks for all of them together
+            self.tell("looking for where the candidates' fits begin", 0.0)
+            guess(forms[:1], model.trials, self.base.fit.values)
+        made: list[Hypothesis] = []
         for k, form in enumerate(forms):
             self.tell(f"trying {form.effect} ({form.name})", k / max(1, len(forms)))
-            made = self._try(form.id, self.base, [form])
-            if form.effect not in best or made.score > best[form.effect].score:
-                best[form.effect] = made
+            made.append(self._try(form.id, self.base, [form], rounds=6 if guess is None else 1))
+        if guess is not None:
+            most = max((h.score for h in made), default=0.0)
+            for k, begun in enumerate(made):
+                if begun.score > most - _BEHIND:
+                    self.tell(f"fitting {forms[k].effect} ({forms[k].name})", k / len(forms))
+                    found = fit(begun.fit.model, begun.fit.values)
+                    made[k] = Hypothesis(found, score(found))
+                    self._alone[forms[k].id] = Hypothesis(found, 0.0)
+                    self.table.append((forms[k].id, made[k]))
+        best: dict[str, Hypothesis] = {}
+        for form, one in zip(forms, made, strict=True):
+            if form.effect not in best or one.score > best[form.effect].score:
+                best[form.effect] = one
         return sorted(best.values(), key=lambda h: -h.score)
 
     def _enriched(self, hypothesis: Hypothesis) -> Hypothesis:
@@ -171,15 +191,25 @@ class Search:
         """Whether a further name is more than the misfit of the first one's form."""
         left = max(excess(best.fit), 0.0)
         gained, better = excess(best.fit) - excess(new.fit), new.score - best.score
-        if better >= _WORTH_MORE and gained >= max(_SHARE * left, _SHARE_OF_BASE * excess(self.base.fit)):
-            return True
+        if better >= _WORTH_MORE and gained >= _SHARE * left:
+            if gained >= _SHARE_OF_BASE * excess(self.base.fit):
+                return True
+            # Little beside what the first name explains, but much for the sensors: then conditions left out decide.
+            if left > (SMALL - 1) * best.fit.count:
+                return self._predicts(best, new, alone=better >= _WORTH_ALONE)
         seen = len(best.effects) < 2 and left > 2 * np.sqrt(2.0 * best.fit.count)
         if not seen or better < _WORTH_BOTH or gained < _SHARE_BOTH * left:
             return False
         # Nearly all that was left: a misfit of form does not predict what it has not seen.
+        return self._predicts(best, new, alone=False)
+
+    def _predicts(self, best: Hypothesis, new: Hypothesis, *, alone: bool) -> bool:
+        """Whether `new` predicts conditions left out better than `best`; `alone`: the answer where there is but one."""
         folds = self._folds(best)
         before, after = predict(best.fit, folds), predict(new.fit, folds)
-        return before is not None and after is not None and after.score > before.score + _WORTH
+        if before is None or after is None:
+            return alone
+        return after.score > before.score + _WORTH
 
     def _folds(self, best: Hypothesis) -> list[tuple[str, ...]]:
         model = best.fit.model

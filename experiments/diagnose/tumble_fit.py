@@ -210,7 +210,7 @@ class Fitter:
             if space.gravities and (number or start.scan):
                 u, residuals, cost = yield from self._scan(u, residuals, cost, way, horizon)
             damping, scanned = 0.0, False
-            for _ in range(steps if horizon >= 1 else max(3, steps // 3)):
+            for _ in range(steps if horizon >= 1 else max(4, steps // 3)):
                 taken += 1
                 jacobian = yield from self._jacobian(u, residuals, way, horizon)
                 normal, slope = normal_equations(jacobian, residuals, u, space)

@@ -7,7 +7,7 @@ looked for together, so that the batched model has its hands full.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -30,8 +30,14 @@ _THIN = 5
 _GROWING = (0.3, 0.6, 1.0)
 _POOR = 1.1
 """Chi-square per sample beyond which the base model is looked for from more places."""
-_FOLLOWED = 6
-"""Effects that are looked for again from nominal values, over growing horizons."""
+_NEAR = 2.0
+"""Chi-square per sample up to which the base model's fit is near enough to begin from."""
+_FOLLOWED = 8
+"""Effects that are looked for over the whole of every trial."""
+_ROUNDS, _MORE_ROUNDS = 6, 12
+"""Steps over the whole of every trial, of all that are followed and of those that are near the best."""
+_HOPELESS = 30.0
+"""Times the best one's chi-square, over part of a trial, beyond which a start is given up."""
 
 
 def _thinned(data: TumbleData) -> TumbleData:
@@ -158,24 +164,61 @@ class Guesser:
     ) -> dict[str, Fit]:
         """The best fit found for each form added to `old`."""
         begun = [(form, point) for form in forms for point in form.starts]
-        chosen = self._screened(fitter, old, begun, start)
-        fits = fitter.fit([self._add(start, old, form, values) for form, values in chosen], steps=12 if old else 7)
         best: dict[str, Fit] = {}
-        for (form, _), found in zip(chosen, fits, strict=True):
-            if form.id not in best or found.cost < best[form.id].cost:
-                best[form.id] = found
+
+        def keep(whose: Sequence[TumbleForm], fits: Sequence[Fit]) -> None:
+            for form, found in zip(whose, fits, strict=True):
+                if form.id not in best or found.cost < best[form.id].cost:
+                    best[form.id] = found
+
+        (now,) = [fitter.residuals([self._point(start)], tuple(old))]
+        size = sum(float(rows[0] @ rows[0]) for rows in now) / max(1, sum(rows.shape[1] for rows in now))
+        if old or size < _NEAR:
+            chosen = self._screened(fitter, old, begun, start)
+            fits = fitter.fit([self._add(start, old, form, values) for form, values in chosen], steps=12 if old else 7)
+            keep([form for form, _ in chosen], fits)
         if old:  # beside what was found already the way is short
             return best
-        effects: dict[str, float] = {}
-        for form in forms:
-            effects[form.effect] = min(effects.get(form.effect, np.inf), best[form.id].cost)
-        followed = sorted(effects, key=lambda effect: effects[effect])[:_FOLLOWED]
-        again = [(form, point) for form, point in begun if form.effect in followed]
-        starts = [self._add(Start(), old, form, point, horizons=_GROWING) for form, point in again]
-        for (form, _), found in zip(again, fitter.fit(starts, steps=15), strict=True):
-            if found.cost < best[form.id].cost:
-                best[form.id] = found
+        self._race(fitter, begun, keep)
+        left = [form for form in forms if form.id not in best]  # given up on the way: told as they stand
+        places = {form.id: point for form, point in reversed(begun)}
+        keep(left, fitter.fit([self._add(Start(), (), form, places[form.id]) for form in left], steps=2))
         return best
+
+    def _race(
+        self, fitter: Fitter, begun: Sequence[tuple[TumbleForm, Values]],
+        keep: Callable[[Sequence[TumbleForm], Sequence[Fit]], None],
+    ) -> None:  # fmt: skip
+        """Every form from all its starts and nominal numbers, over growing horizons; on the way most drop out.
+
+        A base model that lacks something plain stands on branches of its own, from which no effect is found: so all
+        begin where every branch is the same.
+        """
+        running = [(form, self._add(Start(), (), form, point, horizons=_GROWING[:1])) for form, point in begun]
+        for following in (*_GROWING[1:], 1.0):
+            fits = fitter.fit([start for _, start in running], steps=_ROUNDS)
+            seen = max(1, sum(int(np.count_nonzero(rows)) for rows in fits[0].residuals))
+            limit = _HOPELESS * max(min(fit.cost for fit in fits), float(seen))
+            order = sorted(range(len(fits)), key=lambda k: fits[k].cost)
+            effects = list(dict.fromkeys(running[k][0].effect for k in order))
+            last = running[0][1].horizons[-1] >= 1
+            if last:
+                keep([form for form, _ in running], fits)
+            each: dict[str, int] = {}
+            longer = []
+            for k in order:
+                form, found = running[k][0], fits[k]
+                each[form.id] = each.get(form.id, 0) + 1
+                most, alike = (len(effects), 2) if following < 1 else (_FOLLOWED, 1 if last else 2)
+                if each[form.id] <= alike and form.effect in effects[:most] and found.cost <= limit:
+                    start = Start(forms=(form,), values=found.values, gravity=found.gravity, scan=not last,
+                                  horizons=(following,))  # fmt: skip
+                    longer.append((form, start))
+            running = longer
+        keep([form for form, _ in running], fitter.fit([start for _, start in running], steps=_MORE_ROUNDS))
+
+    def _point(self, start: Start) -> tuple[dict[str, float], Array]:
+        return dict(start.values), np.ones(len(self._ids)) if start.gravity is None else start.gravity
 
     def _add(
         self, start: Start, old: Sequence[TumbleForm], form: TumbleForm, values: Values,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -200,6 +200,18 @@ class TumbleProblem:
         physical = self._physical(values, form)
         return {name.partition(".")[2]: (value, units[name]) for name, value in physical.items()}
 
+    def form_std(self, form: Form) -> dict[str, float]:
+        """Relative uncertainty of what is reported of a form, for nature's law is not the form's: name -> std."""
+        assert isinstance(form, TumbleForm)
+        return {form.amplitude.partition(".")[2]: form.form_std} if form.form_std else {}
+
+    def prepare(self, tell: Callable[[str, float], None]) -> None:
+        """Compile the kernels, which takes a while where that was not done before, and says so."""
+        for place, forward in enumerate((self.forward, self._guesser.forward)):
+            tell("compiling the kernels (kept for the next time)", 0.5 * place)
+            forward.predict({}, trials=[0], horizon=0.01)
+            forward.predict({"com-offset.x": np.zeros(1)}, trials=[0], horizon=0.01)
+
     def latent(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
         """Force and torque that the model lacks, and what they might depend on (`tumble_latent`)."""
         data = self.data.trials[self._index[trial]]
@@ -245,15 +257,17 @@ class TumbleProblem:
             ),
             effect=tuple(
                 EffectTable(
-                    id=form.effect,
-                    file=self.own[form.effect].file.name if form.effect in self.own else None,
+                    id=effect,
+                    file=self.own[effect].file.name if effect in self.own else None,
                     parameters={
                         name.partition(".")[2]: value
+                        for form in forms
+                        if form.effect == effect
                         for name, value in self._physical(values, form).items()
                         if math.isfinite(value)
                     },
                 )
-                for form in forms
+                for effect in dict.fromkeys(form.effect for form in forms)
             ),
         )
         write_model(path, model)

@@ -19,10 +19,13 @@ def ball_radius(radius):
     return radius
 
 
-def inertial_rate_force(s, depth, rate, normal):
-    """b rate^2 while going in: the ground's own inertia."""
+def inertial_rate_force(s, depth, rate, normal, power):
+    """b rate^2 while going in: the ground's own inertia; with another power p, b (1 m/s)^2 (rate / (1 m/s))^p."""
     sinking = max(rate, 0.0)
-    return normal * sinking * sinking
+    drag = normal * sinking * sinking
+    if power != 2.0:
+        drag = normal * max(sinking, 1e-12) ** power
+    return drag
 
 
 def inertial_side_force(s, depth, slip, sideways):
@@ -30,8 +33,8 @@ def inertial_side_force(s, depth, slip, sideways):
     return -sideways * abs(slip) * slip
 
 
-def hardened(depth, force, work, exponent, reference):
-    """The law's force times (z / z_0)^(n - 1); the work is exact for every law that is a power of depth."""
+def hardened(depth, force, work, exponent, reference, bend):
+    """The law's force times (z / z_0)^(n - 1) (1 + b z); the work is exact for every law that is a power of depth."""
     grown = force
     stored = work
     if exponent != 1.0:
@@ -41,6 +44,13 @@ def hardened(depth, force, work, exponent, reference):
         stored = work * ratio
         if work > 0.0:
             stored = grown * z / (force * z / work + exponent - 1.0)
+    if bend != 0.0:
+        z = max(depth, 0.0)
+        power = 2.0  # one more than the power of depth that the force goes with
+        if stored > 0.0:
+            power = grown * z / stored
+        stored = stored * (1.0 + bend * z * power / (power + 1.0))
+        grown = grown * (1.0 + bend * z)
     return grown, stored
 
 
@@ -92,6 +102,8 @@ CONTACT_EFFECTS: tuple[Term, ...] = (
         parameters=(
             Parameter(name="normal", unit="kg/m", default=0.0, lowest=0.0, summary="b, while the tip goes in"),
             Parameter(name="sideways", unit="kg/m", default=0.0, lowest=0.0, summary="b_x, while the tip slides"),
+            Parameter(name="power", unit="1", default=2.0, lowest=1.0, highest=3.0,
+                      summary="of the speed of going in; where it is not 2, b is the force at 1 m/s over (1 m/s)^2"),
         ),
         source="Katsuragi and Durian, Nature Physics 3 (2007), 420: the inertia of displaced grains",
         limits="b does not grow with depth",
@@ -103,7 +115,9 @@ CONTACT_EFFECTS: tuple[Term, ...] = (
             Parameter(name="exponent", unit="1", default=1.0, lowest=0.3, highest=4.0,
                       summary="n of (z / z_0)^(n - 1) on the law's force; 1 changes nothing"),
             Parameter(name="reference", unit="m", default=1e-3, lowest=0.0, above_lowest=True,
-                      summary="z_0: the depth at which the force is the base law's"),
+                      summary="z_0: the depth at which the power changes nothing"),
+            Parameter(name="bend", unit="1/m", default=0.0, lowest=0.0,
+                      summary="b of 1 + b z, a factor beside the power's: a law that is straight while shallow"),
         ),
         source="pressure and sinkage of soils (Bekker 1969); slow penetration grows as z^1.3 (Hill et al. 2005)",
         limits="work exact for laws that are powers of depth (spring-damper, Hunt-Crossley, power, Katsuragi-Durian)",

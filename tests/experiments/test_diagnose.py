@@ -67,6 +67,7 @@ def test_a_hidden_effect_of_another_form_than_the_librarys_is_named_and_the_gap_
     found = diagnosed(pushes(force))
     assert (found.verdict, found.effects) == ("named", (name,))
     assert found.before.held_out > 5 and found.after.held_out < 0.2 * found.before.held_out
+    assert found.model_std == {}  # two replicates of each speed, which differ by the sensors alone
     assert {place.phase for place in found.where} & {"in", "out"}
 
 
@@ -118,7 +119,14 @@ def test_the_command_writes_what_the_contract_says(tmp_path, capsys):
     said = json.loads((out / "diagnosis.json").read_text())
     jsonschema.validate(said, SCHEMA)
     assert said["verdict"] == "named" and len(said["gap"]["held_out_trials"]) == 1
-    assert [effect.id for effect in read_model(out / "model.toml").effect][:1] == ["plastic-sinkage"]
+    model = read_model(out / "model.toml")
+    assert [effect.id for effect in model.effect][:1] == ["plastic-sinkage"]
+    # One fit: the model is what was printed and what the gap is of.
+    assert model.surface.stiffness == pytest.approx(said["base"]["after"]["stiffness"]["value"], rel=1e-12)
+    quantities = json.loads((out / "result.json").read_text())["quantities"]
+    assert quantities["stiffness_after"]["value"] == said["base"]["after"]["stiffness"]["value"]
+    for name, told in said["effects"][0]["parameters"].items():
+        assert model.effect[0].parameters[name] == pytest.approx(told["value"], rel=1e-12)
     page = (out / "report.html").read_text()
     assert "plastic-sinkage" in page and "data:image/png" in page
     assert "plastic-sinkage" in capsys.readouterr().out

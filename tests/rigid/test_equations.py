@@ -25,10 +25,10 @@ VALUES = {
     "pulley-inertia": {"mass": 0.7},
     "umbilical": {"stiffness": 0.3, "drag": 0.2},
     "tip-radius": {"radius": 0.011},
-    "depth-hardening": {"exponent": 1.35, "reference": 2e-3},
+    "depth-hardening": {"exponent": 1.35, "reference": 2e-3, "bend": 60.0},
     "plastic-sinkage": {"share": 0.25},
     "adhesion": {"force": 0.8, "reach": 3e-3},
-    "inertial-drag": {"normal": 40.0, "sideways": 7.0},
+    "inertial-drag": {"normal": 40.0, "sideways": 7.0, "power": 1.7},
     "wire-compliance": {"stiffness": 3e3, "damping": 25.0},
 }
 
@@ -88,10 +88,11 @@ class Derived:
             if "plastic-sinkage" in on:
                 f = on["plastic-sinkage"]["share"]
                 z = (depth - f * TOP) / (1 - f)
-            z0, e = 1, 0
+            z0, e, b = 1, 0, 0
             if "depth-hardening" in on:
                 z0, e = on["depth-hardening"]["reference"], on["depth-hardening"]["exponent"] - 1
-            stored = trial.stiffness * z ** (2 + e) / ((2 + e) * z0**e)
+                b = on["depth-hardening"]["bend"]
+            stored = trial.stiffness * (z ** (2 + e) / (2 + e) + b * z ** (3 + e) / (3 + e)) / z0**e
             if "plastic-sinkage" in on:
                 stored *= 1 - f
             force = -sp.diff(stored, Y)  # on y, of depth alone
@@ -101,13 +102,14 @@ class Derived:
                 stored += held
                 force += -sp.diff(held, Y)
             energy += stored
-            drag = on.get("inertial-drag", {"normal": 0, "sideways": 0})
+            drag = on.get("inertial-drag", {"normal": 0, "sideways": 0, "power": 2})
             lost = sp.Integer(0)
             if sinking:
                 D += trial.damping * sink**2 / 2
-                lost = trial.damping * sink + drag["normal"] * sink**2
+                inert = drag["normal"] * sink ** drag["power"]
+                lost = trial.damping * sink + inert
                 for k in range(3):
-                    work[k] -= drag["normal"] * sink**2 * sp.diff(sink, SPEED[k])
+                    work[k] -= inert * sp.diff(sink, SPEED[k])
             # The horizontal speed of the material point that touches: the ball turns with the platform.
             slide = U - W * ((length - r) * sp.cos(gamma) + r)
             side = -drag["sideways"] * sp.Abs(slide) * slide - slip.get(n, 0) * trial.sliding_friction * (force + lost)

@@ -1,0 +1,62 @@
+"""Parameters that end where they cannot go on: at a bound, or far from what was stated.
+
+A number that was stated as 5.3 +- 0.01 and is fitted as 5.36 has not been measured anew: the model lacks something, and
+bends what it has. Such a model does not explain the data, however little it leaves.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from .fitting import Fit
+
+__all__ = ["Bound", "bounds_met"]
+
+_FAR = 5.0
+"""Standard deviations from the stated value that no true number has (chance 6e-7)."""
+
+
+@dataclass(frozen=True)
+class Bound:
+    """One parameter that met its bound, or went all but there."""
+
+    parameter: str
+    value: float
+    unit: str
+    sigmas: float | None
+    """Standard deviations from what was stated; None where nothing was (a parameter of an effect)."""
+    at_bound: bool
+
+    @property
+    def strains(self) -> bool:
+        """Whether the model needs a number that the campaign all but excludes."""
+        return self.sigmas is not None
+
+    @property
+    def words(self) -> str:
+        """As in: the mass went to ..."""
+        if self.sigmas is not None:
+            end = ", the end of its range" if self.at_bound else ""
+            return f"{self.parameter} {self.value:.4g} {self.unit} ({self.sigmas:+.1f} sigma{end})"
+        return f"{self.parameter} {self.value:.4g} {self.unit} (the most or least that the library allows)"
+
+
+def bounds_met(found: Fit) -> tuple[Bound, ...]:
+    """Base parameters 5 standard deviations and more from their stated values, and effects' parameters at a bound.
+
+    An amplitude at zero is no bound, nor is a number that may be no less than zero and is zero.
+    """
+    base = {p.name for p in found.model.problem.base}
+    shown = []
+    for p in found.model.parameters:
+        value = found.values[p.name]
+        near = 1e-6 * max(abs(p.scale), 1e-300)
+        at = value <= p.lowest + near or value >= p.highest - near
+        if p.name in base and math.isfinite(p.std):
+            sigmas = (value - p.value) / p.std
+            if abs(sigmas) >= _FAR:
+                shown.append(Bound(p.name, value, p.unit, sigmas, at))
+        elif p.name not in base and "." in p.name and at and abs(value) > near:
+            shown.append(Bound(p.name, value, p.unit, None, True))
+    return tuple(shown)

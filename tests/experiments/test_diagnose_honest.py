@@ -1,0 +1,116 @@
+"""What keeps a diagnosis honest: errors near jumps, numbers too far from what was stated, noise that is none."""
+
+import numpy as np
+import pytest
+from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial
+
+from experiments.diagnose.bounds import bounds_met
+from experiments.diagnose.colour import find_colours
+from experiments.diagnose.diagnosis import diagnose
+from experiments.diagnose.fitting import Model, Whitener, fit, settled
+from experiments.diagnose.gate import held_out_gate, open_gate
+from experiments.diagnose.penetration_problem import make_problem
+from experiments.diagnose.problem import Parameter, Samples, TrialInfo
+
+COUNT = 400
+
+
+def base(z, v, top):
+    return STIFFNESS * z + DAMPING * max(v, 0.0)
+
+
+def pushed(force, speeds):
+    return [(f"{k}", "driven", v, driven_trial(force, speed=v, retreat=True, seed=k)) for k, v in enumerate(speeds)]
+
+
+class Line:
+    """y = k t with unit noise, and a branch: for k beyond `jump` the model is off by 5 everywhere."""
+
+    kind = "line"
+    design = ""
+    forms = ()
+
+    def __init__(self, *, jump=np.inf, noise=None, std=0.1, trials=("1", "2")):
+        self.jump, self.time = jump, np.linspace(0.0, 100.0, COUNT)
+        self.trials = tuple(TrialInfo(id=id, condition=(id,)) for id in trials)
+        drawn = np.random.default_rng(3)
+        self.measured = {
+            id: self.time + (drawn.standard_normal(COUNT) if noise is None else noise(drawn, id)) for id in trials
+        }
+        self.base = (Parameter(name="k", unit="1", value=1.0, std=std, scale=std, step=0.02 * std, lowest=1 - 6 * std,
+                               highest=1 + 6 * std),)  # fmt: skip
+
+    def samples(self, trial):
+        return Samples(time=self.time, channel=np.full(COUNT, "y"), std=np.ones(COUNT))
+
+    def evaluate(self, points, forms, trials):
+        models = [p["k"] * self.time + 5.0 * (p["k"] > self.jump) for p in points]
+        return [{id: self.measured[id] - model for id in trials} for model in models]
+
+
+def fitted(problem, trials=("1", "2")):
+    return fit(Model(problem, Whitener.white(problem), trials))
+
+
+def test_a_jump_within_a_step_of_the_fit_is_no_slope():
+    """std of k = 1 / sqrt(sum t^2) over the samples, the prior beside it; a step of 2e-3 reaches over the jump."""
+    problem = Line(jump=1.0005)
+    found = fitted(problem)
+    assert abs(found.values["k"] - 1) < 5e-4
+    exact = (2 * (problem.time**2).sum() + 0.1**-2) ** -0.5
+    assert np.sqrt(found.covariance()[0, 0]) < 0.7 * exact
+    assert np.sqrt(settled(found).covariance()[0, 0]) == pytest.approx(exact, rel=1e-6)
+
+
+def test_a_number_that_the_campaign_excludes_is_said_and_no_right_model_needs_one():
+    problem = Line(std=5e-3)
+    assert open_gate(fitted(problem))[1].passed and not bounds_met(fitted(problem))
+    problem.measured = {id: rows + 0.05 * problem.time for id, rows in problem.measured.items()}
+    found = fitted(problem)
+    (bound,) = bounds_met(found)
+    assert bound.at_bound and bound.strains and bound.sigmas == pytest.approx(6.0)
+    problem.measured = {id: rows - 0.022 * problem.time for id, rows in problem.measured.items()}  # 5.6 sigma off
+    found = fitted(problem)
+    (bound,) = bounds_met(found)
+    assert not bound.at_bound and bound.sigmas == pytest.approx(5.5, abs=0.1)
+    assert abs(found.chi_square / found.count - 1) < 0.15  # nothing is left of the data,
+    assert not open_gate(found)[1].passed  # and still it is no explanation
+
+
+def test_trials_held_out_have_a_gate_that_knows_what_the_fit_left_uncertain():
+    problem = Line(trials=("1", "2", "3"))
+    found = fitted(problem)
+    assert held_out_gate(found, ["3"], found.values).passed
+    problem.measured["3"] = problem.measured["3"] + 1.5 * np.sin(problem.time / 10)
+    assert not held_out_gate(found, ["3"], found.values).passed
+
+
+def correlated(random, trial):
+    """x_k = 0.6 x_(k-1) + 0.8 n_k, of unit variance."""
+    white = random.standard_normal(COUNT)
+    for k in range(1, COUNT):
+        white[k] = 0.6 * white[k - 1] + 0.8 * white[k]
+    return white
+
+
+def burst(random, trial):
+    white = random.standard_normal(COUNT)
+    white[150:170] += 6.0 * random.standard_normal(20)
+    return white
+
+
+def test_noise_that_is_there_all_the_time_has_a_colour_and_a_burst_has_none():
+    (colour,) = find_colours(fitted(Line(noise=correlated))).values()
+    assert colour.persistence == pytest.approx(0.6, abs=0.07) and colour.std == pytest.approx(1.0, abs=0.1)
+    (colour,) = find_colours(fitted(Line(noise=lambda random, trial: 1.4 * random.standard_normal(COUNT)))).values()
+    assert colour.std == pytest.approx(1.4, abs=0.1)
+    found = fitted(Line(noise=burst))
+    assert found.chi_square > 2 * found.count
+    assert find_colours(found) == {}
+
+
+def test_a_stiffness_that_was_stated_wrong_is_not_passed_over():
+    trials = pushed(base, (0.01, 0.03, 0.1, 0.02))
+    found = diagnose(make_problem(campaign_of(trials, stiffness=0.7 * STIFFNESS, doubt=(0.05, 0.1))))
+    assert found.verdict != "none"
+    assert any(bound.parameter.startswith("stiffness") for bound in found.bounds_before)
