@@ -8,21 +8,9 @@ from .case import Case
 __all__ = ["CASES"]
 
 FAMILY = "Not yet"
-WALLS = "walls that stand round the bed: it is periodic sideways"
-COHESION = "cases of cohesion in this suite"
 TESTS = "the material tests (shear, repose) that give mu or phi of the same bed"
 
 CASES = [
-    Case("dmt", FAMILY, "DMT pull-off", "4 pi gamma R", "Derjaguin, Muller & Toporov 1975", waits_for=COHESION),
-    Case("jkr", FAMILY, "JKR pull-off", "3 pi gamma R", "Johnson, Kendall & Roberts 1971", waits_for=COHESION),
-    Case(
-        "janssen",
-        FAMILY,
-        "Janssen silo",
-        "sigma = rho g D / 4 mu_w K (1 - exp(-4 mu_w K z / D))",
-        "Janssen 1895",
-        waits_for=WALLS,
-    ),
     Case(
         "repose",
         FAMILY,
@@ -38,14 +26,6 @@ CASES = [
         "30 to 33 degrees for Toyoura sand at critical state",
         "design data, from a second source",
         waits_for=TESTS,
-    ),
-    Case(
-        "dosta",
-        FAMILY,
-        "Steel ball of 20 mm at 5 m/s into 2 mm grains",
-        "depth and speed over 0.1 s, nine open codes",
-        "Dosta et al. 2024, Comput. Phys. Commun. 296, 109066",
-        waits_for="a body that grains push (the ball has a mass of its own), and walls",
     ),
     Case(
         "katsuragi-durian",

@@ -8,21 +8,51 @@ import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from . import books, collisions, integrator, large_body, oblique, one_grain, peers, pending, restitution, spinning
+from . import (
+    books,
+    cohesion,
+    collisions,
+    dosta,
+    integrator,
+    large_body,
+    oblique,
+    one_grain,
+    peers,
+    pending,
+    restitution,
+    silo,
+    spinning,
+)
 from .case import Case
 
 __all__ = ["SUITE", "chosen", "fingerprint", "fingerprint_of"]
 
 SHARED = ("case.py", "spheres.py")
 """What cases of every family are computed by."""
-NEEDS = {"books": ("cloud.py", "energy.py"), "peers": ("cloud.py",), "spinning": ("oblique.py",)}
+NEEDS = {
+    "books": ("cloud.py", "energy.py"),
+    "peers": ("cloud.py",),
+    "spinning": ("oblique.py",),
+    "dosta": ("peers.py",),
+}
 """What else those of a module are."""
 
-SUITE: tuple[Case, ...] = tuple(
-    case
-    for module in (one_grain, integrator, collisions, restitution, oblique, spinning, books, large_body, peers, pending)
-    for case in module.CASES
+_MODULES = (
+    one_grain,
+    integrator,
+    collisions,
+    restitution,
+    oblique,
+    spinning,
+    cohesion,
+    books,
+    silo,
+    large_body,
+    peers,
+    dosta,
+    pending,
 )
+SUITE: tuple[Case, ...] = tuple(case for module in _MODULES for case in module.CASES)
 
 
 def chosen(only: Sequence[str] = (), *, quick: bool = False) -> list[Case]:

@@ -3,8 +3,10 @@
 import dataclasses
 import math
 
+import numpy as np
 import pytest
 
+from experiments.validate import dosta, silo
 from experiments.validate.case import Case, Comparison, Outcome, compared
 from experiments.validate.experiment import run_case
 from experiments.validate.peers import PEERS
@@ -85,3 +87,21 @@ def test_a_case_without_numbers_or_that_ends_with_an_error_fails():
 def test_a_case_needs_something_to_do_or_to_wait_for():
     with pytest.raises(ValueError, match="either compute or waits_for"):
         Case("x", "f", "t", "r", "s")
+
+
+def test_dostas_grains_fill_their_box_and_the_ball_starts_on_the_first():
+    positions, radii = dosta.grains()
+    assert positions.shape == (25000, 3) and (radii == 1e-3).all()
+    for axis in (0, 1):
+        low, high = dosta.WALLS[2 * axis : 2 * axis + 2]
+        assert low < (positions - radii[:, None])[:, axis].min() + 1e-5
+        assert (positions + radii[:, None])[:, axis].max() < high + 1e-5
+    height = dosta.first_touch(positions, radii)
+    gap = np.linalg.norm(positions - [0, 0, height], axis=1) - radii - dosta.BALL_RADIUS
+    assert abs(gap.min()) < 1e-12
+
+
+def test_janssens_floor_carries_all_of_a_shallow_filling_and_no_more_than_its_scale():
+    """W_s (1 - exp(-W / W_s)): W - W^2 / 2 W_s where shallow."""
+    assert silo.carried(np.array(0.01), 1.0) == pytest.approx(0.01 - 0.01**2 / 2, rel=1e-4)
+    assert silo.carried(np.array(50.0), 1.0) == pytest.approx(1.0)
