@@ -13,18 +13,25 @@ __all__ = [
     "Ball",
     "Bed",
     "BedFailure",
+    "Box",
+    "Capsule",
     "Cone",
     "Cylinder",
     "Facing",
     "LogNormal",
     "MATERIALS",
     "Material",
+    "Mesh",
     "Normal",
+    "Placed",
     "Plane",
+    "Polyhedron",
     "SAND",
     "Sieve",
+    "Tube",
     "Uniform",
     "material",
+    "mesh_from_file",
 ]
 
 # Taichi greets on stdout as it is imported; what a script prints is the script's.
@@ -34,14 +41,18 @@ os.environ.setdefault("TI_LOG_LEVEL", "error")
 if TYPE_CHECKING:
     from .bed import Bed, BedFailure
     from .materials import MATERIALS, SAND, Facing, Material, material
+    from .mesh import Mesh, Polyhedron, mesh_from_file
     from .shapes import Ball, Cone, Cylinder, Plane
     from .sizes import LogNormal, Normal, Sieve, Uniform
+    from .solids import Box, Capsule, Placed, Tube
 
 _ROOMS = {
     "bed": ("Bed", "BedFailure"),
     "materials": ("Facing", "MATERIALS", "Material", "SAND", "material"),
+    "mesh": ("Mesh", "Polyhedron", "mesh_from_file"),
     "shapes": ("Ball", "Cone", "Cylinder", "Plane"),
     "sizes": ("LogNormal", "Normal", "Sieve", "Uniform"),
+    "solids": ("Box", "Capsule", "Placed", "Tube"),
 }
 
 

@@ -17,7 +17,8 @@ from .lists import MOST_BODIES
 from .materials import Facing, Material
 from .materials import material as find_material
 from .measure import bulk_packing, surface_height
-from .shapes import Plane, Primitive
+from .shapes import Plane
+from .solids import AnyShape
 from .timestep import time_step_for
 
 __all__ = ["Bed", "BedFailure"]
@@ -208,7 +209,7 @@ class Bed:
 
     def add_body(
         self,
-        shape: Sequence[Primitive],
+        shape: AnyShape | Sequence[AnyShape],
         *,
         position: Sequence[float],
         friction: float | None = None,
@@ -221,7 +222,9 @@ class Bed:
         """Put a body among the grains and return its number. It moves as it is told; see ``move_body``.
 
         Args:
-            shape: primitives of ``dem.shapes`` in the body's frame; their union is the body.
+            shape: one or several of dem's Ball, Cylinder, Cone, Capsule, Box, Tube, Polyhedron, Mesh, Plane and Placed,
+                in the body's frame; their union is the body, and touches a grain once. What lies farther sideways from
+                the body's origin than half the bed's period touches nothing.
             position: of the body's origin [m].
             friction, restitution, rolling_friction: of a grain on the body; the grains' own when None.
             young, poisson: of the body; rigid when None. [Pa], [1].
@@ -242,12 +245,13 @@ class Bed:
         )
         body = self._add(shape, position, facing)
         kept = self.max_overlap
-        self._make_lists()
         self.max_overlap = 0.0
+        self._make_lists()
         self._push()
         found = self.max_overlap
         if found > self.overlap_limit:
             self._engine.body_count[None] = body
+            self._engine.drop_shapes(int(self._engine.body_primitives[body][0]))
             self._make_lists()
             self.max_overlap = kept
             self._push()
@@ -258,16 +262,22 @@ class Bed:
         self.max_overlap = max(kept, found)
         return body
 
-    def _add(self, shape: Sequence[Primitive], position: Sequence[float], facing: Facing) -> int:
+    def _add(self, shape: AnyShape | Sequence[AnyShape], position: Sequence[float], facing: Facing) -> int:
         e = self._engine
-        shape = list(shape)
+        parts: list[Any] = [shape] if isinstance(shape, AnyShape) else list(shape)
         body = int(e.body_count[None])
         used = int(e.body_primitives[body - 1][1]) if body else 0
-        if not shape:
+        if not parts:
             raise ValueError("shape is empty; a body needs at least one primitive")
+        for part in parts:
+            if not isinstance(part, AnyShape):
+                raise ValueError(
+                    f"shape holds {part!r}, which is no shape; use Ball, Cylinder, Cone, Capsule, Box, Tube, "
+                    f"Polyhedron, Mesh, Plane or Placed"
+                )
         if len(position) != 3 or not all(math.isfinite(p) for p in position):
             raise ValueError(f"position = {tuple(position)} must be 3 finite numbers [m]")
-        if body >= MOST_BODIES or used + len(shape) > MOST_PRIMITIVES:
+        if body >= MOST_BODIES or used + len(parts) > MOST_PRIMITIVES:
             raise ValueError(f"a bed takes at most {MOST_BODIES} bodies of {MOST_PRIMITIVES} primitives in all")
         stuff = self.material
         facing.refuse_for(stuff)
@@ -286,17 +296,15 @@ class Bed:
             surface_energy=_or(facing.surface_energy, stuff.surface_energy),
             tensile=self._settings["tensile"],
         )
-        for k, primitive in enumerate(shape):
-            e.primitive_kind[used + k] = primitive.kind
-            e.primitive_row[used + k] = primitive.row()
-        e.body_primitives[body] = [used, used + len(shape)]
-        e.body_extent[body] = min(1e35, max(p.extent() for p in shape))
+        e.put_shapes(used, parts)
+        e.body_primitives[body] = [used, used + len(parts)]
+        e.body_extent[body] = min(1e35, max(p.extent() for p in parts))
         e.body_position[body] = [float(p) for p in position]
         e.body_velocity[body] = [0.0, 0.0, 0.0]
         e.body_spin[body] = [0.0, 0.0, 0.0]
         e.body_turn[body] = [1.0, 0.0, 0.0, 0.0]
         e.body_count[None] = body + 1
-        if body == FLOOR and any(isinstance(p, Plane) for p in shape):
+        if body == FLOOR and any(isinstance(p, Plane) for p in parts):
             self._has_floor = True
         return body
 
@@ -333,6 +341,11 @@ class Bed:
         """Where a body's origin is [m], shape [3]."""
         self._check_body(body)
         return np.array(self._engine.body_position[body], dtype=float)
+
+    def body_turn(self, body: int) -> np.ndarray:
+        """How a body is turned: a unit quaternion, scalar first, shape [4]."""
+        self._check_body(body)
+        return np.array(self._engine.body_turn[body], dtype=float)
 
     def reaction(self, body: int) -> tuple[np.ndarray, np.ndarray]:
         """Force [N] and torque about the body's origin [N m] from the grains, each of shape [3].
@@ -404,7 +417,7 @@ class Bed:
         e = self._engine
         e.keep_lists()
         e.sort(*self.gravity)
-        e.make_lists(self._skin)
+        e.make_lists(self._skin, e.shapes)
         self.list_count += 1
         self._since_lists = 0
         code, value = (int(v) for v in e.problem[None])
@@ -434,7 +447,7 @@ class Bed:
 
     def _push(self, elapsed: float = 0.0) -> None:
         """Forces where the grains are; ``elapsed`` is the time by which contacts have slid since they were computed."""
-        self._engine.push_all(elapsed)
+        self._engine.push_all(elapsed, self._engine.shapes)
 
     def _shift_velocities(self, part: float) -> None:
         self._engine.shift_velocities(part * self.time_step)
@@ -475,7 +488,7 @@ class Bed:
     def contact_counts(self) -> np.ndarray:
         """Contacts of each grain with grains and bodies, by id, shape [grain_count]."""
         counts = np.zeros(self.grain_count, dtype=np.int32)
-        self._engine.count_contacts(counts)
+        self._engine.count_contacts(counts, self._engine.shapes)
         return counts
 
     @property

@@ -46,6 +46,7 @@ from .lists import (
     Lists,
     curve_ranks,
 )
+from .shape_table import PLAIN, Shapes
 from .shapes import ROW_WIDTH
 
 __all__ = ["Engine", "MOST_BODIES", "MOST_PRIMITIVES", "STEPS_PER_LAUNCH", "take_engine"]
@@ -92,7 +93,7 @@ def _roomy(count: int, *, least: int) -> int:
 
 
 @ti.data_oriented
-class Engine(Lists):
+class Engine(Lists, Shapes):
     """Grains, lists and bodies in Taichi fields, and the kernels that advance them.
 
     Args:
@@ -260,6 +261,9 @@ class Engine(Lists):
         self.body_pair = F(PAIR_WIDTH, real, MOST_BODIES)
         self.primitive_kind = ti.field(ti.i32, MOST_PRIMITIVES)
         self.primitive_row = F(ROW_WIDTH, real, MOST_PRIMITIVES)
+        self.shapes = PLAIN  # the table of the shapes that need one; kernels are compiled anew for another
+        self._kept = None
+        self._meshes = []
         self.grain_pair = F(PAIR_WIDTH, real, ())
         # Step control: moved is written by move and read by push; halted is written by push and read by move.
         self.moved = ti.field(ti.i32, ())
@@ -288,6 +292,7 @@ class Engine(Lists):
             counter[None] = 0
         self.problem[None] = [0, 0]
         self.clear_pushes()
+        self.clear_shapes()
 
     def read(self, name: str) -> np.ndarray:
         """A field as a numpy array: the rows of the grains or chunks there are, or all of them."""
@@ -316,9 +321,9 @@ class Engine(Lists):
         if self.gpu:
             self.done[None] = 0
             for _ in range(min(most, STEPS_PER_LAUNCH)):
-                self.run_on_gpu(dt, limit, *gravity, keep)
+                self.run_on_gpu(dt, limit, *gravity, keep, self.shapes)
         else:
-            self.run(dt, limit, *gravity, keep, min(most, STEPS_PER_LAUNCH))
+            self.run(dt, limit, *gravity, keep, min(most, STEPS_PER_LAUNCH), self.shapes)
         return int(self.done[None]), bool(self.halted[None])
 
     @ti.func
@@ -376,7 +381,7 @@ class Engine(Lists):
             self.body_turn[b] = s / s.norm()
 
     @ti.func
-    def push(self, c, dt):
+    def push(self, c, dt, shapes: ti.template()):
         """Forces between the grains of a chunk and all that they touch."""
         start, end = self.chunk_range(c)
         # First find out which pairs touch, without a branch that a processor would have to guess; then their forces.
@@ -456,7 +461,7 @@ class Engine(Lists):
                     self.torque[j] = self.torque[j] + (arm_j * t - turn)
             largest = ti.max(largest, overlap * by_sum)
         for s in range(c * self.count[NEAR_ROOM], self.near_end[c]):
-            largest = ti.max(largest, self.push_near(c, s, dt))
+            largest = ti.max(largest, self.push_near(c, s, dt, shapes))
         self.overlap[c] = ti.max(self.overlap[c], largest)
 
     @ti.func
@@ -470,12 +475,15 @@ class Engine(Lists):
         return d
 
     @ti.func
-    def push_near(self, c, s, dt):
+    def push_near(self, c, s, dt, shapes: ti.template()):
         """Force between a grain and a body; returns overlap over diameter."""
         i = self.near_grain[s]
         b = self.near_body[s]
         x = self.position[i]
-        distance, n, curvature, arm = self.nearest(b, x.xyz)
+        reach = x.w
+        if ti.static(shapes.full):
+            reach += self.body_range(b, x.w, 0.0)
+        distance, n, curvature, arm = self.nearest(b, x.xyz, reach, shapes, False)
         overlap = x.w - distance
         result = ti.cast(0.0, self.real)
         if overlap > -self.body_range(b, x.w, curvature):
@@ -520,7 +528,17 @@ class Engine(Lists):
         return result
 
     @ti.kernel
-    def run(self, dt: float, limit: float, gx: float, gy: float, gz: float, keep: float, steps: int):
+    def run(
+        self,
+        dt: float,
+        limit: float,
+        gx: float,
+        gy: float,
+        gz: float,
+        keep: float,
+        steps: int,
+        shapes: ti.template(),
+    ):
         """Up to ``steps`` steps on a CPU; stops by itself where new lists are needed.
 
         Then halted is 1, done says how many steps are whole, and the forces of the next one are still to come.
@@ -566,32 +584,32 @@ class Engine(Lists):
                                 self.done[None] = phase // 2
                                 here = False
                             else:
-                                self.push(c, dt)
+                                self.push(c, dt, shapes)
                             ti.atomic_add(self.ticket[FINISHED], 1)
 
     @ti.kernel
-    def run_on_gpu(self, dt: float, limit: float, gx: float, gy: float, gz: float, keep: float):
+    def run_on_gpu(self, dt: float, limit: float, gx: float, gy: float, gz: float, keep: float, shapes: ti.template()):
         """One step on a GPU, where every grain is a chunk; nothing where new lists are needed, as in ``run``."""
         for c in range(self.count[CHUNKS]):
             if self.halted[None] == 0:
                 self.move(c, dt, limit, ti.Vector([gx, gy, gz]), keep)
         for c in range(self.count[CHUNKS]):
             if self.moved[None] == 0:
-                self.push(c, dt)
+                self.push(c, dt, shapes)
                 if c == 0:
                     self.done[None] = self.done[None] + 1
             elif c == 0:
                 self.halted[None] = 1
 
     @ti.kernel
-    def push_all(self, dt: float):
+    def push_all(self, dt: float, shapes: ti.template()):
         """The forces of the step that was interrupted by new lists."""
         for _ in range(1):
             self.ticket[QUEUE] = 0
         for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
             c = self.next_chunk(w, True)
             while c < self.count[CHUNKS]:
-                self.push(c, dt)
+                self.push(c, dt, shapes)
                 c = self.next_chunk(w, False)
 
     # ------------------------------------------------------------------ what the host reads
@@ -618,7 +636,7 @@ class Engine(Lists):
                 self.spin[i][k] = self.spin[i][k] + self.torque[i][k] * (2.5 * share / (r * r))
 
     @ti.kernel
-    def count_contacts(self, counts: ti.types.ndarray(dtype=ti.i32, ndim=1)):
+    def count_contacts(self, counts: ti.types.ndarray(dtype=ti.i32, ndim=1), shapes: ti.template()):
         """Contacts of each grain, by id."""
         for i in range(self.count[GRAINS]):
             counts[self.id[i]] = 0
@@ -635,7 +653,12 @@ class Engine(Lists):
         for c in range(self.count[CHUNKS]):
             for s in range(c * self.count[NEAR_ROOM], self.near_end[c]):
                 i = self.near_grain[s]
-                distance, n, curvature, arm = self.nearest(self.near_body[s], self.position[i].xyz)
                 r = self.position[i].w
+                reach = r
+                if ti.static(shapes.full):
+                    reach += self.body_range(self.near_body[s], r, 0.0)
+                distance, n, curvature, arm = self.nearest(
+                    self.near_body[s], self.position[i].xyz, reach, shapes, False
+                )
                 if distance < r + self.body_range(self.near_body[s], r, curvature):
                     ti.atomic_add(counts[self.id[i]], 1)

@@ -86,8 +86,11 @@ class Lists:
         return d
 
     @ti.func
-    def nearest(self, b, x):
-        """Distance, normal and curvature of body b at a point, and the arm from its origin to the nearest point."""
+    def nearest(self, b, x, reach, shapes: ti.template(), deep: ti.template()):
+        """Distance, normal and curvature of body b at a point, and the arm from its origin to the nearest point.
+
+        Of bodies farther than ``reach`` the distance may be 1e30. ``deep``: also tell how deep a point far inside is.
+        """
         d = self.from_body(b, x)
         q = self.body_turn[b]
         local = rotate(ti.Vector([q[0], -q[1], -q[2], -q[3]]), d)
@@ -97,11 +100,18 @@ class Lists:
         primitives = self.body_primitives[b]
         for k in range(primitives[0], primitives[1]):
             row = self.primitive_row[k]
-            distance, n_k, c_k = distance_to(self.primitive_kind[k], row, local)
-            if distance < best:
-                best = distance
-                normal = n_k
-                curvature = c_k
+            if ti.static(shapes.full):
+                distance, n_k, c_k = shapes.distance_to(k, self.primitive_kind[k], row, local, reach, deep)
+                if distance < best:
+                    best = distance
+                    normal = n_k
+                    curvature = c_k
+            else:
+                distance, n_k, c_k = distance_to(self.primitive_kind[k], row, local)
+                if distance < best:
+                    best = distance
+                    normal = n_k
+                    curvature = c_k
         normal = rotate(q, normal)
         return best, normal, curvature, d - best * normal
 
@@ -231,7 +241,7 @@ class Lists:
         return found
 
     @ti.kernel
-    def make_lists(self, skin: float):
+    def make_lists(self, skin: float, shapes: ti.template()):
         """New pair and near lists for the sorted grains; history comes over from the lists put aside."""
         for b in range(MOST_BODIES):
             self.body_listed[b] = self.body_position[b]
@@ -241,14 +251,14 @@ class Lists:
         for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
             c = self.next_chunk(w, True)
             while c < self.count[CHUNKS]:
-                self.list_chunk(c, ti.cast(skin, self.real))
+                self.list_chunk(c, ti.cast(skin, self.real), shapes)
                 c = self.next_chunk(w, False)
         for _ in range(1):
             self.moved[None] = 0
             self.halted[None] = 0
 
     @ti.func
-    def list_chunk(self, c, skin):
+    def list_chunk(self, c, skin, shapes: ti.template()):
         start, end = self.chunk_range(c)
         base = c * self.count[CHUNK_ROOM]
         s = base
@@ -293,7 +303,7 @@ class Lists:
             self.pair_end[i] = ti.min(s, base + self.count[CHUNK_ROOM])
         if s > base + self.count[CHUNK_ROOM]:
             self.problem[None] = ti.Vector([2, s - base])
-        self.list_near(c, start, end, skin)
+        self.list_near(c, start, end, skin, shapes)
 
     @ti.func
     def list_pair(self, s, i, j, code):
@@ -318,7 +328,7 @@ class Lists:
                 self.roll[s] = ti.Vector.zero(self.real, 3)
 
     @ti.func
-    def list_near(self, c, start, end, skin):
+    def list_near(self, c, start, end, skin, shapes: ti.template()):
         base = c * self.count[NEAR_ROOM]
         s = base
         for i in range(start, end):
@@ -327,7 +337,11 @@ class Lists:
                 reach = x.w + skin + self.body_range(b, x.w, 0.0)
                 distance = 2.0 * reach
                 if self.from_body(b, x.xyz).norm_sqr() < (self.body_extent[b] + reach) ** 2:
-                    distance, n, curvature, arm = self.nearest(b, x.xyz)
+                    distance, n, curvature, arm = self.nearest(b, x.xyz, reach, shapes, True)
+                if ti.static(shapes.full):
+                    # A grain in the midst of a mesh is out of its surface's reach: no force would tell of it.
+                    if distance < -x.w:
+                        self.overlap[c] = ti.max(self.overlap[c], (x.w - distance) / (2.0 * x.w))
                 if distance < reach:
                     if s < base + self.count[NEAR_ROOM]:
                         self.near_grain[s] = i

@@ -5,7 +5,7 @@ nearest to the grain's centre. Lengths in metres.
 
 Each primitive is stored as one row (kind, body, six numbers); ``nearest`` returns, for a point outside, the exact
 distance to the union, the outward unit normal there, and the curvature 1/R of a ball's surface (0 for the others,
-which meet a grain as a plane does).
+which meet a grain as a plane does). Further shapes are in ``dem.solids`` and ``dem.mesh``.
 """
 
 import math
@@ -19,7 +19,8 @@ PLANE, BALL, FRUSTUM = 0, 1, 2
 ROW_WIDTH = 6
 
 
-def _positive(kind: str, **values: float) -> None:
+def refuse_length(kind: str, **values: float) -> None:
+    """Raises ValueError for a length that is not positive and finite; ``kind`` says whose."""
     for name, value in values.items():
         if not (math.isfinite(value) and value > 0):
             raise ValueError(f"{kind}: {name} = {value} must be a positive length [m]")
@@ -56,7 +57,7 @@ class Ball:
     radius: float = 0.0
 
     def __post_init__(self):
-        _positive("Ball", radius=self.radius)
+        refuse_length("Ball", radius=self.radius)
 
     kind = BALL
 
@@ -104,7 +105,7 @@ class Cylinder:
     radius: float
 
     def __post_init__(self):
-        _positive("Cylinder", radius=self.radius)
+        refuse_length("Cylinder", radius=self.radius)
         if not self.top > self.bottom:
             raise ValueError(f"Cylinder: top = {self.top} must lie above bottom = {self.bottom} [m]")
 

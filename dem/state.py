@@ -62,6 +62,7 @@ def take(bed: Bed) -> dict[str, np.ndarray]:
         state[name] = e.read(name)[near]
     if e.rolling:
         state["roll"] = e.read("roll")[touching]
+    state |= e.shape_state()
     state["numbers"] = np.array(
         [
             bed.steps,
@@ -90,6 +91,7 @@ def put_back(bed: Bed, state: dict[str, np.ndarray]) -> None:
         raise ValueError(f"this state is in {state['position'].dtype}, the bed in {bed._runtime.precision}")
     for name in (*GRAIN_FIELDS, *BODY_FIELDS):
         e.write(name, state[name])
+    e.restore_shapes(state)
     counts = state["pair_count"]
     chunk = _chunk_starts(bed.grain_count, e.chunk_count)
     before = np.concatenate(([0], np.cumsum(counts)))
@@ -220,6 +222,7 @@ def adopt(bed: Bed, state: dict[str, np.ndarray], *, keep: np.ndarray | None = N
     for name in BODY_FIELDS:
         if name not in ("overlap", "pushes"):
             e.write(name, state[name])
+    e.restore_shapes(state)
     e.body_count[None] = int(state["numbers"][1])
     bed._has_floor = bool(state["numbers"][5])
     bed.steps = int(state["numbers"][0])

@@ -1,6 +1,6 @@
 """A bed of 300 grains in eight chunks that falls onto its floor and a ball: for tests of bits, here and elsewhere.
 
-As a script, in a process of its own:  falling_bed.py WHAT FILE STEPS THREADS [EVERY [COHESION]]
+As a script, in a process of its own:  falling_bed.py WHAT FILE STEPS THREADS [EVERY [COHESION [BODY]]]
     fresh   makes the bed, advances it and saves it
     resume  loads the bed and advances it to that many steps in all
 Saves every EVERY steps when given, and says the number of steps after each save.
@@ -14,16 +14,33 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import solid_shapes
 
 import dem.engine
-from dem import Ball, Bed, Cylinder, Material
+from dem import Ball, Bed, Box, Capsule, Cylinder, Material, Mesh, Placed, Polyhedron, Tube
 
 GRAINS_PER_CHUNK = 37
 STUFF = Material("grain", 2600, 1e7, 0.25, 0.5, 0.6, 0.15)
 
 
-def make(threads=None, precision="float64", cohesion="none"):
-    """The bed at time 0, with a ball-tipped cylinder that is pulled through it at a slant; at Bond number 1 or 0."""
+SPIKE = [Ball(center=(0, 0, 0.004), radius=0.004), Cylinder(0.004, 0.04, 0.004)]
+
+
+def solids():
+    """A turned thing of every shape that a table is needed for, two meshes among them, as wide as the spike."""
+    tip = [(0, 0, 0.0), (0.004, 0, 0.006), (-0.004, 0.001, 0.006), (0, -0.004, 0.007), (0.001, 0.004, 0.008)]
+    return [
+        Polyhedron(tip),
+        Mesh(*solid_shapes.finer(*solid_shapes.box((0.006, 0.005, 0.006), (0.0, 0.0, 0.01)))),
+        Placed(Capsule((0, 0, 0), (0, 0, 0.006), 0.002), (0.002, 0.0, 0.014), (0.9, 0.3, -0.2, 0.1)),
+        Placed(Box((0.003, 0.004, 0.008)), (-0.002, 0.0, 0.02), (0.8, 0.1, 0.5, 0.0)),
+        Tube(0.02, 0.04, 0.003, 0.004),
+    ]
+
+
+def make(threads=None, precision="float64", cohesion="none", body="spike"):
+    """The bed at time 0, with a ball-tipped cylinder (or ``solids``) that is pulled through it at a slant; at Bond
+    number 1 or 0."""
     dem.engine.GRAINS_PER_CHUNK = GRAINS_PER_CHUNK
     rng = np.random.default_rng(7)
     i = np.arange(300)
@@ -40,10 +57,9 @@ def make(threads=None, precision="float64", cohesion="none"):
         threads=threads,
         precision=precision,
     )
-    body = bed.add_body(
-        [Ball(center=(0, 0, 0.004), radius=0.004), Cylinder(0.004, 0.04, 0.004)], position=(0.034, 0.018, 0.0228)
-    )
-    bed.move_body(body, velocity=(0.05, 0.02, -0.5), spin=(0.0, 0.0, 20.0))
+    shape, height = (SPIKE, 0.0228) if body == "spike" else (solids(), 0.0195)
+    number = bed.add_body(shape, position=(0.034, 0.018, height))
+    bed.move_body(number, velocity=(0.05, 0.02, -0.5), spin=(0.0, 0.0, 20.0))
     return bed
 
 
@@ -63,7 +79,8 @@ def main() -> None:
     every = int(sys.argv[5]) if len(sys.argv) > 5 else steps
     dem.engine.GRAINS_PER_CHUNK = GRAINS_PER_CHUNK
     cohesion = sys.argv[6] if len(sys.argv) > 6 else "none"
-    bed = make(threads, cohesion=cohesion) if what == "fresh" else Bed.load(path, threads=threads)
+    body = sys.argv[7] if len(sys.argv) > 7 else "spike"
+    bed = make(threads, cohesion=cohesion, body=body) if what == "fresh" else Bed.load(path, threads=threads)
     while bed.steps < steps:
         bed.advance(min(every, steps - bed.steps))
         bed.save(path)

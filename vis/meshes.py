@@ -7,11 +7,13 @@ so that the normals point out of the body.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["mesh_volume", "revolve", "spike_mesh", "spike_profile"]
+__all__ = ["in_place", "mesh_volume", "revolve", "shape_mesh", "spike_mesh", "spike_profile"]
 
 Mesh = tuple[NDArray[np.float64], NDArray[np.int64]]
 
@@ -141,3 +143,115 @@ def mesh_volume(points: ArrayLike, triangles: ArrayLike) -> float:
     """Volume [m3] of a closed mesh by the divergence theorem; positive where the normals point outwards."""
     corners = np.asarray(points, dtype=np.float64)[np.asarray(triangles)]
     return float(np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6.0)
+
+
+def shape_mesh(shape: Any, *, segments: int = 72) -> Mesh:
+    """Surface of a shape that grains touch, or of several, in the body's frame; where several overlap, both are shown.
+
+    Args:
+        shape: What `Bed.add_body` takes: an object that is called Ball, Box, Capsule, Cone, Cylinder, Mesh, Placed,
+            Polyhedron or Tube and has the sizes [m] of `dem`'s shape of that name, or a sequence of such.
+        segments: Segments of a full circle.
+
+    Raises:
+        ValueError: another shape (a Plane has no end), no shape at all.
+    """
+    if isinstance(shape, (list, tuple)):
+        if not shape:
+            raise ValueError("shape is empty; at least one shape was expected")
+        parts = [shape_mesh(part, segments=segments) for part in shape]
+        before = np.cumsum([0, *(len(points) for points, _ in parts)])
+        triangles = [faces + first for (_, faces), first in zip(parts, before, strict=False)]
+        return np.concatenate([points for points, _ in parts]), np.concatenate(triangles)
+    kind = type(shape).__name__
+    if kind not in _SURFACES:
+        raise ValueError(f"shape is a {kind}; a surface can be shown of {', '.join(_SURFACES)}")
+    return _SURFACES[kind](shape, segments)
+
+
+def in_place(points: ArrayLike, position: ArrayLike, turn: ArrayLike = (1.0, 0.0, 0.0, 0.0)) -> NDArray[np.float64]:
+    """Points of a body's frame [m], shape (n, 3), where the body is: turned by a unit quaternion, scalar first, and put
+    at `position` [m]."""
+    q = np.asarray(turn, dtype=np.float64)
+    given = np.asarray(points, dtype=np.float64)
+    twist = 2.0 * np.cross(q[1:], given)
+    return given + q[0] * twist + np.cross(q[1:], twist) + np.asarray(position, dtype=np.float64)
+
+
+def _frustum(shape: Any, segments: int) -> Mesh:
+    low, high = (shape.radius,) * 2 if hasattr(shape, "radius") else (shape.bottom_radius, shape.top_radius)
+    outline = [(0.0, shape.bottom), (low, shape.bottom), (high, shape.top), (0.0, shape.top)]
+    return revolve([p for k, p in enumerate(outline) if k in (0, 3) or p[0] > 0.0], segments=segments)
+
+
+def _capsule(shape: Any, segments: int) -> Mesh:
+    """A ball with its halves apart, its axis turned from z to that from `start` to `end`."""
+    start, along = np.asarray(shape.start, dtype=float), np.subtract(shape.end, shape.start).astype(float)
+    points, triangles = _ball(shape.radius, segments, apart=float(np.linalg.norm(along)))
+    axis = along / np.linalg.norm(along)
+    # Half way between z and the axis; where they are opposed, half a turn about x.
+    turn = np.array([1.0 + axis[2], -axis[1], axis[0], 0.0]) if axis[2] > -1.0 + 1e-12 else np.array([0.0, 1.0, 0, 0])
+    return in_place(points, start, turn / np.linalg.norm(turn)), triangles
+
+
+def _ball(radius: float, segments: int, *, apart: float = 0.0) -> Mesh:
+    """Its middle in the origin; the upper half moved up by `apart`."""
+    count = 2 * max(1, math.ceil(segments / 4))
+    angles = np.linspace(0.0, np.pi, count + 1)
+    outline = radius * np.column_stack([np.sin(angles), -np.cos(angles)])
+    outline[[0, -1], 0] = 0.0
+    if apart > 0.0:
+        outline = np.insert(outline, count // 2, outline[count // 2], axis=0)
+        outline[count // 2 + 1 :, 1] += apart
+    return revolve(outline, segments=segments)
+
+
+def _box(shape: Any, segments: int) -> Mesh:
+    corners = np.array([[k & 1, k >> 1 & 1, k >> 2 & 1] for k in range(8)]) - 0.5
+    quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    triangles = [(a, *pair) for a, b, c, d in quads for pair in ((b, c), (c, d))]
+    return corners * np.asarray(shape.size) + np.asarray(shape.center), np.array(triangles, dtype=np.int64)
+
+
+def _tube(shape: Any, segments: int) -> Mesh:
+    """Four rings: outside below and above, inside above and below."""
+    rings = [(shape.outer_radius, shape.bottom), (shape.outer_radius, shape.top)]
+    rings += [(shape.inner_radius, shape.top), (shape.inner_radius, shape.bottom)]
+    angle = 2.0 * np.pi * np.arange(segments) / segments
+    points = [np.column_stack([r * np.cos(angle), r * np.sin(angle), np.full(segments, z)]) for r, z in rings]
+    here = np.arange(segments)
+    following = (here + 1) % segments
+    triangles = []
+    for k in range(4):
+        low, high = k * segments, (k + 1) % 4 * segments
+        triangles.append(np.column_stack([low + here, low + following, high + following]))
+        triangles.append(np.column_stack([low + here, high + following, high + here]))
+    return np.concatenate(points), np.concatenate(triangles).astype(np.int64)
+
+
+def _triangles(shape: Any, segments: int) -> Mesh:
+    return np.array(shape.mesh.vertices, dtype=np.float64), np.array(shape.mesh.triangles, dtype=np.int64)
+
+
+def _placed(shape: Any, segments: int) -> Mesh:
+    points, triangles = shape_mesh(shape.shape, segments=segments)
+    turn = np.asarray(shape.turn, dtype=np.float64)
+    return in_place(points, shape.position, turn / np.linalg.norm(turn)), triangles
+
+
+def _ball_in_place(shape: Any, segments: int) -> Mesh:
+    points, triangles = _ball(shape.radius, segments)
+    return points + np.asarray(shape.center), triangles
+
+
+_SURFACES: dict[str, Callable[[Any, int], Mesh]] = {
+    "Ball": _ball_in_place,
+    "Box": _box,
+    "Capsule": _capsule,
+    "Cone": _frustum,
+    "Cylinder": _frustum,
+    "Mesh": _triangles,
+    "Placed": _placed,
+    "Polyhedron": _triangles,
+    "Tube": _tube,
+}

@@ -9,9 +9,10 @@ from pathlib import Path
 import falling_bed
 import numpy as np
 import pytest
+import solid_shapes
 
 import dem.engine
-from dem import Bed
+from dem import Bed, Mesh
 
 ROOT = Path(__file__).resolve().parents[2]
 STEPS, EVERY = 900, 100
@@ -87,6 +88,31 @@ def test_cohesive_grains_keep_their_bits_too(cohesion, tmp_path):
         again.advance(100)
         loaded[step] = falling_bed.digest(again)
     assert loaded == {step: digests[step] for step in (200, 300)}
+    assert finish(elsewhere_too) == digests
+
+
+def test_a_body_of_meshes_and_turned_boxes_keeps_the_bits_too(tmp_path):
+    """One thread elsewhere, two here; from a file of the middle; and back after the table held another mesh."""
+    elsewhere_too = elsewhere("fresh", tmp_path / "other.npz", 300, 1, 100, "none", "solids")
+    bed = falling_bed.make(2, body="solids")
+    digests, again = {}, {}
+    for step in (100, 200, 300):
+        bed.advance(100)
+        digests[step] = falling_bed.digest(bed)
+        if step == 100:
+            bed.save(tmp_path / "bed.npz")
+            state = bed.state()
+    assert np.linalg.norm(bed.reaction(1)[0]) > 1e-3 and bed.list_count > 2
+    loaded = Bed.load(tmp_path / "bed.npz", threads=2)
+    assert loaded.add_body(Mesh(*solid_shapes.box((0.001, 0.002, 0.003))), position=(0.0, 0.0, 0.15)) == 2
+    loaded.restore(state)
+    for step in (200, 300):
+        loaded.advance(100)
+        again[step] = falling_bed.digest(loaded)
+    assert again == {step: digests[step] for step in (200, 300)}
+    fewer = loaded.without(np.arange(300) == 7)
+    assert np.array_equal(fewer.state()["mesh_vertices"], state["mesh_vertices"])
+    fewer.advance(20)
     assert finish(elsewhere_too) == digests
 
 
