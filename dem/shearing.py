@@ -21,10 +21,11 @@ __all__ = ["MOST_PRESSURE", "Shearing", "roughen_floor", "shear_bed"]
 
 # Friction and rolling friction of a grain on lid and floor [1]: ten times what any grain has.
 _ROUGH = 10.0
-# Steps between two looks of the servo, and its fastest speed over the lid's sideways.
-_STEPS, _SERVO = 20, 0.5
+# Steps between two looks of the servo; and over the time in which a grain falls the bed's depth, how long it takes what
+# still lacks into its speed: a bed that dilates steadily needs a lid that rises steadily.
+_STEPS, _REMEMBERS = 20, 0.2
 # A lid may press this many times what lies on the floor: more makes overlaps grow past their bound at the rough walls.
-MOST_PRESSURE = 8.0
+MOST_PRESSURE = 6.0
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Shearing:
         way: the lid's, sideways [m]. height: of the lid over where it was when the shearing began [m].
         shear, normal: what the grains push the lid with over the bed's area [Pa].
         pressure: asked for [Pa]. speed: of the lid [m/s]. inertial_number: speed / height d sqrt(density / pressure).
-        packing_fraction: before the lid came.
+        packing_fraction: before the lid came. overburden: the bed's own weight over its area [Pa].
     """
 
     way: np.ndarray
@@ -46,6 +47,7 @@ class Shearing:
     speed: float
     inertial_number: float
     packing_fraction: float
+    overburden: float
 
 
 def roughen_floor(bed: Bed) -> None:
@@ -115,16 +117,17 @@ def shear_bed(
     start = bed.body_position(body)
     height = float(start[2])
     speed = inertial_number * height / grain * math.sqrt(pressure / bed.material.density)
-    servo, rows = max(lid.speed, _SERVO * speed), []
+    servo, steady, rows = max(lid.speed, speed), 0.0, []
     while (gone := float(bed.body_position(body)[0] - start[0])) < way:
         bed.advance(_STEPS)
         force = bed.reaction(body)[0]
         lacking = max(-1.0, min(1.0, (pressure * area - force[2]) / (pressure * area)))
-        bed.move_body(body, velocity=(speed, 0.0, -servo * lacking))
+        bed.move_body(body, velocity=(speed, 0.0, -servo * lacking - steady))
+        steady += servo * lacking * _STEPS * bed.time_step / (_REMEMBERS * fall)
         rows.append((gone, float(bed.body_position(body)[2] - height), -force[0] / area, force[2] / area))
         if len(rows) % 20 == 0:
             tell(min(1.0, gone / way))
     if not rows:
         raise BedFailure("the lid did not move")
     gone_by, height_by, shear, normal = np.array(rows).T
-    return Shearing(gone_by, height_by, shear, normal, pressure, speed, inertial_number, packing)
+    return Shearing(gone_by, height_by, shear, normal, pressure, speed, inertial_number, packing, floor)

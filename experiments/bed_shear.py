@@ -2,6 +2,9 @@
 
 Peak: the largest shear stress, smoothed over half a diameter of the lid's way. Critical: the mean over the second half
 of the way, with the standard error of five parts of it. Mohr-Coulomb: a straight line through the runs' stresses.
+
+Normal stress is that at half the bed's height, as in a shear box: the lid's and half of what the bed weighs. Where in
+the bed it shears is not known, and half its weight on either side feigns a cohesion of up to that times the friction.
 """
 
 from __future__ import annotations
@@ -41,21 +44,22 @@ class Strength:
 
 
 def strength_of(run: Shearing, grain: float) -> Strength:
-    """Peak and critical shear stress of a run, at its mean normal stress.
+    """Peak and critical shear stress of a run, at its mean normal stress at half height.
 
     The servo lets the normal stress vary a little, and the shear stress varies with it: their ratio is averaged.
     """
-    normal = float(run.normal.mean())
+    pressing = run.normal + 0.5 * run.overburden
+    normal = float(pressing.mean())
     count = max(1, round(_SMOOTH * grain / max(1e-12, (run.way[-1] - run.way[0]) / max(1, len(run.way) - 1))))
     count = min(count, len(run.way))
     kernel = np.ones(count) / count
-    smooth = np.convolve(run.shear, kernel, "valid") / np.convolve(run.normal, kernel, "valid")
+    smooth = np.convolve(run.shear, kernel, "valid") / np.convolve(pressing, kernel, "valid")
     top = int(np.argmax(smooth))
     parts = [
         part.mean() / other.mean()
         for part, other in zip(
             np.array_split(run.shear[len(run.way) // 2 :], _PARTS),
-            np.array_split(run.normal[len(run.way) // 2 :], _PARTS),
+            np.array_split(pressing[len(run.way) // 2 :], _PARTS),
             strict=True,
         )
     ]
@@ -126,7 +130,7 @@ def _carry_out(settings: BedShearSettings, folder: RunFolder, progress: Progress
 
 
 _COLUMNS = {"way": "way_m", "height": "height_m", "shear": "shear_Pa", "normal": "normal_Pa"}
-_NUMBERS = ("pressure", "speed", "inertial_number", "packing_fraction")
+_NUMBERS = ("pressure", "speed", "inertial_number", "packing_fraction", "overburden")
 
 
 def _write(folder: RunFolder, name: str, run: Shearing) -> None:
@@ -157,6 +161,12 @@ def _result(
                 "note": "slope of the line through the runs; std: standard error of the fit",
             },
             f"{kind}_cohesion": {"value": start, "std": start_error, "unit": "Pa", "note": "where that line begins"},
+            f"{kind}_cohesion_unsure": {
+                "value": 0.5 * runs[0].overburden * slope,
+                "std": None,
+                "unit": "Pa",
+                "note": "either way, since it may shear anywhere between lid and floor",
+            },
             f"{kind}_ratio": {
                 "value": float(np.mean([getattr(s, kind) / s.normal for s in strengths])),
                 "std": float(np.std([getattr(s, kind) / s.normal for s in strengths], ddof=1)),
@@ -210,6 +220,7 @@ def _result(
                 "series": f"series/shear-{pressure:g}.csv",
                 "pressure": run.pressure,
                 "speed": run.speed,
+                "at_lid": float(run.normal.mean()),
                 "normal": s.normal,
                 "peak": s.peak,
                 "critical": s.critical,

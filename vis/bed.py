@@ -17,6 +17,7 @@ from vis.canvas import colour_values, nice_above
 from vis.frames import read_frames
 from vis.numbers import short
 from vis.page import Block, Page, Section, Tile, code, figure, listing, table, text, write_page
+from vis.pictures import _render_apart as render_apart
 from vis.pictures import opengl_available
 from vis.plot_parts import Plot, legend_above, new_panels
 from vis.render import run_job
@@ -133,16 +134,14 @@ def _picture(folder: Path, result: Mapping[str, Any]) -> tuple[list[Block], str]
         "size": [1600, 1200],
     }
     job = {"folder": str(folder), "stills": [view], "animation": None}
-    opengl, note = opengl_available(), ""
-    try:
-        run_job(job, opengl=opengl)
-    except (RuntimeError, OSError) as error:
-        if not opengl:
-            raise
-        note = f"Rendering with OpenGL failed ({error}); a cross-section stands in for the picture."
+    note = "This machine has no OpenGL for off-screen pictures; a cross-section stands in for the picture."
+    if opengl_available():
+        failure = render_apart(job, 120.0, lambda: None)
+        note = (
+            f"Rendering with OpenGL failed ({failure}); a cross-section stands in for the picture." if failure else ""
+        )
+    if note:
         run_job(job, opengl=False)
-    if not opengl:
-        note = "This machine has no OpenGL for off-screen pictures; a cross-section stands in for the picture."
     return [figure(file, title="The bed", caption="Grains coloured by the number of their contacts.")], note
 
 

@@ -84,10 +84,12 @@ def _curves(folder: Path, result: Mapping[str, Any]) -> Plot:
             way = columns["way_m"] / grain
             count = max(1, len(way) // 60)
             kernel = np.ones(count) / count
-            smooth = np.convolve(columns["shear_Pa"] / run["normal"], kernel, "valid")
+            smooth = np.convolve(columns["shear_Pa"], kernel, "valid") / np.convolve(
+                columns["normal_Pa"], kernel, "valid"
+            )
             ratio.plot(way[count // 2 : count // 2 + len(smooth)], smooth, color=colour)
             height.plot(way, columns["height_m"] / grain, color=colour)
-        ratio.set_ylabel("shear over mean normal stress [1]")
+        ratio.set_ylabel("shear over normal stress, at the lid [1]")
         ratio.set_ylim(bottom=0.0)
         height.set_ylabel("the lid has risen by [diameters]")
         for axis in (ratio, height):
@@ -99,7 +101,7 @@ def _curves(folder: Path, result: Mapping[str, Any]) -> Plot:
                 for run, colour in zip(result["runs"], colours, strict=True)
             ],
         )
-    return Plot("shear", "The lid's way", "Stress smoothed over a sixtieth of the way.", drawing)
+    return Plot("shear", "The lid's way", "Both stresses smoothed over a sixtieth of the way.", drawing)
 
 
 def _lines(result: Mapping[str, Any]) -> Plot:
