@@ -25,7 +25,7 @@ _ROUGH = 10.0
 # still lacks into its speed: a bed that dilates steadily needs a lid that rises steadily.
 _STEPS, _REMEMBERS = 20, 0.2
 # A lid may press this many times what lies on the floor: more makes overlaps grow past their bound at the rough walls.
-MOST_PRESSURE = 6.0
+MOST_PRESSURE = 4.0
 
 
 @dataclass(frozen=True)

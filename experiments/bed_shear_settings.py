@@ -18,9 +18,9 @@ class BedShearSettings(StrictSettings):
 
     bed: str = Field(description="The bed: a file, the folder of a run of bed make, or a name on the shelf.")
     pressures: tuple[Positive, ...] = Field(
-        (2.0, 4.0, 6.0),
+        (1.0, 2.0, 4.0),
         min_length=2,
-        description="Pressures on the lid, over what lies on the bed's floor [1]; at most 6.",
+        description="Pressures on the lid, over what lies on the bed's floor [1]; at most 4.",
     )
     way: Positive = Field(8.0, ge=2, le=200, description="How far the lid goes sideways [mean diameters].")
     inertial_number: Positive = Field(
@@ -30,9 +30,9 @@ class BedShearSettings(StrictSettings):
 
     @model_validator(mode="after")
     def _can_be(self) -> BedShearSettings:
-        if max(self.pressures) > 6:
+        if max(self.pressures) > 4:
             raise ValueError(
-                f"pressures = {' '.join(f'{p:g}' for p in self.pressures)} holds {max(self.pressures):g}: at most 6 "
+                f"pressures = {' '.join(f'{p:g}' for p in self.pressures)} holds {max(self.pressures):g}: at most 4 "
                 f"times what lies on the floor would do, for which the bed's grains are stiff enough; or a deeper bed"
             )
         if len(set(self.pressures)) < len(self.pressures):
