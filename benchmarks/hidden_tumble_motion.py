@@ -50,10 +50,10 @@ def _kernel() -> Any:
         """Normal force of a row, elastic part and all."""
         K = p[i, NUMBER["stiffness"]]
         C = p[i, NUMBER["damping"]]
-        bend = p[i, NUMBER["harden_bend"]]  # 1/m: K z (1 + b z), then saturating where negative
+        bend = p[i, NUMBER["harden_bend"]]  # 1/m: K z (1 + b z)^1.4, then saturating where negative
         loaded = K * depth
         if bend > 0.0:
-            loaded = K * depth * (1.0 + bend * depth)
+            loaded = K * depth * (1.0 + bend * depth) ** 1.4
         if bend < 0.0:
             loaded = K * depth / (1.0 - bend * depth)
         power = p[i, NUMBER["harden_power"]]
@@ -65,7 +65,7 @@ def _kernel() -> Any:
             share = ti.max(depth - crater, 0.0) / ti.max(top - crater, 1e-12)
             peak = K * top
             if bend > 0.0:
-                peak = K * top * (1.0 + bend * top)
+                peak = K * top * (1.0 + bend * top) ** 1.4
             bent = ti.min(0.3, 1.5 * plastic)  # with the crater the way back straightens out
             loaded = peak * share * (1.0 - bent + bent * share)
         pull = 0.0
