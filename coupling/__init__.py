@@ -1,20 +1,33 @@
 """The master that steps a body and a ground together."""
 
+from .bed_footing import BedFooting, LeftTheBedError, platform_members
 from .bed_ground import BedGround
+from .footing import Footing, LawFooting
 from .ground import Ground
+from .master import Master
 from .penetration import Drive, Drop, Run, SetDown, drive, drop, overdamped_below, set_down
+from .planar_body import PlanarBody
 from .trajectory import Penetration
+from .tumbling import CoupledTumble
 
 __all__ = [
+    "BedFooting",
     "BedGround",
+    "CoupledTumble",
     "Drive",
     "Drop",
+    "Footing",
     "Ground",
+    "LawFooting",
+    "LeftTheBedError",
+    "Master",
     "Penetration",
+    "PlanarBody",
     "Run",
     "SetDown",
     "drive",
     "drop",
     "overdamped_below",
+    "platform_members",
     "set_down",
 ]

@@ -1,0 +1,338 @@
+"""A bed of grains as a footing: the platform's spikes and hull as DEM bodies that follow its pose.
+
+A row of spikes is one spike in the bed, `copies` of them side by side in the platform: the bed is periodic across (y),
+so it is a slice of the sand as wide as a spike has for itself, and every force on the body counts `copies` times. Each
+spike is a body of its own, so that its force is known; rows that face each other share one (`slot`), since only the
+lower one can be near the sand.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rigid.quaternions import multiply, to_matrix
+from rigid.reaction import Contact
+
+from .footing import FootReaction, row_tips
+from .poses import Pose, Twist, Vector, Wrench, chord_share, matrices
+
+__all__ = ["HULL", "BedFooting", "LeftTheBedError", "Member", "ball_member", "platform_members"]
+
+HULL = -1
+"""Row number of what is no spike."""
+AWAY = 100.0
+"""How far above the bed a body waits before it is placed [m]."""
+
+
+class LeftTheBedError(RuntimeError):
+    """The body came down where there is no bed, or down to its floor."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Member:
+    """One piece of the platform that grains can touch: a ball, or a rod with a round end at its lower end."""
+
+    row: int
+    """Of the planar model's rows; HULL for the hull."""
+    at: Vector
+    """Its origin in body axes [m], shape (3,)."""
+    turn: Vector
+    """Unit quaternion from its axes (z along the rod) to the body's, shape (4,)."""
+    radius: float
+    """[m]."""
+    length: float = 0.0
+    """Of the rod above its origin [m]; 0: a ball."""
+    below: float = 0.0
+    """Of the rod below its origin [m]; only where there is no ball."""
+    slot: int = 0
+    """The DEM body that stands for it: that of a slot is its lowest member."""
+
+    def shapes(self) -> list[Any]:
+        """As `dem.shapes` has it, in its own axes."""
+        from dem.shapes import Ball, Cylinder
+
+        parts: list[Any] = [] if self.below else [Ball(radius=self.radius)]
+        if self.length:
+            parts.append(Cylinder(bottom=-self.below, top=self.length, radius=self.radius))
+        return parts
+
+
+def ball_member(radius: float) -> Member:
+    """A ball at the body's origin."""
+    return Member(row=0, at=np.zeros(3), turn=np.array([1.0, 0.0, 0.0, 0.0]), radius=radius)
+
+
+def platform_members(
+    *, spike_length: float, count: int, diameter: float, clear: float, hull_radius: float = 0.0, width: float = 0.0
+) -> list[Member]:
+    """`count` rows of spikes that end `spike_length` [m] from the centre, and a hull that rolls inside the octagon.
+
+    A spike is a rod of this `diameter` [m] with a ball at its end, `clear` [m] long, and lies in the plane of motion
+    (the Hedgehog's own lean sideways by 21 degrees). The hull is a cylinder about the axis of rotation, `hull_radius`
+    [m] thick and as wide as the bed, `width` [m]; 0: none. Raises ValueError for a spike thicker than long.
+    """
+    radius = 0.5 * diameter
+    if not 0 < diameter < clear <= spike_length:
+        raise ValueError(
+            f"spike_diameter = {diameter} m, spike_clear = {clear} m: it must be thinner than it is long, and no "
+            f"longer than spike_length = {spike_length} m"
+        )
+    slots = next(n for n in (6, 5, 4, 3, 2, 1) if count % n == 0 and n < count)
+    if slots < 3:
+        raise ValueError(f"spike_count = {count}: rows that share a body must be far apart; 6, 8 or 16 would do")
+    inner = row_tips(spike_length - radius, count)
+    members = []
+    for row, at in enumerate(inner):
+        up = -at / np.linalg.norm(at)  # along the shaft, towards the centre
+        angle = math.atan2(up[0], up[2])
+        turn = np.array([math.cos(0.5 * angle), 0.0, math.sin(0.5 * angle), 0.0])
+        members.append(Member(row=row, at=at, turn=turn, radius=radius, length=clear - radius, slot=row % slots))
+    if hull_radius > 0:
+        half = math.sqrt(0.5)
+        members.append(
+            Member(
+                row=HULL, at=np.zeros(3), turn=np.array([half, half, 0.0, 0.0]), radius=hull_radius,
+                length=0.5 * width, below=0.5 * width, slot=slots,
+            )
+        )  # fmt: skip
+    return members
+
+
+class BedFooting:
+    """`bed` under a body made of `members`.
+
+    Parameters
+    ----------
+    bed : dem.Bed.
+    origin : (x, y) in the bed of the body's x = y = 0 [m].
+    copies : how many of each member there are side by side [1].
+    touch : normal force over `copies` from which a member counts as touching [N].
+    bounded : whether a member that comes down beyond the bed's ends along x is an error; it is periodic there.
+    friction, restitution, rolling_friction, young, poisson : of a grain and a member, as `Bed.add_body` has them.
+
+    The members wait far above until `place`. Raises ValueError for more slots than a bed takes.
+    """
+
+    name = "bed"
+    gives_friction = True
+
+    def __init__(
+        self,
+        bed: Any,
+        members: Sequence[Member],
+        *,
+        origin: tuple[float, float],
+        copies: float = 1.0,
+        touch: float = 0.0,
+        bounded: bool = True,
+        friction: float | None = None,
+        restitution: float | None = None,
+        rolling_friction: float | None = None,
+        young: float | None = None,
+        poisson: float = 0.3,
+    ) -> None:
+        self.bed, self.members, self.copies, self.touch, self.bounded = bed, list(members), copies, touch, bounded
+        self.origin = np.array([origin[0], origin[1], float(bed.surface)])
+        """Where the body's (0, 0, 0) is in the bed [m], shape (3,)."""
+        self._slots = [
+            [index for index, member in enumerate(self.members) if member.slot == slot]
+            for slot in sorted({member.slot for member in self.members})
+        ]
+        self.bodies = [
+            bed.add_body(
+                self.members[indices[0]].shapes(), position=(*origin, float(bed.surface) + AWAY), friction=friction,
+                restitution=restitution, rolling_friction=rolling_friction, young=young, poisson=poisson,
+            )
+            for indices in self._slots
+        ]  # fmt: skip
+        self._used = [indices[0] for indices in self._slots]
+        """The member that each body stood for in the last step."""
+        self._mass = float(bed.grains()["mass"].sum())
+        self.impulse = np.zeros(3)
+        """Of gravity and floor on the grains since the start [N s]."""
+
+    @property
+    def time_step(self) -> float:
+        """The bed's own [s]."""
+        return float(self.bed.time_step)
+
+    @property
+    def lag(self) -> float:
+        """The bed's step (see `Footing.lag`) [s]."""
+        return float(self.bed.time_step)
+
+    # Where it may start --------------------------------------------------------------------------------------------
+
+    def clear_height(self, pose: Pose, *, most: float = 0.05) -> float:
+        """How far the body must be lifted from `pose` to touch no grain [m]; a hundredth of a grain is added.
+
+        0 where it touches none there. Raises ValueError where `most` [m] would not do.
+        """
+        grains = self.bed.grains()
+        if self._deepest_overlap(grains, pose)[0] <= 0:
+            return 0.0
+        low, high = 0.0, most
+        if self._deepest_overlap(grains, pose, most)[0] > 0:
+            raise ValueError(f"the body starts so deep in the bed that {most:g} m would not lift it clear")
+        for _ in range(40):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self._deepest_overlap(grains, pose, middle)[0] > 0 else (low, middle)
+        return high + 0.02 * float(grains["radius"].mean())
+
+    def check_start(self, pose: Pose) -> None:
+        """Raise ValueError for a pose in overlap with grains, with the height that would do."""
+        overlap, row = self._deepest_overlap(self.bed.grains(), pose)
+        if overlap > 0:
+            what = "the hull" if row == HULL else f"spike {row}"
+            lifted = float(pose.position[2]) + self.clear_height(pose)
+            raise ValueError(
+                f"the body at a height of {pose.position[2]:.6g} m starts in overlap with a grain: {what} by "
+                f"{overlap:.3g} m; {lifted:.6g} m would do"
+            )
+
+    def _deepest_overlap(self, grains: Mapping[str, Any], pose: Pose, lift: float = 0.0) -> tuple[float, int]:
+        """Largest overlap of a member and a grain [m], and the member's row. A rod's flat ends count as round."""
+        centres, radii = grains["position"], grains["radius"]
+        worst = (-math.inf, HULL)
+        for index in self._in_use(pose):
+            member = self.members[index]
+            position, turn = self._member_pose(member, pose)
+            axis = to_matrix(turn)[:, 2]
+            away = self._nearest_image(centres - (position + np.array([0.0, 0.0, lift])))
+            along = np.clip(away @ axis, -member.below, member.length)
+            overlap = member.radius + radii - np.linalg.norm(away - along[:, None] * axis, axis=1)
+            worst = max(worst, (float(overlap.max()), member.row))
+        return worst
+
+    # The step ------------------------------------------------------------------------------------------------------
+
+    def step(self, pose: Pose, twist: Twist, dt: float) -> FootReaction:
+        """See `Footing.step`. Raises LeftTheBedError, and what the bed raises."""
+        steps = round(dt / self.time_step)
+        if steps < 1 or not math.isclose(steps * self.time_step, dt, rel_tol=1e-9):
+            raise ValueError(f"dt is {dt} s: it must be a whole multiple of the bed's step, {self.time_step} s")
+        _, middle, last = matrices(pose, twist, dt)
+        chord = chord_share(twist, dt)
+        used = self._used = self._in_use(pose)
+        for body, index in zip(self.bodies, used, strict=True):
+            member = self.members[index]
+            position, turn = self._member_pose(member, pose)
+            velocity = twist.velocity + chord * np.cross(twist.spin, middle @ member.at)
+            self.bed.move_body(
+                body, position=tuple(position), velocity=tuple(velocity), turn=tuple(turn), spin=tuple(twist.spin)
+            )
+        self.bed.advance(steps)
+        end = pose.position + dt * twist.velocity
+        force, torque = np.zeros(3), np.zeros(3)
+        contacts: dict[int, Contact] = {}
+        sinkage: dict[int, float] = {}
+        for body, index in zip(self.bodies, used, strict=True):
+            member = self.members[index]
+            own_force, own_torque = (self.copies * np.asarray(part, dtype=float) for part in self.bed.reaction(body))
+            arm = chord * (middle @ member.at)
+            force += own_force
+            torque += own_torque + np.cross(arm, own_force)
+            lowest = float((end + last @ member.at)[2]) - member.radius
+            if lowest < 0 and member.row != HULL:
+                sinkage[member.row] = -lowest
+            if own_force[2] > self.touch * self.copies:
+                point = pose.position + 0.5 * dt * twist.velocity + arm - np.array([0.0, 0.0, member.radius])
+                along = np.array([own_force[0], own_force[1], 0.0])
+                contacts[member.row] = Contact(point, float(own_force[2]), tangential_force=along)
+                self._check_inside(member, float((end + last @ member.at)[0]), lowest)
+        floor = np.asarray(self.bed.reaction(0)[0], dtype=float) if self.bodies[0] > 0 else np.zeros(3)
+        self.impulse = self.impulse + dt * (self._mass * np.array(self.bed.gravity, dtype=float) - floor)
+        return FootReaction(Wrench(force, torque), contacts, sinkage)
+
+    def _check_inside(self, member: Member, x: float, lowest: float) -> None:
+        what = "the hull" if member.row == HULL else f"spike {member.row}"
+        at, length = self.origin[0] + x, float(self.bed.size[0])
+        if self.bounded and not 0 <= at <= length:
+            way = "ahead of" if at > length else "behind"
+            raise LeftTheBedError(
+                f"{what} came down {abs(at - length) if at > length else abs(at):.3g} m {way} the bed, which is "
+                f"{length:g} m long, at x = {x:.4g} m from the start"
+            )
+        if member.row != HULL and lowest + self.origin[2] < member.radius:
+            raise LeftTheBedError(
+                f"{what} sank {-lowest:.3g} m, to within its radius of the floor: the bed is {self.origin[2]:.3g} m "
+                "deep"
+            )
+
+    def _in_use(self, pose: Pose) -> list[int]:
+        """The member that each slot stands for: its lowest."""
+        matrix = to_matrix(pose.turn)
+        return [min(indices, key=lambda k: (float(matrix[2] @ self.members[k].at), k)) for indices in self._slots]
+
+    def _member_pose(self, member: Member, pose: Pose) -> tuple[Vector, NDArray[np.float64]]:
+        position = self.origin + pose.position + to_matrix(pose.turn) @ member.at
+        return position, multiply(pose.turn, member.turn)
+
+    # What it holds -------------------------------------------------------------------------------------------------
+
+    def energies(self) -> dict[str, float]:
+        """Of the grains, `copies` times [J] (`dem.energy.bed_energies`)."""
+        from dem.energy import bed_energies
+
+        surfaces = {
+            body: partial(self._surface_of, self.members[index], pose)
+            for body, index, pose in zip(self.bodies, self._used, self._posed(), strict=True)
+        }
+        found = bed_energies(self.bed, bodies=surfaces)
+        return {name: self.copies * value for name, value in found.items()}
+
+    def _posed(self) -> list[Pose]:
+        """Where the bed has its bodies now."""
+        state = self.bed.state()
+        return [
+            Pose(
+                np.asarray(state["body_position"][body], dtype=float), np.asarray(state["body_turn"][body], dtype=float)
+            )
+            for body in self.bodies
+        ]
+
+    def _surface_of(self, member: Member, pose: Pose, points: Vector) -> tuple[Vector, Vector, Vector]:
+        """Distance of points to a member placed there, outward normal, curvature; round where a rod has a ball."""
+        matrix = to_matrix(pose.turn)
+        away = self._nearest_image(points - pose.position)
+        along = away @ matrix[:, 2]
+        on = np.clip(along, -member.below, member.length)
+        from_axis = away - on[:, None] * matrix[:, 2]
+        size = np.linalg.norm(from_axis, axis=1)
+        curvature = np.where((along < 0) | (member.length == 0), 1.0 / member.radius, 0.0) * (member.below == 0)
+        return size - member.radius, from_axis / size[:, None], curvature
+
+    def _nearest_image(self, away: Vector) -> Vector:
+        size = np.array(self.bed.size, dtype=float)[:2]
+        away[:, :2] -= size * np.round(away[:, :2] / size)
+        return away
+
+    def momentum(self) -> Vector:
+        """Momentum of the grains less the impulse of gravity and floor on them, `copies` times [N s], shape (3,).
+
+        With the velocities half a step ahead of the positions, which the impulses so far have made: what changes it is
+        the body, to round-off.
+        """
+        grains = self.bed.grains()
+        ahead = grains["mass"][:, None] * grains["velocity"] + 0.5 * self.time_step * grains["force"]
+        return self.copies * (ahead.sum(axis=0) - self.impulse)
+
+    def state(self) -> dict[str, Any]:
+        """The bed's, which contains the bodies and their contacts."""
+        return {f"bed.{key}": value for key, value in self.bed.state().items()} | {
+            "impulse": self.impulse.copy(),
+            "used": np.array(self._used),
+        }
+
+    def restore(self, state: Mapping[str, ArrayLike]) -> None:
+        """Go back to what `state` gave."""
+        self.bed.restore({key[4:]: np.asarray(value) for key, value in state.items() if key.startswith("bed.")})
+        self.impulse = np.array(state["impulse"], dtype=float)
+        self._used = [int(index) for index in np.asarray(state["used"])]

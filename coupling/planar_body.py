@@ -1,0 +1,246 @@
+"""The platform of the planar model as a body that a footing pushes: three coordinates, a flywheel, and the rig.
+
+Coordinates and signs are the planar model's (docs/planar.md): x along the surface, z up from it (the model's y), theta
+about +y, clockwise. The inertia in z is m + m_b where there is a rig, in x it is m; the weight is (m + m_b) g_sim.
+
+A macro step of length H from the velocity v, s the footing's lag (0 for a law, its own step for a bed):
+
+    u  = v + (H - s) / 2 M^-1 (G + F_guess)      held during the step: a guess at the velocity of its middle
+    q' = q + H u
+    v' = v + H M^-1 (G + F)                      F: the mean force of the step just done
+
+v belongs to a time s / 2 later than q, as in the grains' leapfrog; with H = s it is that leapfrog. Where the ground
+gives Coulomb bounds, F holds the friction that these leave open: sticking rows share the horizontal force in proportion
+to their loads, and their mean slip is zero at the step's end; beyond mu_s N they slide with mu_d N until the slip
+passes through zero. Events of friction are found to the step, so they are of first order in H.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigid.reaction import Contact
+from rigid.trial import Trial
+
+from .footing import FootReaction
+from .poses import Pose, Twist, Vector, Wrench
+
+__all__ = ["HAND_TIME", "PlanarBody"]
+
+HAND_TIME = 0.002
+"""Mass over drag of a body that a hand sets down [s], as in `coupling.SetDown`."""
+_OPEN = 9
+"""Mode of a row that does not touch."""
+
+
+class PlanarBody:
+    """The platform of `trial`, at rest at (`x`, `z`) [m] and `theta` [rad].
+
+    Raises ValueError for a trial with effects: the master has the base model only.
+    """
+
+    def __init__(self, trial: Trial, *, z: float, x: float = 0.0, theta: float = 0.0) -> None:
+        if trial.effects:
+            named = ", ".join(effect.id for effect in trial.effects)
+            raise ValueError(f"effects = {named}: on grains the base model alone is computed; leave them out")
+        self.trial = trial
+        self.place = np.array([x, z, theta], dtype=float)
+        """x, z [m], theta [rad]."""
+        self.rates = np.zeros(3)
+        """Their rates, at a time lag / 2 later."""
+        self.wheel_speed = trial.wheel_speed_0
+        self.time = 0.0
+        self.torque_work = 0.0
+        """Work of the torque since it was let go [J]."""
+        self.max_wheel_speed = math.inf
+        self.modes: NDArray[np.int8] = np.full(trial.spike_count, _OPEN, dtype=np.int8)
+        """Of each row under a Coulomb bound: 0 sticks, +1 and -1 slides towards +x and -x, 9 does not touch."""
+        self.touching = False
+        """Whether anything touched in the last step, which is when the torque acts."""
+        self._let_go()
+
+    def _let_go(self) -> None:
+        trial = self.trial
+        self.inertia = np.array([trial.mass, trial.mass + trial.counterweight, trial.inertia])
+        self._drag = np.zeros(3)
+        self.held_by_hand = False
+
+    def take_in_hand(self, lowering_speed: float) -> None:
+        """From here on a hand lowers it: c = W / lowering_speed [m/s] resists, and what is felt has the mass 2 ms c.
+
+        The same in all directions, and about the axis with l^2: it sinks until the ground carries it, and cannot bounce
+        on a ground softer than W / (8 ms lowering_speed). The torque waits.
+        """
+        scale = np.array([1.0, 1.0, self.trial.spike_length**2])
+        drag = self.trial.weight / lowering_speed
+        self.inertia, self._drag = HAND_TIME * drag * scale, drag * scale
+        self.held_by_hand = True
+
+    def let_go(self) -> None:
+        """The hand opens: at rest from here, its time is 0 and the torque begins."""
+        self._let_go()
+        self.rates = np.zeros(3)
+        self.time = self.torque_work = 0.0
+
+    # What a footing sees -------------------------------------------------------------------------------------------
+
+    @property
+    def pose(self) -> Pose:
+        """Where it is; y is 0."""
+        x, z, theta = self.place
+        return Pose(np.array([x, 0.0, z]), np.array([math.cos(0.5 * theta), 0.0, math.sin(0.5 * theta), 0.0]))
+
+    def predict(self, dt: float, guess: Wrench, lag: float) -> Twist:
+        """The twist to hold over the next `dt` [s], under the guess at the ground's wrench."""
+        if lag > dt * (1 + 1e-9):
+            raise ValueError(f"dt = {dt} s is shorter than the footing's own step of {lag} s")
+        half = 0.5 * max(dt - lag, 0.0)
+        self._torque = self._mean_torque(dt)
+        push = self._applied() + _generalised(guess)
+        held = (self.inertia * self.rates + half * push) / (self.inertia + half * self._drag)
+        return _twist(held)
+
+    def resolve(self, dt: float, twist: Twist, reaction: FootReaction) -> Wrench:
+        """The whole wrench of the ground: `reaction` with the friction that its Coulomb bounds leave open."""
+        bounded = {row: contact for row, contact in reaction.contacts.items() if contact.tangential_force is None}
+        self._next_modes = np.full(len(self.modes), _OPEN, dtype=np.int8)
+        self._next_touching = bool(reaction.contacts)
+        if not bounded:
+            return reaction.wrench
+        force = _Friction(self, dt, twist, reaction.wrench, bounded).solve(self._next_modes)
+        return Wrench(reaction.wrench.force + force[0], reaction.wrench.torque + force[1])
+
+    def advance(self, dt: float, twist: Twist, wrench: Wrench) -> None:
+        """Take the step: along `twist`, with the impulse of `wrench`."""
+        held = np.array([twist.velocity[0], twist.velocity[2], twist.spin[1]])
+        push = self._applied() + _generalised(wrench)
+        self.place = self.place + dt * held
+        self.rates = (self.inertia * self.rates + dt * push) / (self.inertia + dt * self._drag)
+        self.acceleration = push / self.inertia
+        self.torque_work += self._torque * held[2] * dt
+        sign = 1.0 if self.trial.actuator == "motor" else -1.0
+        self.wheel_speed += sign * self._torque * dt / self.trial.wheel_inertia
+        self.modes, self.touching = self._next_modes, self._next_touching
+        self.time += dt
+
+    # What it has ---------------------------------------------------------------------------------------------------
+
+    def rates_now(self, lag: float) -> Vector:
+        """Rates of x, z and theta at the time of the pose, shape (3,)."""
+        return self.rates - 0.5 * lag * self.acceleration
+
+    def kinetic_energy(self, lag: float) -> float:
+        """Of platform and counterweight [J], without the wheel's spin."""
+        now = self.rates_now(lag)
+        return float(0.5 * (self.inertia * now) @ now)
+
+    @property
+    def potential_energy(self) -> float:
+        """(m + m_b) g_sim z [J]."""
+        return self.trial.weight * float(self.place[1])
+
+    def state(self) -> dict[str, Any]:
+        """All that its next steps depend on."""
+        return {
+            "numbers": np.concatenate(
+                [
+                    self.place, self.rates, self.acceleration, self.inertia, self._drag,
+                    [self.wheel_speed, self.time, self.torque_work, self.touching, self.held_by_hand],
+                ]
+            ),
+            "modes": self.modes.copy(),
+        }  # fmt: skip
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go back to what `state` gave."""
+        numbers = np.asarray(state["numbers"], dtype=float)
+        parts = numbers[:15].reshape(5, 3)
+        self.place, self.rates, self.acceleration, self.inertia, self._drag = (part.copy() for part in parts)
+        self.wheel_speed, self.time, self.torque_work = (float(number) for number in numbers[15:18])
+        self.touching, self.held_by_hand = bool(numbers[18]), bool(numbers[19])
+        self.modes = np.array(state["modes"], dtype=np.int8)
+
+    acceleration: Vector = np.zeros(3)
+    """Of x, z and theta, the mean of the last step."""
+    _torque = 0.0
+    _next_touching = False
+    _next_modes: NDArray[np.int8] = np.zeros(0, dtype=np.int8)
+
+    def _applied(self) -> Vector:
+        """Generalised force of weight and torque."""
+        return np.array([0.0, -self.trial.weight, self._torque])
+
+    def _mean_torque(self, dt: float) -> float:
+        """Mean torque of the next step [N m]: it acts while anything touches, until its end or the wheel's."""
+        trial = self.trial
+        if self.held_by_hand or not self.touching or trial.torque == 0:
+            return 0.0
+        left = trial.torque_until - self.time
+        room = self.wheel_speed if trial.actuator == "brake" else self.max_wheel_speed - self.wheel_speed
+        left = min(left, room * trial.wheel_inertia / trial.torque)
+        return trial.torque * min(1.0, max(0.0, left / dt))
+
+
+class _Friction:
+    """The friction of rows under Coulomb bounds in one step."""
+
+    def __init__(self, body: PlanarBody, dt: float, twist: Twist, wrench: Wrench, contacts: dict[int, Contact]) -> None:
+        self.body, self.dt = body, dt
+        self.rows = sorted(contacts)
+        self.loads = np.array([contacts[row].normal_force for row in self.rows])
+        self.mu_s = np.array([float(contacts[row].mu_s or 0.0) for row in self.rows])
+        self.mu_d = np.array([float(contacts[row].mu_d or 0.0) for row in self.rows])
+        centre = body.pose.position + 0.5 * dt * twist.velocity
+        arms = np.array([contacts[row].point - centre for row in self.rows])
+        half = 0.5 * dt * float(twist.spin[1])
+        self.h = -arms[:, 2]
+        """How far below the centre each touches at the step's middle [m]; at its end:"""
+        self.h_end = -(arms[:, 2] * math.cos(half) - arms[:, 0] * math.sin(half))
+        self.push = body._applied() + _generalised(wrench)
+        self.weight = body.inertia + dt * body._drag
+
+    def solve(self, modes: NDArray[np.int8]) -> tuple[Vector, Vector]:
+        """Force [N] and torque [N m] of friction; writes the rows' modes into `modes`."""
+        rates = self.body.rates
+        slips = rates[0] - rates[2] * self.h
+        now = np.array([self.body.modes[row] for row in self.rows])
+        now = np.where(now == _OPEN, np.sign(slips), now).astype(int)
+        for _ in range(4 * len(self.rows) + 4):
+            sticks = now == 0
+            force, after = self._with(now, sticks)
+            beyond = sticks & (abs(force.sum(where=sticks)) > (self.mu_s * self.loads).sum(where=sticks))
+            slip = after[0] - after[2] * self.h_end
+            caught = ~sticks & (slip * now < 0)
+            if not beyond.any() and not caught.any():
+                break
+            now = np.where(beyond, -np.sign(force.sum(where=sticks)), np.where(caught, 0, now)).astype(int)
+        modes[self.rows] = now
+        return np.array([force.sum(), 0.0, 0.0]), np.array([0.0, -float(force @ self.h), 0.0])
+
+    def _with(self, now: NDArray[np.int64], sticks: NDArray[np.bool_]) -> tuple[Vector, Vector]:
+        """Friction of each row [N] and the rates at the end, with these modes."""
+        body, dt = self.body, self.dt
+        force = np.where(sticks, 0.0, -now * self.mu_d * self.loads)
+        push = self.push + np.array([force.sum(), 0.0, -float(force @ self.h)])
+        after = (body.inertia * body.rates + dt * push) / self.weight
+        if sticks.any():
+            total = self.loads.sum(where=sticks)
+            share = np.where(sticks, self.loads, 0.0) / total if total > 0 else sticks / sticks.sum()
+            mean, mean_end = float(share @ self.h), float(share @ self.h_end)
+            answer = dt / self.weight * np.array([1.0, 0.0, -mean])
+            held = -(after[0] - mean_end * after[2]) / (answer[0] - mean_end * answer[2])
+            after = after + held * answer
+            force = force + held * share
+        return force, after
+
+
+def _generalised(wrench: Wrench) -> Vector:
+    return np.array([wrench.force[0], wrench.force[2], wrench.torque[1]])
+
+
+def _twist(rates: Vector) -> Twist:
+    return Twist(np.array([rates[0], 0.0, rates[1]]), np.array([0.0, rates[2], 0.0]))

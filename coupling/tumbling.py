@@ -1,0 +1,359 @@
+"""A tumble of the planar platform on any footing: set down, let go, turned over by its flywheel.
+
+A stepper as those of `coupling.penetration`: `advance` makes one macro step, `state` and `restore` work between any
+two. On a bed a hand first lowers the platform until the sand carries it (`PlanarBody.take_in_hand`); then time is 0,
+the torque begins and the books are opened. Every macro step leaves one row.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from rigid.trajectory import STATES, Tally, Trajectory, Transition
+from rigid.trial import Trial
+
+from .bed_footing import BedFooting
+from .contact_state import ContactReader, state_of
+from .footing import Footing, FootReaction, LawFooting
+from .master import Master
+from .planar_body import PlanarBody
+from .poses import Wrench
+
+__all__ = ["AT_REST", "CoupledTumble"]
+
+AT_REST = 0.005
+"""What a platform at rest may still lack of its weight, and its mean speed over the lowering speed [1]."""
+REST_TIME = 0.04
+"""For how long the signs of rest must hold [s]."""
+LONGEST_PLACING = 3.0
+"""A platform that has not come to rest after this [s] is an error."""
+COLUMNS = (
+    "time", "x", "y", "theta", "vx", "vy", "omega", "ax", "ay", "alpha", "wheel_speed", "kinetic_energy",
+    "potential_energy", "torque_work", "given", "taken",
+)  # fmt: skip
+"""Of a row: the planar model's names; work on the footing as the body and as the footing sees it [J]."""
+
+
+class CoupledTumble:
+    """The platform of `trial` on `footing`, followed for `duration` [s] from where the torque begins.
+
+    Parameters
+    ----------
+    substeps, extrapolation, iterations : as `Master` has them.
+    tip_radius : of the balls that its spikes end with [m]; 0 for a surface law.
+    lowering_speed : of the hand [m/s]; None: no hand, the platform starts at `height`.
+    height : of the centre at the start [m]; None: on a law where the law carries it, on a bed just clear of the grains.
+    energy_interval : between measurements of what the footing holds [s].
+    max_wheel_speed : where a motor has no torque left [rad/s].
+
+    Raises ValueError for a start in overlap with grains, and for what `Master` and `PlanarBody` refuse.
+    """
+
+    def __init__(
+        self,
+        trial: Trial,
+        footing: Footing,
+        *,
+        duration: float,
+        substeps: int = 10,
+        extrapolation: int = 0,
+        iterations: int = 1,
+        tip_radius: float = 0.0,
+        lowering_speed: float | None = None,
+        height: float | None = None,
+        energy_interval: float = 0.02,
+        max_wheel_speed: float = math.inf,
+    ) -> None:
+        for key, value in {"duration": duration, "energy_interval": energy_interval}.items():
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"{key} is {value}: it must be above 0 (in s)")
+        if lowering_speed is not None and not (math.isfinite(lowering_speed) and lowering_speed > 0):
+            raise ValueError(f"lowering_speed is {lowering_speed}: it must be above 0 (in m/s)")
+        self.trial, self.footing, self.duration = trial, footing, float(duration)
+        half = math.pi / trial.spike_count
+        self.level = (trial.spike_length - tip_radius) * math.cos(half) + tip_radius
+        """Height of the centre with the lowest tips at the surface [m]."""
+        start = self.level if height is None else float(height)
+        if height is None and isinstance(footing, LawFooting):
+            start -= _sinkage(footing, 0.5 * trial.weight)
+        self.body = PlanarBody(trial, z=start)
+        if isinstance(footing, BedFooting):
+            if height is None:
+                self.body.place[1] += footing.clear_height(self.body.pose)
+            footing.check_start(self.body.pose)
+        self.body.max_wheel_speed = max_wheel_speed
+        self.lowering_speed = lowering_speed
+        rests = lowering_speed is None and height is None
+        weight = Wrench(np.array([0.0, 0.0, trial.weight if rests else 0.0]), np.zeros(3))
+        self.master = Master(
+            self.body, footing, substeps=substeps, extrapolation=extrapolation, iterations=iterations,
+            first_guess=weight,
+        )  # fmt: skip
+        rows = trial.spike_count
+        self.reader = ContactReader(
+            rows, weight=trial.weight, mu_d=trial.sliding_friction, macro_step=self.master.macro_step
+        )
+        self._every = max(1, round(energy_interval / self.master.macro_step))
+        self.placed = lowering_speed is None
+        """Whether the hand has let go."""
+        self.placing_steps = 0
+        """Macro steps that the hand took."""
+        self._settling: list[tuple[float, float, float, float]] = []
+        self._rows: list[list[float]] = []
+        self._states: list[int] = []
+        self._feet: list[np.ndarray] = []
+        self._samples: list[list[float]] = []
+        self._frames = 0
+        self.energy_names: tuple[str, ...] = ()
+        """What the footing's energies are, in the order of `samples`."""
+        if self.placed:
+            self.body.touching = rests
+            self._begin()
+        else:
+            assert lowering_speed is not None
+            self.body.take_in_hand(lowering_speed)
+
+    # How far -------------------------------------------------------------------------------------------------------
+
+    @property
+    def done(self) -> bool:
+        """Whether the time is over."""
+        return self.placed and self.body.time >= self.duration - 0.5 * self.master.macro_step
+
+    @property
+    def time(self) -> float:
+        """Now [s]; before 0 while the hand holds it: how long it has been held, negative."""
+        return self.body.time if self.placed else -self.body.time
+
+    @property
+    def fraction(self) -> float:
+        """How far the tumble is along, 0 to 1; 0 while the hand holds it."""
+        return min(1.0, self.body.time / self.duration) if self.placed else 0.0
+
+    # Stepping ------------------------------------------------------------------------------------------------------
+
+    def advance(self) -> None:
+        """One macro step; nothing once it is done."""
+        if self.done:
+            return
+        if not self.placed:
+            self._lower()
+            return
+        reaction = self.master.step()
+        self._keep(reaction)
+        if (self.master.count - self.placing_steps) % self._every == 0 or self.done:
+            self._measure()
+
+    def run(
+        self,
+        *,
+        on_step: Callable[[CoupledTumble], None] | None = None,
+        on_frame: Callable[[CoupledTumble], None] | None = None,
+        frame_interval: float | None = None,
+    ) -> Trajectory:
+        """Go on to the end. `on_frame` is called every `frame_interval` [s] of the tumble, and at its end."""
+        while True:
+            if on_frame and frame_interval and self.placed:
+                due = self.body.time >= self._frames * frame_interval - 0.5 * self.master.macro_step
+                self._frames += due
+                if due or self.done:
+                    on_frame(self)
+            if self.done:
+                return self.trajectory()
+            self.advance()
+            if on_step:
+                on_step(self)
+
+    def _lower(self) -> None:
+        reaction = self.master.step()
+        self.placing_steps = self.master.count
+        body, wrench = self.body, self.master.wrench
+        length = self.trial.spike_length
+        self._settling.append(
+            (wrench.force[2], wrench.torque[1] / length, float(body.rates[1]), float(body.rates[2]) * length)
+        )
+        count = max(2, round(REST_TIME / self.master.macro_step))
+        self._settling = self._settling[-count:]
+        assert self.lowering_speed is not None
+        if len(self._settling) == count and reaction.contacts:
+            lift, turn, sinking, turning = np.array(self._settling).mean(axis=0)
+            near = max(abs(lift - self.trial.weight), abs(turn)) <= AT_REST * self.trial.weight
+            if near and max(abs(sinking), abs(turning)) <= AT_REST * self.lowering_speed:
+                body.let_go()
+                self.placed = True
+                self._begin()
+                return
+        if body.time > LONGEST_PLACING:
+            raise RuntimeError(
+                f"the platform did not come to rest within {LONGEST_PLACING:g} s of being set down: the ground carried "
+                f"{wrench.force[2]:.3g} of {self.trial.weight:.3g} N at the end"
+            )
+
+    def _begin(self) -> None:
+        self.master.open_books()
+        start = self.footing.momentum() if isinstance(self.footing, BedFooting) else np.zeros(3)
+        self._momentum = start
+        self._keep(self.master.last)
+        self._measure()
+
+    def _keep(self, reaction: FootReaction | None) -> None:
+        """One row, of the time of the pose."""
+        body, lag, master = self.body, self.footing.lag, self.master
+        rates, (given, taken) = body.rates_now(lag), master.exchanged()
+        self._rows.append(
+            [
+                body.time, *body.place, *rates, *body.acceleration, body.wheel_speed, body.kinetic_energy(lag),
+                body.potential_energy, body.torque_work, given, taken,
+            ]
+        )  # fmt: skip
+        count = self.trial.spike_count
+        feet = np.zeros((4, count))
+        if reaction is not None:
+            centre = body.place[:2] - 0.5 * master.macro_step * rates[:2]
+            for row, contact in reaction.contacts.items():
+                if row < 0:
+                    continue
+                h = centre[1] - contact.point[2]
+                along = contact.tangential_force
+                feet[0, row] = contact.normal_force
+                feet[1, row] = along[0] if along is not None else 0.0
+                feet[2, row] = rates[0] - rates[2] * h
+            for row, depth in reaction.sinkage.items():
+                feet[3, row] = depth
+        self._feet.append(feet)
+        if self.footing.gives_friction:
+            state = self.reader.see(feet[0], feet[1], feet[2])
+        else:
+            touching = body.modes != 9
+            state = state_of(touching, touching & (body.modes != 0)) if len(self._rows) > 1 else "stand"
+        self._states.append(STATES.index(state))
+
+    def _measure(self) -> None:
+        """What the footing holds, and by how much the momentum of all is off."""
+        found = self.footing.energies()
+        self.energy_names = tuple(found)
+        off = 0.0
+        if isinstance(self.footing, BedFooting):
+            moving = self.body.rates[:2] * self.body.inertia[:2]
+            fallen = np.array([0.0, -self.trial.weight * self.body.time])
+            off = float(np.linalg.norm((self.footing.momentum() - self._momentum)[[0, 2]] + moving - fallen))
+        self._samples.append([self.body.time, off, *found.values()])
+
+    # What came of it -----------------------------------------------------------------------------------------------
+
+    @property
+    def columns(self) -> dict[str, np.ndarray]:
+        """The rows so far, by COLUMNS."""
+        return dict(zip(COLUMNS, np.array(self._rows, dtype=float).reshape(-1, len(COLUMNS)).T, strict=True))
+
+    @property
+    def feet(self) -> np.ndarray:
+        """Normal and horizontal force [N], slip speed [m/s] and sinkage [m] of each row, shape [step, 4, row]."""
+        return np.array(self._feet).reshape(-1, 4, self.trial.spike_count)
+
+    @property
+    def states(self) -> list[str]:
+        """The state at every row."""
+        return [STATES[code] for code in self._states]
+
+    @property
+    def samples(self) -> dict[str, np.ndarray]:
+        """Of the footing, by time: `time` [s], `momentum_error` [N s] and its energies [J]."""
+        table = np.array(self._samples, dtype=float).reshape(-1, 2 + len(self.energy_names))
+        return dict(zip(("time", "momentum_error", *self.energy_names), table.T, strict=True))
+
+    @property
+    def balance(self) -> np.ndarray:
+        """Energy of the body gained, less the torque's work, plus what the footing took [J]: 0 but for the coupling."""
+        rows = self.columns
+        energy = rows["kinetic_energy"] + rows["potential_energy"]
+        return energy - energy[0] - rows["torque_work"] + rows["taken"] - rows["taken"][0]
+
+    def trajectory(self) -> Trajectory:
+        """As the planar model's integrators give it, what the footing holds as stored energy.
+
+        `dissipated` is what the footing took less what it holds more than at the start: by difference, not measured.
+        """
+        rows, samples = self.columns, self.samples
+        tally = Tally(self.trial, rows["x"][0], rows["y"][0], 0.0)
+        for k in range(len(rows["time"])):
+            away = tally.distance(rows["x"][k], rows["y"][k])
+            if tally.angle is None and away >= 0.01:
+                near = tally.distance(rows["x"][k - 1], rows["y"][k - 1])
+                share = (0.01 - near) / (away - near)
+                tally.launch(*(rows[c][k - 1] + share * (rows[c][k] - rows[c][k - 1]) for c in ("x", "y")))
+            tally.see(rows["time"][k], rows["vx"][k], rows["vy"][k], rows["omega"][k], 0.0, rows["torque_work"][k], 0.0)
+        held = np.sum([samples[name] for name in self.energy_names], axis=0)
+        stored = np.interp(rows["time"], samples["time"], held)
+        residual = float(np.abs(self.balance).max()) / max(tally.most_work, tally.scale)
+        shared = {name: rows[name] for name in COLUMNS[:14]}
+        return Trajectory(
+            trial=self.trial,
+            method="coupled",
+            state=np.array(self._states, dtype=np.int8),
+            stored_energy=stored,
+            dissipated=rows["taken"] - rows["taken"][0] - (stored - stored[0]),
+            transitions=self._transitions(),
+            trajectory_angle=tally.angle,
+            max_speed=tally.max_speed,
+            time_of_max_speed=tally.time_of_max_speed,
+            max_angular_velocity=tally.max_spin,
+            energy_residual=residual,
+            notes={"macro_step": self.master.macro_step},
+            **shared,
+        )
+
+    def _transitions(self) -> tuple[Transition, ...]:
+        found: list[Transition] = []
+        for row, code in zip(self._rows, self._states, strict=True):
+            if not found or STATES[code] != found[-1][1]:
+                found.append((row[0], STATES[code], row[3]))
+        return tuple(found)
+
+    def state(self) -> dict[str, Any]:
+        """All that the rest of the run depends on: a flat dict of numpy arrays."""
+        own: dict[str, Any] = {
+            "tumble.counts": np.array([self.placed, self.placing_steps, self._frames], dtype=np.int64),
+            "tumble.settling": np.array(self._settling, dtype=float).reshape(-1, 4),
+            "tumble.rows": np.array(self._rows, dtype=float).reshape(-1, len(COLUMNS)),
+            "tumble.states": np.array(self._states, dtype=np.int8),
+            "tumble.feet": self.feet,
+            "tumble.samples": np.array(self._samples, dtype=float).reshape(-1, 2 + len(self.energy_names)),
+            "tumble.energies": np.array(self.energy_names, dtype=str),
+            "tumble.momentum": np.asarray(self._momentum, dtype=float),
+        }
+        own |= {f"reader.{key}": value for key, value in self.reader.state().items()}
+        return own | self.master.state()
+
+    _momentum = np.zeros(3)
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go back to what `state` gave."""
+        placed, self.placing_steps, self._frames = (int(number) for number in state["tumble.counts"])
+        self.placed = bool(placed)
+        self._settling = [tuple(row) for row in np.asarray(state["tumble.settling"]).tolist()]
+        self._rows = np.asarray(state["tumble.rows"]).tolist()
+        self._states = [int(code) for code in state["tumble.states"]]
+        self._feet = list(np.asarray(state["tumble.feet"]))
+        self._samples = np.asarray(state["tumble.samples"]).tolist()
+        self.energy_names = tuple(str(name) for name in np.asarray(state["tumble.energies"]))
+        self._momentum = np.array(state["tumble.momentum"], dtype=float)
+        self.reader.restore({key[7:]: value for key, value in state.items() if key.startswith("reader.")})
+        self.master.restore(state)
+
+
+def _sinkage(footing: LawFooting, load: float) -> float:
+    """Depth at which the first row's law carries `load` [N] at rest [m], by bisection."""
+    law, low, high = footing.grounds[0], 0.0, 1e-6
+    while float(law.force(high, 0.0)) < load:
+        low, high = high, 2 * high
+        if high > 1.0:
+            raise ValueError(f"the ground does not carry {load:.3g} N a row")
+    for _ in range(200):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if float(law.force(middle, 0.0)) < load else (low, middle)
+    return high

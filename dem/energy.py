@@ -1,0 +1,113 @@
+"""What a bed holds: kinetic energy, height, and the springs of its contacts, read from its state.
+
+The springs are those of ``dem.contact``: Hertz's 4/15 (2 E*) a d^2 (which is 2/5 F d), and half the stiffness of now
+times the square of the stretch for the tangential, rolling and twisting ones. What dashpots and sliding take is not
+measured: the engine keeps no book of it (``experiments.validate.energy`` does, for a few grains).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .lists import INDEX_BITS, INDEX_MASK
+
+if TYPE_CHECKING:
+    from .bed import Bed
+
+__all__ = ["bed_energies"]
+
+Array = np.ndarray
+Gap = Callable[[Array], tuple[Array, Array, Array]]
+_TWO_E, _EIGHT_G = 0, 1  # of a row of pair parameters
+
+
+def bed_energies(bed: Bed, *, bodies: Mapping[int, Gap]) -> dict[str, float]:
+    """Energies of the grains [J].
+
+    Args:
+        bodies: number of a body -> its surface as a function of points [m], shape [n, 3], in the bed: distance [m],
+            shape [n]; outward normal, shape [n, 3]; curvature [1/m], shape [n]. The floor is known; a body that is not
+            named counts as having no springs.
+
+    Returns:
+        kinetic (translation and rotation, at the time of the positions), potential (of gravity, from z = 0), normal,
+        tangential, turning (springs of all contacts, bodies and floor included).
+
+    Raises:
+        ValueError: grains with cohesion, whose contacts store energy in another way.
+    """
+    if bed.material.cohesion != "none":
+        raise ValueError(f"cohesion = {bed.material.cohesion!r}: the energy of such contacts is not measured yet")
+    grains = bed.grains()
+    moving = 0.5 * grains["mass"] @ (grains["velocity"] ** 2).sum(axis=1)
+    turning = 0.2 * (grains["mass"] * grains["radius"] ** 2) @ (grains["spin"] ** 2).sum(axis=1)
+    height = -(grains["mass"] @ (grains["position"] @ np.array(bed.gravity, dtype=float)))
+    state = bed.state()
+    surfaces: dict[int, Gap] = {0: _floor} if bed._has_floor else {}
+    springs = _pairs(bed, state) + _near(state, surfaces | dict(bodies))
+    names = ("normal", "tangential", "turning")
+    found = {"kinetic": float(moving + turning), "potential": float(height)}
+    return found | {name: float(value) for name, value in zip(names, springs, strict=True)}
+
+
+def _floor(points: Array) -> tuple[Array, Array, Array]:
+    return points[:, 2], np.broadcast_to([0.0, 0.0, 1.0], points.shape), np.zeros(len(points))
+
+
+def _springs(
+    row: Array, overlap: Array, radius: Array, stretch: Array, turned: Array, normal: Array, share: Any
+) -> Array:
+    """Normal, tangential and turning springs of contacts [J], shape (3,); ``row`` their pairs' parameters."""
+    a = np.sqrt(radius * overlap)
+    k_t = row[..., _EIGHT_G] * a
+    twist = (turned * normal).sum(axis=1)
+    roll = (turned**2).sum(axis=1) - twist**2
+    held = (
+        4 / 15 * row[..., _TWO_E] * a * overlap**2,
+        0.5 * k_t * (stretch**2).sum(axis=1),
+        0.5 * k_t * (radius**2 * roll + 0.5 * a**2 * twist**2),
+    )
+    return np.array([float((share * part).sum()) for part in held])
+
+
+def _pairs(bed: Bed, state: Mapping[str, Array]) -> Array:
+    """Of two grains. A pair within a chunk is listed once, one across chunks by both."""
+    count = bed.grain_count
+    position = state["position"].astype(float)
+    first = np.repeat(np.arange(count), state["pair_count"])
+    touching = state["pair"] < 0
+    i, bits = first[touching], ~state["pair"][touching]
+    j, image = bits & INDEX_MASK, bits >> INDEX_BITS
+    d = position[i, :3] - position[j, :3]
+    d[:, 0] += (image % 3 - 1) * bed.size[0]
+    d[:, 1] += (image // 3 - 1) * bed.size[1]
+    length = np.linalg.norm(d, axis=1)
+    r_i, r_j = position[i, 3], position[j, 3]
+    overlap = np.maximum(0.0, r_i + r_j - length)
+    slide = state["slide"].astype(float)
+    turned = state["roll"].astype(float) if "roll" in state else np.zeros_like(d)
+    chunks = len(state["near_count"])
+    base, rest = divmod(count, chunks)
+    ends = np.cumsum(base + (np.arange(chunks) < rest))
+    own = np.searchsorted(ends, i, side="right") == np.searchsorted(ends, j, side="right")
+    row = np.array(bed._engine.grain_pair[None], dtype=float)
+    share = np.where(own, 1.0, 0.5)
+    return _springs(row, overlap, r_i * r_j / (r_i + r_j), slide[:, :3], turned, d / length[:, None], share)
+
+
+def _near(state: Mapping[str, Array], surfaces: Mapping[int, Gap]) -> Array:
+    """Of a grain and a body."""
+    total = np.zeros(3)
+    for body, surface in surfaces.items():
+        mine = state["near_body"] == body
+        centres = state["position"][state["near_grain"][mine]].astype(float)
+        distance, normal, curvature = surface(centres[:, :3])
+        overlap = np.maximum(0.0, centres[:, 3] - distance)
+        radius = centres[:, 3] / (1 + centres[:, 3] * curvature)
+        slide, turned = (state[name][mine].astype(float) for name in ("near_slide", "near_roll"))
+        row = state["body_pair"][body].astype(float)
+        total += _springs(row, overlap, radius, slide[:, :3], turned[:, :3], normal, 1.0)
+    return total
