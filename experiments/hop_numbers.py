@@ -14,7 +14,7 @@ from rigid.platform_files import find_platform
 from rigid.trial import Trial
 
 from .hop_settings import DEFAULT_DISTANCE, HopSettings
-from .settled import Number, Settled, defaults_said, settle_limits, settle_platform, settle_surface
+from .settled import Number, Settled, check_wheel_speed, defaults_said, settle_limits, settle_platform, settle_surface
 from .tumble_platform import platform_numbers
 
 __all__ = ["HopPlan", "plan_hop"]
@@ -108,16 +108,12 @@ def _check(settings: HopSettings, numbers: Settled, platform: Platform, brake: s
     body = ("mass", "inertia", "spike_length", "wheel_inertia", "stiffness", "damping", "mu_s", "mu_d")
     own: dict[str, Any] = {name: numbers.value(name) for name in body}
     Trial(gravity_sim=settings.gravity, gravity=settings.gravity, **own)
-    fastest, strongest = numbers["max_wheel_speed"], numbers["max_motor_torque"]
-    if settings.wheel_speed_0 is not None and settings.wheel_speed_0 > fastest.value:
-        raise ValueError(
-            f"wheel_speed_0 = {settings.wheel_speed_0:g} rad/s is beyond max_wheel_speed = {fastest.value:g} rad/s "
-            f"({fastest.origin}): at most that would do, or a max_wheel_speed above it"
-        )
+    if settings.wheel_speed_0 is not None:
+        check_wheel_speed(settings.wheel_speed_0, numbers)
     if settings.torque is None:
         return
     by_brake = settings.actuator == "brake"
-    most = platform.wheel().brake_torque if by_brake else strongest.value
+    most = platform.wheel().brake_torque if by_brake else numbers.value("max_motor_torque")
     if settings.torque > most * (1 + 1e-12):
         whose = f"{brake if by_brake else 'the motor'} of {platform.name}"
         more = "" if by_brake else ", or a max_motor_torque above it"

@@ -18,6 +18,7 @@ __all__ = [
     "Number",
     "Settled",
     "check_actuation",
+    "check_wheel_speed",
     "defaults_said",
     "settle_limits",
     "settle_platform",
@@ -154,12 +155,8 @@ def check_actuation(
     setting, for a torque beyond the motor, and for a wheel that starts beyond its limit.
     """
     torque, speed = numbers["torque"].value, numbers["wheel_speed_0"].value
-    fastest, strongest = numbers["max_wheel_speed"], numbers["max_motor_torque"]
-    if speed > fastest.value:
-        raise ValueError(
-            f"wheel_speed_0 = {speed:g} rad/s is beyond max_wheel_speed = {fastest.value:g} rad/s ({fastest.origin}): "
-            f"at most that would do, or a max_wheel_speed above it"
-        )
+    strongest = numbers["max_motor_torque"]
+    check_wheel_speed(speed, numbers)
     if actuator == "motor" and torque > strongest.value * (1 + 1e-9):
         whose = (
             f"the motor of platform = {platform.name!r}" if strongest.origin != "given" else "max_motor_torque (given)"
@@ -171,3 +168,13 @@ def check_actuation(
     if actuator == "brake" and torque > platform.brake_torque * (1 + 1e-9):
         return [f"torque = {torque:g} N m is beyond the brake of {platform.name}, {platform.brake_torque:g} N m"]
     return []
+
+
+def check_wheel_speed(speed: float, numbers: Mapping[str, Number]) -> None:
+    """Raise ValueError for a wheel that starts beyond its limit [rad/s]."""
+    fastest = numbers["max_wheel_speed"]
+    if speed > fastest.value:
+        raise ValueError(
+            f"wheel_speed_0 = {speed:g} rad/s is beyond max_wheel_speed = {fastest.value:g} rad/s ({fastest.origin}): "
+            f"at most that would do, or a max_wheel_speed above it"
+        )

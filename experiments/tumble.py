@@ -28,7 +28,7 @@ from .tumble_trial import TumblePlan, plan_tumble
 from .tumble_words import tumble_sentences
 from .whole_runs import whole_run
 
-__all__ = ["check", "quantities_of", "resume", "run", "trajectory_columns"]
+__all__ = ["check", "motion_columns", "quantities_of", "result_of", "resume", "run", "trajectory_columns"]
 
 MODEL_COPY = "model.toml"
 """The model that was run, in the run's folder; effects of one's own lie beside it."""
@@ -36,6 +36,11 @@ MODEL_COPY = "model.toml"
 
 def check(settings: TumbleSettings) -> None:
     """Raise ValueError, naming key, value and what would do, for what the settings class cannot see."""
+    if settings.ground == "bed":
+        from .tumble_grains import check_on_grains  # loads the room of the grains
+
+        check_on_grains(settings)
+        return
     check_sweep(settings)
     plan = plan_tumble(middle_of_sweep(settings))
     check_tumble_campaign(settings)
@@ -110,6 +115,10 @@ def _integrate(settings: TumbleSettings, plan: TumblePlan, *, duration: float) -
 
 
 def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
+    if settings.ground == "bed":
+        from .tumble_grains import tumble_on_grains
+
+        return tumble_on_grains(settings, folder, progress)
     with folder.lock():
         copied = _keep_model(settings, folder)
         plan = plan_tumble(middle_of_sweep(settings), model_file=copied)
@@ -121,12 +130,12 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
         trajectory, full = _integrate(settings, plan, duration=settings.duration)
         progress.update(1.0)
         write_series(folder.path / "trajectory.csv", trajectory_columns(trajectory))
-        folder.write_series("motion", _motion_columns(trajectory))
-        result = _result(settings, plan, trajectory, full)
+        folder.write_series("motion", motion_columns(trajectory))
+        result = result_of(settings, plan, trajectory, full)
         if settings.sweep:
             progress.message("the numbers above are those of the middle of the sweep")
             progress.stage("sweep")
-            _add_sweep(result, settings, folder)
+            _add_sweep(result, settings, folder, copied)
         made = write_tumble_campaign(settings, plan, folder.path, progress)
         result |= {"campaign": made} if made is not None else {}
         folder.write_result(result)
@@ -135,9 +144,9 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
     return result
 
 
-def _add_sweep(result: dict[str, Any], settings: TumbleSettings, folder: RunFolder) -> None:
+def _add_sweep(result: dict[str, Any], settings: TumbleSettings, folder: RunFolder, model: Path | None) -> None:
     """Integrate the sweep and put what came out beside the trial in its middle."""
-    swept = run_sweep(settings, folder)
+    swept = run_sweep(settings, folder, model_file=model)
     result["departures"]["sentences"] += swept["sweep"]["sentences"]
     result["title"] += ", in the middle of a sweep of " + " and ".join(settings.sweep)
     result |= swept
@@ -158,7 +167,7 @@ def _keep_model(settings: TumbleSettings, folder: RunFolder) -> Path | None:
     return copy
 
 
-def _motion_columns(trajectory: Trajectory) -> dict[str, Any]:
+def motion_columns(trajectory: Trajectory) -> dict[str, Any]:
     """What else the plots show, by time."""
     columns: dict[str, Any] = {
         "t_s": trajectory.time,
@@ -182,7 +191,8 @@ def _energies(trajectory: Trajectory) -> Mapping[str, Any]:
     }
 
 
-def _result(settings: TumbleSettings, plan: TumblePlan, trajectory: Trajectory, full: float | None) -> dict[str, Any]:
+def result_of(settings: TumbleSettings, plan: TumblePlan, trajectory: Trajectory, full: float | None) -> dict[str, Any]:
+    """What result.json holds of one trial."""
     trial = plan.trial
     stated = (
         f"rig at {trial.gravity_sim:.4g} m/s2" if trial.counterweight > 0 else f"free at {trial.gravity_sim:.4g} m/s2"
@@ -211,7 +221,7 @@ def _result(settings: TumbleSettings, plan: TumblePlan, trajectory: Trajectory, 
         "surface": plan.surface,
         "ground": settings.ground,
         "actuator": settings.actuator,
-        "method": settings.method,
+        "method": trajectory.method,
         "duration": settings.duration,
         "spike_count": trial.spike_count,
         "effects": [{"id": effect.id, "parameters": dict(effect.values)} for effect in trial.effects],

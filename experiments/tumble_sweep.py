@@ -10,6 +10,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -67,13 +68,14 @@ def check_sweep(settings: TumbleSettings) -> None:
     _plan(settings)
 
 
-def run_sweep(settings: TumbleSettings, folder: RunFolder) -> dict[str, Any]:
-    """Integrate the sweep, write sweep.csv and return what result.json says of it; nothing without a sweep."""
-    if not settings.sweep:
-        return {}
+def run_sweep(settings: TumbleSettings, folder: RunFolder, *, model_file: Path | None = None) -> dict[str, Any]:
+    """Integrate the sweep, write sweep.csv and return what result.json says of it.
+
+    `model_file` stands in for ``settings.model``, where that was copied.
+    """
     from rigid.batch import simulate_batch
 
-    ranges, points = parse_sweep(settings.sweep), _plan(settings)
+    ranges, points = parse_sweep(settings.sweep), _plan(settings, model_file=model_file)
     corners = _corners(ranges)
     time_step = min(PAPER_STEP, *(0.999 * longest_step(points[place].trial) for place in corners))
     batch = simulate_batch([point.trial for point in points], duration=settings.duration, time_step=time_step)
@@ -111,13 +113,13 @@ def run_sweep(settings: TumbleSettings, folder: RunFolder) -> dict[str, Any]:
 # Its trials -----------------------------------------------------------------------------------------------------------
 
 
-def _plan(settings: TumbleSettings) -> list[_Point]:
+def _plan(settings: TumbleSettings, *, model_file: Path | None = None) -> list[_Point]:
     """Every trial, the last key running fastest."""
     ranges = parse_sweep(settings.sweep)
     points = []
     for values in itertools.product(*(each.values for each in ranges)):
         try:
-            plan = plan_tumble(_at(settings, ranges, values))
+            plan = plan_tumble(_at(settings, ranges, values), model_file=model_file)
         except ValueError as error:
             where = ", ".join(f"{each.key} = {value:g}" for each, value in zip(ranges, values, strict=True))
             raise ValueError(f"sweep: at {where}: {_plain(error)}") from None

@@ -7,6 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from experiments import tumble_sweep
+from experiments.campaign import TumbleModel, write_model
+from experiments.campaign.tables import FORMAT, PlatformTable, RigTable, TumbleSurface, WheelTable
 from experiments.cli import main
 from experiments.runfolder import read_series
 from experiments.sweep_ranges import parse_sweep
@@ -27,6 +30,15 @@ def _somewhere_else(tmp_path, monkeypatch, request):
 @pytest.fixture
 def reported():
     """The report is drawn."""
+
+
+def a_model():
+    return TumbleModel(
+        format=FORMAT, kind="tumble", name="fitted",
+        platform=PlatformTable(mass=5.2, inertia=0.07, spike_length=0.19), wheel=WheelTable(inertia=1.1e-3),
+        rig=RigTable(counterweight=5.1, wire_length=2.2),
+        surface=TumbleSurface(kind="slate", stiffness=2e4, damping=70.0, mu_s=0.4),
+    )  # fmt: skip
 
 
 def test_a_sweep_is_its_tumbles_one_by_one(capsys, reported):
@@ -101,6 +113,17 @@ def test_a_sweep_that_cannot_be_is_refused_before_there_is_a_folder(capsys, opti
     text = capsys.readouterr().err
     assert all(words in text for words in said), text
     assert not Path("a").exists()
+
+
+def test_a_sweep_of_a_model_needs_nothing_but_its_folder_to_be_done_again():
+    """Without an integration: the plan of the copy in the run's folder, the model itself being gone."""
+    Path("a").mkdir()
+    write_model("a/model.toml", a_model())
+    settings = TumbleSettings(model="gone.toml", rig=0.0085, sweep=("mu_s=0.3:0.5:0.1",))
+    plan = plan_tumble(middle_of_sweep(settings), model_file=Path("a/model.toml"))
+    points = tumble_sweep._plan(settings, model_file=Path("a/model.toml"))
+    assert [point.trial.mu_s for point in points] == [0.3, 0.4, 0.5]
+    assert points[1].trial == plan.trial and plan.trial.mass == 5.2
 
 
 def test_a_trial_of_a_sweep_that_cannot_stand_has_no_numbers_and_is_counted():
