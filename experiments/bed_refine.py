@@ -45,9 +45,10 @@ def refined_options(settings: BedRefineSettings) -> tuple[dict[str, Any], Prepar
         stuff = replace(stuff, surface_energy=stuff.surface_energy * share**power)
     last = [stage for stage in recipe["stages"] if stage.partition(":")[0] in ("cut", "tilt")]
     first = [stage for stage in recipe["stages"] if stage not in last]
-    before = coarse.reports[len(first) - 1]
-    packing = f"packing:{before.packing_fraction:.4f}"
     levelled = first[-1] if first[-1].partition(":")[0] == "level" else None
+    # Before it was levelled: a shallow bed's packing is read lower, its floor and surface weighing in it.
+    before = coarse.reports[len(first) - (1 if levelled is None else 2)]
+    packing = f"packing:{before.packing_fraction:.4f}"
     middle = [packing] if levelled is None else [packing, levelled]
     stages = [*(first if levelled is None else first[:-1]), *middle, *last]
     options = {
@@ -83,12 +84,20 @@ def _scaled(sizes: Sizes, share: float) -> Sizes:
 def check(settings: BedRefineSettings) -> None:
     """Raise ValueError, naming key, value and what would do, for what cannot be refined, or not on this machine."""
     from dem.prepare import check_options
+    from dem.recipe import check_stages, parse_stage
 
     check_name(settings.name)
     options, _ = refined_options(settings)
     sizes: Sizes = options["grain"]
     check_options(options["size"], sizes.mean, options["gravity"], options["seed"], options["max_overlap"])
     check_memory(options["size"], sizes.mean, 0.0)
+    check_stages(
+        [parse_stage(stage) for stage in options["stages"]],
+        size=options["size"],
+        grain=sizes.mean,
+        sizes=sizes,
+        cohesive=options["material"].cohesion != "none",
+    )
 
 
 def _carry_out(settings: BedRefineSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:

@@ -3,8 +3,8 @@
 Peak: the largest shear stress, smoothed over half a diameter of the lid's way. Critical: the mean over the second half
 of the way, with the standard error of five parts of it. Mohr-Coulomb: a straight line through the runs' stresses.
 
-Normal stress is that at half the bed's height, as in a shear box: the lid's and half of what the bed weighs. Where in
-the bed it shears is not known, and half its weight on either side feigns a cohesion of up to that times the friction.
+Normal stress is the lid's. Shear stress is the same at every height and the normal one grows downwards with the bed's
+own weight, so that the bed shears under the lid; what lies between lid and there feigns a cohesion, told beside it.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ __all__ = ["Strength", "check", "fit_line", "resume", "run", "strength_of"]
 
 _SMOOTH = 0.5
 """Way of the lid over which the peak's stress is averaged [mean diameters]."""
+_BAND = 3.0
+"""How far below the lid it may shear [mean diameters]; a guess."""
 _PARTS = 5
 """Parts of the second half of the way, whose scatter gives the standard error."""
 
@@ -44,22 +46,21 @@ class Strength:
 
 
 def strength_of(run: Shearing, grain: float) -> Strength:
-    """Peak and critical shear stress of a run, at its mean normal stress at half height.
+    """Peak and critical shear stress of a run, at its mean normal stress.
 
     The servo lets the normal stress vary a little, and the shear stress varies with it: their ratio is averaged.
     """
-    pressing = run.normal + 0.5 * run.overburden
-    normal = float(pressing.mean())
+    normal = float(run.normal.mean())
     count = max(1, round(_SMOOTH * grain / max(1e-12, (run.way[-1] - run.way[0]) / max(1, len(run.way) - 1))))
     count = min(count, len(run.way))
     kernel = np.ones(count) / count
-    smooth = np.convolve(run.shear, kernel, "valid") / np.convolve(pressing, kernel, "valid")
+    smooth = np.convolve(run.shear, kernel, "valid") / np.convolve(run.normal, kernel, "valid")
     top = int(np.argmax(smooth))
     parts = [
         part.mean() / other.mean()
         for part, other in zip(
             np.array_split(run.shear[len(run.way) // 2 :], _PARTS),
-            np.array_split(pressing[len(run.way) // 2 :], _PARTS),
+            np.array_split(run.normal[len(run.way) // 2 :], _PARTS),
             strict=True,
         )
     ]
@@ -161,11 +162,11 @@ def _result(
                 "note": "slope of the line through the runs; std: standard error of the fit",
             },
             f"{kind}_cohesion": {"value": start, "std": start_error, "unit": "Pa", "note": "where that line begins"},
-            f"{kind}_cohesion_unsure": {
-                "value": 0.5 * runs[0].overburden * slope,
+            f"{kind}_cohesion_feigned": {
+                "value": _BAND * grain / bed.surface * runs[0].overburden * slope,
                 "std": None,
                 "unit": "Pa",
-                "note": "either way, since it may shear anywhere between lid and floor",
+                "note": "what the weight of three diameters of bed above where it shears would feign",
             },
             f"{kind}_ratio": {
                 "value": float(np.mean([getattr(s, kind) / s.normal for s in strengths])),
@@ -220,7 +221,6 @@ def _result(
                 "series": f"series/shear-{pressure:g}.csv",
                 "pressure": run.pressure,
                 "speed": run.speed,
-                "at_lid": float(run.normal.mean()),
                 "normal": s.normal,
                 "peak": s.peak,
                 "critical": s.critical,

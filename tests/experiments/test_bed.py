@@ -168,7 +168,7 @@ def test_a_bed_is_sheared_from_the_command_line(shelf, tmp_path):
     assert main([*words, "--threads", "1", "--quiet", "--out", str(tmp_path / "run")]) == DONE
     result = json.loads((tmp_path / "run" / "result.json").read_text())
     for run in result["runs"]:
-        assert run["at_lid"] == pytest.approx(run["pressure"], rel=0.1)
+        assert run["normal"] == pytest.approx(run["pressure"], rel=0.1)
         assert 0.2 < run["critical"] / run["normal"] <= run["peak"] / run["normal"] < 1.5
     assert result["quantities"]["critical_friction_angle"]["std"] is None  # two runs: no error can be told
     assert (tmp_path / "run" / "figures" / "mohr-coulomb.png").exists()

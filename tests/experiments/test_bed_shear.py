@@ -1,7 +1,6 @@
 """The shear test: lines and peaks of made-up runs come back exactly (test_bed.py shears a bed)."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -26,14 +25,6 @@ def test_peak_and_critical_stress_are_those_of_a_made_up_run():
     assert found.peak == pytest.approx(0.8 * found.normal) and found.critical == pytest.approx(0.6 * found.normal)
     assert found.normal == pytest.approx(1000.0, rel=1e-3) and found.critical_error < 1e-9 * found.normal
     assert found.peak_way <= 2 * GRAIN
-
-
-def test_the_normal_stress_is_that_at_half_height():
-    """The lid's, 1000 Pa, and half of what the bed weighs, 100 Pa."""
-    light = made_up(1000.0, peak=0.8, critical=0.6)
-    heavy = replace(light, overburden=200.0)
-    assert strength_of(heavy, GRAIN).normal == pytest.approx(strength_of(light, GRAIN).normal + 100.0)
-    assert strength_of(heavy, GRAIN).critical == pytest.approx(strength_of(light, GRAIN).critical, rel=2e-3)
 
 
 def test_the_line_through_three_runs_is_mohr_coulomb_s():
