@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 
 from .platform_settings import NotNegative, PlatformSettings, Positive
 from .sweep_ranges import parse_sweep
+from .tumble_bed_settings import TumbleBedSettings
 
 __all__ = ["TrialSettings", "TumbleSettings"]
 
@@ -26,7 +27,7 @@ class TrialSettings(PlatformSettings):
     ground: str = Field(
         "spring-damper",
         description="Law that computes the surface's force: spring-damper, hunt-crossley, power, katsuragi-durian, "
-        "bekker or rft.",
+        "bekker or rft; for tumble also bed, a bed of grains.",
     )
     ground_parameters: tuple[str, ...] = Field(
         (), description="Parameters of another law than the spring-damper, of one spike, as name=value in SI."
@@ -71,6 +72,8 @@ class TrialSettings(PlatformSettings):
                     f"stiffness and damping"
                 )
             return None
+        if self.ground == "bed":
+            return "ground_parameters is given: a bed of grains has none" if self.ground_parameters else None
         for key in ("stiffness", "damping"):
             value = getattr(self, key)
             if value is not None:
@@ -81,7 +84,7 @@ class TrialSettings(PlatformSettings):
         return None
 
 
-class TumbleSettings(TrialSettings):
+class TumbleSettings(TumbleBedSettings, TrialSettings):
     """One trial of a platform on spikes that a flywheel turns over: pivot, slip, hop."""
 
     # The gravity
@@ -128,7 +131,7 @@ class TumbleSettings(TrialSettings):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
-        for finding in (self._sweep(), self._gravity(), self._actuation()):
+        for finding in (self._sweep(), self._gravity(), self._actuation(), self._on_grains()):
             if finding:
                 raise ValueError(finding)
         return self
@@ -159,6 +162,17 @@ class TumbleSettings(TrialSettings):
             ):
                 if value != default:
                     return f"{key} = {value} belongs to a rig, and gravity = {self.gravity:g} m/s2 is a free platform's"
+        return None
+
+    def _on_grains(self) -> str | None:
+        given = self.bed_settings_given()
+        if self.ground != "bed":
+            return f"{given[0]} = {getattr(self, given[0])} belongs to ground = 'bed'" if given else None
+        for key in ("effects", "sweep", "campaign", "model"):
+            if getattr(self, key):
+                return f"{key} is given with ground = 'bed': on grains there is the base model alone, without it"
+        if self.method != "located":
+            return f"method = {self.method!r} is of the planar model: on grains there is the coupling's own step"
         return None
 
     def _actuation(self) -> str | None:

@@ -23,6 +23,7 @@ from PIL import Image, ImageDraw
 from vis.numbers import quantity, short
 from vis.page import Block, Page, Section, Tile, code, figure, table, text, write_page
 from vis.style import BED, GREY, INK, MODEL, styled
+from vis.tumble_grains import grains_section
 from vis.tumble_sweep import sweep_section
 
 __all__ = ["STATES", "read_columns", "state_runs", "write_tumble_report"]
@@ -66,6 +67,9 @@ def write_tumble_report(folder: str | Path, *, progress: Callable[[float], None]
     if "sweep" in result:
         swept, _ = read_columns(folder / result["sweep"]["file"])
         page = replace(page, sections=[sweep_section(result, figures, swept), *page.sections])
+    if "grains" in result:
+        tables = {name: read_columns(folder / file) for name, file in result["grains"]["series"].items()}
+        page = replace(page, sections=[*page.sections[:1], grains_section(result, figures, tables), *page.sections[1:]])
     report = write_page(folder / "report.html", page)
     tell(1.0)
     return report

@@ -1,0 +1,47 @@
+"""Settings of a tumble on grains: the bed, the spikes in it, the coupling. They belong to ``ground = "bed"``."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from .strict import StrictSettings
+
+__all__ = ["TumbleBedSettings"]
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+
+class TumbleBedSettings(StrictSettings):
+    """What a bed of grains under a platform is made of, and how it is coupled; SI units."""
+
+    bed_size: tuple[Positive, Positive, Positive] = Field(
+        (0.5, 0.06, 0.046),
+        description="On a bed: its length along the motion, its width for one spike (both periodic) and its depth [m].",
+    )
+    grain: Positive = Field(0.003, description="On a bed: mean grain diameter [m].")
+    spread: float = Field(0.15, ge=0, le=0.5, description="On a bed: grain diameters are uniform within 1 +- this [1].")
+    seed: int = Field(1, ge=0, lt=2**31, description="On a bed: seed of its grains.")
+    young: Positive | None = Field(
+        None, description="On a bed: Young's modulus of the softened grains [Pa]; from max_overlap if not given."
+    )
+    max_overlap: float = Field(0.05, gt=0, le=0.2, description="On a bed: largest overlap of grains over diameter [1].")
+    spike_diameter: Positive = Field(0.012, description="On a bed: diameter of shaft and ball tip of a spike [m].")
+    spike_clear: Positive = Field(0.04, description="On a bed: how far a spike stands out of the hull [m].")
+    spike_friction: NotNegative = Field(0.5, description="On a bed: friction of spike and grains [1].")
+    spike_restitution: float = Field(0.5, ge=0.01, le=1, description="On a bed: restitution of spike and grains [1].")
+    lowering_speed: Positive = Field(0.05, description="On a bed: speed at which the platform is set down [m/s].")
+    substeps: int = Field(10, ge=1, le=200, description="On a bed: steps of the grains in one of the platform [1].")
+    extrapolation: int = Field(0, ge=0, le=2, description="On a bed: order of the guess at the next force [1].")
+    iterations: int = Field(1, ge=1, le=50, description="On a bed: how often a step is computed at most; 1: explicit.")
+    frame_count: int = Field(30, ge=0, le=1000, description="On a bed: frames for ParaView; 0: none.")
+    checkpoint_interval: Positive = Field(60.0, description="On a bed: time between checkpoints [s].")
+    threads: int | None = Field(None, ge=1, description="On a bed: threads; all cores if not given.")
+    cache: bool = Field(True, description="On a bed: whether prepared beds are kept and used again.")
+
+    def bed_settings_given(self) -> list[str]:
+        """Names of those of these settings that are not at their defaults."""
+        fields = TumbleBedSettings.model_fields
+        return [name for name, field in fields.items() if getattr(self, name) != field.default]

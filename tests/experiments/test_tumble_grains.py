@@ -1,0 +1,118 @@
+"""`hedgebed tumble --ground bed`: refusals before any work; a small platform on a small bed, stopped and taken up."""
+
+import math
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from experiments import tumble, tumble_grains
+from experiments.runfolder import RunFolder
+from experiments.tumble_settings import TumbleSettings
+
+SMALL = {
+    "surface": "sand", "ground": "bed", "mass": 0.3, "inertia": 2e-4, "spike_length": 0.04, "wheel_inertia": 1e-5,
+    "rig": 0.03, "torque": 0.01, "duration": 0.06, "bed_size": (0.2, 0.036, 0.03), "grain": 0.006, "frame_count": 3,
+    "spike_diameter": 0.008, "spike_clear": 0.015, "substeps": 8, "lowering_speed": 0.04, "stiffness": 500.0,
+    "damping": 2.0, "threads": 1,
+}  # fmt: skip
+
+
+def on_bed(**more):
+    return TumbleSettings(**({"surface": "sand", "ground": "bed", "duration": 0.9} | more))
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"bed_size": (0.2, 0.06, 0.046)}, r"bed_size = 0.2 m along the motion .* 0.28 m or a shorter one would do"),
+        ({"bed_size": (0.4, 0.03, 0.046)}, r"bed_size = 0.03 m across .* 0.036 m would do"),
+        ({"bed_size": (0.4, 0.06, 0.03)}, r"bed_size = 0.03 m deep .* 0.043 m would do"),
+        ({"grain": 0.013}, r"grain = 0.013 m is larger than the spike: at most 0.012 m would do"),
+        ({"grain": 0.0003}, r"grain = 0.0003 m makes about .* 0.00\d+ m or a smaller bed would do"),
+        ({"surface": "steel"}, r"surface = 'steel' has no grains .* sand would do"),
+        ({"spike_clear": 0.01}, r"spike_diameter = 0.012 m, spike_clear = 0.01 m"),
+    ],
+)
+def test_a_bed_that_will_not_do_is_refused_before_any_work(given, said):
+    with pytest.raises(ValueError, match=said):
+        tumble.check(on_bed(**given))
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"effects": ("pendulum.length=2.2",)},
+        {"method": "paper"},
+        {"campaign": "made"},
+        {"ground_parameters": ("stiffness=3",)},
+        {"ground": "spring-damper", "grain": 0.004},
+    ],
+)
+def test_what_does_not_go_with_grains_is_refused_by_name(given):
+    with pytest.raises(ValueError, match=list(given)[-1]):
+        on_bed(**given)
+
+
+def small_bed(*_):
+    """Two layers of large grains, almost at rest."""
+    from dem import Bed
+    from dem.materials import SAND
+
+    d, rows, columns = 6e-3, 32, 6
+    low = [((i + 0.5) * d, (j + 0.5) * d, 0.5 * d) for i in range(rows) for j in range(columns)]
+    high = [((i + 1.0) * d, (j + 1.0) * d, 0.5 * d + d * math.sqrt(0.5)) for i in range(rows) for j in range(columns)]
+    bed = Bed.from_grains(
+        SAND, positions=np.array(low + high), radii=np.full(2 * rows * columns, 0.5 * d), young=1e7, max_overlap=0.1,
+        size=(rows * d, columns * d, 0.03), height=0.3, threads=1, gravity=9.80665,
+    )  # fmt: skip
+    bed.advance(1000)
+    bed.surface = float((bed.grains()["position"][:, 2] + 0.5 * d).max())
+    return bed
+
+
+@pytest.mark.slow
+def test_a_run_stopped_by_ctrl_c_is_taken_up_again_to_the_same_numbers(tmp_path, monkeypatch):
+    monkeypatch.setattr(tumble_grains, "_prepare", small_bed)
+    monkeypatch.setattr(tumble_grains, "write_report", lambda *_: None)
+    settings = TumbleSettings(**SMALL)
+    whole = tumble.run(settings, tmp_path / "whole")
+    calls = 0
+
+    @contextmanager
+    def stopping():
+        def asked():
+            nonlocal calls
+            calls += 1
+            return calls == 250
+
+        yield asked
+
+    monkeypatch.setattr(tumble_grains, "held_back", stopping)
+    with pytest.raises(KeyboardInterrupt):
+        tumble.run(settings, tmp_path / "broken")
+    assert RunFolder.open(tmp_path / "broken").load_checkpoint("tumble") is not None
+    again = tumble.resume(tmp_path / "broken")
+    assert again["quantities"] == whole["quantities"]
+    for name in ("trajectory.csv", "series/feet.csv", "series/bed.csv", "series/motion.csv", "frames/tumble.pvd"):
+        assert (tmp_path / "broken" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
+    assert whole["quantities"]["energy_residual"]["value"] < 0.01
+    assert whole["quantities"]["momentum_residual"]["value"] < 1e-12
+    assert whole["method"] == "coupled" and whole["ground"] == "bed"
+    assert whole["grains"]["beside"]["max_speed"]["value"] > 0
+    rows = (tmp_path / "whole" / "trajectory.csv").read_text().count("\n") - 1
+    assert rows >= 1000 * settings.duration
+    _check_report(tmp_path / "whole", whole)
+
+
+def _check_report(folder, result):
+    """The section of the report has both figures and both columns."""
+    from vis.tumble import read_columns
+    from vis.tumble_grains import grains_section
+
+    (folder / "figures").mkdir(exist_ok=True)
+    tables = {name: read_columns(folder / file) for name, file in result["grains"]["series"].items()}
+    section = grains_section(result, folder / "figures", tables)
+    assert [block.kind for block in section.blocks] == ["figure", "table", "figure", "text"]
+    assert all((folder / "figures" / name).stat().st_size > 5000 for name in ("beside.png", "feet.png"))
+    assert "rig: grains at 1 g" in section.blocks[-1].text

@@ -1,0 +1,120 @@
+"""A tumble on grains beside the spring-damper: paths, forces and sinkage of the spikes; a section of the report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from vis.numbers import short
+from vis.page import Section, figure, table, text
+from vis.style import BED, GREY, INK, MODEL, styled
+
+__all__ = ["grains_section"]
+
+Columns = tuple[Mapping[str, NDArray[np.float64]], NDArray[np.str_]]
+_ROWS = (BED, MODEL, "#009E73", "#CC79A7", GREY, "#56B4E9", "#E69F00", INK)
+"""Colours of the rows of spikes."""
+
+
+def grains_section(result: Mapping[str, Any], figures: Path, tables: Mapping[str, Columns]) -> Section:
+    """The section, its figures drawn into `figures`. `tables`: the run's own, feet and beside."""
+    feet, beside = tables["feet"][0], tables["beside"][0]
+    own = tables["own"][0]
+    with styled():
+        _draw_paths(own, beside).savefig(figures / "beside.png", dpi=130)
+        _draw_feet(feet).savefig(figures / "feet.png", dpi=130)
+    grains = result["grains"]
+    facts = (
+        f"{grains['mode']}. {grains['grain_count']} grains, packing {short(grains['packing_fraction'], 3)}, "
+        f"E = {short(grains['young'] / 1e6, 3)} MPa ({short(grains['softer_than_real'], 2)} times softer than real), "
+        f"step {short(1e6 * grains['time_step'], 3)} µs, {round(grains['macro_step'] / grains['time_step'])} of them "
+        f"in one of the platform; largest overlap {short(100 * grains['max_overlap'], 2)} %. "
+        f"One spike stands for its row of two."
+    )
+    blocks = [
+        figure(
+            figures / "beside.png", title="Grains and spring-damper",
+            caption="The same trial on the bed of grains and on the spring-damper of the same surface.",
+        ),
+        table(("", "grains", "spring-damper"), _compared(result)),
+        figure(
+            figures / "feet.png", title="What each row feels",
+            caption="Above: upward force, mean over 5 ms. Below: how deep its lowest point is under the surface.",
+        ),
+        text(facts, small=True),
+    ]  # fmt: skip
+    return Section("On grains, beside the spring-damper", blocks)
+
+
+def _compared(result: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    """The numbers that both have."""
+    rows = []
+    for name, label, scale, unit in (
+        ("trajectory_angle", "trajectory angle", 180 / math.pi, "°"),
+        ("max_speed", "largest speed", 1.0, " m/s"),
+        ("max_angular_velocity", "largest dθ/dt", 1.0, " rad/s"),
+        ("transition_angle_slip", "slips from", 180 / math.pi, "°"),
+        ("transition_angle_hop", "hops from", 180 / math.pi, "°"),
+    ):
+        values = (result["quantities"][name]["value"], result["grains"]["beside"][name]["value"])
+        cells = ["–" if value is None else f"{short(scale * value, 3)}{unit}" for value in values]
+        rows.append((label, *cells))
+    return rows
+
+
+def _panels(rows: int, columns: int, height: float) -> tuple[Figure, Any]:
+    with mpl.rc_context({"figure.constrained_layout.use": True}):
+        drawing = Figure(figsize=(8.6, height))
+    FigureCanvasAgg(drawing)
+    return drawing, drawing.subplots(rows, columns, squeeze=False)
+
+
+def _draw_paths(own: Mapping[str, NDArray[np.float64]], beside: Mapping[str, NDArray[np.float64]]) -> Figure:
+    drawing, ((path, angle, speed),) = _panels(1, 3, 3.0)
+    for columns, label, style in (
+        (own, "grains", {"color": BED, "lw": 1.6}),
+        (beside, "spring-damper", {"color": MODEL, "lw": 1.3, "ls": (0, (4, 2))}),
+    ):
+        x, y = 1e3 * columns["x_m"], 1e3 * columns["y_m"]
+        path.plot(x - x[0], y - y[0], label=label, **style)
+        angle.plot(columns["t_s"], np.degrees(columns["theta_rad"]), **style)
+        speed.plot(columns["t_s"], np.hypot(columns["vx_m_s"], columns["vy_m_s"]), **style)
+    path.set_xlabel("x − x(0) [mm]")
+    path.set_ylabel("y − y(0) [mm]")
+    path.set_aspect("equal", adjustable="datalim")
+    angle.set_xlabel("time [s]")
+    angle.set_ylabel("θ [degrees]")
+    speed.set_xlabel("time [s]")
+    speed.set_ylabel("speed of the centre [m/s]")
+    drawing.legend(handles=path.lines, loc="outside upper left", ncols=2)
+    return drawing
+
+
+def _draw_feet(feet: Mapping[str, NDArray[np.float64]]) -> Figure:
+    drawing, axes = _panels(2, 1, 4.2)
+    force, depth = axes[:, 0]
+    time = feet["t_s"]
+    count = sum(name.startswith("normal_") for name in feet)
+    window = max(1, round(5e-3 / float(np.median(np.diff(time))))) if len(time) > 1 else 1
+    for row in range(count):
+        normal, sinkage = feet[f"normal_{row}_N"], 1e3 * feet[f"sinkage_{row}_m"]
+        if not normal.any():
+            continue
+        colour = _ROWS[row % len(_ROWS)]
+        force.plot(time, np.convolve(normal, np.full(window, 1 / window), mode="same"), color=colour, lw=1.0)
+        depth.plot(time, np.where(sinkage > 0, sinkage, np.nan), color=colour, lw=1.4, label=f"row {row}")
+    force.set_ylabel("N of a row [N]")
+    depth.set_ylabel("sinkage [mm]")
+    depth.set_xlabel("time [s]")
+    depth.invert_yaxis()
+    if depth.lines:
+        drawing.legend(handles=depth.lines, loc="outside upper left", ncols=8)
+    return drawing
