@@ -200,7 +200,7 @@ def tumble_forms(
             "depth-hardening",
             "straight while shallow",
             _free("depth-hardening.bend", "1/m", 0.03 / max(sinkage, 1e-6), lowest=0.0, highest=1e6),
-            starts=tuple({"depth-hardening.bend": b / max(sinkage, 1e-6)} for b in (0.05, 0.5)),
+            starts=tuple({"depth-hardening.bend": b / max(sinkage, 1e-6)} for b in (0.005, 0.05, 0.5)),
         ),
         TumbleForm(
             effect="depth-hardening",

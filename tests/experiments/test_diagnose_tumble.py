@@ -13,6 +13,7 @@ from experiments.diagnose.tumble_data import CHANNELS, tumble_data
 from experiments.diagnose.tumble_fit import Fitter
 from experiments.diagnose.tumble_forms import tumble_forms
 from experiments.diagnose.tumble_forward import Forward
+from experiments.diagnose.tumble_guess import Guesser
 from experiments.diagnose.tumble_problem import TumbleProblem, make_problem
 from experiments.diagnose.tumble_steps import ZERO_STD, Start, whiten
 from rigid import STATES, Effect
@@ -121,6 +122,23 @@ def test_a_pendulum_is_found_with_its_length_and_beats_a_slope():
     reported = found.reported(best.values, by_id["pendulum:centred"])
     assert reported["length"][0] == pytest.approx(1 / curvature)
     assert ids == ["001", "002", "003", "004"]
+
+
+def test_a_plain_effect_is_found_where_the_base_model_ends_on_branches_of_its_own():
+    """A centre of mass 0.58 mm off the shaft, half of what cancels the whole restoring moment at 0.0085 g."""
+    truth = {"x": -5e-4, "y": 3e-4}
+    found = make_problem(campaign(effects=(Effect(id="com-offset", parameters=truth),), seed=4, off=0.5))
+    ids = [trial.id for trial in found.trials]
+    forms = {form.id: form for form in found.forms}
+    guesser = Guesser(found.forward, [forms["com-offset:both"], forms["slope:plane"]])
+    base = guesser.guess((), ids, {})
+    values = guesser.guess((forms["com-offset:both"],), ids, base)
+    (residuals,) = found.evaluate([base], (), ids)
+    assert np.mean(np.concatenate(list(residuals.values())) ** 2) > 5
+    (residuals,) = found.evaluate([values], (forms["com-offset:both"],), ids)
+    assert np.mean(np.concatenate(list(residuals.values())) ** 2) < 1.1
+    for name, value in truth.items():
+        assert values[f"com-offset.{name}"] == pytest.approx(value, abs=3e-5)
 
 
 def test_the_latent_force_of_a_missing_pendulum_is_that_of_the_wires():
