@@ -388,7 +388,9 @@ def measure_stage(
     share = bed.floor_force / (bed.weight * cosine)
     return StageReport(
         stage=stage,
-        packing_fraction=float(bed.packing_fraction if across is None else packing[inner].mean()),
+        packing_fraction=float(
+            bed.packing_fraction if across is None else (packing[inner] if inner.any() else packing).mean()
+        ),
         coordination_number=bed.coordination_number,
         surface=float(bed.surface),
         grain_count=bed.grain_count,

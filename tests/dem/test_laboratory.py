@@ -122,6 +122,7 @@ def test_a_cut_leaves_faces_that_fall_and_a_report_of_the_middle(bed):
     assert report.notes["removed"] == count - after.grain_count > 0
     assert report.notes["fallen"] > 0  # sand without cohesion holds no vertical face
     assert after.kinetic_energy / after.weight / GRAIN < ENERGY_RATIO
+    assert 0 < report.packing_fraction < 0.64
     assert len(report.profile["stress_zz"]) == len(report.profile["height"])
 
 
