@@ -127,7 +127,7 @@ def test_without_a_bed_the_command_shows_both_laws(tmp_path, capsys):
 
 
 def test_beside_a_bed_that_does_not_spring_back_the_amended_law_closes_the_gap(tmp_path, monkeypatch):
-    sand = SimpleNamespace(name="sand", density=2650.0, young=7e10, poisson=0.25, friction=0.5)
+    sand = SimpleNamespace(name="sand", density=2650.0, young=7e10, poisson=0.25, friction=0.5, surface_energy=0.0)
     unload = K / 0.1  # the stand-in's elastic line is that of a crater of nine tenths
     monkeypatch.setattr(
         penetrate, "prepare_bed",

@@ -195,7 +195,7 @@ def grains(tmp_path_factory):
         seeds=(1, 2, 3), speeds=(0.2, 0.4), other_speeds=(0.4,), drop_speeds=(0.1,), other_drop_speeds=(0.1,),
         drop_time=0.5, depth=0.01, frame_count=0, mass=MASS, load=LOAD, lowering_speed=0.1, substeps=20,
     )  # fmt: skip
-    sand = SimpleNamespace(name="sand", density=2650.0, young=7e10, poisson=0.25, friction=0.5)
+    sand = SimpleNamespace(name="sand", density=2650.0, young=7e10, poisson=0.25, friction=0.5, surface_energy=0.0)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
             penetrate, "prepare_bed",

@@ -10,7 +10,7 @@ from experiments.remarks import overlap_warning, softening_note
 from experiments.settings import PenetrateSettings
 from experiments.softening import Softening
 
-SAND = SimpleNamespace(name="sand", density=2650.0, young=7e10, poisson=0.25, friction=0.5)
+SAND = SimpleNamespace(name="sand", density=2650.0, young=7e10, poisson=0.25, friction=0.5, surface_energy=0.0)
 QUICK = {
     "speeds": (0.2, 0.4), "other_speeds": (0.4,), "drop_speeds": (0.1,), "other_drop_speeds": (0.1,), "drop_time": 0.5,
     "depth": 0.01, "frame_count": 0, "mass": 0.3, "load": 0.4, "lowering_speed": 0.1, "substeps": 20, "seeds": (1,),

@@ -20,7 +20,7 @@ from experiments.settings import PenetrateSettings, expected_grain_count
 from experiments.units import plan_units, shown_units
 from vis.frames import frame_names, read_frames
 
-SAND = SimpleNamespace(name="sand", density=2650.0, young=7e10, poisson=0.25, friction=0.5)
+SAND = SimpleNamespace(name="sand", density=2650.0, young=7e10, poisson=0.25, friction=0.5, surface_energy=0.0)
 QUICK = {
     "seeds": (1, 2, 3),
     "speeds": (0.2, 0.4),
@@ -293,8 +293,8 @@ def test_the_shipped_cases_are_settings():
     assert full.tip_diameter / full.grain >= 9.999 and full.max_overlap <= 0.01 and min(full.speeds) < 0.1
     finer = {"grain", "max_overlap", "speeds", "other_speeds", "other_drop_speeds", "reference", "bed_size", "young"}
     assert full.young >= penetrate.choose_softness(full.model_copy(update={"young": None})).young
-    assert min(full.bed_size[:2]) > 4.99 * full.tip_diameter
-    assert full.bed_size[2] > full.depth + 1.99 * full.tip_diameter
+    # Four tips wide: what that alone does is in docs/results/README.md, by the shipped grains in a bed of this size.
+    assert min(full.bed_size[:2]) > 4 * full.tip_diameter and full.bed_size[2] > full.depth + 1.8 * full.tip_diameter
     assert {name for name, value in full if value != getattr(short, name)} == finer
     assert len(full.seeds) >= 3 and full.other_speeds == full.speeds and full.other_drop_speeds == full.drop_speeds
 
