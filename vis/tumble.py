@@ -149,8 +149,10 @@ def _draw_trajectory(
             more = (Line2D([], [], color=INK, lw=1.0, ls=(0, (4, 3)), label=label),)
         path.ticklabel_format(useOffset=False)
         if far < 1e-4:  # it has not moved to speak of
-            path.set_xlim(x[0] - 1, x[0] + 1)
-            path.set_ylim(y[0] - 1, y[0] + 1)
+            half = max(1.5 * scale * far, 1e-3)
+            path.set_xlim(x[0] - half, x[0] + half)
+            path.set_ylim(y[0] - half, y[0] + half)
+            path.locator_params(nbins=5)
         else:
             path.set_aspect("equal", adjustable="datalim")
             path.margins(0.08)
@@ -164,6 +166,8 @@ def _draw_trajectory(
         other = rates.twinx()
         other.plot(time, numbers["omega_rad_s"], color=INK, lw=1.1, ls=(0, (1, 1.2)))
         other.set_ylabel("dθ/dt [rad/s], dotted")
+        for axis in (rates, other):  # small numbers in powers of ten: their digits would leave no room for the labels
+            axis.ticklabel_format(axis="y", scilimits=(-2, 4))
         other.grid(False)
         other.spines["right"].set_visible(True)
         _legend_of_states(drawing, states, more)
@@ -198,6 +202,7 @@ def _draw_states(
         over_angle.set_yticks(range(len(order)), order)
         over_angle.set_ylim(-0.5, len(order) - 0.5)
         over_angle.set_xlabel("θ [degrees]")
+        over_angle.locator_params(axis="x", nbins=6)
         _legend_of_states(drawing, states)
     caption = (
         "Left: the angle over time. Right: state against angle, as in Figure 6 of the paper: stand (two or more spikes "

@@ -53,6 +53,7 @@ def _draw(keys: list[dict[str, Any]], columns: Mapping[str, NDArray[np.float64]]
     if len(keys) == 1:
         for axis, (name, scale, label) in zip(axes, _PANELS, strict=True):
             axis.plot(columns[keys[0]["column"]], scale * columns[name], "o-", color=BED, ms=3.5, lw=1.4)
+            _say_if_empty(axis, keys[0], columns[name])
             _label(axis, keys[0], label)
         return drawing
     along, other = (0, 1) if shape[0] >= shape[1] else (1, 0)
@@ -70,6 +71,7 @@ def _draw(keys: list[dict[str, Any]], columns: Mapping[str, NDArray[np.float64]]
     for axis, grid, (_, _, label) in zip(axes, grids, _PANELS, strict=True):
         for values, colour, value in zip(grid.T, colours, keys[other]["values"], strict=True):
             axis.plot(keys[along]["values"], values, "o-", color=colour, ms=3, lw=1.3, label=f"{value:g}")
+        _say_if_empty(axis, keys[along], grid)
         _label(axis, keys[along], label)
     handles, labels = axes[0].get_legend_handles_labels()
     drawing.legend(handles, labels, title=_words(keys[other]), loc="outside upper left", ncols=_MOST_LINES)
@@ -83,3 +85,10 @@ def _words(key: Mapping[str, Any]) -> str:
 def _label(axis: Axes, key: Mapping[str, Any], label: str) -> None:
     axis.set_xlabel(_words(key))
     axis.set_ylabel(label)
+
+
+def _say_if_empty(axis: Axes, key: Mapping[str, Any], values: NDArray[np.float64]) -> None:
+    if np.isnan(values).all():
+        axis.set_xlim(min(key["values"]), max(key["values"]))
+        axis.set_yticks([])
+        axis.text(0.5, 0.5, "never 10 mm away", transform=axis.transAxes, ha="center", va="center")
