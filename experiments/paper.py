@@ -23,7 +23,8 @@ from rigid.trial import Trial
 
 from .paper_claims import claims, first_lasting
 from .paper_settings import PaperSettings
-from .paper_variants import HARD, variants
+from .paper_transitions import HARD
+from .paper_variants import variants
 from .progress import Progress
 from .reporting import write_report
 from .runfolder import RunFolder
@@ -168,8 +169,12 @@ def _rows(trajectory: Any) -> dict[str, Any]:
     }
 
 
-def _launch(trajectory: Any, states: Sequence[tuple[float, str, float]]) -> dict[str, float] | None:
-    """Position and velocity at the first hop, from a row in that flight, which is a parabola; None without one."""
+def _launch(trajectory: Any, states: Sequence[tuple[float, str, float]]) -> dict[str, float | bool] | None:
+    """Position and velocity at the first hop, from a row in that flight, which is a parabola; None without one.
+
+    `lasts` [s] goes to the end of the trial where the hop has not `landed` by then; `height` [m] is that of the
+    parabola's peak above the launch.
+    """
     start = next((time for time, state, _ in states if state == "hop"), None)
     if start is None:
         return None
@@ -188,6 +193,8 @@ def _launch(trajectory: Any, states: Sequence[tuple[float, str, float]]) -> dict
         "vy": vy,
         "gravity": g,
         "lasts": float(min(end, trajectory.time[-1]) - start),
+        "landed": math.isfinite(end),
+        "height": max(vy, 0.0) ** 2 / (2 * g),
     }
 
 

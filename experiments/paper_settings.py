@@ -6,6 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from .paper_transitions import HARD, measured_angles
 from .strict import StrictSettings
 
 __all__ = ["PaperSettings"]
@@ -28,6 +29,11 @@ class PaperSettings(StrictSettings):
         ("steel", "brick", "sand", "jsc1a"), min_length=1, description="Materials; Figures 5 to 7 take steel and brick."
     )
     friction_band: float = Field(0.1, gt=0, lt=1, description="Friction is varied by this, relative, up and down [1].")
+    measured_angles: tuple[str, ...] = Field(
+        (),
+        description="Transition angles read off Figure 6, SURFACE-TORQUE-STATE=DEGREES with slip or hop for the state "
+        "(steel-0.125-hop=18), to be compared with ours; the paper prints none as a number.",
+    )
     rig_reading: Literal["pair", "weight"] = Field("pair", description="What rig means; see tumble.")
 
     # What the paper does not give
@@ -57,4 +63,7 @@ class PaperSettings(StrictSettings):
                 raise ValueError(f"{key} = {list(values)} holds a value twice: each once would do")
         if set(self.motor_torques) & set(self.brake_torques):
             raise ValueError(f"brake_torques = {list(self.brake_torques)} holds a torque of motor_torques too")
+        torques = (*self.motor_torques, *self.brake_torques)
+        hard = [surface for surface in HARD if surface in self.surfaces]
+        measured_angles(self.measured_angles, surfaces=hard, torques=torques)
         return self

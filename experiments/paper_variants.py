@@ -15,13 +15,12 @@ from rigid.laws import find_law
 from rigid.trial import Effect, Ground, Trial
 
 from .paper_settings import PaperSettings
+from .paper_transitions import HARD
 from .surfaces import find_surface
 from .tumble_trial import SPIKES_PER_ROW
 
-__all__ = ["FACTORS", "GRAINS", "HARD", "SLIDING", "SWEPT", "Variant", "variants"]
+__all__ = ["FACTORS", "GRAINS", "SLIDING", "SWEPT", "Variant", "variants"]
 
-HARD = ("steel", "brick")
-"""The surfaces of Figures 5 to 7."""
 GRAINS = ("sand", "jsc1a")
 SWEPT = ("inertia", "wheel_inertia", "stiffness", "damping", "wheel_speed_0")
 """Numbers that the paper does not give, halved and doubled."""

@@ -13,6 +13,7 @@ from experiments.cli import main
 from experiments.paper import plan_jobs, run
 from experiments.paper_claims import friction_of_a_rigid_pivot
 from experiments.paper_settings import PaperSettings
+from experiments.paper_transitions import slip_before_hop
 from experiments.tumble_settings import TumbleSettings
 from experiments.tumble_trial import plan_tumble
 from rigid.planar import simulate
@@ -23,7 +24,7 @@ def small(tmp_path_factory):
     """The folder of a short run: one gravity, one motor torque and the brake, two surfaces."""
     folder = tmp_path_factory.mktemp("paper") / "a"
     settings = PaperSettings(
-        rigs=(0.0085,), motor_torques=(0.125,), surfaces=("brick", "sand"), duration=2.0, brake_duration=1.2,
+        rigs=(0.0085,), motor_torques=(0.125,), surfaces=("brick", "sand"), duration=2.5, brake_duration=1.2,
         sweep=False, workers=1,
     )  # fmt: skip
     run(settings, folder)
@@ -114,6 +115,36 @@ def test_claims_say_what_is_stated_what_came_out_and_whether_it_is_inside(small)
     assert quantities["claims_met"]["value"] == sum(claim["met"] for claim in compared)
 
 
+def test_a_hop_counts_as_brief_by_the_contact_before_it_and_brakes_do_not_count(small):
+    hop = next(c for c in result_of(small)["claims"] if c["statement"].startswith("even a short tumble ends"))
+    assert hop["ours"] == "1 of 1 motor trials" and "shorter than the contact before it" in hop["judged_by"]
+    cases = {(c["surface"], c["torque"], c["variant"]): c for c in result_of(small)["cases"]}
+    motor, brake = (cases["brick", torque, "nominal"]["launch"] for torque in (0.125, 6.0))
+    assert motor["landed"] and motor["lasts"] == pytest.approx(0.65, abs=0.01) and motor["lasts"] < motor["time"]
+    assert motor["height"] == pytest.approx(motor["vy"] ** 2 / (2 * 0.0085 * 9.80665), rel=1e-9)
+    assert not brake["landed"] and brake["lasts"] > brake["time"]
+    assert f"{brake['lasts']:.2f} s after {brake['time']:.2f} s of contact" in hop["note"]
+
+
+def test_transition_angles_are_shown_with_bands_and_judged_once_measured_ones_are_given(tmp_path):
+    settings = PaperSettings(
+        rigs=(0.0085,), motor_torques=(0.22,), surfaces=("brick",), duration=1.0, brake_duration=0.2, sweep=False,
+        workers=1, measured_angles=("brick-0.22-hop=19", "brick-6-slip=0", "brick-6-hop=14"),
+    )  # fmt: skip
+    run(settings, tmp_path / "a")
+    claim = result_of(tmp_path / "a")["claims"][-1]
+    # 15.35, 0 and 8.06 degrees: two of three within five.
+    assert claim["ours"] == "2 of 3 within 5 degrees" and claim["met"] is True
+    assert "brick 0.22 N m hop 15.3" in claim["note"] and "measured 19" in claim["note"]
+
+
+def test_the_slip_that_ends_in_a_hop_is_not_the_jerk_of_the_torque():
+    states = [(0.0, "slip", 0.0), (0.05, "pivot", 0.001), (1.3, "slip", 0.2), (1.6, "hop", 0.35), (2.3, "slip", 0.8)]
+    assert slip_before_hop({"transitions": states}) == 0.2
+    assert slip_before_hop({"transitions": states[:3]}) is None
+    assert slip_before_hop({"transitions": [(0.0, "pivot", 0.0), (1.0, "hop", 0.3)]}) is None
+
+
 def test_the_numbers_hold_both_integrators_and_the_friction_band(small):
     cases = {(c["surface"], c["torque"], c["variant"]): c for c in result_of(small)["cases"]}
     for surface in ("brick", "sand"):
@@ -175,6 +206,8 @@ def test_the_friction_that_a_rigid_pivot_asks_for_solves_newtons_equations():
         (["--surfaces", "steel", "snow"], ["surface = 'snow'"]),
         (["--rigs", "0.01", "0.01"], ["rigs", "twice"]),
         (["--friction-band", "1.5"], ["--friction-band = 1.5", "less than 1"]),
+        (["--measured-angles", "brick-0.125"], ["measured_angles", "SURFACE-TORQUE-STATE=DEGREES"]),
+        (["--measured-angles", "sand-6-hop=3"], ["sand-6-hop", "none of steel, brick"]),
         (["--motor-torques", "1"], ["torque = 1 N m", "motor"]),
         (["--motor-torques", "0.1", "--brake-torques", "0.1"], ["brake_torques", "motor_torques"]),
     ],

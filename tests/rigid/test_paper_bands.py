@@ -96,14 +96,54 @@ def test_at_6_nm_the_platform_slips_at_once_and_until_it_hops(mu_s, level):
     assert names == ["slip", "hop"]
 
 
-def test_even_a_short_tumble_at_0_0085_g_ends_in_a_brief_hop():
-    # Seen in 5 of 6 cases: steel and brick, three torques. Within one tumble, an eighth of a turn.
-    hops = 0
+HOPS = {
+    # (mu_s, torque): theta of the first hop [degrees], contact before it, and its length [s] where it lands in 2.5 s
+    (BRICK, 0.125): (20.0, 1.65, 0.65),
+    (BRICK, 0.22): (15.35, 0.74, 0.71),
+    (BRICK, 6.0): (8.1, 0.08, None),
+    (STEEL, 0.125): (17.5, 1.20, 0.69),
+    (STEEL, 0.22): (14.3, 0.63, 0.74),
+    (STEEL, 6.0): (9.9, 0.09, None),
+}
+"""At 0.0085 g; the table of docs/planar.md holds the angles."""
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """The six cases of Figure 6, 2.5 s long."""
+    return {(mu_s, torque): tumble(torque, mu_s, duration=2.5) for mu_s, torque in HOPS}
+
+
+def first_hop(run):
+    """Theta [degrees], beginning and end [s] of the first hop; no end where the run ends in it."""
+    k = next(k for k, (_, name, _) in enumerate(run.transitions) if name == "hop")
+    begin, _, theta = run.transitions[k]
+    return math.degrees(theta), begin, run.transitions[k + 1][0] if k + 1 < len(run.transitions) else None
+
+
+def test_the_six_cases_at_0_0085_g_hop_first_at_the_documented_angles_and_for_the_documented_times(runs):
+    for case, (angle, contact, length) in HOPS.items():
+        theta, begin, end = first_hop(runs[case])
+        assert theta == pytest.approx(angle, abs=0.1)
+        assert begin == pytest.approx(contact, abs=0.01)
+        assert (end is None) == (length is None)
+        if length is not None:
+            assert end - begin == pytest.approx(length, abs=0.01)
+
+
+def test_fewer_tumbles_end_in_a_hop_shorter_than_the_contact_before_it_than_the_paper_saw_in_5_of_6(runs):
+    # The motor trials of a 2.5 s run. Brakes throw the platform for longer than the whole run.
+    brief = {case: (hop := first_hop(runs[case])) and hop[2] - hop[1] < hop[1] for case in HOPS if case[1] != 6.0}
+    assert brief == {(BRICK, 0.125): True, (BRICK, 0.22): True, (STEEL, 0.125): True, (STEEL, 0.22): False}
     for mu_s in (STEEL, BRICK):
-        for torque in (0.125, 0.22, 6.0):
-            angle = tumble(torque, mu_s).transition_angle("hop")
-            hops += angle is not None and angle < math.pi / 4
-    assert hops >= 5
+        _, begin, end = first_hop(runs[mu_s, 6.0])
+        assert end is None and 2.5 - begin > 20 * begin
+
+
+def test_on_brick_at_0_125_nm_the_pivot_becomes_a_slip_at_11_5_degrees(runs):
+    names = [name for _, name, _ in runs[BRICK, 0.125].transitions]
+    assert names[:4] == ["slip", "pivot", "slip", "hop"]  # the first slip is the jerk of the torque, 0.05 degrees
+    assert math.degrees(runs[BRICK, 0.125].transitions[2][2]) == pytest.approx(11.5, abs=0.1)
 
 
 def test_ten_percent_of_friction_moves_a_sliding_start_and_not_a_pivot():
@@ -132,12 +172,27 @@ def held_share(trial):
     return abs(system.stick_force) / system.contacts[0].load
 
 
-def test_the_pair_s_reading_of_0_0085_g_pivots_on_steel_at_0_125_nm_where_the_weight_s_slips():
-    # docs/planar.md: W = (m + m_b) g_sim with g_sim = 0.0085 g lets a pivot hold; half of it does not. That is the
-    # pivot itself, its spring settled. (A torque that begins at once jerks two soft feet loose before, whatever K:
-    # tests/rigid/test_planar_events.py.)
-    assert held_share(in_rig(0.125, mu_s=STEEL)) == pytest.approx(0.18, abs=0.01)
-    counterweight = MASS * (1 - 0.0085)  # g_sim = g (m - m_b) / m
+def weight_reading(torque):
+    """Trial on steel with 0.0085 g read as the weight left per mass of the platform."""
+    counterweight = MASS * (1 - 0.0085)
     weight = MASS * 0.0085 * G
-    half = in_rig(0.125, mu_s=STEEL, counterweight=counterweight, gravity_sim=weight / (MASS + counterweight))
-    assert held_share(half) > STEEL
+    return in_rig(torque, mu_s=STEEL, counterweight=counterweight, gravity_sim=weight / (MASS + counterweight))
+
+
+def test_a_pivot_on_steel_whose_spring_has_settled_would_be_held_by_the_pair_s_weight_and_not_by_the_weight_s():
+    # A state set by hand, no run: once the tip's spring has settled, a pivot at 0.125 N m asks for 0.18 of the load
+    # with W = (m + m_b) g_sim, and for more than mu_s = 0.25 with half of it. No run on a step of the torque gets
+    # there: the next test.
+    assert held_share(in_rig(0.125, mu_s=STEEL)) == pytest.approx(0.18, abs=0.01)
+    assert held_share(weight_reading(0.125)) > STEEL
+
+
+@pytest.mark.parametrize("trial", [in_rig(0.125, mu_s=STEEL), weight_reading(0.125)], ids=["pair", "weight"])
+def test_runs_on_steel_at_0_125_nm_slip_at_once_in_either_reading_of_0_0085_g(trial):
+    # Erratum of docs/planar.md: m h tau / (J + m h^2) = 0.51 N is asked of friction before a spring has moved, h = l
+    # cos(pi/8); mu_s W is 0.22 N in the pair's reading, 0.11 N in the weight's.
+    height = LENGTH * math.cos(math.pi / 8)
+    asked = MASS * height * 0.125 / (trial.inertia + MASS * height**2)
+    assert asked == pytest.approx(0.51, abs=0.005) and asked > 2 * STEEL * trial.weight
+    time, name, theta = simulate(trial, duration=0.1).transitions[0]
+    assert (time, name, theta) == (0.0, "slip", 0.0)
