@@ -110,15 +110,18 @@ def _result(
     driven = min(left.time, wheel.inertia * speed / torque)
     lands = "" if flown is not None else "it escapes"
     quantities = {
-        "wheel_speed": _quantity(speed, "rad/s", "before the brake" if by_brake else "reached when it leaves"),
+        "wheel_speed": _quantity(
+            speed, "rad/s", f"on rigid ground, {'before the brake' if by_brake else 'reached when it leaves'}"
+        ),
+        "model_wheel_speed": _quantity(sought, "rad/s", _model_speed_note(plan, given, sought, by_brake=by_brake)),
         "wheel_speed_impulsive": _quantity(
             wanted / sudden.speed if wanted else None, "rad/s", lands or "closed form of a brake that takes no time"
         ),
         "torque": _quantity(torque, "N m", "on the platform, constant"),
         "torque_time": _quantity(driven, "s", "how long the torque acts before it leaves"),
-        "rotation": _quantity(left.rotation, "rad", "how far it turns on the ground"),
-        "launch_speed": _quantity(left.speed, "m/s", "of the centre"),
-        "launch_angle": _quantity(left.angle, "rad", "from the horizontal"),
+        "rotation": _quantity(left.rotation, "rad", "how far it turns on the ground, rigid"),
+        "launch_speed": _quantity(left.speed, "m/s", "of the centre, from rigid ground"),
+        "launch_angle": _quantity(left.angle, "rad", "above the horizontal, from rigid ground"),
         "least_viable_angle": _quantity(
             least_viable_angle(tumbler.mu_s), "rad", "pi/2 - atan(mu_s): flattest sudden launch without sliding"
         ),
@@ -128,13 +131,14 @@ def _result(
         "distance": _quantity(flown.distance if flown else None, "m", lands or "along the ground, rigid"),
         "escape_speed": _quantity(escape, "m/s", "sqrt(2 g R)" if escape else "unknown without body_radius"),
         "escape_ratio": _quantity(left.speed / escape if escape else None, "1", "launch speed over escape speed"),
-    } | _model_quantities(plan, left, flown, given, escape, sought)
+    } | _model_quantities(plan, left, flown, given, escape)
     said = sentences(plan, left, flown, given, torque=torque, speed=speed, by_brake=by_brake, sought=sought)
     return {
         "format": "hedgebed-result/1",
         "experiment": "hop",
         "version": __version__,
-        "title": f"{plan.platform.name}: a hop {_asked(settings, plan)} at {settings.gravity:g} m/s2",
+        "title": f"{plan.platform.name}: a hop {_asked(settings, plan)} at {settings.gravity:g} m/s2"
+        + (_wheel_words(plan, given, speed, sought) if by_brake and plan.distance is not None else ""),
         "status": "done",
         "quantities": quantities,
         "numbers": {
@@ -162,18 +166,36 @@ def _asked(settings: HopSettings, plan: HopPlan) -> str:
     return f"by {settings.torque:g} N m"
 
 
+def _wheel_words(plan: HopPlan, given: SurfaceHop | None, speed: float, sought: float | None) -> str:
+    """The answer for a distance, on either ground: the one of rigid ground alone is no plan for a hop."""
+    said = f", by a wheel at {speed:.4g} rad/s from rigid ground"
+    if given is None:
+        return said
+    return said + (f", {sought:.4g} from {plan.surface}" if sought is not None else f", none from {plan.surface}")
+
+
+def _model_speed_note(plan: HopPlan, given: SurfaceHop | None, sought: float | None, *, by_brake: bool) -> str:
+    if plan.distance is None:
+        return "no distance was asked for"
+    if given is None:
+        return "on ground that gives: not for this platform"
+    where = f"on {plan.ground}, by the planar model"
+    if not by_brake:
+        return f"{where}: not sought for a motor"
+    return f"{where}, before the brake" if sought is not None else f"{where}: none goes the distance"
+
+
 def _model_quantities(
     plan: HopPlan,
     left: Launch,
     flown: Flight | None,
     given: SurfaceHop | None,
     escape: float | None,
-    sought: float | None,
 ) -> dict[str, dict[str, Any]]:
     """What the planar model makes of the same wheel and torque, and how many times theory's that is."""
     other = given.launch if given is not None else None
     flight_of = given.flight if given is not None else None
-    where = "planar model, on ground that gives"
+    where = f"planar model, on {plan.surface}"
     if given is None:
         where += ": not for this platform"
     elif other is None:
@@ -192,13 +214,6 @@ def _model_quantities(
         ),
         "model_escape_ratio": _quantity(
             other.speed / escape if other and escape else None, "1", "model_launch_speed over escape speed"
-        ),
-        "model_wheel_speed": _quantity(
-            sought,
-            "rad/s",
-            "of a brake: goes the distance by the planar model"
-            if plan.distance is not None
-            else "no distance was asked for",
         ),
     }
 

@@ -14,7 +14,16 @@ from rigid.platform_files import find_platform
 from rigid.trial import Trial
 
 from .hop_settings import DEFAULT_DISTANCE, HopSettings
-from .settled import Number, Settled, check_wheel_speed, defaults_said, settle_limits, settle_platform, settle_surface
+from .settled import (
+    Number,
+    Settled,
+    brake_words,
+    check_actuation,
+    defaults_said,
+    settle_limits,
+    settle_platform,
+    settle_surface,
+)
 from .tumble_platform import platform_numbers
 
 __all__ = ["HopPlan", "plan_hop"]
@@ -27,7 +36,7 @@ class HopPlan:
     platform: Platform
     wheel: Flywheel
     brake: str
-    """What slows the wheel, in words: a platform file without a brake_torque lets the motor do it."""
+    """What slows the wheel, in words."""
     tumbler: Tumbler
     surface: str
     stiffness: float
@@ -56,13 +65,13 @@ class HopPlan:
 def plan_hop(settings: HopSettings) -> HopPlan:
     """The numbers that `settings` stand for.
 
-    Raises ValueError, naming the setting, for a platform or a surface there is not, a torque or a wheel speed beyond
-    the platform's, and numbers that cannot be.
+    Raises ValueError, naming the setting, for a platform or a surface there is not, a torque beyond the motor, a wheel
+    speed beyond the wheel's, and numbers that cannot be.
     """
     platform, of_platform = find_platform(settings.platform), platform_numbers(settings.platform, in_plane=False)
     numbers = Settled(settings)
-    default = HopSettings.model_fields["gravity"].default
-    numbers["gravity"] = Number(settings.gravity, "m/s2", "default" if settings.gravity == default else "given")
+    given = settings.model_fields_set
+    numbers["gravity"] = Number(settings.gravity, "m/s2", "given" if "gravity" in given else "default")
     if settings.asks_for == "distance":
         numbers.settle("distance", DEFAULT_DISTANCE, "default")
     for name in ("body_radius", "wheel_speed_0"):
@@ -71,7 +80,7 @@ def plan_hop(settings: HopSettings) -> HopPlan:
     settle_platform(numbers, of_platform)
     numbers.settle("lean", of_platform.lean, f"platform {of_platform.name}")
     settle_limits(numbers, of_platform)
-    own, brake = platform.wheel(), _brake_words(platform.wheel())
+    own, brake = platform.wheel(), brake_words(of_platform)
     if settings.actuator == "brake":
         numbers.settle("torque", own.brake_torque, f"{brake} of platform {of_platform.name}, at its largest")
     elif settings.torque is not None:
@@ -81,16 +90,13 @@ def plan_hop(settings: HopSettings) -> HopPlan:
         own, inertia=numbers.value("wheel_inertia"), max_speed=numbers.value("max_wheel_speed"),
         motor_torque=numbers.value("max_motor_torque"),
     )  # fmt: skip
-    _check(settings, numbers, platform, brake)
+    _check(settings, numbers)
+    warnings += check_actuation(settings.actuator, of_platform, numbers)
     tumbler = Tumbler(
         mass=numbers.value("mass"), inertia=numbers.value("inertia"), spike_length=numbers.value("spike_length"),
         lean=of_platform.lean, gravity=settings.gravity, mu_s=numbers.value("mu_s"), mu_d=numbers.value("mu_d"),
     )  # fmt: skip
-    choices = {
-        name: str(getattr(settings, name))
-        for name in ("platform", "actuator")
-        if getattr(settings, name) == HopSettings.model_fields[name].default
-    }
+    choices = {name: str(getattr(settings, name)) for name in ("platform", "actuator") if name not in given}
     if settings.surface is None:
         choices["surface"] = surface
     if settings.body_radius is None:
@@ -103,22 +109,8 @@ def plan_hop(settings: HopSettings) -> HopPlan:
     )  # fmt: skip
 
 
-def _check(settings: HopSettings, numbers: Settled, platform: Platform, brake: str) -> None:
-    """Refuse numbers that no body can have, as a tumble does, and torque and wheel speed beyond their limits."""
+def _check(settings: HopSettings, numbers: Settled) -> None:
+    """Refuse numbers that no body can have, as a tumble does."""
     body = ("mass", "inertia", "spike_length", "wheel_inertia", "stiffness", "damping", "mu_s", "mu_d")
     own: dict[str, Any] = {name: numbers.value(name) for name in body}
     Trial(gravity_sim=settings.gravity, gravity=settings.gravity, **own)
-    if settings.wheel_speed_0 is not None:
-        check_wheel_speed(settings.wheel_speed_0, numbers)
-    if settings.torque is None:
-        return
-    by_brake = settings.actuator == "brake"
-    most = platform.wheel().brake_torque if by_brake else numbers.value("max_motor_torque")
-    if settings.torque > most * (1 + 1e-12):
-        whose = f"{brake if by_brake else 'the motor'} of {platform.name}"
-        more = "" if by_brake else ", or a max_motor_torque above it"
-        raise ValueError(f"torque = {settings.torque:g} N m: {whose} gives at most {most:g} N m: that would do{more}")
-
-
-def _brake_words(wheel: Flywheel) -> str:
-    return "the brake" if wheel.brake_torque > wheel.motor_torque or math.isinf(wheel.brake_torque) else "the motor"

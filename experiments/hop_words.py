@@ -32,7 +32,7 @@ def sentences(
 ) -> list[str]:
     """What a person wants to be told; `sought` is the wheel speed [rad/s] for the distance on ground that gives."""
     mu_s = plan.tumbler.mu_s
-    way = "slides off" if left.slid else "leaves without sliding"
+    way = "slides off rigid ground" if left.slid else "leaves rigid ground without sliding"
     turning = f"{speed:.4g} rad/s ({speed * 30 / math.pi:.4g} rpm)"
     how = (
         f"Braking a wheel at {turning} with {torque:g} N m{_by(plan)},"

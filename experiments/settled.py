@@ -17,6 +17,7 @@ __all__ = [
     "UNITS",
     "Number",
     "Settled",
+    "brake_words",
     "check_actuation",
     "check_wheel_speed",
     "defaults_said",
@@ -149,14 +150,17 @@ def settle_surface(numbers: Settled, surface: str | None, *, model: Any = None) 
 def check_actuation(
     actuator: Literal["motor", "brake"], platform: PlatformNumbers, numbers: Mapping[str, Number]
 ) -> list[str]:
-    """What has to be said of torque and wheel.
+    """What has to be said of torque and wheel, of a tumble and of a hop, as far as they are settled.
 
-    A brake beyond the platform's own is no more than said: it is an impulse in the limit. Raises ValueError, naming the
-    setting, for a torque beyond the motor, and for a wheel that starts beyond its limit.
+    A brake beyond the platform's own is no more than said: it is an impulse in the limit; of another wheel's brake
+    nothing is known. Raises ValueError, naming the setting, for a torque beyond the motor, and for a wheel that starts
+    beyond its limit.
     """
-    torque, speed = numbers["torque"].value, numbers["wheel_speed_0"].value
-    strongest = numbers["max_motor_torque"]
-    check_wheel_speed(speed, numbers)
+    if "wheel_speed_0" in numbers:
+        check_wheel_speed(numbers["wheel_speed_0"].value, numbers)
+    if "torque" not in numbers:
+        return []
+    torque, strongest, wheel = numbers["torque"].value, numbers["max_motor_torque"], numbers["wheel_inertia"]
     if actuator == "motor" and torque > strongest.value * (1 + 1e-9):
         whose = (
             f"the motor of platform = {platform.name!r}" if strongest.origin != "given" else "max_motor_torque (given)"
@@ -165,9 +169,17 @@ def check_actuation(
             f"torque = {torque:g} N m is beyond {whose}: at most {strongest.value:g} N m would do, or a "
             f"max_motor_torque above it, or actuator = brake with a wheel_speed_0"
         )
-    if actuator == "brake" and torque > platform.brake_torque * (1 + 1e-9):
-        return [f"torque = {torque:g} N m is beyond the brake of {platform.name}, {platform.brake_torque:g} N m"]
+    own = wheel.origin != "model" and wheel.value == platform.wheel_inertia
+    if actuator == "brake" and own and torque > platform.brake_torque * (1 + 1e-9):
+        whose = f"{brake_words(platform)} of {platform.name}"
+        return [f"torque = {torque:g} N m is beyond {whose}, {platform.brake_torque:g} N m"]
     return []
+
+
+def brake_words(platform: PlatformNumbers) -> str:
+    """What slows the platform's wheel: a platform file without a brake_torque lets the motor do it."""
+    own = platform.brake_torque > platform.motor_torque or math.isinf(platform.brake_torque)
+    return "the brake" if own else "the motor"
 
 
 def check_wheel_speed(speed: float, numbers: Mapping[str, Number]) -> None:

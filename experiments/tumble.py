@@ -121,7 +121,7 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
         return tumble_on_grains(settings, folder, progress)
     with folder.lock():
         copied = _keep_model(settings, folder)
-        plan = plan_tumble(middle_of_sweep(settings), model_file=copied)
+        plan = plan_tumble(middle_of_sweep(settings, model_file=copied), model_file=copied)
         for sentence in plan.sentences():
             progress.message(sentence)
         for warning in plan.warnings:
@@ -133,7 +133,7 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
         folder.write_series("motion", motion_columns(trajectory))
         result = result_of(settings, plan, trajectory, full)
         if settings.sweep:
-            progress.message("the numbers above are those of the middle of the sweep")
+            progress.message("the numbers above are those of one trial of the sweep, in its middle or nearest to it")
             progress.stage("sweep")
             _add_sweep(result, settings, folder, copied)
         made = write_tumble_campaign(settings, plan, folder.path, progress)
@@ -148,7 +148,7 @@ def _add_sweep(result: dict[str, Any], settings: TumbleSettings, folder: RunFold
     """Integrate the sweep and put what came out beside the trial in its middle."""
     swept = run_sweep(settings, folder, model_file=model)
     result["departures"]["sentences"] += swept["sweep"]["sentences"]
-    result["title"] += ", in the middle of a sweep of " + " and ".join(settings.sweep)
+    result["title"] += ", one trial of a sweep of " + " and ".join(settings.sweep)
     result |= swept
 
 

@@ -119,7 +119,7 @@ def _plan(settings: TumbleSettings) -> TumblePlan:
 
 
 def _beside(settings: TumbleSettings) -> TumbleSettings:
-    kept = {name: getattr(settings, name) for name in type(settings).model_fields}
+    kept = {name: getattr(settings, name) for name in settings.model_fields_set}
     own = set(settings.bed_settings_given()) | {"ground"}
     return TumbleSettings(**{name: value for name, value in kept.items() if name not in own})
 

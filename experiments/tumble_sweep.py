@@ -1,7 +1,7 @@
 """`hedgebed tumble --sweep KEY=FROM:TO:STEP`: the same tumble over a range of one number, or over two.
 
-All trials are integrated at once by the batched model (`rigid.simulate_batch`). The trial in the middle is the run's
-own, integrated accurately; it and the corners tell how far the batch is off.
+All trials are integrated at once by the batched model (`rigid.simulate_batch`). The trial in the middle, or the one
+nearest to it that can stand, is the run's own, integrated accurately; it and the corners tell how far the batch is off.
 """
 
 from __future__ import annotations
@@ -9,14 +9,17 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rigid.batch import BatchTrajectory, simulate_batch
+from rigid.dynamics import System
 from rigid.planar import PAPER_STEP, longest_step, simulate
+from rigid.statics import standing
 from rigid.trial import Trial
 
 from .runfolder import RunFolder, write_series
@@ -38,6 +41,10 @@ COLUMNS = {
     "transition_angle_hop": "rad",
 }
 """Of each trial, by the names of a tumble's quantities."""
+GAPS = ("trajectory_angle", "max_speed", "max_angular_velocity")
+"""What is compared with the accurate integrator."""
+WHEEL_SAMPLES = 128
+"""Moments of a trial among which the one at which its wheel is at its limit is sought, over and over more closely."""
 SUFFIXES = {"1": "", "9.80665 m/s2": "_g"}
 
 Array = NDArray[np.float64]
@@ -49,14 +56,21 @@ class _Point:
 
     values: tuple[float, ...]
     trial: Trial
+    """As planned: its torque does not yet end where the wheel is at its limit."""
+    max_wheel_speed: float
+    """[rad/s]."""
 
 
-def middle_of_sweep(settings: TumbleSettings) -> TumbleSettings:
-    """The settings of the trial in the middle; `settings` themselves without a sweep."""
+def middle_of_sweep(settings: TumbleSettings, *, model_file: Path | None = None) -> TumbleSettings:
+    """The settings of the trial in the middle that can stand, or nearest to it; `settings` themselves without a sweep.
+
+    `model_file` stands in for ``settings.model``, where that was copied. Raises ValueError where no trial can stand.
+    """
     ranges = parse_sweep(settings.sweep)
     if not ranges:
         return settings
-    return _at(settings, ranges, tuple(each.values[(len(each.values) - 1) // 2] for each in ranges))
+    points = _plan(settings, model_file=model_file)
+    return _at(settings, ranges, points[_shown(ranges, points)].values)
 
 
 def check_sweep(settings: TumbleSettings) -> None:
@@ -73,12 +87,11 @@ def run_sweep(settings: TumbleSettings, folder: RunFolder, *, model_file: Path |
 
     `model_file` stands in for ``settings.model``, where that was copied.
     """
-    from rigid.batch import simulate_batch
-
     ranges, points = parse_sweep(settings.sweep), _plan(settings, model_file=model_file)
     corners = _corners(ranges)
     time_step = min(PAPER_STEP, *(0.999 * longest_step(points[place].trial) for place in corners))
-    batch = simulate_batch([point.trial for point in points], duration=settings.duration, time_step=time_step)
+    batch = _batch(points, duration=settings.duration, time_step=time_step)
+    shown = _shown(ranges, points)
     found: dict[str, Array] = {
         "trajectory_angle": batch.trajectory_angle,
         "max_speed": batch.max_speed,
@@ -92,7 +105,7 @@ def run_sweep(settings: TumbleSettings, folder: RunFolder, *, model_file: Path |
     }
     write_series(folder.path / SWEEP_FILE, keys | {_column(name, COLUMNS[name]): found[name] for name in found})
     fallen = int((~batch.stands).sum())
-    gaps = _gaps(settings.duration, points, found, [*corners, _middle(ranges)])
+    gaps = _gaps(settings.duration, points, found, [*corners, shown])
     return {
         "sweep": {
             "file": SWEEP_FILE,
@@ -104,7 +117,7 @@ def run_sweep(settings: TumbleSettings, folder: RunFolder, *, model_file: Path |
             "cannot_stand": fallen,
             "time_step": time_step,
             "gaps": gaps,
-            "sentences": _sentences(settings, ranges, points, fallen, gaps),
+            "sentences": _sentences(settings, ranges, points, shown, fallen, gaps),
         },
         "tables": [_table(ranges, points, found)],
     }
@@ -123,10 +136,37 @@ def _plan(settings: TumbleSettings, *, model_file: Path | None = None) -> list[_
         except ValueError as error:
             where = ", ".join(f"{each.key} = {value:g}" for each, value in zip(ranges, values, strict=True))
             raise ValueError(f"sweep: at {where}: {_plain(error)}") from None
-        limit = plan.max_wheel_speed
-        trial, _ = torque_within_limit(plan.trial, max_wheel_speed=limit, duration=settings.duration)
-        points.append(_Point(values, trial))
+        points.append(_Point(values, plan.trial, plan.max_wheel_speed))
     return points
+
+
+def _batch(points: Sequence[_Point], *, duration: float, time_step: float) -> BatchTrajectory:
+    """All trials by the batched model, a motor's torque ended where its wheel comes to its limit.
+
+    The wheel of a motor only gains speed, so that the limit says nothing of those that end below it; of the others the
+    moment is sought by the batch too, until it is known within a step, between two of which the gain is even.
+    """
+    trials = [point.trial for point in points]
+    batch = simulate_batch(trials, duration=duration, time_step=time_step)
+    limit = np.array([point.max_wheel_speed for point in points])
+    beyond = np.flatnonzero(batch.final["wheel_speed"] > limit)
+    if not len(beyond) or trials[0].actuator != "motor":
+        return batch
+    limit = limit[beyond, None]
+    low, high = np.zeros(len(beyond)), np.full(len(beyond), duration)
+    while True:
+        times = np.clip(np.linspace(low, high, WHEEL_SAMPLES, axis=1), 0.0, duration)
+        fast = simulate_batch([trials[k] for k in beyond], duration=duration, time_step=time_step, times=times)
+        speed, rows = fast.channel("wheel_speed"), np.arange(len(beyond))
+        after = np.clip(np.argmax(speed > limit, axis=1), 1, None)
+        low, high = times[rows, after - 1], times[rows, after]
+        if np.max(high - low) <= time_step:
+            break
+    slow, quick = speed[rows, after - 1], speed[rows, after]
+    ends = low + (high - low) * np.clip((limit[:, 0] - slow) / (quick - slow), 0.0, 1.0)
+    for k, end in zip(beyond, ends, strict=True):
+        trials[k] = replace(trials[k], torque_until=float(end))
+    return simulate_batch(trials, duration=duration, time_step=time_step)
 
 
 def _plain(error: ValueError) -> str:
@@ -139,10 +179,10 @@ def _plain(error: ValueError) -> str:
 
 def _at(settings: TumbleSettings, ranges: Sequence[SweepRange], values: Sequence[float]) -> TumbleSettings:
     """The settings of one trial."""
-    changed: dict[str, Any] = settings.model_dump() | {"sweep": ()}
+    changed: dict[str, Any] = settings.model_dump(exclude_unset=True) | {"sweep": ()}  # what was not given stays so
     for each, value in zip(ranges, values, strict=True):
         if each.is_effect:
-            changed["effects"] = (*changed["effects"], f"{each.key}={value!r}")
+            changed["effects"] = (*changed.get("effects", ()), f"{each.key}={value!r}")
         else:
             changed[each.key] = value
     return TumbleSettings(**changed)
@@ -160,23 +200,58 @@ def _middle(ranges: Sequence[SweepRange]) -> int:
     return int(np.ravel_multi_index([(count - 1) // 2 for count in counts], counts))
 
 
+def _shown(ranges: Sequence[SweepRange], points: Sequence[_Point]) -> int:
+    """The number of the trial that can stand in the middle, or, in steps of the ranges, nearest to it."""
+    counts = [len(each.values) for each in ranges]
+    steps = np.stack(np.unravel_index(np.arange(len(points)), counts), axis=1)
+    far = np.sum((steps - steps[_middle(ranges)]) ** 2, axis=1)
+    why: ValueError | None = None
+    for place in np.argsort(far, kind="stable"):
+        try:
+            standing(System(points[place].trial))
+        except ValueError as error:
+            why = why or error
+        else:
+            return int(place)
+    raise ValueError(f"sweep: none of its {len(points)} trials can stand; in the middle {why}")
+
+
 # What it says ---------------------------------------------------------------------------------------------------------
 
 
 def _gaps(duration: float, points: Sequence[_Point], found: dict[str, Array], places: Sequence[int]) -> dict[str, Any]:
-    """Largest differences from the accurate integrator over the trials `places`; None where either has no number."""
-    most: dict[str, float] = dict.fromkeys(("trajectory_angle", "max_speed", "max_angular_velocity"), 0.0)
-    checked = 0
+    """Largest differences from the accurate integrator over the trials `places` that stand by both.
+
+    `angles` counts those of them with a trajectory angle by both.
+    `stand_by_one_only` and `away_by_one_only` count those that stand, or get 10 mm away, by one of the two alone.
+    """
+    most: dict[str, float] = dict.fromkeys(GAPS, 0.0)
+    checked = angles = standing_apart = away_apart = 0
     for place in dict.fromkeys(places):
-        if math.isnan(found["max_speed"][place]):
+        point, stands = points[place], not math.isnan(found["max_speed"][place])
+        try:
+            standing(System(point.trial))
+        except ValueError:
+            standing_apart += stands
             continue
-        run = simulate(points[place].trial, duration=duration, sample_interval=min(1e-2, duration))
+        if not stands:
+            standing_apart += 1
+            continue
+        trial, _ = torque_within_limit(point.trial, max_wheel_speed=point.max_wheel_speed, duration=duration)
+        run = simulate(trial, duration=duration, sample_interval=min(1e-2, duration))
         checked += 1
-        for name in most:
+        away_apart += (run.trajectory_angle is None) != math.isnan(found["trajectory_angle"][place])
+        for name in GAPS:
             accurate, ours = getattr(run, name), float(found[name][place])
             if accurate is not None and not math.isnan(ours):
                 most[name] = max(most[name], abs(accurate - ours))
-    return {"checked": checked} | most
+                angles += name == "trajectory_angle"
+    return {
+        "checked": checked,
+        "angles": angles,
+        "stand_by_one_only": standing_apart,
+        "away_by_one_only": away_apart,
+    } | most
 
 
 def _column(name: str, unit: str) -> str:
@@ -205,17 +280,26 @@ def _table(ranges: Sequence[SweepRange], points: Sequence[_Point], found: dict[s
 
 
 def _sentences(
-    settings: TumbleSettings, ranges: Sequence[SweepRange], points: Sequence[_Point], fallen: int, gaps: dict[str, Any]
+    settings: TumbleSettings,
+    ranges: Sequence[SweepRange],
+    points: Sequence[_Point],
+    shown: int,
+    fallen: int,
+    gaps: dict[str, Any],
 ) -> list[str]:
-    middle = points[_middle(ranges)].values
-    where = ", ".join(f"{each.key} = {value:g}" for each, value in zip(ranges, middle, strict=True))
-    said = [f"All but the table is of the trial in the middle, {where}; all {len(points)} trials are in {SWEEP_FILE}."]
+    where = ", ".join(f"{each.key} = {value:g}" for each, value in zip(ranges, points[shown].values, strict=True))
+    which = "in the middle" if shown == _middle(ranges) else "nearest the middle that can stand"
+    said = [f"All but the table is of the trial {which}, {where}; all {len(points)} trials are in {SWEEP_FILE}."]
     if gaps["checked"]:
-        angle = math.degrees(gaps["trajectory_angle"])
+        angle = f"{math.degrees(gaps['trajectory_angle']):.2g} degrees in the trajectory angle and "
         said.append(
-            f"The batched model is off the accurate one by at most {angle:.2g} degrees in the trajectory angle and "
+            f"The batched model is off the accurate one by at most {angle if gaps['angles'] else ''}"
             f"{gaps['max_speed']:.2g} m/s in the largest speed, at {gaps['checked']} trials (corners and middle)."
         )
+    for key, one, more in (("stand_by_one_only", "stands", "stand"), ("away_by_one_only", "gets", "get")):
+        if gaps[key]:
+            what = (one if gaps[key] == 1 else more) + (" 10 mm away" if key == "away_by_one_only" else "")
+            said.append(f"{gaps[key]} of the corners and the middle {what} by one of the two models only.")
     if any(each.key == "mu_s" for each in ranges) and settings.mu_d is None and not _sweeps(ranges, "mu_d"):
         said.append("mu_d is half of mu_s throughout.")
     if fallen:

@@ -105,13 +105,12 @@ def _choices(settings: TumbleSettings, surface: str, model: TumbleModel | None) 
     found = {"surface": surface} if settings.surface is None and model is None else {}
     units = {"duration": " s", "sample_interval": " s"}
     names = ["platform", "ground", "actuator", "duration", "method", "sample_interval"]
-    fields = type(settings).model_fields
     if settings.gravity is None:
         names.append("rig_reading")
         if settings.rig is None:
             found["rig"] = f"{DEFAULT_RIG:g}"
     for name in names:
-        if getattr(settings, name) == fields[name].default:
+        if name not in settings.model_fields_set:
             found[name] = f"{getattr(settings, name)}{units.get(name, '')}"
     if not settings.effects and model is None:
         found["effects"] = "none"

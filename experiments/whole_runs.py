@@ -37,6 +37,9 @@ def whole_run(
     def resume(folder: str | Path, *, progress: Progress | None = None) -> Result:
         """Carry out again, from its start, what `folder` was made for."""
         kept = RunFolder.open(Path(folder))
-        return carry_out(settings_class(**kept.settings), kept, progress or Progress())
+        fields = settings_class.model_fields
+        # run.toml has them all: those at their defaults are said to be so again.
+        given = {k: value for k, value in kept.settings.items() if k not in fields or value != fields[k].default}
+        return carry_out(settings_class(**given), kept, progress or Progress())
 
     return run, resume

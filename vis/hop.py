@@ -139,10 +139,19 @@ def _said(result: Mapping[str, Any], name: str, scale: float = 1.0, unit: str | 
     return f"{words}{shown}" if shown in ("°", "") else f"{words} {shown}"
 
 
+def _wheel_on_surface(result: Mapping[str, Any]) -> list[Tile]:
+    """The wheel speed for the same distance from ground that gives, where one was sought and found."""
+    if result["quantities"]["model_wheel_speed"]["value"] is None:
+        return []
+    said = _said(result, "model_wheel_speed")
+    return [Tile(f"Wheel speed, {result['surface']}", said, "for that distance, planar model", second=True)]
+
+
 def _page(result: Mapping[str, Any], drawn: list[Block]) -> Page:
     quantities, degrees = result["quantities"], math.degrees(1.0)
     tiles = [
         Tile("Wheel speed", _said(result, "wheel_speed"), quantities["wheel_speed"]["note"]),
+        *_wheel_on_surface(result),
         Tile(
             "Launch, rigid ground", _said(result, "launch_speed"), f"at {_said(result, 'launch_angle', degrees, '°')}"
         ),

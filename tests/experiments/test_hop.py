@@ -8,7 +8,11 @@ from dataclasses import replace
 import pytest
 
 from experiments.cli import BAD_INPUT, DONE, main
+from experiments.hop_numbers import plan_hop
 from experiments.hop_on_surface import flight_path, hop_on_surface
+from experiments.hop_settings import HopSettings
+from experiments.tumble_settings import TumbleSettings
+from experiments.tumble_trial import plan_tumble
 from rigid.hop import Launch, Tumbler, brake_launch, flight
 from rigid.planar import simulate
 from rigid.platform_files import PLATFORM_FOLDER
@@ -199,9 +203,41 @@ def test_what_is_said_reads_well(tmp_path, capsys):
     _, motor = hop(tmp_path, capsys, "--distance", "0.5", "--actuator", "motor", name="b")
     first = [result["departures"]["sentences"][0] for result in (brake, motor)]
     assert re.fullmatch(
-        r"Braking a wheel at \S+ rad/s \(\S+ rpm\) with 6 N m, the platform slides off at \S+ m/s, .*", first[0]
+        r"Braking a wheel at \S+ rad/s \(\S+ rpm\) with 6 N m, the platform slides off rigid ground at \S+ m/s, .*",
+        first[0],
     )
     assert re.fullmatch(r"A motor at \S+ N m, whose wheel comes to \S+ rad/s \(\S+ rpm\), the platform .*", first[1])
+
+
+def test_the_wheel_speeds_of_both_grounds_stand_side_by_side_and_say_which_is_which(tmp_path, capsys):
+    _, result = hop(tmp_path, capsys, "--distance", "5")
+    rigid, gives = (result["quantities"][name] for name in ("wheel_speed", "model_wheel_speed"))
+    assert list(result["quantities"])[:2] == ["wheel_speed", "model_wheel_speed"]
+    assert "rigid ground" in rigid["note"] and "on brick" in gives["note"]
+    assert result["title"].endswith(
+        f"by a wheel at {rigid['value']:.4g} rad/s from rigid ground, {gives['value']:.4g} from brick"
+    )
+    _, result = hop(tmp_path, capsys, "--surface", "sand", "--distance", "5", name="sand")
+    assert result["title"].endswith("from rigid ground, none from sand")
+
+
+def test_a_brake_beyond_the_platforms_own_is_said_as_a_tumble_says_it_and_not_of_another_wheel():
+    """Of another wheel's brake nothing is known, as nothing is of its motor."""
+    said = "torque = 8 N m is beyond the brake of hedgehog, 6 N m"
+    brake = {"torque": 8.0, "actuator": "brake", "wheel_speed_0": 100.0}
+    assert said in plan_hop(HopSettings(**brake)).warnings and said in plan_tumble(TumbleSettings(**brake)).warnings
+    brake["wheel_inertia"] = 2e-3
+    for plan in (plan_hop(HopSettings(**brake)), plan_tumble(TumbleSettings(**brake))):
+        assert not any("beyond" in warning for warning in plan.warnings)
+    slowed = plan_hop(HopSettings(torque=0.2, platform="mascot")).warnings
+    assert "torque = 0.2 N m is beyond the motor of mascot, 0.1 N m" in slowed
+
+
+def test_a_value_that_was_given_is_no_default_though_it_equals_it():
+    for settings, origin in ((HopSettings(), "default"), (HopSettings(gravity=1e-3, actuator="brake"), "given")):
+        plan = plan_hop(settings)
+        assert plan.numbers["gravity"].value == 1e-3 and plan.numbers["gravity"].origin == origin
+        assert ("actuator = brake (default)" in plan.sentences()) == (origin == "default")
 
 
 # Asked by what the flywheel does
@@ -279,8 +315,10 @@ def test_a_motor_is_asked_for_its_torque(tmp_path, capsys):
         (("--distance", "5000"), "distance = 5000 m is too far"),
         (("--distance", "30", "--body-radius", "20"), "escapes"),
         (("--actuator", "motor", "--distance", "1"), "0.22 N m"),
-        (("--torque", "7"), "at most 6 N m"),
-        (("--torque", "1", "--actuator", "motor"), "torque = 1 N m: the motor of Hedgehog gives at most 0.22 N m"),
+        (
+            ("--torque", "1", "--actuator", "motor"),
+            "torque = 1 N m is beyond the motor of platform = 'hedgehog': at most",
+        ),
         (("--torque", "0.2", "--actuator", "motor", "--distance", "2"), "leave one of the two out"),
         (("--wheel-speed-0", "100", "--distance", "2"), "leave one of the two out"),
         (("--wheel-speed-0", "100", "--actuator", "motor"), "torque in place of distance would do"),

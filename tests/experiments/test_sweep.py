@@ -13,6 +13,7 @@ from experiments.campaign.tables import FORMAT, PlatformTable, RigTable, TumbleS
 from experiments.cli import main
 from experiments.runfolder import read_series
 from experiments.sweep_ranges import parse_sweep
+from experiments.tumble_platform import torque_within_limit
 from experiments.tumble_settings import TumbleSettings
 from experiments.tumble_sweep import middle_of_sweep
 from experiments.tumble_trial import plan_tumble
@@ -106,6 +107,7 @@ def test_the_middle_of_a_sweep_is_a_tumble_of_its_own():
         (["--sweep", "torque=0.1:0.3:0.1"], ["at torque = 0.3", "at most 0.22 N m"]),
         (["--sweep", "mu_s=0.3:0.6:0.1", "--method", "paper"], ["method = 'paper'", "'located' would do"]),
         (["--sweep", "mu_s=0.3:0.6:0.1", "--campaign", "c"], ["campaign = 'c' with a sweep"]),
+        (["--sweep", "com-offset.x=2e-3:3e-3:5e-4"], ["sweep: none of its 3 trials can stand", "tips over"]),
     ],
 )
 def test_a_sweep_that_cannot_be_is_refused_before_there_is_a_folder(capsys, options, said):
@@ -120,7 +122,8 @@ def test_a_sweep_of_a_model_needs_nothing_but_its_folder_to_be_done_again():
     Path("a").mkdir()
     write_model("a/model.toml", a_model())
     settings = TumbleSettings(model="gone.toml", rig=0.0085, sweep=("mu_s=0.3:0.5:0.1",))
-    plan = plan_tumble(middle_of_sweep(settings), model_file=Path("a/model.toml"))
+    copy = Path("a/model.toml")
+    plan = plan_tumble(middle_of_sweep(settings, model_file=copy), model_file=copy)
     points = tumble_sweep._plan(settings, model_file=Path("a/model.toml"))
     assert [point.trial.mu_s for point in points] == [0.3, 0.4, 0.5]
     assert points[1].trial == plan.trial and plan.trial.mass == 5.2
@@ -133,3 +136,53 @@ def test_a_trial_of_a_sweep_that_cannot_stand_has_no_numbers_and_is_counted():
     rows = read_series(Path("a/sweep.csv"))
     assert np.isnan(rows["max_speed_m_s"]).tolist() == [True, False, False, False, True]
     assert json.loads(Path("a/result.json").read_text())["sweep"]["cannot_stand"] == 2
+
+
+def test_where_the_middle_cannot_stand_the_runs_own_trial_is_the_nearest_that_can(capsys):
+    """0 to 3 mm off the shaft: 1.5 mm, in the middle, tips over, and 1 mm stands."""
+    tokens = ["tumble", "--sweep", "com-offset.x=0:3e-3:5e-4", "--duration", "0.1", "--quiet", "--out", "a"]
+    assert main(tokens) == 0
+    result = json.loads(Path("a/result.json").read_text())
+    (effect,) = result["effects"]
+    assert effect["parameters"]["x"] == 1e-3 and result["sweep"]["cannot_stand"] == 4
+    assert "of the trial nearest the middle that can stand, com-offset.x = 0.001" in " ".join(
+        result["departures"]["sentences"]
+    )
+
+
+def test_wheels_that_come_to_their_limit_are_sought_by_the_batch_and_tumble_as_one_by_one(monkeypatch):
+    """145 rad/s are never reached at 0.06 N m, and at 0.22 N m only after a hop; one by one, three are integrated."""
+    asked = []
+
+    def counted(trial, **given):
+        asked.append(trial.torque)
+        return torque_within_limit(trial, **given)
+
+    monkeypatch.setattr(tumble_sweep, "torque_within_limit", counted)
+    tokens = ["tumble", "--sweep", "torque=0.06:0.22:0.04", "--max-wheel-speed", "145", "--duration", "1.8", "--quiet"]
+    assert main([*tokens, "--out", "a"]) == 0
+    rows, result = read_series(Path("a/sweep.csv")), json.loads(Path("a/result.json").read_text())
+    assert len(rows["torque_N_m"]) == 5 and len(asked) == result["sweep"]["gaps"]["checked"] == 3
+    ended = []
+    for place, torque in enumerate(rows["torque_N_m"]):
+        plan = plan_tumble(TumbleSettings(torque=float(torque), max_wheel_speed=145.0))
+        trial, end = torque_within_limit(plan.trial, max_wheel_speed=145.0, duration=1.8)
+        ended.append(end)
+        assert rows["max_speed_m_s"][place] == pytest.approx(simulate(trial, duration=1.8).max_speed, abs=5e-4)
+    assert ended[0] is None and None not in ended[1:]
+    assert ended[-1] > 145 / (0.22 / 1.2e-3) + 0.3  # in a hop the wheel gains nothing
+    assert result["sweep"]["gaps"]["max_speed"] < 5e-4
+
+
+def test_a_trial_that_stands_or_gets_away_by_one_model_only_is_counted_and_told():
+    """The batch's numbers put in by hand; within 0.8 s the accurate centre gets 10 mm away at 0.12 N m, not at 0.02."""
+    settings = TumbleSettings(sweep=("torque=0.02:0.22:0.1",), duration=0.8)
+    points, ranges = tumble_sweep._plan(settings), parse_sweep(settings.sweep)
+    found = {name: np.array([0.1, np.nan, np.nan]) for name in tumble_sweep.GAPS}
+    found["max_speed"][2] = 0.1
+    gaps = tumble_sweep._gaps(0.8, points, found, [0, 1, 2])
+    assert (gaps["checked"], gaps["angles"]) == (2, 0)
+    assert (gaps["stand_by_one_only"], gaps["away_by_one_only"]) == (1, 2)
+    said = " ".join(tumble_sweep._sentences(settings, ranges, points, 1, 0, gaps))
+    assert "1 of the corners and the middle stands by one of the two models only" in said
+    assert "2 of the corners and the middle get 10 mm away by one" in said and "degrees" not in said

@@ -215,6 +215,13 @@ def test_a_strong_brake_slides_off_at_the_angle_of_the_closed_form(options, rati
     assert value_of("a", "transition_angle_slip") == pytest.approx(0.0, abs=1e-6)
 
 
+def test_a_choice_that_was_given_is_no_default_though_it_equals_it():
+    assert "actuator = motor (default)" in plan_tumble(TumbleSettings()).sentences()
+    said = plan_tumble(TumbleSettings(actuator="motor", duration=3.0)).sentences()
+    assert not any(line.startswith(("actuator", "duration")) for line in said)
+    assert "method = located (default)" in said
+
+
 def test_a_brake_beyond_the_platforms_own_is_said():
     plan = plan_tumble(TumbleSettings(torque=600.0, actuator="brake", wheel_speed_0=300.0))
     assert any("beyond the brake" in warning for warning in plan.warnings)
