@@ -95,7 +95,8 @@ class Bed:
             gravity: downwards [m/s2], or a vector.
             young: Young's modulus of the (softened) grains [Pa]; the material's own when None.
             max_overlap: bound on overlap over diameter; the time step is chosen for it.
-            time_step: [s]; an eighth of the contact time when None.
+            time_step: [s]; at most ``dem.timestep.longest_step``. When None an eighth of the contact time, or for
+                strongly damped grains the longest that is stable where that is shorter.
             floor: whether there is a floor at z = 0; a Facing where grains touch it otherwise than one another.
             tensile: whether the damping may pull at the end of a contact (as LIGGGHTS does by default).
             precision, arch, threads: see ``dem.runtime.start``.

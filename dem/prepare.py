@@ -91,7 +91,8 @@ def prepare_bed(
             (``dem.timestep.choose_young``).
         max_overlap: bound on overlap over diameter; also ends a later run that goes past it. While the bed is being
             made the bound is 5 % if that is more: grains that land do so harder than they are ever pressed.
-        time_step: [s]; an eighth of the contact time when None.
+        time_step: [s]; at most ``dem.timestep.longest_step``. When None an eighth of the contact time, or for strongly
+            damped grains the longest that is stable where that is shorter.
         floor: how grains touch the floor; as one another when None.
         precision: "float64" or "float32". arch: "cpu" or "cuda". threads: all when None.
         cache: whether to look in the cache, and to leave the bed there.
