@@ -8,9 +8,10 @@ from .master import Master
 from .penetration import Drive, Drop, Run, SetDown, drive, drop, overdamped_below, set_down
 from .planar_body import PlanarBody
 from .trajectory import Penetration
-from .tumbling import CoupledTumble
+from .tumbling import MOST_REVERSAL, CoupledTumble
 
 __all__ = [
+    "MOST_REVERSAL",
     "BedFooting",
     "BedGround",
     "CoupledTumble",

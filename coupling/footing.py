@@ -121,6 +121,14 @@ class LawFooting:
         """As the law's ground has it [s]."""
         return self.grounds[0].time_step
 
+    def place(self, pose: Pose) -> None:
+        """A body at rest at `pose` is put on it: how deep each row is from the first, so that its springs count."""
+        still = Twist(np.zeros(3), np.zeros(3))
+        ends = pose.position + self.tips @ matrices(pose, still, self.time_step)[0].T
+        self._depths = -ends[:, 2]
+        for row in np.flatnonzero(self._depths > 0):  # a law with a memory keeps it as its deepest
+            self.grounds[row].step(ends[row], still.velocity, self.time_step)
+
     def step(self, pose: Pose, twist: Twist, dt: float) -> FootReaction:
         """See `Footing.step`: each tip goes along its chord, and its law is exact over that path."""
         first, middle, last = matrices(pose, twist, dt)

@@ -57,6 +57,8 @@ class PlanarBody:
         self.torque_work = 0.0
         """Work of the torque since it was let go [J]."""
         self.max_wheel_speed = math.inf
+        self.wheel_at_limit: float | None = None
+        """When a motor's wheel came to `max_wheel_speed` [s], counted as `time`; None if it has not."""
         self.modes: NDArray[np.int8] = np.full(trial.spike_count, _OPEN, dtype=np.int8)
         """Of each row under a Coulomb bound: 0 sticks, +1 and -1 slides towards +x and -x, 9 does not touch."""
         self.touching = False
@@ -122,6 +124,8 @@ class PlanarBody:
         self.rates = (self.inertia * self.rates + dt * push) / (self.inertia + dt * self._drag)
         self.acceleration = push / self.inertia
         self.torque_work += self._torque * held[2] * dt
+        if self.wheel_at_limit is None and self._until_limit <= dt:
+            self.wheel_at_limit = self.time + max(0.0, self._until_limit)
         sign = 1.0 if self.trial.actuator == "motor" else -1.0
         self.wheel_speed += sign * self._torque * dt / self.trial.wheel_inertia
         self.modes, self.touching = self._next_modes, self._next_touching
@@ -150,6 +154,7 @@ class PlanarBody:
                 [
                     self.place, self.rates, self.acceleration, self.inertia, self._drag,
                     [self.wheel_speed, self.time, self.torque_work, self.touching, self.held_by_hand],
+                    [math.nan if self.wheel_at_limit is None else self.wheel_at_limit],
                 ]
             ),
             "modes": self.modes.copy(),
@@ -162,11 +167,14 @@ class PlanarBody:
         self.place, self.rates, self.acceleration, self.inertia, self._drag = (part.copy() for part in parts)
         self.wheel_speed, self.time, self.torque_work = (float(number) for number in numbers[15:18])
         self.touching, self.held_by_hand = bool(numbers[18]), bool(numbers[19])
+        self.wheel_at_limit = None if math.isnan(numbers[20]) else float(numbers[20])
         self.modes = np.array(state["modes"], dtype=np.int8)
 
     acceleration: Vector = np.zeros(3)
     """Of x, z and theta, the mean of the last step."""
     _torque = 0.0
+    _until_limit = math.inf
+    """From the start of this step until a motor's wheel is at its limit, if the torque lasts [s]."""
     _next_touching = False
     _next_modes: NDArray[np.int8] = np.zeros(0, dtype=np.int8)
 
@@ -177,11 +185,15 @@ class PlanarBody:
     def _mean_torque(self, dt: float) -> float:
         """Mean torque of the next step [N m]: it acts while anything touches, until its end or the wheel's."""
         trial = self.trial
+        self._until_limit = math.inf
         if self.held_by_hand or not self.touching or trial.torque == 0:
             return 0.0
         left = trial.torque_until - self.time
         room = self.wheel_speed if trial.actuator == "brake" else self.max_wheel_speed - self.wheel_speed
-        left = min(left, room * trial.wheel_inertia / trial.torque)
+        until = room * trial.wheel_inertia / trial.torque
+        if trial.actuator == "motor" and until <= left:
+            self._until_limit = until
+        left = min(left, until)
         return trial.torque * min(1.0, max(0.0, left / dt))
 
 

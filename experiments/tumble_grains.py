@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from coupling import BedFooting, CoupledTumble, platform_members
+from coupling import MOST_REVERSAL, BedFooting, CoupledTumble, platform_members
 from dem import Bed
 from dem.materials import MATERIALS, Material
 from dem.prepare import fingerprint
@@ -343,13 +343,14 @@ def _conclude(
 
     write_trajectory(folder.path, run)
     write_series(folder.path / "series" / "spring-damper.csv", trajectory_columns(forecast.trajectory))
-    result = result_of(settings, plan, series, None)
+    result = result_of(settings, plan, series, run.body.wheel_at_limit)
     bed, books = run.footing.bed, run.master.books  # type: ignore[attr-defined]
     result["title"] = f"A tumble on a bed of {plan.surface}: {result['title'].partition(': ')[2]}"
     result["code"] = fingerprint()
-    result["quantities"] |= _own_quantities(run, series)
+    result["quantities"] |= _own_quantities(run)
     result["quantities"]["energy_residual"]["note"] += (
-        "; what the bed holds is measured, what it dissipates is by difference"
+        "; dissipated is what the bed took less what it is measured to hold more, so what the bed holds cancels: this "
+        "checks platform and coupling, not the grains (dissipation_reversal sees energy that they make)"
     )
     result["grains"] = {
         "mode": "rig: grains at 1 g" if plan.trial.counterweight > 0 else "flight: grains at the platform's gravity",
@@ -368,6 +369,12 @@ def _conclude(
             for t, state, theta in forecast.trajectory.transitions
         ],
     }  # fmt: skip
+    made = run.dissipation_reversal
+    if made > MOST_REVERSAL:
+        result["warnings"].append(
+            f"dissipation_reversal = {made:.2g} is above {MOST_REVERSAL:g}: the bed made energy, so this run's "
+            f"numbers are not to be trusted; fewer substeps tell whether it is the coupling"
+        )
     across = settings.spike_diameter / settings.grain
     if across < 10:
         result["warnings"].append(
@@ -378,19 +385,24 @@ def _conclude(
     return result
 
 
-def _own_quantities(run: CoupledTumble, series: Trajectory) -> dict[str, dict[str, Any]]:
+def _own_quantities(run: CoupledTumble) -> dict[str, dict[str, Any]]:
     """What a tumble on grains has beyond the planar model's numbers."""
     sinkage = run.feet[:, 3]
     start = sinkage[0][[0, -1]]
-    most = max(float(np.abs(series.torque_work).max()), run.trial.weight * run.trial.spike_length)
     gap = run.columns["given"] - run.columns["taken"]
     found = {
         "sinkage_start": (float(start.mean()), "m", "of the two rows it stands on, mean, when the torque begins"),
         "sinkage_largest": (float(sinkage.max()), "m", "of any row"),
         "largest_row_force": (float(run.feet[:, 0].max()), "N", "upwards, mean of one macro step"),
         "exchange_residual": (
-            float(np.abs(gap - gap[0]).max()) / most, "1",
+            float(np.abs(gap - gap[0]).max()) / run.energy_scale, "1",
             "work that the body gives less what the bed takes, largest, over max(|work of the torque|, W l)",
+        ),
+        "dissipation_reversal": (
+            run.dissipation_reversal, "1",
+            "largest fall of the dissipated energy below what it was before, over max(|work of the torque|, W l), at "
+            f"the times of series/bed.csv: energy that the bed made beyond what it dissipated; a warning above "
+            f"{MOST_REVERSAL:g}",
         ),
         "momentum_residual": (
             float(run.samples["momentum_error"].max()), "N s",

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from coupling import BedFooting, CoupledTumble, LeftTheBedError, Master, PlanarBody, platform_members
+from coupling import MOST_REVERSAL, BedFooting, CoupledTumble, LeftTheBedError, Master, PlanarBody, platform_members
 from coupling.bed_footing import ball_member
 from coupling.poses import Pose, Twist
 from dem import Bed, Material
@@ -87,6 +87,8 @@ def test_the_books_close_with_the_grains_energies_in_them():
     own, grains, given, taken, along, up = np.array(rows).T
     scale = 0.5 * MASS * 0.1**2
     assert taken.max() > 0.3 * scale
+    left = (taken - taken[0]) - (grains - grains[0])
+    assert abs(left[-1]) < MOST_REVERSAL * scale  # what that bound is read off
     assert np.ptp(own + grains) < 0.02 * scale  # the grains' own integrator, at 15 steps a contact
     assert np.ptp(own + taken) < 0.02 * scale and np.ptp(grains - taken) < 0.03 * scale
     # Within a contact the two are off by what half a step of it does; after it they are the same.
@@ -186,6 +188,7 @@ def test_a_tumble_on_grains_closes_its_books_and_goes_on_from_a_checkpoint_to_th
     assert found.theta[-1] > 0.05 and np.ptp(found.theta) > 0.05 and set(run.states) & {"pivot", "slip"}
     assert found.energy_residual < 0.01
     assert (np.diff(found.dissipated).min()) > -0.01 * found.torque_work[-1]
+    assert run.dissipation_reversal < 0.01 * MOST_REVERSAL
     assert run.samples["momentum_error"].max() < 1e-12
     bed.restore(kept)
     other = small(bed, torque=torque, duration=0.1)

@@ -79,6 +79,15 @@ def test_iterated_steps_leave_nothing_between_what_is_given_and_what_is_taken():
     assert run.master.books.repeats > 0
 
 
+@pytest.mark.parametrize("name", list(CASES))
+def test_a_sound_ground_never_gives_dissipated_energy_back(name):
+    """From rest: the springs that it stands on, W^2 / 4 K of two rows, are in the books from the start."""
+    trial = Trial(**RIG, **CASES[name])
+    run, found = coupled(trial, 1e-3, 0.5)
+    assert found.stored_energy[0] == pytest.approx(trial.weight**2 / (4 * trial.stiffness), rel=1e-9)
+    assert run.dissipated[-1] > 0 and run.dissipation_reversal < 1e-6
+
+
 def test_at_rest_it_stays_at_rest_for_ten_seconds():
     trial = Trial(**RIG, **(CASES["brick"] | {"torque": 0.0}))
     run, found = coupled(trial, 1e-2, 10.0)

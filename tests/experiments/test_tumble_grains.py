@@ -2,12 +2,15 @@
 
 import math
 from contextlib import contextmanager
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from coupling import CoupledTumble, LawFooting
 from experiments import tumble, tumble_grains
 from experiments.runfolder import RunFolder
+from experiments.softening import Softening
 from experiments.tumble_settings import TumbleSettings
 
 SMALL = {
@@ -69,6 +72,27 @@ def small_bed(*_):
     bed.advance(1000)
     bed.surface = float((bed.grains()["position"][:, 2] + 0.5 * d).max())
     return bed
+
+
+@pytest.mark.parametrize("false", [False, True])
+def test_the_result_dates_the_wheels_limit_and_warns_of_energy_that_the_ground_made(false, tmp_path):
+    """On the spring-damper in place of grains, which for once holds 1 W more and more than it took."""
+    settings = on_bed(torque=0.125, max_wheel_speed=1.0, duration=0.1, bed_size=(0.4, 0.06, 0.046))
+    plan = tumble_grains._plan(settings)
+    footing = LawFooting.of_trial(plan.trial)
+    footing.bed = SimpleNamespace(grain_count=1, packing_fraction=0.6, surface=0.0, time_step=1e-4, max_overlap=0.0)
+    run = CoupledTumble(plan.trial, footing, duration=0.1, max_wheel_speed=plan.max_wheel_speed)
+    if false:
+        footing.energies = lambda: {"springs": run.body.time}
+    result = tumble_grains._conclude(
+        settings, plan, run, run.run(), tumble_grains._forecast(settings, plan), Softening(1e7, 1.0, 1.0, 7e10),
+        SimpleNamespace(path=tmp_path),
+    )  # fmt: skip
+    assert result["wheel_at_limit"] == pytest.approx(plan.trial.wheel_inertia / 0.125, rel=1e-9)
+    assert any("max_wheel_speed = 1 rad/s, at 0.0096 s" in said for said in result["warnings"])
+    reversal = result["quantities"]["dissipation_reversal"]["value"]
+    assert any("dissipation_reversal" in said for said in result["warnings"]) == false == (reversal > 1e-3)
+    assert "cancels" in result["quantities"]["energy_residual"]["note"]
 
 
 @pytest.mark.slow
