@@ -25,6 +25,7 @@ from rigid.trial import Trial
 from .campaign import Campaign, EffectTable, Recording, TumbleCampaign, TumbleModel, write_campaign, write_model
 from .campaign.tables import (
     FORMAT,
+    HEDGEHOG_ROWS,
     ImuSensor,
     PlatformTable,
     PoseSensor,
@@ -288,7 +289,12 @@ def _tables(settings: CampaignSettings, plan: TumblePlan, values: dict[str, Any]
         "format": FORMAT,
         "kind": "tumble",
         "name": settings.name,
-        "platform": PlatformTable(mass=values["mass"], inertia=values["inertia"], spike_length=trial.spike_length),
+        "platform": PlatformTable(
+            mass=values["mass"],
+            inertia=values["inertia"],
+            spike_length=trial.spike_length,
+            spike_count=None if trial.spike_count == HEDGEHOG_ROWS else trial.spike_count,
+        ),
         "wheel": WheelTable(inertia=trial.wheel_inertia),
         "rig": rig,
         "surface": TumbleSurface(

@@ -82,7 +82,7 @@ def plan_tumble(settings: TumbleSettings, *, model_file: Path | None = None) -> 
     assert platform.spike_count is not None  # or it would have been refused
     trial = Trial(
         **values,
-        spike_count=platform.spike_count,
+        spike_count=platform.spike_count if model is None else model.platform.rows,
         actuator=settings.actuator,
         ground=ground,
         effects=(*_model_effects(model, source), *_given_effects(settings.effects)),
@@ -94,7 +94,8 @@ def plan_tumble(settings: TumbleSettings, *, model_file: Path | None = None) -> 
             unit = next(parameter.unit for parameter in ground.law.parameters if parameter.name == name)
             origin = "given" if name in ground.parameters else f"default of {ground.name}, of one spike"
             numbers[name] = Number(value, unit, origin)
-    numbers["spike_count"] = Number(trial.spike_count, "1", f"rows of platform {platform.name}")
+    rows = f"rows of platform {platform.name}" if model is None else "model"
+    numbers["spike_count"] = Number(trial.spike_count, "1", rows)
     warnings += _rig_warnings(trial)
     choices = _choices(settings, surface, model)
     return TumblePlan(trial, numbers, surface, choices, tuple(warnings), numbers.value("max_wheel_speed"))
@@ -238,6 +239,7 @@ def model_trial(tables: Any, trial: Any, *, effects: tuple[Effect, ...] = ()) ->
         mass=tables.platform.mass,
         inertia=tables.platform.inertia,
         spike_length=tables.platform.spike_length,
+        spike_count=tables.platform.rows,
         stiffness=tables.surface.stiffness,
         damping=tables.surface.damping,
         mu_s=tables.surface.mu_s,

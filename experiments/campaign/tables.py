@@ -65,12 +65,22 @@ class EffectTable(Table):
 # Tumbles --------------------------------------------------------------------------------------------------------------
 
 
+HEDGEHOG_ROWS = 8
+"""Rows of spikes that a platform has of which nothing is said."""
+
+
 class PlatformTable(Table):
     """``[platform]`` of tumbles."""
 
     mass: Positive = Field(description="kg")
     inertia: Positive = Field(description="kg m2, about the axis of rotation, without the wheel's own")
     spike_length: Positive = Field(description="m, centre to tip")
+    spike_count: int | None = Field(None, ge=3, description="rows of spikes at equal angles; 8 if not given")
+
+    @property
+    def rows(self) -> int:
+        """Rows of spikes; what a campaign does not say is the Hedgehog's."""
+        return HEDGEHOG_ROWS if self.spike_count is None else self.spike_count
 
 
 class WheelTable(Table):
@@ -207,7 +217,7 @@ class _Tables(Table):
 
 class _TumbleTables(_Tables):
     kind: Literal["tumble"] = Field(description="'tumble' or 'penetration'")
-    platform: PlatformTable = Field(description="table with mass, inertia and spike_length")
+    platform: PlatformTable = Field(description="table with mass, inertia, spike_length and, if not 8, spike_count")
     wheel: WheelTable = Field(description="table with inertia")
     rig: RigTable | None = Field(None, description="table with counterweight, wire_length and gravity")
     surface: TumbleSurface = Field(description="table with kind, stiffness, damping, mu_s and mu_d")

@@ -30,7 +30,6 @@ SHARED = ("mass", "inertia", "stiffness", "damping", "mu_s", "mu_d")
 """Numbers that all trials share and that may be uncertain."""
 OWN_TO_A_TRIAL = ("gravity", "bed", "friction")
 """Factors that every trial has of its own."""
-_SPIKES = 8
 _MOST_BYTES = 1.5e8
 """Of the sampled motion held at a time."""
 
@@ -167,7 +166,7 @@ class Forward:
         from rigid.trajectory import LAUNCH_DISTANCE
 
         ensure(threads=self.threads)
-        stand, advance = batch_kernel(terms, "spring-damper", _SPIKES)
+        stand, advance = batch_kernel(terms, "spring-damper", self.data.tables.platform.rows)
         total = sum(last - first for _, first, last in lanes)
         width = max(self._grids[trial].size for trial, _, _ in lanes)
         numbers = np.empty((total, 16 + len(parameter_names(terms))))
@@ -210,12 +209,12 @@ class Forward:
         sets: slice,
     ) -> None:  # fmt: skip
         """Rows of numbers as `rigid.batch_kernel` wants them (FIXED_NUMBERS, the ground's law, the effects')."""
-        length = self.data.tables.platform.spike_length
+        length, rows = self.data.tables.platform.spike_length, self.data.tables.platform.rows
         gravity = columns["gravity"][sets, index] * trial.gravity_sim
         mass = columns["mass"][sets]
         bed, rubs = columns["bed"][sets, index], columns["friction"][sets, index]
         fixed = (
-            mass, columns["inertia"][sets], length, length * math.cos(math.pi / _SPIKES), trial.counterweight,
+            mass, columns["inertia"][sets], length, length * math.cos(math.pi / rows), trial.counterweight,
             gravity if trial.local_gravity is None else trial.local_gravity, (mass + trial.counterweight) * gravity,
             trial.torque, trial.torque_until, self.data.tables.wheel.inertia,
             1.0 if trial.actuator == "motor" else -1.0, trial.wheel_speed_0,

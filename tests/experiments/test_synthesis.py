@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,11 @@ import pytest
 from experiments.campaign import read_campaign, read_model
 from experiments.campaign_settings import CampaignSettings
 from experiments.cli import main
+from experiments.diagnose.tumble_problem import make_problem
 from experiments.synthesis import record, run
 from experiments.tumble import resume as resume_tumble
-from experiments.tumble_trial import model_trial
+from experiments.tumble_settings import TumbleSettings
+from experiments.tumble_trial import model_trial, plan_tumble
 from rigid.sensors import SensorSet
 from rigid.trial import Effect
 
@@ -113,6 +116,24 @@ def test_free_of_the_rig_there_is_no_counterweight(tmp_path):
     rest = campaign.recording("001", "imu")
     still = rest.time < 0
     assert rest["ay_m_s2"][still].mean() == pytest.approx(0.05, abs=0.03)  # g_sim, not the earth's
+
+
+def test_a_platform_of_other_rows_is_told_so_and_explained_by_the_model(tmp_path):
+    """A cube has four rows: a model of the Hedgehog's eight tips it at another torque, and cannot follow its tumble."""
+    run(quick(platform="cubli", motor_torques=(0.01,), exact=True, surface="brick"), tmp_path / "a")
+    stated, truth = read_campaign(tmp_path / "a" / "campaign"), read_model(tmp_path / "a" / "truth.toml")
+    assert stated.tables.platform.spike_count == truth.platform.spike_count == 4
+    assert model_trial(stated.tables, stated.tables.trial[0]).spike_count == 4
+    assert "spike_count = 4 (model)" in " ".join(
+        f"{name} = {number.value:g} ({number.origin})"
+        for name, number in plan_tumble(TumbleSettings(model=str(tmp_path / "a" / "truth.toml"))).numbers.items()
+    )
+    total, count = make_problem(stated).chi_square({}, (), "001")
+    assert total / count == pytest.approx(1.0, abs=0.25)
+    eight = stated.tables.platform.model_copy(update={"spike_count": None})
+    other = replace(stated, tables=stated.tables.model_copy(update={"platform": eight}))
+    total, count = make_problem(other).chi_square({}, (), "001")
+    assert total / count > 5
 
 
 def test_the_command_line_makes_one_with_a_report(reported, tmp_path, capsys):
