@@ -15,8 +15,8 @@ with N = W + M y'', y'' = l (s omega' - c omega^2). The platform leaves where N 
 hold, and faster where they slide.
 
 Angles. What the ground gives in a sudden launch is one impulse within its cone of friction, so a launch whose tips do
-not slide cannot be flatter than pi/2 - atan(mu_s). This friction-cone condition is ours; it is not compared with the hop
-angles of Koenig, Pavone, Castillo-Rogez and Nesnas (ICRA 2014), whose formulas we have not read (docs/platform.md).
+not slide cannot be flatter than pi/2 - atan(mu_s). This friction-cone condition is ours; it is not compared with the
+hop angles of Koenig, Pavone, Castillo-Rogez and Nesnas (ICRA 2014), whose formulas we have not read (docs/platform.md).
 
 Flight. On a flat ground a parabola, on a round body of radius R and surface gravity g an ellipse about its centre.
 """
