@@ -11,6 +11,10 @@ from rigid import EFFECTS
 
 def test_all_terms_means_all():
     assert set(planar.AMPLITUDES) == {id for id, term in EFFECTS.items() if not term.sensor}
+    forms = {"inertial-drag": "power", "depth-hardening": "bend"}  # which change the form of a force, not its size
+    for id, name in forms.items():
+        low, high = planar.AMPLITUDES[id][name]
+        assert low < high
 
 
 def test_bench_planar_writes_speed_and_agreement(tmp_path, monkeypatch):
