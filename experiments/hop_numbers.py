@@ -19,6 +19,7 @@ from .settled import (
     Settled,
     brake_words,
     check_actuation,
+    check_body,
     defaults_said,
     settle_limits,
     settle_platform,
@@ -91,7 +92,7 @@ def plan_hop(settings: HopSettings) -> HopPlan:
         motor_torque=numbers.value("max_motor_torque"),
     )  # fmt: skip
     _check(settings, numbers)
-    warnings += check_actuation(settings.actuator, of_platform, numbers)
+    warnings += check_actuation(settings.actuator, of_platform, numbers) + check_body(numbers, of_platform)
     tumbler = Tumbler(
         mass=numbers.value("mass"), inertia=numbers.value("inertia"), spike_length=numbers.value("spike_length"),
         lean=of_platform.lean, gravity=settings.gravity, mu_s=numbers.value("mu_s"), mu_d=numbers.value("mu_d"),

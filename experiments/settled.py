@@ -19,12 +19,16 @@ __all__ = [
     "Settled",
     "brake_words",
     "check_actuation",
+    "check_body",
     "check_wheel_speed",
     "defaults_said",
     "settle_limits",
     "settle_platform",
     "settle_surface",
 ]
+
+OTHER_BODY = 0.2
+"""A mass, inertia or spike length that is off the platform's by more than this share is another body's."""
 
 UNITS = {
     "mass": "kg",
@@ -104,6 +108,22 @@ def settle_platform(numbers: Settled, platform: PlatformNumbers, *, model: Any =
         numbers.settle(name, getattr(platform, name), origin, in_model=in_model)
     in_model = model.wheel.inertia if model is not None else None
     numbers.settle("wheel_inertia", platform.wheel_inertia, origin, in_model=in_model)
+
+
+def check_body(numbers: Mapping[str, Number], platform: PlatformNumbers) -> list[str]:
+    """What has to be said where a body of another size is given, and its other numbers are still the platform's."""
+    given = {name for name in ("mass", "inertia", "spike_length") if numbers[name].origin == "given"}
+    far = any(abs(numbers[name].value / getattr(platform, name) - 1) > OTHER_BODY for name in given)
+    if not far or platform.spike_count is None:
+        return []
+    kept = [
+        f"{name} = {_said(name, numbers[name])}" for name in ("mass", "inertia", "spike_length") if name not in given
+    ]
+    kept = [*kept, f"{platform.spike_count} rows of spikes"]
+    return [
+        f"{', '.join(sorted(given))} given; {', '.join(kept)} stay those of platform {platform.name}: a body of "
+        f"another shape wants a platform file (docs/platform.md)"
+    ]
 
 
 def settle_limits(numbers: Settled, platform: PlatformNumbers, *, in_model: bool = False) -> None:

@@ -20,6 +20,7 @@ from .settled import (
     Number,
     Settled,
     check_actuation,
+    check_body,
     defaults_said,
     settle_limits,
     settle_platform,
@@ -78,6 +79,7 @@ def plan_tumble(settings: TumbleSettings, *, model_file: Path | None = None) -> 
     values: dict[str, Any] = {name: number.value for name, number in numbers.items()}
     settle_limits(numbers, platform, in_model=model is not None)
     warnings += check_actuation(settings.actuator, platform, numbers)
+    warnings += check_body(numbers, platform) if model is None else []
     ground = _ground(settings)
     assert platform.spike_count is not None  # or it would have been refused
     trial = Trial(

@@ -491,3 +491,16 @@ def test_a_platform_with_a_weaker_motor_is_given_its_own_torque():
     plan = plan_tumble(TumbleSettings(platform="cubli", gravity=1.0))
     assert (plan.trial.torque, plan.numbers["torque"].origin) == (0.1, "motor of cubli")
     assert plan.trial.spike_count == 4
+
+
+@pytest.mark.parametrize(
+    ("given", "kept"),
+    [
+        ({"mass": 8.0, "spike_length": 0.25}, "mass, spike_length given; inertia = 0.06 kg m2, 8 rows of spikes stay"),
+        ({"mass": 5.5}, None),
+        ({}, None),
+    ],
+)
+def test_numbers_of_another_body_on_a_platform_that_ships_are_said(given, kept):
+    found = [text for text in plan_tumble(TumbleSettings(**given)).warnings if "rows of spikes" in text]
+    assert found == [] if kept is None else kept in found[0]
