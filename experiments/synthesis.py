@@ -358,7 +358,7 @@ def _table(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     shown = [
         [
             row["id"],
-            f"{row['gravity_sim']:.4g}",
+            f"{row['true_gravity_sim']:.4g}",
             f"{row['torque']:g} {row['actuator']}",
             "-" if row["trajectory_angle"] is None else f"{math.degrees(row['trajectory_angle']):.1f}",
             f"{row['max_speed']:.3g}",

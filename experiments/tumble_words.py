@@ -21,11 +21,22 @@ def tumble_sentences(trajectory: Trajectory) -> list[str]:
     more = len(trajectory.transitions) - MOST
     rest = f" -> {more} more change{'s' if more > 1 else ''} of state (in result.json)" if more > 0 else ""
     said = [f"{' -> '.join(told)}{rest}."]
+    said += _does_not_tip(trajectory)
     if trajectory.max_speed > 0:
         when = trajectory.time_of_max_speed
         state = [name for time, name, _ in trajectory.transitions if time < when or time == 0][-1]
         said.append(f"Fastest at {when:.4g} s ({state}): {trajectory.max_speed:.4g} m/s.")
     return said
+
+
+def _does_not_tip(trajectory: Trajectory) -> list[str]:
+    """Whether it stayed on the rows it stood on: a pivot may be no more than a rocking."""
+    trial, most = trajectory.trial, float(abs(trajectory.theta).max())
+    if most >= math.pi / trial.spike_count or any(state == "hop" for _, state, _ in trajectory.transitions):
+        return []
+    below = trial.actuator == "motor" and not trial.effects and trial.torque < trial.tipping_torque
+    why = f": {trial.torque:g} N m is below the {trial.tipping_torque:.4g} N m that tip it" if below else ""
+    return [f"It does not tip in this time, it turns by {_degrees(most)} at most{why}."]
 
 
 def _degrees(theta: float) -> str:

@@ -20,6 +20,7 @@ from experiments.surfaces import find_surface, surface_names
 from experiments.tumble_platform import torque_within_limit
 from experiments.tumble_settings import TumbleSettings
 from experiments.tumble_trial import plan_tumble
+from experiments.tumble_words import tumble_sentences
 from rigid.planar import simulate
 from rigid.rig import STANDARD_GRAVITY
 
@@ -504,3 +505,11 @@ def test_a_platform_with_a_weaker_motor_is_given_its_own_torque():
 def test_numbers_of_another_body_on_a_platform_that_ships_are_said(given, kept):
     found = [text for text in plan_tumble(TumbleSettings(**given)).warnings if "rows of spikes" in text]
     assert found == [] if kept is None else kept in found[0]
+
+
+def test_it_is_said_when_a_torque_does_not_tip_the_platform():
+    trial = plan_tumble(TumbleSettings(torque=0.03, surface="brick")).trial
+    said = " ".join(tumble_sentences(simulate(trial, duration=1.0)))
+    assert "does not tip" in said and f"0.03 N m is below the {trial.tipping_torque:.4g} N m" in said
+    tipped = plan_tumble(TumbleSettings(torque=0.22, surface="brick")).trial
+    assert "does not tip" not in " ".join(tumble_sentences(simulate(tipped, duration=2.0)))
