@@ -85,9 +85,7 @@ def effects() -> str:
     """The list of effects, in Markdown."""
     lines = ["| effect | what it is | acts on | parameters | source | limits |", "|---|---|---|---|---|---|"]
     for term in EFFECTS.values():
-        own = "; ".join(
-            f"`{p.name}` [{p.unit}] = {p.default:g}: {p.summary}" for p in term.parameters
-        )
+        own = "; ".join(f"`{p.name}` [{p.unit}] = {p.default:g}: {p.summary}" for p in term.parameters)
         lines.append(f"| `{term.id}` | {term.summary} | {term.acts} | {own} | {term.source} | {term.limits} |")
     return "\n".join(line.replace("|u|", "abs(u)") for line in lines)
 
