@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ from hedgebed import __version__
 
 from .amended import read_law
 from .amended_runs import keep_model, kept_law, run_beside, run_without_bed
+from .bed_progress import BedProgress
 from .findings import Findings, bed_entry, bed_quantities, compare_with, read_reference
 from .kept_runs import read_run, write_run
 from .memory import memory_there
@@ -31,7 +31,7 @@ from .reporting import write_report
 from .run_campaign import SpikeSensors, campaign_of, check_target, place_campaign
 from .runfolder import RunFolder
 from .settings import PenetrateSettings, expected_grain_count
-from .softening import Softening, bearing_gradient, drop_depth, soften
+from .softening import Softening, bearing_gradient, drop_depth, soften_material
 from .stopping import held_back
 from .units import Unit, deepest, expected_time, make_run, make_spike, plan_units, shown_units
 
@@ -204,13 +204,11 @@ def choose_softness(settings: PenetrateSettings) -> Softening:
         drop_depth(speed, settings.mass, settings.weight, stiffness)
         for speed in (*settings.drop_speeds, *settings.other_drop_speeds)
     ]
-    chosen = soften(
+    return soften_material(
+        material,
+        young=settings.young,
         max_overlap=settings.max_overlap,
         grain=settings.grain,
-        density=material.density,
-        poisson=material.poisson,
-        friction=material.friction,
-        real_young=material.young,
         gravity=settings.gravity,
         bed_height=settings.bed_size[2],
         depth=min(deepest(settings), max(settings.depth, *drops) if drops else settings.depth),
@@ -224,11 +222,7 @@ def choose_softness(settings: PenetrateSettings) -> Softening:
         ),
         fall=RAIN * settings.bed_size[2],
         pressure=settings.weight / area,
-        surface_energy=material.surface_energy,
     )
-    if settings.young is None:
-        return chosen
-    return Softening(settings.young, chosen.pressure, chosen.speed, material.young)
 
 
 # What the bed's room offers; tests put a stand-in here ---------------------------------------------------------------
@@ -284,29 +278,8 @@ def prepare_bed(settings: PenetrateSettings, seed: int, young: float, progress: 
             arch=settings.arch,
             threads=settings.threads,
             cache=settings.cache,
-            progress=_OneStage(progress, f"bed of seed {seed}", asked_to_stop),
+            progress=BedProgress(progress, f"bed of seed {seed}", asked_to_stop),
         )
-
-
-class _OneStage:
-    """Shows the stages of a preparation as one stage of the experiment; stops it where it can be gone on with."""
-
-    PARTS = ("rain", "settle", "tap")
-
-    def __init__(self, progress: Progress, name: str, asked_to_stop: Callable[[], bool]) -> None:
-        self.progress, self.asked_to_stop, self.part = progress, asked_to_stop, 0
-        progress.stage(name, total=2.0)
-
-    def stage(self, name: str, total: float | None = None) -> None:
-        """The next part begins."""
-        self.part = min(self.PARTS.index(name), 1)
-        self.progress.update(self.part)
-
-    def update(self, done: float) -> None:
-        """`done` of this part, 0 to 1. Raises KeyboardInterrupt if asked to stop."""
-        self.progress.update(self.part + min(1.0, max(0.0, done)))
-        if self.asked_to_stop():
-            raise KeyboardInterrupt
 
 
 # Carrying it out ------------------------------------------------------------------------------------------------------

@@ -27,10 +27,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from dem.timestep import CHAIN
 
-__all__ = ["Softening", "bearing_gradient", "drop_depth", "soften"]
+__all__ = ["Softening", "bearing_gradient", "drop_depth", "soften", "soften_material"]
 
 RAIN_OVERLAP = 0.05
 """Overlap that a grain may have with the floor at the end of its fall, while the bed is made [of a diameter]."""
@@ -105,3 +106,19 @@ def soften(
         for squared, bound in ((speed**2, max_overlap), (2 * gravity * fall, max(max_overlap, RAIN_OVERLAP)))
     )
     return Softening(min(real_young, max(static, struck, landed)), highest, speed, real_young)
+
+
+def soften_material(material: Any, *, young: float | None, **case: float) -> Softening:
+    """`soften` for the grains of a material; where `young` [Pa] is set, that, with what presses and how fast.
+
+    `case` are the options of `soften` that are not the material's. Raises ValueError as `soften` does.
+    """
+    chosen = soften(
+        density=material.density,
+        poisson=material.poisson,
+        friction=material.friction,
+        real_young=material.young,
+        surface_energy=material.surface_energy,
+        **case,
+    )
+    return chosen if young is None else Softening(young, chosen.pressure, chosen.speed, material.young)

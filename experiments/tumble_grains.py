@@ -23,11 +23,12 @@ from rigid.rig import STANDARD_GRAVITY
 from rigid.trajectory import Trajectory
 from rigid.trial import Trial
 
+from .bed_progress import BedProgress
 from .progress import Progress
 from .reporting import write_report
 from .runfolder import RunFolder, write_series
 from .settings import expected_grain_count
-from .softening import Softening, soften
+from .softening import Softening, soften_material
 from .stopping import held_back
 from .surfaces import find_surface
 from .tumble_bed_settings import TumbleBedSettings
@@ -187,14 +188,11 @@ def _check_bed(settings: TumbleSettings, forecast: Forecast) -> None:
 
 def _softness(settings: TumbleSettings, plan: TumblePlan, forecast: Forecast) -> Softening:
     """The modulus of the grains for this run (`experiments.softening`), or the one that is set."""
-    material = _material(plan)
-    chosen = soften(
+    return soften_material(
+        _material(plan),
+        young=settings.young,
         max_overlap=settings.max_overlap,
         grain=settings.grain,
-        density=material.density,
-        poisson=material.poisson,
-        friction=material.friction,
-        real_young=material.young,
         gravity=_grain_gravity(plan.trial),
         bed_height=settings.bed_size[2],
         depth=1.5 * forecast.deepest,
@@ -202,7 +200,6 @@ def _softness(settings: TumbleSettings, plan: TumblePlan, forecast: Forecast) ->
         pressure=plan.trial.weight / COPIES / (0.25 * math.pi * settings.spike_diameter**2),
         fall=RAIN * settings.bed_size[2],
     )
-    return chosen if settings.young is None else Softening(settings.young, chosen.pressure, chosen.speed, chosen.real)
 
 
 def _prepare(settings: TumbleSettings, plan: TumblePlan, softening: Softening, progress: Progress) -> Bed:
@@ -218,29 +215,8 @@ def _prepare(settings: TumbleSettings, plan: TumblePlan, softening: Softening, p
             max_overlap=settings.max_overlap,
             threads=settings.threads,
             cache=settings.cache,
-            progress=_BedProgress(progress, asked_to_stop),
+            progress=BedProgress(progress, "bed", asked_to_stop),
         )
-
-
-class _BedProgress:
-    """Shows the stages of a preparation as one, and stops it where it can be gone on with."""
-
-    PARTS = ("rain", "settle", "tap")
-
-    def __init__(self, progress: Progress, asked_to_stop: Any) -> None:
-        self.progress, self.asked_to_stop, self.part = progress, asked_to_stop, 0
-        progress.stage("bed", total=2.0)
-
-    def stage(self, name: str, total: float | None = None) -> None:
-        """The next part begins."""
-        self.part = min(self.PARTS.index(name), 1) if name in self.PARTS else self.part
-        self.progress.update(self.part)
-
-    def update(self, done: float) -> None:
-        """`done` of this part, 0 to 1. Raises KeyboardInterrupt if asked to stop."""
-        self.progress.update(self.part + min(1.0, max(0.0, done)))
-        if self.asked_to_stop():
-            raise KeyboardInterrupt
 
 
 def _members(settings: TumbleSettings, plan: TumblePlan) -> list[Any]:
