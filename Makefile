@@ -8,7 +8,7 @@ WHAT ?= bed
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help run test slow validate bench doctor format clean distclean
+.PHONY: help run test slow cover validate bench doctor format clean distclean
 
 help:  ## what there is
 	@grep -E '^[a-z]+:.*##' $(firstword $(MAKEFILE_LIST)) | sed -E 's/^([a-z]+):.*## */  make \1\t/' | expand -t 18
@@ -16,13 +16,16 @@ help:  ## what there is
 run: $(VENV)/.installed  ## the shipped case of `hedgebed penetrate` into a fresh folder under runs/ (ARGS="--option value ...")
 	$(BIN)/hedgebed penetrate $(ARGS)
 
-test: $(VENV)/.installed-test  ## ruff, mypy and the tests, with coverage
+test: $(VENV)/.installed-test  ## ruff, mypy and the tests
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest --cov --cov-report=term $(ARGS)
+	$(BIN)/python -m pytest $(ARGS)
 
 slow: $(VENV)/.installed-test  ## the tests that take longer: physics against closed forms, kill and resume
 	$(BIN)/python -m pytest -m slow $(ARGS)
+
+cover: $(VENV)/.installed-test  ## the tests of `make test`, counting the lines they reach: several times as long
+	$(BIN)/python -m pytest --cov --cov-report=term $(ARGS)
 
 validate: $(VENV)/.installed  ## the bed against closed forms, published figures and other codes; writes docs/validation.md
 	$(BIN)/hedgebed validate $(ARGS)
