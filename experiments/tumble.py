@@ -8,7 +8,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -46,6 +46,11 @@ def check(settings: TumbleSettings) -> None:
     check_tumble_campaign(settings)
     if settings.method == "paper":
         _check_paper_step(plan)
+    if settings.method == "coupled":
+        from .tumble_coupled import check_coupled
+
+        check_coupled(settings, plan)
+        return
     _integrate(settings, plan, duration=1e-3)
 
 
@@ -107,11 +112,12 @@ def _quantity(value: float | None, unit: str, note: str) -> dict[str, Any]:
 
 def _integrate(settings: TumbleSettings, plan: TumblePlan, *, duration: float) -> tuple[Trajectory, float | None]:
     """The trajectory, and when the wheel comes to its limit [s], where it does."""
+    method: Literal["located", "paper"] = "paper" if settings.method == "paper" else "located"
     trial, full = torque_within_limit(
-        plan.trial, max_wheel_speed=plan.max_wheel_speed, duration=duration, method=settings.method
+        plan.trial, max_wheel_speed=plan.max_wheel_speed, duration=duration, method=method
     )
     interval = min(settings.sample_interval, duration)
-    return simulate(trial, duration=duration, method=settings.method, sample_interval=interval), full
+    return simulate(trial, duration=duration, method=method, sample_interval=interval), full
 
 
 def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
@@ -127,11 +133,16 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
         for warning in plan.warnings:
             progress.message(f"warning: {warning}")
         progress.stage("tumble", total=1.0)
-        trajectory, full = _integrate(settings, plan, duration=settings.duration)
+        more: dict[str, Any] = {}
+        if settings.method == "coupled":
+            trajectory, full, more = _step_through_master(settings, plan, folder, progress)
+        else:
+            trajectory, full = _integrate(settings, plan, duration=settings.duration)
         progress.update(1.0)
         write_series(folder.path / "trajectory.csv", trajectory_columns(trajectory))
         folder.write_series("motion", motion_columns(trajectory))
         result = result_of(settings, plan, trajectory, full)
+        result["quantities"] |= more
         if settings.sweep:
             progress.message("the numbers above are those of one trial of the sweep, in its middle or nearest to it")
             progress.stage("sweep")
@@ -142,6 +153,18 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
         progress.stage("report", total=1.0)
         write_report(folder.path, progress)
     return result
+
+
+def _step_through_master(
+    settings: TumbleSettings, plan: TumblePlan, folder: RunFolder, progress: Progress
+) -> tuple[Trajectory, float | None, dict[str, Any]]:
+    """The trial by the master, its series/feet.csv written; what `_integrate` gives, and more quantities."""
+    from .tumble_coupled import coupled_quantities, coupled_tumble, feet_columns
+
+    run = coupled_tumble(settings, plan, duration=settings.duration)
+    trajectory = run.run(on_step=lambda run: progress.update(run.fraction))
+    folder.write_series("feet", feet_columns(run))
+    return trajectory, run.body.wheel_at_limit, coupled_quantities(run)
 
 
 def _add_sweep(result: dict[str, Any], settings: TumbleSettings, folder: RunFolder, model: Path | None) -> None:

@@ -8,10 +8,13 @@ from pydantic import Field
 
 from .strict import StrictSettings
 
-__all__ = ["TumbleBedSettings"]
+__all__ = ["OF_THE_MASTER", "TumbleBedSettings"]
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+OF_THE_MASTER = ("substeps", "extrapolation", "iterations")
+"""Those that ``method = "coupled"`` takes on the spring-damper too."""
 
 
 class TumbleBedSettings(StrictSettings):
@@ -33,9 +36,15 @@ class TumbleBedSettings(StrictSettings):
     spike_friction: NotNegative = Field(0.5, description="On a bed: friction of spike and grains [1].")
     spike_restitution: float = Field(0.5, ge=0.01, le=1, description="On a bed: restitution of spike and grains [1].")
     lowering_speed: Positive = Field(0.05, description="On a bed: speed at which the platform is set down [m/s].")
-    substeps: int = Field(10, ge=1, le=200, description="On a bed: steps of the grains in one of the platform [1].")
-    extrapolation: int = Field(0, ge=0, le=2, description="On a bed: order of the guess at the next force [1].")
-    iterations: int = Field(1, ge=1, le=50, description="On a bed: how often a step is computed at most; 1: explicit.")
+    substeps: int = Field(
+        10, ge=1, le=200, description="On a bed, or coupled: steps of the ground in one of the platform [1]."
+    )
+    extrapolation: int = Field(
+        0, ge=0, le=2, description="On a bed, or coupled: order of the guess at the next force [1]."
+    )
+    iterations: int = Field(
+        1, ge=1, le=50, description="On a bed, or coupled: how often a step is computed at most; 1: explicit."
+    )
     frame_count: int = Field(30, ge=0, le=1000, description="On a bed: frames for ParaView; 0: none.")
     checkpoint_interval: Positive = Field(60.0, description="On a bed: time between checkpoints [s].")
     threads: int | None = Field(None, ge=1, description="On a bed: threads; all cores if not given.")

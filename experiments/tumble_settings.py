@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from .platform_settings import NotNegative, PlatformSettings, Positive
 from .sweep_ranges import parse_sweep
-from .tumble_bed_settings import TumbleBedSettings
+from .tumble_bed_settings import OF_THE_MASTER, TumbleBedSettings
 
 __all__ = ["TrialSettings", "TumbleSettings"]
 
@@ -113,8 +113,10 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
     )
 
     # How it is computed
-    method: Literal["located", "paper"] = Field(
-        "located", description="Integrator: transitions located in time, or the paper's fixed step of 1 ms."
+    method: Literal["located", "paper", "coupled"] = Field(
+        "located",
+        description="Integrator: transitions located in time, the paper's fixed step of 1 ms, or the coupling's "
+        "master, which steps the spring-damper as it does grains.",
     )
     sample_interval: float = Field(1e-3, gt=0, le=1e-3, description="Time between rows of trajectory.csv [s].")
 
@@ -166,12 +168,17 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
 
     def _on_grains(self) -> str | None:
         given = self.bed_settings_given()
+        if self.method == "coupled" and self.ground != "bed":
+            given = [name for name in given if name not in OF_THE_MASTER]
+            for key in ("effects", "sweep", "campaign"):
+                if getattr(self, key):
+                    return f"{key} is given with method = 'coupled': the master steps the base model alone, without it"
         if self.ground != "bed":
             return f"{given[0]} = {getattr(self, given[0])} belongs to ground = 'bed'" if given else None
         for key in ("effects", "sweep", "campaign", "model"):
             if getattr(self, key):
                 return f"{key} is given with ground = 'bed': on grains there is the base model alone, without it"
-        if self.method != "located":
+        if self.method == "paper":
             return f"method = {self.method!r} is of the planar model: on grains there is the coupling's own step"
         return None
 

@@ -513,3 +513,41 @@ def test_it_is_said_when_a_torque_does_not_tip_the_platform():
     assert "does not tip" in said and f"0.03 N m is below the {trial.tipping_torque:.4g} N m" in said
     tipped = plan_tumble(TumbleSettings(torque=0.22, surface="brick")).trial
     assert "does not tip" not in " ".join(tumble_sentences(simulate(tipped, duration=2.0)))
+
+
+def test_the_spring_damper_through_the_master_is_the_planar_model_to_its_tolerance():
+    """`--method coupled` beside the default on the same trial: the batch's tolerance (docs/planar.md), and its feet."""
+    given = ("tumble", "--surface", "sand", "--rig", "0.0085", "--torque", "0.22", "--duration", "0.9", "--quiet")
+    assert main([*given, "--out", "planar"]) == 0
+    assert main([*given, "--method", "coupled", "--out", "coupled"]) == 0
+    one, other = (read_series(Path(name) / "trajectory.csv") for name in ("planar", "coupled"))
+    most = {"x_m": 5e-5, "y_m": 2e-4, "theta_rad": 1.5e-3, "vx_m_s": 1e-4, "vy_m_s": 4e-4, "omega_rad_s": 3e-3}
+    rows = np.flatnonzero(np.abs(other["t_s"] * 1e3 - np.round(other["t_s"] * 1e3)) < 1e-6)  # both have a row then
+    at = np.round(other["t_s"][rows] * 1e3).astype(int)
+    assert len(rows) > 400
+    for channel, tolerance in most.items():
+        assert np.abs(other[channel][rows] - one[channel][at]).max() < tolerance, channel
+    feet, found = read_series(Path("coupled/series/feet.csv")), result_of("coupled")
+    assert found["method"] == "coupled" and found["quantities"]["exchange_residual"]["value"] < 1e-5
+    weight, stiffness = (found["trial"][name]["value"] for name in ("weight", "stiffness"))
+    assert feet["normal_0_N"][0] == pytest.approx(weight / 2, rel=1e-6)
+    assert value_of("coupled", "sinkage_start") == pytest.approx(weight / (2 * stiffness), rel=1e-6)
+    # Coupled or not, the ground's force is what accelerates the platform: (m + m_b) ay + W, mean of each step.
+    motion = read_series(Path("coupled/series/motion.csv"))
+    heavy = found["trial"]["mass"]["value"] + found["trial"]["counterweight"]["value"]
+    lifted = sum(feet[f"normal_{row}_N"] for row in range(8))
+    assert np.abs(lifted - heavy * motion["ay_m_s2"] - weight)[1:].max() < 1e-9 * weight
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (("--ground", "bekker"), "ground = 'bekker': the master takes the spring-damper"),
+        (("--effects", "pendulum.length=2.2"), "effects is given with method = 'coupled'"),
+        (("--substeps", "30"), "substeps = 30 makes a step of 1.2 ms.* 25 or less would do"),
+        (("--grain", "0.004"), "grain = 0.004 belongs to ground = 'bed'"),
+    ],
+)
+def test_what_the_master_cannot_step_is_refused_by_name(given, said, capsys):
+    assert main(["tumble", "--method", "coupled", *given]) == 2
+    assert re.search(said, capsys.readouterr().err.replace("\n", " "))
