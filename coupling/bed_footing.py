@@ -281,12 +281,25 @@ class BedFooting:
         """Of the grains, `copies` times [J] (`dem.energy.bed_energies`)."""
         from dem.energy import bed_energies
 
-        surfaces = {
+        found = bed_energies(self.bed, bodies=self._surfaces())
+        return {name: self.copies * value for name, value in found.items()}
+
+    def pushes(self) -> tuple[Vector, Vector]:
+        """Where grains touch the members now [m], and the normal springs' forces on them [N], shape [n, 3] both.
+
+        In the body's world (z from the surface); of one of the `copies`, without damping and friction.
+        """
+        from dem.energy import body_pushes
+
+        points, forces = body_pushes(self.bed, bodies=self._surfaces())
+        return points - self.origin, forces
+
+    def _surfaces(self) -> dict[int, Any]:
+        """Each DEM body's surface, as `dem.energy` wants it."""
+        return {
             body: partial(self._surface_of, self.members[index], pose)
             for body, index, pose in zip(self.bodies, self._used, self._posed(), strict=True)
         }
-        found = bed_energies(self.bed, bodies=surfaces)
-        return {name: self.copies * value for name, value in found.items()}
 
     def _posed(self) -> list[Pose]:
         """Where the bed has its bodies now."""

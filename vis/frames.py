@@ -3,6 +3,8 @@
     frames/driven-0.1-seed1.pvd               every part over time
     frames/driven-0.1-seed1_grains_0000.vtu   grain centres as vertices, with their fields
     frames/driven-0.1-seed1_spike_0000.vtu    a body as a triangle mesh in place
+    frames/tumble_row_forces_0000.vtu         points with vectors, for glyphs
+    frames/tumble_surface_0000.vti            a height map: warped by its `height`, it lies where the grains' tops are
 
 The default name, "frames", has no prefix: `frames/frames.pvd`, `frames/grains_0000.vtu`. Reals are float32, blocks are
 zlib-compressed, in base64. Every file is written beside its place and moved there, the PVD last, so a run that is
@@ -14,14 +16,14 @@ from __future__ import annotations
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["GRAIN_FIELDS", "Frame", "FrameWriter", "Frames", "frame_names", "read_frames"]
+__all__ = ["GRAIN_FIELDS", "Frame", "FrameWriter", "Frames", "HeightMap", "frame_names", "read_frames"]
 
 #: The fields of a grain that a frame keeps: name -> (components, meaning and unit).
 GRAIN_FIELDS: dict[str, tuple[int, str]] = {
@@ -34,7 +36,23 @@ GRAIN_FIELDS: dict[str, tuple[int, str]] = {
 }
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*\Z")
 Body = tuple[ArrayLike, ArrayLike]
+Cloud = tuple[ArrayLike, Mapping[str, ArrayLike]]
 _Part = tuple[str, NDArray[np.float32], dict[str, NDArray[Any]], NDArray[np.int64] | None]
+
+
+@dataclass(frozen=True)
+class HeightMap:
+    """Values on a level grid.
+
+    Attributes:
+        origin: x and y of the first point [m].
+        spacing: Between points along x and y [m].
+        fields: Name -> values, shape (points along y, points along x). `height` [m] is what a viewer warps by.
+    """
+
+    origin: tuple[float, float]
+    spacing: tuple[float, float]
+    fields: dict[str, NDArray[Any]]
 
 
 class FrameWriter:
@@ -89,6 +107,8 @@ class FrameWriter:
         bodies: Mapping[str, Body] | None = None,
         *,
         values: Mapping[str, float] | None = None,
+        clouds: Mapping[str, Cloud] | None = None,
+        maps: Mapping[str, HeightMap] | None = None,
     ) -> Path:
         """Write one frame.
 
@@ -99,6 +119,8 @@ class FrameWriter:
                 magnitude, shape (n,).
             bodies: Name -> (points [m], shape (n, 3), triangles, shape (m, 3)).
             values: Scalars of this frame, such as depth [m] and force [N].
+            clouds: Name -> (points [m], shape (n, 3), fields), a field of shape (n,) or (n, 3): what glyphs are of.
+            maps: Name -> height map.
 
         Returns:
             The PVD file.
@@ -117,14 +139,21 @@ class FrameWriter:
         index = len({entry.time for entry in before})
         parts: list[_Part] = [("grains", *_grain_arrays(grains), None)]
         for body, (points, triangles) in (bodies or {}).items():
-            if body == "grains" or not _NAME.match(body):
-                raise ValueError(f"a body is named {body!r}; letters, digits and . _ + - only, and not 'grains'")
             parts.append((body, *_body_arrays(body, points, triangles)))
+        for cloud, (points, fields) in (clouds or {}).items():
+            parts.append((cloud, *_cloud_arrays(cloud, points, fields), None))
+        for key in [*(bodies or {}), *(clouds or {}), *(maps or {})]:
+            if key == "grains" or not _NAME.match(key):
+                raise ValueError(f"a part is named {key!r}; letters, digits and . _ + - only, and not 'grains'")
         fresh = []
         for part, (name, positions, fields, faces) in enumerate(parts):
             file = f"{self._prefix}{name}_{index:04d}.vtu"
             _write_vtu(self.folder / file, positions, fields, faces, scalars)
             fresh.append(_Entry(time, part, name, file))
+        for name, grid in (maps or {}).items():
+            file = f"{self._prefix}{name}_{index:04d}.vti"
+            _write_vti(self.folder / file, name, grid, scalars)
+            fresh.append(_Entry(time, len(fresh), name, file))
         self._entries = before + fresh
         self._write_pvd()
         return self.path
@@ -157,12 +186,16 @@ class Frame:
         grains: `position` [m], shape (n, 3), and the fields of `GRAIN_FIELDS` that were written.
         bodies: Name -> (points [m], shape (n, 3), triangles, shape (m, 3)).
         values: Scalars of this frame (depth [m], force [N], ...).
+        clouds: Name -> (points [m], shape (n, 3), fields), what glyphs are drawn of.
+        maps: Name -> height map.
     """
 
     time: float
     grains: dict[str, NDArray[Any]]
     bodies: dict[str, tuple[NDArray[np.float64], NDArray[np.int64]]]
     values: dict[str, float]
+    clouds: dict[str, tuple[NDArray[np.float64], dict[str, NDArray[Any]]]] = field(default_factory=dict)
+    maps: dict[str, HeightMap] = field(default_factory=dict)
 
 
 class Frames(Sequence[Frame]):
@@ -192,15 +225,22 @@ class Frames(Sequence[Frame]):
         time = float(self.times[index])
         grains: dict[str, NDArray[Any]] = {"position": np.zeros((0, 3))}
         bodies, values = {}, {}
+        clouds: dict[str, tuple[NDArray[np.float64], dict[str, NDArray[Any]]]] = {}
+        maps: dict[str, HeightMap] = {}
         for entry in self._by_time[time]:
+            if entry.file.endswith(".vti"):
+                maps[entry.name] = _read_vti(self.folder / entry.file)
+                continue
             points, triangles, fields, scalars = _read_vtu(self.folder / entry.file)
             values.update(scalars)
             if entry.name == "grains":
                 grains = {"position": points, **fields}
-            else:
+            elif len(triangles):
                 bodies[entry.name] = (points, triangles)
+            else:
+                clouds[entry.name] = (points, fields)
         values.pop("TimeValue", None)
-        return Frame(time, grains, bodies, values)
+        return Frame(time, grains, bodies, values, clouds, maps)
 
 
 def read_frames(folder: str | Path, name: str = "frames") -> Frames:
@@ -267,6 +307,19 @@ def _body_arrays(
     return corners, {}, faces
 
 
+def _cloud_arrays(
+    cloud: str, points: ArrayLike, fields: Mapping[str, ArrayLike]
+) -> tuple[NDArray[np.float32], dict[str, NDArray[Any]]]:
+    at = _checked(cloud, np.asarray(points, dtype=float).reshape(-1, 3), (3,))
+    found: dict[str, NDArray[Any]] = {}
+    for key, given in fields.items():
+        array = _checked(f"{cloud} {key}", given, (1, 3)) if len(at) else np.asarray(given, dtype=np.float32)
+        if len(array) != len(at):
+            raise ValueError(f"{key!r} of {cloud!r} has {len(array)} rows for {len(at)} points")
+        found[key] = array
+    return at, found
+
+
 def _checked(name: str, given: ArrayLike, columns: tuple[int, ...]) -> NDArray[np.float32]:
     array = np.ascontiguousarray(given, dtype=np.float32)
     width = 1 if array.ndim == 1 else array.shape[1] if array.ndim == 2 else 0
@@ -296,12 +349,12 @@ def _write_vtu(
     vertices = vtkPoints()
     vertices.SetData(numpy_to_vtk(points, deep=True))
     grid.SetPoints(vertices)
-    array = vtkCellArray()
+    polygons = vtkCellArray()
     offsets = np.arange(len(cells) + 1, dtype=np.int32) * cells.shape[1]
-    array.SetData(numpy_to_vtk(offsets, deep=True), numpy_to_vtk(cells.astype(np.int32).ravel(), deep=True))
-    grid.SetCells(VTK_VERTEX if triangles is None else VTK_TRIANGLE, array)
-    for name, field in fields.items():
-        data = numpy_to_vtk(field, deep=True)
+    polygons.SetData(numpy_to_vtk(offsets, deep=True), numpy_to_vtk(cells.astype(np.int32).ravel(), deep=True))
+    grid.SetCells(VTK_VERTEX if triangles is None else VTK_TRIANGLE, polygons)
+    for name, array in fields.items():
+        data = numpy_to_vtk(array, deep=True)
         data.SetName(name)
         grid.GetPointData().AddArray(data)
     for name, value in values.items():
@@ -318,6 +371,57 @@ def _write_vtu(
     if not writer.Write():
         raise OSError(f"{temporary} could not be written")
     temporary.replace(path)
+
+
+def _write_vti(path: Path, name: str, grid: HeightMap, values: Mapping[str, float]) -> None:
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+    from vtkmodules.vtkCommonDataModel import vtkImageData
+    from vtkmodules.vtkIOXML import vtkXMLImageDataWriter
+
+    shapes = {np.shape(field) for field in grid.fields.values()}
+    if len(shapes) != 1 or len(next(iter(shapes))) != 2:
+        raise ValueError(f"the fields of {name!r} have shapes {sorted(shapes)}; they must share one, (ny, nx)")
+    rows, columns = next(iter(shapes))
+    image = vtkImageData()
+    image.SetDimensions(columns, rows, 1)
+    image.SetOrigin(*grid.origin, 0.0)
+    image.SetSpacing(*grid.spacing, 1.0)
+    for key, field_values in grid.fields.items():
+        data = numpy_to_vtk(np.ascontiguousarray(field_values, dtype=np.float32).ravel(), deep=True)
+        data.SetName(key)
+        image.GetPointData().AddArray(data)
+    for key, value in values.items():
+        data = numpy_to_vtk(np.array([value]), deep=True)
+        data.SetName(key)
+        image.GetFieldData().AddArray(data)
+    temporary = path.with_name(path.name + ".part")
+    writer = vtkXMLImageDataWriter()
+    writer.SetFileName(str(temporary))
+    writer.SetInputData(image)
+    writer.SetDataModeToBinary()
+    writer.SetCompressorTypeToZLib()
+    if not writer.Write():
+        raise OSError(f"{temporary} could not be written")
+    temporary.replace(path)
+
+
+def _read_vti(path: Path) -> HeightMap:
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOXML import vtkXMLImageDataReader
+
+    reader = vtkXMLImageDataReader()
+    if not path.exists() or not reader.CanReadFile(str(path)):
+        raise ValueError(f"{path} is {'no VTI file' if path.exists() else 'missing though its PVD lists it'}")
+    reader.SetFileName(str(path))
+    reader.Update()
+    image = reader.GetOutput()
+    columns, rows, _ = image.GetDimensions()
+    data = image.GetPointData()
+    fields = {
+        data.GetArrayName(i): vtk_to_numpy(data.GetArray(i)).reshape(rows, columns).copy()
+        for i in range(data.GetNumberOfArrays())
+    }
+    return HeightMap(image.GetOrigin()[:2], image.GetSpacing()[:2], fields)
 
 
 def _read_vtu(
