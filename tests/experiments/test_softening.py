@@ -25,7 +25,7 @@ def test_overlap_to_the_power_of_minus_three_halves():
 
 
 def test_stiff_grains_carry_more_on_a_chain_as_measured():
-    """1.4 times what was measured: 2.8 at 3.9 % of a diameter, five grains across the tip; 5.2 at 1.02 %, ten across."""
+    """1.4 times what was measured: 2.8 at 3.9 % of a diameter, five grains across the tip; 5.2 at 1.02 %, ten."""
     assert chain(0.05) == chain(0.1) == 4.0 >= 1.4 * 2.8
     assert chain(0.01) == chain(0.001) == 7.4 >= 1.4 * 5.2
     assert chain(math.sqrt(0.05 * 0.01)) == pytest.approx((4.0 + 7.4) / 2)
