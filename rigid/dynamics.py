@@ -133,7 +133,7 @@ class System:
             )
         self.crater = model.crater(self.p)
         self.has_memory = self._remembers()
-        self.sheds = self.has_memory and (ground.law.has_memory or model.has("crater"))
+        self.sheds = self.has_memory and (ground.law.has_memory or model.has("crater", "unload"))
         self.has_vertical, self.has_rotation = model.has("vertical_friction"), model.has("rotation_friction")
         s.inner_mode = 1.0
         self.inner = bool(model.has("inner_mass") and model.inner(self.p, s)[0] > 0)
@@ -304,7 +304,7 @@ class System:
 
     def _shed(self, depth: float, slip: float, elastic: float) -> float:
         """Work that the elastic force does not store, per depth, on new ground [N]: F - d(stored)/d(depth)."""
-        if not self.model.law.has_memory:
+        if not self.model.law.has_memory and not self.model.has("unload"):
             return self.crater * elastic
         e = 1e-3 * depth
 

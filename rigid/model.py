@@ -107,7 +107,7 @@ class Model:
     @property
     def has_memory(self) -> bool:
         """Whether the deepest depth of a spike matters."""
-        return self.law.has_memory or self.has("crater", "hold")
+        return self.law.has_memory or self.has("crater", "hold", "unload")
 
 
 def parameter_names(terms: Sequence[Term]) -> tuple[str, ...]:
@@ -181,6 +181,7 @@ def model_source(terms: Sequence[Term], law: SurfaceLaw) -> str:
     if law.has_memory:
         out += ["    stored = law_springback_energy(z, top, p.rebound, elastic)"]
         out += ["    elastic = elastic * law_springback(z, top, p.rebound)"]
+    out += [f"    elastic, stored = {call}" for call in _calls(every, "unload", "z, top, elastic, stored")]
     if _calls(every, "crater", ""):
         out += ["    stored = left * stored"]
     for call in _calls(every, "hold", "s, depth, held"):

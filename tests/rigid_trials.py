@@ -13,8 +13,12 @@ from rigid import Effect, Trial
 G = 9.80665
 MASS, INERTIA, LENGTH = 5.3, 0.06, 0.2
 
-# As in the benchmark, but that what moves the start may be larger.
-RANGES = AMPLITUDES | {"com-offset": {"x": (-4e-4, 4e-4), "y": (-1e-3, 1e-3)}, "slope": {"angle": (-0.03, 0.03)}}
+# As in the benchmark, but that what moves the start may be larger, and a crater's way back bent.
+RANGES = AMPLITUDES | {
+    "com-offset": {"x": (-4e-4, 4e-4), "y": (-1e-3, 1e-3)},
+    "slope": {"angle": (-0.03, 0.03)},
+    "plastic-sinkage": {"share": (0.05, 0.6), "bend": (0.0, 1.5)},
+}
 """Plausible sizes of every effect that acts on the motion."""
 
 

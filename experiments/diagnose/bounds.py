@@ -36,10 +36,11 @@ class Bound:
     @property
     def words(self) -> str:
         """As in: the mass went to ..."""
+        value = f"{self.parameter} {self.value:.4g}" + (f" {self.unit}" if self.unit != "1" else "")
         if self.sigmas is not None:
             end = ", the end of its range" if self.at_bound else ""
-            return f"{self.parameter} {self.value:.4g} {self.unit} ({self.sigmas:+.1f} sigma{end})"
-        return f"{self.parameter} {self.value:.4g} {self.unit} (the most or least that the library allows)"
+            return f"{value} ({self.sigmas:+.1f} sigma{end})"
+        return f"{value} (the most or least that the library allows)"
 
 
 def bounds_met(found: Fit) -> tuple[Bound, ...]:

@@ -147,11 +147,14 @@ def _add_plastic(add: _Add) -> None:
 
 def _add_adhesion(add: _Add) -> None:
     effect, reach = "adhesion", ("pull_reach", "depth", math.log(0.005), math.log(1.0))
-    add(effect, "held", ("pull", "area", 0.3, 0.0, 10.0), reach, starts=((0.05, -3.0), (0.1, -1.0)))
-    add(effect, "held by depth", ("pull_deep", "area", 0.3, 0.0, 10.0), reach, ("pull_growth", "plain", 0.0, 2.0),
-        starts=((0.05, -3.0, 0.7), (0.1, -1.0, 0.7)))  # fmt: skip
-    add(effect, "held wherever it has been", ("pull_ever", "area", 0.3, 0.0, 10.0), reach,
-        ("pull_growth", "plain", 0.0, 2.0), starts=((0.05, -3.0, 0.7), (0.1, -1.0, 0.7)))  # fmt: skip
+    # How sharply it goes from growing to its full size: 1 is a hyperbola, 2.3 next to tanh, 5 next to a corner.
+    sharp = ("pull_sharpness", "plain", 0.7, 5.0)
+    add(effect, "held", ("pull", "area", 0.3, 0.0, 10.0), reach, sharp, starts=((0.05, -3.0, 2.0), (0.1, -1.0, 2.0)))
+    grown = ("pull_growth", "plain", 0.0, 2.0)
+    add(effect, "held by depth", ("pull_deep", "area", 0.3, 0.0, 10.0), reach, grown, sharp,
+        starts=((0.05, -3.0, 0.7, 2.0), (0.1, -1.0, 0.7, 2.0)))  # fmt: skip
+    add(effect, "held wherever it has been", ("pull_ever", "area", 0.3, 0.0, 10.0), reach, grown, sharp,
+        starts=((0.05, -3.0, 0.7, 2.0), (0.1, -1.0, 0.7, 2.0)))  # fmt: skip
     add(effect, "held and let go", ("pull_short", "area", 0.3, 0.0, 10.0), reach, starts=((0.1, -3.0), (0.1, -1.0)))
     add(effect, "viscous", ("pull_viscous", "viscous", 0.3, 0.0, 10.0), starts=((0.1,),))
 

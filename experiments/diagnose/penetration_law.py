@@ -37,7 +37,7 @@ SLOTS = (
     "drag", "drag_onset", "drag_reach", "drag_deep", "drag_both", "drag_tip",
     "shaft", "shaft_deep", "shaft_square", "shaft_viscous", "shaft_slow", "shaft_speed",
     "pull", "pull_reach", "pull_deep", "pull_growth", "pull_ever", "pull_short", "pull_viscous",
-    "shift_depth", "shift_speed",
+    "pull_sharpness", "shift_depth", "shift_speed",
 )  # fmt: skip
 """Numbers of a lane, in order. `radius_depth`: depth at which the tip is wholly in; `speed_scale`: below it the
 direction of a driven spike is not certain; shifts: added to a driven spike's path, for derivatives."""
@@ -170,7 +170,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
     PULL, PULL_REACH, PULL_DEEP, PULL_SHORT, PULL_VISCOUS = (
         S["pull"], S["pull_reach"], S["pull_deep"], S["pull_short"], S["pull_viscous"],
     )  # fmt: skip
-    PULL_GROWTH, PULL_EVER = S["pull_growth"], S["pull_ever"]
+    PULL_GROWTH, PULL_EVER, SHARPNESS = S["pull_growth"], S["pull_ever"], S["pull_sharpness"]
     SHIFT_DEPTH, SHIFT_SPEED = S["shift_depth"], S["shift_speed"]
     Table = ti.types.ndarray(dtype=ti.f64, ndim=2)
     Line = ti.types.ndarray(dtype=ti.f64, ndim=1)
@@ -201,6 +201,14 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
         if n[k, LAYER_SLOPE] != 0.0:
             grown += n[k, LAYER_SLOPE] * ti.max(depth - n[k, LAYER_DEPTH], 0.0)
         return grown if depth > 0.0 else 0.0
+
+    @ti.func
+    def mobilised(share: ti.f64, sharpness: ti.f64) -> ti.f64:
+        """Of a pull, `share` being the retreat over its reach: 1 - exp(-x), or x / (1 + x^p)^(1/p) of a sharpness p."""
+        part = 1.0 - ti.exp(-share)
+        if sharpness > 0.0:
+            part = share / ti.pow(1.0 + ti.pow(ti.max(share, 1e-12), sharpness), 1.0 / sharpness)
+        return part
 
     @ti.func
     def force(z: ti.f64, v: ti.f64, way: ti.f64, top: ti.f64, deepest: ti.f64, n: ti.template(), k: ti.i32) -> ti.f64:
@@ -238,11 +246,11 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
                 grown = n[k, PULL]
                 if n[k, PULL_DEEP] != 0.0:
                     grown += n[k, PULL_DEEP] * ti.pow(most / n[k, REFERENCE], n[k, PULL_GROWTH])
-                total -= grown * (1.0 - ti.exp(-held))
+                total -= grown * mobilised(held, n[k, SHARPNESS])
                 total -= n[k, PULL_SHORT] * held * ti.exp(1.0 - held)
             if n[k, PULL_EVER] != 0.0 and z < ever:
-                mobilised = 1.0 - ti.exp(-(ever - z) / n[k, PULL_REACH])
-                total -= n[k, PULL_EVER] * ti.pow(ever / n[k, REFERENCE], n[k, PULL_GROWTH]) * mobilised
+                part = mobilised((ever - z) / n[k, PULL_REACH], n[k, SHARPNESS])
+                total -= n[k, PULL_EVER] * ti.pow(ever / n[k, REFERENCE], n[k, PULL_GROWTH]) * part
             total -= n[k, PULL_VISCOUS] * rising
             if ti.static(OWN):
                 s = State(mass=n[k, MASS], gravity=n[k, GRAVITY], weight=n[k, MASS] * n[k, GRAVITY], y=-z, vy=-v)

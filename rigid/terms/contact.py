@@ -59,6 +59,24 @@ def crater_share(share):
     return share
 
 
+def bent_unloading(depth, top, force, work, share, bend):
+    """The force times (z / z_top)^a, a = c (1 - exp(-f / 0.05)): 0 where nothing stays; `depth` is the compressed z.
+
+    The energy is exact where the loading curve is a power of depth.
+    """
+    left = force
+    stored = work
+    if bend != 0.0 and share > 0.0:
+        grown = bend * (1.0 - exp(-20.0 * share))
+        ratio = 1.0
+        if depth < top:
+            ratio = (max(depth, 1e-12 * top) / top) ** grown
+        left = force * ratio
+        if work > 0.0:
+            stored = left * depth / (force * depth / work + grown)
+    return left, stored
+
+
 def held_back(s, depth, held, force, reach):
     """A (1 - exp(-(top - z) / d)) of pull, mobilised over the retreat from the deepest depth since it touched."""
     pull = 0.0
@@ -125,11 +143,16 @@ CONTACT_EFFECTS: tuple[Term, ...] = (
     ),
     Term(
         id="plastic-sinkage", summary="the surface does not spring back", acts="the ground's law, with memory",
-        parameters=(Parameter(name="share", unit="1", default=0.0, lowest=0.0, highest=0.95,
-                              summary="of the deepest depth that stays when the load is gone"),),
-        source="elastic-plastic unloading as in Walton and Braun 1986, with the unloading curve similar to the loading",
-        limits="a spike forgets its crater when its tip leaves the undisturbed surface",
-        hooks={"crater": crater_share},
+        parameters=(
+            Parameter(name="share", unit="1", default=0.0, lowest=0.0, highest=0.95,
+                              summary="of the deepest depth that stays when the load is gone"),
+            Parameter(name="bend", unit="1", default=0.0, lowest=0.0, highest=4.0,
+                      summary="c: what unloading's exponent has more than loading's, fully from a share of 0.2 on"),
+        ),
+        source="elastic-plastic unloading as in Walton and Braun 1986, with the unloading curve similar to the loading "
+               "(bend = 0); the bend is ours",
+        limits="a spike forgets its crater when its tip leaves the undisturbed surface; the way back in is the way out",
+        hooks={"crater": crater_share, "unload": bent_unloading},
     ),
     Term(
         id="adhesion", summary="the tip is held on retreat", acts="normal force, with memory",

@@ -163,16 +163,19 @@ def test_depth_hardening_changes_the_sinkage():
     assert 900.0 * z * (z / 1e-3) ** 0.5 == pytest.approx(0.5 * trial.weight, rel=1e-9)
 
 
-def test_plastic_sinkage_leaves_a_crater_and_takes_its_share_of_the_work():
+@pytest.mark.parametrize("bend", [0.0, 1.5])
+def test_plastic_sinkage_leaves_a_crater_and_takes_its_share_of_the_work(bend):
     # A drop on two rows without any damper: the crater keeps f of the depth, the ground f of the work, so the platform
-    # leaves with sqrt(1 - f) of its speed, but for the weight.
+    # leaves with sqrt(1 - f) of its speed, but for the weight. Where the way back goes with the power 1 + a of what is
+    # left of the depth, it gives back 2 / (2 + a) of that.
     f, v = 0.4, 0.3
-    trial = free(damping=0.0, mu_s=0.0, level=1e-5, effects=(effect("plastic-sinkage", share=f),))
+    kept = (1 - f) * 2 / (2 + bend * (1 - math.exp(-20 * f)))
+    trial = free(damping=0.0, mu_s=0.0, level=1e-5, effects=(effect("plastic-sinkage", share=f, bend=bend),))
     rows = thrown(trial, [0.0, LENGTH * math.cos(G0) + 1e-4, 0.0, 0.0, -v, 0.0], 0.2)
     deepest = LENGTH * math.cos(G0) - rows[:, 2].min()
     assert deepest == pytest.approx(v * math.sqrt(MASS / (2 * trial.stiffness)), rel=1e-3)
-    assert rows[-1, 5] == pytest.approx(v * math.sqrt(1 - f), rel=1e-3)
-    assert rows[-1, 9] == pytest.approx(f * 0.5 * MASS * v**2, rel=2e-3)
+    assert rows[-1, 5] == pytest.approx(v * math.sqrt(kept), rel=1e-3)
+    assert rows[-1, 9] == pytest.approx((1 - kept) * 0.5 * MASS * v**2, rel=2e-3)
     assert rows[-1, 9] == pytest.approx(0.5 * MASS * (v**2 - rows[-1, 5] ** 2), rel=2e-3)
 
 

@@ -26,7 +26,7 @@ VALUES = {
     "umbilical": {"stiffness": 0.3, "drag": 0.2},
     "tip-radius": {"radius": 0.011},
     "depth-hardening": {"exponent": 1.35, "reference": 2e-3, "bend": 60.0},
-    "plastic-sinkage": {"share": 0.25},
+    "plastic-sinkage": {"share": 0.25, "bend": 0.6},
     "adhesion": {"force": 0.8, "reach": 3e-3},
     "inertial-drag": {"normal": 40.0, "sideways": 7.0, "power": 1.7},
     "wire-compliance": {"stiffness": 3e3, "damping": 25.0},
@@ -84,15 +84,17 @@ class Derived:
             gamma = A + sp.pi / 8 + n * sp.pi / 4
             depth = (length - r) * sp.cos(gamma) + r - Y
             sink = dot(depth)
-            z = depth
+            z, a = depth, 0
             if "plastic-sinkage" in on:
                 f = on["plastic-sinkage"]["share"]
+                a = on["plastic-sinkage"]["bend"] * (1 - math.exp(-20 * f))
                 z = (depth - f * TOP) / (1 - f)
             z0, e, b = 1, 0, 0
             if "depth-hardening" in on:
                 z0, e = on["depth-hardening"]["reference"], on["depth-hardening"]["exponent"] - 1
                 b = on["depth-hardening"]["bend"]
-            stored = trial.stiffness * (z ** (2 + e) / (2 + e) + b * z ** (3 + e) / (3 + e)) / z0**e
+            e += a
+            stored = trial.stiffness * (z ** (2 + e) / (2 + e) + b * z ** (3 + e) / (3 + e)) / (z0 ** (e - a) * TOP**a)
             if "plastic-sinkage" in on:
                 stored *= 1 - f
             force = -sp.diff(stored, Y)  # on y, of depth alone
