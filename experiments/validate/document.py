@@ -48,7 +48,9 @@ def _lines(result: Mapping[str, Any], command: str) -> Iterator[str]:
     yield ""
     about = f"version {result['version']}, code {result['code']}"
     yield f"Written by `{command}` on {result['date']} ({about}); do not edit."
-    yield f"{result['title'].partition(': ')[2].capitalize()}."
+    alone = any(row.get("command") for row in result["cases"])
+    since = " Cases that were run by themselves since say when and with which code." if alone else ""
+    yield f"{result['title'].partition(': ')[2].capitalize()}.{since}"
     yield ""
     yield "A row shows the number of its case that takes the largest share of its band; its other numbers are below."
     yield "A case that fails stays here as failing, with what is known of the reason."
@@ -88,7 +90,8 @@ def _failing(result: Mapping[str, Any]) -> Iterator[str]:
 
 def _details(row: Mapping[str, Any]) -> Iterator[str]:
     yield from ("", f"### {row['id']}: {row['title']}", "")
-    yield f"{row['reference']} ({row['source']}). Run on {row['date']}, {row['seconds']:.0f} s."
+    by = f" by `{row['command']}`, code {row['code']}" if row.get("command") else ""
+    yield f"{row['reference']} ({row['source']}). Run on {row['date']}{by}, {row['seconds']:.0f} s."
     for remark in row["remarks"]:
         yield from ("", remark)
     if len(row["comparisons"]) > 1:

@@ -15,11 +15,12 @@ from experiments.runfolder import RunFolder, write_text
 from experiments.validate_settings import ValidateSettings
 from hedgebed import __version__
 
+from . import kept as kept_result
 from .case import Case, Outcome
 from .document import markdown
 from .suite import SUITE, chosen, fingerprint, fingerprint_of
 
-__all__ = ["check", "fingerprint", "resume", "run", "run_case"]
+__all__ = ["check", "fingerprint", "keep", "resume", "run", "run_case"]
 
 _ROOT = Path(__file__).resolve().parents[2]
 
@@ -43,6 +44,10 @@ def check(settings: ValidateSettings) -> None:
     chosen(settings.only, quick=settings.quick)
     if settings.document is not None and not Path(settings.document).resolve().parent.is_dir():
         raise ValueError(f"document = {settings.document!r} lies in a folder that does not exist: make it first")
+    if settings.keep and settings.document is not None:
+        raise ValueError("keep = True is for a checkout's own table: leave document out")
+    if settings.keep and not _is_checkout():
+        raise ValueError(f"keep = True needs a checkout, with docs/ and pyproject.toml: {_ROOT} is none")
 
 
 def run_case(case: Case, tell: Any = None) -> tuple[Outcome, float]:
@@ -77,9 +82,13 @@ def _carry_out(settings: ValidateSettings, folder: RunFolder, progress: Progress
         folder.write_result(result)
         text = markdown(result, command=_command(settings))
         write_text(folder.path / "validation.md", text)
-        document = _document(settings, entire)
-        if document is not None:
-            write_text(document, text)
+        if settings.document is not None:
+            write_text(Path(settings.document), text)
+        elif entire and _is_checkout():
+            write_text(_ROOT / "docs" / "validation.md", text)
+            kept_result.write(_ROOT, result)
+        elif settings.keep:
+            keep(result["cases"], command=_command(settings))
         progress.stage("report", total=1.0)
         from vis.validation import write_validation_report
 
@@ -191,12 +200,20 @@ def _why(row: dict[str, Any]) -> str:
     return f"{said} ({row['reason']})" if row["reason"] else said
 
 
-def _document(settings: ValidateSettings, entire: bool) -> Path | None:
-    """Where the table goes beside the run folder."""
-    if settings.document is not None:
-        return Path(settings.document)
-    docs = _ROOT / "docs"
-    return docs / "validation.md" if entire and docs.is_dir() and (_ROOT / "pyproject.toml").is_file() else None
+def _is_checkout() -> bool:
+    """Whether this code lies in a checkout, with a table to be kept up."""
+    return (_ROOT / "docs").is_dir() and (_ROOT / "pyproject.toml").is_file()
+
+
+def keep(cases: Sequence[dict[str, Any]], *, command: str) -> None:
+    """Put the cases that were run into the checkout's table, docs/validation.md, and the result that it is made of."""
+    before = kept_result.read(_ROOT)
+    rows = kept_result.merged_rows(before["cases"] if before else (), cases, SUITE, command=command)
+    result = _result(rows, before is not None)
+    if before is not None:
+        result |= {key: before[key] for key in ("version", "code", "date")}
+    kept_result.write(_ROOT, result)
+    write_text(_ROOT / "docs" / "validation.md", markdown(result, command="hedgebed validate"))
 
 
 def _command(settings: ValidateSettings) -> str:

@@ -13,8 +13,11 @@ from . import (
     cohesion,
     collisions,
     dosta,
+    impact,
     integrator,
+    intrusion,
     large_body,
+    low_gravity,
     oblique,
     one_grain,
     peers,
@@ -34,6 +37,9 @@ NEEDS = {
     "peers": ("cloud.py",),
     "spinning": ("oblique.py",),
     "dosta": ("peers.py",),
+    "low_gravity": ("drops.py", "parts.py"),
+    "impact": ("drops.py", "parts.py"),
+    "intrusion": ("drops.py", "parts.py"),
 }
 """What else those of a module are."""
 
@@ -50,6 +56,9 @@ _MODULES = (
     large_body,
     peers,
     dosta,
+    low_gravity,
+    impact,
+    intrusion,
     pending,
 )
 SUITE: tuple[Case, ...] = tuple(case for module in _MODULES for case in module.CASES)

@@ -96,6 +96,26 @@ def test_part_of_the_suite_leaves_the_committed_table_alone(suite, tmp_path, mon
     assert "hedgebed validate`" in (tmp_path / "docs" / "validation.md").read_text()
 
 
+def test_a_case_run_by_itself_goes_into_the_kept_table_with_its_own_code(suite, tmp_path, monkeypatch):
+    monkeypatch.setattr(experiment, "_ROOT", tmp_path)
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "pyproject.toml").touch()
+    experiment.run(ValidateSettings(quick=True), tmp_path / "quick")
+    experiment.run(ValidateSettings(only=("long",), keep=True), tmp_path / "one")
+    table = tmp_path / "docs" / "validation.md"
+    assert "1 pass, 0 fail, 3 not run, 1 not yet." in table.read_text()
+    experiment.run(ValidateSettings(only=("bad",), keep=True), tmp_path / "two")
+    text = table.read_text()
+    assert "1 pass, 1 fail, 2 not run, 1 not yet." in text and "by `hedgebed validate --only bad`, code" in text
+    assert "- **bad** (1 of 1 numbers): it is known to be bad." in text and text.index("### bad") < text.index(
+        "### long"
+    )
+    experiment.run(ValidateSettings(), tmp_path / "all")
+    assert table.read_text() == (tmp_path / "all" / "validation.md").read_text()
+    with pytest.raises(ValueError, match="leave document out"):
+        experiment.run(ValidateSettings(keep=True, document=str(tmp_path / "x.md")), tmp_path / "four")
+
+
 def test_a_case_there_is_not_is_refused_with_the_nearest(tmp_path, capsys):
     assert main(["validate", "--only", "free-fal", "--out", str(tmp_path / "run")]) == 2
     assert "only = 'free-fal' is no case of the suite; did you mean 'free-fall'" in capsys.readouterr().err
