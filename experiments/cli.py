@@ -11,7 +11,7 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_origin
 
 from cyclopts import App, CycloptsError, Parameter
 from pydantic import BaseModel
@@ -29,7 +29,7 @@ from experiments.cli_streams import (
     terminate_like_ctrl_c,
 )
 from experiments.progress import Progress, make_progress
-from experiments.reading import Layer, find_case, read_case, settings_from
+from experiments.reading import Layer, find_case, option, read_case, settings_from
 from experiments.registry import Experiment, find_experiment
 from experiments.runfolder import RunFolder, fresh_path, write_json
 from hedgebed import __version__
@@ -69,11 +69,21 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
     settings_class = experiment.settings_class()
     presets = experiment.presets
 
+    pair = bool(experiment.subject) and get_origin(settings_class.model_fields[experiment.subject].annotation) is tuple
+
     def command(
-        case: Path | None = None, *, out: Path | None = None, json: bool = False, quiet: bool = False, **given: Any
+        case: Path | None = None,
+        other: Path | None = None,
+        *,
+        out: Path | None = None,
+        json: bool = False,
+        quiet: bool = False,
+        **given: Any,
     ) -> int:
         with refusing():
-            if experiment.subject and case is not None and (not case.is_file() or case.suffix == ".npz"):
+            if pair and case is not None and other is not None:
+                case, given[experiment.subject] = None, (str(case), str(other))
+            elif experiment.subject and case is not None and (not case.is_file() or case.suffix == ".npz"):
                 case, given[experiment.subject] = None, str(case)
             if case is not None and is_number(str(case)):
                 raise ValueError(_stray(str(case), settings_class))
@@ -106,6 +116,9 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
         about = Parameter(help=fields[experiment.subject].description, negative="", show_default=False)
         first = first.replace(name=experiment.subject, annotation=Annotated[Path | None, about])
     parameters = [first]
+    if pair:
+        about = Parameter(help="The other of the two.", negative="", show_default=False)
+        parameters.append(first.replace(name="other", annotation=Annotated[Path | None, about]))
     parameters += [option_of(name, field) for name, field in fields.items() if name != experiment.subject]
     parameters += [*flags, reserved_option("out"), reserved_option("json"), reserved_option("quiet")]
     command.__signature__ = inspect.Signature(parameters, return_annotation=int)  # type: ignore[attr-defined]
@@ -205,19 +218,38 @@ def _campaign_new(
 def _campaign_from_run() -> Callable[..., int]:
     """The function behind ``hedgebed campaign from-run``, with one parameter per setting of the sensors."""
     from experiments.run_campaign import SpikeSensors, write_run_campaign
+    from experiments.tumble_recorded import TumbleRecording, write_tumbles_campaign
 
-    fields = SpikeSensors.model_fields
+    of_spikes, of_tumbles = SpikeSensors.model_fields, TumbleRecording.model_fields
+    fields = of_spikes | of_tumbles
 
     def command(run: Path, folder: Path, **given: Any) -> int:
         with refusing():
-            sensors = settings_from(SpikeSensors, [Layer(None, as_typed(given, fields))])
-            assert isinstance(sensors, SpikeSensors)
-            campaign = write_run_campaign(run, folder, sensors=sensors)
+            tumbled = RunFolder.open(run).command == "tumble"
+            stray = sorted(set(given) & (set(of_spikes) - {"seed"} if tumbled else set(of_tumbles)))
+            if stray:
+                kind = "a tumble" if tumbled else "a spike"
+                raise ValueError(f"{option(stray[0])} is given, and {str(run)!r} is a run of {kind}: without it")
+            typed = as_typed(given, fields)
+            if tumbled:
+                own = Layer(None, {name: value for name, value in typed.items() if name in of_tumbles})
+                recording = settings_from(TumbleRecording, [own])
+                assert isinstance(recording, TumbleRecording)
+                seed = settings_from(SpikeSensors, [Layer(None, {k: v for k, v in typed.items() if k == "seed"})])
+                assert isinstance(seed, SpikeSensors)
+                campaign = write_tumbles_campaign(run, folder, recording=recording, seed=seed.seed)
+            else:
+                sensors = settings_from(SpikeSensors, [Layer(None, typed)])
+                assert isinstance(sensors, SpikeSensors)
+                campaign = write_run_campaign(run, folder, sensors=sensors)
         print(f"campaign: {folder / 'campaign.toml'}")
         say(f"{len(campaign.tables.trial)} trials; `hedgebed diagnose {folder}` says what the spring-damper lacks")
         return DONE
 
-    places = {"run": "Folder of a finished run of penetrate.", "folder": "Where to write it; must be new or empty."}
+    places = {
+        "run": "Folder of a finished run of penetrate, or of tumble.",
+        "folder": "Where to write it; must be new or empty.",
+    }
     parameters = [
         inspect.Parameter(
             name, inspect.Parameter.POSITIONAL_ONLY, annotation=Annotated[Path, Parameter(help=text, negative="")]
@@ -277,9 +309,15 @@ def build_app() -> App:
     if "campaign" in registry.EXPERIMENTS:
         app["campaign"].command(_campaign_new, name="new")
         app["campaign"].command(
-            _campaign_from_run(), name="from-run", help="Write a finished run of penetrate as a campaign of trials."
+            _campaign_from_run(),
+            name="from-run",
+            help="Write finished runs of penetrate, or of tumble, as a campaign of trials.",
         )
     app.command(_resume, name="resume")
+    if "tumble" in registry.EXPERIMENTS:
+        from experiments.render_command import render
+
+        app.command(render, name="render")
     app.command(_bench, name="bench")
     app.command(_effects, name="effects")
     app.command(_doctor, name="doctor")

@@ -41,7 +41,7 @@ class Experiment:
     module: str
     presets: tuple[Preset, ...] = ()
     subject: str = ""
-    """The setting that the command's first argument is, instead of a case file."""
+    """The setting that the command's first argument is (its first two, of a setting of two), instead of a case file."""
 
     def settings_class(self) -> type[BaseModel]:
         """The settings class. Quick: it imports no Taichi."""
@@ -122,6 +122,13 @@ EXPERIMENTS: dict[str, Experiment] = {
             settings="experiments.diagnose_settings:DiagnoseSettings",
             module="experiments.diagnose.experiment",
             subject="campaign",
+        ),
+        Experiment(
+            "compare",
+            "Two finished runs side by side: numbers with their differences, curves, states, pictures.",
+            settings="experiments.compare_settings:CompareSettings",
+            module="experiments.compare",
+            subject="runs",
         ),
         Experiment(
             "bed make",

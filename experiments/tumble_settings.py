@@ -175,7 +175,12 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
                     return f"{key} is given with method = 'coupled': the master steps the base model alone, without it"
         if self.ground != "bed":
             return f"{given[0]} = {getattr(self, given[0])} belongs to ground = 'bed'" if given else None
-        for key in ("effects", "sweep", "campaign", "model"):
+        if self.campaign is not None:
+            return (
+                f"campaign = {self.campaign!r} is given with ground = 'bed': `hedgebed campaign from-run` makes one of "
+                f"finished runs, so without it"
+            )
+        for key in ("effects", "sweep", "model"):
             if getattr(self, key):
                 return f"{key} is given with ground = 'bed': on grains there is the base model alone, without it"
         if self.method == "paper":

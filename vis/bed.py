@@ -17,8 +17,7 @@ from vis.canvas import colour_values, nice_above
 from vis.frames import read_frames
 from vis.numbers import short
 from vis.page import Block, Page, Section, Tile, code, figure, listing, table, text, write_page
-from vis.pictures import _render_apart as render_apart
-from vis.pictures import opengl_available
+from vis.pictures import opengl_available, render_apart
 from vis.plot_parts import Plot, legend_above, new_panels
 from vis.render import run_job
 from vis.style import styled

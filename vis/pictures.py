@@ -29,7 +29,7 @@ from vis.frames import Frame, Frames, frame_names, read_frames
 from vis.numbers import quote
 from vis.render import run_job
 
-__all__ = ["Picture", "Pictures", "make_pictures", "opengl_available"]
+__all__ = ["Picture", "Pictures", "make_pictures", "opengl_available", "render_apart"]
 
 _STILLS = 6
 _STILL_COSTS = 4.0  # in frames of the animation, as measured in software
@@ -122,7 +122,7 @@ def make_pictures(
     moving = len(job["animation"]["frames"]) if job["animation"] else 0
     counter = _Counter([_STILL_COSTS] * len(job["stills"]) + [1.0] * moving, progress)
     if opengl_available():
-        failure = _render_apart(job, stall, counter.step)
+        failure = render_apart(job, stall, counter.step)
         if failure is None:
             return Pictures(stills, animation, "opengl", notes)
         notes.append(f"Rendering with OpenGL failed ({failure}); cross-sections stand in for the pictures.")
@@ -150,8 +150,10 @@ class _Counter:
             self.progress(min(1.0, sum(self.costs[: self.done]) / sum(self.costs)))
 
 
-def _render_apart(job: dict[str, Any], stall: float, step: Callable[[], None]) -> str | None:
-    """Carry out a job in a child process; None when it succeeded, else why it did not."""
+def render_apart(
+    job: dict[str, Any], stall: float, step: Callable[[], None], *, module: str = "vis.render"
+) -> str | None:
+    """Carry out a job in a child process, `python -m module`; None when it succeeded, else why it did not."""
     environment = dict(os.environ)
     root = str(Path(__file__).resolve().parent.parent)
     environment["PYTHONPATH"] = os.pathsep.join(filter(None, (root, environment.get("PYTHONPATH", ""))))
@@ -160,7 +162,7 @@ def _render_apart(job: dict[str, Any], stall: float, step: Callable[[], None]) -
         file.write_text(json.dumps(job), encoding="utf-8")
         with log.open("w") as errors:
             child = subprocess.Popen(
-                [sys.executable, "-m", "vis.render", str(file)],
+                [sys.executable, "-m", module, str(file)],
                 stdout=subprocess.PIPE,
                 stderr=errors,
                 env=environment,

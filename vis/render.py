@@ -25,7 +25,7 @@ from PIL import Image
 from vis.canvas import Caption, ColourScale, Page, colour_values, colourmap
 from vis.frames import read_frames
 
-__all__ = ["main", "run_job", "write_gif"]
+__all__ = ["main", "replace_file", "run_job", "write_gif", "write_png"]
 
 _GIF_LIMIT = 5_500_000  # bytes
 
@@ -41,14 +41,14 @@ def run_job(job: dict[str, Any], *, opengl: bool, step: Callable[[], None] = lam
     folder = Path(job["folder"])
     for view in job["stills"]:
         for image in _images(folder, view, opengl):
-            _replace(Path(view["file"]), functools.partial(_write_png, image))
+            replace_file(Path(view["file"]), functools.partial(write_png, image))
             step()
     if view := job.get("animation"):
         images = []
         for image in _images(folder, view, opengl):
             images.append(image)
             step()
-        _replace(Path(view["file"]), functools.partial(write_gif, images=images))
+        replace_file(Path(view["file"]), functools.partial(write_gif, images=images))
 
 
 def _images(folder: Path, view: dict[str, Any], opengl: bool) -> Iterator[NDArray[np.uint8]]:
@@ -130,11 +130,11 @@ def _with_scale(image: Image.Image) -> Image.Image:
     return Image.fromarray(np.concatenate([np.asarray(image), strip], axis=1))
 
 
-def _write_png(image: NDArray[np.uint8], path: Path) -> None:
+def write_png(image: NDArray[np.uint8], path: Path) -> None:
     Image.fromarray(image).save(path, "PNG")
 
 
-def _replace(path: Path, write: Callable[[Path], None]) -> None:
+def replace_file(path: Path, write: Callable[[Path], None]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(path.name + ".part")
     write(temporary)

@@ -34,6 +34,7 @@ _OTHERS = {
     "bed make": ("vis.bed", "write_bed_report"),
     "bed refine": ("vis.bed", "write_bed_report"),
     "bed test shear": ("vis.bed_shear", "write_shear_report"),
+    "compare": ("vis.compare", "write_compare_report"),
     "validate": ("vis.validation", "write_validation_report"),
 }
 

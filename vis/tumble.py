@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -22,16 +20,16 @@ from PIL import Image, ImageDraw
 
 from vis.numbers import quantity, short
 from vis.page import Block, Page, Section, Tile, code, figure, table, text, write_page
+from vis.pictures import Pictures
 from vis.style import BED, GREY, INK, MODEL, styled
 from vis.tumble_grains import grains_section
+from vis.tumble_series import STATES, read_columns, state_runs
 from vis.tumble_sweep import sweep_section
 
 __all__ = ["STATES", "read_columns", "state_runs", "write_tumble_report"]
 
 Array = NDArray[np.float64]
 
-STATES = {"stand": GREY, "pivot": BED, "slip": MODEL, "hop": "#009E73"}
-"""The states in the order of losing hold, with their colours."""
 _WIDTH = 8.6
 _DPI = 130
 _MOST_STEPS = 60
@@ -42,8 +40,22 @@ _JOULES = (("mJ", 1.0), ("µJ", 1e3), ("nJ", 1e6), ("pJ", 1e9), ("fJ", 1e12))
 """Units of energy, and how many of them a mJ has."""
 
 
-def write_tumble_report(folder: str | Path, *, progress: Callable[[float], None] | None = None) -> Path:
+def write_tumble_report(
+    folder: str | Path,
+    *,
+    pictures: bool | None = None,
+    colour: str = "displacement",
+    film: bool = True,
+    progress: Callable[[float], None] | None = None,
+) -> Path:
     """Make figures/, animation.gif and report.html of the folder of a tumble, and return the report.
+
+    Args:
+        folder: The run folder.
+        pictures: Whether to draw the platform on its ground in space, stills and film; None: where there are grains.
+        colour: What grains are coloured by, a key of `vis.canvas.COLOURS`.
+        film: Whether to make the film.
+        progress: Called with the share that is done, 0 to 1.
 
     Raises FileNotFoundError where the folder has no trajectory.csv or result.json.
     """
@@ -60,9 +72,9 @@ def write_tumble_report(folder: str | Path, *, progress: Callable[[float], None]
         with styled():
             drawing.savefig(figures / f"{name}.png", dpi=_DPI)
         drawn.append(figure(figures / f"{name}.png", title=title, caption=caption))
-        tell(0.2 * (index + 1))
+        tell(0.1 * (index + 1))
     moving = _animate(folder / "animation.gif", result, numbers, states)
-    tell(0.9)
+    tell(0.4)
     page = _page(folder, result, drawn, moving, len(numbers["t_s"]))
     if "sweep" in result:
         swept, _ = read_columns(folder / result["sweep"]["file"])
@@ -70,28 +82,25 @@ def write_tumble_report(folder: str | Path, *, progress: Callable[[float], None]
     if "grains" in result:
         tables = {name: read_columns(folder / file) for name, file in result["grains"]["series"].items()}
         page = replace(page, sections=[*page.sections[:1], grains_section(result, figures, tables), *page.sections[1:]])
+    if pictures if pictures is not None else "grains" in result and (folder / "frames" / "tumble.pvd").exists():
+        from vis.tumble_pictures import make_tumble_pictures
+
+        drawn_apart = make_tumble_pictures(folder, by=colour, film=film, progress=lambda done: tell(0.4 + 0.55 * done))
+        page = replace(page, sections=[*page.sections[:1], _seen(drawn_apart), *page.sections[1:]])
     report = write_page(folder / "report.html", page)
     tell(1.0)
     return report
 
 
-def read_columns(path: Path) -> tuple[dict[str, Array], NDArray[np.str_]]:
-    """The columns of a CSV file that are numbers, by name, and its column ``state`` (empty where it has none)."""
-    with path.open(newline="", encoding="utf-8") as file:
-        rows = list(csv.reader(file))
-    header, body = rows[0], rows[1:]
-    kept = [index for index, name in enumerate(header) if name != "state"]
-    values = np.array([[row[index] for index in kept] for row in body], dtype=float).reshape(len(body), len(kept))
-    states = [row[header.index("state")] for row in body] if "state" in header else []
-    return {header[index]: values[:, place] for place, index in enumerate(kept)}, np.array(states, dtype=str)
-
-
-def state_runs(states: NDArray[np.str_]) -> list[tuple[int, int, str]]:
-    """Stretches of one state: (first row, row after the last, state)."""
-    if not len(states):
-        return []
-    edges = [0, *(np.flatnonzero(states[1:] != states[:-1]) + 1).tolist(), len(states)]
-    return [(low, high, str(states[low])) for low, high in pairwise(edges)]
+def _seen(drawn: Pictures) -> Section:
+    """The section of pictures in space."""
+    film = [drawn.animation] if drawn.animation is not None else []
+    blocks = [figure(one.file, title=one.title, caption=one.caption, show_file=one in film)
+              for one in (*film, *drawn.stills)]  # fmt: skip
+    camera = (
+        "In front of the spikes' plane the grains are left out. Red arrows: the force on a row, as long as its size."
+    )
+    return Section("Seen from near", [*blocks, text(camera, small=True), *(text(note) for note in drawn.notes)])
 
 
 # Figures --------------------------------------------------------------------------------------------------------------

@@ -37,7 +37,8 @@ def test_the_defaults_are_valid(experiment):
 def test_a_subject_must_be_named(experiment):
     with pytest.raises(ValueError, match=experiment.subject):
         settings_from(experiment.settings_class(), [])
-    settings_from(experiment.settings_class(), [Layer(None, {experiment.subject: "somewhere"})])
+    named = "somewhere" if experiment.name != "compare" else ("somewhere", "else")
+    settings_from(experiment.settings_class(), [Layer(None, {experiment.subject: named})])
 
 
 @ALL

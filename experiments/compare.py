@@ -1,0 +1,184 @@
+"""`hedgebed compare`: two finished runs in one report, their numbers with differences, what they did over time.
+
+Differences are the second less the first. Of tumbles series/compared.csv holds both on one grid of time; what they
+stood on does not matter, nor does who stepped them. Of penetrations numbers are compared, and the drives both have.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from hedgebed import __version__
+
+from .compare_settings import CompareSettings
+from .compare_tumbles import Moved, compared_columns, gaps, read_moved, told_apart
+from .progress import Progress
+from .reporting import write_report
+from .runfolder import RunFolder, read_json
+from .whole_runs import whole_run
+
+__all__ = ["check", "resume", "run"]
+
+KINDS = ("tumble", "penetrate")
+
+
+def check(settings: CompareSettings) -> None:
+    """Raise ValueError, naming the folder and what would do, for runs that cannot be compared."""
+    first, second = (_finished(path) for path in settings.runs)
+    if first.path.resolve() == second.path.resolve():
+        raise ValueError(f"runs = {settings.runs[0]!r} twice: a run does not differ from itself, another would do")
+    if first.command != second.command:
+        raise ValueError(
+            f"runs: {settings.runs[0]!r} is of {first.command} and {settings.runs[1]!r} of {second.command}: two of "
+            f"one kind would do"
+        )
+
+
+def _finished(path: str) -> RunFolder:
+    folder = RunFolder.open(Path(path))
+    if folder.command not in KINDS:
+        raise ValueError(
+            f"runs: {path!r} is of {folder.command}, of which there is nothing to compare over time: runs of "
+            f"{' or of '.join(KINDS)} would do"
+        )
+    if not (folder.path / "result.json").exists():
+        status = folder.status or "not finished"
+        raise ValueError(
+            f"runs: {path!r} has no result yet ({status}): `hedgebed resume {path}` finishes it where it can be"
+        )
+    return folder
+
+
+def _carry_out(settings: CompareSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
+    with folder.lock():
+        first, second = (_finished(path) for path in settings.runs)
+        results = [read_json(one.path / "result.json") for one in (first, second)]
+        labels = _labels((first, second), results)
+        result: dict[str, Any] = {
+            "format": "hedgebed-result/1", "experiment": "compare", "version": __version__, "kind": first.command,
+            "title": f"{labels[0]} and {labels[1]}", "status": "done",
+            "runs": [
+                {"folder": os.path.relpath(one.path, folder.path), "label": label, "title": str(found.get("title", ""))}
+                for one, label, found in zip((first, second), labels, results, strict=True)
+            ],
+            "quantities": {}, "departures": {"sentences": []},
+            "compared": _compared(results), "differs": _differs(first, second, results),
+            "colour": settings.colour, "pictures": settings.pictures and first.command == "tumble",
+            "warnings": [
+                f"{label}: {warning}" for label, one in zip(labels, results, strict=True) for warning in one["warnings"]
+            ],
+        }  # fmt: skip
+        if first.command == "tumble":
+            progress.stage("series", total=1.0)
+            moved = [read_moved(one.path, one_result) for one, one_result in zip((first, second), results, strict=True)]
+            _add_motion(result, moved, labels, folder)
+        result["tables"] = [
+            _table(f"Numbers of both, and {labels[1]} less {labels[0]}", labels, result["compared"]),
+            *([_differing(labels, result["differs"])] if result["differs"] else []),
+        ]
+        folder.write_result(result)
+        progress.stage("report", total=1.0)
+        write_report(folder.path, progress)
+    return result
+
+
+def _add_motion(result: dict[str, Any], moved: list[Moved], labels: tuple[str, str], folder: RunFolder) -> None:
+    """series/compared.csv, the gaps between both as quantities, and sentences."""
+    columns = compared_columns(moved[0], moved[1])
+    folder.write_series("compared", columns)
+    result["series"] = "series/compared.csv"
+    result["spike_count"] = min(one.count for one in moved)
+    result["weights"] = [one.weight for one in moved]
+    result["quantities"] = gaps(columns)
+    result["departures"]["sentences"] = told_apart(columns, labels, moved)
+    result["warnings"] += [f"{label}: {note}" for label, one in zip(labels, moved, strict=True) for note in one.notes]
+
+
+def _labels(folders: tuple[RunFolder, RunFolder], results: list[dict[str, Any]]) -> tuple[str, str]:
+    """What to call the two: by their ground where that differs, else by their folders."""
+    words = [_ground(one) for one in results]
+    if words[0] == words[1]:
+        words = [one.path.name or str(one.path) for one in folders]
+    if words[0] == words[1]:
+        words = [str(one.path) for one in folders]
+    return words[0], words[1]
+
+
+def _ground(result: Mapping[str, Any]) -> str:
+    ground = str(result.get("ground", ""))
+    named = {"bed": f"bed of {result.get('surface', 'grains')}", "": "bed of grains"}.get(ground, ground)
+    return named if result.get("method") != "paper" else f"{named}, the paper's step"
+
+
+def _compared(results: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Every quantity of either, with the difference where both have a value."""
+    first, second = (result.get("quantities", {}) for result in results)
+    rows = []
+    for name in dict.fromkeys([*first, *second]):
+        one, other = first.get(name, {}), second.get(name, {})
+        values = [entry.get("value") for entry in (one, other)]
+        both = all(isinstance(value, int | float) for value in values)
+        spreads = [entry.get("std") for entry in (one, other)]
+        rows.append(
+            {
+                "name": name, "unit": one.get("unit", other.get("unit", "")), "first": values[0], "second": values[1],
+                "difference": values[1] - values[0] if both else None,
+                "relative": (values[1] - values[0]) / abs(values[0]) if both and values[0] else None,
+                "first_std": spreads[0], "second_std": spreads[1],
+            }
+        )  # fmt: skip
+    return rows
+
+
+def _differs(first: RunFolder, second: RunFolder, results: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Settings and numbers of the trial in which the two differ: key, both values as they are written."""
+    rows = []
+    for key in dict.fromkeys([*first.settings, *second.settings]):
+        one, other = first.settings.get(key), second.settings.get(key)
+        if one != other:
+            rows.append({"key": key, "first": _written(one), "second": _written(other), "unit": ""})
+    trials = [result.get("trial", {}) for result in results]
+    known = {row["key"] for row in rows}
+    for key in dict.fromkeys([*trials[0], *trials[1]]):
+        one, other = (trial.get(key, {}).get("value") for trial in trials)
+        if one != other and key not in known:
+            unit = trials[0].get(key, trials[1].get(key, {})).get("unit", "")
+            rows.append({"key": key, "first": _written(one), "second": _written(other), "unit": unit})
+    return rows
+
+
+def _written(value: Any) -> str:
+    if value is None:
+        return "not set"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _table(title: str, labels: tuple[str, str], rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """For the terminal: angles in degrees."""
+    shown = []
+    for row in rows:
+        scale, unit = (
+            (180 / math.pi, "degrees") if row["unit"] == "rad" else (1.0, row["unit"] if row["unit"] != "1" else "")
+        )
+        numbers = [_number(row[key], scale, key == "difference") for key in ("first", "second", "difference")]
+        relative = f"{100 * row['relative']:+.3g} %" if row["relative"] is not None else ""
+        shown.append([row["name"], *numbers, relative, unit])
+    return {"title": title, "head": ["quantity", *labels, "less", "", "unit"], "rows": shown}
+
+
+def _number(value: Any, scale: float, signed: bool) -> str:
+    if not isinstance(value, int | float) or not math.isfinite(value):
+        return "-"
+    return f"{scale * value:+.4g}" if signed and value else f"{scale * value:.4g}"
+
+
+def _differing(labels: tuple[str, str], rows: list[dict[str, Any]]) -> dict[str, Any]:
+    shown = [[row["key"], row["first"], row["second"], row["unit"]] for row in rows]
+    return {"title": "Settings and numbers that differ", "head": ["key", *labels, "unit"], "rows": shown}
+
+
+run, resume = whole_run("compare", CompareSettings, _carry_out, check=check)

@@ -1,0 +1,171 @@
+"""Two tumbles on one grid of time: where they were, what held them up, how far they went apart."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .runfolder import read_series
+
+__all__ = ["Moved", "compared_columns", "gaps", "read_moved", "told_apart"]
+
+Array = NDArray[np.float64]
+INTERVAL = 1e-3
+"""Between rows of series/compared.csv [s]; longer where that would be more than MOST_ROWS."""
+MOST_ROWS = 20_000
+WINDOW = 5e-3
+"""Over which forces are averaged [s], as states are read off forces."""
+CHANNELS = ("x_m", "y_m", "theta_rad", "vx_m_s", "vy_m_s", "omega_rad_s")
+ENERGIES = ("kinetic_J", "potential_J", "stored_J", "energy_J", "torque_work_J", "dissipated_J")
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A tumble as its run folder has it."""
+
+    series: Mapping[str, Array]
+    """Of trajectory.csv, `state` among them."""
+    motion: Mapping[str, Array]
+    count: int
+    """Rows of spikes."""
+    sinkage: Array
+    """Depth of the lowest point of each row [m], 0 above the surface, shape [time, row]."""
+    load: Array | None
+    """On each row, upwards [N], shape [time, row]; None where it is not known."""
+    lift: Array | None
+    """The ground's force, upwards [N], shape [time]."""
+    push: Array | None
+    """The same, along x [N]."""
+    weight: float = 0.0
+    """(m + m_b) g_sim [N]."""
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def time(self) -> Array:
+        """[s], shape [time]."""
+        return self.series["t_s"]
+
+
+def read_moved(folder: Path, result: Mapping[str, Any]) -> Moved:
+    """What the run in `folder` did. Raises ValueError where a series is missing."""
+    try:
+        series = read_series(folder / "trajectory.csv")
+        motion = read_series(folder / "series" / "motion.csv")
+    except OSError as error:
+        raise ValueError(f"runs: {str(folder)!r} has no {Path(str(error.filename)).name}: run it again") from None
+    trial = {name: entry["value"] for name, entry in result["trial"].items()}
+    count = int(result["spike_count"])
+    path = folder / "series" / "feet.csv"
+    feet = read_series(path) if path.exists() else None
+    angle = math.pi / count + 2 * math.pi / count * np.arange(count) + series["theta_rad"][:, None]
+    depth = trial["spike_length"] * np.cos(angle) - series["y_m"][:, None]
+    sinkage, load = np.maximum(depth, 0.0), None
+    notes = []
+    effects = bool(result["effects"])
+    if feet is not None:
+        sinkage = np.column_stack([feet[f"sinkage_{row}_m"] for row in range(count)])
+        load = np.column_stack([feet[f"normal_{row}_N"] for row in range(count)])
+    elif result["ground"] == "spring-damper" and not effects:
+        # docs/planar.md: K delta + C max(0, rate of delta), of a tip at the end of each row
+        rate = -series["vy_m_s"][:, None] - trial["spike_length"] * np.sin(angle) * series["omega_rad_s"][:, None]
+        load = np.where(depth > 0, trial["stiffness"] * depth + trial["damping"] * np.maximum(rate, 0.0), 0.0)
+    else:
+        notes.append("the load on each row is not in its folder")
+    lift = push = None
+    if effects:
+        notes.append("what its effects add is not told from the ground's force, which is left out")
+    else:
+        lift = (trial["mass"] + trial["counterweight"]) * motion["ay_m_s2"] + trial["weight"]
+        push = trial["mass"] * motion["ax_m_s2"]
+    return Moved(series, motion, count, sinkage, load, lift, push, trial["weight"], notes)
+
+
+def compared_columns(first: Moved, second: Moved) -> dict[str, Any]:
+    """Both on one grid, `_1` and `_2`: as long as both last; forces are means over 5 ms."""
+    end = float(min(first.time[-1], second.time[-1]))
+    step = max(INTERVAL, end / MOST_ROWS)
+    time: Array = np.asarray(np.arange(math.floor(end / step + 1e-9) + 1) * step, dtype=float)
+    columns: dict[str, Any] = {"t_s": time}
+    for number, one in enumerate((first, second), 1):
+        for name in CHANNELS:
+            columns[f"{name}_{number}"] = np.interp(time, one.time, one.series[name])
+        nearest = np.clip(np.searchsorted(one.time, time, side="right") - 1, 0, len(one.time) - 1)
+        columns[f"state_{number}"] = np.asarray(one.series["state"])[nearest]
+        for row in range(one.count):
+            columns[f"sinkage_{row}_m_{number}"] = np.interp(time, one.time, one.sinkage[:, row])
+            if one.load is not None:
+                columns[f"load_{row}_N_{number}"] = _mean(time, one.time, one.load[:, row])
+        for name, values in (("lift_N", one.lift), ("push_N", one.push)):
+            if values is not None:
+                columns[f"{name}_{number}"] = _mean(time, one.time, values)
+        for name in ENERGIES:
+            columns[f"{name}_{number}"] = np.interp(time, one.motion["t_s"], one.motion[name])
+    return columns
+
+
+def _mean(at: Array, time: Array, values: Array) -> Array:
+    """Mean over WINDOW about each time, by the trapezoidal rule; over what there is of it at the ends."""
+    whole = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(time) * (values[1:] + values[:-1]))])
+    low, high = np.maximum(at - 0.5 * WINDOW, time[0]), np.minimum(at + 0.5 * WINDOW, time[-1])
+    return np.asarray((np.interp(high, time, whole) - np.interp(low, time, whole)) / np.maximum(high - low, 1e-12))
+
+
+def gaps(columns: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """How far the two went apart, as quantities of a result."""
+    time = columns["t_s"]
+    found: dict[str, tuple[float, str, str]] = {}
+    for name, unit in (("x", "m"), ("y", "m"), ("theta", "rad")):
+        away = _away(columns, name, unit)
+        at = int(np.argmax(np.abs(away)))
+        found[f"gap_{name}"] = (float(np.abs(away[at])), unit, f"largest over time, at {time[at]:.4g} s")
+        found[f"gap_{name}_end"] = (float(away[-1]), unit, f"second less first at {time[-1]:.4g} s")
+    same = np.asarray(columns["state_1"]) == np.asarray(columns["state_2"])
+    found["same_state"] = (float(same.mean()), "1", "share of the time in which both are in the same state")
+    deepest = [_deepest(columns, number) for number in (1, 2)]
+    found["gap_sinkage"] = (deepest[1] - deepest[0], "m", "of the deepest row, each at its own time; second less first")
+    return {
+        name: {"value": value, "std": 0.0, "unit": unit, "note": note} for name, (value, unit, note) in found.items()
+    }
+
+
+def _away(columns: Mapping[str, Any], name: str, unit: str) -> Array:
+    """Second less first; of the path, each from its own start: a body sinks before its torque begins."""
+    one, other = (np.asarray(columns[f"{name}_{unit}_{number}"]) for number in (1, 2))
+    start = other[0] - one[0] if unit == "m" else 0.0
+    return other - one - start
+
+
+def _deepest(columns: Mapping[str, Any], number: int) -> float:
+    rows = [values for name, values in columns.items() if name.startswith("sinkage_") and name.endswith(f"_{number}")]
+    return float(np.max(rows))
+
+
+def told_apart(columns: Mapping[str, Any], labels: tuple[str, str], moved: list[Moved]) -> list[str]:
+    """What a reader wants to hear of the two."""
+    found = gaps(columns)
+    end = float(columns["t_s"][-1])
+
+    def said(name: str) -> float:
+        return float(found[name]["value"])
+
+    ahead, up, turned = 1e3 * said("gap_x_end"), 1e3 * said("gap_y_end"), math.degrees(said("gap_theta_end"))
+    sentences = [
+        f"At {end:.4g} s the centre on {labels[1]} is {abs(ahead):.3g} mm {'ahead' if ahead > 0 else 'behind'} and "
+        f"{abs(up):.3g} mm {'higher' if up > 0 else 'lower'} than on {labels[0]}, each from its own start, and has "
+        f"turned {abs(turned):.3g} degrees {'more' if turned > 0 else 'less'}.",
+        f"On the way at most {1e3 * said('gap_x'):.3g} mm along, {1e3 * said('gap_y'):.3g} mm in height and "
+        f"{math.degrees(said('gap_theta')):.3g} degrees apart; in the same state {100 * said('same_state'):.0f} % of "
+        f"the time.",
+        f"The deepest row goes {1e3 * _deepest(columns, 1):.3g} mm deep on {labels[0]}, "
+        f"{1e3 * _deepest(columns, 2):.3g} mm on {labels[1]}.",
+    ]
+    lasts = [float(one.time[-1]) for one in moved]
+    if abs(lasts[0] - lasts[1]) > 2e-3:
+        sentences.append(f"They last {lasts[0]:.4g} and {lasts[1]:.4g} s: compared as long as both do.")
+    return sentences

@@ -1,0 +1,95 @@
+"""`hedgebed compare` and `hedgebed render`: two tumbles in one report, what is refused, pictures made again."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.cli import main
+from experiments.compare_tumbles import read_moved
+from experiments.runfolder import read_series
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """The same tumble on the spring-damper of sand, by the master, and on that of brick, longer."""
+    home = tmp_path_factory.mktemp("runs")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("experiments.tumble.write_report", lambda folder, progress: None)
+        common = ("tumble", "--rig", "0.0085", "--torque", "0.22", "--quiet")
+        sand = ("--surface", "sand", "--method", "coupled", "--duration", "0.2")
+        assert main([*common, *sand, "--out", str(home / "sand")]) == 0
+        assert main([*common, "--surface", "brick", "--duration", "0.3", "--out", str(home / "brick")]) == 0
+    return home
+
+
+def test_two_tumbles_side_by_side_have_their_differences_in_numbers_curves_and_a_page(runs, tmp_path, capsys):
+    out = tmp_path / "both"
+    assert (
+        main(["compare", str(runs / "sand"), str(runs / "brick"), "--no-pictures", "--out", str(out), "--quiet"]) == 0
+    )
+    assert "brick less sand" in capsys.readouterr().out
+    result = json.loads((out / "result.json").read_text())
+    one, other = (read_series(runs / name / "trajectory.csv") for name in ("sand", "brick"))
+    ends = [(run["x_m"] - run["x_m"][0])[np.searchsorted(run["t_s"], 0.2 - 1e-9)] for run in (one, other)]
+    assert result["quantities"]["gap_x_end"]["value"] == pytest.approx(ends[1] - ends[0], rel=1e-3)
+    assert 0 <= result["quantities"]["same_state"]["value"] <= 1
+    rows = {row["name"]: row for row in result["compared"]}
+    values = [json.loads((runs / name / "result.json").read_text())["quantities"] for name in ("sand", "brick")]
+    assert rows["max_speed"]["difference"] == values[1]["max_speed"]["value"] - values[0]["max_speed"]["value"]
+    assert rows["sinkage_start"]["second"] is None is rows["sinkage_start"]["difference"]
+    assert {"surface", "stiffness", "mu_d", "method"} <= {row["key"] for row in result["differs"]}
+    columns = read_series(out / "series" / "compared.csv")
+    assert columns["t_s"][-1] == pytest.approx(0.2)
+    page = (out / "report.html").read_text()
+    assert page.count("data:image/png") == 5 and "They last 0.2 and 0.3 s" in page
+
+
+def test_the_loads_on_the_rows_are_the_force_that_lifts_the_platform(runs):
+    """Sum of K delta + C max(0, rate) over the rows = (m + m_b) ay + W, whoever integrated it."""
+    for name in ("sand", "brick"):
+        moved = read_moved(runs / name, json.loads((runs / name / "result.json").read_text()))
+        assert np.abs(moved.load.sum(axis=1) - moved.lift)[1:].max() < 1e-6 * moved.weight
+        deepest = moved.sinkage.max()
+        assert deepest == pytest.approx({"sand": 0.009, "brick": 1.4e-4}[name], rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ("others", "said"),
+    [
+        (("sand",), "a run does not differ from itself"),
+        (("nothing",), "is not a run folder"),
+        (("begun",), "has no result yet"),
+        (
+            ("hop",),
+            "is of hop, of which there is nothing to compare over time: runs of tumble or of penetrate would do",
+        ),
+        (("spike",), "is of tumble and .* of penetrate: two of one kind would do"),
+    ],
+)
+def test_what_cannot_be_compared_is_refused_by_name(runs, tmp_path, others, said, capsys):
+    text = (runs / "sand" / "run.toml").read_text()
+    for name, command in (("begun", "tumble"), ("hop", "hop"), ("spike", "penetrate")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "run.toml").write_text(text.replace('command = "tumble"', f'command = "{command}"'))
+    (tmp_path / "spike" / "result.json").write_text("{}")
+    other = runs / "sand" if others[0] == "sand" else tmp_path / others[0]
+    assert main(["compare", str(runs / "sand"), str(other), "--out", str(tmp_path / "out")]) == 2
+    assert re.search(said, capsys.readouterr().err.replace("\n", " "))
+    assert not (tmp_path / "out").exists()
+
+
+def test_pictures_of_a_run_are_made_again_without_opengl_too(runs, monkeypatch, capsys):
+    monkeypatch.setenv("HEDGEBED_NO_OPENGL", "1")
+    assert main(["render", str(runs / "brick"), "--no-film", "--quiet", "--json"]) == 0
+    drawn = [Path(name).name for name in json.loads(capsys.readouterr().out)["pictures"]]
+    assert {"tumble-start.png", "tumble-half.png", "tumble-end.png", "trajectory.png"} <= set(drawn)
+    page = (runs / "brick" / "report.html").read_text()
+    assert "Seen from near" in page and "no OpenGL" in page
+
+
+def test_what_has_no_result_is_not_rendered(tmp_path, capsys):
+    assert main(["render", str(tmp_path)]) == 2
+    assert "is not a run folder" in capsys.readouterr().err

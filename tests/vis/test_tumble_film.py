@@ -1,0 +1,97 @@
+"""Pictures of a tumble on grains: a camera that follows, a colour scale that stays, arrows and tracks in place."""
+
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from vis.frames import FrameWriter
+from vis.meshes import spike_mesh
+from vis.reel import Reel
+from vis.stage import Eye
+from vis.tracks import height_map
+from vis.tumble_film import Sheet, run_film_job
+from vis.tumble_pictures import draw_tracks
+
+LENGTH, SIZE = 0.04, (0.12, 0.03)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A platform of 40 mm spikes that slides 30 mm over a bed of 240 grains and moves those in front ever further."""
+    time = np.linspace(0.0, 1.0, 11)
+    fine = np.linspace(0.0, 1.0, 101)
+    names = ("t_s", "x_m", "y_m", "theta_rad", "vx_m_s", "vy_m_s", "omega_rad_s")
+    table = [fine, 0.03 * fine, np.full(101, 0.036), 0.1 * fine, np.full(101, 0.03), 0 * fine, np.full(101, 0.1)]
+    rows = [",".join([*(repr(float(column[k])) for column in table), "slip"]) for k in range(101)]
+    (tmp_path / "trajectory.csv").write_text("\n".join([",".join((*names, "state")), *rows]) + "\n")
+    trial = {"spike_length": LENGTH, "weight": 2.0, "mass": 1.0}
+    result = {
+        "title": "made up", "ground": "bed", "spike_count": 8, "effects": [],
+        "trial": {name: {"value": value} for name, value in trial.items()},
+    }  # fmt: skip
+    (tmp_path / "result.json").write_text(json.dumps(result))
+    at = np.array([[0.0025 + 0.005 * i, 0.0025 + 0.005 * j, 0.0025 + 0.005 * k]
+                   for i in range(24) for j in range(5) for k in range(2)])  # fmt: skip
+    points, triangles = spike_mesh("sphere", diameter=0.004, length=0.008, segments=8)
+    points -= points.mean(axis=0)  # about the tip: eight of them about the centre, as real ones are
+    angles = np.pi / 8 + np.pi / 4 * np.arange(8)
+    tips = LENGTH * np.column_stack([-np.sin(angles), np.zeros(8), -np.cos(angles)])
+    writer = FrameWriter(tmp_path, name="tumble")
+    for now in time:
+        centre = np.array([0.05 + 0.03 * now, 0.015, 0.01 + 0.036])
+        spikes = np.concatenate([points + centre + tip * 0.9 for tip in tips])
+        faces = np.concatenate([triangles + k * len(points) for k in range(8)])
+        moved = np.where((at[:, 0] < 0.06)[:, None], [[2e-3 * now, 0.0, 0.0]], 0.0)
+        surface = height_map(
+            at - [[0, 0, 1e-3 * now]] * (at[:, :1] < 0.06), np.full(len(at), 0.0025), SIZE, spacing=0.0025
+        )
+        surface.fields["change"] = surface.fields["height"] - 0.01
+        writer.write(
+            float(now), {"position": at, "radius": np.full(len(at), 0.0025), "displacement": moved},
+            {"spikes": (spikes, faces), "hull": (spikes, faces)},
+            clouds={"row_forces": (centre[None] - [[0, 0, 0.04]], {"force": np.array([[0.0, 0.0, 2.0]])})},
+            maps={"surface": surface},
+        )  # fmt: skip
+    return tmp_path
+
+
+def test_a_length_is_the_same_all_over_the_picture():
+    """Parallel projection: places differ by (dx / width, dz cos(pitch) / height), the focus is in the middle."""
+    eye = Eye((400, 200), width=0.4, cut=0.01, pitch=0.24)
+    points = np.array([[1.0, 0.01, 2.0], [1.1, 0.01, 2.0], [1.0, 0.01, 2.05]])
+    placed = eye.place(points, (1.0, 2.0))
+    assert placed == pytest.approx(np.array([[0.5, 0.5], [0.75, 0.5], [0.5, 0.5 + 0.25 * np.cos(0.24)]]))
+
+
+def test_the_camera_follows_and_the_scale_stays_put(folder):
+    reel = Reel.open(folder)
+    assert reel.surface == pytest.approx(0.01, abs=1e-6) and reel.cut == pytest.approx(0.015, abs=1e-6)
+    sheet = Sheet([reel], (320, 180), by="displacement", opengl=False)
+    whole, near = sheet.ways
+    assert whole[:, 0] == pytest.approx(reel.centres()[:, 0], abs=1e-3)  # 30 mm further at the end
+    assert np.ptp(near[:, 0]) > 0.02 and np.ptp(near[:, 1]) == 0.0
+    assert sheet.norm.vmax == 2.0  # mm: what the grains that take part moved by the end, in every picture
+    sheet.draw(0.0)
+    sheet.draw(1.0)
+    assert sheet.norm.vmax == 2.0
+
+
+def test_stills_film_and_tracks_are_drawn_without_opengl(folder):
+    job = {
+        "runs": [str(folder)], "labels": None, "by": "displacement",
+        "stills": [{"file": str(folder / "still.png"), "time": 1.0, "size": [640, 360]}],
+        "film": {"file": str(folder / "film.gif"), "times": [0.0, 0.5, 1.0], "size": [320, 180]},
+    }  # fmt: skip
+    seen = []
+    run_film_job(job, opengl=False, step=lambda: seen.append(1))
+    assert len(seen) == 4
+    still = np.asarray(Image.open(folder / "still.png")).astype(int)
+    assert still.shape == (360, 640, 3)
+    red = (abs(still - [176, 0, 32]) < 40).all(axis=2)  # the arrows of the weight and of the row's force
+    assert red[:, 280:580].sum() > 60
+    with Image.open(folder / "film.gif") as film:
+        assert film.n_frames == 3
+    tracks = draw_tracks(Reel.open(folder), folder / "tracks.png")
+    assert tracks.file.stat().st_size > 5000

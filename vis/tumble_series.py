@@ -1,0 +1,38 @@
+"""What a tumble's folder holds as columns, and the stretches of its states."""
+
+from __future__ import annotations
+
+import csv
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vis.style import BED, GREY, MODEL
+
+__all__ = ["STATES", "read_columns", "state_runs"]
+
+Array = NDArray[np.float64]
+
+STATES = {"stand": GREY, "pivot": BED, "slip": MODEL, "hop": "#009E73"}
+"""The states in the order of losing hold, with their colours."""
+
+
+def read_columns(path: Path) -> tuple[dict[str, Array], NDArray[np.str_]]:
+    """The columns of a CSV file that are numbers, by name, and its column ``state`` (empty where it has none)."""
+    with path.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.reader(file))
+    header, body = rows[0], rows[1:]
+    kept = [index for index, name in enumerate(header) if name != "state"]
+    values = np.array([[row[index] for index in kept] for row in body], dtype=float).reshape(len(body), len(kept))
+    states = [row[header.index("state")] for row in body] if "state" in header else []
+    return {header[index]: values[:, place] for place, index in enumerate(kept)}, np.array(states, dtype=str)
+
+
+def state_runs(states: NDArray[np.str_]) -> list[tuple[int, int, str]]:
+    """Stretches of one state: (first row, row after the last, state)."""
+    if not len(states):
+        return []
+    edges = [0, *(np.flatnonzero(states[1:] != states[:-1]) + 1).tolist(), len(states)]
+    return [(low, high, str(states[low])) for low, high in pairwise(edges)]
