@@ -20,6 +20,7 @@ from hedgebed import __version__
 from .campaign import Campaign, PenetrationCampaign, Recording, TumbleCampaign, read_campaign
 from .campaign_settings import CheckSettings
 from .diagnose.problem import Finding
+from .plausible import find_implausible, loud_sensors
 from .progress import Progress
 from .replicas import Condition, condition_of, condition_words, odd_replicates
 from .reporting import write_report
@@ -46,7 +47,7 @@ def find_faults(campaign: Campaign) -> list[Finding]:
         found = _faults_of_data(campaign)
     jumped = {finding.trial for finding in found if _jumps(finding)}
     odd = [finding for finding in odd_replicates(campaign) if finding.trial not in jumped]
-    return [*_missing_sensors(campaign), *found, *odd]
+    return [*_missing_sensors(campaign), *find_implausible(campaign), *found, *odd, *loud_sensors(campaign)]
 
 
 def _jumps(finding: Finding) -> bool:

@@ -77,10 +77,22 @@ def odd_replicates(campaign: Campaign) -> list[Finding]:
         if 2 * len(worst) < len(trials):  # where half of them are odd, none is
             found += [
                 Finding(trial=id, channel=channel, what=f"trial {id} is at odds with its {len(trials) - 1} replicates, "
-                        f"which agree with one another: in {channel} it lies {ratio:.0f} times as far from them")
+                        f"which agree with one another: in {channel} it lies {ratio:.0f} times as far from them"
+                        + _own_gravity(tables))
                 for id, (ratio, channel) in worst.items()
             ]  # fmt: skip
     return found
+
+
+def _own_gravity(tables: TumbleCampaign | PenetrationCampaign) -> str:
+    """What may be behind it where every trial has a gravity of its own."""
+    std = tables.uncertainty.gravity_sim if isinstance(tables, TumbleCampaign) else 0.0
+    if not std:
+        return ""
+    return (
+        f" (its own simulated gravity, uncertain by {100 * std:.2g} %, can do that near the torque that only just "
+        f"tips; diagnose fits it)"
+    )
 
 
 def _curves(
@@ -123,7 +135,7 @@ def _from_start(values: Array) -> Array:
 
 
 def _resampled(pairs: list[tuple[Array, Array]]) -> list[Array]:
-    """Means of each curve over common stretches of the first of each pair; NaN where a curve has nothing."""
+    """Medians of each curve over common stretches of its first part: lone readings do not count; NaN for none."""
     known = [(x[np.isfinite(x) & np.isfinite(y)], y[np.isfinite(x) & np.isfinite(y)]) for x, y in pairs]
     if min(len(x) for x, _ in known) < 8:
         return []
@@ -136,9 +148,8 @@ def _resampled(pairs: list[tuple[Array, Array]]) -> list[Array]:
     for x, y in known:
         place = np.digitize(x, edges) - 1
         inside = (place >= 0) & (place < len(edges) - 1)
-        total = np.bincount(place[inside], y[inside], len(edges) - 1)
-        rows = np.bincount(place[inside], minlength=len(edges) - 1)
-        curves.append(np.where(rows > 0, total / np.maximum(rows, 1), np.nan))
+        own = [y[inside][place[inside] == k] for k in range(len(edges) - 1)]
+        curves.append(np.array([np.median(values) if len(values) else np.nan for values in own]))
     return curves
 
 
@@ -157,7 +168,7 @@ def _at_odds(ids: list[str], curves: list[Array], std: float) -> list[tuple[str,
         others = [j for j in range(count) if j != k]
         mine = min(far[k, j] for j in others)
         theirs = float(np.median([far[a, b] for a in others for b in others if a < b]))
-        size = float(np.median([np.nanvar(curves[j]) for j in others]))
+        size = float(np.median([np.nanvar(curves[j]) if np.isfinite(curves[j]).any() else 0.0 for j in others]))
         if mine > max(_AT_ODDS * theirs, _NOISE * std**2, _SIZEABLE**2 * size):
             found.append((ids[k], mine / max(theirs, 1e-300)))
     return found

@@ -8,12 +8,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from vis.numbers import short
 from vis.page import Page, Section, Tile, code, figure, table, text, write_page
+from vis.palette import line_handles, line_styles
 from vis.style import styled
 from vis.tumble import read_columns
 
@@ -50,33 +50,26 @@ def write_campaign_report(folder: str | Path, *, progress: Callable[[float], Non
 
 def _draw(campaign: Path, trials: list[dict[str, Any]]) -> Figure:
     shown = trials[:: -(-len(trials) // _MOST)]
+    conditions = [f"{t['actuator']} {t['torque']:g} N m, {t['gravity_sim']:.3g} m/s²" for t in shown]
+    styles = line_styles(conditions)
     with styled():
         drawing = Figure(figsize=(8.6, 5.0))
         FigureCanvasAgg(drawing)
         axes = drawing.subplots(2, 3, sharex=True).ravel()
-        handles = []
-        colours = _colours(len(shown))
-        for trial, colour in zip(shown, colours, strict=True):
+        for trial, condition in zip(shown, conditions, strict=True):
             files = {
                 sensor: read_columns(campaign / f"{trial['id']}-{sensor}.csv")[0] for sensor in ("pose", "imu", "wheel")
             }
             for axis, (sensor, column, scale, _) in zip(axes, _CHANNELS, strict=True):
                 columns = files[sensor]
-                (line,) = axis.plot(columns["t_s"], scale * columns[column], color=colour, lw=0.8)
-            line.set_label(f"{trial['id']}: {trial['torque']:g} N m, {trial['gravity_sim']:.3g} m/s²")
-            handles.append(line)
+                axis.plot(columns["t_s"], scale * columns[column], lw=0.8, **styles[condition])
         for axis, (_, _, _, label) in zip(axes, _CHANNELS, strict=True):
             axis.set_ylabel(label)
         for axis in axes[3:]:
             axis.set_xlabel("time [s]")
-        drawing.legend(handles=handles, loc="outside upper left", ncols=3, fontsize=7.5)
+        handles = line_handles([str(trial["id"]) for trial in shown], conditions)
+        drawing.legend(handles=handles, loc="outside upper left", ncols=2, fontsize=7.5)
     return drawing
-
-
-def _colours(count: int) -> list[Any]:
-    import matplotlib as mpl
-
-    return [mpl.colormaps["viridis"](share) for share in np.linspace(0.0, 0.92, max(1, count))]
 
 
 def _page(result: Mapping[str, Any], picture: Path) -> Page:
@@ -102,8 +95,8 @@ def _page(result: Mapping[str, Any], picture: Path) -> Page:
         for effect in result["effects"]
     ]
     caption = (
-        "What camera, IMU and wheel recorded, with their noise; before 0 the platform stands still. At most twelve "
-        "trials are drawn."
+        "What camera, IMU and wheel recorded, with their noise; before 0 the platform stands still. Replicates share a "
+        "colour; at most twelve trials are drawn."
     )
     return Page(
         title=str(result["title"]),

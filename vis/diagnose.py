@@ -1,52 +1,23 @@
-"""Plots and report of a diagnosis: reads diagnosis.json, result.json, evidence.csv, latent.csv and series/."""
+"""The report of a diagnosis: reads diagnosis.json, result.json, latent.csv and series/."""
 
 from __future__ import annotations
 
-import csv
 import json
-import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from vis.diagnose_figures import draw_evidence, draw_latent, draw_phases, draw_trajectories, read_channel, worst
 from vis.numbers import short
 from vis.page import Block, Page, Section, Tile, code, figure, listing, table, text, write_page
-from vis.style import BED, GREY, INK, MODEL, styled
+from vis.style import styled
 
 __all__ = ["write_diagnosis_report"]
 
-Array = NDArray[np.float64]
-
-_WIDTH = 8.6
 _DPI = 130
-_MOST_PANELS = 6
-_UNITS = {"x": "m", "y": "m", "theta": "rad", "gyro": "rad/s", "ax": "m/s2", "ay": "m/s2", "wheel": "rad/s",
-          "depth": "m", "force": "N", "accel": "m/s2"}  # fmt: skip
-
-
-@dataclass(frozen=True)
-class _Channel:
-    """One channel of one trial, all arrays of one shape."""
-
-    trial: str
-    name: str
-    time: Array
-    measured: Array
-    before: Array
-    after: Array
-    std: Array
-    phase: NDArray[np.str_]
-
-    def residual(self, stage: str) -> Array:
-        """(measured - model) / std."""
-        return (self.measured - getattr(self, stage)) / self.std
+_DASH = "\N{EN DASH}"
 
 
 def write_diagnosis_report(folder: str | Path, *, progress: Callable[[float], None] | None = None) -> Path:
@@ -58,23 +29,30 @@ def write_diagnosis_report(folder: str | Path, *, progress: Callable[[float], No
     folder = Path(folder)
     said = json.loads((folder / "diagnosis.json").read_text(encoding="utf-8"))
     result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
-    channels = [_read_channel(path) for path in sorted((folder / "series").glob("*.csv"))]
-    worst = sorted(channels, key=lambda c: -float(np.mean(c.residual("before") ** 2)))
+    channels = [read_channel(path) for path in sorted((folder / "series").glob("*.csv"))]
     held = set(said["gap"]["held_out_trials"])
+    labels = _labels(said)
+    shown = worst([channel for channel in channels if len(channel.time)], held)
     figures = folder / "figures"
     figures.mkdir(exist_ok=True)
     drawn: dict[str, Block] = {}
     plans: list[tuple[str, str, str, Callable[[], Figure | None]]] = [
-        ("trajectories", "Measured, before, after", "The channels in which the base model fails most: measured (dots), "
-         "the base model with its parameters fitted (dashed), and the model with what was added (line).",
-         lambda: _draw_trajectories(_spread(worst), held)),
-        ("residuals", "Residuals before and after", "The same channels: measured less model over the sensor's noise, "
-         "before (orange) and after (blue); the band is two standard deviations.",
-         lambda: _draw_residuals(_spread(worst), held)),
-        ("evidence", "What every candidate explains", "Log evidence over the base model, tempered for misfit of form, "
-         "best form of each set of effects.", lambda: _draw_evidence(said)),
-        ("latent", "What no effect explains", "What the best model lacks, against what it goes with most.",
-         lambda: _draw_latent(folder, said)),
+        ("trajectories", "Measured and modelled",
+         "The channels in which the base model fails most, held-out trials last: left measured (dots) and modelled, "
+         "right what is left over the sensor's noise. The band along the top is the phase of the base model's motion.",
+         lambda: draw_trajectories(shown, held, labels)),
+        ("residuals", "What is left, by phase and channel",
+         "Chi-square per sample with the noise that campaign.toml states. Trials held out took no part in fitting or "
+         "choosing.",
+         lambda: draw_phases(said.get("by_phase", []), labels)),
+        ("evidence", "What every candidate explains",
+         "Log evidence over the base model, tempered for misfit of form: the best form of each name, and of sets of "
+         "names those that beat all of their parts.",
+         lambda: draw_evidence(said)),
+        ("latent", "What no effect explains",
+         "What the best model lacks, over time and over what it goes with most. Shares are those of the variance that "
+         "a binned mean explains, judged on rows that took no part in making it.",
+         lambda: draw_latent(folder, said, channels)),
     ]  # fmt: skip
     for place, (name, title, caption, draw) in enumerate(plans):
         with styled():
@@ -83,177 +61,41 @@ def write_diagnosis_report(folder: str | Path, *, progress: Callable[[float], No
                 drawing.savefig(figures / f"{name}.png", dpi=_DPI)
                 drawn[name] = figure(figures / f"{name}.png", title=title, caption=caption)
         tell(0.2 * (place + 1))
-    report = write_page(folder / "report.html", _page(said, result, channels, drawn))
+    report = write_page(folder / "report.html", _page(said, result, drawn))
     tell(1.0)
     return report
 
 
-def _read_channel(path: Path) -> _Channel:
-    with path.open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    trial, _, name = path.stem.rpartition(".")
-
-    def column(key: str, default: float = 1.0) -> Array:
-        return np.array([float(row.get(key) or default) for row in rows])
-
-    phase = np.array([row.get("phase") or "" for row in rows])
-    return _Channel(trial, name, column("t_s"), column("measured"), column("before"), column("after"),
-                    column("std"), phase)  # fmt: skip
-
-
-def _spread(worst: Sequence[_Channel]) -> list[_Channel]:
-    """The worst channels, no more than half of the panels of one trial's kind while there are others."""
-    chosen: list[_Channel] = []
-    for channel in worst:
-        alike = sum(c.name == channel.name for c in chosen)
-        if alike < max(2, _MOST_PANELS // len({c.name for c in worst})) and len(chosen) < _MOST_PANELS:
-            chosen.append(channel)
-    return chosen
-
-
-# Figures --------------------------------------------------------------------------------------------------------------
-
-
-def _grid(count: int, height: float) -> tuple[Figure, list[Axes]]:
-    rows = math.ceil(count / 2) if count > 1 else 1
-    drawing = Figure(figsize=(_WIDTH, height * rows))
-    FigureCanvasAgg(drawing)
-    axes = drawing.subplots(rows, 2 if count > 1 else 1, squeeze=False).ravel().tolist()
-    for axis in axes[count:]:
-        axis.set_visible(False)
-    return drawing, axes[:count]
-
-
-def _draw_trajectories(channels: Sequence[_Channel], held: set[str]) -> Figure | None:
-    if not channels:
-        return None
-    drawing, axes = _grid(len(channels), 2.4)
-    for axis, c in zip(axes, channels, strict=True):
-        step = max(1, len(c.time) // 160)
-        axis.plot(c.time[::step], c.measured[::step], ".", color=INK, ms=2.5, label="measured")
-        axis.plot(c.time, c.before, color=MODEL, ls=(0, (4, 2)), lw=1.5, label="before")
-        axis.plot(c.time, c.after, color=BED, lw=1.3, label="after")
-        axis.set_title(_title(c, held))
-        axis.set_xlabel("time [s]")
-        axis.set_ylabel(f"{c.name} [{_UNITS.get(c.name, '1')}]")
-    axes[0].legend()
-    return drawing
-
-
-def _draw_residuals(channels: Sequence[_Channel], held: set[str]) -> Figure | None:
-    if not channels:
-        return None
-    drawing, axes = _grid(len(channels), 2.2)
-    for axis, c in zip(axes, channels, strict=True):
-        axis.axhspan(-2, 2, color="#e9eef2", lw=0)
-        axis.plot(c.time, c.residual("before"), color=MODEL, lw=0.9, label="before")
-        axis.plot(c.time, c.residual("after"), color=BED, lw=0.9, label="after")
-        axis.set_title(_title(c, held))
-        axis.set_xlabel("time [s]")
-        axis.set_ylabel("residual [std]")
-    axes[0].legend()
-    return drawing
-
-
-def _title(channel: _Channel, held: set[str]) -> str:
-    return f"{channel.trial}, {channel.name}" + (", held out" if channel.trial in held else "")
-
-
-def _draw_evidence(said: Mapping[str, Any]) -> Figure | None:
-    best: dict[str, float] = {}
-    for row in said.get("evidence", []):
-        name = " + ".join(row["effects"])
-        best.setdefault(name, float(row["score"]))
-    if not best:
-        return None
-    singles = [name for name in best if " + " not in name]
-    names = sorted({*singles, *list(best)[:6]}, key=lambda name: best[name])
-    drawing = Figure(figsize=(_WIDTH, 0.7 + 0.33 * len(names)))
-    FigureCanvasAgg(drawing)
-    axis = drawing.subplots()
-    chosen = " + ".join(effect["id"] for effect in said["effects"])
-    colours = [BED if name == chosen else MODEL if name in said["alternatives"] else GREY for name in names]
-    axis.barh(range(len(names)), [best[name] for name in names], color=colours, height=0.66)
-    axis.set_yticks(range(len(names)), names)
-    axis.set_xlabel("log evidence over the base model [nats]")
-    return drawing
-
-
-def _draw_latent(folder: Path, said: Mapping[str, Any]) -> Figure | None:
-    if "latent" not in said or not (folder / said["latent"]["file"]).exists():
-        return None
-    with (folder / said["latent"]["file"]).open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    names = list(rows[0]) if rows else []
-    latent = next((name for name in names if name.startswith("latent_")), None)
-    if latent is None:
-        return None
-    shares = said["latent"].get("explained", {})
-    against = max(shares, key=lambda name: shares[name]) if shares else "t_s"
-    drawing = Figure(figsize=(_WIDTH, 3.0))
-    FigureCanvasAgg(drawing)
-    axes = drawing.subplots(1, 2)
-    columns = ["t_s", against if against != "t_s" else "depth_m"]
-    for axis, column in zip(axes, columns, strict=True):
-        for trial in dict.fromkeys(row["trial"] for row in rows):
-            own = [row for row in rows if row["trial"] == trial and row.get(column)]
-            axis.plot([float(row[column]) for row in own], [float(row[latent]) for row in own], ".", ms=1.5)
-        axis.set_xlabel(column)
-    axes[0].set_ylabel(latent)
-    return drawing
+def _labels(said: Mapping[str, Any]) -> tuple[str, str]:
+    """What the models before and after are called; the second is empty where nothing was added."""
+    before, names = "base model, fitted", " + ".join(effect["id"] for effect in said["effects"])
+    if said["verdict"] == "none" or said["gap"]["after"] == said["gap"]["before"]:
+        return before, ""
+    return before, f"with {names}" if names else "best model found"
 
 
 # The page -------------------------------------------------------------------------------------------------------------
 
 
-def _page(
-    said: Mapping[str, Any], result: Mapping[str, Any], channels: Sequence[_Channel], drawn: Mapping[str, Block]
-) -> Page:
+def _page(said: Mapping[str, Any], result: Mapping[str, Any], drawn: Mapping[str, Block]) -> Page:
     gap = said["gap"]
     named = ", ".join(effect["id"] for effect in said["effects"]) or "nothing"
+    which = "chi-square a sample, " + ("fitted" if gap["before"]["held_out"] is None else "held-out") + " trials"
     tiles = [
-        Tile("Verdict", said["verdict"], named),
-        Tile("Gap before", _gap(gap["before"]["held_out"], gap["before"]["fit"]), _which(gap)),
-        Tile("Gap after", _gap(gap["after"]["held_out"], gap["after"]["fit"]), _which(gap), second=True),
+        Tile("Verdict", said["verdict"], " or ".join([named, *said["alternatives"]])),
+        Tile("Gap before", _gap(gap["before"]), which),
+        Tile("Gap after", _gap(gap["after"]), which, second=True),
     ]
-    effect_rows = [
-        (effect["id"], name, short(entry["value"], 4), short(entry["std"], 2), entry["unit"])
-        for effect in said["effects"] for name, entry in effect["parameters"].items()
-    ]  # fmt: skip
-    base_rows = [
-        (name, short(entry["value"], 4), short(entry["std"], 2), short(said["base"]["after"][name]["value"], 4),
-         short(said["base"]["after"][name]["std"], 2), entry["unit"])
-        for name, entry in said["base"]["before"].items() if name in said["base"]["after"]
-    ]  # fmt: skip
-    where = [
-        (p["trial"], p["channel"], p["phase"], f"{p['from_s']:.4g}", f"{p['to_s']:.4g}", short(p.get("excess", 0.0), 3))
-        for p in said["where"]
-    ]
-    evidence = [
-        (row["candidate"], f"{row['score']:.1f}", f"{row['left']:.3g}") for row in said.get("evidence", [])
-    ]  # fmt: skip
-    phases = _by_phase(channels)
-    numbers: list[Block] = []
-    if effect_rows:
-        numbers.append(table(("effect", "parameter", "value", "std", "unit"), effect_rows, title="What was added"))
-    if base_rows:
-        head = ("parameter", "before", "std", "after", "std", "unit")
-        numbers.append(table(head, base_rows, title="The base model's parameters"))
     sections = [
-        Section("", [listing(result["departures"]["sentences"]),
-                     *_there(drawn, "trajectories", "residuals", "latent")]),
-        Section("Where the base model fails", [
-            table(("phase", "channel", "before", "after"), phases,
-                  title="Chi-square per sample by phase and channel (the sensors' noise as stated)"),
-            *([table(("trial", "channel", "phase", "from [s]", "to [s]", "chi-square beyond noise"), where,
-                     title="The worst stretches")] if where else []),
-        ]),
-        Section("Candidates", [*_there(drawn, "evidence"), *(
-            [table(("candidate", "evidence [nats]", "excess a sample"), evidence)] if evidence
-            else [text("Nothing was left that a candidate could explain.")]
-        )]),
+        Section("", [listing(result["departures"]["sentences"]), *_there(drawn, "trajectories")]),
+        Section("What is left", [_gap_table(gap), *_there(drawn, "residuals"), *_phase_table(said),
+                                 *_there(drawn, "latent")]),
+        Section("Where the base model fails", _where(said)),
+        Section("Candidates", [*_there(drawn, "evidence"), *_evidence(said)]),
         Section("What these trials can tell apart", _told_apart(said)),
-        Section("Numbers", numbers),
+        Section("The next experiment", [text(said["next_experiment"])] if said.get("next_experiment") else []),
+        Section("Numbers", _numbers(said)),
+        Section("What was found in the recordings", _findings(said)),
         Section("To do this again", [text(f"With hedgebed {result['version']}, in this folder:"),
                                      code("hedgebed diagnose run.toml")]),
     ]  # fmt: skip
@@ -267,6 +109,101 @@ def _page(
     )
 
 
+def _gap(gap: Mapping[str, Any]) -> str:
+    return short(gap["fit"] if gap["held_out"] is None else gap["held_out"], 3)
+
+
+def _gap_table(gap: Mapping[str, Any]) -> Block:
+    def cell(value: float | None) -> str:
+        return _DASH if value is None else short(value, 3)
+
+    rows = [(name, cell(gap["before"][part]), cell(gap["after"][part]))
+            for part, name in (("fit", "fitted trials"), ("held_out", "held-out trials"))]  # fmt: skip
+    return table(("", "base model", "best model"), rows, title="The gap, chi-square per sample (1: the sensors' noise)")
+
+
+def _phase_table(said: Mapping[str, Any]) -> list[Block]:
+    """By phase and channel, fitted trials beside held-out ones."""
+    rows: dict[tuple[str, str], dict[bool, Mapping[str, Any]]] = {}
+    for row in said.get("by_phase", []):
+        rows.setdefault((row["phase"], row["channel"]), {})[row["held_out"]] = row
+    if not rows:
+        return []
+
+    def cells(part: Mapping[str, Any] | None) -> tuple[str, str, str]:
+        if part is None:
+            return _DASH, _DASH, _DASH
+        return str(part["samples"]), short(part["before"], 3), short(part["after"], 3)
+
+    head = ("phase", "channel", "samples fitted", "before", "after", "samples held out", "before", "after")
+    body = [(*key, *cells(parts.get(False)), *cells(parts.get(True))) for key, parts in rows.items()]
+    return [table(head, body, title="Chi-square per sample by phase and channel")]
+
+
+def _where(said: Mapping[str, Any]) -> list[Block]:
+    if not said["where"]:
+        return []
+    rows = [
+        (p["trial"], _settings(p.get("settings", {})), p["channel"], p["phase"], f"{p['from_s']:.4g}",
+         f"{p['to_s']:.4g}", short(p.get("excess", 0.0), 3))
+        for p in said["where"]
+    ]  # fmt: skip
+    head = ("trial", "settings", "channel", "phase", "from [s]", "to [s]", "chi-square beyond noise")
+    return [table(head, rows, title="The worst stretches")]
+
+
+def _settings(settings: Mapping[str, float]) -> str:
+    """torque_N_m = 0.22 as "torque 0.22 N m"."""
+    units = {"N_m": "N m", "m_s2": "m/s²", "m_s": "m/s", "m": "m", "kg": "kg", "rad_s": "rad/s"}
+    shown = []
+    for name, value in settings.items():
+        unit = next((u for u in sorted(units, key=len, reverse=True) if name.endswith(f"_{u}")), "")
+        what = name.removesuffix(f"_{unit}") if unit else name
+        shown.append(f"{what.replace('_', ' ')} {short(value, 4)} {units.get(unit, '')}".strip())
+    return ", ".join(shown)
+
+
+def _evidence(said: Mapping[str, Any]) -> list[Block]:
+    rows = [(row["candidate"], f"{row['score']:.1f}", f"{row['left']:.3g}") for row in said.get("evidence", [])]
+    if not rows:
+        return [text("Nothing was left that a candidate could explain: none was tried.")]
+    head = ("candidate (effect:form)", "evidence over the base model [nats]", "excess a sample")
+    return [table(head, rows, title="Every candidate that was tried, the likeliest first")]
+
+
+def _numbers(said: Mapping[str, Any]) -> list[Block]:
+    effects = [
+        (effect["id"], name, short(entry["value"], 4), short(entry["std"], 2), _unit(entry["unit"]))
+        for effect in said["effects"] for name, entry in effect["parameters"].items()
+    ]  # fmt: skip
+    after = said["base"]["after"]
+    base = [
+        (name, short(entry["value"], 4), short(entry["std"], 2), short(after[name]["value"], 4),
+         short(after[name]["std"], 2), _unit(entry["unit"]))
+        for name, entry in said["base"]["before"].items() if name in after
+    ]  # fmt: skip
+    blocks = []
+    if effects:
+        blocks.append(table(("effect", "parameter", "value", "std", "unit"), effects, title="What was added"))
+    if base:
+        head = ("parameter", "before", "std", "after", "std", "unit")
+        blocks.append(table(head, base, title="The base model's parameters"))
+    return blocks
+
+
+def _unit(unit: str) -> str:
+    return "" if unit == "1" else unit
+
+
+def _findings(said: Mapping[str, Any]) -> list[Block]:
+    rows = [
+        (f["what"], f["trial"] or _DASH, f["channel"] or _DASH,
+         _DASH if f["from_s"] is None else f"{f['from_s']:.4g} to {f['to_s']:.4g}", "yes" if f["set_aside"] else "no")
+        for f in said.get("findings", [])
+    ]  # fmt: skip
+    return [table(("what", "trial", "channel", "seconds", "set aside"), rows, words=True)] if rows else []
+
+
 def _told_apart(said: Mapping[str, Any]) -> list[Block]:
     """The first effect against the nearest other names, and what would tell them apart."""
     rows = said.get("equivalence", [])
@@ -275,12 +212,12 @@ def _told_apart(said: Mapping[str, Any]) -> list[Block]:
     first, *others = rows
 
     def number(value: float | None, digits: int = 3) -> str:
-        return "-" if value is None else short(value, digits)
+        return _DASH if value is None else short(value, digits)
 
     cells = [(first["effect"], "", "", "", "", number(first["left_out"]), "")]
     cells += [
         (row["effect"], f"{row['angle_deg']:.0f}", number(row["distance"]), f"{row['evidence_behind']:.1f}",
-         "-" if row["left_out_behind"] is None else f"{row['left_out_behind']:.1f}", number(row["left_out"]),
+         _DASH if row["left_out_behind"] is None else f"{row['left_out_behind']:.1f}", number(row["left_out"]),
          "yes" if row["told_apart"] else "no")
         for row in others
     ]  # fmt: skip
@@ -295,24 +232,3 @@ def _told_apart(said: Mapping[str, Any]) -> list[Block]:
 
 def _there(drawn: Mapping[str, Block], *names: str) -> list[Block]:
     return [drawn[name] for name in names if name in drawn]
-
-
-def _gap(held_out: float | None, fitted: float) -> str:
-    return short(fitted if held_out is None else held_out, 3)
-
-
-def _which(gap: Mapping[str, Any]) -> str:
-    return "chi-square a sample, " + ("fitted trials" if gap["before"]["held_out"] is None else "held-out trials")
-
-
-def _by_phase(channels: Sequence[_Channel]) -> list[tuple[str, str, str, str]]:
-    found: dict[tuple[str, str], list[tuple[Array, Array]]] = {}
-    for c in channels:
-        for phase in dict.fromkeys(c.phase.tolist()):
-            rows = c.phase == phase
-            found.setdefault((phase, c.name), []).append((c.residual("before")[rows], c.residual("after")[rows]))
-    rows = []
-    for (phase, name), pairs in sorted(found.items()):
-        before, after = (float(np.mean(np.concatenate([pair[k] for pair in pairs]) ** 2)) for k in (0, 1))
-        rows.append((phase, name, short(before, 3), short(after, 3)))
-    return rows

@@ -8,8 +8,6 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -17,6 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from vis.page import Block, Page, Section, Tile, code, figure, listing, table, text, write_page
+from vis.palette import RED, line_handles, line_styles
 from vis.style import BED, GREY, MODEL, styled
 from vis.tumble import read_columns
 
@@ -51,8 +50,8 @@ def write_inspection_report(folder: str | Path, *, progress: Callable[[float], N
     figures.mkdir(exist_ok=True)
     plans = [
         ("recordings", "What was recorded", _draw_tumbles if result["kind"] == "tumble" else _draw_penetrations,
-         "Every channel of every trial, as recorded; at most twelve trials are drawn, those in which something was "
-         "found first. Red: where."),
+         "Every channel of every trial, as recorded; replicates share a colour. At most twelve trials are drawn, those "
+         "in which something was found first. Red: where, or a trial that is at odds with its replicates."),
         ("coverage", "What is there", _draw_coverage,
          "A line for each recording, from its first to its last row; white are gaps, red is what was found."),
     ]  # fmt: skip
@@ -81,24 +80,23 @@ def _mark(axis: Axes, result: Mapping[str, Any], channels: Sequence[str], shown:
     """Red where something was found in one of the channels."""
     for finding in result["findings"]:
         if finding["channel"] in channels and finding["trial"] in shown and finding["from_s"] is not None:
-            axis.axvspan(finding["from_s"], finding["to_s"], color="#c0392b", alpha=0.18, lw=0)
-            axis.axvline(finding["from_s"], color="#c0392b", lw=0.8)
+            axis.axvspan(finding["from_s"], finding["to_s"], color=RED, alpha=0.18, lw=0)
+            axis.axvline(finding["from_s"], color=RED, lw=0.8)
 
 
 def _draw_tumbles(folder: Path, result: Mapping[str, Any]) -> Figure:
     trials = _shown(result)
     held = {entry["sensor"] for entry in result["recordings"]}
     channels = [channel for channel in _TUMBLE if channel[0] in held]
-    drawing = Figure(figsize=(_WIDTH, 1.9 * math.ceil(len(channels) / 2) + 0.3 * math.ceil(len(trials) / 3)))
+    drawing = Figure(figsize=(_WIDTH, 1.9 * math.ceil(len(channels) / 2) + 0.12 * len(trials)))
     FigureCanvasAgg(drawing)
     axes = drawing.subplots(math.ceil(len(channels) / 2), 2, sharex=True, squeeze=False).ravel()
-    handles = []
-    for trial, colour in zip(trials, _colours(len(trials)), strict=True):
+    styles, handles = _lines(result, trials)
+    for trial in trials:
         files = _files(folder, result, trial["id"])
         for axis, (sensor, column, factor, _, _) in zip(axes, channels, strict=False):
             if sensor in files:
-                axis.plot(files[sensor]["t_s"], factor * files[sensor][column], color=colour, lw=0.8)
-        handles.append(Line2D([], [], color=colour, label=f"{trial['id']}: {trial['condition']}"))
+                axis.plot(files[sensor]["t_s"], factor * files[sensor][column], lw=0.9, **styles[trial["id"]])
     names = {trial["id"] for trial in trials}
     for axis, (sensor, _, _, label, channel) in zip(axes, channels, strict=False):
         axis.set_ylabel(label)
@@ -108,7 +106,7 @@ def _draw_tumbles(folder: Path, result: Mapping[str, Any]) -> Figure:
     for axis in axes[max(0, len(channels) - 2) : len(channels)]:
         axis.set_xlabel("time [s]")
         axis.tick_params(labelbottom=True)
-    drawing.legend(handles=handles, loc="outside upper left", ncols=3, fontsize=7.5)
+    drawing.legend(handles=handles, loc="outside upper left", ncols=2, fontsize=7.5)
     return drawing
 
 
@@ -125,32 +123,27 @@ def _draw_penetrations(folder: Path, result: Mapping[str, Any]) -> Figure:
                   (drops, "t_s", 1e3, "time since touch-down [ms]", "accel_m_s2", 1.0, "acceleration [m/s²]",
                    "accel")]  # fmt: skip
     rows = len(plans) // 2
-    drawing = Figure(figsize=(_WIDTH, 2.7 * rows + 0.2 * math.ceil(len(trials) / 3)))
+    drawing = Figure(figsize=(_WIDTH, 2.7 * rows + 0.1 * len(trials)))
     FigureCanvasAgg(drawing)
     axes = drawing.subplots(rows, 2, squeeze=False).ravel()
-    colours = dict(zip([trial["id"] for trial in trials], _colours(len(trials)), strict=True))
-    handles = [
-        Line2D([], [], color=colours[trial["id"]], label=f"{trial['id']}: {trial['condition']}") for trial in trials
-    ]
+    styles, handles = _lines(result, trials)
     for axis, (chosen, across, wide, below, up, tall, label, channel) in zip(axes, plans, strict=True):
         for trial in chosen:
             columns = _files(folder, result, trial["id"])["data"]
-            axis.plot(wide * columns[across], tall * columns[up], color=colours[trial["id"]], lw=0.8)
+            axis.plot(wide * columns[across], tall * columns[up], lw=0.9, **styles[trial["id"]])
             for finding in result["findings"]:
                 if finding["trial"] != trial["id"] or finding["from_s"] is None:
                     continue
                 if finding["channel"] not in (None, channel):
                     continue
                 rows_there = (columns["t_s"] >= finding["from_s"]) & (columns["t_s"] <= finding["to_s"])
-                axis.plot(
-                    wide * columns[across][rows_there], tall * columns[up][rows_there], ".", color="#c0392b", ms=3
-                )
+                axis.plot(wide * columns[across][rows_there], tall * columns[up][rows_there], ".", color=RED, ms=3)
         axis.axhline(0.0, color=GREY, lw=0.8)
         if up == "depth_m":
             axis.invert_yaxis()
         axis.set_xlabel(below)
         axis.set_ylabel(label)
-    drawing.legend(handles=handles, loc="outside upper left", ncols=3, fontsize=7.5)
+    drawing.legend(handles=handles, loc="outside upper left", ncols=2, fontsize=7.5)
     return drawing
 
 
@@ -172,20 +165,30 @@ def _draw_coverage(folder: Path, result: Mapping[str, Any]) -> Figure:
             own = finding["trial"] == entry["trial"] and of.get(channel, channel) == entry["sensor"]
             if own and finding["from_s"] is not None:
                 wide = max(finding["to_s"] - finding["from_s"], 0.004 * (end - start))
-                axis.barh(place, wide, left=finding["from_s"], height=0.3, color="#c0392b", lw=0)
+                axis.barh(place, wide, left=finding["from_s"], height=0.3, color=RED, lw=0)
     words = [f"{entry['trial']}  {entry['sensor'] if entry['sensor'] != 'data' else ''}".strip() for entry in entries]
     axis.set_yticks(range(len(entries)), words, fontsize=7.5)
     axis.invert_yaxis()
     axis.grid(False, axis="y")
     axis.set_xlabel("time [s]")
     kinds = list(dict.fromkeys(entry["sensor"] for entry in entries))
-    handles = [Patch(color=colours[kind], label=kind) for kind in kinds] + [Patch(color="#c0392b", label="found")]
+    handles = [Patch(color=colours[kind], label=kind) for kind in kinds] + [Patch(color=RED, label="found")]
     drawing.legend(handles=handles, loc="outside upper left", ncols=4, fontsize=7.5)
     return drawing
 
 
-def _colours(count: int) -> list[Any]:
-    return [mpl.colormaps["viridis"](share) for share in np.linspace(0.0, 0.92, max(1, count))]
+def _lines(result: Mapping[str, Any], trials: Sequence[Mapping[str, Any]]) -> tuple[dict[str, Any], list[Line2D]]:
+    """Colour and dash of each trial, that of its condition (red: at odds with its replicates), and the legend."""
+    odd = [finding["trial"] for finding in result["findings"] if "at odds" in finding["what"]]
+    usual = [trial for trial in trials if trial["id"] not in odd]
+    by_condition = line_styles([trial["condition"] for trial in usual])
+    styles = {trial["id"]: by_condition[trial["condition"]] for trial in usual}
+    styles |= {name: {"color": RED, "ls": "-"} for name in odd}
+    handles = line_handles([trial["id"] for trial in usual], [trial["condition"] for trial in usual])
+    handles += [
+        Line2D([], [], lw=1.6, color=RED, label=f"{trial['id']}: at odds") for trial in trials if trial["id"] in odd
+    ]
+    return styles, handles
 
 
 def _page(result: Mapping[str, Any], drawn: Sequence[Block]) -> Page:

@@ -20,6 +20,7 @@ from experiments.runfolder import write_json, write_series
 
 from .diagnosis import Diagnosis
 from .evidence import excess, inflation
+from .telling import PhaseTable
 
 __all__ = ["document", "write_diagnosis"]
 
@@ -27,6 +28,7 @@ __all__ = ["document", "write_diagnosis"]
 def document(found: Diagnosis) -> dict[str, Any]:
     """diagnosis.json."""
     effects = [{"id": effect, "parameters": found.parameters(effect)} for effect in found.effects]
+    settings = {trial.id: dict(trial.settings) for trial in found.problem.trials}
     said: dict[str, Any] = {
         "format": "hedgehog-diagnosis/1",
         "verdict": found.verdict,
@@ -34,7 +36,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
         "alternatives": list(found.alternatives) if found.verdict == "ambiguous" else [],
         "where": [
             {"trial": p.trial, "channel": p.channel, "phase": p.phase, "from_s": p.from_s, "to_s": p.to_s,
-             "excess": p.excess}
+             "excess": p.excess, "settings": settings[p.trial]}
             for p in found.where
         ],
         "gap": {
@@ -107,6 +109,7 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
             "score": np.array([r["score"] for r in rows]),
             "chi_square_left": np.array([r["left"] for r in rows]),
         })  # fmt: skip
+    phase_table = PhaseTable()
     for trial in problem.trials:
         before = problem.compare(found.base_values, (), trial.id)
         after = problem.compare(found.best_values, found.forms, trial.id)
@@ -119,8 +122,12 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
             columns = {"t_s": columns["t_s"], "measured": columns["measured"], "before": columns["model"],
                        "after": after[channel]["model"]}  # fmt: skip
             if len(columns["t_s"]) == int(rows_here.sum()):
-                columns |= {"std": samples.std[rows_here], "phase": phases[rows_here]}
+                std = samples.std[rows_here]
+                columns |= {"std": std, "phase": phases[rows_here]}
+                left = [(columns["measured"] - columns[stage]) / std for stage in ("before", "after")]
+                phase_table.add(channel, phases[rows_here], *left, held_out=trial.id in found.held_out)
             write_series(folder / "series" / f"{trial.id}.{channel}.csv", columns)
+    said["by_phase"] = phase_table.rows
     write_json(folder / "diagnosis.json", said)
     return said
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -11,8 +12,9 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from experiments.campaign import read_campaign
+from experiments.campaign import Campaign, read_campaign
 from experiments.diagnose_settings import DiagnoseSettings
+from experiments.plausible import find_implausible
 from experiments.progress import Progress
 from experiments.runfolder import RunFolder
 from hedgebed import __version__
@@ -21,6 +23,7 @@ from .diagnosis import Diagnosis, diagnose
 from .document import write_diagnosis
 from .own import load_own
 from .problem import Problem
+from .telling import told_tables, where_sentences
 
 __all__ = ["check", "diagnose_campaign", "resume", "run"]
 
@@ -50,7 +53,7 @@ def diagnose_campaign(
 
     `effect_file`: Python files with effects of one's own (`own`), which stand among the candidates.
     """
-    problem = _make_problem(Path(campaign), effect_file)
+    measured, problem = _make_problem(Path(campaign), effect_file)
     told = progress or Progress()
     stage = [""]
 
@@ -66,17 +69,18 @@ def diagnose_campaign(
 
         gates = cache_folder() / "gates"
     with threadpool_limits(1):  # matrices are small: threads of the linear algebra only get in each other's way
-        return diagnose(problem, thorough=thorough, seed=seed, tell=tell, gates=gates)
+        found = diagnose(problem, thorough=thorough, seed=seed, tell=tell, gates=gates)
+    return replace(found, findings=(*find_implausible(measured), *found.findings))
 
 
-def _make_problem(folder: Path, effect_file: Sequence[str | Path]) -> Problem:
+def _make_problem(folder: Path, effect_file: Sequence[str | Path]) -> tuple[Campaign, Problem]:
     campaign = read_campaign(folder)
     own = tuple(load_own(file) for file in effect_file)
     name = f"experiments.diagnose.{campaign.tables.kind}_problem"
     if find_spec(name) is None:
         raise ValueError(f"{folder}: kind = {campaign.tables.kind!r} cannot be diagnosed yet")
     with threadpool_limits(1):
-        return import_module(name).make_problem(campaign, own=own)
+        return campaign, import_module(name).make_problem(campaign, own=own)
 
 
 def _carry_out(settings: DiagnoseSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
@@ -121,7 +125,7 @@ def _result(found: Diagnosis, said: dict[str, Any]) -> dict[str, Any]:
     for effect in said["effects"]:
         for name, entry in effect["parameters"].items():
             quantities[f"{effect['id']}.{name}"] = entry
-    sentences = [said["next_experiment"]]
+    sentences = [*where_sentences(said), f"Next experiment: {said['next_experiment']}"]
     if "latent" in said:
         sentences.insert(0, f"What is missing depends on {said['latent']['depends_on']}.")
     more = getattr(found.problem, "remarks", None)
@@ -151,6 +155,7 @@ def _result(found: Diagnosis, said: dict[str, Any]) -> dict[str, Any]:
         "status": "done",
         "verdict": found.verdict,
         "quantities": quantities,
+        "tables": told_tables(said),
         "departures": {"sentences": sentences},
         "warnings": warnings,
     }

@@ -13,13 +13,18 @@ from experiments.campaign.tables import PenetrationTrial
 
 from .penetration_depth import SmoothDepth, smooth_depth
 from .problem import Array, Finding, TrialInfo
+from .stuck import stuck_rows
 
 __all__ = ["Prepared", "prepare"]
 
 _FEWEST = 12
 """Rows that a trial must have to say anything."""
 _AROUND = 20
-"""Rows on either side from which a speed is taken."""
+"""Rows on either side of a gap that tell whether the clock has jumped."""
+_LOST = 40
+"""Rows for which a marker may be lost before it counts as gone for good."""
+_SMOOTH, _ROUGH = 1.7, 3.0
+"""Chi-square a row up to which a polynomial goes through both sides of a gap, and beyond which it does not."""
 _OUTLIER = 8.0
 """Noise standard deviations beyond which a lone reading is a fault (once in 1e15 by chance)."""
 
@@ -104,12 +109,14 @@ def _one(
         time, depth, other = time[keep], depth[keep], other[keep]
     for name, values in (("depth", depth), (channel, other)):
         missing = int(np.isnan(values).sum())
-        if missing > 0.02 * len(values):
+        if missing == len(values):
+            say(f"not one of {missing} readings of {name} is a number")
+        elif missing > 0.02 * len(values):
             say(f"{missing} of {len(values)} readings of {name} are gaps; the rest is used")
-    jump = _clock_jump(time, depth, std_depth)
+    jump = _clock_jump(time, depth, std_depth) or (None if driven else _clock_jump(time, other, std_other))
     if jump is not None:
         rows = np.arange(jump, len(time))
-        say(f"the clock jumps by {time[jump] - time[jump - 1]:.3g} s where the depth goes on as if it had not; all "
+        say(f"the clock jumps by {time[jump] - time[jump - 1]:.3g} s where the motion goes on as if it had not; all "
             f"that follows is set aside", rows=rows)  # fmt: skip
         time, depth, other = time[:jump], depth[:jump], other[:jump]
     for name, values, std in (("depth", depth, std_depth), (channel, other, std_other)):
@@ -118,15 +125,28 @@ def _one(
         range_ = float(np.ptp(np.percentile(known, [0.5, 99.5]))) if name != "depth" and len(known) else 0.0
         lone = _lone_readings(values, max(std, 0.15 * range_))
         if len(lone):
-            what = f"{len(lone)} readings of {name} lie far from their neighbours and are set aside"
-            say(what, where=name, rows=lone)
+            several = f"{len(lone)} readings of {name} lie far from their neighbours and are set aside"
+            one = f"one reading of {name} lies far from its neighbours and is set aside"
+            say(several if len(lone) > 1 else one, where=name, rows=lone)
             values[lone] = np.nan
-    step = _lasting_step(time, depth, std_depth)
-    if step is not None:
-        rows = np.arange(step, len(depth))
-        say(f"the depth jumps by {1e3 * (depth[step] - depth[step - 1]):.3g} mm between two readings and stays there, "
-            f"as where a marker is lost; it is set aside from there on", where="depth", rows=rows)  # fmt: skip
-        depth[step:] = np.nan
+        stuck = stuck_rows(values)
+        if len(stuck):
+            say(f"{len(stuck)} readings of {name} repeat the one before where it never does otherwise: the sensor is "
+                f"stuck, they are set aside", where=name, rows=stuck)  # fmt: skip
+            values[stuck] = np.nan
+    step = _step(time, depth, std_depth)
+    while step is not None:
+        size = depth[step] - depth[step - 1]
+        back = _step(time[: step + _LOST], depth[: step + _LOST], std_depth, after=step)
+        if back is not None and abs(depth[back] - depth[back - 1] + size) > 0.5 * abs(size):
+            back = None
+        rows = np.arange(step, len(depth) if back is None else back)
+        stays = "stays there, as where a marker is lost; it is set aside from there on"
+        comes = f"comes back {len(rows)} rows later, as where a marker is lost for a while; these are set aside"
+        say(f"the depth jumps by {1e3 * size:.3g} mm between two readings and {stays if back is None else comes}",
+            where="depth", rows=rows)  # fmt: skip
+        depth[rows] = np.nan
+        step = None if back is None else _step(time, depth, std_depth, after=back)
     if driven:
         held = _held(other)
         if held is not None:
@@ -198,29 +218,34 @@ def _lone_readings(values: Array, std: float) -> NDArray[np.int64]:
     return known[suspect] if suspect.sum() <= 0.05 * len(v) else known[:0]
 
 
-def _lasting_step(time: Array, depth: Array, std: float) -> int | None:
-    """The row from which the depth is another, the speeds before and after it agreeing; None where there is none."""
+def _step(time: Array, depth: Array, std: float, *, after: int = 0) -> int | None:
+    """The first row beyond `after` at which the depth becomes another, the speeds on both sides agreeing; else None."""
     known = np.flatnonzero(np.isfinite(depth))
     t, d = time[known], depth[known]
     if len(t) < 20 or np.any(np.diff(t) <= 0):
         return None
-    for k in range(6, len(t) - 6):
+    first = int(np.searchsorted(known, after)) if after else 0
+    for k in range(max(3, first + 3), len(t) - 3):
         if abs(d[k] - d[k - 1]) < 12 * std:
             continue
-        before, after = slice(k - 6, k), slice(k, k + 6)
-        if t[k] - t[k - 1] > 4 * np.median(np.diff(t[k - 6 : k + 6])):
+        low, high = max(first, k - 6), min(len(t), k + 6)
+        if t[k] - t[k - 1] > 4 * np.median(np.diff(t[low:high])):
             continue
-        left, right = np.polyfit(t[before] - t[k], d[before], 1), np.polyfit(t[after] - t[k], d[after], 1)
+        left, right = (np.polyfit(t[side] - t[k], d[side], 1) for side in (slice(low, k), slice(k, high)))
         bend = abs(left[0] - right[0]) * (t[k] - t[k - 1])
         if abs(right[1] - left[1]) > 12 * std + 3 * bend + 0.8 * abs(left[0]) * (t[k] - t[k - 1]):
             return int(known[k])
     return None
 
 
-def _clock_jump(time: Array, depth: Array, std: float) -> int | None:
-    """The row at which the clock jumps forward while the motion does not; None where it never does."""
-    known = np.flatnonzero(np.isfinite(depth))
-    t, d = time[known], depth[known]
+def _clock_jump(time: Array, values: Array, std: float) -> int | None:
+    """The row at which the clock jumps forward while the motion does not; None where it never does.
+
+    One polynomial is laid through the rows on both sides of a gap, once with the times as they stand and once with the
+    gap closed, of the lowest degree up to 3 that fits the second: where the clock jumped, it does not fit the first.
+    """
+    known = np.flatnonzero(np.isfinite(values))
+    t, v = time[known], values[known]
     if len(t) < 2 * _AROUND:
         return None
     gaps = np.diff(t)
@@ -228,17 +253,22 @@ def _clock_jump(time: Array, depth: Array, std: float) -> int | None:
     for k in np.flatnonzero(gaps > 4 * usual) + 1:
         if k < _AROUND or k > len(t) - _AROUND:
             continue
-        before, after = slice(k - _AROUND, k), slice(k, k + _AROUND)
-        left, right = np.polyfit(t[before] - t[k - 1], d[before], 1), np.polyfit(t[after] - t[k], d[after], 1)
-        doubt = std * np.sqrt(12 / _AROUND) / (_AROUND * usual)  # of a slope
-        if abs(left[0] - right[0]) > 0.2 * max(abs(left[0]), abs(right[0])) + 4 * doubt:
-            continue
-        moved = right[1] - left[1]
-        if abs(moved - left[0] * gaps[k - 1]) > 12 * std + 4 * doubt * gaps[k - 1] and abs(moved - left[0] * usual) < (
-            5 * std + 4 * doubt * usual
-        ):
+        near = slice(k - _AROUND, k + _AROUND)
+        as_read = t[near] - t[k]
+        closed = as_read + np.where(as_read < 0, gaps[k - 1] - usual, 0.0)
+        for degree in (1, 2, 3):
+            stands, shut = (_beyond(degree, clock, v[near], std) for clock in (as_read, closed))
+            if shut < _SMOOTH:
+                break
+        if stands > max(_ROUGH, 2.5 * shut) and shut < _SMOOTH:
             return int(known[k])
     return None
+
+
+def _beyond(degree: int, time: Array, values: Array, std: float) -> float:
+    """Chi-square a row that the best polynomial leaves."""
+    fitted = np.polynomial.Polynomial.fit(time, values, degree)
+    return float(np.mean((values - fitted(time)) ** 2)) / max(std, 1e-300) ** 2
 
 
 def _held(values: Array) -> NDArray[np.bool_] | None:

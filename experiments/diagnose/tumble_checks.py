@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from .problem import Finding
+from .stuck import stuck_rows
 from .tumble_data import CHANNELS, TrialData, TumbleData
 
 __all__ = ["checked"]
@@ -42,6 +43,16 @@ def checked(data: TumbleData) -> tuple[TumbleData, list[Finding]]:
             if len(mine) < 8:
                 continue
             _gaps(trial, name, mine, findings)
+            stuck = stuck_rows(trial.value[mine])
+            if len(stuck):
+                keep[mine[stuck]] = False
+                findings.append(Finding(
+                    trial=trial.id, channel=name, from_s=float(trial.time[mine[stuck[0]]]),
+                    to_s=float(trial.time[mine[stuck[-1]]]), set_aside=True,
+                    what=f"{len(stuck)} rows of {name} repeat the one before where it never does otherwise: the sensor "
+                    f"is stuck, they are set aside",
+                ))  # fmt: skip
+                mine = np.delete(mine, stuck)
             if name in ("x", "y", "theta"):
                 _jumps(trial, name, mine, keep, findings)
         lost = {name: trial.time[trial.of(name) & ~keep] for name in ("x", "y", "theta")}
@@ -116,6 +127,8 @@ def _clocks(trial: TrialData, keep: NDArray[np.bool_], findings: list[Finding]) 
         if not told:
             continue
         clock = np.unique(trial.time[told[0]])
+        if len(clock) < 3:
+            continue
         steps = np.diff(clock)
         usual = float(np.median(steps))
         for k in np.flatnonzero(steps > max(4 * usual, 2e-3)):

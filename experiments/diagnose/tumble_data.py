@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 CHANNELS = ("x", "y", "theta", "gyro", "ax", "ay", "wheel")
 """Channels of a diagnosis, in the order of a trial's samples."""
 
+_LATEST = 1e3
+"""Seconds after the torque by which a trial must have begun: unix time would be simulated for years."""
 _COLUMNS = {
     "x": ("pose", "x_m", 0), "y": ("pose", "y_m", 1), "theta": ("pose", "theta_rad", 2),
     "gyro": ("imu", "gyro_rad_s", 0), "ax": ("imu", "ax_m_s2", 1), "ay": ("imu", "ay_m_s2", 2),
@@ -88,7 +90,8 @@ class TumbleData:
 
 
 def tumble_data(campaign: Campaign) -> TumbleData:
-    """The samples of `campaign`. Raises ValueError for one of another kind, a sensor with a std of 0, no sample."""
+    """The samples of `campaign`. Raises ValueError for one of another kind, a sensor with a std of 0, no sample,
+    a clock that does not begin with the torque."""
     tables = campaign.tables
     if not isinstance(tables, TumbleCampaign):
         raise ValueError(f"kind = {tables.kind!r}: 'tumble' was expected")
@@ -112,6 +115,8 @@ def tumble_data(campaign: Campaign) -> TumbleData:
         if not parts or not sum(len(part[0]) for part in parts):
             raise ValueError(f"trial {trial.id!r} holds no sample: numbers of at least one sensor were expected")
         time, value, std, channel = (np.concatenate(column) for column in zip(*parts, strict=True))
+        if time.min() > _LATEST:
+            raise ValueError(f"trial {trial.id!r} begins at t_s = {time.min():.10g}: t = 0 is when the torque starts")
         trials.append(
             TrialData(
                 id=trial.id,

@@ -134,7 +134,7 @@ def test_lone_readings_and_gaps_are_left_out_and_a_clock_that_jumps_ends_the_tri
     )
     assert len(problem.samples("d").time) == 300 - 10 - 1
     said = " ".join(finding.what for finding in problem.findings)
-    assert "clock jumps" in said and "far from their neighbours" in said and "gaps" in said
+    assert "clock jumps" in said and "far from its neighbours" in said and "gaps" in said
 
 
 def test_a_fitted_model_file_reads_back_with_its_effects(tmp_path):

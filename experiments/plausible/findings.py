@@ -1,0 +1,113 @@
+"""What is implausible about a campaign, as findings that name their trial; and sensors louder than stated."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.campaign import Campaign, PenetrationCampaign, TumbleCampaign
+from experiments.campaign.tables import PenetrationTrial, TumbleTrial
+from experiments.diagnose.problem import Finding
+
+from .penetration import penetration_oddities
+from .tumble import tumble_oddities
+from .words import times
+
+__all__ = ["find_implausible", "loud_sensors"]
+
+Array = NDArray[np.float64]
+
+_MANY = 4
+"""Trials of which the same is said once."""
+_LOUD = 2.0
+"""Times the stated noise from which on a sensor is called louder."""
+
+
+def find_implausible(campaign: Campaign) -> list[Finding]:
+    """What cannot be as it stands, a sentence each, trial after trial."""
+    tables = campaign.tables
+    found: list[Finding] = []
+    for trial in tables.trial:
+        if isinstance(tables, PenetrationCampaign):
+            assert isinstance(trial, PenetrationTrial)
+            recording = campaign.recording(trial.id, "data")
+            odd = [] if recording is None else list(penetration_oddities(tables, trial, recording))
+        else:
+            assert isinstance(trial, TumbleTrial)
+            odd = list(tumble_oddities(campaign, tables, trial))
+        found += [Finding(trial=trial.id, channel=channel, what=f"trial {trial.id}: {what}") for channel, what in odd]
+    return _once(found)
+
+
+def _once(found: list[Finding]) -> list[Finding]:
+    """What is odd alike in many trials is said once, of the first."""
+    alike: dict[tuple[str | None, str], list[Finding]] = {}
+    for finding in found:
+        pattern = re.sub(r"[-+.0-9e]*[0-9]", "#", finding.what.removeprefix(f"trial {finding.trial}: "))
+        alike.setdefault((finding.channel, pattern), []).append(finding)
+    merged = []
+    for several in alike.values():
+        first = several[0]
+        if len(several) < _MANY:
+            merged += several
+            continue
+        others = ", ".join(finding.trial for finding in several[1:_MANY]) + (", ..." if len(several) > _MANY else "")
+        merged.append(replace(first, what=f"{first.what} (and alike in {len(several) - 1} more: {others})"))
+    return merged
+
+
+def loud_sensors(campaign: Campaign) -> list[Finding]:
+    """Sensors whose readings scatter from row to row by far more than the noise that campaign.toml states.
+
+    Fourth differences, of which a smooth motion leaves little; the median of a trial, so that touches do not count; the
+    median over the trials. A bed whose grains jam and give way makes the force do the same, and the sentence says so.
+    """
+    tables = campaign.tables
+    ratios: dict[tuple[str, str], list[float]] = {}
+    stated: dict[tuple[str, str], float] = {}
+    for trial in tables.trial:
+        for sensor in trial.files:
+            recording = campaign.recording(trial.id, sensor)
+            if recording is None:
+                continue
+            for column, name, std in _noises(tables, trial, sensor):
+                scatter = _scatter(recording[column])
+                if scatter is not None and std > 0:
+                    ratios.setdefault((name, column), []).append(scatter / std)
+                    stated[name, column] = std
+    found = []
+    for (name, column), own in ratios.items():
+        ratio = float(np.median(own))
+        if ratio > _LOUD:
+            scatter = f"{column} scatters from row to row by {ratio * stated[name, column]:.2g}, {times(ratio)} what "
+            cause = f"[sensors.{name}] states: a louder sensor, or something that moves as fast as it is read"
+            found.append(Finding(trial="", what=scatter + cause))
+    return found
+
+
+def _noises(
+    tables: TumbleCampaign | PenetrationCampaign, trial: TumbleTrial | PenetrationTrial, sensor: str
+) -> Iterator[tuple[str, str, float]]:
+    """(column, key of [sensors], std as stated)."""
+    if isinstance(trial, PenetrationTrial):
+        pairs = [("depth_m", "depth"), ("force_N", "force") if trial.mode == "driven" else ("accel_m_s2", "accel")]
+        for column, name in pairs:
+            table = getattr(tables.sensors, name)
+            if table is not None:
+                yield column, name, table.std[0]
+        return
+    for (quantity, unit), std in zip(trial.columns(sensor)[1:], getattr(tables.sensors, sensor).std, strict=True):
+        yield f"{quantity}_{unit}", sensor, std
+
+
+def _scatter(values: Array) -> float | None:
+    """Noise of neighbouring readings; None of too few, and of readings that are held or coarsely rounded."""
+    known = values[np.isfinite(values)]
+    if len(known) < 40 or np.mean(np.diff(known) == 0) > 0.2:
+        return None
+    return float(np.median(np.abs(np.diff(known, 4)))) / 0.6745 / math.sqrt(70)

@@ -1,0 +1,132 @@
+"""Pushes and drops that are not what the format asks for: signs, units, zeros, speeds, what an accelerometer reads."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.campaign import PenetrationCampaign, Recording
+from experiments.campaign.tables import PenetrationTrial
+from rigid.rig import STANDARD_GRAVITY
+
+from .words import OFF, ZERO, Odd, said, std_of, times
+
+__all__ = ["penetration_oddities"]
+
+Array = NDArray[np.float64]
+
+_DEEP = 30.0
+"""Diameters beyond which a depth over `_DEEP_METRES` is doubted."""
+_DEEP_METRES = 0.3
+
+
+def penetration_oddities(tables: PenetrationCampaign, trial: PenetrationTrial, data: Recording) -> Iterator[Odd]:
+    time, depth = data.time, data["depth_m"]
+    known = np.isfinite(depth)
+    if known.sum() < 12:
+        return
+    deepest, std = float(depth[known].max()), std_of(tables.sensors.depth)
+    highest = -float(depth[known].min())
+    if deepest <= 3 * std or (trial.mode == "driven" and highest > 3 * deepest + 3 * std):
+        yield said(
+            "depth",
+            f"the depth goes from {-1e3 * highest:.3g} to {1e3 * deepest:.3g} mm, hardly into the bed; ",
+            "it is positive downwards from the undisturbed surface",
+        )
+        return
+    diameter = tables.diameter_of(trial)
+    if deepest > max(_DEEP * diameter, _DEEP_METRES):
+        yield said(
+            "depth",
+            f"the depth goes to {deepest:.3g} m, {deepest / diameter:.0f} diameters: is depth_m in mm? depth_mm would ",
+            "say so",
+        )
+        return
+    if trial.mode == "driven":
+        yield from _driven(tables, trial, time, depth, data["force_N"], std)
+    else:
+        yield from _drop(tables, trial, time, depth, data["accel_m_s2"], std)
+
+
+def _driven(
+    tables: PenetrationCampaign, trial: PenetrationTrial, time: Array, depth: Array, force: Array, std: float
+) -> Iterator[Odd]:
+    last = int(np.nanargmax(depth))
+    into = np.arange(len(depth)) <= last
+    deep = into & (depth > 0.3 * depth[last]) & np.isfinite(force)
+    if deep.sum() >= 8 and float(np.median(force[deep])) < -4 * std_of(tables.sensors.force):
+        yield said(
+            "force",
+            f"the force is {np.median(force[deep]):.3g} N in the middle of the way in, downwards; the bed's force on ",
+            "the spike, upwards, was expected",
+        )
+    above = into & (depth < -3 * std - 0.02 * depth[last]) & np.isfinite(force)
+    if above.sum() >= 3:
+        zero = float(np.median(force[above]))
+        error = 1.25 * std_of(tables.sensors.force) / math.sqrt(above.sum())
+        if abs(zero) > max(OFF * error, std_of(tables.sensors.force)):
+            yield said(
+                "force",
+                f"the force reads {zero:.3g} N above the surface, {times(abs(zero) / std_of(tables.sensors.force))} ",
+                "its noise: its zero, or the spike's weight, is to be taken off",
+            )
+    if trial.speed:
+        moving = into & (depth > 0.05 * depth[last]) & (depth < 0.95 * depth[last])
+        if moving.sum() >= 8 and np.ptp(time[moving]) > 0:
+            speed = float(np.polyfit(time[moving], depth[moving], 1)[0])
+            if not 0.5 < speed / trial.speed < 2.0:
+                yield said("depth", f"speed = {trial.speed:g} m/s, but the depth goes in at {speed:.3g} m/s")
+
+
+def _drop(
+    tables: PenetrationCampaign, trial: PenetrationTrial, time: Array, depth: Array, accel: Array, std: float
+) -> Iterator[Odd]:
+    assert trial.speed is not None
+    both = np.isfinite(depth) & np.isfinite(accel) & (time >= 0)
+    if both.sum() >= 12:
+        yield from _second_derivative(trial, time[both], depth[both], accel[both], std)
+    known = np.isfinite(depth) & (np.abs(time) < 0.2 * max(float(np.nanmax(depth)), 1e-9) / trial.speed)
+    if known.sum() >= 6 and np.ptp(time[known]) > 0:
+        (_, speed, start), covariance = np.polyfit(time[known], depth[known], 2, cov="unscaled")
+        errors = max(std, 1e-12) * np.sqrt(np.diag(covariance))
+        if abs(start) > max(OFF * errors[2], ZERO * std):
+            yield said(
+                "depth",
+                f"the depth is {1e3 * start:.3g} mm at t = 0; t = 0 is the first touch, where it was expected to be 0",
+            )
+        elif abs(speed - trial.speed) > max(OFF * errors[1], 0.2 * trial.speed):
+            yield said("depth", f"speed = {trial.speed:g} m/s at the surface, but the depth goes in at {speed:.3g} m/s")
+
+
+def _second_derivative(trial: PenetrationTrial, time: Array, depth: Array, accel: Array, std: float) -> Iterator[Odd]:
+    """Is accel_m_s2 the second derivative of the depth, or what an accelerometer reads?"""
+    step = np.diff(time)
+    if not len(step) or step.max() > 10 * np.median(step):
+        return  # a gap: nothing can be integrated across it
+
+    def twice(values: Array) -> Array:
+        once = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * step)])
+        return np.concatenate([[0.0], np.cumsum(0.5 * (once[1:] + once[:-1]) * step)])
+
+    straight = np.column_stack([np.ones(len(time)), time])
+    of_accel, of_gravity = twice(accel), 0.5 * trial.gravity * (time - time[0]) ** 2
+
+    def left(model: Array) -> float:
+        rest = depth - model
+        rest = rest - straight @ np.linalg.lstsq(straight, rest, rcond=None)[0]
+        return float(np.sqrt(np.mean(rest**2)))
+
+    as_asked = left(of_accel)
+    others = {
+        "the sign is reversed: downwards is positive": -of_accel,
+        "it is what an accelerometer reads, 0 in free fall: gravity is to be added": of_accel + of_gravity,
+        "it is what an accelerometer reads, upwards positive: gravity less the reading is d2(depth)/dt2":
+            of_gravity - of_accel,
+        "it looks like units of g: accel_g would say so": STANDARD_GRAVITY * of_accel,
+    }  # fmt: skip
+    words, best = min(((words, left(model)) for words, model in others.items()), key=lambda pair: pair[1])
+    if as_asked > ZERO * std and best < 0.2 * as_asked:
+        yield said("accel", f"accel_m_s2 is not the second derivative of the depth; {words}")

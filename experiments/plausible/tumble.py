@@ -1,0 +1,180 @@
+"""Tumbles that are not what the format asks for: the camera's zero, gyro, wheel, gravity."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.campaign import Campaign, Recording, TumbleCampaign
+from experiments.campaign.tables import TumbleTrial
+
+from .words import OFF, ZERO, Odd, said, times, unit_words
+
+__all__ = ["tumble_oddities"]
+
+Array = NDArray[np.float64]
+
+_SCALE = 0.1
+"""Relative difference of gyro and camera that neither noise nor a clock makes."""
+_TURNS = {
+    -1.0: "one of the two has its sign reversed: clockwise is positive",
+    180 / math.pi: "gyro_rad_s looks like degrees a second: gyro_deg_s would say so",
+    math.pi / 180: "theta_rad looks like degrees: theta_deg would say so",
+    30 / math.pi: "gyro_rad_s looks like revolutions a minute: gyro_rpm would say so",
+}
+_NO_TURN = "one of the two has another scale, or is not about the axis of rotation"
+_LATE = 0.03
+"""Seconds by which the wheel may begin to change late before t = 0 is doubted."""
+
+
+def tumble_oddities(campaign: Campaign, tables: TumbleCampaign, trial: TumbleTrial) -> Iterator[Odd]:
+    pose, imu, wheel = (campaign.recording(trial.id, sensor) for sensor in ("pose", "imu", "wheel"))
+    for name, recording in (("pose", pose), ("imu", imu), ("wheel", wheel)):
+        if recording is not None and len(recording) and not recording.time[0] < 1.0 <= 1.0 + recording.time[-1]:
+            yield said(
+                name,
+                f"{name} runs from {recording.time[0]:.7g} to {recording.time[-1]:.7g} s; t = 0 is when the torque ",
+                "starts",
+            )
+            return
+    turning = list(_turning(pose, imu)) if pose is not None and imu is not None else []
+    yield from turning
+    if pose is not None:
+        yield from _start(tables, pose, angle=not turning)
+    if imu is not None:
+        yield from _at_rest(tables, trial, imu)
+    if wheel is not None:
+        yield from _wheel(tables, trial, wheel)
+
+
+def _start(tables: TumbleCampaign, pose: Recording, *, angle: bool) -> Iterator[Odd]:
+    """x = 0, theta = 0 (unless the angle is known to be odd) and the height of a platform that stands on two rows."""
+    sensor = tables.sensors.pose
+    assert sensor is not None
+    height = tables.platform.spike_length * math.cos(math.pi / tables.platform.rows)
+    expected = {"y_m": (height, "m", 1), "x_m": (0.0, "m", 0), "theta_rad": (0.0, "rad", 2)}
+    for column, (value, unit, place) in expected.items():
+        std = sensor.std[place]
+        early, channel = _early(pose, column), column.split("_")[0]
+        if len(early) < 2:
+            continue
+        there = float(np.median(early))
+        words = unit_words(there / value) if value else None
+        if words is not None:
+            yield said(channel, f"{column} is {there:.4g} at the start where {value:.4g} was expected; {words}")
+            return
+        if column == "theta_rad" and not angle:
+            continue
+        if abs(there - value) > (ZERO + OFF / math.sqrt(len(early))) * std:
+            yield said(
+                channel,
+                f"{column} is {there:.4g} {unit} at the start where {value:.4g} was expected, ",
+                f"{times(abs(there - value) / std)} the camera's noise: its zero is to be taken off (up to 3 times ",
+                "is allowed for)",
+            )
+
+
+def _turning(pose: Recording, imu: Recording) -> Iterator[Odd]:
+    """The gyro, integrated, against the camera's angle."""
+    angle, rate = pose["theta_rad"], imu["gyro_rad_s"]
+    seen, felt = np.isfinite(angle), np.isfinite(rate)
+    if min(seen.sum(), felt.sum()) < 20:
+        return
+    time, steps = imu.time[felt], np.diff(imu.time[felt])
+    if steps.max() > max(10 * np.median(steps), 0.05):
+        return
+    turned = np.concatenate([[0.0], np.cumsum(0.5 * (rate[felt][1:] + rate[felt][:-1]) * steps)])
+    inside = seen & (pose.time >= time[0]) & (pose.time <= time[-1])
+    if inside.sum() < 20:
+        return
+    by_gyro, by_camera = np.interp(pose.time[inside], time, turned), angle[inside]
+    if np.ptp(by_camera) == 0 or np.ptp(by_gyro) == 0 or abs(np.corrcoef(by_gyro, by_camera)[0, 1]) < 0.98:
+        return
+    slope = float(np.polyfit(by_camera, by_gyro, 1)[0])
+    if abs(slope - 1) > _SCALE:
+        words = next((words for ratio, words in _TURNS.items() if abs(slope / ratio - 1) < _SCALE), _NO_TURN)
+        yield said("gyro", f"the gyro turns {slope:.3g} times as far as the camera's angle; {words}")
+
+
+def _at_rest(tables: TumbleCampaign, trial: TumbleTrial, imu: Recording) -> Iterator[Odd]:
+    """Specific force before the torque starts: 0 along body x, the local gravity along body y."""
+    sensor = tables.sensors.imu
+    assert sensor is not None
+    gravity = tables.local_gravity_of(trial)
+    up = _early(imu, "ay_m_s2")
+    if len(up) < 2 or gravity < 20 * sensor.std[2]:
+        return
+    there = float(np.median(up))
+    words = unit_words(there / gravity)
+    if words is None and abs(there - gravity) > 0.2 * gravity:
+        words = "which axis is up, and is gravity in it?"
+    if words is not None:
+        yield said(
+            "ay",
+            f"ay_m_s2 is {there:.4g} at rest where the local gravity, {gravity:.4g} m/s2, was expected; ",
+            words,
+        )
+
+
+def _wheel(tables: TumbleCampaign, trial: TumbleTrial, wheel: Recording) -> Iterator[Odd]:
+    """Its speed at the start, and how fast it changes at first: torque / wheel inertia."""
+    sensor = tables.sensors.wheel
+    assert sensor is not None
+    speed = wheel["omega_rad_s"]
+    expected = trial.torque / tables.wheel.inertia * (1 if trial.actuator == "motor" else -1)
+    until = min(trial.torque_until, 0.3, 0.5 * trial.wheel_speed_0 / abs(expected) if expected < 0 else math.inf)
+    early = _early(wheel, "omega_rad_s") if (wheel.time < 0).any() else speed[:0]
+    if len(early) >= 2:
+        there = float(np.median(early))
+        words = unit_words(there / trial.wheel_speed_0) if trial.wheel_speed_0 > 20 * sensor.std[0] else None
+        if words is not None or abs(there - trial.wheel_speed_0) > max(10 * sensor.std[0], 0.05 * trial.wheel_speed_0):
+            yield said(
+                "wheel",
+                f"the wheel turns at {there:.4g} rad/s at the start where wheel_speed_0 = {trial.wheel_speed_0:g}"
+                if words is None
+                else f"; {words}",
+            )
+            return
+    rows = (wheel.time >= 0) & (wheel.time <= until) & np.isfinite(speed)
+    if rows.sum() < 6 or abs(expected) * np.ptp(wheel.time[rows]) < 20 * sensor.std[0]:
+        return
+    slope = float(np.polyfit(wheel.time[rows], speed[rows], 1)[0])
+    words = unit_words(slope / expected)
+    if words is None and not 0.6 < slope / expected < 1.6:
+        late = _onset(wheel.time, speed, trial.wheel_speed_0, expected, sensor.std[0])
+        if late is not None:
+            yield said("wheel", f"the wheel's speed begins to change at {late:.3g} s; t = 0 is when the torque starts")
+            return
+        words = "the torque or the wheel's inertia is another"
+    if words is not None:
+        yield said(
+            "wheel",
+            f"the wheel's speed changes by {slope:.4g} rad/s2 at first where torque / [wheel] inertia = ",
+            f"{expected:.4g}; {words}",
+        )
+
+
+def _onset(time: Array, speed: Array, start: float, slope: float, std: float) -> float | None:
+    """When the wheel begins to change as it should have from t = 0 [s]; None where it never does."""
+    known = np.isfinite(speed)
+    time, change = time[known], (speed[known] - start) * math.copysign(1.0, slope)
+    moved = np.flatnonzero(change > max(20 * std, 0.02 * abs(slope)))
+    if not len(moved):
+        return None
+    rows = (time >= time[moved[0]]) & (time <= time[moved[0]] + 0.2)
+    if rows.sum() < 6:
+        return None
+    found, zero = np.polyfit(time[rows], change[rows], 1)
+    onset = -zero / found if found > 0 else 0.0
+    return float(onset) if 0.6 < found / abs(slope) < 1.6 and onset > _LATE else None
+
+
+def _early(recording: Recording, column: str) -> Array:
+    """Readings before the torque starts; where there are none, those of the first 20 ms."""
+    values, time = recording[column], recording.time
+    known = np.isfinite(values)
+    rows = known & (time < 0) if (known & (time < 0)).sum() >= 2 else known & (time <= 0.02)
+    return np.asarray(values[rows])

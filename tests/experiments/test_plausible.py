@@ -1,0 +1,98 @@
+"""Recordings that are not what the format asks for are said by what is wrong with them; others are left in peace."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.campaign import Campaign, Recording, read_campaign
+from experiments.campaign.templates import TEMPLATES
+from experiments.inspection import find_faults
+
+GRAVITY = 9.80665
+
+
+def changed(kind: str, trial: str, sensor: str, change: Callable[[dict[str, np.ndarray]], None]) -> Campaign:
+    """The template of a kind with the columns of one recording changed."""
+    campaign = read_campaign(TEMPLATES / f"template-{kind}")
+    columns = {name: column.copy() for name, column in campaign.recordings[trial, sensor].columns.items()}
+    change(columns)
+    return replace(campaign, recordings={**campaign.recordings, (trial, sensor): Recording(columns)})
+
+
+def times(name: str, factor: float, plus: float = 0.0) -> Callable[[dict[str, np.ndarray]], None]:
+    """That column becomes factor x column + plus."""
+
+    def change(columns: dict[str, np.ndarray]) -> None:
+        columns[name] = factor * columns[name] + plus
+
+    return change
+
+
+def frozen(columns: dict[str, np.ndarray]) -> None:
+    columns["force_N"][60:90] = columns["force_N"][60]
+
+
+def lost_for_a_while(columns: dict[str, np.ndarray]) -> None:
+    columns["depth_m"][60:70] += 0.02
+
+
+@pytest.mark.parametrize(
+    ("kind", "trial", "sensor", "change", "said"),
+    [
+        ("tumble", "001", "pose", times("theta_rad", 57.3), "theta_deg would say so"),
+        ("tumble", "001", "imu", times("gyro_rad_s", 57.3), "gyro_deg_s would say so"),
+        ("tumble", "001", "imu", times("gyro_rad_s", -1.0), "sign reversed"),
+        ("tumble", "001", "pose", times("y_m", 1e3), "thousandths"),
+        ("tumble", "001", "pose", times("x_m", 1.0, 0.02), "its zero is to be taken off"),
+        ("tumble", "001", "imu", times("ay_m_s2", 1 / GRAVITY), "units of g"),
+        ("tumble", "001", "wheel", times("omega_rad_s", 9.55), "revolutions per minute"),
+        ("tumble", "001", "wheel", times("t_s", 1.0, 0.2), "begins to change at 0.199 s"),
+        ("penetration", "001", "data", times("depth_m", 1e3), "depth_mm would say so"),
+        ("penetration", "001", "data", times("depth_m", -1.0), "hardly into the bed"),
+        ("penetration", "001", "data", times("force_N", -1.0), "the bed's force on the spike, upwards, was expected"),
+        ("penetration", "001", "data", times("force_N", 1.0, 4.9), "the spike's weight, is to be taken off"),
+        ("penetration", "001", "data", times("t_s", 0.1), "speed = 0.01 m/s, but the depth goes in at 0.098"),
+        ("penetration", "003", "data", times("accel_m_s2", 1.0, -GRAVITY), "gravity is to be added"),
+        ("penetration", "003", "data", times("accel_m_s2", -1.0, GRAVITY), "gravity less the reading"),
+        ("penetration", "001", "data", frozen, "the sensor is stuck"),
+        ("penetration", "001", "data", lost_for_a_while, "comes back 10 rows later"),
+    ],
+)
+def test_what_is_wrong_with_a_recording_is_said(kind, trial, sensor, change, said):
+    told = [finding.what for finding in find_faults(changed(kind, trial, sensor, change)) if finding.trial == trial]
+    assert any(said in what for what in told), told
+
+
+def test_nothing_is_wrong_with_the_templates():
+    assert find_faults(read_campaign(TEMPLATES / "template-penetration")) == []
+    told = [finding.what for finding in find_faults(read_campaign(TEMPLATES / "template-tumble"))]
+    assert told == ["trial 002 has no recording of imu, others have"]
+
+
+def test_what_is_odd_alike_in_many_trials_is_said_once():
+    campaign = read_campaign(TEMPLATES / "template-penetration")
+    (first, *_), data = campaign.tables.trial, campaign.recordings["001", "data"]
+    wrong = Recording({**data.columns, "force_N": -data["force_N"]})
+    trials = tuple(first.model_copy(update={"id": f"{k}"}) for k in range(6))
+    many = replace(
+        campaign, tables=campaign.tables.model_copy(update={"trial": trials}),
+        recordings={(trial.id, "data"): wrong for trial in trials},
+    )  # fmt: skip
+    told = [finding.what for finding in find_faults(many) if "upwards, was expected" in finding.what]
+    assert len(told) == 1 and "alike in 5 more" in told[0]
+
+
+def test_a_sensor_louder_than_stated_is_said():
+    noise = np.random.default_rng(1)
+
+    def louder(columns: dict[str, np.ndarray]) -> None:
+        columns["force_N"] += 0.3 * noise.standard_normal(len(columns["force_N"]))
+
+    campaign = changed("penetration", "001", "data", louder)
+    one = campaign.tables.model_copy(update={"trial": campaign.tables.trial[:1]})
+    told = [finding.what for finding in find_faults(replace(campaign, tables=one))]
+    assert any("times what [sensors.force] states" in what for what in told), told

@@ -1,0 +1,315 @@
+"""Figures of a diagnosis: measured against both models, what is left by phase, candidates, the latent force."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from vis.style import BED, GREY, INK, MODEL
+from vis.tumble import state_runs
+
+__all__ = ["Channel", "draw_evidence", "draw_latent", "draw_phases", "draw_trajectories", "read_channel", "worst"]
+
+Array = NDArray[np.float64]
+
+_WIDTH = 8.6
+_MOST_ROWS = 6
+_MOST_BARS = 14
+#: channel -> (what it is, unit, factor on SI)
+_QUANTITIES: dict[str, tuple[str, str, float]] = {
+    "x": ("x", "mm", 1e3),
+    "y": ("y", "mm", 1e3),
+    "theta": ("θ", "degrees", 180 / math.pi),
+    "gyro": ("gyro", "rad/s", 1.0),
+    "ax": ("specific force, body x", "m/s²", 1.0),
+    "ay": ("specific force, body y", "m/s²", 1.0),
+    "wheel": ("wheel", "rad/s", 1.0),
+    "depth": ("depth", "mm", 1e3),
+    "force": ("force", "N", 1.0),
+    "accel": ("acceleration", "m/s²", 1.0),
+}
+_PHASES = {"stand": "#b9b9b9", "pivot": "#009E73", "slip": "#CC79A7", "hop": "#9fd0f0",
+           "free": "#9fd0f0", "in": "#b9b9b9", "rest": "#E69F00", "out": "#CC79A7"}  # fmt: skip
+#: column of latent.csv -> axis label and factor; what is not here is shown under its own name
+_COLUMNS: dict[str, tuple[str, float]] = {
+    "t_s": ("time [s]", 1.0),
+    "depth_m": ("depth [mm]", 1e3),
+    "retreat_m": ("way back from the deepest point [mm]", 1e3),
+    "velocity_m_s": ("velocity, downwards [m/s]", 1.0),
+    "speed_m_s": ("nominal speed of the trial [m/s]", 1.0),
+    "diameter_m": ("diameter [mm]", 1e3),
+    "gravity_m_s2": ("gravity of the trial [m/s²]", 1.0),
+    "torque_N_m": ("torque of the trial [N m]", 1.0),
+    "x_m": ("x [mm]", 1e3),
+    "y_m": ("y [mm]", 1e3),
+    "theta_rad": ("θ [degrees]", 180 / math.pi),
+    "vx_m_s": ("velocity along the surface [m/s]", 1.0),
+    "vy_m_s": ("velocity upwards [m/s]", 1.0),
+    "omega_rad_s": ("rate of rotation [rad/s]", 1.0),
+    "wheel_rad_s": ("wheel [rad/s]", 1.0),
+    "state": ("state", 1.0),
+    "latent_force_N": ("missing force [N]", 1.0),
+    "latent_force_x_N": ("missing force along x [N]", 1.0),
+    "latent_force_y_N": ("missing force along y [N]", 1.0),
+    "latent_torque_N_m": ("missing torque [N m]", 1.0),
+}
+_BINS = 20
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One channel of one trial, all arrays of one shape."""
+
+    trial: str
+    name: str
+    time: Array
+    measured: Array
+    before: Array
+    after: Array
+    std: Array
+    phase: NDArray[np.str_]
+
+    def residual(self, stage: str) -> Array:
+        """(measured - model) / std."""
+        return (self.measured - getattr(self, stage)) / self.std
+
+
+def read_channel(path: Path) -> Channel:
+    """The series <trial>.<channel>.csv."""
+    with path.open(newline="", encoding="utf-8") as file:
+        head, *rows = list(csv.reader(file))
+    columns = dict(zip(head, zip(*rows, strict=True), strict=True)) if rows else dict.fromkeys(head, ())
+    trial, _, name = path.stem.rpartition(".")
+
+    def numbers(key: str) -> Array:
+        return np.array(columns[key], dtype=float) if key in columns else np.ones(len(rows))
+
+    phase = np.array(columns.get("phase", [""] * len(rows)), dtype=str)
+    return Channel(trial, name, numbers("t_s"), numbers("measured"), numbers("before"), numbers("after"),
+                   numbers("std"), phase)  # fmt: skip
+
+
+def worst(channels: Sequence[Channel], held: set[str]) -> list[Channel]:
+    """At most six channels in which the base model fails most, two of them held out where some are.
+
+    No channel is shown more than twice while there are others.
+    """
+    order = sorted(channels, key=lambda c: -float(np.mean(c.residual("before") ** 2)))
+    kinds = len({c.name for c in channels})
+    each = max(2, math.ceil(_MOST_ROWS / max(1, kinds)))
+    kept = min(2, sum(c.trial in held for c in channels))
+    chosen: list[Channel] = []
+    for part, most in ((False, _MOST_ROWS - kept), (True, _MOST_ROWS)):
+        for channel in order:
+            alike = sum(c.name == channel.name for c in chosen)
+            if (channel.trial in held) is part and alike < each and len(chosen) < most:
+                chosen.append(channel)
+    return chosen
+
+
+# Measured, before, after ----------------------------------------------------------------------------------------------
+
+
+def draw_trajectories(channels: Sequence[Channel], held: set[str], labels: tuple[str, str]) -> Figure | None:
+    """A row a channel: measured and both models on the left, residuals over the noise on the right.
+
+    `labels`: what the models before and after are called; an empty one is not drawn.
+    """
+    if not channels:
+        return None
+    drawing = Figure(figsize=(_WIDTH, 0.8 + 1.72 * len(channels)))
+    FigureCanvasAgg(drawing)
+    axes = drawing.subplots(len(channels), 2, squeeze=False)
+    models = [("before", MODEL, (0, (4, 2)), labels[0]), ("after", BED, "-", labels[1])]
+    models = [entry for entry in models if entry[3]]
+    for (left, right), c in zip(axes, channels, strict=True):
+        what, unit, factor = _QUANTITIES.get(c.name, (c.name, "SI", 1.0))
+        quick = np.ptp(c.time) < 0.5
+        time = c.time * (1e3 if quick else 1.0)
+        step = max(1, len(time) // 160)
+        right.axhspan(-2, 2, color="#e3e8ec", lw=0)
+        for stage, colour, dash, _ in models:
+            left.plot(time, factor * getattr(c, stage), color=colour, ls=dash, lw=1.4, zorder=3)
+            right.plot(time, c.residual(stage), color=colour, lw=0.8, ls="-")
+        left.plot(time[::step], factor * c.measured[::step], ".", color=INK, ms=2.4, zorder=2)
+        for axis in (left, right):
+            _strip(axis, time, c.phase)
+            axis.set_xlabel("time [ms]" if quick else "time [s]", labelpad=1)
+        left.set_title(f"{c.trial}, {what}" + (" (held out)" if c.trial in held else ""))
+        left.set_ylabel(f"{what.split(',')[0]} [{unit}]")
+        right.set_ylabel("residual / noise")
+    handles: list[Any] = [Line2D([], [], color=INK, ls="", marker=".", label="measured")]
+    handles += [Line2D([], [], color=colour, ls=dash, label=label) for _, colour, dash, label in models]
+    handles.append(Patch(color="#e3e8ec", label="± 2 std of the sensor"))
+    handles += _phase_handles(phase for c in channels for phase in c.phase)
+    drawing.legend(handles=handles, loc="outside upper left", ncols=4, fontsize=8)
+    return drawing
+
+
+def _strip(axis: Axes, time: Array, phase: NDArray[np.str_]) -> None:
+    """The states of the motion as a band along the panel's top."""
+    spans: dict[str, list[tuple[float, float]]] = {}
+    for low, high, name in state_runs(phase):
+        end = time[min(high, len(time) - 1)]
+        spans.setdefault(name, []).append((float(time[low]), float(end - time[low])))
+    for name, pieces in spans.items():
+        if name in _PHASES:
+            axis.broken_barh(pieces, (0.96, 0.04), transform=axis.get_xaxis_transform(), color=_PHASES[name], lw=0)
+
+
+def _phase_handles(phases: Iterable[Any]) -> list[Patch]:
+    there = {str(phase) for phase in phases}
+    return [Patch(color=colour, label=name) for name, colour in _PHASES.items() if name in there]
+
+
+# What is left, by phase and channel -----------------------------------------------------------------------------------
+
+
+def draw_phases(rows: Sequence[Mapping[str, Any]], labels: tuple[str, str]) -> Figure | None:
+    """Chi-square per sample before and after, by channel and phase, fitted trials and held-out ones side by side."""
+    if not rows:
+        return None
+    keys = list(dict.fromkeys((row["channel"], row["phase"]) for row in rows))
+    keys.sort(key=lambda key: (list(_QUANTITIES).index(key[0]) if key[0] in _QUANTITIES else 99,
+                               list(_PHASES).index(key[1]) if key[1] in _PHASES else 99))  # fmt: skip
+    parts = [(held, name) for held, name in ((False, "fitted trials"), (True, "held-out trials"))
+             if any(row["held_out"] is held for row in rows)]  # fmt: skip
+    drawing = Figure(figsize=(_WIDTH, 1.15 + 0.24 * len(keys)))
+    FigureCanvasAgg(drawing)
+    axes = drawing.subplots(1, len(parts), sharey=True, sharex=True, squeeze=False).ravel()
+    for axis, (held, title) in zip(axes, parts, strict=True):
+        axis.axvline(1.0, color=INK, lw=1.0, ls=(0, (1, 1.5)))
+        for row in rows:
+            if row["held_out"] is not held:
+                continue
+            place = keys.index((row["channel"], row["phase"]))
+            before, after = (max(float(row[stage]), 1e-3) for stage in ("before", "after"))
+            if labels[1]:
+                axis.plot([before, after], [place, place], color=GREY, lw=1.2, zorder=2)
+                axis.plot(after, place, "o", color=BED, ms=5.5, zorder=4)
+            axis.plot(before, place, "D", color=MODEL, ms=4.8, zorder=3)
+        axis.set_xscale("log")
+        axis.set_title(title)
+        axis.set_xlabel("chi-square per sample (1: the sensors' noise)")
+    axes[0].set_yticks(range(len(keys)), [f"{channel}, {phase}" for channel, phase in keys])
+    axes[0].invert_yaxis()
+    handles = [Line2D([], [], color=MODEL, ls="", marker="D", ms=4.8, label=labels[0])]
+    if labels[1]:
+        handles.append(Line2D([], [], color=BED, ls="", marker="o", ms=5.5, label=labels[1]))
+    drawing.legend(handles=handles, loc="outside upper left", ncols=2, fontsize=8)
+    return drawing
+
+
+# Candidates -----------------------------------------------------------------------------------------------------------
+
+
+def draw_evidence(said: Mapping[str, Any]) -> Figure | None:
+    """Bars: the best form of each single name, and the best sets of names that beat all of their parts."""
+    best: dict[tuple[str, ...], float] = {}
+    for row in said.get("evidence", []):
+        best.setdefault(tuple(row["effects"]), float(row["score"]))
+    if not best:
+        return None
+    chosen = tuple(effect["id"] for effect in said["effects"])
+    singles = [names for names in best if len(names) == 1]
+    sets = [names for names in best if len(names) > 1
+            and all(best[names] > best.get((name,), -math.inf) + 0.05 for name in names)]  # fmt: skip
+    names = sorted({*singles, *sets[:5], *([chosen] if chosen in best else [])}, key=lambda n: (best[n], -len(n)))
+    names = names[-_MOST_BARS:] if len(names) > _MOST_BARS else names
+    drawing = Figure(figsize=(_WIDTH, 1.2 + 0.27 * len(names)))
+    FigureCanvasAgg(drawing)
+    axis = drawing.subplots()
+    kinds = {name: _kind(name, chosen, said) for name in names}
+    sure = "named for certain" if said["verdict"] == "unknown" else "named"
+    colours = {sure: BED, "cannot be told from it": MODEL, "other": "#b5b5b5"}
+    axis.barh(range(len(names)), [best[name] for name in names], color=[colours[kinds[n]] for n in names], height=0.66)
+    axis.axvline(0.0, color=INK, lw=0.9)
+    axis.set_yticks(range(len(names)), [" + ".join(name) for name in names])
+    axis.grid(False, axis="y")
+    axis.set_xlabel("log evidence over the base model [nats]; left of 0: not worth its parameters")
+    shown = [kind for kind in colours if kind in kinds.values()]
+    drawing.legend(handles=[Patch(color=colours[kind], label=kind) for kind in shown], loc="outside upper left",
+                   ncols=3, fontsize=8)  # fmt: skip
+    return drawing
+
+
+def _kind(name: tuple[str, ...], chosen: tuple[str, ...], said: Mapping[str, Any]) -> str:
+    if name == chosen:
+        return "named for certain" if said["verdict"] == "unknown" else "named"
+    swapped = [(other, *chosen[1:]) for other in said["alternatives"]]
+    return "cannot be told from it" if set(name) in [set(s) for s in swapped] else "other"
+
+
+# What no effect explains ----------------------------------------------------------------------------------------------
+
+
+def draw_latent(folder: Path, said: Mapping[str, Any], channels: Sequence[Channel]) -> Figure | None:
+    """Every latent column over time, and over what it goes with most; coloured by phase, with means of equal counts."""
+    if "latent" not in said or not (folder / said["latent"]["file"]).exists():
+        return None
+    with (folder / said["latent"]["file"]).open(newline="", encoding="utf-8") as file:
+        head, *rows = list(csv.reader(file))
+    latents = [name for name in head if name.startswith("latent_")]
+    if not rows or not latents:
+        return None
+    columns = dict(zip(head, zip(*rows, strict=True), strict=True))
+    trials = np.array(columns.pop("trial"), dtype=str)
+    values = {name: np.array([float(cell or "nan") for cell in column]) for name, column in columns.items()}
+    shares = {name: share for name, share in said["latent"].get("explained", {}).items() if name in values}
+    others = [name for name in sorted(shares, key=lambda n: -shares[n]) if name != "t_s" and shares[name] > 0]
+    other = others[0] if others else next(name for name in head if name not in (*latents, "trial", "t_s"))
+    phase = _phase_at(trials, values["t_s"], channels)
+    drawing = Figure(figsize=(_WIDTH, 0.6 + 2.3 * len(latents)))
+    FigureCanvasAgg(drawing)
+    axes = drawing.subplots(len(latents), 2, squeeze=False, sharey="row")
+    for pair, latent in zip(axes, latents, strict=True):
+        for axis, column in zip(pair, ("t_s", other), strict=True):
+            label, factor = _COLUMNS.get(column, (column, 1.0))
+            across = factor * values[column]
+            for name in dict.fromkeys(phase.tolist()):
+                own = phase == name
+                axis.plot(across[own], values[latent][own], ".", ms=1.6, color=_PHASES.get(name, GREY), alpha=0.8)
+            axis.axhline(0.0, color=GREY, lw=0.8)
+            axis.plot(*_means(across, values[latent]), "-", color=INK, lw=1.3, marker="o", ms=3)
+            share = said["latent"].get("explained", {}).get(column)
+            axis.set_xlabel(label + (f"; explains {100 * share:.0f} %" if share is not None else ""))
+        pair[0].set_ylabel(_COLUMNS.get(latent, (latent, 1.0))[0])
+    handles = [*_phase_handles(phase), Line2D([], [], color=INK, marker="o", ms=3, label="means of equal counts")]
+    drawing.legend(handles=handles, loc="outside upper left", ncols=5, fontsize=8)
+    return drawing
+
+
+def _phase_at(trials: NDArray[np.str_], time: Array, channels: Sequence[Channel]) -> NDArray[np.str_]:
+    """The phase at each row of the latent force: that of the same trial's sample next in time."""
+    phase = np.full(len(trials), "", dtype="<U8")
+    for trial in dict.fromkeys(trials.tolist()):
+        source = next((c for c in channels if c.trial == trial and len(c.time)), None)
+        if source is not None:
+            own = trials == trial
+            middle = 0.5 * (source.time[1:] + source.time[:-1])
+            phase[own] = source.phase[np.searchsorted(middle, time[own])]
+    return phase
+
+
+def _means(x: Array, y: Array) -> tuple[Array, Array]:
+    """Means of y over x in bins of equal count; what is constant within a bin counts once."""
+    good = np.isfinite(x) & np.isfinite(y)
+    x, y = x[good], y[good]
+    if len(np.unique(x)) <= _BINS:
+        places = np.unique(x)
+        return places, np.array([y[x == place].mean() for place in places])
+    order = np.argsort(x, kind="stable")
+    pieces = [piece for piece in np.array_split(order, _BINS) if len(piece)]
+    return np.array([x[p].mean() for p in pieces]), np.array([y[p].mean() for p in pieces])
