@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,10 +28,12 @@ from .reporting import write_report
 from .runfolder import RunFolder
 from .whole_runs import whole_run
 
-__all__ = ["check", "find_faults", "resume", "run"]
+__all__ = ["check", "find_faults", "resume", "run", "unnamed_files"]
 
 _LONG = 10.0
 """A step of the time this many times the usual one is a gap."""
+_LISTED = 4
+"""Files that are listed by name."""
 
 
 def check(settings: CheckSettings) -> None:
@@ -52,6 +55,17 @@ def find_faults(campaign: Campaign) -> list[Finding]:
 
 def _jumps(finding: Finding) -> bool:
     return "jumps" in finding.what or "by a jump" in finding.what
+
+
+def unnamed_files(folder: Path, campaign: Campaign) -> list[Finding]:
+    """Recordings in the folder that no trial names: a trial forgotten, or what is left of a template."""
+    trials: Sequence[Any] = campaign.tables.trial
+    named = {(folder / file).resolve() for trial in trials for file in trial.files.values()}
+    left = [str(path.relative_to(folder)) for path in sorted(folder.rglob("*.csv")) if path.resolve() not in named]
+    if not left:
+        return []
+    shown = ", ".join(left[:_LISTED]) + (f" and {len(left) - _LISTED} more" if len(left) > _LISTED else "")
+    return [Finding(trial="", what=f"{shown}: in the folder, but no trial names {'it' if len(left) == 1 else 'them'}")]
 
 
 def _missing_sensors(campaign: Campaign) -> list[Finding]:
@@ -110,7 +124,7 @@ def _carry_out(settings: CheckSettings, folder: RunFolder, progress: Progress) -
     with folder.lock():
         campaign = read_campaign(settings.campaign)
         progress.stage("check", total=1.0)
-        findings = find_faults(campaign)
+        findings = [*unnamed_files(Path(settings.campaign), campaign), *find_faults(campaign)]
         recordings = []
         trials: Sequence[Any] = campaign.tables.trial
         for number, trial in enumerate(trials, 1):

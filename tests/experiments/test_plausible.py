@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from experiments.campaign import Campaign, Recording, read_campaign
-from experiments.campaign.templates import TEMPLATES
-from experiments.inspection import find_faults
+from experiments.campaign.templates import TEMPLATES, new_campaign
+from experiments.inspection import find_faults, unnamed_files
 
 GRAVITY = 9.80665
 
@@ -71,6 +71,14 @@ def test_nothing_is_wrong_with_the_templates():
     assert find_faults(read_campaign(TEMPLATES / "template-penetration")) == []
     told = [finding.what for finding in find_faults(read_campaign(TEMPLATES / "template-tumble"))]
     assert told == ["trial 002 has no recording of imu, others have"]
+
+
+def test_recordings_that_no_trial_names_are_said(tmp_path):
+    folder = new_campaign(tmp_path / "c", kind="penetration")
+    assert unnamed_files(folder, read_campaign(folder)) == []
+    (folder / "004.csv").write_text("t_s,depth_m,force_N\n")
+    (said,) = unnamed_files(folder, read_campaign(folder))
+    assert said.what == "004.csv: in the folder, but no trial names it"
 
 
 def test_what_is_odd_alike_in_many_trials_is_said_once():
