@@ -107,8 +107,8 @@ def prepare_as(
         ValueError: what ``prepare_bed`` refuses; stages that cannot be; a packing, or a slope, that is out of reach.
         BedFailure: the bed did not come to rest.
     """
-    stuff = find_material(material)
     sizes = sizes_of(grain, spread)
+    stuff = find_material(material, grain=sizes.mean)
     check_options(size, sizes.mean, gravity, seed, max_overlap)
     size = tuple(float(s) for s in size)
     plan = [parse_stage(stage) if isinstance(stage, str) else stage for stage in stages]

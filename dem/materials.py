@@ -1,12 +1,38 @@
-"""Grain materials: the numbers of single grains, each with where it comes from; and those of what grains meet."""
+"""Grain materials: the numbers of single grains, each with where it comes from; and those of what grains meet.
+
+A material has a name, of those that ship, or a file, as ``hedgebed bed calibrate`` writes it (TOML):
+```
+format = "hedgebed-material/1"
+name = "my-sand"
+density = 2650.0            # [kg/m3]
+young = 70e9                # [Pa]
+poisson = 0.25
+friction = 0.5
+restitution = 0.5
+rolling_friction = 0.2      # 0 if not given
+cohesion = "dmt"            # "none" if not given
+surface_energy = 0.3        # [J/m2]; with cohesion
+grain = 0.004               # the mean diameter for which surface_energy holds [m]; for every one if not given
+[sources]                   # where each number comes from, in words
+friction = "..."
+```
+A table ``[calibration]`` may follow, which says how the numbers were found and is not read here.
+"""
 
 from __future__ import annotations
 
 import difflib
 import math
-from dataclasses import dataclass, field, replace
+import re
+import tomllib
+from dataclasses import MISSING, dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
 
-__all__ = ["COHESIONS", "Facing", "MATERIALS", "Material", "SAND", "material"]
+__all__ = ["COHESIONS", "Facing", "MATERIALS", "MATERIAL_FORMAT", "Material", "SAND", "material", "read_material"]
+
+MATERIAL_FORMAT = "hedgebed-material/1"
+_NAME = re.compile(r"[a-z0-9][a-z0-9._+-]*")
 
 COHESIONS = ("none", "dmt", "jkr")
 """The laws of cohesion, see ``dem.cohesion``."""
@@ -21,6 +47,7 @@ class Material:
         friction, restitution, rolling_friction: of two grains on one another.
         cohesion: "none", "dmt" or "jkr" (``dem.cohesion``).
         surface_energy: gamma [J/m2], half the work of adhesion of two grains; 0 without cohesion.
+        grain: mean diameter of the grains for which ``surface_energy`` holds [m], see ``for_grain``; None: of all.
 
     Raises:
         ValueError: a number that no material can have, with the key and what would do.
@@ -35,6 +62,7 @@ class Material:
     rolling_friction: float = 0.0
     cohesion: str = "none"
     surface_energy: float = 0.0
+    grain: float | None = field(default=None, compare=False)
     sources: dict[str, str] = field(default_factory=dict, compare=False)
 
     def __post_init__(self):
@@ -64,10 +92,22 @@ class Material:
                 refuse("surface_energy", "0 without a law of cohesion; set cohesion to 'dmt' or 'jkr' [J/m2]")
         elif not 0 < self.surface_energy < math.inf:
             refuse("surface_energy", f"positive with cohesion {self.cohesion!r} [J/m2]")
+        if self.grain is not None and not 0 < self.grain < math.inf:
+            refuse("grain", "positive [m]")
 
     def softened(self, young: float) -> Material:
         """The same material with another Young's modulus [Pa]."""
         return replace(self, young=young)
+
+    def for_grain(self, diameter: float) -> Material:
+        """The same material in grains of another mean diameter [m], with the strength that it has in its own.
+
+        Cohesion, a stress, goes as surface energy over diameter, so that the surface energy is taken in proportion. A
+        material that does not say for which grains its surface energy holds stays as it is.
+        """
+        if self.grain is None or self.cohesion == "none":
+            return self
+        return replace(self, surface_energy=self.surface_energy * diameter / self.grain, grain=diameter)
 
 
 @dataclass(frozen=True)
@@ -133,20 +173,99 @@ SAND = Material(
 )
 """Fine silica sand. Its rolling friction and restitution are guesses within the field's usual range."""
 
-MATERIALS = {SAND.name: SAND}
+PRESETS = Path(__file__).parent / "presets"
 
 
-def material(name: str | Material) -> Material:
-    """The material of that name, or the material itself.
+def read_material(path: str | Path) -> Material:
+    """The material in a file of the form that this module's docstring gives.
 
     Raises:
-        ValueError: no material of that name; the message lists those there are.
+        ValueError: a file that cannot be read or is not of this form, a key that there is not or that lacks, a value of
+            the wrong kind or that no material can have, the name of a material that ships with other numbers.
     """
-    if isinstance(name, Material):
-        return name
-    found = MATERIALS.get(str(name).lower())
-    if found is None:
-        near = difflib.get_close_matches(str(name).lower(), MATERIALS, n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise ValueError(f"material = {name!r} is not known; there is {', '.join(sorted(MATERIALS))}{hint}")
-    return found
+    stuff = _read(Path(path))
+    known = MATERIALS.get(stuff.name)
+    if known is not None and (known != stuff or known.grain != stuff.grain):
+        raise ValueError(
+            f"{path}: name = {stuff.name!r} is that of a material that ships, with other numbers; another name would do"
+        )
+    return stuff
+
+
+def _read(path: Path) -> Material:
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ValueError(f"material = {str(path)!r} cannot be read: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"material = {str(path)!r} is not TOML: {error}") from None
+    found = table.pop("format", None)
+    if found != MATERIAL_FORMAT:
+        raise ValueError(f"{path}: format = {found!r}, {MATERIAL_FORMAT!r} was expected")
+    table.pop("calibration", None)
+    known = {one.name: one for one in fields(Material)}
+    for key in table:
+        if key not in known:
+            near = difflib.get_close_matches(key, known, n=1)
+            hint = f"did you mean {near[0]!r}?" if near else f"there is {', '.join(known)}"
+            raise ValueError(f"{path}: {key} = {table[key]!r} is no key of a material; {hint}")
+    lacking = [
+        key
+        for key, one in known.items()
+        if key not in table and one.default is MISSING and one.default_factory is MISSING
+    ]
+    if lacking:
+        raise ValueError(f"{path}: {', '.join(lacking)} must be given")
+    return Material(**{key: _of_its_kind(path, key, value) for key, value in table.items()})
+
+
+def _of_its_kind(path: Path, key: str, value: Any) -> Any:
+    """A value as ``Material`` takes it. Raises ValueError for one of another kind."""
+    if key == "sources":
+        if not isinstance(value, dict) or not all(isinstance(text, str) for text in value.values()):
+            raise ValueError(f"{path}: sources = {value!r} must be a table of texts, one for each number")
+        return value
+    if key in ("name", "cohesion"):
+        if not isinstance(value, str):
+            raise ValueError(f"{path}: {key} = {value!r} must be a text")
+        if key == "name" and not _NAME.fullmatch(value):
+            raise ValueError(
+                f"{path}: name = {value!r} cannot name a material: small letters, digits, '.', '_', '+', '-'"
+            )
+        return value
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"{path}: {key} = {value!r} must be a number")
+    return float(value)
+
+
+MATERIALS = {SAND.name: SAND} | {
+    stuff.name: stuff for stuff in map(_read, sorted(PRESETS.glob("*.toml") if PRESETS.is_dir() else ()))
+}
+"""The materials that ship: ``SAND``, and the calibrated ones of dem/presets (docs/materials.md)."""
+
+
+def material(name: str | Path | Material, *, grain: float | None = None) -> Material:
+    """The material of that name or in that file, or the material itself.
+
+    Args:
+        name: of a material that ships, or the path of a file: what ends in .toml or has a slash in it.
+        grain: mean diameter of the grains that it is wanted for [m], see ``Material.for_grain``.
+
+    Raises:
+        ValueError: no material of that name, with those there are; a file that will not do (``read_material``).
+    """
+    stuff = name if isinstance(name, Material) else _find(name)
+    return stuff if grain is None else stuff.for_grain(grain)
+
+
+def _find(name: str | Path) -> Material:
+    word = str(name)
+    if word.lower() in MATERIALS:
+        return MATERIALS[word.lower()]
+    if isinstance(name, Path) or word.endswith(".toml") or "/" in word:
+        return read_material(name)
+    near = difflib.get_close_matches(word.lower(), MATERIALS, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    raise ValueError(
+        f"material = {name!r} is not known; there is {', '.join(sorted(MATERIALS))}, and files that end in .toml{hint}"
+    )

@@ -79,7 +79,8 @@ def prepare_bed(
     """A bed rained in, levelled and settled under gravity, or the same one from the cache.
 
     Args:
-        material: a name or a Material.
+        material: a name, the file of a material or a Material; its surface energy is taken for these grains, where it
+            says for which it holds (``Material.for_grain``).
         size: lateral periods (x, y) and depth after levelling (z) [m].
         grain: mean diameter [m], or a distribution of ``dem.sizes``.
         spread: with a mean diameter: diameters are uniform within +- this share of it [1]; 0.15 when None.
@@ -110,9 +111,9 @@ def prepare_bed(
             outside 0 to 0.5 or beside a distribution, a packing that cannot be reached, a time step too long.
         BedFailure: the bed did not come to rest.
     """
-    stuff = find_material(material)
     sizes = sizes_of(grain, spread)
     grain = sizes.mean
+    stuff = find_material(material, grain=grain)
     check_options(size, grain, gravity, seed, max_overlap)
     if packing is not None:
         check_packing(packing, sizes, cohesive=stuff.cohesion != "none")

@@ -15,7 +15,7 @@ def settings_of_bed(given: dict[str, Any]) -> dict[str, Any]:
     `given` contradicts the bed.
     """
     from dem.bedfile import find_bed, read_preparation
-    from dem.materials import MATERIALS
+    from dem.materials import MATERIALS, material
     from dem.state import read_file
 
     name = str(given["bed"])
@@ -25,16 +25,21 @@ def settings_of_bed(given: dict[str, Any]) -> dict[str, Any]:
     if settings["gravity"][0] or settings["gravity"][1] or any(s.startswith("cut") for s in stages):
         raise ValueError(f"bed = {name!r} was cut or tilted: a spike needs a level one, prepared without these stages")
     stuff = settings["material"]
-    known = MATERIALS.get(stuff.name)
-    if known is None or known.softened(stuff.young) != stuff:
-        raise ValueError(
-            f"bed = {name!r} is of a material {stuff.name!r} whose numbers are not those of one that ships "
-            f"({', '.join(sorted(MATERIALS))}): use the bed from a script, with coupling.drive"
-        )
     radii = state["position"][:, 3].astype(float)
     grain = _plain(2 * radii.mean())
+    known = material(given["material"]) if "material" in given else MATERIALS.get(stuff.name)
+    if known is None or not _alike(known, stuff, read_preparation(path).recipe):
+        raise ValueError(
+            f"bed = {name!r} is of a material {stuff.name!r} whose numbers are not those of "
+            + (
+                f"material = {given['material']!r}: the file that the bed was made with would do"
+                if "material" in given
+                else f"one that ships ({', '.join(sorted(MATERIALS))}): give --material with the file that it was made "
+                "with"
+            )
+        )
     said = {
-        "material": stuff.name,
+        "material": given.get("material", stuff.name),
         "bed_size": settings["size"],
         "grain": grain,
         "spread": min(0.5, _plain((radii.max() - radii.min()) / (radii.max() + radii.min()))),
@@ -52,6 +57,13 @@ def settings_of_bed(given: dict[str, Any]) -> dict[str, Any]:
                 f"{key} = {given[key]!r} beside bed = {name!r}, whose own is {value!r}: leave {key} out, or the bed"
             )
     return given | said
+
+
+def _alike(known: Any, stuff: Any, recipe: dict[str, Any]) -> bool:
+    """Whether a bed's grains are of the material `known`, in the size for which the bed was prepared."""
+    kept = recipe.get("material", {}).get("grain")
+    known = known.softened(stuff.young) if kept is None else known.for_grain(kept).softened(stuff.young)
+    return bool(known == stuff)
 
 
 def _plain(value: float) -> float:

@@ -23,7 +23,7 @@ def check(settings: BedSettings) -> None:
     check_name(settings.name)
     check_options(settings.size, settings.grain, settings.gravity, settings.seed, settings.max_overlap)
     check_memory(settings.size, settings.grain, settings.spread)
-    stuff, sizes = material(settings.material), Uniform(settings.grain, settings.spread)
+    stuff, sizes = material(settings.material, grain=settings.grain), Uniform(settings.grain, settings.spread)
     young = settings.young or soft_enough(
         stuff, size=settings.size, sizes=sizes, gravity=settings.gravity, max_overlap=settings.max_overlap
     )
@@ -48,7 +48,7 @@ def _carry_out(settings: BedSettings, folder: RunFolder, progress: Progress) -> 
     options = settings.model_dump(exclude={"name"})
     with folder.lock():
         prepared = prepared_in(folder, progress, options, name=settings.name)
-        title = f"A bed of {settings.material}: {' '.join(settings.stages)}"
+        title = f"A bed of {prepared.recipe['material']['name']}: {' '.join(settings.stages)}"
         return finish_bed(folder, prepared, progress, experiment="bed make", title=title, name=settings.name)
 
 

@@ -42,7 +42,7 @@ def refined_options(settings: BedRefineSettings) -> tuple[dict[str, Any], Prepar
     stuff = Material(**recipe["material"])
     if stuff.cohesion != "none":
         power = {"strength": 1, "bond": 2, "surface-energy": 0}[settings.keep]
-        stuff = replace(stuff, surface_energy=stuff.surface_energy * share**power)
+        stuff = replace(stuff, surface_energy=stuff.surface_energy * share**power, grain=grain)
     last = [stage for stage in recipe["stages"] if stage.partition(":")[0] in ("cut", "tilt")]
     first = [stage for stage in recipe["stages"] if stage not in last]
     levelled = first[-1] if first[-1].partition(":")[0] == "level" else None

@@ -22,7 +22,7 @@ _NAME = "Name under which the bed is kept on the shelf (HEDGEBED_BEDS); in the r
 class BedSettings(StrictSettings):
     """A bed prepared as in a laboratory, stage by stage."""
 
-    material: str = Field("sand", description="Grain material, by name.")
+    material: str = Field("sand", description="Grain material: a name, or a material.toml.")
     stages: tuple[str, ...] = Field(
         ("rain", "level"),
         min_length=1,

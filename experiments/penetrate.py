@@ -78,7 +78,7 @@ def check(settings: PenetrateSettings) -> None:
         check_target(settings.campaign)
     if settings.ground == "spring-damper":
         return
-    find_material(settings.material)
+    find_material(settings)
     for seeds, speeds in ((settings.seeds[:1], settings.speeds), (settings.seeds[1:], settings.other_speeds)):
         if seeds and not speeds:
             raise ValueError("other_speeds is empty: at least one speed would do, so that every seed has a fit")
@@ -87,7 +87,7 @@ def check(settings: PenetrateSettings) -> None:
     _check_young(settings)
     _check_reach(settings)
     step = bed_step(settings, choose_softness(settings).young)
-    found = settings.crossing(step, find_material(settings.material).young)
+    found = settings.crossing(step, find_material(settings).young)
     if found:
         raise ValueError(found)
     _check_step_count(settings, step)
@@ -127,7 +127,7 @@ def _check_arch(settings: PenetrateSettings) -> None:
 def _check_young(settings: PenetrateSettings) -> None:
     if settings.young is None:
         return
-    most = find_material(settings.material).young
+    most = find_material(settings).young
     chosen = choose_softness(settings.model_copy(update={"young": None})).young
     if settings.young > most:
         raise ValueError(
@@ -196,7 +196,7 @@ def _check_step_count(settings: PenetrateSettings, step: float) -> None:
 
 def choose_softness(settings: PenetrateSettings) -> Softening:
     """The modulus of the grains for these runs (see `experiments.softening`), or the one that is set."""
-    material = find_material(settings.material)
+    material = find_material(settings)
     bulk = 0.6 * material.density
     area = math.pi * settings.tip_diameter**2 / 4
     stiffness = bearing_gradient(bulk, settings.gravity, material.friction) * area
@@ -228,11 +228,11 @@ def choose_softness(settings: PenetrateSettings) -> Softening:
 # What the bed's room offers; tests put a stand-in here ---------------------------------------------------------------
 
 
-def find_material(name: str) -> Any:
-    """The grain material called `name`. Raises ValueError naming those there are."""
+def find_material(settings: PenetrateSettings) -> Any:
+    """The grain material, for grains of this size. Raises ValueError naming those there are."""
     from dem.materials import material
 
-    return material(name)
+    return material(settings.material, grain=settings.grain)
 
 
 def fingerprint() -> str:
@@ -247,7 +247,7 @@ def bed_step(settings: PenetrateSettings, young: float) -> float:
     from dem.timestep import time_step_for
 
     return time_step_for(
-        find_material(settings.material).softened(young),
+        find_material(settings).softened(young),
         diameter=settings.grain * (1 - settings.spread),
         max_overlap=settings.max_overlap,
         wanted=settings.time_step,
@@ -264,7 +264,7 @@ def prepare_bed(settings: PenetrateSettings, seed: int, young: float, progress: 
         return Bed.load(find_bed(settings.bed), arch=settings.arch, threads=settings.threads)
     with held_back() as asked_to_stop:
         return Bed.prepare(
-            find_material(settings.material),
+            find_material(settings),
             size=settings.bed_size,
             grain=settings.grain,
             spread=settings.spread,
@@ -518,7 +518,7 @@ def _conclude(
         "experiment": "penetrate",
         "version": __version__,
         "code": fingerprint(),
-        "title": f"A {1e3 * settings.tip_diameter:g} mm spike in {settings.material}",
+        "title": f"A {1e3 * settings.tip_diameter:g} mm spike in {find_material(settings).name}",
         "status": "done",
         "quantities": quantities,
         "runs": entries,
@@ -561,6 +561,6 @@ def _bed_facts(bed: Any, seed: int, softening: Softening) -> dict[str, Any]:
 
 def _expected_stiffness(settings: PenetrateSettings) -> float:
     """A guess at the bed's stiffness under the tip [N/m], for progress and frames."""
-    material = find_material(settings.material)
+    material = find_material(settings)
     area = math.pi * settings.tip_diameter**2 / 4
     return bearing_gradient(0.6 * material.density, settings.gravity, material.friction) * area

@@ -151,6 +151,12 @@ EXPERIMENTS: dict[str, Experiment] = {
             subject="bed",
         ),
         Experiment(
+            "bed calibrate",
+            "Grain parameters from bulk figures: a response surface over sheared samples, and a material.toml.",
+            settings="experiments.calibrate_settings:CalibrateSettings",
+            module="experiments.calibrate",
+        ),
+        Experiment(
             "validate",
             "Verifies the bed: closed forms, published figures and other codes, beside what comes out.",
             settings="experiments.validate_settings:ValidateSettings",

