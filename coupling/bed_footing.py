@@ -154,6 +154,8 @@ class BedFooting:
         ]  # fmt: skip
         self._used = [indices[0] for indices in self._slots]
         """The member that each body stood for in the last step."""
+        self._at = np.array([member.at for member in self.members])
+        self._turns = np.array([member.turn for member in self.members])
         self._mass = float(bed.grains()["mass"].sum())
         self.impulse = np.zeros(3)
         """Of gravity and floor on the grains since the start [N s]."""
@@ -201,7 +203,7 @@ class BedFooting:
         """Largest overlap of a member and a grain [m], and the member's row. A rod's flat ends count as round."""
         centres, radii = grains["position"], grains["radius"]
         worst = (-math.inf, HULL)
-        for index in self._in_use(pose):
+        for index in self._lowest(to_matrix(pose.turn)):
             member = self.members[index]
             position, turn = self._member_pose(member, pose)
             axis = to_matrix(turn)[:, 2]
@@ -218,38 +220,39 @@ class BedFooting:
         steps = round(dt / self.time_step)
         if steps < 1 or not math.isclose(steps * self.time_step, dt, rel_tol=1e-9):
             raise ValueError(f"dt is {dt} s: it must be a whole multiple of the bed's step, {self.time_step} s")
-        _, middle, last = matrices(pose, twist, dt)
+        first, middle, last = matrices(pose, twist, dt)
         chord = chord_share(twist, dt)
-        used = self._used = self._in_use(pose)
-        for body, index in zip(self.bodies, used, strict=True):
-            member = self.members[index]
-            position, turn = self._member_pose(member, pose)
-            velocity = twist.velocity + chord * np.cross(twist.spin, middle @ member.at)
-            self.bed.move_body(
-                body, position=tuple(position), velocity=tuple(velocity), turn=tuple(turn), spin=tuple(twist.spin)
-            )
+        used = self._used = self._lowest(first)
+        at = self._at[used]
+        arms = chord * (at @ middle.T)
+        self.bed.move_bodies(
+            self.bodies,
+            positions=self.origin + pose.position + at @ first.T,
+            velocities=twist.velocity + np.cross(twist.spin, arms),
+            turns=self._turns[used] @ _left(pose.turn).T,
+            spins=np.tile(twist.spin, (len(used), 1)),
+        )
         self.bed.advance(steps)
-        end = pose.position + dt * twist.velocity
-        force, torque = np.zeros(3), np.zeros(3)
+        rows = self.bed.reactions()
+        forces, torques = np.hsplit(self.copies * rows[self.bodies], 2)
+        wrench = Wrench(forces.sum(axis=0), (torques + np.cross(arms, forces)).sum(axis=0))
+        halfway = pose.position + 0.5 * dt * twist.velocity
+        ends = pose.position + dt * twist.velocity + at @ last.T
         contacts: dict[int, Contact] = {}
         sinkage: dict[int, float] = {}
-        for body, index in zip(self.bodies, used, strict=True):
-            member = self.members[index]
-            own_force, own_torque = (self.copies * np.asarray(part, dtype=float) for part in self.bed.reaction(body))
-            arm = chord * (middle @ member.at)
-            force += own_force
-            torque += own_torque + np.cross(arm, own_force)
-            lowest = float((end + last @ member.at)[2]) - member.radius
+        for k, index in enumerate(used):
+            member, force = self.members[index], forces[k]
+            lowest = float(ends[k, 2]) - member.radius
             if lowest < 0 and member.row != HULL:
                 sinkage[member.row] = -lowest
-            if own_force[2] > self.touch * self.copies:
-                point = pose.position + 0.5 * dt * twist.velocity + arm - np.array([0.0, 0.0, member.radius])
-                along = np.array([own_force[0], own_force[1], 0.0])
-                contacts[member.row] = Contact(point, float(own_force[2]), tangential_force=along)
-                self._check_inside(member, float((end + last @ member.at)[0]), lowest)
-        floor = np.asarray(self.bed.reaction(0)[0], dtype=float) if self.bodies[0] > 0 else np.zeros(3)
+            if force[2] > self.touch * self.copies:
+                point = halfway + arms[k] - np.array([0.0, 0.0, member.radius])
+                along = np.array([force[0], force[1], 0.0])
+                contacts[member.row] = Contact(point, float(force[2]), tangential_force=along)
+                self._check_inside(member, float(ends[k, 0]), lowest)
+        floor = rows[0, :3] if self.bodies[0] > 0 else np.zeros(3)
         self.impulse = self.impulse + dt * (self._mass * np.array(self.bed.gravity, dtype=float) - floor)
-        return FootReaction(Wrench(force, torque), contacts, sinkage)
+        return FootReaction(wrench, contacts, sinkage)
 
     def _check_inside(self, member: Member, x: float, lowest: float) -> None:
         what = "the hull" if member.row == HULL else f"spike {member.row}"
@@ -266,10 +269,10 @@ class BedFooting:
                 "deep"
             )
 
-    def _in_use(self, pose: Pose) -> list[int]:
-        """The member that each slot stands for: its lowest."""
-        matrix = to_matrix(pose.turn)
-        return [min(indices, key=lambda k: (float(matrix[2] @ self.members[k].at), k)) for indices in self._slots]
+    def _lowest(self, matrix: Vector) -> list[int]:
+        """The member that each slot stands for, its lowest, with the body turned by this matrix."""
+        heights = (self._at @ matrix[2]).tolist()
+        return [min(indices, key=heights.__getitem__) for indices in self._slots]
 
     def _member_pose(self, member: Member, pose: Pose) -> tuple[Vector, NDArray[np.float64]]:
         position = self.origin + pose.position + to_matrix(pose.turn) @ member.at
@@ -349,3 +352,8 @@ class BedFooting:
         self.bed.restore({key[4:]: np.asarray(value) for key, value in state.items() if key.startswith("bed.")})
         self.impulse = np.array(state["impulse"], dtype=float)
         self._used = [int(index) for index in np.asarray(state["used"])]
+
+
+def _left(turn: Vector) -> Vector:
+    """The product with a quaternion on its right as a matrix, shape (4, 4): multiply(turn, q) = matrix @ q."""
+    return np.column_stack([multiply(turn, unit) for unit in np.eye(4)])

@@ -309,7 +309,10 @@ class Engine(Lists, Shapes):
         values = np.asarray(values)
         shape = (*field.shape, *values.shape[len(field.shape) :])
         array = np.zeros(shape, dtype=values.dtype)
-        array[: len(values) if rows is None else len(array)][slice(None) if rows is None else rows] = values
+        if rows is None:
+            array[tuple(slice(count) for count in values.shape[: len(field.shape)])] = values
+        else:
+            array[rows] = values
         field.from_numpy(array)
 
     # ------------------------------------------------------------------ the step
@@ -618,6 +621,42 @@ class Engine(Lists, Shapes):
     def clear_pushes(self):
         for c, b in ti.ndrange(self.count[CHUNKS], MOST_BODIES):
             self.pushes[c, b] = ti.Vector.zero(self.real, 6)
+
+    @ti.kernel
+    def place_bodies(
+        self, bodies: ti.types.ndarray(dtype=ti.i32, ndim=1), rows: ti.types.ndarray(dtype=ti.f64, ndim=2)
+    ):
+        """Pose and motion of several bodies: position, velocity, turn, spin in a row of 13."""
+        for _ in range(1):
+            for k in range(bodies.shape[0]):
+                b = bodies[k]
+                for d in ti.static(range(3)):
+                    self.body_position[b][d] = ti.cast(rows[k, d], self.real)
+                    self.body_velocity[b][d] = ti.cast(rows[k, 3 + d], self.real)
+                    self.body_spin[b][d] = ti.cast(rows[k, 10 + d], self.real)
+                for d in ti.static(range(4)):
+                    self.body_turn[b][d] = ti.cast(rows[k, 6 + d], self.real)
+
+    @ti.kernel
+    def tally(self, rows: ti.types.ndarray(dtype=ti.f64, ndim=2)):
+        """Sums over the chunks, in their order: of what grains do to each body; and the largest overlap, or NaN.
+
+        A row of six for each body, and one more whose first number is the overlap.
+        """
+        for b in range(MOST_BODIES + 1):
+            if b < MOST_BODIES:
+                for k in ti.static(range(6)):
+                    total = ti.cast(0.0, ti.f64)
+                    for c in range(self.count[CHUNKS]):
+                        total += ti.cast(self.pushes[c, b][k], ti.f64)
+                    rows[b, k] = total
+            else:
+                largest = ti.cast(0.0, ti.f64)
+                for c in range(self.count[CHUNKS]):
+                    overlap = ti.cast(self.overlap[c], ti.f64)
+                    if not (overlap <= largest) and largest == largest:
+                        largest = overlap
+                rows[b, 0] = largest
 
     @ti.kernel
     def mark_origin(self):

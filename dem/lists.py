@@ -19,7 +19,7 @@ ITEMS_PER_THREAD = 512
 # Places of the counters in Engine.ticket: of a plain loop over chunks; of ``Engine.run``.
 CACHE_LINE = 16
 QUEUE, TURN, FINISHED = 0, CACHE_LINE, 2 * CACHE_LINE
-MOST_BODIES = 8
+MOST_BODIES = 32  # the floor, a platform's 24 spikes and hull, and some more
 
 # A neighbour's code: its index, and in the upper bits which periodic image is meant. The sign says "touching".
 INDEX_BITS = 26

@@ -110,7 +110,7 @@ def put_back(bed: Bed, state: dict[str, np.ndarray]) -> None:
         e.write(name, state[name], near)
     numbers = [int(v) for v in state["numbers"]]
     bed.steps, bodies, bed.list_count, bed._since_lists, bed._reaction_steps, floor = numbers
-    bed._has_floor = bool(floor)
+    bed._has_floor, bed._tallied = bool(floor), None
     e.body_count[None] = bodies
     e.moved[None] = 0
     e.halted[None] = 0

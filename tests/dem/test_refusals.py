@@ -67,7 +67,7 @@ def test_a_bed_that_cannot_be_is_refused(options, words):
         ([Ball(radius=0.005)], {"position": (0.01, 0.05)}, "position = .* must be 3 finite numbers"),
         ([Ball(radius=0.005)], {"friction": -1.0}, "friction = -1.0"),
         ([Ball(radius=0.005)], {"restitution": 1.5}, "restitution = 1.5 must lie between"),
-        ([Ball(radius=0.005)] * 65, {}, "at most 8 bodies of 64 primitives"),
+        ([Ball(radius=0.005)] * 65, {}, "at most 32 bodies of 64 primitives"),
     ],
 )
 def test_a_body_that_cannot_be_is_refused(shape, options, words):
@@ -114,14 +114,21 @@ def test_moving_a_body_that_is_not_there_or_to_nowhere_is_refused():
 
 
 def test_many_bodies_are_told_apart():
-    """Eight bodies, the floor among them; the ninth is refused."""
+    """32 bodies, the floor among them; one more is refused. Moved at once they go where each is told."""
     bed = make(gravity=0.0)
-    bodies = [bed.add_body([Ball(radius=0.002)], position=(0.005 * k, 0.02, 0.05)) for k in range(7)]
-    assert bodies == [1, 2, 3, 4, 5, 6, 7]
+    bodies = [bed.add_body([Ball(radius=0.002)], position=(0.001 * k, 0.02, 0.05)) for k in range(31)]
+    assert bodies == list(range(1, 32))
     for k in bodies:
-        assert bed.body_position(k) == pytest.approx((0.005 * (k - 1), 0.02, 0.05))
-    with pytest.raises(ValueError, match="at most 8 bodies"):
+        assert bed.body_position(k) == pytest.approx((0.001 * (k - 1), 0.02, 0.05))
+    with pytest.raises(ValueError, match="at most 32 bodies"):
         bed.add_body([Plane()], position=(0, 0, -1))
+    places = np.random.default_rng(1).uniform(0.06, 0.07, (2, 3))
+    how = {"velocities": np.ones((2, 3)), "turns": np.tile([0.6, 0.0, 0.8, 0.0], (2, 1)), "spins": np.zeros((2, 3))}
+    bed.move_bodies([31, 4], positions=places, **how)
+    assert np.array_equal([bed.body_position(31), bed.body_position(4)], places)
+    assert np.array_equal(bed.body_turn(4), how["turns"][0]) and bed.body_turn(5)[0] == 1
+    with pytest.raises(ValueError, match="turns has shape"):
+        bed.move_bodies([3], positions=places[:1], velocities=places[:1], turns=places[:1], spins=places[:1])
 
 
 # ---------------------------------------------------------------------------- on the way
