@@ -7,9 +7,7 @@ replicates. `hedgebed diagnose` finds the same and sets it aside.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +19,8 @@ from hedgebed import __version__
 from .campaign import Campaign, PenetrationCampaign, Recording, TumbleCampaign, read_campaign
 from .campaign_settings import CheckSettings
 from .diagnose.problem import Finding
-from .plausible import find_implausible, loud_sensors
+from .diagnose.telling import findings_in_words
+from .plausible import find_implausible, loud_sensors, said_once
 from .progress import Progress
 from .replicas import Condition, condition_of, condition_words, odd_replicates
 from .reporting import write_report
@@ -93,28 +92,7 @@ def _faults_of_data(campaign: Campaign) -> list[Finding]:
     from .diagnose.tumble_checks import checked
     from .diagnose.tumble_data import tumble_data
 
-    return _merged([_named(finding) for finding in checked(tumble_data(campaign))[1]])
-
-
-def _named(finding: Finding) -> Finding:
-    """With the trial in its sentence."""
-    what = finding.what if finding.trial in finding.what else f"trial {finding.trial}: {finding.what}"
-    return replace(finding, what=what)
-
-
-def _merged(found: list[Finding]) -> list[Finding]:
-    """What is the same of several channels of one sensor as one finding."""
-    groups: dict[tuple[str, float | None, float | None, str], list[Finding]] = {}
-    for f in found:
-        pattern = re.sub(rf"\b{f.channel}\b", "*", f.what) if f.channel else f.what
-        groups.setdefault((f.trial, f.from_s, f.to_s, pattern), []).append(f)
-    merged = []
-    for (_, _, _, pattern), alike in groups.items():
-        names = [f.channel for f in alike if f.channel]
-        together = pattern.replace("*", ", ".join(names)).replace(" has no ", " have no ")
-        said = together if len(alike) > 1 else alike[0].what
-        merged.append(replace(alike[0], what=said))
-    return merged
+    return findings_in_words(checked(tumble_data(campaign))[1])
 
 
 # The result -----------------------------------------------------------------------------------------------------------
@@ -212,7 +190,7 @@ def _result(campaign: Campaign, recordings: list[dict[str, Any]], findings: list
             {"trial": f.trial, "what": f.what, "channel": f.channel, "from_s": f.from_s, "to_s": f.to_s}
             for f in findings
         ],
-        "warnings": [finding.what for finding in findings],
+        "warnings": [finding.what for finding in said_once(findings)],
     }
 
 

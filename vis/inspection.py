@@ -207,7 +207,7 @@ def _page(result: Mapping[str, Any], drawn: Sequence[Block]) -> Page:
         for entry in result["recordings"]
     ]
     head = ("recording", "rows", "rate [Hz]", "from [s]", "to [s]", "rows with gaps", "longest gap [s]")
-    found = [finding["what"][:1].upper() + finding["what"][1:] + "." for finding in result["findings"]]
+    found = [what[:1].upper() + what[1:] + "." for what in result["warnings"]]
     return Page(
         title=str(result["title"]),
         lead=[f"hedgebed {result['version']}", "campaign check", str(result["kind"])],

@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from experiments.campaign import Campaign, read_campaign
 from experiments.diagnose_settings import DiagnoseSettings
-from experiments.plausible import find_implausible
+from experiments.plausible import find_implausible, said_once
 from experiments.progress import Progress
 from experiments.runfolder import RunFolder
 from hedgebed import __version__
@@ -23,7 +23,7 @@ from .diagnosis import Diagnosis, diagnose
 from .document import write_diagnosis
 from .own import load_own
 from .problem import Problem
-from .telling import told_tables, where_sentences
+from .telling import findings_in_words, told_tables, where_sentences
 
 __all__ = ["check", "diagnose_campaign", "resume", "run"]
 
@@ -70,7 +70,7 @@ def diagnose_campaign(
         gates = cache_folder() / "gates"
     with threadpool_limits(1):  # matrices are small: threads of the linear algebra only get in each other's way
         found = diagnose(problem, thorough=thorough, seed=seed, tell=tell, gates=gates)
-    return replace(found, findings=(*find_implausible(measured), *found.findings))
+    return replace(found, findings=(*find_implausible(measured), *findings_in_words(found.findings)))
 
 
 def _make_problem(folder: Path, effect_file: Sequence[str | Path]) -> tuple[Campaign, Problem]:
@@ -91,7 +91,7 @@ def _carry_out(settings: DiagnoseSettings, folder: RunFolder, progress: Progress
         )  # fmt: skip
         for file in settings.effect_file:  # model.toml names it
             shutil.copyfile(file, folder.path / Path(file).name)
-        for finding in found.findings:
+        for finding in said_once(found.findings):
             progress.message(finding.what)
         with threadpool_limits(1):
             said = write_diagnosis(folder.path, found)
@@ -135,7 +135,7 @@ def _result(found: Diagnosis, said: dict[str, Any]) -> dict[str, Any]:
         f"Replicates differ by more than the sensors: {kind}, standard deviation {std:.3g} (relative); it is the bed's."
         for kind, std in found.model_std.items()
     ]
-    warnings = [finding.what for finding in found.findings]
+    warnings = [finding.what for finding in said_once(found.findings)]
     for model, bounds, meaning in (
         ("the base model", found.bounds_before, "it bends them because it lacks something"),
         ("the best model", found.bounds_after if found.forms else (), "it does not explain the data"),

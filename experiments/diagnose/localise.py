@@ -107,14 +107,27 @@ def depends_on(table: Mapping[str, NDArray[np.generic]]) -> tuple[str, dict[str,
             share = _explained(x[good], y[good])
             shares[name] = max(shares.get(name, 0.0), share)
     ranked = sorted(shares.items(), key=lambda pair: -pair[1])
-    words = {"t_s": "time"}
-    told = [(words.get(name, name), share) for name, share in ranked if share > 0.1]
+    told = [(column_words(name), share) for name, share in ranked if share > 0.1]
     if not told:
         return "nothing that was recorded: no column explains a tenth of it", shares
     best = told[0]
     sentence = f"{best[0]} (explains {100 * best[1]:.0f} % of it)"
     more = [f"{name} ({100 * share:.0f} %)" for name, share in told[1:3]]
     return sentence + (f", then {', '.join(more)}" if more else ""), shares
+
+
+_WORDS = {
+    "t_s": "time", "depth_m": "depth", "retreat_m": "the way back from the deepest point", "velocity_m_s": "velocity",
+    "speed_m_s": "the trial's speed", "diameter_m": "diameter", "gravity_m_s2": "the trial's gravity",
+    "torque_N_m": "the trial's torque", "x_m": "x", "y_m": "height", "theta_rad": "angle",
+    "vx_m_s": "velocity along the surface", "vy_m_s": "velocity upwards", "omega_rad_s": "rate of rotation",
+    "wheel_rad_s": "speed of the wheel",
+}  # fmt: skip
+
+
+def column_words(name: str) -> str:
+    """What a column of latent.csv is called in a sentence."""
+    return _WORDS.get(name, name)
 
 
 def _explained(x: Array, y: Array) -> float:

@@ -129,7 +129,7 @@ def _one(
             one = f"one reading of {name} lies far from its neighbours and is set aside"
             say(several if len(lone) > 1 else one, where=name, rows=lone)
             values[lone] = np.nan
-        stuck = stuck_rows(values)
+        stuck = stuck_rows(values) if not driven or name != "depth" else lone[:0]  # a machine may stand still
         if len(stuck):
             say(f"{len(stuck)} readings of {name} repeat the one before where it never does otherwise: the sensor is "
                 f"stuck, they are set aside", where=name, rows=stuck)  # fmt: skip

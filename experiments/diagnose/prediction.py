@@ -2,8 +2,9 @@
 
 Every condition (torque and gravity of a tumble; kind, speed and diameter of a penetration) is left out in turn, the
 model refitted to the others, and the trials left out are predicted with nothing but their own nuisances refitted within
-their priors. A name whose form happens to bend to the trials at hand predicts others badly. What a prediction leaves is
-weighed as the evidence weighs a fit (`evidence.tempered`), since the form is never nature's.
+their priors; a base parameter of which the others say nothing at all (K of a diameter) stays as all trials have it. A
+name whose form happens to bend to the trials at hand predicts others badly. What a prediction leaves is weighed as the
+evidence weighs a fit (`evidence.tempered`), since the form is never nature's.
 """
 
 from __future__ import annotations
@@ -62,8 +63,18 @@ def predict(found: Fit, folds: Sequence[tuple[str, ...]]) -> Predicted | None:
     for fold in folds:
         rest = tuple(id for id in model.trials if id not in fold)
         learned = fit(model.on(rest), found.values, rounds=_ROUNDS)
-        values = held_out_fit(model, fold, {**found.values, **learned.values})
+        values = held_out_fit(model, fold, {**found.values, **learned.values, **_untold(learned, found)})
         (modes,) = model.on(fold).evaluate([values])
         chi_square += float(modes @ modes)
         count += len(modes)
     return Predicted(chi_square, count, tempered(chi_square - count, slow_count(found)))
+
+
+def _untold(learned: Fit, found: Fit) -> dict[str, float]:
+    """Base parameters of which the trials that are left say nothing (K of a diameter that is left out), as all say."""
+    base = {p.name for p in found.model.problem.base}
+    silent = [
+        p.name for p, slope in zip(learned.model.parameters, learned.jacobian.T, strict=True)
+        if p.name in base and not slope.any()
+    ]  # fmt: skip
+    return {name: found.values[name] for name in silent}

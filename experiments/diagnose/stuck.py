@@ -14,11 +14,14 @@ _USUAL = 0.05
 
 
 def stuck_rows(values: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Rows after the first of every run of `_LONG` equal readings and more; NaN are passed over, shape [n] -> [m]."""
+    """Rows after the first of every run of `_LONG` equal readings and more; NaN are passed over, shape [n] -> [m].
+
+    Zeros are let be: they are what a sensor says that is cut off there, or at rest.
+    """
     known = np.flatnonzero(np.isfinite(values))
     if len(known) < 3 * _LONG:
         return known[:0]
-    same = np.diff(values[known]) == 0
+    same = (np.diff(values[known]) == 0) & (values[known][1:] != 0)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(int), [0]])))
     runs = [(low, high) for low, high in zip(edges[::2], edges[1::2], strict=True) if high - low >= _LONG - 1]
     stuck = np.zeros(len(same), dtype=bool)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from .problem import Array
+from .problem import Array, Finding
 
-__all__ = ["PhaseTable", "told_tables", "setting_words", "where_sentences"]
+__all__ = ["PhaseTable", "findings_in_words", "told_tables", "setting_words", "where_sentences"]
 
 _UNITS = {"N_m": "N m", "m_s2": "m/s2", "m_s": "m/s", "m": "m"}
 _MAINLY = 0.5
@@ -47,11 +49,12 @@ def where_sentences(said: Mapping[str, Any]) -> list[str]:
     if not places:
         return []
     total = sum(place["excess"] for place in places)
-    parts = [f"in {_shares(places, key, total)}" for key in ("phase", "channel")]
+    phase, channel = (_shares(places, key, total) for key in ("phase", "channel"))
     first = places[0]
     said_first = (
-        f"The base model fails most {' and '.join(parts)} (shares of the chi-square beyond the noise); its worst "
-        f"stretch is {first['channel']} of trial {first['trial']} from {first['from_s']:.4g} to {first['to_s']:.4g} s."
+        f"The base model fails most in phase {phase} and channel {channel}, shares of the chi-square beyond the "
+        f"noise; its worst stretch is {first['channel']} of trial {first['trial']} from {first['from_s']:.4g} to "
+        f"{first['to_s']:.4g} s."
     )
     settings = _settings(places, total)
     return [said_first, *([f"Most of it is at {settings}."] if settings else [])]
@@ -122,3 +125,29 @@ def told_tables(said: Mapping[str, Any]) -> list[dict[str, Any]]:
             "rows": [[row["candidate"], f"{row['score']:.1f}", f"{row['left']:.3g}"] for row in chosen],
         })  # fmt: skip
     return tables
+
+
+def findings_in_words(found: Sequence[Finding]) -> list[Finding]:
+    """Findings whose sentences name their trial, what several channels of one sensor share as one."""
+    return _merged([_named(finding) for finding in found])
+
+
+def _named(finding: Finding) -> Finding:
+    """With the trial in its sentence."""
+    what = finding.what if finding.trial in finding.what else f"trial {finding.trial}: {finding.what}"
+    return replace(finding, what=what)
+
+
+def _merged(found: list[Finding]) -> list[Finding]:
+    """What is the same of several channels of one sensor as one finding."""
+    groups: dict[tuple[str, float | None, float | None, str], list[Finding]] = {}
+    for f in found:
+        pattern = re.sub(rf"\b{f.channel}\b", "*", f.what) if f.channel else f.what
+        groups.setdefault((f.trial, f.from_s, f.to_s, pattern), []).append(f)
+    merged = []
+    for (_, _, _, pattern), alike in groups.items():
+        names = [f.channel for f in alike if f.channel]
+        together = pattern.replace("*", ", ".join(names)).replace(" has no ", " have no ")
+        said = together if len(alike) > 1 else alike[0].what
+        merged.append(replace(alike[0], what=said))
+    return merged

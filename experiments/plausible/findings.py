@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from .penetration import penetration_oddities
 from .tumble import tumble_oddities
 from .words import times
 
-__all__ = ["find_implausible", "loud_sensors"]
+__all__ = ["find_implausible", "loud_sensors", "said_once"]
 
 Array = NDArray[np.float64]
 
@@ -41,10 +41,10 @@ def find_implausible(campaign: Campaign) -> list[Finding]:
             assert isinstance(trial, TumbleTrial)
             odd = list(tumble_oddities(campaign, tables, trial))
         found += [Finding(trial=trial.id, channel=channel, what=f"trial {trial.id}: {what}") for channel, what in odd]
-    return _once(found)
+    return said_once(found)
 
 
-def _once(found: list[Finding]) -> list[Finding]:
+def said_once(found: Sequence[Finding]) -> list[Finding]:
     """What is odd alike in many trials is said once, of the first."""
     alike: dict[tuple[str | None, str], list[Finding]] = {}
     for finding in found:
@@ -84,9 +84,9 @@ def loud_sensors(campaign: Campaign) -> list[Finding]:
     for (name, column), own in ratios.items():
         ratio = float(np.median(own))
         if ratio > _LOUD:
-            scatter = f"{column} scatters from row to row by {ratio * stated[name, column]:.2g}, {times(ratio)} what "
+            words = f"{column} scatters from row to row by {ratio * stated[name, column]:.2g}, {times(ratio)} what "
             cause = f"[sensors.{name}] states: a louder sensor, or something that moves as fast as it is read"
-            found.append(Finding(trial="", what=scatter + cause))
+            found.append(Finding(trial="", what=words + cause))
     return found
 
 

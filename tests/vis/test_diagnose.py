@@ -1,0 +1,67 @@
+"""The report of a diagnosis is made from its folder alone."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+
+from vis.diagnose import write_diagnosis_report
+from vis.diagnose_figures import read_channel, worst
+from vis.palette import line_handles, line_styles
+
+
+def write_folder(folder, *, trials: dict[str, float]) -> None:
+    """An unknown diagnosis of pushes; `trials`: id -> size of what is missing, in standard deviations."""
+    (folder / "series").mkdir()
+    time = np.linspace(0.0, 1.0, 60)
+    latent = ["trial,t_s,latent_force_N,depth_m,velocity_m_s"]
+    for trial, size in trials.items():
+        rows = ["t_s,measured,before,after,std,phase"]
+        for t in time:
+            rows.append(f"{t},{t + 0.1 * size * t},{t},{t + 0.05 * size * t},0.1,{'in' if t < 0.5 else 'out'}")
+            latent.append(f"{trial},{t},{0.05 * size * t},{0.01 * t},0.01")
+        (folder / "series" / f"{trial}.force.csv").write_text("\n".join(rows) + "\n")
+    (folder / "latent.csv").write_text("\n".join(latent) + "\n")
+    phase = {"phase": "in", "channel": "force", "samples": 30, "before": 9.0, "after": 3.0}
+    said = {
+        "verdict": "unknown", "effects": [], "alternatives": [],
+        "where": [{"trial": "a", "channel": "force", "phase": "in", "from_s": 0.0, "to_s": 0.4, "excess": 90.0,
+                   "settings": {"speed_m_s": 0.01}}],
+        "gap": {"before": {"fit": 9.0, "held_out": 8.0}, "after": {"fit": 3.0, "held_out": 4.0},
+                "held_out_trials": ["d"]},
+        "latent": {"file": "latent.csv", "depends_on": "the depth", "explained": {"depth_m": 0.9, "t_s": 0.5}},
+        "base": {stage: {"stiffness": {"value": 1.0, "std": 0.1, "unit": "N/m"}} for stage in ("before", "after")},
+        "by_phase": [phase | {"held_out": held} for held in (False, True)],
+        "evidence": [{"candidate": "layering:slope", "effects": ["layering"], "score": 2.0, "left": 2.0}],
+        "findings": [{"what": "trial a: gaps", "trial": "a", "channel": "force", "from_s": 0.1, "to_s": 0.2,
+                      "set_aside": True}],
+        "next_experiment": "Repeat the trial.",
+    }  # fmt: skip
+    result = {"title": "Something is missing", "version": "0", "warnings": ["a gap"],
+              "departures": {"sentences": ["The base model fails most in in."]}}  # fmt: skip
+    (folder / "diagnosis.json").write_text(json.dumps(said))
+    (folder / "result.json").write_text(json.dumps(result))
+
+
+def test_the_report_of_an_unknown_has_every_part_and_names_columns_in_words(tmp_path):
+    write_folder(tmp_path, trials={"a": 3.0, "d": 2.0})
+    page = write_diagnosis_report(tmp_path).read_text(encoding="utf-8")
+    for part in ("Measured and modelled", "What is left, by phase and channel", "layering:slope", "Repeat the trial.",
+                 "What no effect explains", "speed 0.01 m/s", "trial a: gaps", "held-out trials"):  # fmt: skip
+        assert part in page
+    figures = {path.stem for path in (tmp_path / "figures").iterdir()}
+    assert figures == {"trajectories", "residuals", "evidence", "latent"}
+
+
+def test_the_worst_channels_are_drawn_and_held_out_ones_among_them(tmp_path):
+    write_folder(tmp_path, trials={name: float(size) for name, size in zip("abcdefgh", range(9, 1, -1), strict=True)})
+    channels = [read_channel(path) for path in sorted((tmp_path / "series").glob("*.csv"))]
+    assert [channel.trial for channel in worst(channels, {"h", "g", "f"})] == ["a", "b", "c", "d", "f", "g"]
+
+
+def test_replicates_share_a_line_and_conditions_do_not():
+    keys = [f"condition {k}" for k in range(12) for _ in range(3)]
+    styles = line_styles(keys)
+    assert len(styles) == 12 and len({(style["color"], str(style["ls"])) for style in styles.values()}) == 12
+    assert [line.get_label() for line in line_handles(["1", "2", "3"], ["a", "b", "a"])] == ["a: 1, 3", "b: 2"]
