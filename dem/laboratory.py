@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +15,10 @@ from . import runtime
 from .bed import Bed, BedFailure
 from .lid import Lid
 from .materials import Facing, Material
-from .materials import material as find_material
 from .measure import packing_profile
-from .prepare import BEARING, check_options, fingerprint, rain, soft_enough
+from .prepare import BEARING, Specification
 from .recipe import DENSEST_UNIFORM, FLUFF, Stage, check_stages, parse_stage
-from .sizes import Sizes, Uniform, describe, sizes_of
+from .sizes import Sizes, Uniform
 from .stages import _DRAG, _PAST, _SHORT, ENERGY_RATIO, FLOOR_RATIO, Preparation
 from .stress import find_contacts, stress_profile
 
@@ -107,58 +106,26 @@ def prepare_as(
         ValueError: what ``prepare_bed`` refuses; stages that cannot be; a packing, or a slope, that is out of reach.
         BedFailure: the bed did not come to rest.
     """
-    sizes = sizes_of(grain, spread)
-    stuff = find_material(material, grain=sizes.mean)
-    check_options(size, sizes.mean, gravity, seed, max_overlap)
-    size = tuple(float(s) for s in size)
+    wanted = Specification.of(
+        material, size=size, grain=grain, spread=spread, gravity=gravity, seed=seed, young=young,
+        max_overlap=max_overlap, time_step=time_step, floor=floor, precision=precision, arch=arch, threads=threads,
+    )  # fmt: skip
+    stuff, sizes, (x, y, z) = wanted.material, wanted.sizes, wanted.size
     plan = [parse_stage(stage) if isinstance(stage, str) else stage for stage in stages]
-    check_stages(plan, size=size, grain=sizes.mean, sizes=sizes, cohesive=stuff.cohesion != "none")
-    if young is None:
-        young = soft_enough(stuff, size=size, sizes=sizes, gravity=gravity, max_overlap=max_overlap)
-    recipe = {
-        "code": fingerprint(),
-        "stages": [str(stage) for stage in plan],
-        "material": {f.name: getattr(stuff, f.name) for f in fields(stuff) if f.name != "sources"},
-        "size": list(size),
-        "sizes": describe(sizes),
-        "gravity": float(gravity),
-        "seed": int(seed),
-        "young": float(young),
-        "max_overlap": float(max_overlap),
-        "time_step": time_step,
-        "floor": None if floor is None else asdict(floor),
-        "precision": precision,
-        "arch": arch,
-    }
+    check_stages(plan, size=wanted.size, grain=sizes.mean, sizes=sizes, cohesive=stuff.cohesion != "none")
+    recipe = wanted.recipe() | {"stages": [str(stage) for stage in plan]}
     runtime.start(arch=arch, threads=threads, precision=precision)
-    depth = (size[2] + _SURPLUS_DIAMETERS * sizes.mean) * (DENSEST_UNIFORM if isinstance(sizes, Uniform) else 0.70)
-    bed = rain(
-        stuff,
-        volume=depth * size[0] * size[1],
-        size=size,
-        sizes=sizes,
-        gravity=gravity,
-        seed=seed,
-        young=young,
-        max_overlap=max_overlap,
-        time_step=time_step,
-        floor=floor,
-        precision=precision,
-        arch=arch,
-        threads=threads,
-    )
+    depth = (z + _SURPLUS_DIAMETERS * sizes.mean) * (DENSEST_UNIFORM if isinstance(sizes, Uniform) else 0.70)
     work = Laboratory(
-        bed, stages=plan, grain=sizes.mean, progress=progress, path=None if keep is None else Path(keep), recipe=recipe
+        wanted.rain(depth * x * y),
+        stages=plan,
+        grain=sizes.mean,
+        progress=progress,
+        path=None if keep is None else Path(keep),
+        recipe=recipe,
     )
     work.find(arch=arch, threads=threads)
-    bed = work.run()
-    bed.material = stuff.softened(young)
-    bed.recipe = recipe
-    bed.overlap_limit = float(max_overlap)
-    bed.mark_origin()
-    bed.max_overlap = 0.0
-    bed.steps = 0
-    return Prepared(bed, recipe, work.reports)
+    return Prepared(wanted.finish(work.run(), recipe), recipe, work.reports)
 
 
 class Laboratory(Preparation):
@@ -214,33 +181,14 @@ class Laboratory(Preparation):
 
     # ------------------------------------------------------------------ kept and found again
 
-    def keep(self) -> None:
-        """Write it down as it is."""
-        if self._path is not None:
-            self.bed.save(self._path)
-            notes = {
-                "recipe": self._recipe,
-                "reports": [asdict(report) for report in self.reports],
-                "notes": self.notes,
-                "steps": self.bed.steps,
-            }
-            self._path.with_suffix(".json").write_text(json.dumps(notes))
-            self._kept = self._now()
+    def _told(self) -> dict[str, Any]:
+        return {"recipe": self._recipe, "reports": [asdict(report) for report in self.reports]}
 
-    def find(self, **options: Any) -> None:
-        """Go back to what was kept for the same recipe, if there is something whole."""
-        if self._path is None or not self._path.exists():
-            return
-        try:
-            kept = json.loads(self._path.with_suffix(".json").read_text())
-            bed = Bed.load(self._path, **options)
-            if kept["steps"] != bed.steps or kept["recipe"] != json.loads(json.dumps(self._recipe)):
-                return
-            reports = [StageReport(**report) for report in kept["reports"]]
-            notes = dict(kept["notes"])
-        except (OSError, ValueError, KeyError, TypeError, AttributeError):
-            return
-        self.bed, self.reports, self.notes = bed, reports, notes
+    def _recall(self, kept: dict[str, Any]) -> bool:
+        if kept["recipe"] != json.loads(json.dumps(self._recipe)):
+            return False
+        self.reports = [StageReport(**report) for report in kept["reports"]]
+        return True
 
     # ------------------------------------------------------------------ the stages
 

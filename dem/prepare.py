@@ -12,7 +12,7 @@ import math
 import os
 import warnings
 from collections.abc import Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,7 @@ from .sizes import Sizes, Uniform, describe, sizes_of
 from .stages import Preparation
 from .timestep import choose_young
 
-__all__ = ["BEARING", "cache_folder", "check_options", "fingerprint", "prepare_bed", "rain", "soft_enough"]
+__all__ = ["BEARING", "Specification", "cache_folder", "check_options", "fingerprint", "prepare_bed", "soft_enough"]
 
 _EXPECTED_PACKING = 0.57
 # Penetration resistance of sand grows with depth about sixty times as fast as its overburden (3D-RFT, Agarwal et al.
@@ -44,6 +44,115 @@ def cache_folder() -> Path:
     """Where prepared beds are kept: ``HEDGEBED_CACHE``, or ~/.cache/hedgebed."""
     given = os.environ.get("HEDGEBED_CACHE")
     return Path(given).expanduser() if given else Path.home() / ".cache" / "hedgebed"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Specification:
+    """What a bed is rained from: the options that every preparation takes, checked, and chosen where left open.
+
+    Attributes:
+        material: as given; ``young`` is the softened grains' modulus [Pa].
+        size: lateral periods and depth [m]. sizes: of the grains.
+
+    The others are as in ``prepare_bed``.
+    """
+
+    material: Material
+    size: tuple[float, float, float]
+    sizes: Sizes
+    gravity: float
+    seed: int
+    young: float
+    max_overlap: float
+    time_step: float | None
+    floor: Facing | None
+    precision: str
+    arch: str
+    threads: int | None
+
+    @classmethod
+    def of(
+        cls,
+        material: str | Material,
+        *,
+        size: Sequence[float],
+        grain: float | Sizes,
+        spread: float | None,
+        gravity: float,
+        seed: int,
+        young: float | None,
+        max_overlap: float,
+        **others: Any,
+    ) -> Specification:
+        """Check the options of ``prepare_bed`` and choose the modulus where it is None. Raises ValueError."""
+        sizes = sizes_of(grain, spread)
+        stuff = find_material(material, grain=sizes.mean)
+        check_options(size, sizes.mean, gravity, seed, max_overlap)
+        x, y, z = (float(s) for s in size)
+        if young is None:
+            young = soft_enough(stuff, size=(x, y, z), sizes=sizes, gravity=gravity, max_overlap=max_overlap)
+        return cls(
+            material=stuff,
+            size=(x, y, z),
+            sizes=sizes,
+            gravity=float(gravity),
+            seed=int(seed),
+            young=float(young),
+            max_overlap=float(max_overlap),
+            **others,
+        )
+
+    def recipe(self) -> dict[str, Any]:
+        """What shapes the bed, as JSON takes it, with the code's digest; threads do not."""
+        return {
+            "code": fingerprint(),
+            "material": {f.name: getattr(self.material, f.name) for f in fields(self.material) if f.name != "sources"},
+            "size": list(self.size),
+            "sizes": describe(self.sizes),
+            "gravity": self.gravity,
+            "seed": self.seed,
+            "young": self.young,
+            "max_overlap": self.max_overlap,
+            "time_step": self.time_step,
+            "floor": None if self.floor is None else asdict(self.floor),
+            "precision": self.precision,
+            "arch": self.arch,
+        }
+
+    def rain(self, volume: float) -> Bed:
+        """Grains of this solid volume [m3] in the air, at rest, in a loose column."""
+        rng = np.random.default_rng(self.seed)
+        radii = draw_radii(rng, volume, self.sizes)
+        positions = rain_positions(rng, radii, self.size[:2])
+        top = float((positions[:, 2] + radii).max())
+        bed = Bed.from_grains(
+            self.material,
+            positions=positions,
+            radii=radii,
+            size=self.size,
+            height=top + 10 * self.sizes.mean,
+            gravity=self.gravity,
+            young=self.young,
+            max_overlap=self.max_overlap,
+            time_step=self.time_step,
+            floor=True if self.floor is None else self.floor,
+            seed=self.seed,
+            precision=self.precision,
+            arch=self.arch,
+            threads=self.threads,
+        )
+        bed.overlap_limit = max(bed.overlap_limit, _RAIN_OVERLAP)
+        return bed
+
+    def finish(self, bed: Bed, recipe: dict[str, Any]) -> Bed:
+        """The prepared bed at time 0, bound by ``max_overlap``, with displacements counted from here."""
+        bed.material = self.material.softened(self.young)
+        bed.recipe = recipe
+        bed.overlap_limit = self.max_overlap
+        bed.mark_origin()
+        bed.max_overlap = 0.0
+        bed.steps = 0
+        return bed
 
 
 @functools.cache
@@ -111,31 +220,17 @@ def prepare_bed(
             outside 0 to 0.5 or beside a distribution, a packing that cannot be reached, a time step too long.
         BedFailure: the bed did not come to rest.
     """
-    sizes = sizes_of(grain, spread)
-    grain = sizes.mean
-    stuff = find_material(material, grain=grain)
-    check_options(size, grain, gravity, seed, max_overlap)
+    wanted = Specification.of(
+        material, size=size, grain=grain, spread=spread, gravity=gravity, seed=seed, young=young,
+        max_overlap=max_overlap, time_step=time_step, floor=floor, precision=precision, arch=arch, threads=threads,
+    )  # fmt: skip
+    stuff, sizes = wanted.material, wanted.sizes
     if packing is not None:
         check_packing(packing, sizes, cohesive=stuff.cohesion != "none")
-    size = tuple(float(s) for s in size)
-    if young is None:
-        young = soft_enough(stuff, size=size, sizes=sizes, gravity=gravity, max_overlap=max_overlap)
-    recipe = {
-        "code": fingerprint(),
-        "material": {f.name: getattr(stuff, f.name) for f in fields(stuff) if f.name != "sources"},
-        "size": size,
-        "grain": float(grain),
+    recipe = wanted.recipe() | {
+        "grain": float(sizes.mean),
         "spread": sizes.spread if isinstance(sizes, Uniform) else None,
-        "sizes": describe(sizes),
         "packing": packing,
-        "gravity": float(gravity),
-        "seed": int(seed),
-        "young": float(young),
-        "max_overlap": float(max_overlap),
-        "time_step": time_step,
-        "floor": None if floor is None else asdict(floor),
-        "precision": precision,
-        "arch": arch,
     }
     runtime.start(arch=arch, threads=threads, precision=precision)
     key = hashlib.sha256(json.dumps(recipe, sort_keys=True).encode()).hexdigest()[:24]
@@ -146,13 +241,13 @@ def prepare_bed(
         except ValueError as problem:
             warnings.warn(f"the cached bed {path.name} cannot be read and is made anew: {problem}", stacklevel=2)
         else:
-            bed.material = stuff.softened(young)
+            bed.material = stuff.softened(wanted.young)
             bed.recipe = recipe
             return bed
     work = Preparation(
-        _rain(stuff, size, sizes, gravity, seed, young, max_overlap, time_step, floor, precision, arch, threads),
-        grain=grain,
-        depth=size[2],
+        _rain(wanted),
+        grain=sizes.mean,
+        depth=wanted.size[2],
         packing=packing,
         progress=progress,
         path=cache_folder() / "unfinished" / path.name if cache else None,
@@ -163,10 +258,7 @@ def prepare_bed(
     except BedFailure as failure:
         kept = work.bed.save(cache_folder() / "failed" / path.name)
         raise BedFailure(f"{failure.reason}; the bed as it was is in {kept}") from None
-    bed.material = stuff.softened(young)
-    bed.recipe = recipe
-    bed.overlap_limit = float(max_overlap)
-    bed = _reset(bed)
+    bed = wanted.finish(bed, recipe)
     if cache:
         try:
             bed.save(path)
@@ -207,70 +299,7 @@ def check_options(size, grain, gravity, seed, max_overlap) -> None:
             )
 
 
-def _rain(stuff, size, sizes, gravity, seed, young, max_overlap, time_step, floor, precision, arch, threads) -> Bed:
+def _rain(wanted: Specification) -> Bed:
     """The grains in the air, at rest, in a loose column, for a bed that is cut level."""
-    fill = max(size[2] * (1 + _SURPLUS), size[2] + _SURPLUS_DIAMETERS * sizes.mean)
-    return rain(
-        stuff,
-        volume=0.60 * fill * size[0] * size[1],
-        size=size,
-        sizes=sizes,
-        gravity=gravity,
-        seed=seed,
-        young=young,
-        max_overlap=max_overlap,
-        time_step=time_step,
-        floor=floor,
-        precision=precision,
-        arch=arch,
-        threads=threads,
-    )
-
-
-def rain(
-    stuff: Material,
-    *,
-    volume: float,
-    size: Sequence[float],
-    sizes: Sizes,
-    gravity: float,
-    seed: int,
-    young: float,
-    max_overlap: float,
-    time_step: float | None,
-    floor: Facing | None,
-    precision: str,
-    arch: str,
-    threads: int | None,
-) -> Bed:
-    """Grains of this solid volume [m3] in the air, at rest, in a loose column; the rest as in ``prepare_bed``."""
-    rng, grain = np.random.default_rng(seed), sizes.mean
-    radii = draw_radii(rng, volume, sizes)
-    positions = rain_positions(rng, radii, size[:2])
-    top = float((positions[:, 2] + radii).max())
-    bed = Bed.from_grains(
-        stuff,
-        positions=positions,
-        radii=radii,
-        size=size,
-        height=top + 10 * grain,
-        gravity=gravity,
-        young=young,
-        max_overlap=max_overlap,
-        time_step=time_step,
-        floor=True if floor is None else floor,
-        seed=seed,
-        precision=precision,
-        arch=arch,
-        threads=threads,
-    )
-    bed.overlap_limit = max(bed.overlap_limit, _RAIN_OVERLAP)
-    return bed
-
-
-def _reset(bed: Bed) -> Bed:
-    """The prepared bed at time 0, with displacements counted from here."""
-    bed.mark_origin()
-    bed.max_overlap = 0.0
-    bed.steps = 0
-    return bed
+    x, y, z = wanted.size
+    return wanted.rain(0.60 * max(z * (1 + _SURPLUS), z + _SURPLUS_DIAMETERS * wanted.sizes.mean) * x * y)

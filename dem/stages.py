@@ -81,8 +81,8 @@ class Preparation:
         """Write it down as it is."""
         if self._path is not None:
             self.bed.save(self._path)
-            notes = {"stage": self.stage, "notes": self.notes, "steps": self.bed.steps}
-            self._path.with_suffix(".json").write_text(json.dumps(notes))
+            kept = self._told() | {"notes": self.notes, "steps": self.bed.steps}
+            self._path.with_suffix(".json").write_text(json.dumps(kept))
             self._kept = self._now()
 
     def find(self, **options: Any) -> None:
@@ -90,14 +90,22 @@ class Preparation:
         if self._path is None or not self._path.exists():
             return
         try:
-            bed = Bed.load(self._path, **options)
             kept = json.loads(self._path.with_suffix(".json").read_text())
-            if kept["steps"] != bed.steps:  # ended between the two files
+            bed, notes = Bed.load(self._path, **options), dict(kept["notes"])
+            if kept["steps"] != bed.steps or not self._recall(kept):  # ended between the two files, or another's
                 return
-            stage, notes = str(kept["stage"]), dict(kept["notes"])
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             return
-        self.bed, self.stage, self.notes = bed, stage, notes
+        self.bed, self.notes = bed, notes
+
+    def _told(self) -> dict[str, Any]:
+        """What is kept beside the bed, its steps and the notes, as JSON takes it."""
+        return {"stage": self.stage}
+
+    def _recall(self, kept: dict[str, Any]) -> bool:
+        """Take up again what ``_told`` gave; whether it is of this work. Nothing is changed where it raises."""
+        self.stage = str(kept["stage"])
+        return True
 
     def forget(self) -> None:
         """Remove what was kept."""

@@ -140,12 +140,14 @@ def test_the_key_of_the_cache_holds_every_option(monkeypatch):
         def measure_surface(self):
             pass
 
+        def mark_origin(self):
+            pass
+
         def save(self, path):
             asked.append(path.name)
             path.parent.mkdir(parents=True, exist_ok=True)
 
-    for name in ("_rain", "_reset"):
-        monkeypatch.setattr(dem.prepare, name, lambda *_: NoBed())
+    monkeypatch.setattr(dem.prepare, "_rain", lambda *_: NoBed())
     monkeypatch.setattr(Preparation, "run", lambda work: work.bed)
     monkeypatch.setattr(dem.prepare.runtime, "start", lambda **_: None)
 
