@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
@@ -18,7 +17,7 @@ from vis.frames import read_frames
 from vis.numbers import short
 from vis.page import Block, Page, Section, Tile, code, figure, listing, table, text, write_page
 from vis.pictures import opengl_available, render_apart
-from vis.plot_parts import Plot, legend_above, new_panels
+from vis.plot_parts import Plot, drawn_into, legend_above, new_panels, shades
 from vis.render import run_job
 from vis.style import styled
 from vis.tumble import read_columns
@@ -36,10 +35,7 @@ def write_bed_report(folder: str | Path, *, progress: Callable[[float], None] | 
     tell = progress if progress is not None else lambda done: None
     folder = Path(folder)
     result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
-    figures = folder / "figures"
-    figures.mkdir(exist_ok=True)
-    plots = [_profiles(folder, result), *_passes(folder, result)]
-    drawn = [figure(plot.save(figures), title=plot.title, caption=plot.caption) for plot in plots]
+    drawn = drawn_into(folder, [_profiles(folder, result), *_passes(folder, result)])
     tell(0.4)
     picture, note = _picture(folder, result)
     tell(0.9)
@@ -48,15 +44,11 @@ def write_bed_report(folder: str | Path, *, progress: Callable[[float], None] | 
     return report
 
 
-def _colours(count: int) -> list[Any]:
-    return [colormaps["cividis"](x) for x in np.linspace(0.0, 0.85, count)]
-
-
 def _profiles(folder: Path, result: Mapping[str, Any]) -> Plot:
     """Packing and stresses against height, a colour for each stage."""
     with styled():
         drawing, (packing, vertical, sideways) = new_panels(3, height=3.6, sharey=True)
-        colours = _colours(len(result["stages"]))
+        colours = shades(len(result["stages"]))
         for stage, colour in zip(result["stages"], colours, strict=True):
             columns, _ = read_columns(folder / stage["series"])
             height = 1e3 * columns["height_m"]
@@ -96,7 +88,7 @@ def _passes(folder: Path, result: Mapping[str, Any]) -> list[Plot]:
         return []
     with styled():
         drawing, (axis,) = new_panels(1, height=2.6)
-        for stage, colour in zip(stages, _colours(len(stages)), strict=True):
+        for stage, colour in zip(stages, shades(len(stages)), strict=True):
             columns, _ = read_columns(folder / stage["trace_series"])
             axis.plot(columns["pass"], columns["packing"], color=colour, marker=".", label=stage["stage"])
         axis.set_xlabel("taps, or presses of the lid, that were kept [1]")

@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.lines import Line2D
 
 from vis.numbers import quote
-from vis.page import Page, Section, Tile, code, figure, table, text, write_page
-from vis.plot_parts import Plot, legend_above, new_panels
+from vis.page import Page, Section, Tile, code, table, text, write_page
+from vis.plot_parts import Plot, drawn_into, legend_above, new_panels, shades
 from vis.style import BED, MODEL, styled
 from vis.tumble import read_columns
 
@@ -29,10 +28,7 @@ def write_shear_report(folder: str | Path, *, progress: Callable[[float], None] 
     tell = progress if progress is not None else lambda done: None
     folder = Path(folder)
     result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
-    figures = folder / "figures"
-    figures.mkdir(exist_ok=True)
-    plots = [_curves(folder, result), _lines(result)]
-    drawn = [figure(plot.save(figures), title=plot.title, caption=plot.caption) for plot in plots]
+    drawn = drawn_into(folder, [_curves(folder, result), _lines(result)])
     tell(0.9)
     quantities = result["quantities"]
     tiles = [
@@ -78,7 +74,7 @@ def _curves(folder: Path, result: Mapping[str, Any]) -> Plot:
     grain = result["grain"]
     with styled():
         drawing, (ratio, height) = new_panels(2, height=3.2, sharex=True)
-        colours = [colormaps["cividis"](x) for x in np.linspace(0.0, 0.85, len(result["runs"]))]
+        colours = shades(len(result["runs"]))
         for run, colour in zip(result["runs"], colours, strict=True):
             columns, _ = read_columns(folder / run["series"])
             way = columns["way_m"] / grain

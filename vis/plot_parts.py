@@ -1,4 +1,4 @@
-"""What the plots of a penetration run share: the figure, its legend, the parts of a series, words for a caption."""
+"""What plots share: the figure, its legend, their way into a report; the parts of a penetration run's series, words."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -15,6 +16,8 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from vis.folder import Run, Series
+from vis.page import Block
+from vis.page import figure as block_of
 from vis.style import BED, MODEL, styled
 
 __all__ = [
@@ -22,11 +25,13 @@ __all__ = [
     "Plot",
     "above_surface",
     "by_speed",
+    "drawn_into",
     "has_model",
     "legend_above",
     "new_panels",
     "number_of",
     "pair_of_handles",
+    "shades",
     "speed_words",
     "spread_words",
 ]
@@ -49,6 +54,18 @@ class Plot:
         with styled():
             self.figure.savefig(path)
         return path
+
+
+def drawn_into(folder: Path, plots: Iterable[Plot]) -> list[Block]:
+    """Write the plots to `<folder>/figures`; what shows them in a report."""
+    figures = folder / "figures"
+    figures.mkdir(exist_ok=True)
+    return [block_of(plot.save(figures), title=plot.title, caption=plot.caption) for plot in plots]
+
+
+def shades(count: int) -> list[Any]:
+    """A colour for each of so many that have an order, from dark to light."""
+    return [colormaps["cividis"](share) for share in np.linspace(0.0, 0.85, count)]
 
 
 def new_panels(count: int, *, height: float, sharex: bool = False, sharey: bool = False) -> tuple[Figure, list[Axes]]:
