@@ -6,8 +6,9 @@ import math
 import numpy as np
 import pytest
 import taichi as ti
+from single_grains import RADIUS, SIZE, grains_at, rotated
 
-from dem import Ball, Bed, Cone, Cylinder, Material, Plane, runtime
+from dem import Ball, Cone, Cylinder, Plane, runtime
 from dem.contact import effective_moduli
 from dem.shapes import distance_to
 
@@ -141,25 +142,6 @@ def test_a_shape_that_cannot_be_is_refused(make, words):
 
 # ---------------------------------------------------------------------------- grains on bodies
 
-STUFF = Material("grain", 2600, 1e8, 0.25, 0.5, 1.0)
-RADIUS = 0.002
-SIZE = (0.045, 0.045, 0.04)
-
-
-def grains_at(positions, velocities=None, **options):
-    positions = np.atleast_2d(np.array(positions, dtype=float))
-    return Bed.from_grains(
-        STUFF,
-        positions=positions,
-        radii=np.full(len(positions), RADIUS),
-        velocities=None if velocities is None else np.atleast_2d(np.array(velocities, dtype=float)),
-        size=SIZE,
-        height=0.045,
-        gravity=0.0,
-        floor=False,
-        **options,
-    )
-
 
 @pytest.mark.parametrize(("young", "poisson"), [(None, 0.3), (3e8, 0.3)])
 def test_a_grain_on_a_ball_reproduces_hertz(young, poisson):
@@ -189,14 +171,7 @@ def test_a_grain_on_a_ball_reproduces_hertz(young, poisson):
 def spike_and_grains(shift):
     """A turned spike, ball and cylinder, that moves and spins among grains which touch its side and tip."""
     at = np.array([0.02, 0.03, 0.02]) + shift
-    axis_angle = 0.4
-    turn = (math.cos(axis_angle / 2), math.sin(axis_angle / 2) * 0.6, math.sin(axis_angle / 2) * 0.8, 0.0)
-    q = np.array(turn)
-
-    def rotated(x):
-        v = q[1:]
-        return np.array(x) + 2 * q[0] * np.cross(v, x) + 2 * np.cross(v, np.cross(v, x))
-
+    turn = (math.cos(0.2), 0.6 * math.sin(0.2), 0.8 * math.sin(0.2), 0.0)
     reach = 0.004 + RADIUS * 0.98
     local = [
         [0, 0, 0.004 - reach],
@@ -205,7 +180,7 @@ def spike_and_grains(shift):
         [0, -reach, 0.009],
         [-reach * 0.6, reach * 0.8, 0.015],
     ]
-    positions = [at + rotated(p) for p in local]
+    positions = at + rotated(turn, local)
     bed = grains_at(positions, np.random.default_rng(4).normal(0, 0.05, (5, 3)), time_step=2e-6)
     body = bed.add_body([Ball(center=(0, 0, 0.004), radius=0.004), Cylinder(0.004, 0.02, 0.004)], position=(0, 0, 0.3))
     bed.move_body(body, position=at, turn=turn, velocity=(0.02, -0.01, -0.1), spin=(3.0, 0.0, 10.0))

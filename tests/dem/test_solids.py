@@ -6,21 +6,15 @@ import numpy as np
 import pytest
 import solid_shapes
 import taichi as ti
+from single_grains import RADIUS, STUFF, grains_at, rotated
 
-from dem import Ball, Bed, Box, Capsule, Cylinder, Facing, Material, Mesh, Placed, Polyhedron, Tube, runtime
+from dem import Ball, Box, Capsule, Cylinder, Facing, Material, Mesh, Placed, Polyhedron, Tube, runtime
 from dem.contact import effective_moduli
 from dem.shape_table import ShapeTable
 from dem.solids import bare, place_row
 
 TURN = (math.cos(0.35), 0.6 * math.sin(0.35), 0.0, 0.8 * math.sin(0.35))
 """A turn by 0.7 rad about (0.6, 0, 0.8)."""
-
-
-def rotated(q, x):
-    """Points x turned by the unit quaternion q."""
-    axis = np.array(q[1:])
-    t = 2 * np.cross(axis, x)
-    return np.asarray(x) + q[0] * t + np.cross(axis, t)
 
 
 def back(q):
@@ -135,25 +129,6 @@ def test_a_solid_that_cannot_be_is_refused(make, words):
 
 
 # ---------------------------------------------------------------------------- grains on bodies
-
-STUFF = Material("grain", 2600, 1e8, 0.25, 0.5, 1.0)
-RADIUS = 0.002
-SIZE = (0.045, 0.045, 0.04)
-
-
-def grains_at(positions, velocities=None, *, gravity=0.0, **options):
-    positions = np.atleast_2d(np.array(positions, dtype=float))
-    return Bed.from_grains(
-        options.pop("material", STUFF),
-        positions=positions,
-        radii=np.full(len(positions), RADIUS),
-        velocities=None if velocities is None else np.atleast_2d(np.array(velocities, dtype=float)),
-        size=SIZE,
-        height=0.06,
-        gravity=gravity,
-        floor=options.pop("floor", False),
-        **options,
-    )
 
 
 def box_mesh(size, center=(0.0, 0.0, 0.0), *, cuts=0):
