@@ -1,4 +1,4 @@
-"""Lets a test ask for another layout of the engine: chunks, one grain a chunk as on a GPU."""
+"""Few shapes of the engine for all tests of beds; and a test may ask for another layout: chunks, one grain a chunk."""
 
 from __future__ import annotations
 
@@ -8,6 +8,11 @@ import gc
 import pytest
 
 import dem.bed
+from dem.engine import Engine
+
+LEAST_GRAINS, LEAST_CELLS = 1024, 8192
+"""Room in an engine of the tests. Where an engine is large enough it makes no difference to a bed how large it is, and
+one that is compiled for the largest bed of most tests serves them all, one after the other."""
 
 
 class EnginePool:
@@ -32,6 +37,23 @@ class EnginePool:
 
 
 POOL = EnginePool()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def roomy_engines():
+    """Engines have room for ``LEAST_GRAINS`` and ``LEAST_CELLS``, but for those with one grain a chunk."""
+    plan = Engine.plan
+
+    def roomy(**settings):
+        found = plan(**settings)
+        if not settings.get("gpu"):
+            found["capacity"] = max(found["capacity"], LEAST_GRAINS)
+            found["cell_capacity"] = max(found["cell_capacity"], LEAST_CELLS)
+        return found
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Engine, "plan", staticmethod(roomy))
+        yield
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -1,4 +1,4 @@
-"""Registers the stand-in experiment."""
+"""Registers the stand-in experiment; where runs go, and that they draw no report; one engine for small beds."""
 
 import sys
 from pathlib import Path
@@ -6,9 +6,26 @@ from types import ModuleType
 
 import dig_experiment
 import pytest
+from engine_pool import roomy_engines
 
 from experiments import registry
 from experiments.runfolder import RunFolder
+
+__all__ = ["dig", "reported", "roomy_engines", "unreported"]
+
+
+@pytest.fixture
+def reported():
+    """The report is drawn."""
+
+
+@pytest.fixture
+def unreported(tmp_path, monkeypatch, request):
+    """Runs go to `tmp_path`; only what asks for it with ``reported`` draws a report."""
+    monkeypatch.chdir(tmp_path)
+    if "reported" not in request.fixturenames:
+        for module in ("hop", "synthesis", "tumble"):
+            monkeypatch.setattr(f"experiments.{module}.write_report", lambda folder, progress: None)
 
 
 @pytest.fixture

@@ -1,5 +1,6 @@
 """`hedgebed hop`: the wheel speed for a distance, what is said of escape, what is refused."""
 
+import functools
 import json
 import math
 import re
@@ -19,23 +20,26 @@ from rigid.platform_files import PLATFORM_FOLDER
 from rigid.trial import Trial
 from vis import write_report
 
-
-@pytest.fixture(autouse=True)
-def _unreported(monkeypatch, request):
-    """Only what asks for it with ``reported`` draws a report."""
-    if "reported" not in request.fixturenames:
-        monkeypatch.setattr("experiments.hop.write_report", lambda folder, progress: None)
-
-
-@pytest.fixture
-def reported():
-    """The report is drawn."""
+pytestmark = pytest.mark.usefixtures("unreported")
 
 
 def hop(tmp_path, capsys, *options, name="run"):
     status = main(["hop", *options, "--json", "--quiet", "--out", str(tmp_path / name)])
     said = capsys.readouterr()
     return status, json.loads(said.out) if status == DONE else said.err
+
+
+@pytest.fixture(scope="module")
+def result_of(tmp_path_factory):
+    """The result of a hop with these options; what several tests ask for is run once."""
+
+    @functools.cache
+    def ask(*options):
+        folder = tmp_path_factory.mktemp("hop")
+        assert main(["hop", *options, "--quiet", "--out", str(folder / "run")]) == DONE
+        return json.loads((folder / "run" / "result.json").read_text())
+
+    return ask
 
 
 def test_the_wheel_speed_takes_the_hedgehog_the_distance(tmp_path, capsys):
@@ -55,8 +59,8 @@ def test_the_wheel_speed_takes_the_hedgehog_the_distance(tmp_path, capsys):
     assert json.loads((tmp_path / "run" / "result.json").read_text()) == result
 
 
-def test_without_a_radius_it_says_that_it_cannot_tell(tmp_path, capsys):
-    _, result = hop(tmp_path, capsys, "--distance", "5")
+def test_without_a_radius_it_says_that_it_cannot_tell(result_of):
+    result = result_of("--distance", "5")
     assert result["quantities"]["escape_speed"]["value"] is None
     assert any("cannot be told without body_radius" in warning for warning in result["warnings"])
 
@@ -74,14 +78,13 @@ def test_near_escape_it_says_so_with_the_share(tmp_path, capsys):
     )
 
 
-def test_escape_is_near_from_half_its_speed_on(tmp_path, capsys):
+def test_escape_is_near_from_half_its_speed_on(result_of):
     """The larger launch decides: radii for which the model's is 0.45 and 0.55 of sqrt(2 g R), theory's below half."""
-    _, flat = hop(tmp_path, capsys, "--distance", "5", name="flat")
-    speed = flat["quantities"]["model_launch_speed"]["value"]
+    speed = result_of("--distance", "5")["quantities"]["model_launch_speed"]["value"]
     near = {}
     for share in (0.45, 0.55):
         radius = (speed / share) ** 2 / (2 * 1e-3)
-        _, result = hop(tmp_path, capsys, "--distance", "5", "--body-radius", f"{radius:.6g}", name=f"{share:g}")
+        result = result_of("--distance", "5", "--body-radius", f"{radius:.6g}")
         assert result["quantities"]["escape_ratio"]["value"] < 0.4
         ratio = result["quantities"]["model_escape_ratio"]["value"]
         near[ratio > 0.5] = any("escape is near" in warning for warning in result["warnings"])
@@ -92,9 +95,9 @@ def test_escape_is_near_from_half_its_speed_on(tmp_path, capsys):
 # On ground that gives
 
 
-def test_springy_ground_throws_a_sliding_platform_faster_at_the_same_angle(tmp_path, capsys):
-    """The command of the issue: 76 degrees, tan(angle) = 1 / mu_d, on both; the speed of an integration of its own."""
-    _, result = hop(tmp_path, capsys, "--gravity", "1e-3", "--distance", "5", "--body-radius", "300")
+def test_springy_ground_throws_a_sliding_platform_faster_at_the_same_angle(result_of):
+    """76 degrees, tan(angle) = 1 / mu_d, on both; the speed of an integration of its own."""
+    result = result_of("--distance", "5", "--body-radius", "300")
     value = {key: quantity["value"] for key, quantity in result["quantities"].items()}
     trial = Trial(
         mass=5.3, inertia=0.06, spike_length=0.2, mu_s=0.5,
@@ -126,9 +129,9 @@ def test_springy_ground_throws_tips_that_hold_up_more_steeply(tmp_path, capsys):
     assert any("leave more steeply" in sentence for sentence in result["departures"]["sentences"])
 
 
-def test_soft_ground_has_no_wheel_speed_for_what_it_cannot_throw(tmp_path, capsys):
+def test_soft_ground_has_no_wheel_speed_for_what_it_cannot_throw(result_of):
     """On the sand's 82 N/m it turns in place before it leaves: 2 m at most, whatever the wheel, so none is named."""
-    _, result = hop(tmp_path, capsys, "--surface", "sand", "--distance", "5")
+    result = result_of("--surface", "sand", "--distance", "5")
     assert result["quantities"]["distance_factor"]["value"] < 0.4
     assert result["quantities"]["model_wheel_speed"]["value"] is None
     assert any("No wheel speed up to 1050 rad/s" in sentence for sentence in result["departures"]["sentences"])
@@ -197,10 +200,10 @@ def test_a_motor_slows_the_wheel_where_there_is_no_brake_and_unequal_sides_have_
     assert (tmp_path / "run" / "report.html").exists()
 
 
-def test_what_is_said_reads_well(tmp_path, capsys):
+def test_what_is_said_reads_well(result_of):
     """The words that a person sees, under a brake and under a motor."""
-    _, brake = hop(tmp_path, capsys, "--distance", "5", name="a")
-    _, motor = hop(tmp_path, capsys, "--distance", "0.5", "--actuator", "motor", name="b")
+    brake = result_of("--distance", "5")
+    motor = result_of("--actuator", "motor", "--distance", "0.5")
     first = [result["departures"]["sentences"][0] for result in (brake, motor)]
     assert re.fullmatch(
         r"Braking a wheel at \S+ rad/s \(\S+ rpm\) with 6 N m, the platform slides off rigid ground at \S+ m/s, .*",
@@ -209,15 +212,15 @@ def test_what_is_said_reads_well(tmp_path, capsys):
     assert re.fullmatch(r"A motor at \S+ N m, whose wheel comes to \S+ rad/s \(\S+ rpm\), the platform .*", first[1])
 
 
-def test_the_wheel_speeds_of_both_grounds_stand_side_by_side_and_say_which_is_which(tmp_path, capsys):
-    _, result = hop(tmp_path, capsys, "--distance", "5")
+def test_the_wheel_speeds_of_both_grounds_stand_side_by_side_and_say_which_is_which(result_of):
+    result = result_of("--distance", "5")
     rigid, gives = (result["quantities"][name] for name in ("wheel_speed", "model_wheel_speed"))
     assert list(result["quantities"])[:2] == ["wheel_speed", "model_wheel_speed"]
     assert "rigid ground" in rigid["note"] and "on brick" in gives["note"]
     assert result["title"].endswith(
         f"by a wheel at {rigid['value']:.4g} rad/s from rigid ground, {gives['value']:.4g} from brick"
     )
-    _, result = hop(tmp_path, capsys, "--surface", "sand", "--distance", "5", name="sand")
+    result = result_of("--surface", "sand", "--distance", "5")
     assert result["title"].endswith("from rigid ground, none from sand")
 
 
@@ -243,8 +246,8 @@ def test_a_value_that_was_given_is_no_default_though_it_equals_it():
 # Asked by what the flywheel does
 
 
-def test_a_wheel_speed_that_is_given_goes_as_far_as_the_distance_it_was_found_for(tmp_path, capsys):
-    _, sought = hop(tmp_path, capsys, "--distance", "5", "--body-radius", "300", name="a")
+def test_a_wheel_speed_that_is_given_goes_as_far_as_the_distance_it_was_found_for(result_of, tmp_path, capsys):
+    sought = result_of("--distance", "5", "--body-radius", "300")
     value = {key: quantity["value"] for key, quantity in sought["quantities"].items()}
     speed = repr(value["wheel_speed"])
     status, result = hop(tmp_path, capsys, "--wheel-speed-0", speed, "--body-radius", "300", name="b")
@@ -266,8 +269,8 @@ def test_a_wheel_speed_that_escapes_has_no_landing_and_says_so(tmp_path, capsys,
     assert (tmp_path / "run" / "report.html").exists()
 
 
-def test_a_motors_torque_that_is_given_goes_as_far_as_the_distance_it_was_found_for(tmp_path, capsys):
-    _, sought = hop(tmp_path, capsys, "--actuator", "motor", "--distance", "0.5", name="a")
+def test_a_motors_torque_that_is_given_goes_as_far_as_the_distance_it_was_found_for(result_of, tmp_path, capsys):
+    sought = result_of("--actuator", "motor", "--distance", "0.5")
     torque = sought["quantities"]["torque"]["value"]
     _, result = hop(tmp_path, capsys, "--actuator", "motor", "--torque", repr(torque), name="b")
     assert result["quantities"]["distance"]["value"] == pytest.approx(0.5, rel=1e-6)
@@ -301,9 +304,8 @@ def test_a_distance_too_far_says_what_each_ground_allows(tmp_path, capsys):
     assert result["quantities"]["model_distance"]["value"] == pytest.approx(40, rel=1e-2)
 
 
-def test_a_motor_is_asked_for_its_torque(tmp_path, capsys):
-    status, result = hop(tmp_path, capsys, "--actuator", "motor", "--distance", "0.5")
-    assert status == DONE
+def test_a_motor_is_asked_for_its_torque(result_of):
+    result = result_of("--actuator", "motor", "--distance", "0.5")
     value = {key: quantity["value"] for key, quantity in result["quantities"].items()}
     assert 0 < value["torque"] <= 0.22
     assert value["wheel_speed"] == pytest.approx(value["torque"] * value["torque_time"] / 1.2e-3)

@@ -19,18 +19,7 @@ from experiments.tumble_sweep import middle_of_sweep
 from experiments.tumble_trial import plan_tumble
 from rigid.planar import simulate
 
-
-@pytest.fixture(autouse=True)
-def _somewhere_else(tmp_path, monkeypatch, request):
-    """Runs go to `tmp_path`; only what asks for it with ``reported`` draws a report."""
-    monkeypatch.chdir(tmp_path)
-    if "reported" not in request.fixturenames:
-        monkeypatch.setattr("experiments.tumble.write_report", lambda folder, progress: None)
-
-
-@pytest.fixture
-def reported():
-    """The report is drawn."""
+pytestmark = pytest.mark.usefixtures("unreported")
 
 
 def a_model():

@@ -22,16 +22,7 @@ from rigid.trial import Effect
 STDS = {"pose": (0.0005, 0.0005, 0.003), "imu": (0.01, 0.02, 0.02), "wheel": (0.5,)}
 
 
-@pytest.fixture(autouse=True)
-def _no_report(monkeypatch, tmp_path, request):
-    monkeypatch.chdir(tmp_path)
-    if "reported" not in request.fixturenames:
-        monkeypatch.setattr("experiments.synthesis.write_report", lambda folder, progress: None)
-
-
-@pytest.fixture
-def reported():
-    """The report is drawn."""
+pytestmark = pytest.mark.usefixtures("unreported")
 
 
 def quick(**changes):
@@ -162,8 +153,7 @@ def test_bad_input_is_refused_by_name_and_leaves_no_folder(capsys, options, said
     assert not Path("a").exists()
 
 
-def test_a_tumble_writes_trials_of_itself_and_keeps_the_truth_in_its_own_folder(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("experiments.tumble.write_report", lambda folder, progress: None)
+def test_a_tumble_writes_trials_of_itself_and_keeps_the_truth_in_its_own_folder(capsys):
     tokens = ["tumble", "--surface", "brick", "--gravity", "0.1", "--torque", "0.15", "--duration", "0.6"]
     tokens += ["--effects", "tip-radius.radius=0.01", "--campaign", "c", "--campaign-trials", "3"]
     tokens += ["--campaign-noise", "0.5", "--out", "run", "--quiet"]

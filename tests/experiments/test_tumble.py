@@ -27,17 +27,7 @@ from rigid.rig import STANDARD_GRAVITY
 SHORT = ("--duration", "0.3", "--quiet")
 
 
-@pytest.fixture(autouse=True)
-def _somewhere_else(tmp_path, monkeypatch, request):
-    """Runs go to `tmp_path`; only what asks for it with ``reported`` draws a report."""
-    monkeypatch.chdir(tmp_path)
-    if "reported" not in request.fixturenames:
-        monkeypatch.setattr("experiments.tumble.write_report", lambda folder, progress: None)
-
-
-@pytest.fixture
-def reported():
-    """The report is drawn."""
+pytestmark = pytest.mark.usefixtures("unreported")
 
 
 def result_of(folder):
