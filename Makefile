@@ -5,6 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
 WHAT ?= bed
+WORKERS ?= 2
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -16,16 +17,19 @@ help:  ## what there is
 run: $(VENV)/.installed  ## the shipped case of `hedgebed penetrate` into a fresh folder under runs/ (ARGS="--option value ...")
 	$(BIN)/hedgebed penetrate $(ARGS)
 
-test: $(VENV)/.installed-test  ## ruff, mypy and the tests
+# A file of tests stays with one worker: its fixtures and kernels are made once. WORKERS=0 tests in one process.
+PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
+
+test: $(VENV)/.installed-test  ## ruff, mypy and the tests, these in WORKERS=2 processes
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest $(ARGS)
+	$(PYTEST) $(ARGS)
 
 slow: $(VENV)/.installed-test  ## the tests that take longer: physics against closed forms, kill and resume
-	$(BIN)/python -m pytest -m slow $(ARGS)
+	$(PYTEST) -m slow $(ARGS)
 
 cover: $(VENV)/.installed-test  ## the tests of `make test`, counting the lines they reach: several times as long
-	$(BIN)/python -m pytest --cov --cov-report=term $(ARGS)
+	$(PYTEST) --cov --cov-report=term $(ARGS)
 
 validate: $(VENV)/.installed  ## the bed against closed forms, published figures and other codes; writes docs/validation.md
 	$(BIN)/hedgebed validate $(ARGS)
