@@ -71,8 +71,21 @@ def document(found: Diagnosis) -> dict[str, Any]:
          "set_aside": f.set_aside}
         for f in found.findings
     ]  # fmt: skip
-    said["next_experiment"] = found.next_experiment
+    said["next_experiment"] = _next(found)
     return said
+
+
+def _next(found: Diagnosis) -> str:
+    """The next experiment, the trial with the largest gap by its name."""
+    sums: dict[str, float] = {}
+    for place in found.where:
+        sums[place.trial] = sums.get(place.trial, 0.0) + place.excess
+    if not sums:
+        return found.next_experiment
+    worst = max(sums, key=lambda trial: sums[trial])
+    return found.next_experiment.replace(
+        "the trial with the largest gap", f"trial {worst}, the one with the largest gap,"
+    )
 
 
 def _equivalence(found: Diagnosis) -> list[dict[str, Any]]:

@@ -94,13 +94,16 @@ def depends_on(table: Mapping[str, NDArray[np.generic]]) -> tuple[str, dict[str,
     """A sentence on what the latent columns go with, and the share of their variance that each column explains.
 
     The share is that of a mean in twenty bins of equal count, judged on every second sample after being made on the
-    others, so that noise explains nothing.
+    others, so that noise explains nothing. A column that only says which trial it is counts as the trial.
     """
     shares: dict[str, float] = {}
     latents = [name for name in table if name.startswith("latent_")]
-    others = [name for name in table if name != "trial" and name not in latents]
+    ids, which = np.unique(np.asarray(table["trial"]), return_inverse=True)
+    others = [name for name in table if name != "trial" and name not in latents and not _labels(table[name], which)]
     for latent in latents:
         y = np.asarray(table[latent], dtype=float)
+        if len(ids) > 2:
+            shares["trial"] = max(shares.get("trial", 0.0), _explained(which.astype(float), y))
         for name in others:
             x = np.asarray(table[name], dtype=float)
             good = np.isfinite(x) & np.isfinite(y)
@@ -116,8 +119,17 @@ def depends_on(table: Mapping[str, NDArray[np.generic]]) -> tuple[str, dict[str,
     return sentence + (f", then {', '.join(more)}" if more else ""), shares
 
 
+def _labels(column: NDArray[np.generic], which: NDArray[np.intp]) -> bool:
+    """Whether a column only says which trial it is: another single value in each of three trials or more."""
+    count = int(which.max()) + 1
+    values = np.asarray(column, dtype=float)
+    single = all(np.ptp(values[which == k]) == 0 for k in range(count))
+    return count > 2 and single and len(np.unique(values)) == count
+
+
 _WORDS = {
-    "t_s": "time", "depth_m": "depth", "retreat_m": "the way back from the deepest point", "velocity_m_s": "velocity",
+    "t_s": "time", "trial": "which trial it is",
+    "depth_m": "depth", "retreat_m": "the way back from the deepest point", "velocity_m_s": "velocity",
     "speed_m_s": "the trial's speed", "diameter_m": "diameter", "gravity_m_s2": "the trial's gravity",
     "torque_N_m": "the trial's torque", "x_m": "x", "y_m": "height", "theta_rad": "angle",
     "vx_m_s": "velocity along the surface", "vy_m_s": "velocity upwards", "omega_rad_s": "rate of rotation",

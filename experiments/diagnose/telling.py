@@ -14,6 +14,8 @@ from .problem import Array, Finding
 __all__ = ["PhaseTable", "findings_in_words", "told_tables", "setting_words", "where_sentences"]
 
 _UNITS = {"N_m": "N m", "m_s2": "m/s2", "m_s": "m/s", "m": "m"}
+_MORE = 0.05
+"""Nats by which a set of names must beat each of its parts to be listed."""
 _MAINLY = 0.5
 """Share of what is beyond the noise from which on a phase, a channel or a setting is said to hold it."""
 
@@ -116,7 +118,9 @@ def told_tables(said: Mapping[str, Any]) -> list[dict[str, Any]]:
     for row in said["evidence"]:
         best.setdefault(tuple(sorted(row["effects"])), row)
     singles = [row for names, row in best.items() if len(names) == 1]
-    sets = [row for names, row in best.items() if len(names) > 1][:2]
+    alone = {names[0]: row["score"] for names, row in best.items() if len(names) == 1}
+    sets = [row for names, row in best.items()
+            if len(names) > 1 and all(row["score"] > alone.get(name, 0.0) + _MORE for name in names)][:2]  # fmt: skip
     chosen = [row for row in best.values() if row in singles or row in sets]
     if chosen:
         tables.append({
