@@ -9,7 +9,7 @@ WORKERS ?= 2
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help run test slow cover validate bench doctor format clean distclean
+.PHONY: help run test slow cover validate experiments bench doctor format clean distclean
 
 help:  ## what there is
 	@grep -E '^[a-z]+:.*##' $(firstword $(MAKEFILE_LIST)) | sed -E 's/^([a-z]+):.*## */  make \1\t/' | expand -t 18
@@ -33,6 +33,9 @@ cover: $(VENV)/.installed-test  ## the tests of `make test`, counting the lines 
 
 validate: $(VENV)/.installed  ## the bed against closed forms, published figures and other codes; writes docs/validation.md
 	$(BIN)/hedgebed validate $(ARGS)
+
+experiments: $(VENV)/.installed  ## the platform's experiments on grains that have no result yet (ARGS="CASE ..."); hours
+	$(BIN)/hedgebed experiments run $(ARGS)
 
 bench: $(VENV)/.installed  ## race the bed against LIGGGHTS and LAMMPS, as far as they are installed (WHAT=bed)
 	$(BIN)/hedgebed bench $(WHAT) $(ARGS)

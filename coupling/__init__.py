@@ -8,6 +8,7 @@ from .master import Master
 from .penetration import Drive, Drop, Run, SetDown, drive, drop, overdamped_below, set_down
 from .planar_body import PlanarBody
 from .trajectory import Penetration
+from .tumbles import Landing, TumblesInARow
 from .tumbling import MOST_REVERSAL, CoupledTumble
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "Drop",
     "Footing",
     "Ground",
+    "Landing",
     "LawFooting",
     "LeftTheBedError",
     "Master",
@@ -26,6 +28,7 @@ __all__ = [
     "PlanarBody",
     "Run",
     "SetDown",
+    "TumblesInARow",
     "drive",
     "drop",
     "overdamped_below",

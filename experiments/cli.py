@@ -318,6 +318,10 @@ def build_app() -> App:
         from experiments.render_command import render
 
         app.command(render, name="render")
+        from experiments.suite_commands import add_suite_commands
+
+        app.command(App(name="experiments", help="The platform on grains: the cases that ship, and doing them."))
+        add_suite_commands(app["experiments"])
     app.command(_bench, name="bench")
     app.command(_effects, name="effects")
     app.command(_doctor, name="doctor")

@@ -51,9 +51,10 @@ def find_case(given: Path, shipped: Path) -> Path:
     """
     if given.is_file():
         return given
-    named = shipped / f"{given}.toml"
-    if given.parent == Path() and named.is_file():
-        return named
+    if given.parent == Path():
+        for named in (shipped / f"{given}.toml", *sorted(shipped.glob(f"*/{given.name}.toml"))):
+            if named.is_file():
+                return named
     names = sorted(path.stem for path in shipped.glob("*.toml"))
     also = f"; the cases that ship are {', '.join(names)}" if names else ""
     raise ValueError(f"case = {str(given)!r} is no file: give the path of a TOML file{also}")

@@ -134,8 +134,9 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
             progress.message(f"warning: {warning}")
         progress.stage("tumble", total=1.0)
         more: dict[str, Any] = {}
+        rests: dict[str, Any] | None = None
         if settings.method == "coupled":
-            trajectory, full, more = _step_through_master(settings, plan, folder, progress)
+            trajectory, full, more, rests = _step_through_master(settings, plan, folder, progress)
         else:
             trajectory, full = _integrate(settings, plan, duration=settings.duration)
         progress.update(1.0)
@@ -143,6 +144,11 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
         folder.write_series("motion", motion_columns(trajectory))
         result = result_of(settings, plan, trajectory, full)
         result["quantities"] |= more
+        if settings.method == "coupled":
+            from .tumble_steppers import words
+
+            result["title"] = words(settings, result["title"])
+            result |= {"tables": [rests]} if rests is not None else {}
         if settings.sweep:
             progress.message("the numbers above are those of one trial of the sweep, in its middle or nearest to it")
             progress.stage("sweep")
@@ -157,14 +163,15 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
 
 def _step_through_master(
     settings: TumbleSettings, plan: TumblePlan, folder: RunFolder, progress: Progress
-) -> tuple[Trajectory, float | None, dict[str, Any]]:
-    """The trial by the master, its series/feet.csv written; what `_integrate` gives, and more quantities."""
+) -> tuple[Trajectory, float | None, dict[str, Any], dict[str, Any] | None]:
+    """The trial by the master, its series/feet.csv written; what `_integrate` gives, more quantities, a table."""
     from .tumble_coupled import coupled_quantities, coupled_tumble, feet_columns
+    from .tumble_steppers import own_quantities
 
     run = coupled_tumble(settings, plan, duration=settings.duration)
     trajectory = run.run(on_step=lambda run: progress.update(run.fraction))
     folder.write_series("feet", feet_columns(run))
-    return trajectory, run.body.wheel_at_limit, coupled_quantities(run)
+    return trajectory, run.body.wheel_at_limit, coupled_quantities(run), own_quantities(run)[1]
 
 
 def _add_sweep(result: dict[str, Any], settings: TumbleSettings, folder: RunFolder, model: Path | None) -> None:

@@ -13,7 +13,10 @@ __all__ = ["OF_THE_MASTER", "TumbleBedSettings"]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
-OF_THE_MASTER = ("substeps", "extrapolation", "iterations")
+OF_THE_MASTER = (
+    "substeps", "extrapolation", "iterations", "tumbles", "tumble_turn", "drop_speed", "drop_along", "drop_spin",
+    "drop_theta",
+)  # fmt: skip
 """Those that ``method = "coupled"`` takes on the spring-damper too."""
 
 
@@ -45,6 +48,21 @@ class TumbleBedSettings(StrictSettings):
     iterations: int = Field(
         1, ge=1, le=50, description="On a bed, or coupled: how often a step is computed at most; 1: explicit."
     )
+    tumbles: int = Field(
+        1,
+        ge=1,
+        le=20,
+        description="On a bed, or coupled: tumbles in a row; a torque begins when the platform lies [1].",
+    )
+    tumble_turn: Positive = Field(
+        1.0, le=4, description="On a bed, or coupled: where each torque of a row of tumbles ends, over pi / rows [1]."
+    )
+    drop_speed: Positive | None = Field(
+        None, description="On a bed, or coupled: a landing in place of a tumble, at this speed downwards [m/s]."
+    )
+    drop_along: float = Field(0.0, allow_inf_nan=False, description="Of a landing: speed along the surface [m/s].")
+    drop_spin: float = Field(0.0, allow_inf_nan=False, description="Of a landing: spin, clockwise [rad/s].")
+    drop_theta: float = Field(0.0, allow_inf_nan=False, description="Of a landing: theta at the first touch [rad].")
     frame_count: int = Field(30, ge=0, le=1000, description="On a bed: frames for ParaView; 0: none.")
     checkpoint_interval: Positive = Field(60.0, description="On a bed: time between checkpoints [s].")
     threads: int | None = Field(None, ge=1, description="On a bed: threads; all cores if not given.")

@@ -14,6 +14,7 @@ import numpy as np
 from coupling import CoupledTumble, LawFooting
 
 from .tumble_settings import TumbleSettings
+from .tumble_steppers import own_quantities, stepper_of
 from .tumble_trial import TumblePlan
 
 __all__ = ["check_coupled", "coupled_quantities", "coupled_tumble", "feet_columns", "law_feet"]
@@ -50,8 +51,8 @@ def coupled_tumble(settings: TumbleSettings, plan: TumblePlan, *, duration: floa
     """The trial on the spring-damper, ready to be stepped."""
     footing = LawFooting.of_trial(plan.trial)
     footing.grounds = [replace(ground, time_step=STEP) for ground in footing.grounds]
-    return CoupledTumble(
-        plan.trial, footing, duration=duration, substeps=settings.substeps,
+    return stepper_of(
+        settings, plan.trial, footing, duration=duration, substeps=settings.substeps,
         extrapolation=settings.extrapolation, iterations=settings.iterations, max_wheel_speed=plan.max_wheel_speed,
         energy_interval=1e-3,
     )  # fmt: skip
@@ -74,7 +75,7 @@ def coupled_quantities(run: CoupledTumble) -> dict[str, dict[str, Any]]:
     }  # fmt: skip
     return {
         name: {"value": value, "std": 0.0, "unit": unit, "note": note} for name, (value, unit, note) in found.items()
-    }
+    } | own_quantities(run)[0]
 
 
 def feet_columns(run: CoupledTumble) -> dict[str, Any]:

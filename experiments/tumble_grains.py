@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from coupling import MOST_REVERSAL, BedFooting, CoupledTumble, platform_members
+from coupling import MOST_REVERSAL, BedFooting, CoupledTumble, LawFooting, platform_members
 from dem import Bed
 from dem.materials import MATERIALS, Material
 from dem.prepare import fingerprint
@@ -35,6 +35,7 @@ from .tumble_bed_settings import TumbleBedSettings
 from .tumble_grains_frames import TumbleFrames
 from .tumble_platform import torque_within_limit
 from .tumble_settings import TumbleSettings
+from .tumble_steppers import is_plain, own_quantities, stepper_of, words
 from .tumble_trial import TumblePlan, plan_tumble
 
 __all__ = ["Forecast", "check_on_grains", "tumble_on_grains"]
@@ -122,7 +123,8 @@ def _plan(settings: TumbleSettings) -> TumblePlan:
 def _beside(settings: TumbleSettings) -> TumbleSettings:
     kept = {name: getattr(settings, name) for name in settings.model_fields_set}
     own = set(settings.bed_settings_given()) | {"ground"}
-    return TumbleSettings(**{name: value for name, value in kept.items() if name not in own})
+    landing = {"torque": 0.0} if settings.drop_speed is not None else {}
+    return TumbleSettings(**{name: value for name, value in kept.items() if name not in own} | landing)
 
 
 def _material(plan: TumblePlan) -> Material:
@@ -139,8 +141,15 @@ def _grain_gravity(trial: Trial) -> float:
 
 
 def _forecast(settings: TumbleSettings, plan: TumblePlan) -> Forecast:
-    trial, full = torque_within_limit(plan.trial, max_wheel_speed=plan.max_wheel_speed, duration=settings.duration)
-    found = simulate(trial, duration=settings.duration, sample_interval=min(1e-3, settings.duration))
+    if is_plain(settings):
+        trial, full = torque_within_limit(plan.trial, max_wheel_speed=plan.max_wheel_speed, duration=settings.duration)
+        found = simulate(trial, duration=settings.duration, sample_interval=min(1e-3, settings.duration))
+    else:  # several tumbles and landings are the master's; ten steps of 0.1 ms
+        run = stepper_of(
+            settings, plan.trial, LawFooting.of_trial(plan.trial), duration=settings.duration,
+            max_wheel_speed=plan.max_wheel_speed,
+        )  # fmt: skip
+        found, trial, full = run.run(), plan.trial, run.body.wheel_at_limit
     half = math.pi / trial.spike_count
     angles = found.theta[:, None] + half + 2 * half * np.arange(trial.spike_count)
     tips_x = found.x[:, None] - trial.spike_length * np.sin(angles)
@@ -238,8 +247,8 @@ def _stepper(settings: TumbleSettings, plan: TumblePlan, bed: Bed, forecast: For
     )  # fmt: skip
     bed.max_overlap = 0.0
     bed.mark_origin()
-    return CoupledTumble(
-        plan.trial, footing, duration=settings.duration, substeps=settings.substeps,
+    return stepper_of(
+        settings, plan.trial, footing, duration=settings.duration, substeps=settings.substeps,
         extrapolation=settings.extrapolation, iterations=settings.iterations, tip_radius=0.5 * settings.spike_diameter,
         lowering_speed=settings.lowering_speed, max_wheel_speed=plan.max_wheel_speed,
     )  # fmt: skip
@@ -321,9 +330,11 @@ def _conclude(
     write_series(folder.path / "series" / "spring-damper.csv", trajectory_columns(forecast.trajectory))
     result = result_of(settings, plan, series, run.body.wheel_at_limit)
     bed, books = run.footing.bed, run.master.books  # type: ignore[attr-defined]
-    result["title"] = f"A tumble on a bed of {plan.surface}: {result['title'].partition(': ')[2]}"
+    result["title"] = words(settings, f"A tumble on a bed of {plan.surface}: {result['title'].partition(': ')[2]}")
     result["code"] = fingerprint()
-    result["quantities"] |= _own_quantities(run)
+    added, rests = own_quantities(run)
+    result["quantities"] |= _own_quantities(run) | added
+    result |= {"tables": [rests]} if rests is not None else {}
     result["quantities"]["energy_residual"]["note"] += (
         "; dissipated is what the bed took less what it is measured to hold more, so what the bed holds cancels: this "
         "checks platform and coupling, not the grains (dissipation_reversal sees energy that they make)"

@@ -168,13 +168,18 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
 
     def _on_grains(self) -> str | None:
         given = self.bed_settings_given()
+        if (self.ground == "bed" or self.method == "coupled") and (fault := self._row_or_landing()):
+            return fault
         if self.method == "coupled" and self.ground != "bed":
             given = [name for name in given if name not in OF_THE_MASTER]
             for key in ("effects", "sweep", "campaign"):
                 if getattr(self, key):
                     return f"{key} is given with method = 'coupled': the master steps the base model alone, without it"
         if self.ground != "bed":
-            return f"{given[0]} = {getattr(self, given[0])} belongs to ground = 'bed'" if given else None
+            if not given:
+                return None
+            of_both = " or method = 'coupled'" if given[0] in OF_THE_MASTER else ""
+            return f"{given[0]} = {getattr(self, given[0])} belongs to ground = 'bed'{of_both}"
         if self.campaign is not None:
             return (
                 f"campaign = {self.campaign!r} is given with ground = 'bed': `hedgebed campaign from-run` makes one of "
@@ -185,6 +190,27 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
                 return f"{key} is given with ground = 'bed': on grains there is the base model alone, without it"
         if self.method == "paper":
             return f"method = {self.method!r} is of the planar model: on grains there is the coupling's own step"
+        return None
+
+    def _row_or_landing(self) -> str | None:
+        if self.drop_speed is None:
+            for key in ("drop_along", "drop_spin", "drop_theta"):
+                if getattr(self, key):
+                    return f"{key} = {getattr(self, key):g} is of a landing: give drop_speed (in m/s) as well"
+        else:
+            for key in ("torque", "torque_until", "wheel_speed_0"):
+                if getattr(self, key):
+                    return f"{key} = {getattr(self, key):g} with drop_speed: a landing has no torque, without it"
+            if self.actuator == "brake" or self.tumbles > 1:
+                return (
+                    f"drop_speed = {self.drop_speed:g} m/s is a landing: without a brake, and without tumbles in a row"
+                )
+        if self.tumbles > 1 and self.torque_until is not None:
+            return f"torque_until with tumbles = {self.tumbles}: tumble_turn says where each torque ends, so without it"
+        if self.tumbles > 1 and self.actuator == "brake":
+            return (
+                f"actuator = 'brake' with tumbles = {self.tumbles}: it stops its wheel in the first; a motor would do"
+            )
         return None
 
     def _actuation(self) -> str | None:

@@ -73,6 +73,8 @@ def plan_tumble(settings: TumbleSettings, *, model_file: Path | None = None) -> 
     _settle_gravity(settings, model, numbers)
     weak = platform.motor_torque < TORQUE
     torque, origin = (platform.motor_torque, f"motor of {platform.name}") if weak else (TORQUE, "default")
+    if settings.drop_speed is not None:
+        torque, origin = 0.0, "a landing"
     numbers.settle("torque", torque, origin)
     numbers.settle("torque_until", math.inf, "default: as long as the trial")
     numbers.settle("wheel_speed_0", 0.0, "default")

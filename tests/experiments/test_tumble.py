@@ -536,8 +536,34 @@ def test_the_spring_damper_through_the_master_is_the_planar_model_to_its_toleran
         (("--effects", "pendulum.length=2.2"), "effects is given with method = 'coupled'"),
         (("--substeps", "30"), "substeps = 30 makes a step of 1.2 ms.* 25 or less would do"),
         (("--grain", "0.004"), "grain = 0.004 belongs to ground = 'bed'"),
+        (("--drop-spin", "1"), "drop_spin = 1 is of a landing: give drop_speed"),
+        (("--drop-speed", "0.1", "--torque", "0.1"), "torque = 0.1 with drop_speed: a landing has no torque"),
+        (("--tumbles", "2", "--torque-until", "1"), "torque_until with tumbles = 2: tumble_turn says"),
     ],
 )
 def test_what_the_master_cannot_step_is_refused_by_name(given, said, capsys):
     assert main(["tumble", "--method", "coupled", *given]) == 2
     assert re.search(said, capsys.readouterr().err.replace("\n", " "))
+
+
+def test_a_landing_says_how_fast_it_came_and_what_it_kept():
+    """On the spring of brick with its damper, flat on two rows: it comes at 0.05 m/s and leaves slower."""
+    given = (
+        "--surface",
+        "brick",
+        "--rig",
+        "0.0085",
+        "--method",
+        "coupled",
+        "--drop-speed",
+        "0.05",
+        "--drop-spin",
+        "0.1",
+    )
+    assert main(["tumble", *given, *SHORT, "--out", "landed"]) == 0
+    found = result_of("landed")
+    assert found["title"] == "A landing on brick: 0.05 m/s down, rig at 0.08336 m/s2"
+    assert found["trial"]["torque"] == {"value": 0.0, "unit": "N m", "origin": "a landing"}
+    assert value_of("landed", "impact_speed") == pytest.approx(0.05, rel=0.02)
+    assert 0.3 < value_of("landed", "restitution") < 1 and 0 < value_of("landed", "energy_kept") < 1
+    assert value_of("landed", "energy_residual") < 1e-3

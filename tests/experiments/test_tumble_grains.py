@@ -1,5 +1,6 @@
 """`hedgebed tumble --ground bed`: refusals before any work; a small platform on a small bed, stopped and taken up."""
 
+import json
 import math
 from contextlib import contextmanager
 from types import SimpleNamespace
@@ -7,8 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from coupling import CoupledTumble, LawFooting
+from coupling import CoupledTumble, LawFooting, LeftTheBedError
 from experiments import tumble, tumble_grains
+from experiments.cli import main
 from experiments.runfolder import RunFolder
 from experiments.softening import Softening
 from experiments.tumble_settings import TumbleSettings
@@ -93,6 +95,36 @@ def test_the_result_dates_the_wheels_limit_and_warns_of_energy_that_the_ground_m
     reversal = result["quantities"]["dissipation_reversal"]["value"]
     assert any("dissipation_reversal" in said for said in result["warnings"]) == false == (reversal > 1e-3)
     assert "cancels" in result["quantities"]["energy_residual"]["note"]
+
+
+def test_a_run_that_leaves_the_bed_says_where_and_keeps_its_state_and_series(tmp_path, monkeypatch, capsys):
+    """On the spring-damper in place of grains, which after 50 steps answers as a bed whose end is passed."""
+
+    def stepper(settings, plan, bed, forecast):
+        footing = LawFooting.of_trial(plan.trial)
+        plain, count = footing.step, 0
+
+        def step(*given):
+            nonlocal count
+            count += 1
+            if count > 50:
+                raise LeftTheBedError("spike 7 came down 0.01 m ahead of the bed, which is 0.4 m long")
+            return plain(*given)
+
+        footing.step = step
+        return CoupledTumble(plan.trial, footing, duration=settings.duration)
+
+    monkeypatch.setattr(tumble_grains, "_prepare", lambda *_: None)
+    monkeypatch.setattr(tumble_grains, "_stepper", stepper)
+    out = tmp_path / "left"
+    given = ("--surface", "sand", "--ground", "bed", "--bed-size", "0.4", "0.06", "0.046", "--frame-count", "0")
+    assert main(["tumble", *given, "--duration", "0.3", "--quiet", "--out", str(out)]) == 1
+    said = capsys.readouterr().err.replace("\n", " ")
+    assert "at 0.05 s: spike 7 came down 0.01 m ahead of the bed" in said and "a longer or deeper bed_size" in said
+    assert json.loads((out / "status.json").read_text())["status"] == "failed"
+    state = RunFolder.open(out).load_checkpoint("tumble.failed")
+    assert state is not None and state["master.count"] == 50
+    assert len((out / "trajectory.csv").read_text().splitlines()) == 1 + 51
 
 
 @pytest.mark.slow

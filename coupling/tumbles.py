@@ -1,0 +1,166 @@
+"""Several tumbles in a row on one ground, and a landing: `CoupledTumble` with another beginning or end.
+
+Several tumbles: the torque acts until the platform has turned by `turn` times half the angle between two rows (1: its
+middle is over the leading row, from where it falls by itself); then it waits until the platform lies at rest, which is
+noted, and begins anew. The wheel goes on from the speed that it has. Over how many rows a tumble goes is as it comes.
+
+A landing: no hand and no torque; the platform starts just clear of the ground with the velocities of its fall.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from rigid.trajectory import STATES
+from rigid.trial import Trial
+
+from .bed_footing import BedFooting
+from .footing import Footing, LawFooting
+from .tumbling import CoupledTumble
+
+__all__ = ["Landing", "TumblesInARow"]
+
+REST_SPEED = 2e-3
+"""A platform whose centre and tips are slower is at rest [m/s]: the speed above which a row is said to slide."""
+REST_LASTS = 0.1
+"""For how long [s]."""
+LONGEST_WAIT = 3.0
+"""After the torque's end the next begins at the latest [s], at rest or not, which is noted."""
+NOTED = ("time", "x", "y", "theta", "sinkage", "deepest", "at_rest", "rows_turned")
+"""Of `TumblesInARow.rests`: when and where [s, m, m, rad]; mean depth of the rows that carry, and the largest of any
+since the rest before [m]; whether it was at rest; rows turned by since then."""
+
+
+class TumblesInARow(CoupledTumble):
+    """`tumbles` of them, one after the other; it is over after the last rest, or after `duration` [s].
+
+    `turn` says where each torque ends, over pi / rows [1].
+
+    The other parameters as `CoupledTumble`. Raises ValueError for a brake, whose wheel turns the platform once.
+    """
+
+    def __init__(self, trial: Trial, footing: Footing, *, tumbles: int, turn: float = 1.0, **options: Any) -> None:
+        if trial.actuator == "brake":
+            raise ValueError("tumbles in a row need a motor: a brake stops its wheel in the first")
+        self.tumbles, self.turn = tumbles, turn
+        self._rests: list[list[float]] = []
+        self._on, self._from, self._quiet_since, self._ended, self._seen = True, 0.0, 0.0, 0.0, 0
+        self.tip_radius = float(options.get("tip_radius", 0.0))
+        super().__init__(trial, footing, **options)
+
+    @property
+    def done(self) -> bool:
+        """Whether the last has come to rest, or the time is over."""
+        return len(self._rests) > self.tumbles or super().done
+
+    @property
+    def rests(self) -> dict[str, np.ndarray]:
+        """Where it lay before the first tumble and after each, by NOTED: arrays of shape [rest]."""
+        table = np.array(self._rests, dtype=float).reshape(-1, len(NOTED))
+        return dict(zip(NOTED, table.T, strict=True))
+
+    def advance(self) -> None:
+        """One macro step, and what follows from where the platform is then."""
+        super().advance()
+        if self.placed and len(self._rests) <= self.tumbles:
+            self._watch()
+
+    def _watch(self) -> None:
+        body = self.body
+        if not self._rests:
+            self._note(at_rest=True)
+        if self._on:
+            if body.place[2] - self._from >= self.turn * math.pi / self.trial.spike_count:
+                self._switch(False)
+                self._ended = self._quiet_since = body.time
+            return
+        fastest = max(math.hypot(*body.rates[:2]), abs(body.rates[2]) * self.trial.spike_length)
+        touches = self.master.last is not None and bool(self.master.last.contacts)
+        if fastest > REST_SPEED or not touches:
+            self._quiet_since = body.time
+        rests = body.time - self._quiet_since >= REST_LASTS
+        if rests or (body.time - self._ended >= LONGEST_WAIT and touches):
+            self._note(at_rest=rests)
+            self._from = float(body.place[2])
+            if len(self._rests) <= self.tumbles:
+                self._switch(True)
+
+    def _note(self, *, at_rest: bool) -> None:
+        body, feet = self.body, np.array(self._feet[self._seen :])
+        carried = feet[-1, 0] > 0.05 * self.trial.weight
+        sinkage = self._depths()
+        mean = float(sinkage[carried].mean()) if carried.any() else 0.0
+        before = self._rests[-1][3] if self._rests else float(body.place[2])
+        turned = round((float(body.place[2]) - before) / (2 * math.pi / self.trial.spike_count))
+        deepest = max(float(feet[:, 3].max()), float(sinkage.max()))
+        self._rests.append([body.time, *body.place.tolist(), mean, deepest, float(at_rest), float(turned)])
+        self._seen = len(self._feet)
+
+    def _depths(self) -> np.ndarray:
+        """Depth of each row's lowest point now [m], 0 above the surface, shape [row]."""
+        count, radius = self.trial.spike_count, self.tip_radius
+        angles = float(self.body.place[2]) + math.pi / count * (1 + 2 * np.arange(count))
+        return np.maximum(0.0, (self.trial.spike_length - radius) * np.cos(angles) + radius - float(self.body.place[1]))
+
+    def _switch(self, on: bool) -> None:
+        """The torque acts from now on, or no more."""
+        self._on = on
+        self.body.trial = replace(self.trial, torque_until=math.inf if on else self.body.time)
+
+    def state(self) -> dict[str, Any]:
+        """See `CoupledTumble.state`."""
+        return super().state() | {
+            "row.numbers": np.array([self._on, self._from, self._quiet_since, self._ended, self._seen], dtype=float),
+            "row.rests": np.array(self._rests, dtype=float).reshape(-1, len(NOTED)),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """See `CoupledTumble.restore`."""
+        super().restore(state)
+        on, self._from, self._quiet_since, self._ended, seen = (float(value) for value in state["row.numbers"])
+        self._seen, self._rests = int(seen), np.asarray(state["row.rests"], dtype=float).tolist()
+        self._on = bool(on)
+        self.body.trial = replace(self.trial, torque_until=math.inf if on else self._ended)
+
+
+class Landing(CoupledTumble):
+    """The platform comes down at `speed` [m/s], moving `along` [m/s], turned by `theta` [rad] and with `spin` [rad/s].
+
+    The other parameters as `CoupledTumble`, without a hand or a height; of the torque nothing acts.
+    """
+
+    def __init__(
+        self,
+        trial: Trial,
+        footing: Footing,
+        *,
+        speed: float,
+        along: float = 0.0,
+        spin: float = 0.0,
+        theta: float = 0.0,
+        **options: Any,
+    ) -> None:
+        if not (math.isfinite(speed) and speed > 0):
+            raise ValueError(f"drop_speed is {speed}: it must be above 0 (in m/s, downwards)")
+        self._comes = np.array([along, -speed, spin])
+        self._turned, self.tip_radius = theta, float(options.get("tip_radius", 0.0))
+        high = trial.spike_length + 0.05  # above the grains, whatever is turned down; `_begin` takes it to them
+        super().__init__(replace(trial, torque=0.0), footing, height=high, **options)
+
+    def _begin(self) -> None:
+        body, count = self.body, self.trial.spike_count
+        angles = self._turned + math.pi / count * (1 + 2 * np.arange(count))
+        reach = (self.trial.spike_length - self.tip_radius) * float(np.cos(angles).max()) + self.tip_radius
+        body.place = np.array([0.0, reach, self._turned])
+        if isinstance(self.footing, BedFooting):
+            body.place[1] += self.footing.clear_height(body.pose)
+            self.footing.check_start(body.pose)
+        elif isinstance(self.footing, LawFooting):
+            self.footing.place(body.pose)
+        body.rates = self._comes.copy()
+        super()._begin()
+        self._states[0] = STATES.index("hop")

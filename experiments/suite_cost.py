@@ -1,0 +1,81 @@
+"""What a tumble on grains will cost, from its settings alone: grains, steps, time on two cores."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from .settings import expected_grain_count
+from .tumble_settings import TumbleSettings
+
+__all__ = ["Cost", "cost_of_tumble"]
+
+RATES = ((2e4, 9.52e6), (1e5, 7.09e6))
+"""Grain-steps a second on 2 cores, with rolling, by grain count: docs/performance.md, 2026-11-21, a quiet machine."""
+SMALL_BED = 2e4
+"""Fewer grains than this do not fill two cores: their rate is taken in proportion down to a tenth of the first's."""
+MACRO_STEP = 5e-3
+"""Of the coupling beyond the grains, a macro step [s] (docs/coupling.md, 2026-11-21)."""
+SET_DOWN = 0.4
+"""What the hand takes at 0.05 m/s [s]: 0.39 in the first look of docs/coupling.md."""
+FALL_TIMES = 1.5
+"""What rain and rest take, over the time of a fall from the column's top: 0.27 s to 0.2 s for the beds of 80 mm in
+docs/performance.md, rounded up."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """An estimate."""
+
+    grains: float
+    time_step: float
+    """[s]"""
+    bed_seconds: float
+    """Preparing the bed, once for all cases that share it [s]."""
+    run_seconds: float
+    """The tumble, every grain computed [s]."""
+    grain_steps: float
+    """Of the tumble."""
+
+    @property
+    def seconds(self) -> float:
+        """Both [s]."""
+        return self.bed_seconds + self.run_seconds
+
+
+def cost_of_tumble(settings: TumbleSettings) -> Cost:
+    """The estimate for a tumble with ``ground = "bed"``: every grain computed, two cores with nothing beside.
+
+    Raises ValueError for a bed that will not do, as the run itself would.
+    """
+    from dem.timestep import time_step_for
+
+    from .tumble_grains import RAIN, _check_bed, _forecast, _grain_gravity, _material, _members, _plan, _softness
+
+    plan = _plan(settings)
+    _material(plan)
+    _members(settings, plan)
+    forecast = _forecast(settings, plan)
+    _check_bed(settings, forecast)
+    softening = _softness(settings, plan, forecast)
+    soft = _material(plan).softened(softening.young)
+    smallest = settings.grain * (1 - settings.spread)
+    step = time_step_for(soft, diameter=smallest, max_overlap=settings.max_overlap, wanted=None)
+    grains = expected_grain_count(settings.bed_size, settings.grain, settings.spread)
+    gravity = _grain_gravity(plan.trial)
+    fall = math.sqrt(2 * RAIN * settings.bed_size[2] / gravity)
+    steps = (settings.duration + SET_DOWN) / step
+    rate = _rate(grains)
+    return Cost(
+        grains=grains, time_step=step, bed_seconds=FALL_TIMES * fall / step * grains / rate,
+        run_seconds=steps * grains / rate + steps / settings.substeps * MACRO_STEP, grain_steps=steps * grains,
+    )  # fmt: skip
+
+
+def _rate(grains: float) -> float:
+    counts, rates = zip(*RATES, strict=True)
+    if grains < SMALL_BED:
+        return rates[0] * max(0.1, grains / SMALL_BED)
+    return float(np.interp(grains, counts, rates))

@@ -1,0 +1,111 @@
+"""Which stepper a tumble's settings ask for: one tumble, several in a row, or a landing."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from coupling import CoupledTumble, Footing, Landing, TumblesInARow
+from rigid.trial import Trial
+
+from .tumble_settings import TumbleSettings
+
+__all__ = ["is_plain", "own_quantities", "stepper_of", "words"]
+
+
+def is_plain(settings: TumbleSettings) -> bool:
+    """Whether it is one tumble, from rest: what the planar model's own integrators do."""
+    return settings.tumbles == 1 and settings.drop_speed is None
+
+
+def stepper_of(settings: TumbleSettings, trial: Trial, footing: Footing, **options: Any) -> CoupledTumble:
+    """The stepper of `settings` on any footing; `options` as `CoupledTumble` has them."""
+    if settings.drop_speed is not None:
+        return Landing(
+            trial, footing, speed=settings.drop_speed, along=settings.drop_along, spin=settings.drop_spin,
+            theta=settings.drop_theta, **{key: value for key, value in options.items() if key != "lowering_speed"},
+        )  # fmt: skip
+    if settings.tumbles > 1:
+        return TumblesInARow(trial, footing, tumbles=settings.tumbles, turn=settings.tumble_turn, **options)
+    return CoupledTumble(trial, footing, **options)
+
+
+def words(settings: TumbleSettings, title: str) -> str:
+    """The title of a result, where it is no plain tumble."""
+    before, _, after = title.partition(":")
+    if settings.drop_speed is not None:
+        place = after.split(",")[-1].strip()
+        return f"{before.replace('A tumble', 'A landing')}: {settings.drop_speed:g} m/s down, {place}"
+    if settings.tumbles > 1:
+        return f"{before.replace('A tumble', f'{settings.tumbles} tumbles in a row')}:{after}"
+    return title
+
+
+def own_quantities(run: CoupledTumble) -> tuple[dict[str, dict[str, Any]], dict[str, Any] | None]:
+    """What a row of tumbles or a landing adds to a result: quantities, and a table of the rests."""
+    if isinstance(run, TumblesInARow):
+        return _row(run)
+    if isinstance(run, Landing):
+        return _landing(run), None
+    return {}, None
+
+
+def _quantity(value: float | None, unit: str, note: str) -> dict[str, Any]:
+    return {"value": value, "std": None if value is None else 0.0, "unit": unit, "note": note}
+
+
+def _row(run: TumblesInARow) -> tuple[dict[str, dict[str, Any]], dict[str, Any]]:
+    import numpy as np
+
+    rests = run.rests
+    done = max(len(rests["time"]) - 1, 0)
+    slope = error = None
+    if done >= 2:  # the first rest is before any tumble: set down by a hand, not fallen
+        number, sinkage = np.arange(1, done + 1), rests["sinkage"][1:]
+        slope = float(np.polyfit(number, sinkage, 1)[0])
+    if done >= 3:
+        left = sinkage - np.polyval(np.polyfit(number, sinkage, 1), number)
+        error = float(np.sqrt((left @ left) / (done - 2) / ((number - number.mean()) ** 2).sum()))
+    added = {
+        "tumbles_done": _quantity(float(done), "1", "that came to lie, of those asked for"),
+        "sinkage_per_tumble": _quantity(slope, "m", "slope of the sinkage at rest over the tumbles; null below two")
+        | {"std": error},
+        "sinkage_last": _quantity(
+            float(rests["sinkage"][-1]) if len(rests["sinkage"]) else None, "m",
+            "mean of the rows that carry, at the last rest",
+        ),
+    }  # fmt: skip
+    head = ["after tumble", "time [s]", "rows", "x [mm]", "sinkage [mm]", "deepest [mm]", "at rest"]
+    shown = [
+        [
+            str(k), f"{rests['time'][k]:.3f}", f"{rests['rows_turned'][k]:.0f}", f"{1e3 * rests['x'][k]:.1f}",
+            f"{1e3 * rests['sinkage'][k]:.2f}", f"{1e3 * rests['deepest'][k]:.2f}",
+            "yes" if rests["at_rest"][k] else "no",
+        ]
+        for k in range(len(rests["time"]))
+    ]  # fmt: skip
+    return added, {"title": "Where it came to lie", "head": head, "rows": shown}
+
+
+def _landing(run: Landing) -> dict[str, dict[str, Any]]:
+    import numpy as np
+
+    rows, states = run.columns, run.states
+    touched = next((k for k, state in enumerate(states) if state != "hop"), None)
+    left = None
+    if touched is not None:
+        left = next((k for k in range(touched, len(states)) if states[k] == "hop"), None)
+    came = float(-rows["vy"][touched]) if touched is not None else None
+    speed = np.maximum(np.hypot(rows["vx"], rows["vy"]), np.abs(rows["omega"]) * run.trial.spike_length)
+    moving = np.flatnonzero(speed > 2e-3)
+    settled = None if not len(moving) or moving[-1] == len(speed) - 1 else float(rows["time"][moving[-1] + 1])
+    share = None if left is None or not came else float(rows["vy"][left]) / came
+    energy = rows["kinetic_energy"]
+    kept = None if left is None or touched is None else float(energy[left] / energy[touched])
+    return {
+        "impact_speed": _quantity(came, "m/s", "of the centre, downwards, when a row first touches"),
+        "restitution": _quantity(share, "1", "upward speed where it first leaves the ground again over impact_speed"),
+        "energy_kept": _quantity(kept, "1", "kinetic energy there over that at the first touch"),
+        "settling_time": _quantity(
+            settled, "s", "from where centre and tips stay slower than 2 mm/s; null: they do not"
+        ),
+    }

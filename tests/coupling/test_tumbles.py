@@ -1,0 +1,58 @@
+"""Several tumbles in a row and landings: the torque's schedule, what is noted, a drop's closed form, restart."""
+
+import math
+
+import numpy as np
+import pytest
+
+from coupling import Landing, LawFooting, TumblesInARow
+from rigid import Trial
+
+RIG = {"gravity_sim": 0.3, "counterweight": 0.28}
+SMALL = {"mass": 0.3, "inertia": 2e-4, "spike_length": 0.04, "wheel_inertia": 1e-5, "mu_s": 0.8}
+
+
+def row():
+    """A small platform on ground whose damper lets it fall and lie; the torque is 1.5 times the least that tips."""
+    trial = Trial(**RIG, **SMALL, stiffness=300.0, damping=30.0, torque=1.5 * 0.58 * 0.3 * 0.04 * math.sin(math.pi / 8))
+    return TumblesInARow(trial, LawFooting.of_trial(trial), tumbles=2, duration=8.0, substeps=20)
+
+
+def test_a_tumble_follows_the_other_when_the_platform_lies_and_goes_on_from_a_checkpoint_to_the_same_bits():
+    run = row()
+    while run.time < 1.0:
+        run.advance()
+    kept = run.state()
+    found, rests = run.run(), run.rests
+    assert len(rests["time"]) == 3 and found.time[-1] < 8.0
+    weight, stiffness = run.trial.weight, run.trial.stiffness
+    assert rests["sinkage"] == pytest.approx(np.full(3, weight / (2 * stiffness)), rel=0.1)  # W / 2K on two rows
+    assert rests["at_rest"].all() and (rests["rows_turned"][1:] >= 1).all()
+    assert rests["theta"] == pytest.approx(np.cumsum(rests["rows_turned"]) * math.pi / 4, abs=5e-3)
+    # The torque does work only on the way up to pi / rows, so each tumble costs at most torque times that and a step.
+    work = np.interp(rests["time"], found.time, found.torque_work)
+    assert (np.diff(work) < run.trial.torque * (math.pi / 8 + 0.02)).all() and (np.diff(work) > 0).all()
+    other = row()
+    other.restore(kept)
+    other.run()
+    assert np.array_equal(run.body.place, other.body.place) and run.body.torque_work == other.body.torque_work
+    assert np.array_equal(run.rests["time"], other.rests["time"])
+
+
+def test_a_landing_falls_on_as_it_came_and_bounces_off_a_spring():
+    """Without damping and friction, flat on two rows: m_y v^2 / 2 is given back, so it leaves as fast as it came."""
+    trial = Trial(**RIG, **(SMALL | {"mu_s": 0.0}), stiffness=2000.0, damping=0.0)
+    run = Landing(trial, LawFooting.of_trial(trial), speed=0.1, along=0.02, duration=0.3, substeps=1)
+    found = run.run()
+    assert found.state_names[0] == "hop" and found.torque_work[-1] == 0.0
+    assert found.vx == pytest.approx(np.full(len(found.time), 0.02), abs=1e-12)
+    up = float(found.vy.max())
+    assert up == pytest.approx(0.1, rel=2e-3)
+    with pytest.raises(ValueError, match="drop_speed is 0"):
+        Landing(trial, LawFooting.of_trial(trial), speed=0.0, duration=0.3)
+
+
+def test_a_brake_turns_once():
+    trial = Trial(**RIG, **SMALL, torque=0.1, actuator="brake", wheel_speed_0=30.0)
+    with pytest.raises(ValueError, match="motor"):
+        TumblesInARow(trial, LawFooting.of_trial(trial), tumbles=2, duration=1.0)

@@ -1,0 +1,82 @@
+"""`hedgebed experiments`: the cases that ship are valid, what has a result is left alone, the rest is done and kept."""
+
+import json
+import subprocess
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from experiments import suite, suite_commands
+from experiments.cli import main
+from experiments.reading import find_case
+from experiments.registry import CASES
+from experiments.suite_cost import Cost
+
+
+def test_every_case_of_every_experiment_is_valid_and_found_by_its_name():
+    found = suite.cases()
+    assert {case.experiment for case in found} == set(suite.EXPERIMENTS)
+    assert all(case.settings.ground == "bed" for case in found)
+    assert find_case(Path(found[0].name), CASES) == found[0].path
+    counts = {number: sum(case.experiment == number for case in found) for number in suite.EXPERIMENTS}
+    assert counts == {1: 12, 2: 6, 3: 3, 4: 2, 5: 3, 6: 8}
+
+
+def test_cases_that_can_share_a_bed_do():
+    """What shapes a bed is the same, its modulus given: then `Bed.prepare` finds it in the cache."""
+    shaping = ("bed_size", "grain", "spread", "young", "max_overlap", "seed")
+    names = ("grains1-sand", "grains5")
+    beds = {tuple(getattr(case.settings, key) for key in shaping) for case in suite.cases(names)}
+    assert len(beds) == 1 and None not in next(iter(beds))
+    trials = {tuple(getattr(case.settings, key) for key in shaping) for case in suite.cases(["grains6"])}
+    assert len(trials) == 2  # two seeds
+
+
+@pytest.fixture
+def stubbed(monkeypatch, tmp_path):
+    """Two cases of an hour and of a day; runs that write what a run writes."""
+    chosen = [case for case in suite.cases() if case.name in ("grains1-sand-0.0085-0.22", "grains1-sand-0.015-brake")]
+    seconds = {chosen[0].name: 3000.0, chosen[1].name: 9e4}
+    monkeypatch.setattr(
+        suite_commands, "cases", lambda names=(): [case for case in chosen if not names or case.name in names]
+    )
+    monkeypatch.setattr(suite_commands, "estimate", lambda case: Cost(8e4, 1e-5, 100.0, seconds[case.name] - 100, 1e10))
+    calls = []
+
+    def run(command, **_):
+        calls.append(command[3:])
+        name = Path(command[command.index("--out") + 1] if "--out" in command else command[4]).name
+        folder = tmp_path / "work" / name
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "run.toml").write_text("x = 1\n")
+        if len(calls) == 1:  # stopped the first time
+            return SimpleNamespace(returncode=3)
+        (folder / "result.json").write_text("{}")
+        (folder / "trajectory.csv").write_text("t_s\n" + "\n".join(map(str, range(5000))) + "\n")
+        return SimpleNamespace(returncode=0)
+
+    monkeypatch.setattr(subprocess, "run", run)
+    return calls, ("--results", str(tmp_path / "results"), "--work", str(tmp_path / "work"))
+
+
+def test_what_has_no_result_is_done_gone_on_with_and_kept(stubbed, tmp_path, capsys):
+    calls, where = stubbed
+    assert main(["experiments", "run", *where]) == 3
+    assert calls[0][0] == "tumble" and calls[0][1].endswith("grains1-sand-0.0085-0.22.toml")
+    assert main(["experiments", "run", *where]) == 0
+    assert calls[1][:1] == ["resume"] and len(calls) == 2  # the one of a day is left out
+    kept = tmp_path / "results" / "grains1-sand-0.0085-0.22"
+    assert sorted(path.name for path in kept.iterdir()) == ["result.json", "run.toml", "trajectory.csv"]
+    assert len((kept / "trajectory.csv").read_text().splitlines()) == 1 + 5000 // 3 + 1
+    assert main(["experiments", "run", *where]) == 0 and len(calls) == 2
+    capsys.readouterr()
+    assert main(["experiments", "list", "--json", *where]) == 0
+    rows = {row["case"]: row["standing"] for row in json.loads(capsys.readouterr().out)}
+    assert rows == {"grains1-sand-0.0085-0.22": "done", "grains1-sand-0.015-brake": "too long"}
+    assert main(["experiments", "run", "grains1-sand-0.015-brake", *where]) == 0 and len(calls) == 3
+
+
+def test_a_case_there_is_not_is_refused(capsys):
+    assert main(["experiments", "list", "grains9"]) == 2
+    assert "there is no case 'grains9'" in capsys.readouterr().err
