@@ -33,6 +33,7 @@ PLACES = ((0.25, 0.25), (0.75, 0.75))
 FINENESS = {"5": (6, ((1, PLACES), (2, PLACES))), "7": (8, ((3, PLACES),))}
 """By grains across the ball: D + d over d; seeds of the beds, and places in each."""
 D1_BAND, K_BAND, TIME_BAND = 0.15, 0.25, 0.15
+STRUCK = 0.08  # overlap over diameter that is let pass where the ball strikes; the bed itself stays below 0.05
 LONGEST = 0.4  # [s]
 POINTS = 50
 
@@ -54,6 +55,7 @@ class Fall:
 
         def compute() -> dict[str, np.ndarray]:
             bed = prepared(grain=grain, size=size, gravity=GRAVITY, seed=self.seed)
+            bed.overlap_limit = STRUCK
             found = drop(
                 bed, radius=radius, density=MASS / (4 / 3 * math.pi * radius**3), speed=self.speed,
                 at=(self.at[0] * size[0], self.at[1] * size[1]), longest=LONGEST,
