@@ -93,9 +93,11 @@ def drag_gap(runs: Sequence[Penetration], fit: Fit, weights: Sequence[float] | N
 
 
 def spread(values: Sequence[float | None]) -> float | None:
-    """Standard deviation between seeds (n - 1); None with fewer than two."""
+    """Standard deviation between seeds (n - 1); None with fewer than two, 0 where they differ by round-off only."""
     known = [value for value in values if value is not None]
-    return float(np.std(known, ddof=1)) if len(known) >= 2 else None
+    if len(known) < 2:
+        return None
+    return 0.0 if np.allclose(known, known[0], rtol=1e-12, atol=0.0) else float(np.std(known, ddof=1))
 
 
 def _normal(run: Penetration) -> tuple[Array, Array]:

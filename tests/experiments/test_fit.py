@@ -71,6 +71,7 @@ def test_no_run_to_fit_is_refused():
 def test_spread_needs_two():
     assert spread([1.0]) is None and spread([1.0, None]) is None
     assert spread([1.0, 3.0]) == pytest.approx(np.sqrt(2))
+    assert spread([0.9866102566990252, 0.9866102566990253]) == 0.0
 
 
 def test_departures_are_said_by_depth_and_speed():
