@@ -28,6 +28,7 @@ __all__ = [
     "Polyhedron",
     "SAND",
     "Sieve",
+    "Sleep",
     "Tube",
     "Uniform",
     "material",
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from .mesh import Mesh, Polyhedron, mesh_from_file
     from .shapes import Ball, Cone, Cylinder, Plane
     from .sizes import LogNormal, Normal, Sieve, Uniform
+    from .sleep import Sleep
     from .solids import Box, Capsule, Placed, Tube
 
 _ROOMS = {
@@ -52,6 +54,7 @@ _ROOMS = {
     "mesh": ("Mesh", "Polyhedron", "mesh_from_file"),
     "shapes": ("Ball", "Cone", "Cylinder", "Plane"),
     "sizes": ("LogNormal", "Normal", "Sieve", "Uniform"),
+    "sleep": ("Sleep",),
     "solids": ("Box", "Capsule", "Placed", "Tube"),
 }
 

@@ -18,6 +18,7 @@ from .materials import Facing, Material
 from .materials import material as find_material
 from .measure import bulk_packing, surface_height
 from .shapes import Plane
+from .sleep import Sleep, Sleeper
 from .solids import AnyShape
 from .timestep import time_step_for
 
@@ -49,6 +50,7 @@ class Bed:
 
     Attributes:
         max_overlap: largest overlap over mean diameter of the pair since the bed was made; set it to 0 to start anew.
+        grain_steps: grains computed, summed over the steps since the bed was made in this process.
         recipe: what it was prepared from, as ``prepare_bed`` was asked; empty where it was made otherwise.
         overlap_limit: the bound on it; ``advance`` raises BedFailure past it.
     """
@@ -172,6 +174,8 @@ class Bed:
         self._since_lists = 0
         self._reaction_steps = 0
         self._tallied: np.ndarray | None = None
+        self._sleeper: Sleeper | None = None
+        self.grain_steps = 0
         self._has_floor = False
         self.recipe: dict[str, Any] = {}
         self.surface = math.nan
@@ -390,7 +394,54 @@ class Bed:
         """What ``reaction`` gives, of every body there may be: force and torque in a row of six, shape [body, 6]."""
         if self._tallied is None:
             self._tallied = self._tally()[0]
-        return self._tallied / max(1, self._reaction_steps)
+        total = self._tallied
+        if self._sleeper is not None:
+            total = total.copy()
+            total[FLOOR, :3] += self._sleeper.on_floor()
+        return total / max(1, self._reaction_steps)
+
+    # ------------------------------------------------------------------ sleep
+
+    def let_sleep(self, rules: Sleep | None = None) -> None:
+        """From here on grains at rest far from the bodies are not computed; ``dem.sleep`` has the rules.
+
+        What is read of the bed counts sleepers in, with no speed and no force. The floor's reaction has what they
+        would have passed on to it.
+
+        Raises:
+            ValueError: a bed on a GPU, without floor or gravity, or whose grains cohere by JKR.
+        """
+        self._check_valid()
+        if self._engine.gpu:
+            raise ValueError("arch = 'cuda': grains sleep on a CPU only so far")
+        if not self._has_floor or not any(self.gravity):
+            raise ValueError("grains sleep in a bed with a floor and gravity only: they must lie on something")
+        if self.material.cohesion == "jkr":
+            raise ValueError("cohesion = 'jkr': the force that wakes such grains is not measured; dmt or none would do")
+        self.wake()
+        self._engine.let_sleep()
+        self._sleeper = Sleeper(self, rules or Sleep())
+
+    def wake(self) -> None:
+        """All grains are awake and stay so."""
+        self._check_valid()
+        if self._sleeper is not None:
+            self._make_lists(all_awake=True)
+            self._sleeper = None
+            self._engine.wake_all()
+            self._push()
+
+    @property
+    def awake_count(self) -> int:
+        """Grains that are computed."""
+        return self.grain_count if self._sleeper is None else self._sleeper.awake
+
+    @property
+    def asleep(self) -> np.ndarray:
+        """Whether each grain sleeps, by id, bool, shape [grain_count]."""
+        if self._sleeper is None:
+            return np.zeros(self.grain_count, dtype=bool)
+        return np.asarray(self._engine.rest.asleep.to_numpy()[: self.grain_count] == 1)
 
     def _tally(self) -> tuple[np.ndarray, float]:
         """Sums over the chunks of what grains did to the bodies, shape [body, 6]; the largest overlap."""
@@ -427,21 +478,30 @@ class Bed:
         keep = 1 - self.time_step / drag_time
         e.clear_pushes()
         self._reaction_steps, self._tallied = steps, None
+        sleeper, forced = self._sleeper, False
+        if sleeper is not None:
+            e.rest.held.fill(0)
+            sleeper.slept = 0.0
         limit = 0.5 * self._skin
         done = 0
         while done < steps:
-            advanced, halted = e.launch(steps - done, self.time_step, limit, self.gravity, keep)
+            most = steps - done
+            if sleeper is not None:
+                forced = sleeper.look()
+                if forced:  # new lists in the step to come, as if a grain had moved far
+                    e.moved[None] = 1
+                most = min(most, sleeper.steps_to_look())
+            advanced, halted = e.launch(most, self.time_step, limit, self.gravity, keep)
             done += advanced
-            self.steps += advanced
-            self._since_lists += advanced
+            self._count(advanced)
             if halted:
-                self._adapt_skin()
+                if not forced:
+                    self._adapt_skin()
                 self._make_lists()
                 self._push(self.time_step)
                 limit = 0.5 * self._skin
                 done += 1
-                self.steps += 1
-                self._since_lists += 1
+                self._count(1)
         self._tallied, overlap = self._tally()
         if not overlap <= self.overlap_limit:
             raise BedFailure(
@@ -450,6 +510,13 @@ class Bed:
                 f"{self.material.young:.3g} Pa now) or the bound larger"
             )
 
+    def _count(self, steps: int) -> None:
+        self.steps += steps
+        self._since_lists += steps
+        self.grain_steps += steps * self.awake_count
+        if self._sleeper is not None:
+            self._sleeper.slept += steps * self._sleeper.mass
+
     def _adapt_skin(self) -> None:
         """Towards the skin at which lists cost as much to make as their extra pairs cost to look at."""
         steps = max(1, self._since_lists)
@@ -457,11 +524,13 @@ class Bed:
         skin = self._skin * min(1.4, max(0.7, ratio))
         self._skin = min(_LARGEST_SKIN * self._diameter, max(_LEAST_SKIN * self._diameter, skin))
 
-    def _make_lists(self) -> None:
+    def _make_lists(self, *, all_awake: bool = False) -> None:
         e = self._engine
-        e.keep_lists()
-        e.sort(*self.gravity)
-        e.make_lists(self._skin, e.shapes)
+        e.keep_lists(e.rest)
+        if self._sleeper is not None:
+            self._sleeper.rearrange(all_awake=all_awake)
+        e.sort(*self.gravity, e.rest)
+        e.make_lists(self._skin, e.shapes, e.rest)
         self.list_count += 1
         self._since_lists = 0
         code, value = (int(v) for v in e.problem[None])
@@ -492,7 +561,7 @@ class Bed:
     def _push(self, elapsed: float = 0.0) -> None:
         """Forces where the grains are; ``elapsed`` is the time by which contacts have slid since they were computed."""
         self._tallied = None
-        self._engine.push_all(elapsed, self._engine.shapes)
+        self._engine.push_all(elapsed, self._engine.shapes, self._engine.rest)
 
     def _shift_velocities(self, part: float) -> None:
         self._engine.shift_velocities(part * self.time_step)
@@ -534,6 +603,8 @@ class Bed:
         """Contacts of each grain with grains and bodies, by id, shape [grain_count]."""
         counts = np.zeros(self.grain_count, dtype=np.int32)
         self._engine.count_contacts(counts, self._engine.shapes)
+        if self._sleeper is not None:
+            counts += self._sleeper.contact_counts()
         return counts
 
     @property
@@ -583,6 +654,7 @@ class Bed:
 
     def set_gravity(self, gravity: float | Sequence[float]) -> None:
         """Change gravity [m/s2]: downwards, or a vector."""
+        self.wake()
         self._shift_velocities(0.5)
         self.gravity = _vector(gravity)
         self._make_lists()
@@ -634,6 +706,7 @@ class Bed:
             remove: by id, bool, shape [grain_count].
         """
         self._check_valid()
+        self.wake()
         ids = self._engine.read("id")
         order = np.argsort(ids)
         keep = ~np.asarray(remove, dtype=bool)

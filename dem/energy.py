@@ -108,30 +108,54 @@ def _pairs(bed: Bed, state: Mapping[str, Array]) -> Array:
     d = position[i, :3] - position[j, :3]
     d[:, 0] += (image % 3 - 1) * bed.size[0]
     d[:, 1] += (image // 3 - 1) * bed.size[1]
+    slide = state["slide"].astype(float)
+    turned = state["roll"].astype(float) if "roll" in state else np.zeros_like(d)
+    awake, chunks = state.get("sleep_numbers", (count, len(state["near_count"])))[:2]
+    base, rest = divmod(awake, chunks)
+    ends = np.cumsum(base + (np.arange(chunks) < rest))
+    own = np.searchsorted(ends, i, side="right") == np.searchsorted(ends, j, side="right")
+    share = np.where(own | (j >= awake), 1.0, 0.5)
+    if "sleep_numbers" in state:
+        parts = zip((i, j, d, slide, turned, share), _asleep(bed, state), strict=True)
+        i, j, d, slide, turned, share = (np.concatenate(pair) for pair in parts)
     length = np.linalg.norm(d, axis=1)
     r_i, r_j = position[i, 3], position[j, 3]
     overlap = np.maximum(0.0, r_i + r_j - length)
-    slide = state["slide"].astype(float)
-    turned = state["roll"].astype(float) if "roll" in state else np.zeros_like(d)
-    chunks = len(state["near_count"])
-    base, rest = divmod(count, chunks)
-    ends = np.cumsum(base + (np.arange(chunks) < rest))
-    own = np.searchsorted(ends, i, side="right") == np.searchsorted(ends, j, side="right")
     row = np.array(bed._engine.grain_pair[None], dtype=float)
-    share = np.where(own, 1.0, 0.5)
     return _springs(row, overlap, r_i * r_j / (r_i + r_j), slide[:, :3], turned, d / length[:, None], share)
+
+
+def _asleep(bed: Bed, state: Mapping[str, Array]) -> tuple[Array, ...]:
+    """Of two sleepers: grains, distance, history and share of each contact, as ``_pairs`` has them."""
+    grains = state["sleep_store_who"] >= 0
+    owner, who = (state[f"sleep_store_{name}"][grains].astype(np.int64) for name in ("owner", "who"))
+    place = np.argsort(state["id"])
+    i, j = place[owner], place[who]
+    d = (state["position"][i] - state["position"][j])[:, :3].astype(float)
+    size = np.array(bed.size[:2])
+    d[:, :2] -= size * np.round(d[:, :2] / size)
+    n = bed.grain_count
+    share = np.where(np.isin(who * n + owner, owner * n + who), 0.5, 1.0)  # kept by both, or by one
+    slide, turned = (state[f"sleep_store_{name}"][grains].astype(float) for name in ("slide", "roll"))
+    return i, j, d, slide, turned[:, :3], share
 
 
 def _near(state: Mapping[str, Array], surfaces: Mapping[int, Gap]) -> Array:
     """Of a grain and a body."""
+    rows = [state[name] for name in ("near_grain", "near_body", "near_slide", "near_roll")]
+    if "sleep_numbers" in state:
+        bodies = state["sleep_store_who"] < 0
+        owner, who, *springs = (state[f"sleep_store_{name}"][bodies] for name in ("owner", "who", "slide", "roll"))
+        more = (np.argsort(state["id"])[owner], -1 - who, *springs)
+        rows = [np.concatenate(pair) for pair in zip(rows, more, strict=True)]
     total = np.zeros(3)
     for body, surface in surfaces.items():
-        mine = state["near_body"] == body
-        centres = state["position"][state["near_grain"][mine]].astype(float)
+        mine = rows[1] == body
+        centres = state["position"][rows[0][mine]].astype(float)
         distance, normal, curvature = surface(centres[:, :3])
         overlap = np.maximum(0.0, centres[:, 3] - distance)
         radius = centres[:, 3] / (1 + centres[:, 3] * curvature)
-        slide, turned = (state[name][mine].astype(float) for name in ("near_slide", "near_roll"))
+        slide, turned = (values[mine].astype(float) for values in rows[2:])
         row = state["body_pair"][body].astype(float)
         total += _springs(row, overlap, radius, slide[:, :3], turned[:, :3], normal, 1.0)
     return total

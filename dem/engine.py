@@ -27,6 +27,8 @@ from . import runtime
 from .cohesion import JKR
 from .contact import PAIR_WIDTH, adhesive_range, contact_force, turning_torque
 from .lists import (
+    ALL_CHUNKS,
+    AWAKE,
     BOTTOM,
     CACHE_LINE,
     CHUNK_ROOM,
@@ -48,6 +50,7 @@ from .lists import (
 )
 from .shape_table import PLAIN, Shapes
 from .shapes import ROW_WIDTH
+from .sleep_kernels import EVERYONE, Rest, Sleepers
 
 __all__ = ["Engine", "MOST_BODIES", "MOST_PRIMITIVES", "STEPS_PER_LAUNCH", "take_engine"]
 
@@ -55,6 +58,7 @@ __all__ = ["Engine", "MOST_BODIES", "MOST_PRIMITIVES", "STEPS_PER_LAUNCH", "take
 STEPS_PER_LAUNCH = 20
 GRAINS_PER_CHUNK = 1250
 MOST_CHUNKS = 64
+AWAKE_SHARE = 0.64
 # Looks at a counter, per grain of a chunk, before a thread gives up waiting: some milliseconds.
 PATIENCE = 100
 MOST_PRIMITIVES = 64
@@ -93,7 +97,7 @@ def _roomy(count: int, *, least: int) -> int:
 
 
 @ti.data_oriented
-class Engine(Lists, Shapes):
+class Engine(Lists, Shapes, Sleepers):
     """Grains, lists and bodies in Taichi fields, and the kernels that advance them.
 
     Args:
@@ -192,7 +196,7 @@ class Engine(Lists, Shapes):
         self.cohesion = cohesion
         self.gpu = gpu
         F = ti.Vector.field
-        self.count = ti.field(ti.i32, 8)
+        self.count = ti.field(ti.i32, 10)
         self.box = ti.field(real, 7)
         # Per grain. position: x y z radius; velocity: x y z mass (half a step behind); spin: x y z and nothing.
         self.position = F(4, real, n)
@@ -210,8 +214,8 @@ class Engine(Lists, Shapes):
         self.came_from = ti.field(ti.i32, n)
         self.key = ti.field(ti.i32, n)
         self.rank = ti.field(ti.i32, cell_capacity)
-        self.cell_start = ti.field(ti.i32, cell_capacity + 1)
-        self.cell_fill = ti.field(ti.i32, cell_capacity)
+        self.cell_start = ti.field(ti.i32, 2 * cell_capacity + 1)
+        self.cell_fill = ti.field(ti.i32, 2 * cell_capacity)
         # Pair lists: chunk c owns the rows from c times its room, those of a grain lie together. ``first`` is the
         # grain a row belongs to, ``pair`` its neighbour's code, ``touching`` the rows in contact in this step,
         # ``slide`` the contact's history: x y z of the tangential spring, and what the normal dashpot remembers.
@@ -264,6 +268,8 @@ class Engine(Lists, Shapes):
         self.shapes = PLAIN  # the table of the shapes that need one; kernels are compiled anew for another
         self._kept = None
         self._meshes = []
+        self.rest: Any = EVERYONE  # the table of those that sleep, likewise
+        self._kept_rest: Rest | None = None
         self.grain_pair = F(PAIR_WIDTH, real, ())
         # Step control: moved is written by move and read by push; halted is written by push and read by move.
         self.moved = ti.field(ti.i32, ())
@@ -281,8 +287,10 @@ class Engine(Lists, Shapes):
         self.bottom = box[BOTTOM]
         self.chunk_room = self.pair.shape[0] // chunk_count
         self.near_room = self.near_grain.shape[0] // chunk_count
+        # Fewer awake have smaller chunks, so that all threads have some.
+        self.awake_per_chunk = max(1, round(AWAKE_SHARE * GRAINS_PER_CHUNK))
         sizes = (grain_count, chunk_count, self.chunk_room, self.near_room, *cells, math.prod(cells))
-        self.count.from_numpy(np.array(sizes, dtype=np.int32))
+        self.count.from_numpy(np.array([*sizes, grain_count, chunk_count], dtype=np.int32))
         for k, value in enumerate(box):
             self.box[k] = value
         self.write("rank", curve_ranks(*cells))
@@ -293,6 +301,25 @@ class Engine(Lists, Shapes):
         self.problem[None] = [0, 0]
         self.clear_pushes()
         self.clear_shapes()
+        self.rest = EVERYONE
+
+    def let_sleep(self) -> None:
+        """From here on kernels know of sleep; all are awake still."""
+        if self._kept_rest is None:
+            self._kept_rest = Rest(
+                grains=self.id.shape[0], cells=self.rank.shape[0], chunks=self.overlap.shape[0],
+                rows=self.pair.shape[0], real=self.real,
+            )  # fmt: skip
+        self.rest = rest = self._kept_rest
+        for field in (rest.asleep, rest.was, rest.woken, rest.leaves, rest.quiet, rest.start, rest.end):
+            field.fill(0)
+        for field in (rest.side, rest.mass, rest.news, rest.held):
+            field.fill(0)
+
+    def wake_all(self) -> None:
+        """All are awake, and the kernels are those that know of no sleep."""
+        self.rest = EVERYONE
+        self.count[AWAKE], self.count[CHUNKS] = self.grain_count, self.chunk_count
 
     def read(self, name: str) -> np.ndarray:
         """A field as a numpy array: the rows of the grains or chunks there are, or all of them."""
@@ -324,9 +351,9 @@ class Engine(Lists, Shapes):
         if self.gpu:
             self.done[None] = 0
             for _ in range(min(most, STEPS_PER_LAUNCH)):
-                self.run_on_gpu(dt, limit, *gravity, keep, self.shapes)
+                self.run_on_gpu(dt, limit, *gravity, keep, self.shapes, self.rest)
         else:
-            self.run(dt, limit, *gravity, keep, min(most, STEPS_PER_LAUNCH), self.shapes)
+            self.run(dt, limit, *gravity, keep, min(most, STEPS_PER_LAUNCH), self.shapes, self.rest)
         return int(self.done[None]), bool(self.halted[None])
 
     @ti.func
@@ -384,13 +411,19 @@ class Engine(Lists, Shapes):
             self.body_turn[b] = s / s.norm()
 
     @ti.func
-    def push(self, c, dt, shapes: ti.template()):
+    def push(self, c, dt, shapes: ti.template(), rest: ti.template()):
         """Forces between the grains of a chunk and all that they touch."""
         start, end = self.chunk_range(c)
         # First find out which pairs touch, without a branch that a processor would have to guess; then their forces.
         base = c * self.count[CHUNK_ROOM]
         last = base
-        for s in range(base, self.pair_end[end - 1]):
+        rows = base
+        if ti.static(rest.on):
+            if end > start:
+                rows = self.pair_end[end - 1]
+        else:
+            rows = self.pair_end[end - 1]
+        for s in range(base, rows):
             code = self.pair[s]
             i = self.first[s]
             bits = ti.select(code < 0, ~code, code)
@@ -411,6 +444,7 @@ class Engine(Lists, Shapes):
                         self.roll[s] = ti.Vector.zero(self.real, 3)
         p = self.grain_pair[None]
         largest = ti.cast(0.0, self.real)
+        held = ti.Vector.zero(self.real, 3)
         for k in range(base, last):
             s = self.touching[k]
             i = self.first[s]
@@ -462,10 +496,15 @@ class Engine(Lists, Shapes):
                 if j >= start and j < end:
                     self.force[j] = self.force[j] - f
                     self.torque[j] = self.torque[j] + (arm_j * t - turn)
+            if ti.static(rest.on):
+                if j >= self.count[AWAKE]:
+                    held -= f
             largest = ti.max(largest, overlap * by_sum)
         for s in range(c * self.count[NEAR_ROOM], self.near_end[c]):
             largest = ti.max(largest, self.push_near(c, s, dt, shapes))
         self.overlap[c] = ti.max(self.overlap[c], largest)
+        if ti.static(rest.on):
+            rest.held[c] = rest.held[c] + held
 
     @ti.func
     def apart(self, x_i, x_j, bits):
@@ -541,6 +580,7 @@ class Engine(Lists, Shapes):
         keep: float,
         steps: int,
         shapes: ti.template(),
+        rest: ti.template(),
     ):
         """Up to ``steps`` steps on a CPU; stops by itself where new lists are needed.
 
@@ -587,39 +627,49 @@ class Engine(Lists, Shapes):
                                 self.done[None] = phase // 2
                                 here = False
                             else:
-                                self.push(c, dt, shapes)
+                                self.push(c, dt, shapes, rest)
                             ti.atomic_add(self.ticket[FINISHED], 1)
 
     @ti.kernel
-    def run_on_gpu(self, dt: float, limit: float, gx: float, gy: float, gz: float, keep: float, shapes: ti.template()):
+    def run_on_gpu(
+        self,
+        dt: float,
+        limit: float,
+        gx: float,
+        gy: float,
+        gz: float,
+        keep: float,
+        shapes: ti.template(),
+        rest: ti.template(),
+    ):
         """One step on a GPU, where every grain is a chunk; nothing where new lists are needed, as in ``run``."""
         for c in range(self.count[CHUNKS]):
             if self.halted[None] == 0:
                 self.move(c, dt, limit, ti.Vector([gx, gy, gz]), keep)
         for c in range(self.count[CHUNKS]):
             if self.moved[None] == 0:
-                self.push(c, dt, shapes)
+                self.push(c, dt, shapes, rest)
                 if c == 0:
                     self.done[None] = self.done[None] + 1
             elif c == 0:
                 self.halted[None] = 1
 
     @ti.kernel
-    def push_all(self, dt: float, shapes: ti.template()):
+    def push_all(self, dt: float, shapes: ti.template(), rest: ti.template()):
         """The forces of the step that was interrupted by new lists."""
         for _ in range(1):
             self.ticket[QUEUE] = 0
         for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
             c = self.next_chunk(w, True)
             while c < self.count[CHUNKS]:
-                self.push(c, dt, shapes)
+                self.push(c, dt, shapes, rest)
                 c = self.next_chunk(w, False)
 
     # ------------------------------------------------------------------ what the host reads
 
     @ti.kernel
     def clear_pushes(self):
-        for c, b in ti.ndrange(self.count[CHUNKS], MOST_BODIES):
+        for c, b in ti.ndrange(self.count[ALL_CHUNKS], MOST_BODIES):
             self.pushes[c, b] = ti.Vector.zero(self.real, 6)
 
     @ti.kernel
@@ -647,12 +697,12 @@ class Engine(Lists, Shapes):
             if b < MOST_BODIES:
                 for k in ti.static(range(6)):
                     total = ti.cast(0.0, ti.f64)
-                    for c in range(self.count[CHUNKS]):
+                    for c in range(self.count[ALL_CHUNKS]):
                         total += ti.cast(self.pushes[c, b][k], ti.f64)
                     rows[b, k] = total
             else:
                 largest = ti.cast(0.0, ti.f64)
-                for c in range(self.count[CHUNKS]):
+                for c in range(self.count[ALL_CHUNKS]):
                     overlap = ti.cast(self.overlap[c], ti.f64)
                     if not (overlap <= largest) and largest == largest:
                         largest = overlap

@@ -19,6 +19,7 @@ ITEMS_PER_THREAD = 512
 # Places of the counters in Engine.ticket: of a plain loop over chunks; of ``Engine.run``.
 CACHE_LINE = 16
 QUEUE, TURN, FINISHED = 0, CACHE_LINE, 2 * CACHE_LINE
+BUILT = 2  # place of a number of ``dem.sleep.Rest.news``: the other store of frozen contacts is filled
 MOST_BODIES = 32  # the floor, a platform's 24 spikes and hull, and some more
 
 # A neighbour's code: its index, and in the upper bits which periodic image is meant. The sign says "touching".
@@ -26,8 +27,9 @@ INDEX_BITS = 26
 INDEX_MASK = (1 << INDEX_BITS) - 1
 SAME_IMAGE = 1 + 3 * 1  # (0 + 1) + 3 * (0 + 1)
 
-# Places of the numbers in Engine.count and Engine.box.
-GRAINS, CHUNKS, CHUNK_ROOM, NEAR_ROOM, NX, NY, NZ, CELLS = range(8)
+# Places of the numbers in Engine.count and Engine.box. CHUNKS are those of the grains AWAKE (``dem.sleep``: all, unless
+# a bed lets its grains sleep), of ALL_CHUNKS that there is room for.
+GRAINS, CHUNKS, CHUNK_ROOM, NEAR_ROOM, NX, NY, NZ, CELLS, AWAKE, ALL_CHUNKS = range(10)
 PERIOD_X, PERIOD_Y, BOTTOM, TOP, CELL_X, CELL_Y, CELL_Z = range(7)
 
 
@@ -56,7 +58,7 @@ class Lists:
 
     @ti.func
     def chunk_range(self, c):
-        n = self.count[GRAINS]
+        n = self.count[AWAKE]
         m = self.count[CHUNKS]
         if ti.static(self.gpu):
             return c, c + 1
@@ -70,8 +72,8 @@ class Lists:
         result = i
         if ti.static(not self.gpu):
             m = self.count[CHUNKS]
-            base = self.count[GRAINS] // m
-            rest = self.count[GRAINS] - base * m
+            base = self.count[AWAKE] // m
+            rest = self.count[AWAKE] - base * m
             wide = rest * (base + 1)
             result = ti.select(i < wide, i // (base + 1), rest + (i - wide) // ti.max(base, 1))
         return result
@@ -136,9 +138,12 @@ class Lists:
         return (k * self.count[NY] + j) * self.count[NX] + i
 
     @ti.kernel
-    def sort(self, gx: float, gy: float, gz: float):
-        """Wrap the grains into the box and bring them into the order of the curve; ids break ties."""
-        for k in range(self.count[CELLS]):
+    def sort(self, gx: float, gy: float, gz: float, rest: ti.template()):
+        """Wrap the grains into the box and bring them into the order of the curve; ids break ties.
+
+        Those that sleep come behind those awake: each set has the cells for itself.
+        """
+        for k in range(rest.sets * self.count[CELLS]):
             self.cell_fill[k] = 0
         for i in range(self.count[GRAINS]):
             x = self.position[i]
@@ -156,19 +161,21 @@ class Lists:
                 self.origin[i].y += b
             ci, cj, ck = self.cell_of(self.position[i])
             r = self.rank[self.cell_index(ci, cj, ck)]
+            if ti.static(rest.on):
+                r += self.count[CELLS] * rest.asleep[self.id[i]]
             self.key[i] = r
             ti.atomic_add(self.cell_fill[r], 1)
         for _ in range(1):
             total = 0
-            for r in range(self.count[CELLS]):
+            for r in range(rest.sets * self.count[CELLS]):
                 self.cell_start[r] = total
                 total += self.cell_fill[r]
                 self.cell_fill[r] = self.cell_start[r]
-            self.cell_start[self.count[CELLS]] = total
+            self.cell_start[rest.sets * self.count[CELLS]] = total
         for i in range(self.count[GRAINS]):
             slot = ti.atomic_add(self.cell_fill[self.key[i]], 1)
             self.came_from[slot] = i
-        for r in range(self.count[CELLS]):
+        for r in range(rest.sets * self.count[CELLS]):
             # Whatever thread came first, the order within a cell is that of the ids.
             for a in range(self.cell_start[r] + 1, self.cell_start[r + 1]):
                 moving = self.came_from[a]
@@ -192,21 +199,29 @@ class Lists:
             self.id[i] = self.buffer_id[i]
             self.listed[i] = self.buffer4[0][i].xyz
             self.force[i] = self.buffer4[1][i].w * ti.Vector([gx, gy, gz])
+            if ti.static(rest.on):
+                if i >= self.count[AWAKE]:
+                    self.force[i] = ti.Vector.zero(self.real, 3)
             self.torque[i] = ti.Vector.zero(self.real, 3)
 
     @ti.kernel
-    def keep_lists(self):
+    def keep_lists(self, rest: ti.template()):
         """Put the lists aside, so that the new ones can take the history over."""
         for _ in range(1):
             self.ticket[QUEUE] = 0
         for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
             c = self.next_chunk(w, True)
             while c < self.count[CHUNKS]:
-                self.keep_chunk(c)
+                self.keep_chunk(c, rest)
                 c = self.next_chunk(w, False)
+        if ti.static(rest.on):
+            for i in range(self.count[AWAKE], self.count[GRAINS]):
+                self.old_start[i] = 0
+                self.old_end[i] = 0
+                self.near_first[i] = -1
 
     @ti.func
-    def keep_chunk(self, c):
+    def keep_chunk(self, c, rest: ti.template()):
         start, end = self.chunk_range(c)
         for i in range(start, end):
             self.old_start[i] = self.pair_start[i]
@@ -219,6 +234,8 @@ class Lists:
                     self.old_slide[s] = self.slide[s]
                     if ti.static(self.rolling):
                         self.old_roll[s] = self.roll[s]
+                    if ti.static(rest.on):
+                        rest.old_force[s] = rest.force[s]
         self.old_near_end[c] = self.near_end[c]
         base = c * self.count[NEAR_ROOM]
         for k in range(self.near_end[c] - base):
@@ -241,7 +258,7 @@ class Lists:
         return found
 
     @ti.kernel
-    def make_lists(self, skin: float, shapes: ti.template()):
+    def make_lists(self, skin: float, shapes: ti.template(), rest: ti.template()):
         """New pair and near lists for the sorted grains; history comes over from the lists put aside."""
         for b in range(MOST_BODIES):
             self.body_listed[b] = self.body_position[b]
@@ -251,14 +268,24 @@ class Lists:
         for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
             c = self.next_chunk(w, True)
             while c < self.count[CHUNKS]:
-                self.list_chunk(c, ti.cast(skin, self.real), shapes)
+                self.list_chunk(c, ti.cast(skin, self.real), shapes, rest)
                 c = self.next_chunk(w, False)
+        if ti.static(rest.on):
+            for i in range(self.count[AWAKE], self.count[GRAINS]):
+                self.pair_start[i] = 0
+                self.pair_end[i] = 0
+            for c in range(self.count[CHUNKS], self.count[ALL_CHUNKS]):
+                self.near_end[c] = c * self.count[NEAR_ROOM]
+            for _ in range(1):
+                if rest.news[BUILT] == 1:
+                    rest.side[None] = 1 - rest.side[None]
+                    rest.news[BUILT] = 0
         for _ in range(1):
             self.moved[None] = 0
             self.halted[None] = 0
 
     @ti.func
-    def list_chunk(self, c, skin, shapes: ti.template()):
+    def list_chunk(self, c, skin, shapes: ti.template(), rest: ti.template()):
         start, end = self.chunk_range(c)
         base = c * self.count[CHUNK_ROOM]
         s = base
@@ -286,27 +313,30 @@ class Lists:
                             gj -= self.count[NY]
                             mj = -1
                         r = self.rank[self.cell_index(gi, gj, k)]
-                        for j in range(self.cell_start[r], self.cell_start[r + 1]):
-                            own = j >= start and j < end
-                            if j != i and (j > i or not own):
-                                x_j = self.position[j]
-                                d = x_i.xyz - x_j.xyz
-                                d.x += ti.cast(mi, self.real) * self.box[PERIOD_X]
-                                d.y += ti.cast(mj, self.real) * self.box[PERIOD_Y]
-                                reach = x_i.w + x_j.w + skin
-                                if ti.static(self.cohesion == JKR):
-                                    reach += adhesive_range(self.grain_pair[None], x_i.w * x_j.w / (x_i.w + x_j.w))
-                                if d.norm_sqr() < reach * reach:
-                                    if s < base + self.count[CHUNK_ROOM]:
-                                        self.list_pair(s, i, j, j | ((mi + 1 + 3 * (mj + 1)) << INDEX_BITS))
-                                    s += 1
+                        for _ in range(rest.sets):
+                            for j in range(self.cell_start[r], self.cell_start[r + 1]):
+                                own = j >= start and j < end
+                                if j != i and (j > i or not own):
+                                    x_j = self.position[j]
+                                    d = x_i.xyz - x_j.xyz
+                                    d.x += ti.cast(mi, self.real) * self.box[PERIOD_X]
+                                    d.y += ti.cast(mj, self.real) * self.box[PERIOD_Y]
+                                    reach = x_i.w + x_j.w + skin
+                                    if ti.static(self.cohesion == JKR):
+                                        reach += adhesive_range(self.grain_pair[None], x_i.w * x_j.w / (x_i.w + x_j.w))
+                                    if d.norm_sqr() < reach * reach:
+                                        if s < base + self.count[CHUNK_ROOM]:
+                                            image = (mi + 1 + 3 * (mj + 1)) << INDEX_BITS
+                                            self.list_pair(s, i, j, j | image, rest)
+                                        s += 1
+                            r += self.count[CELLS]
             self.pair_end[i] = ti.min(s, base + self.count[CHUNK_ROOM])
         if s > base + self.count[CHUNK_ROOM]:
             self.problem[None] = ti.Vector([2, s - base])
-        self.list_near(c, start, end, skin, shapes)
+        self.list_near(c, start, end, skin, shapes, rest)
 
     @ti.func
-    def list_pair(self, s, i, j, code):
+    def list_pair(self, s, i, j, code, rest: ti.template()):
         oi, oj = self.came_from[i], self.came_from[j]
         self.first[s] = i
         sign = ti.cast(1.0, self.real)
@@ -326,9 +356,11 @@ class Lists:
             self.slide[s] = ti.Vector.zero(self.real, 4)
             if ti.static(self.rolling):
                 self.roll[s] = ti.Vector.zero(self.real, 3)
+        if ti.static(rest.on):
+            self.list_sleeper(s, i, j, code, old, rest)
 
     @ti.func
-    def list_near(self, c, start, end, skin, shapes: ti.template()):
+    def list_near(self, c, start, end, skin, shapes: ti.template(), rest: ti.template()):
         base = c * self.count[NEAR_ROOM]
         s = base
         for i in range(start, end):
@@ -350,19 +382,26 @@ class Lists:
                         self.near_roll[s] = ti.Vector.zero(self.real, 3)
                         o = self.near_first[self.came_from[i]]
                         while o >= 0:
-                            if self.old_near_grain[o] == self.came_from[i]:
-                                if self.old_near_body[o] == b:
-                                    self.near_slide[s] = self.old_near_slide[o]
-                                    self.near_roll[s] = self.old_near_roll[o]
-                                o += 1
-                                if o % self.count[NEAR_ROOM] == 0 or o >= self.old_near_end[o // self.count[NEAR_ROOM]]:
-                                    o = -1
-                            else:
-                                o = -1
+                            if self.old_near_body[o] == b:
+                                self.near_slide[s] = self.old_near_slide[o]
+                                self.near_roll[s] = self.old_near_roll[o]
+                            o = self.next_near(o, self.came_from[i])
+                        if ti.static(rest.on):
+                            self.wake_near(s, i, b, rest)
                     s += 1
         self.near_end[c] = ti.min(s, base + self.count[NEAR_ROOM])
         if s > base + self.count[NEAR_ROOM]:
             self.problem[None] = ti.Vector([3, s - base])
+
+    @ti.func
+    def next_near(self, o, i):
+        """The row of the old near list behind row o if it is of the same grain (i, its old index), or -1."""
+        result = o + 1
+        if result % self.count[NEAR_ROOM] == 0 or result >= self.old_near_end[result // self.count[NEAR_ROOM]]:
+            result = -1
+        elif self.old_near_grain[result] != i:
+            result = -1
+        return result
 
 
 @ti.func

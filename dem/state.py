@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .lists import INDEX_MASK
+from .lists import AWAKE, CHUNKS, INDEX_MASK
 from .materials import Material
+from .sleep import Sleep, Sleeper
 
 if TYPE_CHECKING:
     from .bed import Bed
@@ -63,6 +64,8 @@ def take(bed: Bed) -> dict[str, np.ndarray]:
     if e.rolling:
         state["roll"] = e.read("roll")[touching]
     state |= e.shape_state()
+    if bed._sleeper is not None:
+        state |= bed._sleeper.state(rows)
     state["numbers"] = np.array(
         [
             bed.steps,
@@ -93,10 +96,12 @@ def put_back(bed: Bed, state: dict[str, np.ndarray]) -> None:
         e.write(name, state[name])
     e.restore_shapes(state)
     counts = state["pair_count"]
-    chunk = _chunk_starts(bed.grain_count, e.chunk_count)
+    awake, chunks = state.get("sleep_numbers", (bed.grain_count, e.chunk_count))[:2]
+    chunk = _chunk_starts(awake, chunks)
     before = np.concatenate(([0], np.cumsum(counts)))
-    which = np.repeat(np.arange(e.chunk_count), np.diff(chunk))
-    start = (before[:-1] - before[chunk[which]] + which * e.chunk_room).astype(np.int32)
+    which = np.repeat(np.arange(chunks), np.diff(chunk))
+    start = np.zeros(bed.grain_count, dtype=np.int32)
+    start[:awake] = before[:awake] - before[chunk[which]] + which * e.chunk_room
     rows = np.repeat(start - before[:-1], counts) + np.arange(before[-1])
     touching = rows[state["pair"] < 0]
     e.write("pair_start", start)
@@ -118,6 +123,13 @@ def put_back(bed: Bed, state: dict[str, np.ndarray]) -> None:
     bed.time_step, bed._skin = reals[:2]
     bed.gravity = tuple(reals[2:5])
     bed.surface, bed.packing_fraction, bed.overlap_limit = reals[5:]
+    e.wake_all()
+    bed._sleeper = None
+    if "sleep_rules" in state:
+        e.let_sleep()
+        e.count[AWAKE], e.count[CHUNKS] = int(awake), int(chunks)
+        bed._sleeper = Sleeper(bed, Sleep(*state["sleep_rules"][:-1], every=int(state["sleep_rules"][-1])))
+        bed._sleeper.restore(state, rows)
 
 
 def write_file(bed: Bed, path: Path) -> None:
@@ -186,6 +198,8 @@ def read_file(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray], str]:
 def adopt(bed: Bed, state: dict[str, np.ndarray], *, keep: np.ndarray | None = None) -> None:
     """Take over the grains, contacts and bodies of a state whose layout is another; ``keep``: which grains, by id."""
     e = bed._engine
+    if "sleep_rules" in state:
+        raise ValueError("this state has grains that sleep, and its layout is another: wake the bed before it is saved")
     ids = state["id"]
     if keep is None:
         keep = np.ones(len(ids), dtype=bool)

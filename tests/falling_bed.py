@@ -1,6 +1,6 @@
 """A bed of 300 grains in eight chunks that falls onto its floor and a ball: for tests of bits, here and elsewhere.
 
-As a script, in a process of its own:  falling_bed.py WHAT FILE STEPS THREADS [EVERY [COHESION [BODY]]]
+As a script, in a process of its own:  falling_bed.py WHAT FILE STEPS THREADS [EVERY [COHESION [BODY [sleep]]]]
     fresh   makes the bed, advances it and saves it
     resume  loads the bed and advances it to that many steps in all
 Saves every EVERY steps when given, and says the number of steps after each save.
@@ -17,7 +17,7 @@ import numpy as np
 import solid_shapes
 
 import dem.engine
-from dem import Ball, Bed, Box, Capsule, Cylinder, Material, Mesh, Placed, Polyhedron, Tube
+from dem import Ball, Bed, Box, Capsule, Cylinder, Material, Mesh, Placed, Polyhedron, Sleep, Tube
 
 GRAINS_PER_CHUNK = 37
 STUFF = Material("grain", 2600, 1e7, 0.25, 0.5, 0.6, 0.15)
@@ -38,7 +38,11 @@ def solids():
     ]
 
 
-def make(threads=None, precision="float64", cohesion="none", body="spike"):
+# Under these many of the grains fall asleep and wake in mid-fall.
+DOZING = {"speed": 0.5, "calm": 0.02, "reach": 0.2, "force": 3.0, "waking_speed": 2.0, "every": 10}
+
+
+def make(threads=None, precision="float64", cohesion="none", body="spike", sleep=False):
     """The bed at time 0, with a ball-tipped cylinder (or ``solids``) that is pulled through it at a slant; at Bond
     number 1 or 0."""
     dem.engine.GRAINS_PER_CHUNK = GRAINS_PER_CHUNK
@@ -60,6 +64,8 @@ def make(threads=None, precision="float64", cohesion="none", body="spike"):
     shape, height = (SPIKE, 0.0228) if body == "spike" else (solids(), 0.0195)
     number = bed.add_body(shape, position=(0.034, 0.018, height))
     bed.move_body(number, velocity=(0.05, 0.02, -0.5), spin=(0.0, 0.0, 20.0))
+    if sleep:
+        bed.let_sleep(Sleep(**DOZING))
     return bed
 
 
@@ -80,7 +86,10 @@ def main() -> None:
     dem.engine.GRAINS_PER_CHUNK = GRAINS_PER_CHUNK
     cohesion = sys.argv[6] if len(sys.argv) > 6 else "none"
     body = sys.argv[7] if len(sys.argv) > 7 else "spike"
-    bed = make(threads, cohesion=cohesion, body=body) if what == "fresh" else Bed.load(path, threads=threads)
+    sleep = len(sys.argv) > 8
+    bed = (
+        make(threads, cohesion=cohesion, body=body, sleep=sleep) if what == "fresh" else Bed.load(path, threads=threads)
+    )
     while bed.steps < steps:
         bed.advance(min(every, steps - bed.steps))
         bed.save(path)

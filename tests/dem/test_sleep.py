@@ -1,0 +1,123 @@
+"""Grains that sleep: what is read of the bed stays what it is awake, bits stay, and what reaches them wakes them."""
+
+import falling_bed
+import numpy as np
+import pytest
+from test_bits import elsewhere, finish
+
+import dem.engine
+from dem import Ball, Bed, Material, Sleep
+from dem.energy import bed_energies
+
+STUFF = Material("grain", 2600, 1e7, 0.25, 0.5, 0.3, 0.1)
+D = 4e-3
+ROWS, COLUMNS = 32, 6
+
+
+@pytest.fixture(scope="module")
+def layer():
+    """Grains in two square layers, at rest, and a ball above one end; of a size for the engine of `falling_bed`."""
+    kept, dem.engine.GRAINS_PER_CHUNK = dem.engine.GRAINS_PER_CHUNK, 60
+    i, j = (a.ravel() for a in np.meshgrid(np.arange(ROWS), np.arange(COLUMNS)))
+    low = np.column_stack([(i + 0.5) * D, (j + 0.5) * D, np.full(i.size, 0.5 * D)])
+    high = low + [0.5 * D, 0.5 * D, D * np.sqrt(0.5)]
+    bed = Bed.from_grains(
+        STUFF, positions=np.concatenate([low, high]), radii=np.full(2 * i.size, 0.5 * D),
+        size=(ROWS * D, COLUMNS * D, 0.02), height=0.07, max_overlap=0.1, threads=2,
+    )  # fmt: skip
+    dem.engine.GRAINS_PER_CHUNK = kept
+    bed.advance(600, drag_time=2e-3)
+    bed.advance(200)
+    ball = bed.add_body(Ball(radius=5e-3), position=(0.02, 0.012, 0.013))
+    bed.move_body(ball, velocity=(0.0, 0.0, -0.05))
+    return bed, bed.state()
+
+
+def pressed(layer, rules=None):
+    """The ball goes 1.7 mm down. Its force, the floor's over the weight, those awake, every 50 steps; energies."""
+    bed, state = layer
+    bed.restore(state)
+    if rules:
+        bed.let_sleep(rules)
+    rows, left, momentum, impulse = [], 2000, [], 0.0
+    mass = bed.grains()["mass"]
+    while left > 0:
+        bed.advance(50)
+        left -= 50
+        impulse += 50 * bed.time_step * (-bed.reaction(0)[0][2] - bed.reaction(1)[0][2] - bed.weight)
+        grains = bed.grains()
+        speed = grains["velocity"][:, 2] + 0.5 * bed.time_step * grains["force"][:, 2] / mass
+        momentum.append(mass @ speed - impulse)
+        rows.append([bed.reaction(1)[0][2], bed.floor_force / bed.weight, bed.awake_count])
+    return np.array(rows), bed_energies(bed, bodies={}), np.ptp(momentum)
+
+
+def test_what_reaches_a_bed_is_the_same_with_grains_asleep(layer):
+    """The force on a ball pressed in, energies; the floor's reaction, which has all the weight.
+
+    1e-4 off as measured: what the layer beyond those awake gives way by, and they do not.
+    """
+    plain, energies, _ = pressed(layer)
+    found, asleep_energies, drift = pressed(layer, Sleep(calm=0.3))
+    assert plain[:, 2].min() == 2 * ROWS * COLUMNS and found[:, 2].min() < ROWS * COLUMNS
+    assert np.abs(found[:, 0] - plain[:, 0]).max() < 1e-3 * plain[:, 0].max()
+    assert np.abs(found[:, 1] - plain[:, 1]).max() < 1e-3 * plain[:, 1].max()
+    for name in ("kinetic", "potential", "normal", "tangential"):
+        assert asleep_energies[name] == pytest.approx(energies[name], rel=5e-3), name
+    # Gravity, floor and ball alone change the momentum of all grains, those that fall asleep or wake included.
+    assert drift < 1e-15
+
+
+def test_woken_at_once_they_go_on_as_if_they_had_not_slept(layer):
+    """At rest under no ball: all asleep, then all awake; nothing moves by more than a millionth of a diameter."""
+    bed, state = layer
+    bed.restore(state)
+    bed.move_body(1, position=(0.02, 0.012, 0.05), velocity=(0.0, 0.0, 0.0))
+    bed.let_sleep(Sleep(calm=0.1))
+    bed.advance(600)
+    assert bed.awake_count == 0 and bed.asleep.all()
+    before = bed.grains()
+    bed.wake()
+    assert bed.awake_count == bed.grain_count
+    bed.advance(200)
+    after = bed.grains()
+    assert np.array_equal(after["coordination"], before["coordination"])
+    assert np.abs(after["position"] - before["position"]).max() < 1e-6 * D
+
+
+def test_the_bits_depend_on_neither_threads_nor_cuts_nor_where_it_goes_on(tmp_path):
+    """Grains that fall, with rules under which they doze off and wake often."""
+    path = tmp_path / "other.npz"
+    other = elsewhere("fresh", path, 600, 1, 100, "none", "spike", "sleep")
+    bed = falling_bed.make(2, sleep=True)
+    digests, counts = {}, []
+    for step in range(100, 700, 100):
+        bed.advance(100)
+        digests[step], state = falling_bed.digest(bed), bed.state()
+        counts.append(bed.awake_count)
+        if step == 300:
+            bed.save(tmp_path / "bed.npz")
+            middle = state
+    assert min(counts) < 270 and len(set(counts)) > 3
+    assert finish(other) == digests
+    bed.restore(middle)
+    for steps in (1, 37, 62, 100):
+        bed.advance(steps)
+    assert falling_bed.digest(bed) == digests[500]
+    again = Bed.load(tmp_path / "bed.npz", threads=2)
+    assert falling_bed.digest(again) == digests[300]
+    again.advance(100)
+    assert falling_bed.digest(again) == digests[400]
+
+
+def test_what_cannot_be_is_refused(layer):
+    with pytest.raises(ValueError, match=r"waking_speed = 0.001 must be above speed = 0.005"):
+        Sleep(waking_speed=1e-3)
+    with pytest.raises(ValueError, match="force = 0 must be above 0"):
+        Sleep(force=0)
+    bed = Bed.from_grains(
+        STUFF, positions=np.array([[0.01, 0.01, 0.01]]), radii=np.array([0.002]), size=(0.02, 0.02, 0.02), gravity=0.0,
+        threads=2,
+    )  # fmt: skip
+    with pytest.raises(ValueError, match="floor and gravity"):
+        bed.let_sleep()
