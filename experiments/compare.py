@@ -19,6 +19,7 @@ from .compare_tumbles import Moved, compared_columns, gaps, read_moved, told_apa
 from .progress import Progress
 from .reporting import write_report
 from .runfolder import RunFolder, read_json
+from .tumble_bed_settings import OF_THE_MASTER, TumbleBedSettings
 from .whole_runs import whole_run
 
 __all__ = ["check", "resume", "run"]
@@ -138,8 +139,8 @@ def _differs(first: RunFolder, second: RunFolder, results: list[dict[str, Any]])
     """Settings and numbers of the trial in which the two differ: key, both values as they are written."""
     rows = []
     for key in dict.fromkeys([*first.settings, *second.settings]):
-        one, other = first.settings.get(key), second.settings.get(key)
-        if one != other:
+        one, other = _used(first, key, results[0]), _used(second, key, results[1])
+        if one != other and "" not in (one, other):
             rows.append({"key": key, "first": _written(one), "second": _written(other), "unit": ""})
     trials = [result.get("trial", {}) for result in results]
     known = {row["key"] for row in rows}
@@ -149,6 +150,16 @@ def _differs(first: RunFolder, second: RunFolder, results: list[dict[str, Any]])
             unit = trials[0].get(key, trials[1].get(key, {})).get("unit", "")
             rows.append({"key": key, "first": _written(one), "second": _written(other), "unit": unit})
     return rows
+
+
+def _used(folder: RunFolder, key: str, result: Mapping[str, Any]) -> Any:
+    """A setting as it took part in a run; "" where it is of the bed, and there was none."""
+    if folder.command == "tumble":
+        if key == "method":
+            return result["method"]
+        if result["ground"] != "bed" and key in TumbleBedSettings.model_fields and key not in OF_THE_MASTER:
+            return ""
+    return folder.settings.get(key)
 
 
 def _written(value: Any) -> str:

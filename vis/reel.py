@@ -142,13 +142,14 @@ class Reel:
         return np.column_stack([self.series["x_m"][rows], self.series["y_m"][rows]]) + self.origin[[0, 2]]
 
     def feet(self) -> Array:
-        """x of the lowest tips at every picture [m], shape (n,): of several as low, their middle."""
+        """x of the lowest tip at every picture [m], shape (n,): of two nearly as low the leading one."""
         rows = [self.row(index) for index in range(len(self))]
         length, count = self.number("spike_length"), int(self.result.get("spike_count", 8))
         angles = self.series["theta_rad"][rows][:, None] + math.pi / count + 2 * math.pi / count * np.arange(count)
         x = self.series["x_m"][rows][:, None] - length * np.sin(angles)
         depth = length * np.cos(angles) - self.series["y_m"][rows][:, None]
-        share = np.exp((depth - depth.max(axis=1, keepdims=True)) / (0.02 * length))
+        wanted = depth + 0.03 * (x - x.mean(axis=1, keepdims=True))
+        share = np.exp((wanted - wanted.max(axis=1, keepdims=True)) / (0.005 * length))
         return (share * x).sum(axis=1) / share.sum(axis=1) + self.origin[0]
 
     # What is seen -----------------------------------------------------------------------------------------------------

@@ -5,7 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from coupling import Landing, LawFooting, TumblesInARow
+from coupling import BedFooting, Landing, LawFooting, TumblesInARow, platform_members
+from dem import Bed
+from dem.materials import SAND
 from rigid import Trial
 
 RIG = {"gravity_sim": 0.3, "counterweight": 0.28}
@@ -56,3 +58,23 @@ def test_a_brake_turns_once():
     trial = Trial(**RIG, **SMALL, torque=0.1, actuator="brake", wheel_speed_0=30.0)
     with pytest.raises(ValueError, match="motor"):
         TumblesInARow(trial, LawFooting.of_trial(trial), tumbles=2, duration=1.0)
+
+
+def test_a_landing_on_grains_keeps_the_momentum_that_it_came_with_in_the_books():
+    """On one layer of 6 mm grains: body and grains less the impulses of weight and floor, to round-off."""
+    d, rows, columns = 6e-3, 20, 6
+    at = np.array([((i + 0.5) * d, (j + 0.5) * d, 0.5 * d) for i in range(rows) for j in range(columns)])
+    bed = Bed.from_grains(
+        SAND, positions=at, radii=np.full(len(at), 0.5 * d), young=1e7, size=(rows * d, columns * d, 0.03), height=0.3,
+        max_overlap=0.1, threads=1, gravity=9.80665,
+    )  # fmt: skip
+    bed.surface = d
+    members = platform_members(spike_length=0.04, count=8, diameter=8e-3, clear=0.015)
+    trial = Trial(**RIG, **SMALL)
+    footing = BedFooting(bed, members, origin=(0.06, 0.018), copies=2.0, touch=1e-3 * trial.weight, friction=0.5)
+    run = Landing(trial, footing, speed=0.1, along=0.05, spin=1.0, duration=0.02, substeps=8, tip_radius=4e-3,
+                  energy_interval=2e-3)  # fmt: skip
+    found = run.run()
+    assert run.states[0] == "hop" and run.feet[:, 0].max() > trial.weight
+    assert found.vx[0] == pytest.approx(0.05) and found.omega[0] == pytest.approx(1.0)
+    assert run.samples["momentum_error"].max() < 1e-12
