@@ -14,6 +14,8 @@ from .problem import Array, Finding
 __all__ = ["PhaseTable", "findings_in_words", "told_tables", "setting_words", "where_sentences"]
 
 _UNITS = {"N_m": "N m", "m_s2": "m/s2", "m_s": "m/s", "m": "m"}
+_OTHER = 0.01
+"""Relative difference from which on two settings are two."""
 _MORE = 0.05
 """Nats by which a set of names must beat each of its parts to be listed."""
 _MAINLY = 0.5
@@ -83,7 +85,7 @@ def _settings(places: Sequence[Mapping[str, Any]], total: float) -> str:
             if value is not None:
                 sums[value] = sums.get(value, 0.0) + place["excess"]
         value, most = max(sums.items(), key=lambda pair: pair[1])
-        if len(sums) > 1 and most >= _MAINLY * total:
+        if max(sums) - min(sums) > _OTHER * max(map(abs, sums)) and most >= _MAINLY * total:
             shown.append(f"{setting_words(name, value)} ({100 * most / total:.0f} %)")
     return ", ".join(shown)
 
