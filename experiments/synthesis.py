@@ -80,7 +80,9 @@ def record(
     sensors = replace(
         sensors,
         clock_offset=clock["offset"] if clock else sensors.clock_offset,
+        clock_drift=clock["drift"] if clock else sensors.clock_drift,
         camera_scale=camera["scale"] if camera else sensors.camera_scale,
+        camera_bend=camera["bend"] if camera else sensors.camera_bend,
     )
     lean = slope["angle"] if slope else 0.0
     trajectory = simulate(trial, duration=duration, times=sensor_times(sensors, duration))

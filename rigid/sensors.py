@@ -91,8 +91,12 @@ class SensorSet:
     """Over which each specific force is averaged [s]."""
     camera_scale: float = 1.0
     """Measured over true, of x and y [1]."""
+    camera_bend: float = 0.0
+    """Added to the scale by the square of the distance from where the platform stood [1/m2]."""
     clock_offset: float = 0.0
-    """The IMU's time minus the true time [s]."""
+    """The IMU's time minus the true time at t = 0 [s]."""
+    clock_drift: float = 0.0
+    """What the IMU's clock gains in a second [1]."""
     lead: float = 0.2
     """How long before t = 0 recording starts [s]."""
     camera_zero_spread: float = 3.0
@@ -113,6 +117,14 @@ class SensorSet:
                 raise ValueError(f"{name} = {values!r} must be three numbers of 0 or more")
         if not math.isfinite(self.clock_offset):
             raise ValueError(f"clock_offset = {self.clock_offset!r} is no number [s]")
+        if not abs(self.clock_drift) <= 0.5:
+            raise ValueError(f"clock_drift = {self.clock_drift!r} must be from -0.5 to 0.5")
+        if not math.isfinite(self.camera_bend):
+            raise ValueError(f"camera_bend = {self.camera_bend!r} is no number [1/m2]")
+
+    def true_times(self, written: Array) -> Array:
+        """True times [s] of times on the IMU's clock."""
+        return (written - self.clock_offset) / (1.0 + self.clock_drift)
 
 
 @dataclass(frozen=True)
@@ -134,7 +146,7 @@ def sensor_times(sensors: SensorSet, duration: float, *, step: float = 1e-3) -> 
 
     The rows of every sensor, both ends of every window of the IMU, and a grid of `step` [s] between them.
     """
-    at = _imu_times(sensors, duration) - sensors.clock_offset
+    at = sensors.true_times(_imu_times(sensors, duration))
     half = 0.5 * sensors.imu_window
     grid = np.arange(0, math.floor(duration / step + 1e-9) + 1) * step
     wanted = np.concatenate(
@@ -189,17 +201,18 @@ def measure(
         zero = np.asarray(camera_zero, dtype=float)
 
     at = _rows(sensors.camera_rate, sensors.lead, duration)
-    scale = sensors.camera_scale
+    x, y = np.interp(at, moving.time, moving.x), np.interp(at, moving.time, moving.y)
+    scale = sensors.camera_scale + sensors.camera_bend * ((x - motion.x[0]) ** 2 + (y - motion.y[0]) ** 2)
     pose = {
         "t_s": at,
-        "x_m": scale * np.interp(at, moving.time, moving.x) + zero[0],
-        "y_m": scale * np.interp(at, moving.time, moving.y) + zero[1],
+        "x_m": scale * x + zero[0],
+        "y_m": scale * y + zero[1],
         "theta_rad": np.interp(at, moving.time, moving.theta) + zero[2],
     }
     _add_noise(pose, sensors.pose_std, streams[1])
 
     written = _imu_times(sensors, duration)
-    true = written - sensors.clock_offset
+    true = sensors.true_times(written)
     ax, ay = _specific_force(moving, true, sensors.imu_window, (gravity_local * up[0], gravity_local * up[1]))
     gyro = np.interp(true, moving.time, moving.omega)
     imu = {"t_s": written, "gyro_rad_s": gyro, "ax_m_s2": ax, "ay_m_s2": ay}
@@ -219,15 +232,16 @@ def _rows(rate: float, lead: float, duration: float) -> Array:
 
 def _imu_times(sensors: SensorSet, duration: float) -> Array:
     """Times on the IMU's clock whose whole window, in true time, has been seen."""
-    at = _rows(sensors.imu_rate, sensors.lead, duration + abs(sensors.clock_offset))
-    return at[at - sensors.clock_offset + 0.5 * sensors.imu_window <= duration + 1e-9]
+    late = abs(sensors.clock_offset) + abs(sensors.clock_drift) * duration
+    at = _rows(sensors.imu_rate, sensors.lead, duration + late)
+    return at[sensors.true_times(at) + 0.5 * sensors.imu_window <= duration + 1e-9]
 
 
 def _with_lead(motion: Motion, sensors: SensorSet) -> Motion:
     """The motion with the time before it, in which the platform stands still."""
     before = (
-        sensors.lead
-        + abs(sensors.clock_offset)
+        sensors.lead / (1.0 - abs(sensors.clock_drift))
+        + 2.0 * abs(sensors.clock_offset)
         + sensors.imu_window
         + 1.0 / min(sensors.camera_rate, sensors.imu_rate, sensors.wheel_rate)
     )

@@ -73,10 +73,13 @@ class Search:
         self.seed = seed
         self.table: list[tuple[str, Hypothesis]] = []
         self._alone: dict[str, Hypothesis] = {}
+        self._most = self.base.score
+        """The best single form's."""
 
     def choose(self) -> Choice:
         """Forward, in pairs, backward."""
         first = self._singles()
+        self._most = max([self._most, *(h.score for h in first)])
         first = [self._enriched(h) for h in first[:3]] + first[3:]
         first.sort(key=lambda h: -h.score)
         best = first[0] if first and first[0].score > self.base.score + _WORTH else self.base
@@ -141,9 +144,29 @@ class Search:
                 best[form.effect] = one
         return sorted(best.values(), key=lambda h: -h.score)
 
-    def _enriched(self, hypothesis: Hypothesis) -> Hypothesis:
-        """With a second form of one of its effects, where that helps: nature's form is between the library's."""
+    def _bent(self, hypothesis: Hypothesis) -> Hypothesis:
+        """With forms of another shape (the problem's `shapes`) where that helps, from where the plain ones are."""
         best = hypothesis
+        shapes = getattr(best.fit.model.problem, "shapes", {})
+        for plain in hypothesis.forms if hypothesis.score > self._most - _BEHIND else ():
+            finer = shapes.get(plain.id)
+            if finer is None or excess(best.fit) < 0.5 * np.sqrt(2.0 * best.fit.count):
+                continue
+            model = best.fit.model.with_forms([finer if form is plain else form for form in best.forms])
+            (new,) = [p for p in finer.parameters if p.name not in {q.name for q in plain.parameters}]
+            begun = [fit(model, {**best.fit.values, new.name: side * new.std}, rounds=3) for side in (-0.7, 0.7)]
+            found = fit(model, min(begun, key=lambda one: one.objective).values)
+            made = Hypothesis(found, score(found))
+            self.table.append((_said(made), made))
+            if made.score > best.score + 1.0:
+                best = made
+                if len(made.forms) == 1:
+                    self._alone[finer.id] = made
+        return best
+
+    def _enriched(self, hypothesis: Hypothesis) -> Hypothesis:
+        """Of another shape or with a second form of an effect, where that helps: nature's is between the library's."""
+        best = self._bent(hypothesis)
         for _ in range(2):
             start = best
             if excess(start.fit) < 0.5 * np.sqrt(2.0 * start.fit.count):

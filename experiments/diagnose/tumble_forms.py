@@ -199,8 +199,8 @@ def tumble_forms(
         _plain(
             "depth-hardening",
             "straight while shallow",
-            _free("depth-hardening.bend", "1/m", 0.03 / max(sinkage, 1e-6), lowest=0.0, highest=1e6),
-            starts=tuple({"depth-hardening.bend": b / max(sinkage, 1e-6)} for b in (0.005, 0.05, 0.5)),
+            _free("depth-hardening.bend", "1/m", 0.03 / max(sinkage, 1e-6), lowest=-1e6, highest=1e6),
+            starts=tuple({"depth-hardening.bend": b / max(sinkage, 1e-6)} for b in (0.005, 0.05, 0.5, -0.03, -0.4)),
         ),
         TumbleForm(
             effect="depth-hardening",

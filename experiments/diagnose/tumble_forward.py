@@ -111,12 +111,15 @@ class Forward:
         moving = any(id not in EFFECTS or not EFFECTS[id].sensor for id in on)
         terms = (*_moving_terms(self.rig), *(own.term for own in self.own)) if moving else ()
         columns = self._columns(sets, count, terms)
-        offset = np.asarray(sets.get("clock-offset.offset", np.zeros(count)), dtype=float)
-        scale = np.asarray(sets.get("camera-scale.scale", np.ones(count)), dtype=float)
+        clock, lens = np.empty((count, 2)), np.empty((count, 2))
+        for k, name in enumerate(("clock-offset.offset", "clock-offset.drift")):
+            clock[:, k] = sets.get(name, neutral(name))
+        for k, name in enumerate(("camera-scale.scale", "camera-scale.bend")):
+            lens[:, k] = sets.get(name, neutral(name))
         slope = np.asarray(sets.get("slope.angle", np.zeros(count)), dtype=float)
         found = []
         for lanes in self._chunks(chosen, count):
-            found += self._run(lanes, columns, terms, offset, scale, slope, motion, horizon)
+            found += self._run(lanes, columns, terms, clock, lens, slope, motion, horizon)
         return _joined(found, chosen, count)
 
     def _columns(self, sets: Mapping[str, Array], count: int, terms: tuple[Term, ...]) -> dict[str, Array]:
@@ -158,7 +161,7 @@ class Forward:
 
     def _run(
         self, lanes: list[tuple[int, int, int]], columns: Mapping[str, Array], terms: tuple[Term, ...],
-        offset: Array, scale: Array, slope: Array, motion: bool, horizon: float,
+        clock: Array, lens: Array, slope: Array, motion: bool, horizon: float,
     ) -> list[tuple[int, int, Prediction]]:  # fmt: skip
         from rigid.batch_kernel import CHANNELS as RECORDED
         from rigid.batch_kernel import SUMMARY, batch_kernel
@@ -176,7 +179,7 @@ class Forward:
             rows, grid = slice(at, at + last - first), self._grids[trial]
             self._fill(numbers[rows], self.data.trials[trial], trial, columns, terms, slice(first, last))
             until = np.inf if horizon >= 1 else horizon * self.data.trials[trial].end + self.data.window
-            own = np.minimum(grid.times(offset[first:last]), until)
+            own = np.minimum(grid.times(clock[first:last]), until)
             times[rows, : grid.size] = own
             times[rows, grid.size :] = own[:, -1:]
             end = max(end, float(own.max()))
@@ -198,7 +201,7 @@ class Forward:
             pull = pull if local is None else np.full(last - first, local)
             grid, sets = self._grids[trial], slice(first, last)
             value, state, moved = grid.read(
-                series[rows, : grid.size], offset[sets], pull, slope[sets], scale[sets], motion
+                series[rows, : grid.size], clock[sets], pull, slope[sets], lens[sets], motion
             )
             found.append((trial, first, Prediction(value, state, moved)))
             at += last - first
@@ -246,65 +249,73 @@ class _Grid:
         half = 0.5 * window if self.parts == 3 else 0.0
         latest = max(self.camera_time[-1:].tolist() + (self.imu_time[-1:] + half).tolist())
         self.end = round(max(latest, 1e-3), 1)
-        self._sorted: dict[float, tuple[Array, NDArray[np.intp]]] = {}
+        self._sorted: dict[tuple[float, float], tuple[Array, NDArray[np.intp]]] = {}
 
-    def _plain(self, offset: float) -> tuple[Array, NDArray[np.intp]]:
-        """Rising sample times for a clock that is off by `offset` [s], and where each reading's sample has gone."""
-        if offset not in self._sorted:
+    def _true(self, clock: tuple[float, float]) -> Array:
+        """True times [s] of the IMU's rows, its clock being off by the first and gaining the second in a second."""
+        return (self.imu_time - clock[0]) / (1.0 + clock[1])
+
+    def _plain(self, clock: tuple[float, float]) -> tuple[Array, NDArray[np.intp]]:
+        """Rising sample times for a clock that is off and gains, and where each reading's sample has gone."""
+        if clock not in self._sorted:
             if len(self._sorted) > 64:
                 self._sorted.clear()
-            true = self.imu_time - offset
+            true = self._true(clock)
             half = 0.5 * self.window
             parts = (true - half, true, true + half) if self.parts == 3 else (true,)
             wanted = np.maximum(np.concatenate([self.camera_time, *parts]), 0.0)
             order = np.argsort(wanted, kind="stable")
             place = np.empty_like(order)
             place[order] = np.arange(len(order))
-            self._sorted[offset] = (wanted[order], place)
-        return self._sorted[offset]
+            self._sorted[clock] = (wanted[order], place)
+        return self._sorted[clock]
 
-    def times(self, offset: Array) -> Array:
+    def times(self, clock: Array) -> Array:
         """Sample times [s], never below 0, shape [set_count, size]."""
-        return np.stack([self._plain(float(value))[0] for value in offset])
+        return np.stack([self._plain((float(offset), float(drift)))[0] for offset, drift in clock])
 
     def read(
-        self, series: Array, offset: Array, pull: Array, slope: Array, scale: Array, motion: bool
+        self, series: Array, clock: Array, pull: Array, slope: Array, lens: Array, motion: bool
     ) -> tuple[Array, NDArray[np.int8], Array]:
         """Readings and states, shape [set_count, sample_count], from the sampled motion of one trial.
 
         Args:
             series: as the batch recorded it at `times`, shape [set_count, size, channel].
-            offset: of the IMU's clock [s], shape [set_count] like the rest.
-            pull: local gravity [m/s2].
+            clock: by what the IMU's is off [s] and what it gains in a second [1], shape [set_count, 2].
+            pull: local gravity [m/s2], shape [set_count] like the rest.
             slope: of the surface [rad].
-            scale: of the camera [1].
+            lens: the camera's scale [1] and what it grows by with the distance's square [1/m2], shape [set_count, 2].
             motion: whether to give the motion at every sample too.
         """
         count = len(series)
         value = np.empty((count, len(self.channel)))
         state = np.empty((count, len(self.channel)), dtype=np.int8)
         moved = np.empty((count, len(self.channel), 7)) if motion else np.empty((count, 0, 7))
-        for one in np.unique(offset):
-            sets = np.flatnonzero(offset == one)
-            self._read(series, sets, float(one), pull, slope, scale, value, state, moved)
+        for one in np.unique(clock, axis=0):
+            sets = np.flatnonzero((clock == one).all(axis=1))
+            self._read(series, sets, (float(one[0]), float(one[1])), pull, slope, lens, value, state, moved)
         return value, state, moved
 
     def _read(
-        self, series: Array, sets: NDArray[np.intp], offset: float, pull: Array, slope: Array, scale: Array,
+        self, series: Array, sets: NDArray[np.intp], clock: tuple[float, float], pull: Array, slope: Array, lens: Array,
         value: Array, state: NDArray[np.int8], moved: Array,
     ) -> None:  # fmt: skip
-        place = self._plain(offset)[1]
+        place = self._plain(clock)[1]
         here = series if len(sets) == len(series) else series[sets]
         cameras, imus = len(self.camera_time), len(self.imu_time)
         camera = here[:, place[:cameras]]
         parts = [here[:, place[cameras + k * imus : cameras + (k + 1) * imus]] for k in range(self.parts)]
         middle = parts[self.parts // 2] if imus else camera[:, :0]
+        seen = lens[sets, 0, None]
+        if lens[sets, 1].any():
+            away = (camera[:, :, 0] - camera[:, :1, 0]) ** 2 + (camera[:, :, 1] - camera[:, :1, 1]) ** 2
+            seen = seen + lens[sets, 1, None] * away
         readings = {
-            "x": scale[sets, None] * camera[:, :, 0], "y": scale[sets, None] * camera[:, :, 1],
+            "x": seen * camera[:, :, 0], "y": seen * camera[:, :, 1],
             "theta": camera[:, :, 2], "wheel": np.abs(camera[:, :, 8]), "gyro": middle[:, :, 5],
         }  # fmt: skip
         if self.force.any():
-            readings["ax"], readings["ay"] = self._specific_force(parts, offset, pull[sets], slope[sets])
+            readings["ax"], readings["ay"] = self._specific_force(parts, clock, pull[sets], slope[sets])
         for number, name in enumerate(CHANNELS):
             mine = np.flatnonzero(self.channel == number)
             if not len(mine):
@@ -317,13 +328,15 @@ class _Grid:
             if moved.shape[1]:
                 moved[np.ix_(sets, mine)] = source[:, rows][:, :, (0, 1, 2, 3, 4, 5, 8)]
 
-    def _specific_force(self, parts: list[Array], offset: float, pull: Array, slope: Array) -> tuple[Array, Array]:
+    def _specific_force(
+        self, parts: list[Array], clock: tuple[float, float], pull: Array, slope: Array
+    ) -> tuple[Array, Array]:
         """In body axes [m/s2]: mean over the window by parts (`rigid.sensors`), the integral by Simpson's rule."""
         gx, gy = (pull * np.sin(slope))[:, None], (pull * np.cos(slope))[:, None]
         if self.parts == 1:
             at = parts[0]
             sine, cosine = np.sin(at[:, :, 2]), np.cos(at[:, :, 2])
-            moves = self.imu_time - offset >= 0
+            moves = self._true(clock) >= 0
             ax, ay = np.where(moves, at[:, :, 6], 0.0) + gx, np.where(moves, at[:, :, 7], 0.0) + gy
             return ax * cosine - ay * sine, ax * sine + ay * cosine
         along, up, over_x, over_y = [], [], [], []

@@ -26,6 +26,7 @@ from .tumble_forms import TumbleForm, tumble_forms
 from .tumble_forward import SHARED, Forward, Prediction
 from .tumble_guess import Guesser
 from .tumble_latent import latent_columns
+from .tumble_shapes import shaped
 from .tumble_steps import LOST, ZERO_STD, whiten
 
 __all__ = ["TumbleProblem", "make_problem"]
@@ -145,6 +146,11 @@ class TumbleProblem:
             wheel_speed=max(10.0, 0.5 * float(np.mean(wheel))),
             own=tuple(self.own.values()),
         )
+
+    @cached_property
+    def shapes(self) -> dict[str, TumbleForm]:
+        """Forms of another shape, to go on to from the plain ones, by the id of these."""
+        return shaped(self.forms)
 
     @cached_property
     def design(self) -> str:

@@ -72,24 +72,42 @@ def bearing_drag(s, torque):
     return torque + 0.0 * s.omega
 
 
-def umbilical_potential(s, stiffness):
-    """V = k theta^2 / 2."""
-    return 0.5 * stiffness * s.theta * s.theta
+def umbilical_potential(s, stiffness, spring_power):
+    """V = k |theta|^(n + 1) / (n + 1)."""
+    energy = 0.5 * stiffness * s.theta * s.theta
+    if spring_power != 1.0:
+        energy = stiffness * max(abs(s.theta), 1e-12) ** (spring_power + 1.0) / (spring_power + 1.0)
+    return energy
 
 
-def umbilical_force(s, stiffness, drag):
-    """-k theta - c omega."""
-    return 0.0, 0.0, -stiffness * s.theta - drag * s.omega
+def umbilical_force(s, stiffness, drag, spring_power, drag_power):
+    """-k theta |theta|^(n - 1) - c omega |omega|^(m - 1)."""
+    spring = stiffness * s.theta
+    if spring_power != 1.0:
+        spring = spring * max(abs(s.theta), 1e-12) ** (spring_power - 1.0)
+    resisted = drag * s.omega
+    if drag_power != 1.0:
+        resisted = resisted * max(abs(s.omega), 1e-12) ** (drag_power - 1.0)
+    return 0.0, 0.0, -spring - resisted
 
 
-def umbilical_loss(s, drag):
-    """c omega^2."""
-    return drag * s.omega * s.omega
+def umbilical_loss(s, drag, drag_power):
+    """c |omega|^(m + 1)."""
+    power = drag * s.omega * s.omega
+    if drag_power != 1.0:
+        power = power * max(abs(s.omega), 1e-12) ** (drag_power - 1.0)
+    return power
 
 
-def torque_fade_factor(s, speed_loss, time_loss):
-    """Falls in a straight line with the wheel's speed and with time, never below zero."""
-    return max(0.0, 1.0 - speed_loss * abs(s.wheel_speed) - time_loss * s.time)
+def torque_fade_factor(s, speed_loss, time_loss, speed_power, time_power):
+    """1 - (a w)^p - (b t)^q, w the wheel's speed, never below zero; p = q = 1 are straight lines."""
+    lost = speed_loss * abs(s.wheel_speed)
+    if speed_power != 1.0:
+        lost = max(lost, 1e-12) ** speed_power
+    faded = time_loss * s.time
+    if time_power != 1.0:
+        faded = max(faded, 1e-12) ** time_power
+    return max(0.0, 1.0 - lost - faded)
 
 
 BODY_EFFECTS: tuple[Term, ...] = (
@@ -154,9 +172,13 @@ BODY_EFFECTS: tuple[Term, ...] = (
         parameters=(
             Parameter(name="stiffness", unit="N m/rad", default=0.0, lowest=0.0, summary="bending of the cable"),
             Parameter(name="drag", unit="N m s/rad", default=0.0, lowest=0.0, summary="its inner friction"),
+            Parameter(name="spring_power", unit="1", default=1.0, lowest=0.3, highest=4.0,
+                      summary="of the angle that its torque goes with; where it is not 1, stiffness is at 1 rad"),
+            Parameter(name="drag_power", unit="1", default=1.0, lowest=0.3, highest=3.0,
+                      summary="of the rate that its drag goes with; where it is not 1, drag is at 1 rad/s"),
         ),
-        source="a cable as a torsion spring and a linear damper, free of torque at theta = 0",
-        limits="small strains; the cable's pull on x and y is left out",
+        source="a cable as a torsion spring and a damper, straight or not, free of torque at theta = 0",
+        limits="the cable's pull on x and y is left out",
         hooks={"potential": umbilical_potential, "force": umbilical_force, "loss": umbilical_loss},
     ),
     Term(
@@ -165,8 +187,12 @@ BODY_EFFECTS: tuple[Term, ...] = (
             Parameter(name="speed_loss", unit="s/rad", default=0.0, lowest=0.0,
                       summary="share lost per rad/s of the wheel: 1 / no-load speed of a DC motor"),
             Parameter(name="time_loss", unit="1/s", default=0.0, lowest=0.0, summary="share lost a second: heating"),
+            Parameter(name="speed_power", unit="1", default=1.0, lowest=0.2, highest=5.0,
+                      summary="p of (speed_loss w)^p: 1 a straight line, above it falls late"),
+            Parameter(name="time_power", unit="1", default=1.0, lowest=0.2, highest=5.0,
+                      summary="q of (time_loss t)^q"),
         ),
         source="torque-speed line of a DC motor at a fixed voltage; fade of a brake that warms",
-        limits="a straight line, cut at zero", hooks={"torque_factor": torque_fade_factor},
+        limits="cut at zero", hooks={"torque_factor": torque_fade_factor},
     ),
 )  # fmt: skip

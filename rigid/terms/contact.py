@@ -1,16 +1,20 @@
 """Effects at the contact: friction that changes, tips that are balls, ground that drags, hardens, stays or holds."""
 
-from math import exp
+from math import exp, log
 
 from .term import Parameter, Term
 
 __all__ = ["CONTACT_EFFECTS"]
 
 
-def vibration_factor(s, slip, reduction, speed):
-    """1 - r w^2 / (w^2 + w_0^2) on both coefficients, w the wheel's speed."""
+def vibration_factor(s, slip, reduction, speed, power):
+    """1 - r w^p / (w^p + w_0^p) on both coefficients, w the wheel's speed."""
     w = s.wheel_speed * s.wheel_speed
-    factor = 1.0 - reduction * w / (w + speed * speed)
+    half = speed * speed
+    if power != 2.0:
+        w = max(w, 1e-12) ** (0.5 * power)
+        half = speed**power
+    factor = 1.0 - reduction * w / (w + half)
     return factor, factor
 
 
@@ -34,7 +38,10 @@ def inertial_side_force(s, depth, slip, sideways):
 
 
 def hardened(depth, force, work, exponent, reference, bend):
-    """The law's force times (z / z_0)^(n - 1) (1 + b z); the work is exact for every law that is a power of depth."""
+    """The law's force times (z / z_0)^(n - 1) and 1 + b z, or 1 / (1 + |b| z) where b is negative.
+
+    The work is exact for every law that is a power of depth, of a negative b for one that is straight.
+    """
     grown = force
     stored = work
     if exponent != 1.0:
@@ -44,7 +51,14 @@ def hardened(depth, force, work, exponent, reference, bend):
         stored = work * ratio
         if work > 0.0:
             stored = grown * z / (force * z / work + exponent - 1.0)
-    if bend != 0.0:
+    if bend < 0.0:
+        x = max(-bend * depth, 0.0)
+        share = 1.0 - x * (2.0 / 3.0 - x * (0.5 - 0.4 * x))  # 2 (x - ln(1 + x)) / x^2
+        if x > 1e-3:
+            share = 2.0 * (x - log(1.0 + x)) / (x * x)
+        stored = stored * share
+        grown = grown / (1.0 + x)
+    if bend > 0.0:
         z = max(depth, 0.0)
         power = 2.0  # one more than the power of depth that the force goes with
         if stored > 0.0:
@@ -77,21 +91,35 @@ def bent_unloading(depth, top, force, work, share, bend):
     return left, stored
 
 
-def held_back(s, depth, held, force, reach):
-    """A (1 - exp(-(top - z) / d)) of pull, mobilised over the retreat from the deepest depth since it touched."""
+def held_back(s, depth, held, force, reach, sharpness):
+    """A (1 - exp(-x)) of pull, x = (top - z) / d the retreat from the deepest depth since it touched.
+
+    A sharpness m takes A ((1 - m) (1 - exp(-x)) + m tanh(x)) instead: at 1 it is mobilised in full over a shorter way.
+    """
     pull = 0.0
     work = 0.0
     if force != 0.0:
-        back = max(held - depth, 0.0)
-        left = exp(-back / reach)
-        pull = force * (1.0 - left)
-        work = force * (back - reach * (1.0 - left))
+        x = max(held - depth, 0.0) / reach
+        left = exp(-x)
+        share = 1.0 - left
+        area = x - share
+        if sharpness != 0.0:
+            twice = left * left
+            share = (1.0 - sharpness) * share + sharpness * (1.0 - twice) / (1.0 + twice)
+            area = (1.0 - sharpness) * area + sharpness * (x + log(0.5 * (1.0 + twice)))
+        pull = force * share
+        work = force * reach * area
     return pull, work
 
 
-def rate_friction_factor(s, slip, change, speed):
-    """mu_d (1 + c |u| / (|u| + u_0)): grows (c > 0) or falls (c < 0) and saturates."""
-    return 1.0, 1.0 + change * abs(slip) / (abs(slip) + speed)
+def rate_friction_factor(s, slip, change, speed, power):
+    """mu_d (1 + c |u|^p / (|u|^p + u_0^p)): grows (c > 0) or falls (c < 0) and saturates."""
+    u = abs(slip)
+    half = speed
+    if power != 1.0:
+        u = max(u, 1e-12) ** power
+        half = speed**power
+    return 1.0, 1.0 + change * u / (u + half)
 
 
 CONTACT_EFFECTS: tuple[Term, ...] = (
@@ -102,6 +130,8 @@ CONTACT_EFFECTS: tuple[Term, ...] = (
                       summary="share of the friction that a fast wheel takes away"),
             Parameter(name="speed", unit="rad/s", default=100.0, lowest=0.0, above_lowest=True,
                       summary="wheel speed at half of it"),
+            Parameter(name="power", unit="1", default=2.0, lowest=0.3, highest=8.0,
+                      summary="p: how sharply it sets in about that speed"),
         ),
         source="the paper suspects it; vibration lowers mean friction by the share of time in light contact "
                "(Dupont et al. 1994, IEEE TAC 39:2, for the phenomenon)",
@@ -134,11 +164,13 @@ CONTACT_EFFECTS: tuple[Term, ...] = (
                       summary="n of (z / z_0)^(n - 1) on the law's force; 1 changes nothing"),
             Parameter(name="reference", unit="m", default=1e-3, lowest=0.0, above_lowest=True,
                       summary="z_0: the depth at which the power changes nothing"),
-            Parameter(name="bend", unit="1/m", default=0.0, lowest=0.0,
-                      summary="b of 1 + b z, a factor beside the power's: a law that is straight while shallow"),
+            Parameter(name="bend", unit="1/m", default=0.0,
+                      summary="b of 1 + b z, or of 1 / (1 - b z) where negative, a factor beside the power's: a law "
+                              "that is straight while shallow"),
         ),
         source="pressure and sinkage of soils (Bekker 1969); slow penetration grows as z^1.3 (Hill et al. 2005)",
-        limits="work exact for laws that are powers of depth (spring-damper, Hunt-Crossley, power, Katsuragi-Durian)",
+        limits="work exact for laws that are powers of depth (spring-damper, Hunt-Crossley, power, Katsuragi-Durian); "
+               "with a negative bend for the spring-damper and an exponent of 1",
         hooks={"stiffen": hardened},
     ),
     Term(
@@ -160,6 +192,8 @@ CONTACT_EFFECTS: tuple[Term, ...] = (
             Parameter(name="force", unit="N", default=0.0, lowest=0.0, summary="A, a row's, fully mobilised"),
             Parameter(name="reach", unit="m", default=1e-4, lowest=0.0, above_lowest=True,
                       summary="retreat over which it is mobilised"),
+            Parameter(name="sharpness", unit="1", default=0.0, lowest=-1.0, highest=2.5,
+                      summary="m: 0 as 1 - exp, 1 as tanh of the retreat over that reach"),
         ),
         source="pull-off force of cohesive ground; mobilised over a distance so that rest is well defined",
         limits="breaks where the tip leaves the surface; friction does not see the pull",
@@ -172,6 +206,8 @@ CONTACT_EFFECTS: tuple[Term, ...] = (
                       summary="relative change of mu_d at high sliding speed"),
             Parameter(name="speed", unit="m/s", default=0.05, lowest=0.0, above_lowest=True,
                       summary="sliding speed at half of it"),
+            Parameter(name="power", unit="1", default=1.0, lowest=0.2, highest=8.0,
+                      summary="p: how sharply it sets in about that speed"),
         ),
         source="velocity strengthening or weakening (Stribeck; Armstrong-Helouvry et al. 1994, Automatica 30:1083)",
         limits="no memory of past sliding", hooks={"friction_factor": rate_friction_factor},

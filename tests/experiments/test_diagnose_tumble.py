@@ -28,10 +28,15 @@ from rigid import STATES, Effect
         ((Effect(id="com-offset", parameters={"x": 4e-4, "y": -3e-4}),), {"com-offset.x": 4e-4, "com-offset.y": -3e-4}),
         (
             (
-                Effect(id="clock-offset", parameters={"offset": 0.013}),
-                Effect(id="camera-scale", parameters={"scale": 1.02}),
+                Effect(id="clock-offset", parameters={"offset": 0.013, "drift": 0.004}),
+                Effect(id="camera-scale", parameters={"scale": 1.02, "bend": 0.3}),
             ),
-            {"clock-offset.offset": 0.013, "camera-scale.scale": 1.02},
+            {
+                "clock-offset.offset": 0.013,
+                "clock-offset.drift": 0.004,
+                "camera-scale.scale": 1.02,
+                "camera-scale.bend": 0.3,
+            },
         ),
     ],
 )

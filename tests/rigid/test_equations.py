@@ -23,11 +23,11 @@ VALUES = {
     "com-offset": {"x": 0.003, "y": -0.002},
     "slope": {"angle": 0.15},
     "pulley-inertia": {"mass": 0.7},
-    "umbilical": {"stiffness": 0.3, "drag": 0.2},
+    "umbilical": {"stiffness": 0.3, "drag": 0.2, "spring_power": 1.6, "drag_power": 0.8},
     "tip-radius": {"radius": 0.011},
     "depth-hardening": {"exponent": 1.35, "reference": 2e-3, "bend": 60.0},
     "plastic-sinkage": {"share": 0.25, "bend": 0.6},
-    "adhesion": {"force": 0.8, "reach": 3e-3},
+    "adhesion": {"force": 0.8, "reach": 3e-3, "sharpness": 0.6},
     "inertial-drag": {"normal": 40.0, "sideways": 7.0, "power": 1.7},
     "wire-compliance": {"stiffness": 3e3, "damping": 25.0},
 }
@@ -77,8 +77,9 @@ class Derived:
             energy += mb * true * (1 - arc) * d**2 / (2 * wires)
             energy += mb * true * arc * (sp.sqrt(above**2 + d**2) - above)
         if "umbilical" in on:
-            energy += on["umbilical"]["stiffness"] * A**2 / 2
-            D += on["umbilical"]["drag"] * W**2 / 2
+            power, rate_power = on["umbilical"]["spring_power"] + 1, on["umbilical"]["drag_power"] + 1
+            energy += on["umbilical"]["stiffness"] * sp.Abs(A) ** power / power
+            D += on["umbilical"]["drag"] * sp.Abs(W) ** rate_power / rate_power
         self.slips, self.loads = {}, {}
         for n in touching:
             gamma = A + sp.pi / 8 + n * sp.pi / 4
@@ -99,8 +100,9 @@ class Derived:
                 stored *= 1 - f
             force = -sp.diff(stored, Y)  # on y, of depth alone
             if "adhesion" in on:
-                a, reach, back = on["adhesion"]["force"], on["adhesion"]["reach"], TOP - depth
-                held = a * (back - reach * (1 - sp.exp(-back / reach)))
+                a, reach, m_s = on["adhesion"]["force"], on["adhesion"]["reach"], on["adhesion"]["sharpness"]
+                x = (TOP - depth) / reach
+                held = a * reach * ((1 - m_s) * (x - 1 + sp.exp(-x)) + m_s * sp.log(sp.cosh(x)))
                 stored += held
                 force += -sp.diff(held, Y)
             energy += stored

@@ -123,20 +123,22 @@ def test_a_window_across_a_jump_of_the_force_holds_its_share_exactly():
 def test_the_camera_reads_the_geometric_centre_with_its_zero_and_scale():
     time = sensor_times(SENSORS, 0.5)
     run = motion(time, x=0.1 * time, y=0.2 - 0.05 * time, theta=2.0 * time)
-    recorded = measure(run, replace(SENSORS, camera_scale=1.02), gravity_local=G, camera_zero=(0.001, -0.002, 0.003))
+    camera = replace(SENSORS, camera_scale=1.02, camera_bend=0.5)
+    recorded = measure(run, camera, gravity_local=G, camera_zero=(0.001, -0.002, 0.003))
     at = np.maximum(recorded.pose["t_s"], 0.0)
-    assert recorded.pose["x_m"] == pytest.approx(1.02 * 0.1 * at + 0.001, abs=1e-12)
-    assert recorded.pose["y_m"] == pytest.approx(1.02 * (0.2 - 0.05 * at) - 0.002, abs=1e-12)
+    scale = 1.02 + 0.5 * (0.1**2 + 0.05**2) * at**2
+    assert recorded.pose["x_m"] == pytest.approx(scale * 0.1 * at + 0.001, abs=1e-12)
+    assert recorded.pose["y_m"] == pytest.approx(scale * (0.2 - 0.05 * at) - 0.002, abs=1e-12)
     assert recorded.pose["theta_rad"] == pytest.approx(2.0 * at + 0.003, abs=1e-12)
 
 
-@pytest.mark.parametrize("offset", [0.012, -0.012])
-def test_a_clock_that_is_ahead_writes_what_happened_later_than_it_did(offset):
-    sensors = replace(SENSORS, clock_offset=offset)
+@pytest.mark.parametrize(("offset", "drift"), [(0.012, 0.0), (-0.012, 0.0), (0.012, 0.05)])
+def test_a_clock_that_is_ahead_writes_what_happened_later_than_it_did(offset, drift):
+    sensors = replace(SENSORS, clock_offset=offset, clock_drift=drift)
     time = sensor_times(sensors, 0.5)
     recorded = measure(motion(time, omega=3.0 * time, theta=1.5 * time**2), sensors, gravity_local=G)
-    # Written time minus true time is the offset: the row at t shows the gyro of t - offset.
-    expected = 3.0 * np.maximum(0.0, recorded.imu["t_s"] - offset)
+    # Written less true time is the offset and what was gained since: t shows the gyro of (t - offset) / (1 + gain).
+    expected = 3.0 * np.maximum(0.0, (recorded.imu["t_s"] - offset) / (1 + drift))
     assert recorded.imu["gyro_rad_s"] == pytest.approx(expected, abs=1e-12)
 
 
