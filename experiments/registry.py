@@ -151,6 +151,24 @@ EXPERIMENTS: dict[str, Experiment] = {
             subject="bed",
         ),
         Experiment(
+            "bed test repose",
+            "Angle of repose: beds drain through a slot, and the slopes that stay are measured.",
+            settings="experiments.bed_test_settings:BedReposeSettings",
+            module="experiments.bed_repose",
+        ),
+        Experiment(
+            "bed test cone",
+            "A cone penetrometer pushed into beds: cone index against depth, and its gradient.",
+            settings="experiments.bed_test_settings:BedConeSettings",
+            module="experiments.bed_cone",
+        ),
+        Experiment(
+            "bed test cut",
+            "A vertical face cut in beds, gravity rising until it falls: critical height and cohesion.",
+            settings="experiments.bed_test_settings:BedCutSettings",
+            module="experiments.bed_cut",
+        ),
+        Experiment(
             "bed calibrate",
             "Grain parameters from bulk figures: a response surface over sheared samples, and a material.toml.",
             settings="experiments.calibrate_settings:CalibrateSettings",

@@ -34,6 +34,9 @@ _OTHERS = {
     "bed make": ("vis.bed", "write_bed_report"),
     "bed refine": ("vis.bed", "write_bed_report"),
     "bed test shear": ("vis.bed_shear", "write_shear_report"),
+    "bed test repose": ("vis.bed_repose", "write_repose_report"),
+    "bed test cone": ("vis.bed_cone", "write_cone_report"),
+    "bed test cut": ("vis.bed_cut", "write_cut_report"),
     "compare": ("vis.compare", "write_compare_report"),
     "validate": ("vis.validation", "write_validation_report"),
 }

@@ -1,0 +1,193 @@
+"""What `bed test repose`, `cone` and `cut` share: the beds, run by run; quantities with their spread; the result."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from dem.bedfile import find_bed, load_prepared
+from hedgebed import __version__
+
+from .bed_progress import BedProgress
+from .bed_test_settings import BedTestSettings
+from .progress import Progress
+from .runfolder import RunFolder
+from .stopping import held_back
+
+__all__ = ["about", "check_bed", "carry_out", "spread_of", "write_frame"]
+
+Run = dict[str, Any]
+_PACKING = 0.6  # about, to reckon what lies on the floor
+
+
+def check_bed(settings: BedTestSettings) -> None:
+    """Raise ValueError for what is no bed, one that is tilted or cut, or one that cannot be prepared."""
+    from dem.bedfile import read_preparation
+    from dem.materials import material
+    from dem.prepare import check_options
+    from dem.state import read_file
+
+    if settings.bed is None:
+        material(settings.material)
+        check_options(settings.size, settings.grain, settings.gravity, 1, 0.05)
+        return
+    path = find_bed(settings.bed)
+    stored, _, _ = read_file(path)
+    stages = [report.stage for report in read_preparation(path).reports]
+    if stored["gravity"][0] or stored["gravity"][1] or any(stage.startswith("cut") for stage in stages):
+        raise ValueError(f"bed = {settings.bed!r} was cut or tilted: a level one would do")
+
+
+def _soft(settings: BedTestSettings, bearing: float) -> float:
+    """Young's modulus of grains that bear the rain and ``bearing`` times what lies on the floor [Pa]."""
+    from dem.materials import material
+    from dem.packing import rain_column
+    from dem.sizes import Uniform
+    from dem.timestep import choose_young
+
+    stuff, depth = material(settings.material), settings.size[2]
+    return choose_young(
+        stuff,
+        pressure=bearing * _PACKING * stuff.density * settings.gravity * depth,
+        speed=math.sqrt(2 * settings.gravity * rain_column(Uniform(settings.grain, settings.spread)) * depth),
+        max_overlap=0.05,
+        diameter=settings.grain,
+    )
+
+
+def _beds(settings: BedTestSettings, bearing: float | None) -> Iterator[tuple[str, Callable[[Progress | None], Any]]]:
+    """Name of each bed, and what makes it, anew whenever it is called; told where to show how far it is."""
+    from dem import Bed
+
+    if settings.bed is not None:
+        given = settings.bed
+        yield "bed", lambda progress: load_prepared(find_bed(given), threads=settings.threads).bed
+        return
+
+    def prepared(seed: int, progress: Progress | None) -> Any:
+        try:
+            with held_back() as asked_to_stop:
+                return Bed.prepare(
+                    settings.material,
+                    size=settings.size,
+                    grain=settings.grain,
+                    spread=settings.spread,
+                    packing=settings.packing,
+                    gravity=settings.gravity,
+                    seed=seed,
+                    young=None if bearing is None else _soft(settings, bearing),
+                    threads=settings.threads,
+                    progress=progress and BedProgress(progress, f"bed of seed {seed}", asked_to_stop),
+                )
+        except ValueError as error:  # found while it was prepared, as a packing that cannot be reached
+            raise RuntimeError(f"the bed of seed {seed} could not be prepared: {error}") from error
+
+    for seed in settings.seeds:
+        yield f"seed{seed}", partial(prepared, seed)
+
+
+def carry_out(
+    settings: BedTestSettings,
+    folder: RunFolder,
+    progress: Progress,
+    *,
+    test: Callable[[Any, str, Callable[[float], None]], Run],
+    result: Callable[[list[Run]], dict[str, Any]],
+    report: str,
+    copies: int = 1,
+    bearing: float | None = None,
+) -> dict[str, Any]:
+    """Test every bed, or take what a stopped run has finished; write result and report.
+
+    Args:
+        test: tests a bed; told the run's name and a function for the share done. What it returns is kept as JSON.
+        result: makes quantities, tables and warnings of all runs.
+        report: "module:function" in vis that writes the report.
+        copies: tests of each bed, each of a fresh copy.
+        bearing: pressure of the test over what lies on the floor [1], for which the grains of prepared beds are made
+            stiff enough; None: stiff enough for a tip in half the bed's depth, as ``Bed.prepare`` has it.
+    """
+    names = [name for name, _ in _beds(settings, bearing)]
+    with folder.lock():
+        costs = {} if settings.bed is not None else {f"bed of {name.replace('seed', 'seed ')}": 2.0 for name in names}
+        progress.plan(costs | {f"test of {name}": float(copies) for name in names}, seconds={"report": 5.0})
+        runs: list[Run] = []
+        for name, make in _beds(settings, bearing):
+            for copy in range(copies):
+                which = name if copies == 1 else f"{name}-{copy + 1}"
+                if folder.is_done(which):
+                    runs.append(folder.done_data(which))
+                    continue
+                bed = make(None if copy else progress)
+                if not copy or progress.stage_name != f"test of {name}":
+                    progress.stage(f"test of {name}", total=float(copies))
+                try:
+                    found = test(bed, which, partial(_tell, progress, copy))
+                except ValueError as error:  # a bed whose surface lies otherwise than its depth says
+                    raise RuntimeError(f"{which}: {error}") from error
+                bed = None  # its engine serves the next
+                folder.mark_done(which, {"id": which} | found)
+                runs.append(folder.done_data(which))
+        whole = {
+            "format": "hedgebed-result/1",
+            "experiment": folder.command,
+            "version": __version__,
+            "title": "",
+            "status": "done",
+        } | result(runs)
+        whole["runs"] = runs
+        whole["warnings"] = [*whole["warnings"], *dict.fromkeys(w for run in runs for w in run["warnings"])]
+        folder.write_result(whole)
+        progress.stage("report", total=1.0)
+        module, _, function = report.partition(":")
+        getattr(import_module(module), function)(folder.path, progress=progress.update)
+    return whole
+
+
+def _tell(progress: Progress, copy: int, share: float) -> None:
+    progress.update(copy + share)
+
+
+def about(bed: Any) -> Run:
+    """What every run says of its bed before the test."""
+    return {
+        "grain": 2 * float(bed.grains()["radius"].mean()),
+        "grain_count": bed.grain_count,
+        "packing_fraction": bed.packing_fraction,
+        "surface": bed.surface,
+        "size": list(bed.size),
+        "gravity": -bed.gravity[2],
+        "material": bed.material.name,
+        "density": bed.material.density,
+        "young": bed.material.young,
+        "time_step": bed.time_step,
+    }
+
+
+def spread_of(
+    values: Sequence[float | None], unit: str, note: str, *, error: Sequence[float | None] = ()
+) -> dict[str, Any]:
+    """An entry of quantities: mean of the runs and their standard deviation; of one run its ``error``, if any."""
+    known = [value for value in values if value is not None and math.isfinite(value)]
+    own = [e for value, e in zip(values, error, strict=False) if value is not None]
+    if not known:
+        return {"value": None, "std": None, "unit": unit, "note": note}
+    std: float | None = None
+    if len(known) > 1:
+        std, note = float(np.std(known, ddof=1)), f"{note}; std: between {len(known)} runs"
+    elif own and own[0] is not None:
+        std, note = float(own[0]), f"{note}; std: error of the one run"
+    return {"value": float(np.mean(known)), "std": std, "unit": unit, "note": note}
+
+
+def write_frame(folder: RunFolder, name: str, bed: Any) -> None:
+    """Where the grains lie after the test, for the picture and for ParaView."""
+    from vis.frames import GRAIN_FIELDS, FrameWriter
+
+    grains = bed.grains()
+    FrameWriter(folder.path, name=name).write(0.0, {key: grains[key] for key in ("position", *GRAIN_FIELDS)})
