@@ -60,6 +60,7 @@ def test_a_brake_turns_once():
         TumblesInARow(trial, LawFooting.of_trial(trial), tumbles=2, duration=1.0)
 
 
+@pytest.mark.slow
 def test_a_landing_on_grains_keeps_the_momentum_that_it_came_with_in_the_books():
     """On one layer of 6 mm grains: body and grains less the impulses of weight and floor, to round-off."""
     d, rows, columns = 6e-3, 20, 6
