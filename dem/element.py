@@ -5,9 +5,10 @@ sample is periodic sideways, floor and lid are planes on which grains neither sl
 Nothing in it has a length but the grains: stresses scale with the pressure, and with cohesion the strength depends on
 surface energy over pressure times diameter.
 
-1. Grains of a loose jittered column are pressed together by the lid under servo control, in a drag. "loose": with the
-   friction that they have; "dense": with little friction and without rolling friction and adhesion, which come back
-   once it rests.
+1. Grains of a loose jittered column are pressed together by the lid under servo control, in a drag and without
+   adhesion, which comes back once the sample rests (sticking grains would stay apart in a gauze of chains, at a packing
+   of a third, that no soil is). They have their own friction and rolling friction meanwhile, or, for denser samples, a
+   friction of choice and no rolling friction.
 2. The lid moves sideways, the pressure held. Rates are given as inertial numbers, rate d sqrt(density / pressure);
    below some 5e-3 strength hardly depends on them (GDR MiDi 2004, Eur. Phys. J. E 14:341).
 
@@ -32,9 +33,8 @@ from .sizes import Uniform
 from .stress import stress_profile
 from .timestep import choose_young
 
-__all__ = ["STATES", "ElementShear", "press_element", "shear_element"]
+__all__ = ["ElementShear", "press_element", "shear_element"]
 
-STATES = ("loose", "dense")
 # Friction and rolling friction of a grain on lid and floor [1]: ten times what any grain has.
 _ROUGH = 10.0
 # Distance of the column's sites [largest diameters].
@@ -127,8 +127,7 @@ def press_element(
     pressure: float,
     grain: float,
     size: tuple[float, float, float] = (10.0, 8.0, 10.0),
-    state: str = "loose",
-    dense_friction: float = 0.1,
+    pressed_friction: float | None = None,
     spread: float = 0.15,
     seed: int = 1,
     max_overlap: float = 0.05,
@@ -139,17 +138,16 @@ def press_element(
     Args:
         pressure: of the lid [Pa]. grain: mean diameter [m].
         size: of the sample, about [mean diameters]: both periods and the height.
-        state: "loose" or "dense". dense_friction: of the grains while a dense sample is pressed; 0 is densest [1].
+        pressed_friction: of the grains while they are pressed, then without rolling friction; 0 is densest [1]. Their
+            own, rolling friction as well, when None.
         spread: diameters are uniform within 1 +- this [1]. max_overlap: the grains are softened to it.
 
     Raises:
-        ValueError: a pressure, a length or a state that cannot be.
+        ValueError: a pressure, a length or a friction that cannot be.
         BedFailure: it did not come to rest.
     """
-    if state not in STATES:
-        raise ValueError(f"state = {state!r} is none of {', '.join(STATES)}")
-    if not 0 <= dense_friction < math.inf:
-        raise ValueError(f"dense_friction = {dense_friction} must be 0 or more")
+    if pressed_friction is not None and not 0 <= pressed_friction < math.inf:
+        raise ValueError(f"pressed_friction = {pressed_friction} must be 0 or more")
     for name, value, least in (
         ("pressure", pressure, 0.0),
         ("grain", grain, 0.0),
@@ -181,10 +179,10 @@ def press_element(
     )
     bed.overlap_limit = _BOUND * max_overlap
     body = bed.add_body([Plane(normal=(0.0, 0.0, -1.0))], position=(0.0, 0.0, top + 0.01 * grain))
-    _touch(bed, body, slick=dense_friction if state == "dense" else None)
+    _touch(bed, body, friction=pressed_friction, adhesive=False)
     wall = _Wall(bed, body, pressure=pressure, grain=grain)
     _rest(bed, wall, grain)
-    if state == "dense":
+    if pressed_friction is not None or bed.material.cohesion != "none":
         _touch(bed, body)
         _rest(bed, wall, grain)
     return bed, body
@@ -201,7 +199,7 @@ def _column(rng: np.random.Generator, radii: np.ndarray, period: tuple[float, fl
     return (np.column_stack([i, j, k]) + 0.5) * cell + rng.uniform(-1, 1, (len(radii), 3)) * play
 
 
-def _touch(bed: Bed, body: int, *, slick: float | None = None) -> None:
+def _touch(bed: Bed, body: int, *, friction: float | None = None, adhesive: bool = True) -> None:
     """How grains touch one another, lid and floor: as the material says on rough walls, or all with this friction."""
     stuff = bed.material
     for other, rough in ((stuff.young, None), (math.inf, _ROUGH)):
@@ -210,9 +208,9 @@ def _touch(bed: Bed, body: int, *, slick: float | None = None) -> None:
             effective_young=young,
             effective_shear=shear,
             restitution=stuff.restitution,
-            friction=rough or stuff.friction if slick is None else slick,
-            rolling_friction=rough or stuff.rolling_friction if slick is None else 0.0,
-            surface_energy=stuff.surface_energy if slick is None else 0.0,
+            friction=rough or stuff.friction if friction is None else friction,
+            rolling_friction=rough or stuff.rolling_friction if friction is None else 0.0,
+            surface_energy=stuff.surface_energy if adhesive else 0.0,
         )
         if rough is None:
             bed._engine.grain_pair[None] = row

@@ -112,7 +112,7 @@ def calibration_result(
         "quantities": quantities,
         "figures": entries,
         "tables": [_figure_table(entries), _point_table(settings, done)],
-        "points": [{"values": p, "figures": f} for p, f in zip(done.points, done.figures, strict=True)],
+        "points": _points(settings, done, responses, best),
         "curves": _curves(settings, responses, best, folder),
         "scatter": {name: response.scatter for name, response in responses.items()},
         "correlation": fit.correlation,
@@ -164,6 +164,27 @@ def _reach(responses: Mapping[str, Response]) -> dict[str, tuple[float, float]]:
         grid = np.stack(np.meshgrid(*[np.linspace(0, 1, 11)] * width), axis=-1).reshape(-1, width)
         mean, _ = response.at(grid)
         found[name] = (float(mean.min()), float(mean.max()))
+    return found
+
+
+def _points(
+    settings: CalibrateSettings, done: Simulated, responses: Mapping[str, Response], best: Mapping[str, float]
+) -> list[dict[str, Any]]:
+    """The points explored; ``moved``: each figure along the surface to the parameters found, but for the one named."""
+    ends = np.array(list(settings.free.values()))
+    at = (np.array(list(best.values())) - ends[:, 0]) / (ends[:, 1] - ends[:, 0])
+    found = []
+    for point, figures in zip(done.points, done.figures, strict=True):
+        x = (np.array(list(point.values())) - ends[:, 0]) / (ends[:, 1] - ends[:, 0])
+        moved: dict[str, dict[str, float]] = {}
+        for k, key in enumerate(settings.free):
+            there = at.copy()
+            there[k] = x[k]
+            moved[key] = {}
+            for name, response in responses.items():
+                mean, _ = response.at(np.array([x, there]))
+                moved[key][name] = float(figures[name][0] + mean[1] - mean[0])
+        found.append({"values": point, "figures": figures, "moved": moved})
     return found
 
 

@@ -123,6 +123,13 @@ class CalibrateSettings(StrictSettings):
         le=1,
         description="Friction of the grains while a dense sample is pressed [1]; 0: as dense as can be.",
     )
+    loose_friction: float | None = Field(
+        None,
+        ge=0,
+        le=10,
+        description="Friction of the grains while a loose sample is pressed, without rolling friction [1]; their own, "
+        "rolling friction as well, if not given.",
+    )
     pressures: tuple[Positive, ...] = Field(
         (500.0, 1000.0),
         min_length=1,
@@ -141,9 +148,17 @@ class CalibrateSettings(StrictSettings):
         le=10,
         description="No further points once the surface is known to this share of every tolerance [1].",
     )
-    seed: SeedNumber = Field(1, description="Seed of the samples while exploring, and of the design.")
+    seed: SeedNumber = Field(
+        1, description="Seed of the design and of the first sample explored; the others have this and thousands more."
+    )
     check_seeds: tuple[SeedNumber, ...] = Field(
         (2, 3), min_length=1, description="Seeds of the samples with which the parameters found are checked."
+    )
+    checks: int = Field(
+        2,
+        ge=1,
+        le=10,
+        description="Checks at most: another one where a figure is off by more than half its tolerance [1].",
     )
     bed_size: tuple[Positive, Positive, Positive] = Field(
         (0.04, 0.04, 0.035), description="Laboratory beds, for packing fractions: widths and depth [m]."

@@ -109,8 +109,9 @@ def _response(folder: Path, result: Mapping[str, Any], key: str) -> Plot:
             axis.fill_between(x, y - 2 * std, y + 2 * std, color=BED, alpha=0.18, lw=0)
             axis.plot(x, y, color=BED)
             at = [point["values"][key] for point in result["points"]]
-            found = np.array([point["figures"][name] for point in result["points"]])
-            axis.errorbar(at, found[:, 0], yerr=found[:, 1], color=GREY if several else BED, marker="o", ms=4, ls="")
+            found = [point["moved"][key][name] for point in result["points"]]
+            error = [point["figures"][name][1] for point in result["points"]]
+            axis.errorbar(at, found, yerr=error, color=BED, marker="o", ms=4, ls="")
             axis.errorbar(
                 [best], [entry["measured"]], yerr=[entry["error"]], color=INK, marker="D", ms=5, ls="", zorder=5
             )
@@ -120,11 +121,11 @@ def _response(folder: Path, result: Mapping[str, Any], key: str) -> Plot:
         handles = [
             Patch(facecolor=MODEL, alpha=0.3, label="wanted"),
             Line2D([], [], color=BED, label="response, ± 2 std"),
-            Line2D([], [], color=GREY if several else BED, marker="o", ls="", label="simulated"),
+            Line2D([], [], color=BED, marker="o", ls="", label="simulated"),
             Line2D([], [], color=INK, marker="D", ls="", label="check, other seeds"),
         ]
         legend_above(drawing, handles)
-    others = " The line goes through the parameters found; points with other values of the rest lie off it."
+    others = " Line and points: at the parameters found, but for this one; points were moved there along the surface."
     caption = "Bars: standard error that a test tells of itself." + (others if several else "")
     return Plot(f"response-{key}", f"Figures against {key.replace('_', ' ')}", caption, drawing)
 
@@ -157,7 +158,13 @@ def _residuals(result: Mapping[str, Any]) -> Plot:
 
 def _tests(folder: Path, result: Mapping[str, Any]) -> Plot:
     """The stress ratio of the check's tests over strain."""
-    tests = [test for test in result["tests"] if test["test"].startswith("check")]
+    free = result["curves"]
+    tests = [
+        test
+        for test in result["tests"]
+        if test["test"].startswith("check")
+        and all(test["values"][key] == result["quantities"][key]["value"] for key in free)
+    ]
     states = list(dict.fromkeys(test["state"] for test in tests))
     pressures = sorted({test["pressure"] for test in tests})
     with styled():
