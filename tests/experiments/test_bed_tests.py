@@ -2,11 +2,13 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from dem.cutting import cohesion_of
+from dem import SAND, Bed
+from dem.cutting import cohesion_of, cut_and_load
 from dem.penetrometer import ConePush, cone_gradient, cone_length, standard_speed
 from dem.repose import fit_flank
 from experiments.bed_test_settings import BedConeSettings, BedCutSettings, BedReposeSettings
@@ -111,6 +113,20 @@ def test_a_face_of_sand_does_not_stand(cache):
     assert run["stood"] == 0 and run["fell"] == pytest.approx(0.1) and run["critical_height"] is None
     assert result["quantities"]["cohesion"]["value"] is None
     assert any("no face stood at 0.1 of the bed's gravity" in warning for warning in result["warnings"])
+
+
+@pytest.mark.slow
+def test_a_face_of_grains_that_stick_stands_to_a_height_of_their_strength(tmp_path, monkeypatch):
+    """Rumpf's tensile strength, packing Z F / pi d^2, times tan phi of about 0.5 bounds the cohesion from above."""
+    monkeypatch.setenv("HEDGEBED_CACHE", str(tmp_path))
+    stuff = replace(SAND, name="sticky", cohesion="dmt", surface_energy=0.1)
+    bed = Bed.prepare(stuff, size=(18 * GRAIN, 6 * GRAIN, 6 * GRAIN), grain=GRAIN, seed=1, threads=1)
+    pull_off = 4 * math.pi * stuff.surface_energy * GRAIN / 2
+    strength = bed.packing_fraction * bed.coordination_number * pull_off / (math.pi * GRAIN**2)
+    cut = cut_and_load(bed, width=4 * GRAIN)
+    assert cut.critical_height is not None and cut.stood < cut.fell <= cut.stood * 2**0.5
+    assert cut.bounds[0] < cut.critical_height < cut.bounds[1]
+    assert 0.1 < cohesion_of(cut.critical_height, cut.unit_weight, 30.0) / strength < 0.6
 
 
 @pytest.mark.parametrize(
