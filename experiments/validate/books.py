@@ -24,7 +24,7 @@ ROUGH = Material("grain", 2600, 1e7, 0.25, 0.5, 0.6, 0.15)
 GAS = Material("gas", 2600, 1e6, 0.25, 0.0, 1.0)
 
 
-def cluster(material: Material, *, flat: bool = False, **options: Any) -> Bed:
+def cluster(material: Material, *, flat: bool = False, gravity: Any = 0.0, **options: Any) -> Bed:
     """Sixteen grains of 2.5 mm near the middle of the box that fly at one another; ``flat``: a gas in one plane."""
     rng = np.random.default_rng(5)
     i = np.arange(CLUSTER_SIZE)
@@ -46,7 +46,7 @@ def cluster(material: Material, *, flat: bool = False, **options: Any) -> Bed:
         spins=spins,
         size=(0.05, 0.05, 0.05),
         height=0.08,
-        gravity=0.0,
+        gravity=gravity,
         floor=False,
         max_overlap=0.2,
         **options,
@@ -136,15 +136,20 @@ PARTS = {
     "damped": "lost to normal dashpots",
     "rubbed": "lost to tangential forces",
     "turned": "lost to rolling and twisting",
+    "potential": "in height",
 }
 _DURATION = 0.004  # from the first collision to dispersal [s]
+_STRONG = (30.0, 0.0, -100.0)  # gravity that does as much work in that time as the collisions [m/s2]
 
 
-def _energy(material: Material) -> Callable[[Callable[[float], None]], Outcome]:
+def _energy(
+    material: Material, *, gravity: Any = 0.0, tensile: bool = False
+) -> Callable[[Callable[[float], None]], Outcome]:
     def compute(tell: Callable[[float], None]) -> Outcome:
         books: list[Book] = []
         for k, step in enumerate((4e-6, 2e-6)):
-            books.append(keep_book(cluster(material, time_step=step), round(_DURATION / step)))
+            bed = cluster(material, gravity=gravity, time_step=step, tensile=tensile)
+            books.append(keep_book(bed, round(_DURATION / step), tensile=tensile))
             tell((1 + 2 * k) / 3)
         fine = books[1]
         first = fine.parts["kinetic"][0]
@@ -157,9 +162,10 @@ def _energy(material: Material) -> Callable[[Callable[[float], None]], Outcome]:
             Comparison("force on a grain: the bed's less the law's, over the largest", "1", 0.0, off, 1e-9, False),
             Comparison("what a dashpot or friction gives back, over the first energy", "1", 0.0, back, 1e-3, False),
         ]
-        shares = {name: fine.parts[key][-1] / first for key, name in PARTS.items()}
+        named = {key: name for key, name in PARTS.items() if key in fine.parts}
+        shares = {name: fine.parts[key][-1] / first for key, name in named.items()}
         said = ", ".join(f"{100 * share:.2f} % {name}" for name, share in shares.items())
-        curves = [Curve(name, 1e3 * fine.time, fine.parts[key] / first, False) for key, name in PARTS.items()]
+        curves = [Curve(name, 1e3 * fine.time, fine.parts[key] / first, False) for key, name in named.items()]
         curves.append(Curve("sum", 1e3 * fine.time, fine.total / first))
         plot = Plot("Where the energy goes", "time [ms]", "share of the first energy [1]", curves)
         return Outcome(rows, [plot], [f"Of the first energy at the end: {said}."])
@@ -259,6 +265,26 @@ CASES = [
         BOOK,
         FIRST_LAW,
         _energy(ROUGH),
+        slow=True,
+        seconds=20,
+    ),
+    Case(
+        "energy-tensile",
+        FAMILY,
+        "Energy book: with friction, where the damping may pull at the end of a contact",
+        BOOK,
+        FIRST_LAW,
+        _energy(Material("tensile", 2600, 1e7, 0.25, 0.5, 0.6), tensile=True),
+        slow=True,
+        seconds=20,
+    ),
+    Case(
+        "energy-gravity",
+        FAMILY,
+        "Energy book: under gravity, with friction, rolling and twisting",
+        f"{BOOK.partition(' = ')[0]} + potential = first energy{BOOK.partition('first energy')[2]}",
+        FIRST_LAW,
+        _energy(ROUGH, gravity=_STRONG),
         slow=True,
         seconds=20,
     ),

@@ -29,7 +29,7 @@ class Book:
         time: [s].
         parts: kinetic; stored in springs (normal, tangential, turning); lost since the start (damped: to the normal
             dashpots; rubbed, turned: the work against tangential forces and turning torques less what their springs
-            hold).
+            hold); under gravity also potential, from the start.
         force_error: largest difference of a grain's force from the bed's, over the largest force.
     """
 
@@ -84,8 +84,8 @@ class _Dashpot:
     In the step of the first touch it is the mean over the time from the touch to half a step later.
     """
 
-    def __init__(self, count: int, mass: float):
-        self.mass = mass
+    def __init__(self, count: int, mass: float, *, tensile: bool):
+        self.mass, self.least = mass, -math.inf if tensile else 0.0
         self.rate, self.force = np.zeros(count), np.zeros(count)
         self.touched = np.zeros(count, dtype=bool)
 
@@ -99,7 +99,7 @@ class _Dashpot:
         last = np.where(self.touched, self.rate, rate)
         ahead = rate + 0.5 * (rate - last) - 0.5 * dt / self.mass * np.where(self.touched, self.force, 0.0)
         force = (spring - damping * ahead) / (1 + 0.5 * dt / self.mass * damping)
-        self.force = np.where(touching, np.maximum(0.0, force), 0.0)
+        self.force = np.where(touching, np.maximum(self.least, force), 0.0)
         self.rate, self.touched = rate, touching
         return self.force
 
@@ -123,20 +123,23 @@ class _Forces:
         )
 
 
-def keep_book(bed: Bed, steps: int, *, every: int = 20) -> Book:
-    """Advance a bed of like grains without gravity or floor by ``steps``, keeping the book of its energy.
+def keep_book(bed: Bed, steps: int, *, every: int = 20, tensile: bool = False) -> Book:
+    """Advance a bed of like grains without a floor by ``steps``, keeping the book of its energy.
 
-    The law is that of docs/bed.md without cohesion, cut at zero. Grains must start apart.
+    The law is that of docs/bed.md without cohesion, cut at zero unless ``tensile``. Grains must start apart, and under
+    gravity reach no boundary.
     """
     stuff, dt, count = bed.material, bed.time_step, bed.grain_count
     start = bed.grains()
     r, m = float(start["radius"][0]), float(start["mass"][0])
     inertia, radius, mass = 0.4 * m * r * r, r / 2, m / 2
     star, shear = effective_moduli(stuff.young, stuff.poisson, stuff.young, stuff.poisson)
-    factor, mu, mu_r = damping_factor(stuff.restitution), stuff.friction, stuff.rolling_friction
+    factor = damping_factor(stuff.restitution, tensile=tensile)
+    mu, mu_r = stuff.friction, stuff.rolling_friction
+    weight = m * np.array(bed.gravity)
     i, j = np.triu_indices(count, 1)
     slide, roll, twist = (_Springs(len(i)) for _ in range(3))
-    dashpot = _Dashpot(len(i), mass)
+    dashpot = _Dashpot(len(i), mass, tensile=tensile)
     lost, half_w = np.zeros(3), start["spin"]
     before: tuple[_Forces, Array, Array] | None = None
     worst = largest = 0.0
@@ -173,7 +176,7 @@ def keep_book(bed: Bed, steps: int, *, every: int = 20) -> Book:
             back = arm - 0.25 * took * v_n
             v_t = path - v_n[:, None] * middle - np.cross(back[:, None] * (w[i] + w[j]), normals)
             v_t = np.where(touching[:, None], v_t, 0.0)
-            f_t = slide.load(k_t, factor * math.sqrt(4 * shear / star) * root, v_t, mu * f_n, took, flat)
+            f_t = slide.load(k_t, factor * math.sqrt(4 * shear / star) * root, v_t, mu * np.abs(f_n), took, flat)
         if mu_r > 0:
             spin = np.where(touching[:, None], w[i] - w[j], 0.0)
             along = (spin * normals).sum(axis=1)[:, None] * normals
@@ -183,10 +186,10 @@ def keep_book(bed: Bed, steps: int, *, every: int = 20) -> Book:
             angle = roll.stretch + twist.stretch
             twist.stretch = (angle * normals).sum(axis=1)[:, None] * normals
             roll.stretch = angle - twist.stretch
-            torque = roll.load(k_r, share * np.sqrt(k_r), spin - along, mu_r * radius * f_n, took, _as_it_is)
-            bound = 3 * math.pi / 16 * mu * a * f_n
+            torque = roll.load(k_r, share * np.sqrt(k_r), spin - along, mu_r * radius * np.abs(f_n), took, _as_it_is)
+            bound = 3 * math.pi / 16 * mu * a * np.abs(f_n)
             torque += twist.load(k_w, share * np.sqrt(k_w), along, bound, took, _as_it_is)
-        total = np.zeros((count, 3))
+        total = np.tile(weight, (count, 1))
         np.add.at(total, i, f_n[:, None] * normals + f_t)
         np.add.at(total, j, -f_n[:, None] * normals - f_t)
         largest = max(largest, float(np.abs(g["force"]).max()))
@@ -198,11 +201,16 @@ def keep_book(bed: Bed, steps: int, *, every: int = 20) -> Book:
             kinetic = 0.5 * m * float((g["velocity"] ** 2).sum()) + 0.5 * inertia * float((g["spin"] ** 2).sum())
             stored = 0.4 * float((4 / 3 * star * math.sqrt(radius) * overlap**2.5).sum())
             held, turned = slide.stored, roll.stored + twist.stored
-            rows.append([step * dt, kinetic, stored, held, turned, so_far[0], so_far[1] - held, so_far[2] - turned])
+            fallen = -float(weight @ (x - start["position"]).sum(axis=0))
+            losses = [so_far[0], so_far[1] - held, so_far[2] - turned]
+            rows.append([step * dt, kinetic, stored, held, turned, *losses, fallen])
         before = (forces, v, w)
-    names = ("kinetic", "normal", "tangential", "turning", "damped", "rubbed", "turned")
+    names = ("kinetic", "normal", "tangential", "turning", "damped", "rubbed", "turned", "potential")
     columns = np.array(rows).T
-    return Book(columns[0], dict(zip(names, columns[1:], strict=True)), worst / largest if largest else 0.0)
+    parts = dict(zip(names, columns[1:], strict=True))
+    if not weight.any():
+        del parts["potential"]
+    return Book(columns[0], parts, worst / largest if largest else 0.0)
 
 
 def _in_plane(normals: Array) -> Callable[[Array], Array]:

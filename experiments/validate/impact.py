@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -30,12 +31,18 @@ CLEAR = BALL + BEAD
 SPEEDS = (0.4, 0.9, 1.8)  # on touching [m/s]
 BOX = (3.2, 3.2, 2.15)  # of the bed, over D + d
 PLACES = ((0.25, 0.25), (0.75, 0.75))
-FINENESS = {"5": (6, ((1, PLACES), (2, PLACES))), "7": (8, ((3, PLACES),))}
-"""By grains across the ball: D + d over d; seeds of the beds, and places in each."""
+COARSE = ("5", 6, ((1, PLACES),))
+FINE = ("7", 8, ((2, PLACES), (3, PLACES)))
+"""Grains across the ball; D + d over d; seeds of the beds, and places in each."""
 D1_BAND, K_BAND, TIME_BAND = 0.15, 0.25, 0.15
 STRUCK = 0.08  # overlap over diameter that is let pass where the ball strikes; the bed itself stays below 0.05
 LONGEST = 0.4  # [s]
 POINTS = 50
+WHY = (
+    "over its first 8 mm the ball is slowed by up to 70 m/s2 at 1.8 m/s, twice what the law says, then by some 12 "
+    "m/s2, nearly free of speed and depth, and it stops 22 to 29 % above where the law has it. Ball and bed are coarse "
+    "(5 grains, 3.2 diameters); whether that is why is not known until the finer case has been run"
+)
 
 
 @dataclass(frozen=True)
@@ -111,61 +118,71 @@ def _scatter(falls: Sequence[dict[str, np.ndarray]]) -> tuple[float, float]:
     return float(errors[0]), float(errors[1])
 
 
-def _compute(tell: Callable[[float], None]) -> Outcome:
-    plan = {
-        name: [Fall(across, seed, at, speed) for seed, places in beds for at in places for speed in SPEEDS]
-        for name, (across, beds) in FINENESS.items()
-    }
-    whole = sum(len(falls) * len(name) for name, falls in plan.items())
-    done = 0
-    rows, curves, words = [], [], []
-    for name, falls in plan.items():
-        found = []
-        for fall in falls:
-            found.append(fall.run())
-            done += 1
-            tell(min(1.0, done / whole))
-        d1, k_over_m = fit_law(found)
-        errors = _scatter(found)
-        rows += [
-            Comparison(f"d1, {name} grains across", "cm", 100 * D1, 100 * d1, D1_BAND),
-            Comparison(f"k/m, {name} grains across", "1/s2", K_OVER_M, k_over_m, K_BAND),
-        ]
-        stops = {v: np.mean([one["time"][-1] for fall, one in zip(falls, found, strict=True) if fall.speed == v])
-                 for v in SPEEDS}  # fmt: skip
-        first, last = SPEEDS[0], SPEEDS[-1]
-        rows.append(
-            Comparison(f"time to stop, {last:g} over {first:g} m/s, {name} grains across", "1",
-                       published(last)[1] / published(first)[1], float(stops[last] / stops[first]), TIME_BAND)
-        )  # fmt: skip
-        deep = {v: np.mean([one["depth"][-1] for fall, one in zip(falls, found, strict=True) if fall.speed == v])
-                for v in SPEEDS}  # fmt: skip
-        curves.append(Curve(f"bed, {name} across", SPEEDS, [1e3 * deep[v] for v in SPEEDS]))
-        words.append(
-            f"{name} across ({int(found[0]['count'])} grains, packing {float(found[0]['packing']):.3f}, {len(found)} "
-            f"drops): d1 {100 * d1:.2f} +- {100 * errors[0]:.2f} cm, k/m {k_over_m:.0f} +- {errors[1]:.0f} 1/s2"
-        )
+def _drops(tell: Callable[[float], None], fineness: tuple[str, int, Any]) -> Outcome:
+    name, across, beds = fineness
+    falls = [Fall(across, seed, at, speed) for seed, places in beds for at in places for speed in SPEEDS]
+    found = []
+    for fall in falls:
+        found.append(fall.run())
+        tell(len(found) / len(falls))
+    d1, k_over_m = fit_law(found)
+    errors = _scatter(found)
+
+    def mean(key: str) -> dict[float, float]:
+        """Of the last values, by speed."""
+        pairs = list(zip(falls, found, strict=True))
+        return {v: float(np.mean([run[key][-1] for fall, run in pairs if fall.speed == v])) for v in SPEEDS}
+
+    stops, deep = mean("time"), mean("depth")
+    first, last = SPEEDS[0], SPEEDS[-1]
+    rows = [
+        Comparison(f"d1, {name} grains across", "cm", 100 * D1, 100 * d1, D1_BAND),
+        Comparison(f"k/m, {name} grains across", "1/s2", K_OVER_M, k_over_m, K_BAND),
+        Comparison(f"time to stop, {last:g} over {first:g} m/s", "1", published(last)[1] / published(first)[1],
+                   stops[last] / stops[first], TIME_BAND),
+    ]  # fmt: skip
+    curves = [Curve(f"bed, {name} across", SPEEDS, [1e3 * deep[v] for v in SPEEDS])]
+    stood = ", ".join(f"{1e3 * deep[v]:.1f} ({1e3 * published(v)[0]:.1f}) at {v:g} m/s" for v in SPEEDS)
+    many = f"{len(found)} drops in {len(beds)} bed{'s' if len(beds) > 1 else ''}"
+    words = (
+        f"{int(found[0]['count'])} grains a bed, packing {float(found[0]['packing']):.3f}, {many}: d1 {100 * d1:.2f} "
+        f"+- {100 * errors[0]:.2f} cm, k/m {k_over_m:.0f} +- {errors[1]:.0f} 1/s2. It stops at depths [mm] (the "
+        f"published law's in brackets) of {stood}"
+    )
     speeds = np.linspace(SPEEDS[0], SPEEDS[-1], 40)
     curves.insert(0, Curve("published law", speeds, [1e3 * published(v)[0] for v in speeds], False))
     at = ", ".join(f"{speed:g}" for speed in SPEEDS)
     box = " x ".join(f"{share:g}" for share in BOX)
     remark = (
-        f"{'; '.join(words)}. Errors: one drop left out after the other. Drops at {at} m/s; beads of "
+        f"{words}. Errors: one drop left out after the other. Drops at {at} m/s; beads of "
         f"{BEADS.density:g} kg/m3 as rained, in a bed of {box} times D + d, periodic sideways; the published ones lie "
         "at 0.59 in a container of some seven D."
     )
     return Outcome(rows, [Plot("Depth at which the ball stops", "speed [m/s]", "depth [mm]", curves)], [remark])
 
 
+def _coarse(tell: Callable[[float], None]) -> Outcome:
+    return _drops(tell, COARSE)
+
+
+def _fine(tell: Callable[[float], None]) -> Outcome:
+    return _drops(tell, FINE)
+
+
 CASES = [
     Case(
-        "katsuragi-durian",
+        name,
         "Bodies in beds",
-        "Drops of a 25.4 mm steel ball, one law for three speeds",
+        f"Drops of a 25.4 mm steel ball, {across} grains across, one law for three speeds",
         "m a = m g - m v^2 / d1 - k z with d1 = 8.7 cm, k/m = 1040 1/s2",
         "Katsuragi & Durian 2007, Nature Physics 3:420, figures from a second source; the bands are ours",
-        _compute,
+        compute,
         slow=True,
-        seconds=600,
+        seconds=seconds,
+        reason=reason,
+    )
+    for name, across, compute, seconds, reason in (
+        ("katsuragi-durian", COARSE[0], _coarse, 100, WHY),
+        ("katsuragi-durian-fine", FINE[0], _fine, 600, ""),
     )
 ]

@@ -59,7 +59,7 @@ def _driven(name: str, shape: Cone | Cylinder, place: tuple[float, float], depth
 
 
 def _sheared(pressure: float) -> dict[str, np.ndarray]:
-    """Critical and peak stress ratio [1], and the bed's density [kg/m3]."""
+    """Critical and peak stress ratio [1], normal stress [Pa], and the bed's density [kg/m3]."""
 
     def compute() -> dict[str, np.ndarray]:
         bed = prepared(grain=GRAIN, size=SIZE, gravity=GRAVITY, seed=SEED)
@@ -92,20 +92,25 @@ def _compute(tell: Callable[[float], None]) -> Outcome:
         return found
 
     tests = [ticked(_sheared(pressure)) for pressure in PRESSURES]
-    mu, density = (float(np.mean([test[key] for test in tests])) for key in ("critical", "density"))
+    # As `bed test shear`: the slope, since the weight between lid and shear band, the same in all, feigns a cohesion.
+    normal = np.array(PRESSURES)
+    mu = float(np.polyfit(normal, normal * [float(test["critical"]) for test in tests], 1)[0])
+    density = float(tests[0]["density"])
     gradient = stress_gradient(bulk_density=density, friction=mu, gravity=GRAVITY)
-    slopes, curves = [], []
+    slopes, shares, curves = [], [], []
     for across in PLATES:
         radius = 0.5 * across * GRAIN
         runs = [
             ticked(_driven(f"plate {across:g}", Cylinder(0.0, GRAIN, radius), place, PLATE_DEPTHS[1] + 0.5))
             for place in PLACES
         ]
-        slopes.append(float(np.mean([np.polyfit(*_between(run, PLATE_DEPTHS), 1)[0] for run in runs])))
+        pieces = [_between(run, PLATE_DEPTHS) for run in runs]
+        law = flat_plate() * gradient * math.pi * radius**2
+        shares.append(float(np.mean([force.mean() / (law * depth.mean()) for depth, force in pieces])))
+        slopes.append(float(np.mean([np.polyfit(*piece, 1)[0] for piece in pieces])))
         grid = np.linspace(0.0, PLATE_DEPTHS[1] * GRAIN, 50)
         mean = np.mean([np.interp(grid, run["depth"], run["force"]) for run in runs], axis=0)
-        area = math.pi * radius**2
-        curves += [Curve(f"3D-RFT, {across:g} d", 1e3 * grid, flat_plate() * gradient * grid * area, False),
+        curves += [Curve(f"3D-RFT, {across:g} d", 1e3 * grid, law * grid, False),
                    Curve(f"plate of {across:g} d", 1e3 * grid, mean)]  # fmt: skip
     found, margin = plate_law([across * GRAIN for across in PLATES], slopes)
     height = (CONE_DEPTHS[1] + 2) * GRAIN
@@ -126,14 +131,15 @@ def _compute(tell: Callable[[float], None]) -> Outcome:
         f"{slope / (0.25 * math.pi * (across * GRAIN) ** 2) / (flat_plate() * gradient):.2f} at {across:g} d"
         for across, slope in zip(PLATES, slopes, strict=True)
     )
+    means = ", ".join(f"{share:.2f} at {across:g} d" for across, share in zip(PLATES, shares, strict=True))
     remark = (
-        f"Critical stress ratio of the bed {mu:.3f} ({ratios['critical']} at {presses} times its weight; peaks "
-        f"{ratios['peak']}), bulk density {density:.0f} kg/m3; 0.01 more of it are {steep:.0f} % more of xi_n. "
-        f"dF/dz over the plate's own area, over 3D-RFT: {as_is}. Plates and "
-        f"cone (half-angle {math.degrees(HALF_ANGLE):g} degrees) at {SPEED:g} m/s, each at two places of one bed of "
-        f"grains of {1e3 * GRAIN:.2f} mm, {SIZE[0] / GRAIN:.1f} of them wide and {SIZE[2] / GRAIN:.1f} deep; plates "
-        f"fitted over {PLATE_DEPTHS[0]:g} to {PLATE_DEPTHS[1]:g} d of depth, the cone over {CONE_DEPTHS[0]:g} to "
-        f"{CONE_DEPTHS[1]:g} d."
+        f"Critical friction of the bed {mu:.3f}, the slope of shear over normal stress (ratios {ratios['critical']} at "
+        f"{presses} times its weight; peaks {ratios['peak']}), bulk density {density:.0f} kg/m3; 0.01 more of it are "
+        f"{steep:.0f} % more of xi_n. Over the plate's own area, over 3D-RFT: dF/dz {as_is}; mean force over the same "
+        f"depths {means}. Plates and cone (half-angle {math.degrees(HALF_ANGLE):g} degrees) at {SPEED:g} m/s, each at "
+        f"two places of one bed of grains of {1e3 * GRAIN:.2f} mm, {SIZE[0] / GRAIN:.1f} of them wide and "
+        f"{SIZE[2] / GRAIN:.1f} deep; plates fitted over {PLATE_DEPTHS[0]:g} to {PLATE_DEPTHS[1]:g} d of depth, the "
+        f"cone over {CONE_DEPTHS[0]:g} to {CONE_DEPTHS[1]:g} d."
     )
     return Outcome(rows, [Plot("Plates going down", "depth [mm]", "force [N]", curves)], [remark])
 
@@ -147,6 +153,10 @@ CASES = [
         "Agarwal et al. 2023, PNAS 120, e2214017120 (arXiv 2205.14920); the bands are ours",
         _compute,
         slow=True,
-        seconds=600,
+        seconds=300,
+        reason="the plates' force does not begin at zero where they touch, so that over these few grains of depth its "
+        "mean lies 18 to 51 % above 3D-RFT's, what a margin of 0.6 to 0.8 grains makes, and its slope, held to the law "
+        "here, falls short and scatters; the cone is 8 grains across where it is deepest and 3 where the fit begins. "
+        "Bodies of more grains, driven deeper, are to tell whether more is behind it",
     )
 ]
