@@ -27,6 +27,8 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
 from .laws import SurfaceLaw, find_law
 from .mechanics import contact_arms, divide_mass
 from .terms import BASE, STATE_FIELDS, Term
@@ -130,6 +132,21 @@ def _calls(terms: Sequence[Term], hook: str, fixed: str) -> list[str]:
     return found
 
 
+def _bent_energy(terms: Sequence[Term]) -> list[str]:
+    """Lines that integrate the force on the way out: whatever the law and its changes, no closed form holds for all.
+
+    Gauss and Legendre's nodes in u with x = z u^2, so that forces that begin with a power of depth are smooth in u.
+    """
+    out = ["    stored = 0.0"]
+    for node, weight in zip(*np.polynomial.legendre.leggauss(8), strict=True):
+        u = 0.5 * (1.0 + node)
+        out += [f"    x = {float(u * u)!r} * z", "    part = law_loading(x, q)", "    work = law_loading_work(x, q)"]
+        out += [f"    part, work = {call}" for call in _calls(terms, "stiffen", "x, part, work")]
+        out += [f"    part = {call}" for call in _calls(terms, "unload", "x, top, part")]
+        out += [f"    stored = stored + {float(weight * u)!r} * z * part"]
+    return out
+
+
 def model_source(terms: Sequence[Term], law: SurfaceLaw) -> str:
     """The text of the functions for these effects and this law."""
     every = (*BASE, *terms)
@@ -181,7 +198,9 @@ def model_source(terms: Sequence[Term], law: SurfaceLaw) -> str:
     if law.has_memory:
         out += ["    stored = law_springback_energy(z, top, p.rebound, elastic)"]
         out += ["    elastic = elastic * law_springback(z, top, p.rebound)"]
-    out += [f"    elastic, stored = {call}" for call in _calls(every, "unload", "z, top, elastic, stored")]
+    if _calls(every, "unload", "") and not law.has_memory:
+        out += _bent_energy(every)
+        out += [f"    elastic = {call}" for call in _calls(every, "unload", "z, top, elastic")]
     if _calls(every, "crater", ""):
         out += ["    stored = left * stored"]
     for call in _calls(every, "hold", "s, depth, held"):

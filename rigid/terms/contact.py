@@ -73,22 +73,12 @@ def crater_share(share):
     return share
 
 
-def bent_unloading(depth, top, force, work, share, bend):
-    """The force times (z / z_top)^a, a = c (1 - exp(-f / 0.05)): 0 where nothing stays; `depth` is the compressed z.
-
-    The energy is exact where the loading curve is a power of depth.
-    """
+def bent_unloading(depth, top, force, share, bend):
+    """The force times (z / z_top)^a, a = c (1 - exp(-f / 0.05)): 0 where nothing stays; `depth` is the compressed z."""
     left = force
-    stored = work
-    if bend != 0.0 and share > 0.0:
-        grown = bend * (1.0 - exp(-20.0 * share))
-        ratio = 1.0
-        if depth < top:
-            ratio = (max(depth, 1e-12 * top) / top) ** grown
-        left = force * ratio
-        if work > 0.0:
-            stored = left * depth / (force * depth / work + grown)
-    return left, stored
+    if bend != 0.0 and share > 0.0 and depth < top:
+        left = force * (max(depth, 1e-12 * top) / top) ** (bend * (1.0 - exp(-20.0 * share)))
+    return left
 
 
 def held_back(s, depth, held, force, reach, sharpness):
@@ -183,7 +173,8 @@ CONTACT_EFFECTS: tuple[Term, ...] = (
         ),
         source="elastic-plastic unloading as in Walton and Braun 1986, with the unloading curve similar to the loading "
                "(bend = 0); the bend is ours",
-        limits="a spike forgets its crater when its tip leaves the undisturbed surface; the way back in is the way out",
+        limits="a spike forgets its crater when its tip leaves the undisturbed surface; the way back in is the way "
+               "out; no bend on laws whose unloading has a curve of its own",
         hooks={"crater": crater_share, "unload": bent_unloading},
     ),
     Term(

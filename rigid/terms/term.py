@@ -19,8 +19,8 @@ the fixed ones listed below, then the term's own parameters, by name, in any num
 | `rotation_friction`  | s                         | bound [N m] of a dry friction on the rotation                |
 | `crater`             |                           | share of the deepest depth that stays [1], 0 to below 1      |
 | `stiffen`            | depth, force, work        | the law's force [N] and work [J] at a new depth, altered     |
-| `unload`             | depth, top, force, work   | the same below the deepest depth `top`, altered; at `top`    |
-|                      |                           | itself it leaves the force as it is                          |
+| `unload`             | depth, top, force         | that force [N] where the tip has been down to `top`, altered, |
+|                      |                           | at `top` itself it is left; not on laws with a memory        |
 | `hold`               | s, depth, held            | pull [N], energy stored [J]; held: deepest since it touched   |
 | `rate_force`         | s, depth, rate            | normal force [N] that dissipates, by the rate of sinking     |
 | `side_force`         | s, depth, slip            | tangential force [N] on the tip against its slip speed       |
@@ -60,7 +60,7 @@ FIXED_ARGUMENTS: dict[str, tuple[str, ...]] = {
     "rotation_friction": ("s",),
     "crater": (),
     "stiffen": ("depth", "force", "work"),
-    "unload": ("depth", "top", "force", "work"),
+    "unload": ("depth", "top", "force"),
     "hold": ("s", "depth", "held"),
     "rate_force": ("s", "depth", "rate"),
     "side_force": ("s", "depth", "slip"),

@@ -248,11 +248,11 @@ def test_any_trial_with_any_effects_on_any_ground_ends_with_its_books_closed(see
     rng = np.random.default_rng(seed)
     changes = {"ground": None if ground is None else Ground(name=ground, spikes_per_row=2)}
     changes |= {key: value for key, value in (("mu_s", mu_s), ("damping", damping)) if value is not None}
-    trial = replace(drawn(rng, tuple(effects)), **changes)
+    trial = drawn(rng, tuple(effects))
     try:
-        run = simulate(trial, duration=0.8, sample_interval=0.01)
+        run = simulate(replace(trial, **changes), duration=0.8, sample_interval=0.01)
     except ValueError as problem:
-        assert "cannot stand" in str(problem)
+        assert "cannot stand" in str(problem) or "a curve of its own" in str(problem)
         return
     assert run.notes["forced_steps"] == 0
     assert run.energy_residual < 1e-6
