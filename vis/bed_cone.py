@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.lines import Line2D
 
-from vis.bed_tests import colours_of, draw_grains, grains_of, said, write_test_report
+from vis.bed_tests import colours_of, draw_grains, grains_of, height_of, said, write_test_report
 from vis.page import Tile
 from vis.plot_parts import Plot, legend_above, new_panels
 from vis.style import MODEL, styled
@@ -87,7 +87,7 @@ def _side(folder: Path, result: Mapping[str, Any]) -> list[Plot]:
     part["position"] = np.column_stack([away, grains["position"][:, 2]])[behind]
     way = np.linalg.norm(part["displacement"], axis=1) / run["grain"]
     with styled():
-        drawing, (axis,) = new_panels(1, height=3.6)
+        drawing, (axis,) = new_panels(1, height=height_of(part, float(period[0])))
         shown = draw_grains(axis, part, period=float(period[0]), by=way, top=2.0)
         tip, length, half = 1e3 * (run["surface"] - run["depth"]), 1e3 * run["length"], 5e2 * run["diameter"]
         top = axis.get_ylim()[1]

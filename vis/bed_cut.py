@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator
 
 from vis.bed_repose import flank_lines
-from vis.bed_tests import colours_of, draw_grains, grains_of, said, write_test_report
+from vis.bed_tests import colours_of, draw_grains, grains_of, height_of, said, write_test_report
 from vis.page import Tile
 from vis.plot_parts import Plot, legend_above, new_panels
 from vis.style import BED, MODEL, styled
@@ -60,7 +61,7 @@ def _side(folder: Path, result: Mapping[str, Any]) -> list[Plot]:
         return []
     way = np.linalg.norm(grains["displacement"], axis=1) / run["grain"]
     with styled():
-        drawing, (axis,) = new_panels(1, height=3.0)
+        drawing, (axis,) = new_panels(1, height=height_of(grains, run["size"][0]))
         shown = draw_grains(axis, grains, period=run["size"][0], by=way, top=5.0)
         high = 1e3 * run["height"]
         axis.set_ylim(top=max(axis.get_ylim()[1], 1.1 * high))
@@ -115,6 +116,7 @@ def _trials(result: Mapping[str, Any]) -> Plot:
         axis.set_xscale("log")
         heights = [1e3 * run["height"] for run in runs]
         axis.set_xlim(0.09 * min(heights), 4.4 * max(heights))
+        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.xaxis.set_major_formatter("{x:g}")
         axis.xaxis.set_minor_formatter("")
         axis.set_ylim(-0.03, 1.03)

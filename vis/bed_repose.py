@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from vis.bed_tests import colours_of, draw_grains, grains_of, said, write_test_report
+from vis.bed_tests import colours_of, draw_grains, grains_of, height_of, said, write_test_report
 from vis.page import Tile
 from vis.plot_parts import Plot, legend_above, new_panels
 from vis.style import MODEL, styled
@@ -73,7 +73,7 @@ def _side(folder: Path, result: Mapping[str, Any]) -> list[Plot]:
         return []
     way = np.linalg.norm(grains["displacement"], axis=1) / run["grain"]
     with styled():
-        drawing, (axis,) = new_panels(1, height=4.9)
+        drawing, (axis,) = new_panels(1, height=height_of(grains, run["size"][0]))
         shown = draw_grains(axis, grains, period=run["size"][0], by=way, top=5.0)
         half, plate = 0.5 * run["slot"], run["plate"]
         flank_lines(axis, run, start=half, period=run["size"][0], colour=MODEL, base=plate)

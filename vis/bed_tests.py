@@ -18,7 +18,7 @@ from vis.numbers import quote
 from vis.page import Page, Section, Tile, code, figure, table, text, write_page
 from vis.plot_parts import Plot
 
-__all__ = ["colours_of", "draw_grains", "grains_of", "said", "write_test_report"]
+__all__ = ["colours_of", "draw_grains", "grains_of", "height_of", "said", "write_test_report"]
 
 Grains = Mapping[str, NDArray[Any]]
 
@@ -99,6 +99,11 @@ def grains_of(folder: Path, run: Mapping[str, Any]) -> Grains | None:
     """The grains of a run's last frame; None where there is none."""
     frames = read_frames(folder, run["frames"])
     return frames[len(frames) - 1].grains if len(frames) else None
+
+
+def height_of(grains: Grains, period: float) -> float:
+    """Height of a panel in which the grains fill its width, or nearly [inch]. ``period``: of the bed in x [m]."""
+    return min(5.5, 0.7 + 6.9 * float((grains["position"][:, 2] + grains["radius"]).max()) / period)
 
 
 def draw_grains(axis: Axes, grains: Grains, *, period: float, by: NDArray[np.float64], top: float) -> Any:
