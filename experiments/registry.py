@@ -42,6 +42,8 @@ class Experiment:
     presets: tuple[Preset, ...] = ()
     subject: str = ""
     """The setting that the command's first argument is (its first two, of a setting of two), instead of a case file."""
+    example: str = ""
+    """Of what has no default because its case is the question: one that ships, a file in experiments/cases."""
 
     def settings_class(self) -> type[BaseModel]:
         """The settings class. Quick: it imports no Taichi."""
@@ -173,6 +175,7 @@ EXPERIMENTS: dict[str, Experiment] = {
             "Grain parameters from bulk figures: a response surface over sheared samples, and a material.toml.",
             settings="experiments.calibrate_settings:CalibrateSettings",
             module="experiments.calibrate",
+            example="calibrate-sand.toml",
         ),
         Experiment(
             "validate",

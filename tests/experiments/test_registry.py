@@ -10,9 +10,11 @@ from experiments.registry import EXPERIMENTS, find_experiment
 
 ALL = pytest.mark.parametrize("experiment", EXPERIMENTS.values(), ids=lambda experiment: experiment.name)
 
-# A subject (the campaign that is diagnosed) has no default, so no case of it can ship.
+# A subject (the campaign that is diagnosed) has no default, so no case of it can ship; nor has what a case asks for.
 WITHOUT_SUBJECT = pytest.mark.parametrize(
-    "experiment", [one for one in EXPERIMENTS.values() if not one.subject], ids=lambda experiment: experiment.name
+    "experiment",
+    [one for one in EXPERIMENTS.values() if not (one.subject or one.example)],
+    ids=lambda experiment: experiment.name,
 )
 
 
@@ -39,6 +41,13 @@ def test_a_subject_must_be_named(experiment):
         settings_from(experiment.settings_class(), [])
     named = "somewhere" if experiment.name != "compare" else ("somewhere", "else")
     settings_from(experiment.settings_class(), [Layer(None, {experiment.subject: named})])
+
+
+@pytest.mark.parametrize("experiment", [one for one in EXPERIMENTS.values() if one.example], ids=lambda one: one.name)
+def test_what_a_case_must_ask_for_has_an_example_that_ships(experiment):
+    with pytest.raises(ValueError, match=r"as .* = "):
+        settings_from(experiment.settings_class(), [])
+    settings_from(experiment.settings_class(), [read_case(registry.CASES / experiment.example)])
 
 
 @ALL
