@@ -8,7 +8,7 @@ from .case import Case
 __all__ = ["CASES"]
 
 FAMILY = "Not yet"
-TESTS = "the material tests (shear, repose) that give mu or phi of the same bed"
+TESTS = "a case of its own with a figure for spheres that was read in its source; `hedgebed bed test {test}` measures it"
 
 CASES = [
     Case(
@@ -17,7 +17,7 @@ CASES = [
         "Angle of repose against material",
         "31 to 34 degrees for fine sand",
         "design data, unverified",
-        waits_for=TESTS,
+        waits_for=TESTS.format(test="repose"),
     ),
     Case(
         "friction-angle",
@@ -25,6 +25,6 @@ CASES = [
         "Friction angle by direct shear or triaxial",
         "30 to 33 degrees for Toyoura sand at critical state",
         "design data, from a second source",
-        waits_for=TESTS,
+        waits_for=TESTS.format(test="shear"),
     ),
 ]
