@@ -8,7 +8,7 @@ from .case import Case
 __all__ = ["CASES"]
 
 FAMILY = "Not yet"
-TESTS = "a case of its own with a figure for spheres that was read in its source; `hedgebed bed test {test}` measures it"
+TESTS = "a case of its own with a figure that was read in its source; `hedgebed bed test {test}` measures it"
 
 CASES = [
     Case(
