@@ -273,5 +273,9 @@ CASES = [
         _murdoch,
         slow=True,
         seconds=120,
+        reason="hard grains without cohesion or air have no stress and no time but those of their weight: depth over D "
+        "is a function of v / sqrt(g D) alone (cases sink-from-rest and gravity-sweep), and one that grows with v must "
+        "fall with g. The experiment has something else as well: fine sand, poured at 1 g and released just before; its "
+        "authors suspect more drag of the surface",
     ),
 ]
