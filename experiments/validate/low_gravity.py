@@ -275,7 +275,7 @@ CASES = [
         seconds=120,
         reason="hard grains without cohesion or air have no stress and no time but those of their weight: depth over D "
         "is a function of v / sqrt(g D) alone (cases sink-from-rest and gravity-sweep), and one that grows with v must "
-        "fall with g. The experiment has something else as well: fine sand, poured at 1 g and released just before; its "
+        "fall with g. The experiment has something else: fine sand, poured at 1 g and released just before, and its "
         "authors suspect more drag of the surface",
     ),
 ]
