@@ -30,7 +30,7 @@ from .runfolder import RunFolder, write_series
 from .settings import expected_grain_count
 from .softening import Softening, soften_material
 from .stopping import held_back
-from .surfaces import find_surface
+from .surfaces import find_surface, surface_names
 from .tumble_bed_settings import TumbleBedSettings
 from .tumble_grains_frames import TumbleFrames
 from .tumble_platform import torque_within_limit
@@ -129,9 +129,8 @@ def _beside(settings: TumbleSettings) -> TumbleSettings:
 
 def _material(plan: TumblePlan) -> Material:
     if plan.surface not in MATERIALS:
-        raise ValueError(
-            f"surface = {plan.surface!r} has no grains for ground = 'bed': {', '.join(MATERIALS)} would do"
-        )
+        known = ", ".join(name for name in surface_names() if name in MATERIALS)
+        raise ValueError(f"surface = {plan.surface!r} has no grains for ground = 'bed': {known} would do")
     return MATERIALS[plan.surface]
 
 
