@@ -264,8 +264,8 @@ CASES = [
         slow=True,
         seconds=180,
         reason="the ball of 7.4 grains goes 13 % deeper than the one of 5, over D + d. Gravity is not it (case "
-        "gravity-sweep); a bed of few grains is stiffer than a continuum by more than D + d makes up for, or this one bed "
-        "is looser: finer grains and further beds are to tell",
+        "gravity-sweep); a bed of few grains is stiffer than a continuum by more than D + d makes up for, or this "
+        "one bed is looser: finer grains and further beds are to tell",
     ),
     Case(
         "murdoch",
