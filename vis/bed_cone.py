@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from matplotlib.lines import Line2D
 
-from vis.bed_tests import colours_of, draw_grains, grains_of, height_of, said, write_test_report
+from vis.bed_tests import draw_grains, grains_of, height_of, said, write_test_report
 from vis.page import Tile
-from vis.plot_parts import Plot, legend_above, new_panels
+from vis.plot_parts import Plot, legend_above, new_panels, shades
 from vis.style import MODEL, styled
 from vis.tumble import read_columns
 
@@ -49,7 +49,7 @@ def _indices(folder: Path, result: Mapping[str, Any]) -> Plot:
     with styled():
         drawing, (axis, lines) = new_panels(2, height=3.8, sharey=True)
         handles = []
-        for run, colour in zip(runs, colours_of(len(runs)), strict=True):
+        for run, colour in zip(runs, shades(len(runs)), strict=True):
             columns, _ = read_columns(folder / run["series"])
             depth = 1e3 * columns["base_depth_m"]
             axis.plot(1e-3 * columns["index_Pa"], depth, color=colour, lw=1.2)

@@ -11,9 +11,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 
 from vis.bed_repose import flank_lines
-from vis.bed_tests import colours_of, draw_grains, grains_of, height_of, said, write_test_report
+from vis.bed_tests import draw_grains, grains_of, height_of, said, write_test_report
 from vis.page import Tile
-from vis.plot_parts import Plot, legend_above, new_panels
+from vis.plot_parts import Plot, legend_above, new_panels, shades
 from vis.style import BED, MODEL, styled
 from vis.tumble import read_columns
 
@@ -108,7 +108,7 @@ def _trials(result: Mapping[str, Any]) -> Plot:
     with styled():
         drawing, (axis,) = new_panels(1, height=2.6)
         handles = []
-        for run, colour in zip(runs, colours_of(len(runs)), strict=True):
+        for run, colour in zip(runs, shades(len(runs)), strict=True):
             trials = np.array(sorted(run["trials"]))
             axis.plot(1e3 * run["height"] * trials[:, 0], trials[:, 1], color=colour, marker="o", ms=4)
             handles.append(Line2D([], [], color=colour, marker="o", ms=4, label=run["id"]))

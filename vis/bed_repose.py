@@ -11,9 +11,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from vis.bed_tests import colours_of, draw_grains, grains_of, height_of, said, write_test_report
+from vis.bed_tests import draw_grains, grains_of, height_of, said, write_test_report
 from vis.page import Tile
-from vis.plot_parts import Plot, legend_above, new_panels
+from vis.plot_parts import Plot, legend_above, new_panels, shades
 from vis.style import MODEL, styled
 from vis.tumble import read_columns
 
@@ -95,7 +95,7 @@ def _profiles(folder: Path, result: Mapping[str, Any]) -> Plot:
     runs = result["runs"]
     with styled():
         drawing, axes = new_panels(len(runs), height=2.4, sharey=True)
-        for axis, run, colour in zip(axes, runs, colours_of(len(runs)), strict=True):
+        for axis, run, colour in zip(axes, runs, shades(len(runs)), strict=True):
             columns, _ = read_columns(folder / run["series"])
             axis.plot(1e3 * columns["x_m"], 1e3 * columns["thickness_m"], color=colour, marker=".", ls="none")
             flank_lines(axis, run, start=0.5 * run["slot"], period=run["size"][0], colour=MODEL)

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 from numpy.typing import NDArray
@@ -18,7 +17,7 @@ from vis.numbers import quote
 from vis.page import Page, Section, Tile, code, figure, table, text, write_page
 from vis.plot_parts import Plot
 
-__all__ = ["colours_of", "draw_grains", "grains_of", "height_of", "said", "write_test_report"]
+__all__ = ["draw_grains", "grains_of", "height_of", "said", "write_test_report"]
 
 Grains = Mapping[str, NDArray[Any]]
 
@@ -88,11 +87,6 @@ def said(entry: Mapping[str, Any], scale: float = 1.0, unit: str = "") -> str:
         return "–"
     value, std = scale * entry["value"], entry["std"]
     return f"{quote(value)}{unit}" if std is None else f"{value:.3g} ± {scale * std:.1g}{unit}"
-
-
-def colours_of(count: int) -> list[Any]:
-    """A colour for each of so many runs."""
-    return [colormaps["cividis"](x) for x in np.linspace(0.0, 0.85, count)]
 
 
 def grains_of(folder: Path, run: Mapping[str, Any]) -> Grains | None:

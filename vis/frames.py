@@ -353,28 +353,12 @@ def _write_vtu(
     offsets = np.arange(len(cells) + 1, dtype=np.int32) * cells.shape[1]
     polygons.SetData(numpy_to_vtk(offsets, deep=True), numpy_to_vtk(cells.astype(np.int32).ravel(), deep=True))
     grid.SetCells(VTK_VERTEX if triangles is None else VTK_TRIANGLE, polygons)
-    for name, array in fields.items():
-        data = numpy_to_vtk(array, deep=True)
-        data.SetName(name)
-        grid.GetPointData().AddArray(data)
-    for name, value in values.items():
-        data = numpy_to_vtk(np.array([value]), deep=True)
-        data.SetName(name)
-        grid.GetFieldData().AddArray(data)
-    temporary = path.with_name(path.name + ".part")
-    writer = vtkXMLUnstructuredGridWriter()
-    writer.SetFileName(str(temporary))
-    writer.SetInputData(grid)
-    # Not appended raw, a quarter smaller: meshio 5.3.5 cannot read that on Pythons whose base64 reads on after padding.
-    writer.SetDataModeToBinary()
-    writer.SetCompressorTypeToZLib()
-    if not writer.Write():
-        raise OSError(f"{temporary} could not be written")
-    temporary.replace(path)
+    _add_arrays(grid.GetPointData(), fields)
+    _add_arrays(grid.GetFieldData(), {name: np.array([value]) for name, value in values.items()})
+    _write_xml(path, vtkXMLUnstructuredGridWriter(), grid)
 
 
 def _write_vti(path: Path, name: str, grid: HeightMap, values: Mapping[str, float]) -> None:
-    from vtkmodules.util.numpy_support import numpy_to_vtk
     from vtkmodules.vtkCommonDataModel import vtkImageData
     from vtkmodules.vtkIOXML import vtkXMLImageDataWriter
 
@@ -386,18 +370,28 @@ def _write_vti(path: Path, name: str, grid: HeightMap, values: Mapping[str, floa
     image.SetDimensions(columns, rows, 1)
     image.SetOrigin(*grid.origin, 0.0)
     image.SetSpacing(*grid.spacing, 1.0)
-    for key, field_values in grid.fields.items():
-        data = numpy_to_vtk(np.ascontiguousarray(field_values, dtype=np.float32).ravel(), deep=True)
-        data.SetName(key)
-        image.GetPointData().AddArray(data)
-    for key, value in values.items():
-        data = numpy_to_vtk(np.array([value]), deep=True)
-        data.SetName(key)
-        image.GetFieldData().AddArray(data)
+    flat = {key: np.ascontiguousarray(field, dtype=np.float32).ravel() for key, field in grid.fields.items()}
+    _add_arrays(image.GetPointData(), flat)
+    _add_arrays(image.GetFieldData(), {key: np.array([value]) for key, value in values.items()})
+    _write_xml(path, vtkXMLImageDataWriter(), image)
+
+
+def _add_arrays(attributes: Any, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Give VTK's data of points or of the whole field these arrays, by name."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+
+    for name, array in arrays.items():
+        data = numpy_to_vtk(array, deep=True)
+        data.SetName(name)
+        attributes.AddArray(data)
+
+
+def _write_xml(path: Path, writer: Any, content: Any) -> None:
+    """Write into a neighbour first, so that a file that is there is whole. Raises OSError where it cannot."""
     temporary = path.with_name(path.name + ".part")
-    writer = vtkXMLImageDataWriter()
     writer.SetFileName(str(temporary))
-    writer.SetInputData(image)
+    writer.SetInputData(content)
+    # Not appended raw, a quarter smaller: meshio 5.3.5 cannot read that on Pythons whose base64 reads on after padding.
     writer.SetDataModeToBinary()
     writer.SetCompressorTypeToZLib()
     if not writer.Write():

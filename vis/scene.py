@@ -15,7 +15,7 @@ from PIL import Image
 
 from vis.frames import Frame
 
-__all__ = ["Scene"]
+__all__ = ["Scene", "add_spheres"]
 
 _OVERSAMPLE = 1.5  # rendered larger and shrunk: smooth edges at a third of the cost of multi-sampling
 _METAL = (0.74, 0.76, 0.79)
@@ -84,7 +84,7 @@ class Scene:
             self._plotter.remove_actor(actor, render=False)
         position = frame.grains["position"]
         shown = position[:, 1] >= self.cut
-        self._actors = [self._spheres(position[shown], frame.grains["radius"][shown], colours[shown])]
+        self._actors = [add_spheres(self._plotter, position[shown], frame.grains["radius"][shown], colours[shown])]
         for points, triangles in frame.bodies.values():
             self._actors += self._body(points, triangles)
         self._plotter.render()  # a screenshot alone would show the frame before
@@ -115,26 +115,6 @@ class Scene:
         shift = 0.5 * (low + high) - 0.5 * np.array([left + right, foot + head])
         camera.SetWindowCenter(*(2.0 * shift))
 
-    def _spheres(self, centres: NDArray[np.float64], radius: NDArray[np.float64], colours: NDArray[np.float64]) -> Any:
-        from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLSphereMapper
-
-        cloud = self._pyvista.PolyData(centres.astype(np.float32))
-        cloud["radius"] = np.ascontiguousarray(radius, dtype=np.float32)
-        cloud["colour"] = np.round(255 * colours[:, :3]).astype(np.uint8)
-        mapper = vtkOpenGLSphereMapper()
-        mapper.SetInputData(cloud)
-        mapper.SetScaleArray("radius")
-        mapper.SetScalarModeToUsePointFieldData()
-        mapper.SelectColorArray("colour")
-        mapper.SetColorModeToDirectScalars()
-        mapper.SetScalarVisibility(True)
-        actor = self._pyvista.Actor()
-        actor.SetMapper(mapper)
-        light = actor.prop
-        light.ambient, light.diffuse, light.specular = 0.40, 0.74, 0.0
-        self._plotter.add_actor(actor, render=False, reset_camera=False)
-        return actor
-
     def _body(self, points: NDArray[np.float64], triangles: NDArray[np.int64]) -> list[Any]:
         """What of a body lies behind the cut, closed by its section: in front its rim would be nearer the camera, and
         the tip would not meet the scale of depth."""
@@ -152,3 +132,28 @@ class Scene:
             return [body]
         line = self._plotter.add_mesh(rim, color=_RIM, line_width=2.5, lighting=False, render=False, reset_camera=False)
         return [body, line]
+
+
+def add_spheres(
+    plotter: Any, centres: NDArray[np.float64], radius: NDArray[np.float64], colours: NDArray[np.float64]
+) -> Any:
+    """Add spheres to a plotter, each of its colour, shape (n, 3) or more, 0 to 1; return the actor."""
+    import pyvista
+    from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLSphereMapper
+
+    cloud = pyvista.PolyData(centres.astype(np.float32))
+    cloud["radius"] = np.ascontiguousarray(radius, dtype=np.float32)
+    cloud["colour"] = np.round(255 * colours[:, :3]).astype(np.uint8)
+    mapper = vtkOpenGLSphereMapper()
+    mapper.SetInputData(cloud)
+    mapper.SetScaleArray("radius")
+    mapper.SetScalarModeToUsePointFieldData()
+    mapper.SelectColorArray("colour")
+    mapper.SetColorModeToDirectScalars()
+    mapper.SetScalarVisibility(True)
+    actor = pyvista.Actor()
+    actor.SetMapper(mapper)
+    light = actor.prop
+    light.ambient, light.diffuse, light.specular = 0.40, 0.74, 0.0
+    plotter.add_actor(actor, render=False, reset_camera=False)
+    return actor

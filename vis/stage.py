@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from vis.frames import Frame
+from vis.scene import add_spheres
 
 __all__ = ["Eye", "FlatStage", "Stage"]
 
@@ -97,7 +98,9 @@ class Stage(Eye):
             near = np.abs(position[:, 0] - focus[0]) < 0.6 * self.width
             shown = near & (position[:, 1] >= self.cut)
             if shown.any():
-                self._actors.append(self._spheres(position[shown], frame.grains["radius"][shown], colours[shown]))
+                self._actors.append(
+                    add_spheres(self._plotter, position[shown], frame.grains["radius"][shown], colours[shown])
+                )
         for name, (points, triangles) in frame.bodies.items():
             self._actors += self._body(name, points, triangles)
         camera = self._plotter.camera
@@ -116,26 +119,6 @@ class Stage(Eye):
     def close(self) -> None:
         """Free the window."""
         self._plotter.close()
-
-    def _spheres(self, centres: Array, radius: Array, colours: Array) -> Any:
-        from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLSphereMapper
-
-        cloud = self._pyvista.PolyData(centres.astype(np.float32))
-        cloud["radius"] = np.ascontiguousarray(radius, dtype=np.float32)
-        cloud["colour"] = np.round(255 * colours[:, :3]).astype(np.uint8)
-        mapper = vtkOpenGLSphereMapper()
-        mapper.SetInputData(cloud)
-        mapper.SetScaleArray("radius")
-        mapper.SetScalarModeToUsePointFieldData()
-        mapper.SelectColorArray("colour")
-        mapper.SetColorModeToDirectScalars()
-        mapper.SetScalarVisibility(True)
-        actor = self._pyvista.Actor()
-        actor.SetMapper(mapper)
-        light = actor.prop
-        light.ambient, light.diffuse, light.specular = 0.40, 0.74, 0.0
-        self._plotter.add_actor(actor, render=False, reset_camera=False)
-        return actor
 
     def _body(self, name: str, points: Array, triangles: NDArray[np.int64]) -> list[Any]:
         faces = np.column_stack([np.full(len(triangles), 3), triangles]).ravel()
