@@ -562,7 +562,7 @@ class Engine(Lists, Shapes, Sleepers):
             self.torque[i] = self.torque[i] + (t)
             for k in ti.static(range(3)):
                 self.pushes[c, b][k] = self.pushes[c, b][k] - f[k]
-                self.pushes[c, b][k + 3] += t_body[k]
+                self.pushes[c, b][k + 3] = self.pushes[c, b][k + 3] + t_body[k]
             result = overlap / (2.0 * x.w)
         else:
             self.near_slide[s] = ti.Vector.zero(self.real, 4)

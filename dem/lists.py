@@ -155,10 +155,10 @@ class Lists:
             else:
                 a = -ti.floor(x.x / self.box[PERIOD_X]) * self.box[PERIOD_X]
                 b = -ti.floor(x.y / self.box[PERIOD_Y]) * self.box[PERIOD_Y]
-                self.position[i].x += a
-                self.position[i].y += b
-                self.origin[i].x += a
-                self.origin[i].y += b
+                self.position[i].x = self.position[i].x + a
+                self.position[i].y = self.position[i].y + b
+                self.origin[i].x = self.origin[i].x + a
+                self.origin[i].y = self.origin[i].y + b
             ci, cj, ck = self.cell_of(self.position[i])
             r = self.rank[self.cell_index(ci, cj, ck)]
             if ti.static(rest.on):
