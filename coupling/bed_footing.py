@@ -159,6 +159,8 @@ class BedFooting:
         self._mass = float(bed.grains()["mass"].sum())
         self.impulse = np.zeros(3)
         """Of gravity and floor on the grains since the start [N s]."""
+        self.grain_steps = 0
+        """Grains computed since the start, summed over the bed's steps (fewer where grains sleep)."""
 
     @property
     def time_step(self) -> float:
@@ -232,7 +234,9 @@ class BedFooting:
             turns=self._turns[used] @ _left(pose.turn).T,
             spins=np.tile(twist.spin, (len(used), 1)),
         )
+        before = self.bed.grain_steps
         self.bed.advance(steps)
+        self.grain_steps += self.bed.grain_steps - before
         rows = self.bed.reactions()
         forces, torques = np.hsplit(self.copies * rows[self.bodies], 2)
         wrench = Wrench(forces.sum(axis=0), (torques + np.cross(arms, forces)).sum(axis=0))
@@ -345,6 +349,7 @@ class BedFooting:
         return {f"bed.{key}": value for key, value in self.bed.state().items()} | {
             "impulse": self.impulse.copy(),
             "used": np.array(self._used),
+            "grain_steps": np.array(self.grain_steps),
         }
 
     def restore(self, state: Mapping[str, ArrayLike]) -> None:
@@ -352,6 +357,7 @@ class BedFooting:
         self.bed.restore({key[4:]: np.asarray(value) for key, value in state.items() if key.startswith("bed.")})
         self.impulse = np.array(state["impulse"], dtype=float)
         self._used = [int(index) for index in np.asarray(state["used"])]
+        self.grain_steps = int(np.asarray(state["grain_steps"]))
 
 
 def _left(turn: Vector) -> Vector:

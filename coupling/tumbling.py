@@ -29,6 +29,8 @@ AT_REST = 0.005
 """What a platform at rest may still lack of its weight, and its mean speed over the lowering speed [1]."""
 REST_TIME = 0.04
 """For how long the signs of rest must hold [s]."""
+PLACING_WAY = 0.02
+"""Lowering speed times the time that setting down took in the first runs, without REST_TIME [m]; for progress only."""
 LONGEST_PLACING = 3.0
 """A platform that has not come to rest after this [s] is an error."""
 MOST_REVERSAL = 1e-3
@@ -140,8 +142,10 @@ class CoupledTumble:
 
     @property
     def fraction(self) -> float:
-        """How far the tumble is along, 0 to 1; 0 while the hand holds it."""
-        return min(1.0, self.body.time / self.duration) if self.placed else 0.0
+        """How far it is along, 0 to 1, the setting down, as long as it was guessed to take, included."""
+        hand = REST_TIME + PLACING_WAY / self.lowering_speed if self.lowering_speed is not None else 0.0
+        done = hand + self.body.time if self.placed else min(hand, self.body.time)
+        return min(1.0, done / (hand + self.duration))
 
     # Stepping ------------------------------------------------------------------------------------------------------
 
@@ -242,7 +246,7 @@ class CoupledTumble:
         self._states.append(STATES.index(state))
 
     def _measure(self) -> None:
-        """What the footing holds, and by how much the momentum of all is off."""
+        """What the footing holds, by how much the momentum of all is off, and the grains computed."""
         found = self.footing.energies()
         self.energy_names = tuple(found)
         off = 0.0
@@ -250,7 +254,8 @@ class CoupledTumble:
             moving = self.body.rates[:2] * self.body.inertia[:2]
             fallen = np.array([0.0, -self.trial.weight * self.body.time])
             off = float(np.linalg.norm((self.footing.momentum() - self._momentum)[[0, 2]] + moving - fallen))
-        self._samples.append([self.body.time, off, *found.values()])
+        computed = self.footing.grain_steps if isinstance(self.footing, BedFooting) else 0
+        self._samples.append([self.body.time, off, computed, *found.values()])
 
     # What came of it -----------------------------------------------------------------------------------------------
 
@@ -271,9 +276,9 @@ class CoupledTumble:
 
     @property
     def samples(self) -> dict[str, np.ndarray]:
-        """Of the footing, by time: `time` [s], `momentum_error` [N s] and its energies [J]."""
-        table = np.array(self._samples, dtype=float).reshape(-1, 2 + len(self.energy_names))
-        return dict(zip(("time", "momentum_error", *self.energy_names), table.T, strict=True))
+        """Of the footing, by time: `time` [s], `momentum_error` [N s], `grain_steps` of a bed so far, energies [J]."""
+        table = np.array(self._samples, dtype=float).reshape(-1, 3 + len(self.energy_names))
+        return dict(zip(("time", "momentum_error", "grain_steps", *self.energy_names), table.T, strict=True))
 
     @property
     def balance(self) -> np.ndarray:
@@ -354,7 +359,7 @@ class CoupledTumble:
             "tumble.rows": np.array(self._rows, dtype=float).reshape(-1, len(COLUMNS)),
             "tumble.states": np.array(self._states, dtype=np.int8),
             "tumble.feet": self.feet,
-            "tumble.samples": np.array(self._samples, dtype=float).reshape(-1, 2 + len(self.energy_names)),
+            "tumble.samples": np.array(self._samples, dtype=float).reshape(-1, 3 + len(self.energy_names)),
             "tumble.energies": np.array(self.energy_names, dtype=str),
             "tumble.momentum": np.asarray(self._momentum, dtype=float),
         }

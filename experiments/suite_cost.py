@@ -18,8 +18,8 @@ SMALL_BED = 2e4
 """Fewer grains than this do not fill two cores: their rate is taken in proportion down to a tenth of the first's."""
 MACRO_STEP = 5e-3
 """Of the coupling beyond the grains, a macro step [s] (docs/coupling.md, 2026-11-21)."""
-SET_DOWN = 0.4
-"""What the hand takes at 0.05 m/s [s]: 0.39 in the first look of docs/coupling.md."""
+SET_DOWN = 0.4 * 0.05
+"""Way that the hand takes, over its speed [m]: 0.39 s at 0.05 m/s in the first look of docs/coupling.md."""
 FALL_TIMES = 1.5
 """What rain and rest take, over the time of a fall from the column's top: 0.27 s to 0.2 s for the beds of 80 mm in
 docs/performance.md, rounded up."""
@@ -52,7 +52,17 @@ def cost_of_tumble(settings: TumbleSettings) -> Cost:
     """
     from dem.timestep import time_step_for
 
-    from .tumble_grains import RAIN, _check_bed, _forecast, _grain_gravity, _material, _members, _plan, _softness
+    from .tumble_grains import (
+        RAIN,
+        _check_bed,
+        _forecast,
+        _grain_gravity,
+        _lowering_speed,
+        _material,
+        _members,
+        _plan,
+        _softness,
+    )
 
     plan = _plan(settings)
     _material(plan)
@@ -66,7 +76,7 @@ def cost_of_tumble(settings: TumbleSettings) -> Cost:
     grains = expected_grain_count(settings.bed_size, settings.grain, settings.spread)
     gravity = _grain_gravity(plan.trial)
     fall = math.sqrt(2 * RAIN * settings.bed_size[2] / gravity)
-    steps = (settings.duration + SET_DOWN) / step
+    steps = (settings.duration + SET_DOWN / _lowering_speed(settings, plan)) / step
     rate = _rate(grains)
     return Cost(
         grains=grains, time_step=step, bed_seconds=FALL_TIMES * fall / step * grains / rate,

@@ -32,6 +32,8 @@ class Surface:
     """Coefficient of sliding friction [1]."""
     source: str
     granular: bool = False
+    grains: str | None = None
+    """The material of `dem` whose grains a bed of it is made of."""
     guess: bool = False
     """Whether nothing but judgement stands behind the numbers."""
 

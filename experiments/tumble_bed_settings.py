@@ -38,7 +38,9 @@ class TumbleBedSettings(StrictSettings):
     spike_clear: Positive = Field(0.04, description="On a bed: how far a spike stands out of the hull [m].")
     spike_friction: NotNegative = Field(0.5, description="On a bed: friction of spike and grains [1].")
     spike_restitution: float = Field(0.5, ge=0.01, le=1, description="On a bed: restitution of spike and grains [1].")
-    lowering_speed: Positive = Field(0.05, description="On a bed: speed at which the platform is set down [m/s].")
+    lowering_speed: Positive | None = Field(
+        None, description="On a bed: speed at which the platform is set down [m/s]; sqrt(g grain) if not given."
+    )
     substeps: int = Field(
         10, ge=1, le=200, description="On a bed, or coupled: steps of the ground in one of the platform [1]."
     )
@@ -63,6 +65,12 @@ class TumbleBedSettings(StrictSettings):
     drop_along: float = Field(0.0, allow_inf_nan=False, description="Of a landing: speed along the surface [m/s].")
     drop_spin: float = Field(0.0, allow_inf_nan=False, description="Of a landing: spin, clockwise [rad/s].")
     drop_theta: float = Field(0.0, allow_inf_nan=False, description="Of a landing: theta at the first touch [rad].")
+    sleep: bool = Field(
+        False, description="On a bed: whether grains at rest are left out until something reaches them (docs/bed.md)."
+    )
+    sleep_force: Positive = Field(
+        1.0, description="Of sleep: change of a contact's force that wakes a grain, over its weight [1]."
+    )
     frame_count: int = Field(30, ge=0, le=1000, description="On a bed: frames for ParaView; 0: none.")
     checkpoint_interval: Positive = Field(60.0, description="On a bed: time between checkpoints [s].")
     threads: int | None = Field(None, ge=1, description="On a bed: threads; all cores if not given.")

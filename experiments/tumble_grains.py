@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from coupling import MOST_REVERSAL, BedFooting, CoupledTumble, LawFooting, platform_members
-from dem import Bed
-from dem.materials import MATERIALS, Material
+from dem import Bed, Sleep
+from dem.materials import Material
+from dem.materials import material as find_material
 from dem.prepare import fingerprint
 from rigid.planar import simulate
 from rigid.rig import STANDARD_GRAVITY
@@ -107,8 +108,10 @@ def _sentences(settings: TumbleSettings, plan: TumblePlan) -> list[str]:
     """What was left at its default, and what the spring-damper's numbers are for."""
     own = [text for text in plan.sentences() if not text.startswith(("ground =", "method =", "effects =", "sample_"))]
     fields = TumbleBedSettings.model_fields
-    given = settings.bed_settings_given()
+    given = {*settings.bed_settings_given(), "lowering_speed"}
     own += [f"{name} = {getattr(settings, name)} (default)" for name in fields if name not in given]
+    if settings.lowering_speed is None:
+        own.append(f"lowering_speed = {_lowering_speed(settings, plan):.4g} m/s (default: sqrt(g grain) of the grains)")
     return [*own, "stiffness, damping: of the spring-damper beside; mu_d: also what tells sliding from sticking"]
 
 
@@ -128,10 +131,20 @@ def _beside(settings: TumbleSettings) -> TumbleSettings:
 
 
 def _material(plan: TumblePlan) -> Material:
-    if plan.surface not in MATERIALS:
-        known = ", ".join(name for name in surface_names() if name in MATERIALS)
+    """The grains of the surface. A preset of `dem` that holds for one grain size is scaled when the bed is made."""
+    grains = find_surface(plan.surface).grains if plan.surface in surface_names() else None
+    if grains is None:
+        known = ", ".join(name for name in surface_names() if find_surface(name).grains)
         raise ValueError(f"surface = {plan.surface!r} has no grains for ground = 'bed': {known} would do")
-    return MATERIALS[plan.surface]
+    return find_material(grains)
+
+
+def _lowering_speed(settings: TumbleSettings, plan: TumblePlan) -> float:
+    """As set, or the speed of a grain that has fallen half its diameter [m/s], slow for sand in any gravity.
+
+    Its dynamic pressure, 1.1 rho g d, is what sand bears at a depth of a fiftieth of a grain (3D-RFT, `softening`).
+    """
+    return settings.lowering_speed or math.sqrt(_grain_gravity(plan.trial) * settings.grain)
 
 
 def _grain_gravity(trial: Trial) -> float:
@@ -204,7 +217,7 @@ def _softness(settings: TumbleSettings, plan: TumblePlan, forecast: Forecast) ->
         gravity=_grain_gravity(plan.trial),
         bed_height=settings.bed_size[2],
         depth=1.5 * forecast.deepest,
-        speed=max(1.5 * forecast.fastest, settings.lowering_speed),
+        speed=max(1.5 * forecast.fastest, _lowering_speed(settings, plan)),
         pressure=plan.trial.weight / COPIES / (0.25 * math.pi * settings.spike_diameter**2),
         fall=RAIN * settings.bed_size[2],
     )
@@ -246,10 +259,12 @@ def _stepper(settings: TumbleSettings, plan: TumblePlan, bed: Bed, forecast: For
     )  # fmt: skip
     bed.max_overlap = 0.0
     bed.mark_origin()
+    if settings.sleep:
+        bed.let_sleep(Sleep(force=settings.sleep_force))
     return stepper_of(
         settings, plan.trial, footing, duration=settings.duration, substeps=settings.substeps,
         extrapolation=settings.extrapolation, iterations=settings.iterations, tip_radius=0.5 * settings.spike_diameter,
-        lowering_speed=settings.lowering_speed, max_wheel_speed=plan.max_wheel_speed,
+        lowering_speed=_lowering_speed(settings, plan), max_wheel_speed=plan.max_wheel_speed,
     )  # fmt: skip
 
 
@@ -264,11 +279,15 @@ def _follow(settings: TumbleSettings, run: CoupledTumble, folder: RunFolder, pro
         progress.message(f"goes on at {run.time:.4g} s")
     frames = TumbleFrames(settings, run, folder.path, resumed=kept is not None) if settings.frame_count else None
     progress.stage("tumble", total=1.0)
-    saved = time.monotonic()
+    saved, in_hand = time.monotonic(), not run.placed
 
     def on_step(run: CoupledTumble) -> None:
-        nonlocal saved
+        nonlocal saved, in_hand
         progress.update(run.fraction)
+        if in_hand and run.placed:
+            in_hand = False
+            held = run.placing_steps * run.master.macro_step
+            progress.message(f"set down after {held:.3g} s: {1e3 * _sinkage_start(run):.3g} mm deep")
         stop = asked_to_stop()
         if not run.done and (stop or time.monotonic() - saved >= settings.checkpoint_interval):
             folder.save_checkpoint(CHECKPOINT, run.state())
@@ -309,7 +328,7 @@ def write_trajectory(folder: Path, run: CoupledTumble) -> Trajectory:
             columns[f"{name}_{row}_{unit}"] = run.feet[:, k, row]
     write_series(folder / "series" / "feet.csv", columns)
     samples = run.samples
-    units = {"time": "t_s", "momentum_error": "momentum_error_N_s"}
+    units = {"time": "t_s", "momentum_error": "momentum_error_N_s", "grain_steps": "grain_steps"}
     write_series(folder / "series" / "bed.csv", {units.get(name, f"{name}_J"): v for name, v in samples.items()})
     return found
 
@@ -348,7 +367,7 @@ def _conclude(
         "surface": float(bed.surface), "young": softening.young, "softer_than_real": softening.factor,
         "time_step": float(bed.time_step), "macro_step": run.master.macro_step,
         "max_overlap": float(bed.max_overlap), "seed": settings.seed, "steps": run.master.count,
-        "worst_guess": books.worst_guess, "largest_force": books.largest_force,
+        **_grain_steps(settings, run), "worst_guess": books.worst_guess, "largest_force": books.largest_force,
         "beside": quantities_of(forecast.trajectory),
         "beside_transitions": [
             {"time": float(t), "state": state, "theta": float(theta)}
@@ -371,13 +390,30 @@ def _conclude(
     return result
 
 
+def _sinkage_start(run: CoupledTumble) -> float:
+    """Mean depth of the two rows that it stands on when the torque begins [m]."""
+    return float(run.feet[0, 3, [0, -1]].mean())
+
+
+def _grain_steps(settings: TumbleSettings, run: CoupledTumble) -> dict[str, Any]:
+    """Grains computed, step by step, since the torque began, and how many there would be with all of them awake."""
+    done = run.samples["grain_steps"]
+    steps = (run.master.count - run.placing_steps) * settings.substeps
+    whole = steps * int(run.footing.bed.grain_count)  # type: ignore[attr-defined]
+    own = float(done[-1] - done[0])
+    return {
+        "sleep": settings.sleep, "grain_steps": own, "grain_steps_all_awake": float(whole),
+        "awake_share": own / whole if whole else None, "grain_steps_lowering": float(done[0]),
+        "lowering_time": run.placing_steps * run.master.macro_step,
+    }  # fmt: skip
+
+
 def _own_quantities(run: CoupledTumble) -> dict[str, dict[str, Any]]:
     """What a tumble on grains has beyond the planar model's numbers."""
     sinkage = run.feet[:, 3]
-    start = sinkage[0][[0, -1]]
     gap = run.columns["given"] - run.columns["taken"]
     found = {
-        "sinkage_start": (float(start.mean()), "m", "of the two rows it stands on, mean, when the torque begins"),
+        "sinkage_start": (_sinkage_start(run), "m", "of the two rows it stands on, mean, when the torque begins"),
         "sinkage_largest": (float(sinkage.max()), "m", "of any row"),
         "largest_row_force": (float(run.feet[:, 0].max()), "N", "upwards, mean of one macro step"),
         "exchange_residual": (

@@ -35,7 +35,7 @@ def on_bed(**more):
         ({"bed_size": (0.4, 0.06, 0.03)}, r"bed_size = 0.03 m deep .* 0.043 m would do"),
         ({"grain": 0.013}, r"grain = 0.013 m is larger than the spike: at most 0.012 m would do"),
         ({"grain": 0.0003}, r"grain = 0.0003 m makes about .* 0.00\d+ m or a smaller bed would do"),
-        ({"surface": "steel"}, r"surface = 'steel' has no grains .* sand would do"),
+        ({"surface": "steel"}, r"surface = 'steel' has no grains .* sand, jsc1a would do"),
         ({"spike_clear": 0.01}, r"spike_diameter = 0.012 m, spike_clear = 0.01 m"),
     ],
 )
@@ -131,7 +131,7 @@ def test_a_run_that_leaves_the_bed_says_where_and_keeps_its_state_and_series(tmp
 def test_a_run_stopped_by_ctrl_c_is_taken_up_again_to_the_same_numbers(tmp_path, monkeypatch):
     monkeypatch.setattr(tumble_grains, "_prepare", small_bed)
     monkeypatch.setattr(tumble_grains, "write_report", lambda *_: None)
-    settings = TumbleSettings(**SMALL)
+    settings = TumbleSettings(**SMALL, sleep=True)
     whole = tumble.run(settings, tmp_path / "whole")
     calls = 0
 
@@ -154,6 +154,9 @@ def test_a_run_stopped_by_ctrl_c_is_taken_up_again_to_the_same_numbers(tmp_path,
         assert (tmp_path / "broken" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
     assert whole["quantities"]["energy_residual"]["value"] < 0.01
     assert whole["quantities"]["momentum_residual"]["value"] < 1e-12
+    grains = whole["grains"]
+    assert grains["grain_steps"] == pytest.approx(grains["awake_share"] * grains["grain_steps_all_awake"])
+    assert 0 < grains["awake_share"] < 0.9 and grains["lowering_time"] > 0
     assert whole["method"] == "coupled" and whole["ground"] == "bed"
     assert whole["grains"]["beside"]["max_speed"]["value"] > 0
     rows = (tmp_path / "whole" / "trajectory.csv").read_text().count("\n") - 1
