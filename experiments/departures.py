@@ -1,6 +1,7 @@
 """Where the spring-damper departs from the bed: by depth and by speed, in numbers and in words.
 
-All from the way in of driven runs, in bands of depth; runs of one speed on several seeds are averaged.
+All from the way in of driven runs, in bands of depth; runs of one speed on several beds are averaged, and their standard
+deviation between beds is told: without it nobody sees what is the law's fault and what another bed would give.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 from coupling import Penetration
 from vis.numbers import quote
 
-from .fit import Fit, fit_rows
+from .fit import Fit, fit_rows, spread
 
 __all__ = ["departure_table", "departures", "depth_exponent", "sentences"]
 
@@ -48,18 +49,25 @@ def departures(
     return {
         "sentences": sentences(table, exponents, returned, drops, sinkage),
         "table": table,
-        "exponents": [{"speed": speed, "exponent": value} for speed, value in exponents.items()],
+        "exponents": [
+            {"speed": speed, "exponent": value, "std": std, "beds": count}
+            for speed, (value, std, count) in exponents.items()
+        ],
         "work_returned": None if returned is None else {"bed": returned[0], "model": returned[1]},
     }
 
 
-def departure_table(driven: Sequence[Penetration], fit: Fit, bands: int = BANDS) -> list[dict[str, float]]:
-    """Mean force of the bed and of the law per speed and band of depth [N]; gap = (law - bed) / bed [1]."""
+def departure_table(driven: Sequence[Penetration], fit: Fit, bands: int = BANDS) -> list[dict[str, float | None]]:
+    """Mean force of the bed and of the law per speed and band of depth [N]; gap = (law - bed) / bed [1].
+
+    "beds" is how many beds were driven into at that speed; "bed_std" [N] and "gap_std" [1] the standard deviations
+    between them, None where there is one only.
+    """
     if not driven:
         return []
     deepest = max(run.max_depth for run in driven)
     edges = np.linspace(0.0, deepest, bands + 1)
-    table = []
+    table: list[dict[str, float | None]] = []
     for speed, runs in _by_speed(driven).items():
         for low, high in pairwise(edges):
             means = []
@@ -67,40 +75,61 @@ def departure_table(driven: Sequence[Penetration], fit: Fit, bands: int = BANDS)
                 rows = fit_rows(run) & (run.depth > low) & (run.depth <= high)
                 if rows.any():
                     law = fit.force(run.depth[rows], run.velocity[rows])
-                    means.append((run.force[rows].mean(), law.mean()))
+                    means.append((float(run.force[rows].mean()), float(law.mean())))
             if not means:
                 continue
             bed, model = (float(value) for value in np.mean(means, axis=0))
-            gap = (model - bed) / bed if bed > 0 else None
-            table.append({"speed": speed, "depth_from": float(low), "depth_to": float(high),
-                          "bed_force": bed, "model_force": model, "gap": gap})  # fmt: skip
-    return table  # type: ignore[return-value]
+            apart = spread([law - force for force, law in means])
+            table.append(
+                {
+                    "speed": speed,
+                    "depth_from": float(low),
+                    "depth_to": float(high),
+                    "bed_force": bed,
+                    "model_force": model,
+                    "gap": (model - bed) / bed if bed > 0 else None,
+                    "beds": len(means),
+                    "bed_std": spread([force for force, _ in means]),
+                    "gap_std": apart / bed if bed > 0 and apart is not None else None,
+                }
+            )
+    return table
 
 
-def depth_exponent(driven: Sequence[Penetration]) -> dict[float, float]:
-    """Exponent n of F ~ z^n on the way in, per speed, from the deeper three quarters: mean forces of 12 equal bands.
+def depth_exponent(driven: Sequence[Penetration]) -> dict[float, tuple[float, float | None, int]]:
+    """Exponent n of F ~ z^n on the way in, per speed: mean over the beds, standard deviation between them, how many.
 
-    A straight line through log F against log z. Speeds at which fewer than four bands push back are left out.
+    A straight line through log F against log z of each run, from the deeper three quarters: mean forces of 12 equal
+    bands. Runs in which fewer than four bands push back are left out.
     """
     found = {}
     for speed, runs in _by_speed(driven).items():
-        depths, forces = [], []
-        for run in runs:
-            rows = fit_rows(run)
-            edges = np.linspace(0.25 * run.max_depth, run.max_depth, 13)
-            for low, high in pairwise(edges):
-                band = rows & (run.depth > low) & (run.depth <= high)
-                if band.any() and run.force[band].mean() > 0:
-                    depths.append(float(run.depth[band].mean()))
-                    forces.append(float(run.force[band].mean()))
-        if len(depths) >= 4:
-            found[speed] = float(np.polyfit(np.log(depths), np.log(forces), 1)[0])
+        own = [value for run in runs if (value := _exponent(run)) is not None]
+        if own:
+            found[speed] = float(np.mean(own)), spread(own), len(own)
     return found
+
+
+def _exponent(run: Penetration) -> float | None:
+    depths, forces = [], []
+    rows = fit_rows(run)
+    for low, high in pairwise(np.linspace(0.25 * run.max_depth, run.max_depth, 13)):
+        band = rows & (run.depth > low) & (run.depth <= high)
+        if band.any() and run.force[band].mean() > 0:
+            depths.append(float(run.depth[band].mean()))
+            forces.append(float(run.force[band].mean()))
+    return float(np.polyfit(np.log(depths), np.log(forces), 1)[0]) if len(depths) >= 4 else None
+
+
+def smoothed_peak(run: Penetration, window: float) -> float:
+    """Largest running mean of the ground's force over `window` [s] [N]; grains collide in far less than that."""
+    width = max(1, min(len(run.force), round(window / run.macro_step)))
+    return float(np.convolve(run.force, np.full(width, 1.0 / width), mode="valid").max())
 
 
 def sentences(
     table: Sequence[Mapping[str, Any]],
-    exponents: Mapping[float, float],
+    exponents: Mapping[float, tuple[float, float | None, int]],
     returned: tuple[float, ...] | None,
     drops: Sequence[tuple[Penetration, Penetration]],
     sinkage: tuple[Known, Known] | None,
@@ -108,9 +137,11 @@ def sentences(
     """What the numbers say, one finding a sentence."""
     said = [text for part in (_by_depth(table), _by_rate(table)) for text in part]
     if exponents:
-        low, high = min(exponents.values()), max(exponents.values())
-        shown = f"{low:.2f}" if high - low < 0.005 else f"{low:.2f} to {high:.2f}"
-        said.append(f"Going in, the bed's force grows with depth to the power {shown}; the spring's to the power 1.")
+        shown = "; ".join(
+            f"{_plain(quote(value, std, '1', significant=2))} at {speed:g} m/s ({_beds(count)})"
+            for speed, (value, std, count) in exponents.items()
+        )
+        said.append(f"Going in, the bed's force grows with depth to the power {shown}. The spring's: to the power 1.")
     if sinkage is not None:
         bed, law = sinkage
         against = f", {_deeper(law[0] / bed[0])}" if bed[0] > 0 else ""
@@ -124,18 +155,42 @@ def sentences(
             back = f"gives nothing back, that takes another {_share(-returned[0])} of the work put in"
         said.append(f"Pulled out, the bed {back}; the spring-damper gives back {_share(returned[1])}.")
     if drops:
-        peaks = [model.peak_force / bed.peak_force for bed, model in drops if bed.peak_force > 0]
-        # A drop that was ended near the floor, or by its time while still sinking, has no deepest point of its own.
-        stops = [model.max_depth / bed.max_depth for bed, model in drops if bed.stop_time and model.stop_time]
-        parts = []
-        if peaks:
-            gap = _compared(float(np.mean(peaks)) - 1, "above the bed's", "below the bed's", "as high as the bed's")
-            parts.append(f"the spring-damper's peak force is {gap} (largest mean of one macro step)")
-        if stops:
-            gap = _compared(float(np.mean(stops)) - 1, "deeper", "less deep", "as deep as the bed's")
-            parts.append(f"{'its' if peaks else _WHOSE} deepest point is {gap}")
-        if parts:
-            said.append(f"In drops {', and '.join(parts)}.")
+        said += _of_drops(drops)
+    return said
+
+
+def _of_drops(drops: Sequence[tuple[Penetration, Penetration]]) -> list[str]:
+    """Peaks and deepest points of the drops, the law's against the bed's."""
+    peaks = [model.peak_force / bed.peak_force - 1 for bed, model in drops if bed.peak_force > 0]
+    # A drop that was ended near the floor, or by its time while still sinking, has no deepest point of its own.
+    stopped = [(bed, model) for bed, model in drops if bed.stop_time and model.stop_time]
+    parts = []
+    if peaks:
+        gap = _compared(float(np.mean(peaks)), "above the bed's", "below the bed's", "as high as the bed's")
+        step = 1e3 * max(bed.macro_step for bed, _ in drops)
+        text = f"the spring-damper's peak force is {gap} (largest mean of one macro step, {step:.2g} ms"
+        if len(peaks) > 1:
+            text += f"; {_range(peaks)} in {len(peaks)} drops"
+        parts.append(f"{text})")
+    if stopped:
+        gap = _compared(
+            float(np.mean([model.max_depth / bed.max_depth - 1 for bed, model in stopped])),
+            "deeper", "less deep", "as deep as the bed's",
+        )  # fmt: skip
+        parts.append(f"{'its' if peaks else _WHOSE} deepest point is {gap}")
+    said = [f"In drops {', and '.join(parts)}."] if parts else []
+    calm = [
+        smoothed_peak(model, bed.stop_time / 10) / smoothed_peak(bed, bed.stop_time / 10) - 1
+        for bed, model in stopped
+        if bed.stop_time and smoothed_peak(bed, bed.stop_time / 10) > 0
+    ]
+    if calm and peaks:
+        gap = _compared(float(np.mean(calm)), "above the bed's", "below the bed's", "as high as the bed's")
+        ranged = f" ({_range(calm)})" if len(calm) > 1 else ""
+        said.append(
+            f"Some of a bed's peak is single grains that slip: of running means over a tenth of the way to the first "
+            f"stop the spring-damper's is {gap}{ranged}."
+        )
     return said
 
 
@@ -153,11 +208,19 @@ def _by_depth(table: Sequence[Mapping[str, Any]]) -> list[str]:
         others = [row["gap"] for row in band]
         pushes = _compared(worst["gap"], "too hard", "too softly", "as hard as the bed")
         text = (
-            f"{where} the spring-damper pushes {pushes} at "
-            f"{worst['speed']:g} m/s ({worst['model_force']:.3g} N against {worst['bed_force']:.3g} N)"
+            f"{where} the spring-damper pushes {pushes} at {worst['speed']:g} m/s "
+            f"({_plain(quote(worst['model_force'], None, 'N'))} against "
+            f"{_plain(quote(worst['bed_force'], worst['bed_std'], 'N'))}, {_beds(worst['beds'])})"
         )
         if len(others) > 1:
-            text += f"; over all speeds the gap there is {_signed(min(others))} to {_signed(max(others))} %"
+            text += f"; over all speeds the gap there is {_range(others)}"
+        apart = [row for row in band if row["gap_std"] is not None and row is not worst]
+        if worst["beds"] == 1 and apart:
+            least = max(apart, key=lambda row: row["beds"])
+            text += (
+                f". How far beds differ at that speed is not known; at {least['speed']:g} m/s {_beds(least['beds'])} "
+                f"do by {_percent(least['gap_std'])} (one standard deviation)"
+            )
         said.append(f"{text}.")
     return said
 
@@ -175,9 +238,11 @@ def _by_rate(table: Sequence[Mapping[str, Any]]) -> list[str]:
         if before <= 0:
             return []
         ratio[side] = after / before
+    counts = [min(row["beds"] for row in rows) for rows in (slow, fast)]
+    whose = f"({_beds(counts[0])})" if counts[0] == counts[1] else f"({_beds(counts[0])}, then {_beds(counts[1])})"
     return [
-        f"From {speeds[0]:g} to {speeds[-1]:g} m/s the bed's drag changes by {_signed(ratio['bed_force'] - 1)} %, "
-        f"the spring-damper's by {_signed(ratio['model_force'] - 1)} %."
+        f"From {speeds[0]:g} to {speeds[-1]:g} m/s the bed's drag changes by {_signed(ratio['bed_force'] - 1)} % "
+        f"{whose}, the spring-damper's by {_signed(ratio['model_force'] - 1)} %."
     ]
 
 
@@ -215,6 +280,15 @@ def _share(value: float) -> str:
 def _plain(text: str) -> str:
     """Without spaces that do not break: the sentences are shown on terminals too."""
     return text.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def _beds(count: float) -> str:
+    return "one bed" if count == 1 else f"{count:.0f} beds"
+
+
+def _range(shares: Sequence[float]) -> str:
+    """``-9 to +40 %``."""
+    return f"{_signed(min(shares))} to {_signed(max(shares))} %"
 
 
 def _signed(share: float) -> str:

@@ -9,11 +9,8 @@ law know of that, and `experiments.remarks` says how much it is.
 
 from __future__ import annotations
 
-import json
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,23 +19,23 @@ from coupling import Penetration
 from rigid import SpringDamper
 
 from .departures import departures
-from .fit import Fit, drag_gap, fit_rows, fit_spring_damper, spread
+from .fit import Fit, drag_gap, fit_spring_damper, moments_of, spread
 from .remarks import drop_note, remarks, warnings
 from .settings import PenetrateSettings
 from .softening import Softening
 from .units import Unit, make_run
 
-__all__ = ["Findings", "bed_entry", "bed_quantities", "compare_with", "model_run", "read_reference"]
+__all__ = ["Findings", "bed_entry", "bed_quantities", "model_run"]
 
 Runs = Mapping[str, Penetration]
-COMPARED = ("stiffness", "damping", "sinkage_dem", "sinkage_spring_damper", "drag_gap")
 
 
 class Findings:
     """All that is read off the finished runs of one experiment.
 
     `units` and `beds` are the runs and their series in the bed; `fit` is the law fitted to all of them, `seed_fits`
-    those of the seeds, `models` (id -> series) the same runs on the law.
+    those of the seeds, `models` (id -> series) the same runs on the law, `seed_models` the driven runs that all seeds
+    have, each on its own seed's law.
     """
 
     def __init__(self, settings: PenetrateSettings, units: Sequence[Unit], beds: Runs, time_step: float) -> None:
@@ -47,6 +44,12 @@ class Findings:
         self.seed_fits: dict[int, Fit] = self._fit_seeds()
         self.models: dict[str, Penetration] = {
             unit.id: model_run(settings, unit, self.beds[unit.id], self.fit, time_step) for unit in self.units
+        }
+        shared = self.shared_conditions()
+        self.seed_models: dict[str, Penetration] = {
+            unit.id: model_run(settings, unit, self.beds[unit.id], self.seed_fits[unit.seed], time_step)
+            for unit in self.units
+            if unit.kind == "driven" and unit.condition in shared
         }
 
     def of(self, kind: str, seed: int | None = None) -> list[Penetration]:
@@ -97,8 +100,12 @@ class Findings:
                 drag_gap(self.of("driven"), self.fit), spread(gaps), "1",
                 "rms difference over rms drag, way in, all driven runs; spread over the speeds that all seeds have",
             ),
-            "work_returned_dem": self._work_returned(self.beds, "work of the way out over work in, driven runs"),
-            "work_returned_spring_damper": self._work_returned(self.models, "the same on the fitted law"),
+            "work_returned_dem": self._work_returned(
+                self.beds, self.beds, "work of the way out over work in, driven runs"
+            ),
+            "work_returned_spring_damper": self._work_returned(
+                self.models, self.seed_models, "the same on the fitted law; spread: on the laws fitted to each bed"
+            ),
             "load": _quantity(load, 0.0, "N", "on the spike, set down and dropped; (m + m_b) g_sim / 4 unless set"),
             **({"drop_mass": dropped} if self.of("drop") else {}),
             **self.standing_stiffness(),
@@ -154,19 +161,18 @@ class Findings:
     def _runs(self, kind: str, seed: int) -> list[tuple[Unit, Penetration]]:
         return [(unit, self.beds[unit.id]) for unit in self.units if (unit.kind, unit.seed) == (kind, seed)]
 
-    def _work_returned(self, runs: Runs, note: str) -> dict[str, Any]:
-        """Mean share of the work put in that driven runs give back; spread between seeds over the speeds they share."""
-        shares = {
-            unit: runs[unit.id].work_out / runs[unit.id].work_in
-            for unit in self.units
-            if unit.kind == "driven" and runs[unit.id].work_in > 0
-        }
+    def _work_returned(self, runs: Runs, own: Runs, note: str) -> dict[str, Any]:
+        """Mean share of the work put in that driven runs give back; spread between seeds over the speeds they share.
+
+        The spread is that of `own`: the law of each seed by itself differs, where the pooled law is one.
+        """
         shared = self.shared_conditions()
         by_seed = [
-            _mean([share for unit, share in shares.items() if unit.seed == seed and unit.condition in shared])
+            _mean([_returned(own[u.id]) for u, _ in self._runs("driven", seed) if u.condition in shared])
             for seed in self.seeds
         ]
-        return _quantity(_mean(list(shares.values())), spread(by_seed), "1", note)
+        mean = _mean([_returned(runs[unit.id]) for unit in self.units if unit.kind == "driven"])
+        return _quantity(mean, spread(by_seed), "1", note)
 
     def run_entries(self, notes: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
         """The entry "runs": one per run, the model's numbers under model_*; `notes` are what was kept of each."""
@@ -187,6 +193,8 @@ class Findings:
                     "quantities": numbers,
                 }
             )
+            if (moments := moments_of(bed)) is not None:
+                entries[-1]["moments"] = asdict(moments)
         return entries
 
     def fit_entries(self) -> list[dict[str, Any]]:
@@ -200,7 +208,8 @@ class Findings:
                     "damping": fit.damping,
                     "stiffness_error": fit.stiffness_error,
                     "damping_error": fit.damping_error,
-                    "drag_gap": drag_gap(self.of("driven", seed), fit),
+                    "correlation": fit.correlation,
+                    "drag_gap": drag_gap([self.beds[name] for name in fit.runs], fit),
                     "runs": list(fit.runs),
                 }
             )
@@ -218,6 +227,11 @@ class Findings:
         found |= notes
         found["sentences"] += notes.values()
         return found
+
+
+def _returned(run: Penetration) -> float | None:
+    """Share of the work put in that the way out gives back."""
+    return run.work_out / run.work_in if run.work_in > 0 else None
 
 
 def force_at_surface(run: Penetration, reach: float) -> float | None:
@@ -271,88 +285,6 @@ def bed_quantities(facts: Sequence[Mapping[str, Any]], overlap: float | None) ->
 
 _CHOSEN = ("young",)
 """What is set, and so exact; of the rest one bed does not tell how much it differs from bed to bed."""
-
-
-def read_reference(reference: str | Path) -> dict[str, Any]:
-    """The result.json to compare with. Raises ValueError where it is not the result of a penetrate run."""
-    try:
-        other = json.loads(Path(reference).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise ValueError(f"reference = {str(reference)!r} is no result.json that can be read: {error}") from None
-    kind = (other.get("format"), other.get("experiment")) if isinstance(other, dict) else (None, None)
-    if kind != ("hedgebed-result/1", "penetrate"):
-        raise ValueError(
-            f"reference = {str(reference)!r} is format {kind[0]!r}, experiment {kind[1]!r}: the result.json of a "
-            f"penetrate run, format 'hedgebed-result/1', would do"
-        )
-    if not isinstance(other.get("quantities"), dict) or not isinstance(other.get("runs"), list):
-        raise ValueError(
-            f"reference = {str(reference)!r} has no quantities or no runs: take a finished run's result.json"
-        )
-    return other
-
-
-def compare_with(
-    other: Mapping[str, Any], findings: Findings, result: Mapping[str, Any]
-) -> tuple[dict[str, Any], list[str]]:
-    """How far the numbers moved from those of `other`, another result.json: the entry "reference", and sentences.
-
-    Stiffness, damping and what follows from them are those of a fit to the runs whose kind and speed the other has
-    too, each condition weighing what it weighs there, so that runs at other speeds do not pass for a change of grain.
-    """
-    there: Counter[tuple[str, float]] = Counter(
-        (str(run.get("kind")), float(run["speed"])) for run in other["runs"] if run.get("speed") is not None
-    )
-    here = Counter(unit.condition for unit in findings.units)
-    common = {unit.id: unit for unit in findings.units if unit.condition in there}
-    fitted = {name: findings.beds[name] for name, unit in common.items() if unit.kind != "set_down"}
-    weights = {name: there[unit.condition] / here[unit.condition] for name, unit in common.items()}
-    now: dict[str, float | None] = dict.fromkeys(COMPARED)
-    if any(fit_rows(run).any() for run in fitted.values()):
-        law = fit_spring_damper(fitted, weights)
-        now["stiffness"], now["damping"] = law.stiffness, law.damping
-        now["drag_gap"] = drag_gap(list(fitted.values()), law, [weights[name] for name in fitted])
-        now["sinkage_spring_damper"] = findings.settings.weight / law.stiffness if law.stiffness > 0 else None
-    # How slowly it is lowered hardly matters to where it comes to rest.
-    now["sinkage_dem"] = _mean(findings.sinkages(findings.beds))
-    moved: dict[str, Any] = {}
-    said = []
-    for name in COMPARED:
-        entry = other["quantities"].get(name)
-        old, new = entry.get("value") if isinstance(entry, Mapping) else None, now[name]
-        if old is None or new is None:
-            continue
-        change = new / old - 1 if old else None
-        unit = result["quantities"][name]["unit"]
-        moved[name] = {"before": old, "now": new, "change": change, "unit": unit}
-        percent = f" ({100 * change:+.1f} %)" if change is not None else ""
-        said.append(f"{name} moves from {old:.4g} to {new:.4g}{'' if unit == '1' else ' ' + unit}{percent}.")
-    differs = _differences(other, result)
-    missing = sorted({f"{kind} at {speed:g} m/s" for kind, speed in there if (kind, speed) not in here})
-    if moved and differs:
-        said.append(f"what differs: {', '.join(differs)}.")
-    if moved and missing:
-        said.append(f"it has runs that are not made here: {', '.join(missing)}.")
-    return {"moved": moved, "differs": differs, "runs": sorted(common)}, said
-
-
-def _differences(other: Mapping[str, Any], result: Mapping[str, Any]) -> list[str]:
-    """What was set otherwise there than here, as ``grain 0.0024 m there, 0.0012 m here``."""
-    found = []
-    for part, name, unit in (
-        ("bed", "material", ""), ("bed", "size", "m"), ("bed", "grain", "m"), ("bed", "spread", ""),
-        ("bed", "gravity", "m/s2"), ("bed", "max_overlap", "of a diameter"), ("spike", "tip", ""),
-        ("spike", "diameter", "m"), ("spike", "shaft_diameter", "m"), ("spike", "cone_angle", "degrees"),
-        ("spike", "mass", "kg"), ("spike", "friction", ""), ("spike", "restitution", ""), ("spike", "load", "N"),
-    ):  # fmt: skip
-        before, now = (
-            source[part].get(name) if isinstance(source.get(part), Mapping) else None for source in (other, result)
-        )
-        if before is None or now is None or before == now:
-            continue
-        shown = [f"{value:.4g}" if isinstance(value, float) else str(value) for value in (before, now)]
-        found.append(f"{name} {shown[0]} there, {shown[1]} here{f' [{unit}]' if unit else ''}")
-    return found
 
 
 def _quantity(value: float | None, std: float | None, unit: str, note: str = "") -> dict[str, Any]:

@@ -18,7 +18,17 @@ from numpy.typing import NDArray
 
 from coupling import Penetration
 
-__all__ = ["Fit", "drag_gap", "fit_rows", "fit_spring_damper", "spread"]
+__all__ = [
+    "Fit",
+    "Moments",
+    "drag_gap",
+    "fit_moments",
+    "fit_rows",
+    "fit_spring_damper",
+    "gap_of_moments",
+    "moments_of",
+    "spread",
+]
 
 Array = NDArray[np.float64]
 
@@ -55,15 +65,59 @@ def fit_rows(run: Penetration) -> NDArray[np.bool_]:
     return run.way_in & (run.depth > 0)
 
 
+@dataclass(frozen=True)
+class Moments:
+    """All that a fit needs of one run: means over its fitted rows of products of z, v = max(0, dz/dt) and F.
+
+    With them a result.json can be fitted again, to some of its runs, when the series are gone.
+    """
+
+    zz: float
+    """[m2]."""
+    zv: float
+    """[m2/s]."""
+    vv: float
+    """[m2/s2]."""
+    zf: float
+    """[N m]."""
+    vf: float
+    """[N m/s]."""
+    ff: float
+    """[N2]."""
+
+    @property
+    def matrix(self) -> Array:
+        """Of the normal equations, shape (2, 2)."""
+        return np.array([[self.zz, self.zv], [self.zv, self.vv]])
+
+    @property
+    def right(self) -> Array:
+        """Right side of the normal equations, shape (2,)."""
+        return np.array([self.zf, self.vf])
+
+
+def moments_of(run: Penetration) -> Moments | None:
+    """The moments of the rows of `run` that are fitted; None where none is."""
+    rows = fit_rows(run)
+    if not rows.any():
+        return None
+    z, v, force = run.depth[rows], np.maximum(run.velocity[rows], 0.0), run.force[rows]
+    pairs = ((z, z), (z, v), (v, v), (z, force), (v, force), (force, force))
+    return Moments(*(float(a @ b / len(z)) for a, b in pairs))
+
+
 def fit_spring_damper(runs: Mapping[str, Penetration], weights: Mapping[str, float] | None = None) -> Fit:
     """Fit K and C to `runs` (id -> run), each of weight 1 or as given. Raises ValueError where no run has a way in."""
-    parts = {}
-    for name, run in runs.items():
-        if fit_rows(run).any():
-            weight = 1.0 if weights is None else weights[name]
-            parts[name] = tuple(weight * part for part in _normal(run))
-    if not parts:
+    found = {name: moments_of(run) for name, run in runs.items()}
+    return fit_moments({name: part for name, part in found.items() if part is not None}, weights)
+
+
+def fit_moments(runs: Mapping[str, Moments], weights: Mapping[str, float] | None = None) -> Fit:
+    """As `fit_spring_damper`, from the moments of the runs. Raises ValueError where there is no run."""
+    if not runs:
         raise ValueError("no driven run and no drop to fit the spring-damper to")
+    weight = {name: 1.0 if weights is None else weights[name] for name in runs}
+    parts = {name: (weight[name] * part.matrix, weight[name] * part.right) for name, part in runs.items()}
     matrix = sum((part[0] for part in parts.values()), np.zeros((2, 2)))
     right = sum((part[1] for part in parts.values()), np.zeros(2))
     stiffness, damping = _solve(matrix, right)
@@ -92,19 +146,22 @@ def drag_gap(runs: Sequence[Penetration], fit: Fit, weights: Sequence[float] | N
     return float(np.sqrt(square / drag)) if drag > 0 else None
 
 
+def gap_of_moments(runs: Mapping[str, Moments], fit: Fit, weights: Mapping[str, float]) -> float | None:
+    """As `drag_gap`, from the moments of driven runs; good to some 1e-8, by cancellation."""
+    k, c = fit.stiffness, fit.damping
+    square = drag = 0.0
+    for name, m in runs.items():
+        missed = k * k * m.zz + 2 * k * c * m.zv + c * c * m.vv - 2 * (k * m.zf + c * m.vf) + m.ff
+        square, drag = square + weights[name] * max(missed, 0.0), drag + weights[name] * m.ff
+    return float(np.sqrt(square / drag)) if drag > 0 else None
+
+
 def spread(values: Sequence[float | None]) -> float | None:
     """Standard deviation between seeds (n - 1); None with fewer than two, 0 where they differ by round-off only."""
     known = [value for value in values if value is not None]
     if len(known) < 2:
         return None
     return 0.0 if np.allclose(known, known[0], rtol=1e-12, atol=0.0) else float(np.std(known, ddof=1))
-
-
-def _normal(run: Penetration) -> tuple[Array, Array]:
-    """The normal equations of one run: matrix (2, 2) and right side (2,), means over its rows."""
-    rows = fit_rows(run)
-    columns = np.stack([run.depth[rows], np.maximum(run.velocity[rows], 0.0)])
-    return columns @ columns.T / rows.sum(), columns @ run.force[rows] / rows.sum()
 
 
 def _solve(matrix: Array, right: Array) -> tuple[float, float]:

@@ -22,10 +22,11 @@ from hedgebed import __version__
 from .amended import read_law
 from .amended_runs import keep_model, kept_law, run_beside, run_without_bed
 from .bed_progress import BedProgress
-from .findings import Findings, bed_entry, bed_quantities, compare_with, read_reference
+from .findings import Findings, bed_entry, bed_quantities
 from .kept_runs import read_run, write_run
 from .memory import memory_there
 from .progress import Progress
+from .reference import compare_with, read_reference
 from .remarks import overlap_warning, softening_note
 from .reporting import write_report
 from .run_campaign import SpikeSensors, campaign_of, check_target, place_campaign
@@ -535,7 +536,7 @@ def _conclude(
         warnings.append("the result of the shipped case is not here (docs/results of a checkout): nothing compared")
     elif reference is not None:
         try:
-            entry, said = compare_with(read_reference(reference), findings, result)
+            entry, said = compare_with(read_reference(reference), result)
         except ValueError as error:  # it was there before the first run
             warnings.append(f"{error}; nothing compared")
         else:

@@ -82,7 +82,7 @@ def warnings(findings: Findings) -> list[str]:
             f"the stiffness fitted, {findings.fit.stiffness:.3g} N/m, is above {bound:.3g} N/m, up to which a spike "
             f"set down is damped beyond critical: it may have overshot; a lower lowering_speed would do"
         )
-    said += [text for text in (_inseparable(findings), _narrow(findings)) if text]
+    said += [text for text in (_inseparable(findings), _traded(findings), _narrow(findings)) if text]
     if findings.fit.damping == 0:
         said.append("the damping fitted is 0, its bound: the bed shows no drag that grows with speed in these runs")
     if findings.fit.stiffness == 0:
@@ -194,6 +194,18 @@ def _inseparable(findings: Findings) -> str | None:
     return (
         f"the fit hardly tells K from C (correlation of the two: {shown}; fitted to {listed}): give at least two "
         f"speeds and two drop_speeds"
+    )
+
+
+def _traded(findings: Findings) -> str | None:
+    """Where the beds' own fits do not tell K from C, so that the spreads of the two go together."""
+    own = [fit.correlation for fit in findings.seed_fits.values() if fit.correlation is not None]
+    if len(own) < 2 or min(own) >= -MOST_CORRELATED:
+        return None
+    return (
+        f"what every bed has hardly tells K from C (correlation of one bed's: down to {min(own):.2f}): where one comes "
+        f"out high the other comes out low, so that their spreads say less of the beds than that of the drag; "
+        f"other_speeds and other_drop_speeds farther apart would do"
     )
 
 

@@ -29,6 +29,7 @@ from vis.plot_parts import (
     spread_words,
 )
 from vis.style import BED, GREY, INK, MODEL, styled
+from vis.summary_words import Departure, departure_rows
 
 __all__ = ["drag_plot", "gap_plot", "work_plot"]
 
@@ -97,21 +98,25 @@ def drag_plot(run: RunFolder) -> Plot | None:
 
 def gap_plot(run: RunFolder) -> Plot | None:
     """Spring-damper minus bed by depth and speed, as a map with the numbers written in."""
-    table = _gap_table(run)
+    table = departure_rows(run.result) or _departures_of_series(run)
     if not table:
         return None
-    speeds = sorted({row["speed"] for row in table})
-    depths = sorted({(row["depth_from"], row["depth_to"]) for row in table})
+    speeds = sorted({row.speed for row in table})
+    depths = sorted({(row.depth_from, row.depth_to) for row in table})
     difference = np.full((len(depths), len(speeds)), np.nan)
-    share = np.full_like(difference, np.nan)
-    for row in table:
-        at = depths.index((row["depth_from"], row["depth_to"])), speeds.index(row["speed"])
-        difference[at] = row["model_force"] - row["bed_force"]
-        share[at] = difference[at] / row["bed_force"] if row["bed_force"] > 0 else np.nan
-    unit, words = column([float(cell) for cell in difference.ravel()], "N")
+    cells: dict[tuple[int, int], Departure] = {
+        (depths.index((row.depth_from, row.depth_to)), speeds.index(row.speed)): row for row in table
+    }
+    for at, row in cells.items():
+        difference[at] = row.difference
+    values = [float(cell) for cell in difference.ravel()]
+    spreads = [cells[at].bed_std if at in cells else None for at in np.ndindex(difference.shape)]
+    unit, words = column([*values, *spreads], "N")
+    words, apart = words[: len(values)], words[len(values) :]
+    told = any(row.known for row in table)
     bound = float(np.nanmax(np.abs(difference))) or 1.0
     with styled():
-        figure = Figure(figsize=(WIDTH, max(2.6, 0.9 + 0.42 * len(depths))))
+        figure = Figure(figsize=(WIDTH, max(2.6, 0.9 + (0.62 if told else 0.42) * len(depths))))
         FigureCanvasAgg(figure)
         axis = figure.add_subplot()
         norm = TwoSlopeNorm(0.0, -bound, bound)
@@ -126,13 +131,16 @@ def gap_plot(run: RunFolder) -> Plot | None:
         axis.grid(True, which="minor", color="white", lw=2.0)
         axis.tick_params(which="both", length=0)
         axis.spines[:].set_visible(False)
-        for ((i, j), cell), word in zip(np.ndenumerate(difference), words, strict=True):
+        for ((i, j), cell), word, std in zip(np.ndenumerate(difference), words, apart, strict=True):
             number = float(cell)
             if not np.isfinite(number):
                 continue
+            row = cells[i, j]
             text = f"{'+' if number > 0 else ''}{word} {unit}"
-            if np.isfinite(share[i, j]):
-                text += f"   ({_signed(100.0 * float(share[i, j]), 2)} %)"
+            if row.share is not None:
+                text += f"   ({_signed(100.0 * row.share, 2)} %)"
+            if row.known:
+                text += f"\n{row.known}" + (f", ± {std} {unit} between them" if row.bed_std is not None else "")
             dark = abs(number) > 0.62 * bound
             axis.text(j, i, text, ha="center", va="center", fontsize=8.5, color="white" if dark else INK)
         bar = figure.colorbar(image, ax=axis, pad=0.015, fraction=0.05)
@@ -142,7 +150,10 @@ def gap_plot(run: RunFolder) -> Plot | None:
         "gap",
         "Where the spring-damper departs",
         "Mean drag of the spring-damper minus the bed's on the way in, by depth and speed; in brackets as a share of "
-        "the bed's. Orange: the spring-damper pushes back too hard; purple: too softly.",
+        "the bed's. Orange: the spring-damper pushes back too hard; purple: too softly."
+        + (
+            " Below: how many beds it is of, and the standard deviation of the bed's drag between them." if told else ""
+        ),
         figure,
     )
 
@@ -251,17 +262,9 @@ def _bessel(count: NDArray[np.int64]) -> NDArray[np.float64]:
     return np.where(count > 1, count / np.maximum(count - 1, 1), 0.0)
 
 
-def _gap_table(run: RunFolder) -> list[dict[str, float]]:
-    """The table of departures as written, or else made from the driven series."""
-    names = ("speed", "depth_from", "depth_to", "bed_force", "model_force")
-    departures = run.result.get("departures")
-    given = departures.get("table") if isinstance(departures, dict) else None
+def _departures_of_series(run: RunFolder) -> list[Departure]:
+    """The table of departures made from the driven series, where none is written."""
     rows = []
-    for row in given or []:
-        if isinstance(row, dict) and all(isinstance(row.get(name), int | float) for name in names):
-            rows.append({name: float(row[name]) for name in names})
-    if rows:
-        return rows
     for speed in run.speeds("driven"):
         here = [r for r in run.of_kind("driven") if r.speed == speed and r.bed is not None and r.model is not None]
         beds, models = [_way(r.bed, "in") for r in here], [_way(r.model, "in") for r in here]
@@ -272,7 +275,7 @@ def _gap_table(run: RunFolder) -> list[dict[str, float]]:
         if len(grid) == len(grid2) > 1:
             half = 0.5 * (grid[1] - grid[0])
             rows += [
-                dict(zip(names, (speed, d - half, d + half, b, m), strict=True))
+                Departure(speed, d - half, d + half, b, m)
                 for d, b, m in zip(grid.tolist(), bed.tolist(), model.tolist(), strict=True)
             ]
     return rows

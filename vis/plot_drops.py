@@ -212,7 +212,7 @@ def set_down_plot(run: RunFolder) -> Plot | None:
 
 
 def spread_plot(run: RunFolder) -> Plot | None:
-    """K and C fitted to each seed of the bed, with their mean and spread."""
+    """K and C fitted to each seed of the bed, their spread, and what is fitted to all of them."""
     fits = [f for f in run.result.get("fits") or [] if isinstance(f, dict)]
     panels = [
         (key, title, unit)
@@ -230,7 +230,9 @@ def spread_plot(run: RunFolder) -> Plot | None:
                 if (n := number_of(f, key)) is not None
             ]
             values = np.array([value for _, value, _ in rows])
-            mean, spread = float(values.mean()), float(values.std(ddof=1)) if len(values) > 1 else None
+            spread = float(values.std(ddof=1)) if len(values) > 1 else None
+            pooled = number_of(run.result.get("quantities"), key)
+            mean = float(values.mean()) if pooled is None else pooled
             axis.axhline(mean, color=INK, lw=1.0)
             if spread:
                 axis.axhspan(mean - spread, mean + spread, color=MODEL, alpha=0.15, lw=0)
@@ -257,8 +259,9 @@ def spread_plot(run: RunFolder) -> Plot | None:
     return Plot(
         "spread",
         "Spread between beds",
-        f"The spring-damper fitted to each bed by itself, on the runs that every bed has{bars}. Line and band: mean "
-        "and standard deviation between beds. The axes do not start at zero.",
+        f"The spring-damper fitted to each bed by itself, on the runs that every bed has{bars}. Line: fitted to all "
+        "runs of all beds; band: one standard deviation between beds about it. K and C of one bed are not independent: "
+        "where one comes out high the other comes out low. The axes do not start at zero.",
         figure,
     )
 

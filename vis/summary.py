@@ -27,6 +27,7 @@ from vis.summary_tables import (
 )
 from vis.summary_words import (
     NBSP,
+    Departure,
     departure_rows,
     fitted,
     joined,
@@ -161,8 +162,9 @@ def _tiles(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, str]
 
 def _fitted_note(run: RunFolder, quantities: Mapping[str, Any]) -> str:
     words = [f"and damping C = {fitted(quantities, 'damping')}, for motion"]
-    depths = [float(r.bed.depth.max()) for r in run.of_kind("driven") if r.bed is not None]
-    words[0] += f" down to {quote(max(depths), 0.0, 'm')}" if depths else ""
+    drops = [r for r in run.of_kind("drop") if value_of(r.quantities, "stop_time") is not None]
+    depths = [float(r.bed.depth.max()) for r in (*run.of_kind("driven"), *drops) if r.bed is not None]
+    words[0] += f" down to {quote(max(depths), None, 'm')}" if depths else ""
     if value_of(quantities, "stiffness_standing") is not None:
         words.append(f"for a foot that stands K = {quantity(quantities['stiffness_standing'])}")
     if mapping_of(quantities["stiffness"]).get("std") is None and value_of(quantities, "stiffness_error") is not None:
@@ -201,17 +203,16 @@ def _frames(run: RunFolder) -> list[str]:
 
 
 def _push(run: RunFolder) -> dict[str, str] | None:
-    """The greatest force on the way in at the fastest speed, and at the slowest."""
+    """The greatest force on the way in over all speeds, at which it was met, and the least of the other speeds'."""
     by_speed = _peaks(run, "driven", "peak_force")
     if not by_speed:
         return None
     depth = max((float(r.bed.depth.max()) for r in run.of_kind("driven") if r.bed is not None), default=None)
     to = f" to {quote(depth, unit='m')}" if depth is not None else ""
-    (slow, low), (fast, high) = by_speed[0], by_speed[-1]
-    if slow == fast:
-        return {"value": quote(*low, "N"), "note": f"at most, driven in{to} at {slow:g}{NBSP}m/s"}
-    note = f"at most, driven in{to} at {fast:g}{NBSP}m/s; {quote(*low, 'N')} at {slow:g}{NBSP}m/s"
-    return {"value": quote(*high, "N"), "note": note}
+    speed, high = max(by_speed, key=lambda peak: peak[1][0])
+    note = f"at most, driven in{to} at {speed:g}{NBSP}m/s"
+    others = [f"{quote(*peak, 'N')} at {other:g}{NBSP}m/s" for other, peak in by_speed if other != speed]
+    return {"value": quote(*high, "N"), "note": f"{note}; {joined(others)}" if others else note}
 
 
 def _answers(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, str]]:
@@ -281,25 +282,27 @@ def _returned(quantities: Mapping[str, Any]) -> str:
 
 
 def _worst(result: Mapping[str, Any]) -> str:
-    rows = [row for row in departure_rows(result) if row["bed_force"] > 0]
+    rows = [row for row in departure_rows(result) if row.bed_force > 0]
     if not rows:
         return ""
-    worst = max(rows, key=lambda row: abs(row["model_force"] - row["bed_force"]))
+    worst = max(rows, key=lambda row: abs(row.difference))
     text = f"In newtons it is farthest off {_off(worst)}."
-    top = min(row["depth_to"] for row in rows)
-    shallow = [row for row in rows if row["depth_to"] == top and row is not worst]
+    top = min(row.depth_to for row in rows)
+    shallow = [row for row in rows if row.depth_to == top and row is not worst]
     if shallow:
-        near = max(shallow, key=lambda row: abs(row["model_force"] / row["bed_force"] - 1.0))
+        near = max(shallow, key=lambda row: abs(row.difference / row.bed_force))
         text += f" At the top, where a foot stands, it is farthest off {_off(near)}."
     return text
 
 
-def _off(row: Mapping[str, float]) -> str:
-    difference = row["model_force"] - row["bed_force"]
+def _off(row: Departure) -> str:
+    apart = f"; {row.known}" if row.known else ""
+    if row.bed_std is not None:
+        apart += f", {quote(row.bed_std, unit='N', significant=2)} apart"
     return (
-        f"at {row['speed']:g}{NBSP}m/s between {short(1e3 * row['depth_from'])} and {short(1e3 * row['depth_to'])}"
-        f"{NBSP}mm: {quote(abs(difference), unit='N', significant=2)} too {'much' if difference > 0 else 'little'} "
-        f"({percent(abs(difference) / row['bed_force'])})"
+        f"at {row.speed:g}{NBSP}m/s between {short(1e3 * row.depth_from)} and {short(1e3 * row.depth_to)}{NBSP}mm: "
+        f"{quote(abs(row.difference), unit='N', significant=2)} too {'much' if row.difference > 0 else 'little'} "
+        f"({percent(abs(row.difference) / row.bed_force)}{apart})"
     )
 
 

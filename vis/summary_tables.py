@@ -99,21 +99,26 @@ def _fit_error(fit: Mapping[str, Any], key: str) -> float | None:
 def departures_part(result: Mapping[str, Any]) -> dict[str, Any]:
     """Where bed and spring-damper depart: sentences and a table."""
     departures = mapping_of(result.get("departures"))
-    entries = departure_rows(result)
-    unit, forces = column([row[key] for row in entries for key in ("bed_force", "model_force")], "N")
+    entries, dash = departure_rows(result), "\N{EN DASH}"
+    told = any(row.beds is not None for row in entries)
+    unit, forces = column([force for row in entries for force in (row.bed_force, row.bed_std, row.model_force)], "N")
     rows = [
         [
-            f"{row['speed']:g}",
-            f"{short(1e3 * row['depth_from'])} to {short(1e3 * row['depth_to'])}",
+            f"{row.speed:g}",
+            f"{short(1e3 * row.depth_from)} to {short(1e3 * row.depth_to)}",
+            *([f"{row.beds:.0f}" if row.beds is not None else dash] if told else []),
             bed,
+            *([apart] if told else []),
             model,
-            signed_percent(row["model_force"] / row["bed_force"] - 1.0) if row["bed_force"] > 0 else "\N{EN DASH}",
+            dash if row.share is None else signed_percent(row.share),
         ]
-        for row, bed, model in zip(entries, forces[::2], forces[1::2], strict=True)
+        for row, bed, apart, model in zip(entries, forces[::3], forces[1::3], forces[2::3], strict=True)
     ]
     answered = {sentence(str(departures.get(name, ""))) for name in ("which_stiffness", "surface", "set_down")}
     said = [sentence(str(text)) for text in list_of(departures.get("sentences"))]
     head = ["speed [m/s]", "depth [mm]", f"bed [{unit}]", f"spring-damper [{unit}]", "gap"]
+    if told:
+        head[2:3] = ["beds", f"bed, mean [{unit}]", f"std between beds [{unit}]"]
     return {
         "sentences": [text for text in said if text not in answered],
         "table": {"head": head, "rows": rows} if rows else None,
@@ -131,8 +136,8 @@ def reference_part(result: Mapping[str, Any]) -> dict[str, Any] | None:
         rows.append(
             [
                 label_of(key),
-                quote(plain_value(moved.get("before")), None, unit),
-                quote(plain_value(moved.get("now")), None, unit),
+                quote(plain_value(moved.get("before")), plain_value(moved.get("before_std")), unit),
+                quote(plain_value(moved.get("now")), plain_value(moved.get("now_std")), unit),
                 signed_percent(change) if change is not None else "\N{EN DASH}",
             ]
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from vis.numbers import plain, quantity, quote, short
 __all__ = [
     "NBSP",
     "SHARES",
+    "Departure",
     "cell_text",
     "departure_rows",
     "fitted",
@@ -92,14 +94,48 @@ def fitted(quantities: Mapping[str, Any], key: str) -> str:
     return quantity(entry) if entry else "unknown"
 
 
-def departure_rows(result: Mapping[str, Any]) -> list[dict[str, float]]:
+@dataclass(frozen=True)
+class Departure:
+    """One row of the table of departures: mean forces of bed and law in a band of depth at one speed."""
+
+    speed: float
+    """[m/s]."""
+    depth_from: float
+    """[m]."""
+    depth_to: float
+    """[m]."""
+    bed_force: float
+    """[N], mean over the beds."""
+    model_force: float
+    """[N]."""
+    beds: float | None = None
+    """How many; None where it was not told."""
+    bed_std: float | None = None
+    """Standard deviation of the bed's force between beds [N]; None where unknown."""
+
+    @property
+    def difference(self) -> float:
+        """Law minus bed [N]."""
+        return self.model_force - self.bed_force
+
+    @property
+    def share(self) -> float | None:
+        """The difference as a share of the bed's [1]; None where the bed does not push."""
+        return self.difference / self.bed_force if self.bed_force > 0 else None
+
+    @property
+    def known(self) -> str:
+        """How well: ``one bed``, ``3 beds``; empty where it was not told."""
+        return "" if self.beds is None else "one bed" if self.beds == 1 else f"{self.beds:.0f} beds"
+
+
+def departure_rows(result: Mapping[str, Any]) -> list[Departure]:
     """The rows of the table of departures; one that lacks a number is left out."""
-    names = ("speed", "depth_from", "depth_to", "bed_force", "model_force")
     rows = []
     for entry in list_of(mapping_of(result.get("departures")).get("table")):
-        numbers = {name: plain_value(mapping_of(entry).get(name)) for name in names}
-        if all(number is not None for number in numbers.values()):
-            rows.append({name: float(number) for name, number in numbers.items() if number is not None})
+        told = {field.name: plain_value(mapping_of(entry).get(field.name)) for field in fields(Departure)}
+        if all(told[field.name] is not None for field in fields(Departure) if field.default is MISSING):
+            rows.append(Departure(**told))  # type: ignore[arg-type]
     return rows
 
 

@@ -1,12 +1,24 @@
 """K and C come back from runs whose law is known; every run weighs the same; what is found is said."""
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from fake_bed import FakeBed
 
 from coupling import drive, drop
 from experiments.departures import departure_table, departures, depth_exponent, sentences
-from experiments.fit import Fit, drag_gap, fit_rows, fit_spring_damper, spread
+from experiments.fit import (
+    Fit,
+    drag_gap,
+    fit_moments,
+    fit_rows,
+    fit_spring_damper,
+    gap_of_moments,
+    moments_of,
+    spread,
+)
 from rigid import Spike, SpringDamper
 
 SPIKE = Spike(diameter=0.012, length=0.05)
@@ -81,8 +93,9 @@ def test_departures_are_said_by_depth_and_speed():
     table = departure_table(driven, fit)
     assert len(table) == 8 and table[0]["gap"] > 0 > table[3]["gap"]
     assert table[0]["depth_to"] == pytest.approx(0.005)
-    for value in depth_exponent(driven).values():
-        assert value == pytest.approx(2.0, abs=0.02)
+    for value, std, beds in depth_exponent(driven).values():
+        assert value == pytest.approx(2.0, abs=0.02) and (std, beds) == (None, 1)
+    assert [row["beds"] for row in table] == [1] * 8 and table[0]["bed_std"] is None
     law = SpringDamper(stiffness=fit.stiffness, damping=fit.damping, time_step=2e-5)
     models = {"a": drive(SPIKE, into=law, speed=0.1, depth=0.02)}
     found = departures(driven, models, {"a": driven[0]}, fit, sinkage=((0.002, 0.0003), (0.003, None)))
@@ -94,3 +107,39 @@ def test_departures_are_said_by_depth_and_speed():
     assert "gives nothing back, that takes another 0.3 % of the work put in" in costly
     assert found["work_returned"]["bed"] < 0.2 < found["work_returned"]["model"]
     assert departure_table([], Fit(1.0, 0.0, None, None, ())) == []
+
+
+def test_departures_are_told_with_the_spread_between_beds():
+    """Beds of F = 80 z and 120 z at one speed: 100 z +- 28.3 z, so a law of K = 100 is off by 0 +- 28 %."""
+    driven = [drive(SPIKE, into=FakeBed(hardness=k), speed=0.1, depth=0.02) for k in (80.0, 120.0)]
+    driven.append(drive(SPIKE, into=FakeBed(hardness=90.0), speed=0.4, depth=0.02))
+    fit = Fit(100.0, 0.0, None, None, ("a", "b", "c"))
+    table = departure_table(driven, fit)
+    slow = table[0]
+    assert slow["beds"] == 2 and slow["gap"] == pytest.approx(0.0, abs=1e-9)
+    assert slow["bed_std"] == pytest.approx(np.sqrt(0.08) * slow["bed_force"], rel=1e-6)
+    assert slow["gap_std"] == pytest.approx(np.sqrt(0.08), rel=1e-6)
+    first = sentences(table, depth_exponent(driven), None, [], None)[0]
+    assert "11 % too hard at 0.4 m/s" in first and "one bed)" in first
+    assert "not known; at 0.1 m/s 2 beds do by 28 % (one standard deviation)" in first
+
+
+def test_a_peak_of_one_grain_is_told_apart_from_the_beds():
+    """One macro step twice as high: the peak is twice the law's; the mean of four steps, a tenth of the way, 5/4."""
+    run = drop(SPIKE, into=SpringDamper(stiffness=100.0, time_step=1e-4), speed=0.1, mass=0.2, load=0.1, max_time=0.3)
+    force = run.force.copy()
+    force[int(np.argmax(force))] *= 2.0
+    said = sentences([], {}, None, [(replace(run, force=force), run)], None)
+    assert "peak force is 50 % below the bed's" in said[0] and "tenth of the way" in said[1]
+    share = float(re.search(r"is (\d+) % below", said[1])[1])
+    assert share == pytest.approx(20.0, abs=1.0)
+
+
+def test_moments_are_enough_for_a_fit():
+    """A fit to the moments of the runs is the fit to the runs; the gap too, but for its cancellation."""
+    runs = runs_on(lambda: FakeBed(hardness=90.0, rate=0.8, power=1.3))
+    fit, moments = fit_spring_damper(runs), {name: moments_of(run) for name, run in runs.items()}
+    assert fit_moments(moments) == fit
+    driven = {name: part for name, part in moments.items() if name != "drop"}
+    gap = gap_of_moments(driven, fit, dict.fromkeys(driven, 1.0))
+    assert gap == pytest.approx(drag_gap(list(runs.values()), fit), rel=1e-6)

@@ -16,6 +16,7 @@ from fake_bed import FakeBed
 from pydantic import ValidationError
 
 from experiments import memory, penetrate, units
+from experiments.reference import compare_with
 from experiments.settings import PenetrateSettings, expected_grain_count
 from experiments.units import plan_units, shown_units
 from vis.frames import frame_names, read_frames
@@ -229,23 +230,37 @@ def test_a_failing_bed_leaves_its_state(fake, tmp_path, monkeypatch):
 
 
 def test_compared_with_a_reference(fake, tmp_path):
+    """K = 60 N/m there at the speed that both have, whatever its other runs say: F = K z at z = Z or 0."""
     reference = tmp_path / "before.json"
+
+    def kept(speed, stiffness, zz=1e-4):
+        moments = {"zz": zz, "zv": speed * zz**0.5 / 2, "vv": speed**2}
+        moments |= {"zf": stiffness * zz, "vf": stiffness * moments["zv"], "ff": stiffness**2 * zz}
+        return {"id": f"d{speed}", "kind": "driven", "speed": speed, "moments": moments}
+
     before = {
         "format": "hedgebed-result/1",
         "experiment": "penetrate",
-        "quantities": {"stiffness": {"value": 60.0, "std": 1.0, "unit": "N/m"}},
-        "runs": [{"kind": "driven", "speed": 0.2}, {"kind": "driven", "speed": 0.05}],
+        "quantities": {"stiffness": {"value": 130.0, "std": 1.0, "unit": "N/m"}, "load": {"value": 0.6, "unit": "N"}},
+        "runs": [kept(0.2, 60.0), kept(0.05, 200.0)],
         "bed": {"grain": 0.0048, "max_overlap": 0.05},
     }
     reference.write_text(json.dumps(before))
     settings = PenetrateSettings(**(QUICK | {"seeds": (1,), "reference": str(reference), "frame_count": 0}))
     result = penetrate.run(settings, tmp_path / "run")
-    assert result["reference"]["moved"]["stiffness"]["change"] == pytest.approx(110 / 60 - 1, rel=1e-6)
+    moved = result["reference"]["moved"]
+    assert moved["stiffness"]["before"] == pytest.approx(60.0) and moved["stiffness"]["now"] == pytest.approx(110.0)
+    assert moved["sinkage_spring_damper"]["before"] == pytest.approx(0.6 / 60.0)
+    assert moved["drag_gap"]["before"] == pytest.approx(0.0, abs=1e-6)
     said = " ".join(result["departures"]["sentences"])
-    assert "stiffness moves from 60 to 110" in said and "grain 0.0048 there, 0.0024 here" in said
+    assert "stiffness moves from 60.0 N/m to 110 N/m (+83.3 %)" in said and "grain 0.0048 there, 0.0024 here" in said
     assert "driven at 0.05 m/s" in said and "max_overlap" not in said.split("what differs")[1]
     assert result["reference"]["runs"] == ["seed1-driven-0.2"]
     assert result["quantities"]["stiffness"]["std"] is None  # one seed tells nothing of the spread
+    for run in before["runs"]:  # as earlier versions wrote it: what is to be left out cannot be
+        del run["moments"]
+    entry, told = compare_with(before, result)
+    assert "stiffness" not in entry["moved"] and any("tell no moments" in text for text in told)
     assert frame_names(tmp_path / "run") == []
 
 
