@@ -1,7 +1,7 @@
 """Where the spring-damper departs from the bed: by depth and by speed, in numbers and in words.
 
-All from the way in of driven runs, in bands of depth; runs of one speed on several beds are averaged, and their standard
-deviation between beds is told: without it nobody sees what is the law's fault and what another bed would give.
+All from the way in of driven runs, in bands of depth; runs of one speed on several beds are averaged, and their
+standard deviation between beds is told: without it nobody sees what is the law's fault and what another bed would give.
 """
 
 from __future__ import annotations
