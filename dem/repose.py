@@ -25,6 +25,7 @@ __all__ = [
     "Flank",
     "Repose",
     "angle_of_repose",
+    "check_width",
     "fit_flank",
     "measure_flanks",
     "thickness_profile",
@@ -148,16 +149,27 @@ def angle_of_repose(
     )
 
 
+def check_width(width: float, *, slot: float | None, grain: float, depth: float) -> None:
+    """Raise ValueError for a bed too narrow in x for two slopes beside a slot; lengths [m].
+
+    Args:
+        slot: six mean diameters when None. grain: mean diameter. depth: of the bed.
+    """
+    slot = SLOT * grain if slot is None else slot
+    least = slot + 2 * LEAST_FLANK * grain
+    if width < least:
+        raise ValueError(
+            f"size: x = {width:g} m is too narrow for a slot of {slot:.4g} m and two slopes: {least:.4g} m at least "
+            f"would do, for slopes of 25 degrees over all of the depth {slot + 4.3 * depth:.3g} m"
+        )
+
+
 def _check(bed: Bed, grain: float, slot: float) -> None:
     if bed.gravity[0] or bed.gravity[1] or not bed.gravity[2] < 0:
         raise ValueError(f"gravity = {bed.gravity} m/s2: a level bed under gravity is needed")
     if not 3 * grain <= slot < math.inf:
         raise ValueError(f"slot = {slot:g} m is narrower than three grains, {3 * grain:.4g} m: grains would bridge it")
-    least = slot + 2 * LEAST_FLANK * grain
-    if bed.size[0] < least:
-        raise ValueError(
-            f"the bed is {bed.size[0]:g} m wide in x, a slot of {slot:.4g} m and two slopes need {least:.4g} m at least"
-        )
+    check_width(bed.size[0], slot=slot, grain=grain, depth=bed.surface)
 
 
 def _set_on_plate(bed: Bed, grain: float, slot: float, *, rough: bool) -> float:

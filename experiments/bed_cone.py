@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from .bed_test_settings import BedConeSettings
-from .bed_tests import about, carry_out, check_bed, spread_of, write_frame
+from .bed_tests import about, carry_out, check_bed, quantity, write_frame
 from .progress import Progress
 from .runfolder import RunFolder
 from .whole_runs import whole_run
@@ -109,14 +110,15 @@ def _smooth(values: np.ndarray) -> np.ndarray:
 
 
 def _result(runs: list[dict[str, Any]]) -> dict[str, Any]:
-    def of(key: str, unit: str, note: str) -> dict[str, Any]:
-        return spread_of([run[key] for run in runs], unit, note)
-
+    of = partial(quantity, runs)
     one = runs[0]
-    weight = [run["gradient"] / (run["packing_fraction"] * run["density"] * run["gravity"]) for run in runs]
+
+    def over_weight(run: dict[str, Any]) -> float:
+        return run["gradient"] / (run["packing_fraction"] * run["density"] * run["gravity"])
+
     quantities = {
         "gradient": of("gradient", "Pa/m", "of the cone index with the depth of the cone's base, least squares"),
-        "gradient_over_weight": spread_of(weight, "1", "the same over the bed's unit weight"),
+        "gradient_over_weight": of(over_weight, "1", "the same over the bed's unit weight"),
         "index_at_end": of("index_at_end", "Pa", f"cone index, last tenth of the way to {1e3 * one['depth']:.3g} mm"),
         "index_at_half": of("index_at_half", "Pa", "cone index where the base is half as deep as at the end"),
         "index_at_surface": of("start", "Pa", "where the line begins, base at the surface"),

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import asdict
+from functools import partial
 from typing import Any
 
 from .bed_test_settings import BedCutSettings
-from .bed_tests import about, carry_out, check_bed, spread_of, write_frame
+from .bed_tests import about, carry_out, check_bed, quantity, write_frame
 from .progress import Progress
 from .runfolder import RunFolder
 from .whole_runs import whole_run
@@ -77,24 +78,25 @@ def _carry_out(settings: BedCutSettings, folder: RunFolder, progress: Progress) 
 def _result(runs: list[dict[str, Any]], friction_angle: float | None) -> dict[str, Any]:
     from dem.cutting import LEAST, MOST, cohesion_of
 
-    def of(key: str, unit: str, note: str) -> dict[str, Any]:
-        return spread_of([run[key] for run in runs], unit, note)
+    of = partial(quantity, runs)
 
     def cohesion(run: dict[str, Any], angle: float, key: str = "critical_height") -> float | None:
         return None if run[key] is None else cohesion_of(run[key], run["unit_weight"], angle)
 
-    half = [None if run["critical_height"] is None else 0.5 * (run["high"] - run["low"]) for run in runs]
+    def half(run: dict[str, Any]) -> float | None:
+        return None if run["critical_height"] is None else 0.5 * (run["high"] - run["low"])
+
     quantities = {
-        "critical_height": spread_of(
-            [run["critical_height"] for run in runs],
+        "critical_height": of(
+            "critical_height",
             "m",
             "of a vertical face at the bed's own gravity; null where no face stood, or none fell",
             error=half,
         ),
         "stands_to": of("low", "m", "largest height that stood, at the bed's own gravity"),
         "falls_from": of("high", "m", "least height that fell, likewise"),
-        "cohesion": spread_of(
-            [None if friction_angle is None else cohesion(run, friction_angle) for run in runs],
+        "cohesion": of(
+            lambda run: None if friction_angle is None else cohesion(run, friction_angle),
             "Pa",
             "give friction_angle, as bed test shear has it"
             if friction_angle is None

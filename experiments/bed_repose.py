@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict
+from functools import partial
 from typing import Any
 
 from .bed_test_settings import BedReposeSettings
-from .bed_tests import about, carry_out, check_bed, spread_of, write_frame
+from .bed_tests import about, carry_out, check_bed, quantity, write_frame
 from .progress import Progress
 from .runfolder import RunFolder
 from .whole_runs import whole_run
 
-__all__ = ["check", "resume", "run"]
+__all__ = ["BEARING", "check", "resume", "run"]
 
-_BEARING = 2.0
+BEARING = 2.0
 """Pressure over what lies on the floor [1]: a bed that drains bears no more than itself."""
 _SHORT = 6.0
 """A fitted stretch shorter than this leaves the slope to chance [mean diameters]; a guess."""
@@ -22,18 +23,11 @@ _SHORT = 6.0
 
 def check(settings: BedReposeSettings) -> None:
     """Raise ValueError for a bed that is none, not level, or too narrow for two slopes."""
-    from dem.repose import LEAST_FLANK, SLOT
+    from dem.repose import check_width
 
     check_bed(settings)
-    if settings.bed is not None:
-        return
-    slot = SLOT * settings.grain if settings.slot is None else settings.slot
-    least = slot + 2 * LEAST_FLANK * settings.grain
-    if settings.size[0] < least:
-        raise ValueError(
-            f"size: x = {settings.size[0]:g} m is too narrow for a slot of {slot:.4g} m and two slopes: {least:.4g} m "
-            f"at least would do, for slopes of 25 degrees over all of the depth {slot + 4.3 * settings.size[2]:.3g} m"
-        )
+    if settings.bed is None:
+        check_width(settings.size[0], slot=settings.slot, grain=settings.grain, depth=settings.size[2])
 
 
 def _carry_out(settings: BedReposeSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
@@ -70,20 +64,18 @@ def _carry_out(settings: BedReposeSettings, folder: RunFolder, progress: Progres
         test=test,
         result=_result,
         report="vis.bed_repose:write_repose_report",
-        bearing=_BEARING,
+        bearing=BEARING,
     )
 
 
 def _result(runs: list[dict[str, Any]]) -> dict[str, Any]:
-    def of(key: str, unit: str, note: str) -> dict[str, Any]:
-        return spread_of([run[key] for run in runs], unit, note)
-
+    of = partial(quantity, runs)
     quantities = {
-        "angle_of_repose": spread_of(
-            [run["angle"] for run in runs],
+        "angle_of_repose": of(
+            "angle",
             "degrees",
             "drained; mean of two slopes a run, fitted from three diameters to four fifths of the crest's height",
-            error=[run["error"] for run in runs],
+            error="error",
         ),
         "crest": of("crest", "m", "height of what stayed"),
         "drained": of("drained", "1", "grains that fell out"),

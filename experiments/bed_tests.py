@@ -11,15 +11,18 @@ from typing import Any
 import numpy as np
 
 from dem.bedfile import find_bed, load_prepared
+from dem.materials import Material
 from hedgebed import __version__
 
 from .bed_progress import BedProgress
 from .bed_test_settings import BedTestSettings
+from .fit import spread
+from .kept_material import keep_material
 from .progress import Progress
 from .runfolder import RunFolder
 from .stopping import held_back
 
-__all__ = ["about", "check_bed", "carry_out", "spread_of", "write_frame"]
+__all__ = ["about", "check_bed", "carry_out", "quantity", "stiff_enough", "write_frame"]
 
 Run = dict[str, Any]
 _PACKING = 0.6  # about, to reckon what lies on the floor
@@ -43,31 +46,48 @@ def check_bed(settings: BedTestSettings) -> None:
         raise ValueError(f"bed = {settings.bed!r} was cut or tilted: a level one would do")
 
 
-def _soft(settings: BedTestSettings, bearing: float) -> float:
-    """Young's modulus of grains that bear the rain and ``bearing`` times what lies on the floor [Pa]."""
-    from dem.materials import material
+def stiff_enough(
+    stuff: Material, *, depth: float, grain: float, spread: float, gravity: float, bearing: float
+) -> float:
+    """Young's modulus of grains that bear the rain and ``bearing`` times what lies on the floor [Pa].
+
+    Args:
+        depth: of the bed [m]. grain, spread: mean diameter [m], and half the width of the sizes over it [1].
+        gravity: [m/s2].
+    """
     from dem.packing import rain_column
     from dem.sizes import Uniform
     from dem.timestep import choose_young
 
-    stuff, depth = material(settings.material), settings.size[2]
     return choose_young(
         stuff,
-        pressure=bearing * _PACKING * stuff.density * settings.gravity * depth,
-        speed=math.sqrt(2 * settings.gravity * rain_column(Uniform(settings.grain, settings.spread)) * depth),
+        pressure=bearing * _PACKING * stuff.density * gravity * depth,
+        speed=math.sqrt(2 * gravity * rain_column(Uniform(grain, spread)) * depth),
         max_overlap=0.05,
-        diameter=settings.grain,
+        diameter=grain,
     )
 
 
 def _beds(settings: BedTestSettings, bearing: float | None) -> Iterator[tuple[str, Callable[[Progress | None], Any]]]:
     """Name of each bed, and what makes it, anew whenever it is called; told where to show how far it is."""
     from dem import Bed
+    from dem.materials import material
 
     if settings.bed is not None:
         given = settings.bed
         yield "bed", lambda progress: load_prepared(find_bed(given), threads=settings.threads).bed
         return
+
+    young = None
+    if bearing is not None:
+        young = stiff_enough(
+            material(settings.material, grain=settings.grain),
+            depth=settings.size[2],
+            grain=settings.grain,
+            spread=settings.spread,
+            gravity=settings.gravity,
+            bearing=bearing,
+        )
 
     def prepared(seed: int, progress: Progress | None) -> Any:
         try:
@@ -80,7 +100,7 @@ def _beds(settings: BedTestSettings, bearing: float | None) -> Iterator[tuple[st
                     packing=settings.packing,
                     gravity=settings.gravity,
                     seed=seed,
-                    young=None if bearing is None else _soft(settings, bearing),
+                    young=young,
                     threads=settings.threads,
                     progress=progress and BedProgress(progress, f"bed of seed {seed}", asked_to_stop),
                 )
@@ -112,8 +132,10 @@ def carry_out(
         bearing: pressure of the test over what lies on the floor [1], for which the grains of prepared beds are made
             stiff enough; None: stiff enough for a tip in half the bed's depth, as ``Bed.prepare`` has it.
     """
-    names = [name for name, _ in _beds(settings, bearing)]
     with folder.lock():
+        if settings.bed is None:
+            settings = settings.model_copy(update={"material": keep_material(settings.material, folder.path)})
+        names = [name for name, _ in _beds(settings, bearing)]
         costs = {} if settings.bed is not None else {f"bed of {name.replace('seed', 'seed ')}": 2.0 for name in names}
         progress.plan(costs | {f"test of {name}": float(copies) for name in names}, seconds={"report": 5.0})
         runs: list[Run] = []
@@ -169,20 +191,27 @@ def about(bed: Any) -> Run:
     }
 
 
-def spread_of(
-    values: Sequence[float | None], unit: str, note: str, *, error: Sequence[float | None] = ()
-) -> dict[str, Any]:
-    """An entry of quantities: mean of the runs and their standard deviation; of one run its ``error``, if any."""
-    known = [value for value in values if value is not None and math.isfinite(value)]
-    own = [e for value, e in zip(values, error, strict=False) if value is not None]
+Of = str | Callable[[Run], float | None]
+"""What of a run: a key, or a function."""
+
+
+def quantity(runs: Sequence[Run], of: Of, unit: str, note: str, *, error: Of | None = None) -> dict[str, Any]:
+    """An entry of quantities: mean of the runs and their standard deviation; of one run its own ``error``, if any."""
+
+    def number(run: Run, what: Of) -> float | None:
+        value = run[what] if isinstance(what, str) else what(run)
+        return float(value) if value is not None and math.isfinite(value) else None
+
+    known = [run for run in runs if number(run, of) is not None]
     if not known:
         return {"value": None, "std": None, "unit": unit, "note": note}
-    std: float | None = None
-    if len(known) > 1:
-        std, note = float(np.std(known, ddof=1)), f"{note}; std: between {len(known)} runs"
-    elif own and own[0] is not None:
-        std, note = float(own[0]), f"{note}; std: error of the one run"
-    return {"value": float(np.mean(known)), "std": std, "unit": unit, "note": note}
+    values = [value for run in known if (value := number(run, of)) is not None]
+    std = spread(values)
+    if std is not None:
+        note = f"{note}; std: between {len(values)} runs"
+    elif error is not None and (std := number(known[0], error)) is not None:
+        note = f"{note}; std: error of the one run"
+    return {"value": float(np.mean(values)), "std": std, "unit": unit, "note": note}
 
 
 def write_frame(folder: RunFolder, name: str, bed: Any) -> None:

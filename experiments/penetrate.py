@@ -23,6 +23,7 @@ from .amended import read_law
 from .amended_runs import keep_model, kept_law, run_beside, run_without_bed
 from .bed_progress import BedProgress
 from .findings import Findings, bed_entry, bed_quantities
+from .kept_material import MATERIAL_COPY, keep_material
 from .kept_runs import read_run, write_run
 from .memory import memory_there
 from .progress import Progress
@@ -68,7 +69,9 @@ def run(settings: PenetrateSettings, folder: str | Path, *, progress: Progress |
 def resume(folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
     """Finish the run in `folder`. Raises ValueError where there is none; otherwise as `run`."""
     kept = RunFolder.open(Path(folder))
-    return _carry_out(PenetrateSettings(**kept.settings), kept, progress or Progress())
+    copy = kept.path / MATERIAL_COPY
+    given = kept.settings | ({"material": str(copy)} if copy.exists() else {})
+    return _carry_out(PenetrateSettings(**given), kept, progress or Progress())
 
 
 def check(settings: PenetrateSettings) -> None:
@@ -289,6 +292,7 @@ def prepare_bed(settings: PenetrateSettings, seed: int, young: float, progress: 
 def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
     if settings.ground == "spring-damper":
         return run_without_bed(settings, folder, progress)
+    settings = settings.model_copy(update={"material": keep_material(settings.material, folder.path)})
     softening = choose_softness(settings)
     units = plan_units(settings)
     with folder.lock():
@@ -525,7 +529,7 @@ def _conclude(
         "runs": entries,
         "fits": findings.fit_entries(),
         "departures": departures,
-        "bed": bed_entry(facts, settings, softening),
+        "bed": bed_entry(facts, settings, softening) | {"material": find_material(settings).name},
         "spike": asdict(make_spike(settings)) | {"load": settings.weight},
         "warnings": warnings,
     }

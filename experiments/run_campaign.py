@@ -138,18 +138,19 @@ def campaign_of(
         )
         trials.append(trial)
     kinds = {trial.mode for trial in trials}
+    material = str(result["bed"]["material"])
     fitted = {name: float(result["quantities"][name]["value"]) for name in ("stiffness", "damping")}
     tables = PenetrationCampaign(
         format="hedgehog-campaign/1",
         kind="penetration",
-        name=f"{1e3 * settings.tip_diameter:g} mm {settings.tip} in {settings.material}, bed of grains",
+        name=f"{1e3 * settings.tip_diameter:g} mm {settings.tip} in {material}, bed of grains",
         spike=SpikeTable(
             mass=settings.mass,
             diameter=settings.tip_diameter,
             tip=settings.tip,
             cone_angle=settings.cone_angle if settings.tip == "cone" else None,
         ),
-        surface=PenetrationSurface(kind=settings.material, granular=True, **fitted),
+        surface=PenetrationSurface(kind=material, granular=True, **fitted),
         uncertainty=PenetrationUncertainty(stiffness=UNKNOWN, damping=UNKNOWN),
         sensors=PenetrationSensors(
             depth=DepthSensor(std=(sensors.depth_std,)),

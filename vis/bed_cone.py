@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from vis.bed_tests import draw_grains, grains_of, height_of, said, write_test_report
+from vis.bed_tests import said, side_plot, write_test_report
 from vis.page import Tile
 from vis.plot_parts import Plot, legend_above, new_panels, shades
 from vis.style import MODEL, styled
@@ -76,19 +77,16 @@ def _indices(folder: Path, result: Mapping[str, Any]) -> Plot:
 
 def _side(folder: Path, result: Mapping[str, Any]) -> list[Plot]:
     run = result["runs"][0]
-    grains = grains_of(folder, run)
-    if grains is None:
-        return []
-    period = np.array(run["size"][:2])
-    away = grains["position"][:, :2] - np.array(run["place"])
-    away -= period * np.round(away / period)
-    behind = away[:, 1] > 0
-    part = {name: np.asarray(values)[behind] for name, values in grains.items()}
-    part["position"] = np.column_stack([away, grains["position"][:, 2]])[behind]
-    way = np.linalg.norm(part["displacement"], axis=1) / run["grain"]
-    with styled():
-        drawing, (axis,) = new_panels(1, height=height_of(part, float(period[0])))
-        shown = draw_grains(axis, part, period=float(period[0]), by=way, top=2.0)
+
+    def behind(grains: Mapping[str, Any]) -> dict[str, Any]:
+        period = np.array(run["size"][:2])
+        away = grains["position"][:, :2] - np.array(run["place"])
+        away -= period * np.round(away / period)
+        kept = {name: np.asarray(values) for name, values in grains.items()}
+        kept["position"] = np.column_stack([away, grains["position"][:, 2]])
+        return {name: values[away[:, 1] > 0] for name, values in kept.items()}
+
+    def draw(axis: Axes) -> None:
         tip, length, half = 1e3 * (run["surface"] - run["depth"]), 1e3 * run["length"], 5e2 * run["diameter"]
         top = axis.get_ylim()[1]
         axis.fill([0.0, half, -half], [tip, tip + length, tip + length], facecolor="#d9d9d9", edgecolor="black", lw=0.8)
@@ -97,12 +95,6 @@ def _side(folder: Path, result: Mapping[str, Any]) -> list[Plot]:
             [-shaft, shaft, shaft, -shaft], [tip + length, tip + length, top, top],
             facecolor="#d9d9d9", edgecolor="black", lw=0.8,
         )  # fmt: skip
-        drawing.colorbar(shown, ax=axis, shrink=0.8, extend="max", label="way since it was made [d]")
-    return [
-        Plot(
-            "side",
-            "The cone at its deepest",
-            "The half of the bed behind the cone's axis, grains coloured by how far each has moved.",
-            drawing,
-        )
-    ]
+
+    words = "The half of the bed behind the cone's axis, grains coloured by how far each has moved."
+    return side_plot(folder, run, draw, title="The cone at its deepest", caption=words, top=2.0, shown=behind)

@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 
 from vis.bed_repose import flank_lines
-from vis.bed_tests import draw_grains, grains_of, height_of, said, write_test_report
+from vis.bed_tests import said, side_plot, write_test_report
 from vis.page import Tile
 from vis.plot_parts import Plot, legend_above, new_panels, shades
 from vis.style import BED, MODEL, styled
@@ -56,25 +57,20 @@ def _plots(folder: Path, result: Mapping[str, Any]) -> list[Plot]:
 
 def _side(folder: Path, result: Mapping[str, Any]) -> list[Plot]:
     run = result["runs"][0]
-    grains = grains_of(folder, run)
-    if grains is None:
-        return []
-    way = np.linalg.norm(grains["displacement"], axis=1) / run["grain"]
-    with styled():
-        drawing, (axis,) = new_panels(1, height=height_of(grains, run["size"][0]))
-        shown = draw_grains(axis, grains, period=run["size"][0], by=way, top=5.0)
+
+    def draw(axis: Axes) -> None:
         high = 1e3 * run["height"]
         axis.set_ylim(top=max(axis.get_ylim()[1], 1.1 * high))
         for side in (-1, 1):
             axis.plot(2 * [5e2 * side * run["width"]], [0.0, high], color=MODEL, lw=1.2, ls="--")
         if run["flanks"]:
             flank_lines(axis, run, start=0.0, period=run["size"][0], colour=MODEL)
-        drawing.colorbar(shown, ax=axis, shrink=0.8, extend="max", label="way since it was made [d]")
+
     words = (
         "All grains from the side at the end, at the bed's own gravity, coloured by how far each has moved. Dashed: "
         "the faces as they were cut; lines: the slopes that were fitted, if one fell."
     )
-    return [Plot("side", "What became of the faces", words, drawing)]
+    return side_plot(folder, run, draw, title="What became of the faces", caption=words)
 
 
 def _profiles(folder: Path, result: Mapping[str, Any]) -> Plot:

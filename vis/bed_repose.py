@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from vis.bed_tests import draw_grains, grains_of, height_of, said, write_test_report
+from vis.bed_tests import said, side_plot, write_test_report
 from vis.page import Tile
 from vis.plot_parts import Plot, legend_above, new_panels, shades
 from vis.style import MODEL, styled
@@ -68,13 +68,8 @@ def _plots(folder: Path, result: Mapping[str, Any]) -> list[Plot]:
 
 def _side(folder: Path, result: Mapping[str, Any]) -> list[Plot]:
     run = result["runs"][0]
-    grains = grains_of(folder, run)
-    if grains is None:
-        return []
-    way = np.linalg.norm(grains["displacement"], axis=1) / run["grain"]
-    with styled():
-        drawing, (axis,) = new_panels(1, height=height_of(grains, run["size"][0]))
-        shown = draw_grains(axis, grains, period=run["size"][0], by=way, top=5.0)
+
+    def draw(axis: Axes) -> None:
         half, plate = 0.5 * run["slot"], run["plate"]
         flank_lines(axis, run, start=half, period=run["size"][0], colour=MODEL, base=plate)
         for side in (-1.0, 1.0):
@@ -82,13 +77,13 @@ def _side(folder: Path, result: Mapping[str, Any]) -> list[Plot]:
             heights = plate - 2.0 * run["grain"] * np.array([0.0, 1.0, 1.0, 0.0])
             axis.fill(1e3 * ends, 1e3 * heights, color="#444444", zorder=2)
         axis.set_title(f"{run['id']}: {run['flanks'][1]['angle']:.1f}° and {run['flanks'][0]['angle']:.1f}°")
-        drawing.colorbar(shown, ax=axis, shrink=0.8, extend="max", label="way since it was made [d]")
+
     words = (
         "All grains from the side, those in front over those behind, coloured by how far each has moved. Lines: the "
         "fitted slopes, dotted down to the plate; below it the pit with what drained. The lines follow the mean "
         "thickness over y, and single grains lie above them."
     )
-    return [Plot("side", "What the slot left", words, drawing)]
+    return side_plot(folder, run, draw, title="What the slot left", caption=words)
 
 
 def _profiles(folder: Path, result: Mapping[str, Any]) -> Plot:

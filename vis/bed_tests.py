@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from vis.frames import read_frames
 from vis.numbers import quote
 from vis.page import Page, Section, Tile, code, figure, table, text, write_page
-from vis.plot_parts import Plot
+from vis.plot_parts import Plot, new_panels
+from vis.style import styled
 
-__all__ = ["draw_grains", "grains_of", "height_of", "said", "write_test_report"]
+__all__ = ["said", "side_plot", "write_test_report"]
 
 Grains = Mapping[str, NDArray[Any]]
 
@@ -89,33 +90,45 @@ def said(entry: Mapping[str, Any], scale: float = 1.0, unit: str = "") -> str:
     return f"{quote(value)}{unit}" if std is None else f"{value:.3g} ± {scale * std:.1g}{unit}"
 
 
-def grains_of(folder: Path, run: Mapping[str, Any]) -> Grains | None:
-    """The grains of a run's last frame; None where there is none."""
-    frames = read_frames(folder, run["frames"])
-    return frames[len(frames) - 1].grains if len(frames) else None
-
-
-def height_of(grains: Grains, period: float) -> float:
-    """Height of a panel in which the grains fill its width, or nearly [inch]. ``period``: of the bed in x [m]."""
-    return min(5.5, 0.7 + 6.9 * float((grains["position"][:, 2] + grains["radius"]).max()) / period)
-
-
-def draw_grains(axis: Axes, grains: Grains, *, period: float, by: NDArray[np.float64], top: float) -> Any:
-    """The grains from the side, x against height in mm, those at the back first, within half a period of x = 0.
+def side_plot(
+    folder: Path,
+    run: Mapping[str, Any],
+    draw: Callable[[Axes], None],
+    *,
+    title: str,
+    caption: str,
+    top: float = 5.0,
+    shown: Callable[[Grains], Grains] = lambda grains: grains,
+) -> list[Plot]:
+    """The grains of a run's last frame from the side, coloured by how far each has moved; none where no frame is.
 
     Args:
-        period: of the bed in x [m]. by: what colours them, shape [grain_count]; ``top`` is the scale's end.
-
-    Returns:
-        The collection, for a colour bar.
+        draw: draws over them, in mm. top: end of the colours' scale [mean diameters].
+        shown: which grains, and where.
     """
+    frames = read_frames(folder, run["frames"])
+    if not len(frames):
+        return []
+    grains, period = shown(frames[len(frames) - 1].grains), float(run["size"][0])
+    highest = float((grains["position"][:, 2] + grains["radius"]).max())
+    with styled():
+        # The grains fill the panel's width, or nearly.
+        drawing, (axis,) = new_panels(1, height=min(5.5, 0.7 + 6.9 * highest / period))
+        drawn = _draw_grains(axis, grains, period=period, unit=run["grain"], top=top)
+        draw(axis)
+        drawing.colorbar(drawn, ax=axis, shrink=0.8, extend="max", label="way since it was made [d]")
+    return [Plot("side", title, caption, drawing)]
+
+
+def _draw_grains(axis: Axes, grains: Grains, *, period: float, unit: float, top: float) -> Any:
+    """The grains, x against height in mm, those at the back first, within half a period of x = 0, for a colour bar."""
     position, radius = grains["position"], grains["radius"]
     order = np.argsort(-position[:, 1])
     x = np.mod(position[order, 0] + 0.5 * period, period) - 0.5 * period
-    size = 2e3 * radius[order]
+    size, way = 2e3 * radius[order], np.linalg.norm(grains["displacement"][order], axis=1) / unit
     drawn = EllipseCollection(
         size, size, np.zeros(len(size)), units="xy", offsets=1e3 * np.column_stack([x, position[order, 2]]),
-        offset_transform=axis.transData, array=by[order], cmap="cividis", edgecolors="#00000055", linewidths=0.25,
+        offset_transform=axis.transData, array=way, cmap="cividis", edgecolors="#00000055", linewidths=0.25,
     )  # fmt: skip
     drawn.set_clim(0.0, top)
     axis.add_collection(drawn)

@@ -12,7 +12,7 @@ from dem.cutting import cohesion_of, cut_and_load
 from dem.penetrometer import ConePush, cone_gradient, cone_length, standard_speed
 from dem.repose import fit_flank
 from experiments.bed_test_settings import BedConeSettings, BedCutSettings, BedReposeSettings
-from experiments.bed_tests import spread_of
+from experiments.bed_tests import quantity
 from experiments.cli import BAD_INPUT, DONE, main
 from experiments.runfolder import read_series
 
@@ -54,9 +54,12 @@ def test_cohesion_of_a_critical_height_is_terzaghi_s():
 
 
 def test_the_spread_of_runs_and_the_error_of_one():
-    assert spread_of([1.0, 3.0], "m", "x", error=[9.0, 9.0])["std"] == pytest.approx(math.sqrt(2.0))
-    assert spread_of([1.0, None], "m", "x", error=[0.5, None])["std"] == 0.5
-    assert spread_of([None], "m", "x")["value"] is None
+    two = [{"a": 1.0, "e": 9.0}, {"a": 3.0, "e": 9.0}]
+    assert quantity(two, "a", "m", "x", error="e")["std"] == pytest.approx(2**0.5)
+    runs: list = [{"a": None, "e": 0.4}, {"a": 1.0, "e": 0.5}]
+    one = quantity(runs, "a", "m", "x", error="e")
+    assert one == {"value": 1.0, "std": 0.5, "unit": "m", "note": "x; std: error of the one run"}
+    assert quantity(runs[:1], lambda run: run["a"], "m", "x")["value"] is None
 
 
 @pytest.fixture(scope="module")
