@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from vis.folder import Run, RunFolder, Series
-from vis.numbers import column, plain, quote, short
+from vis.numbers import plain, quote, short
 from vis.plot_parts import (
     WIDTH,
     Plot,
@@ -109,10 +109,6 @@ def gap_plot(run: RunFolder) -> Plot | None:
     }
     for at, row in cells.items():
         difference[at] = row.difference
-    values = [float(cell) for cell in difference.ravel()]
-    spreads = [cells[at].bed_std if at in cells else None for at in np.ndindex(difference.shape)]
-    unit, words = column([*values, *spreads], "N")
-    words, apart = words[: len(values)], words[len(values) :]
     told = any(row.known for row in table)
     bound = float(np.nanmax(np.abs(difference))) or 1.0
     with styled():
@@ -131,29 +127,24 @@ def gap_plot(run: RunFolder) -> Plot | None:
         axis.grid(True, which="minor", color="white", lw=2.0)
         axis.tick_params(which="both", length=0)
         axis.spines[:].set_visible(False)
-        for ((i, j), cell), word, std in zip(np.ndenumerate(difference), words, apart, strict=True):
-            number = float(cell)
-            if not np.isfinite(number):
-                continue
-            row = cells[i, j]
-            text = f"{'+' if number > 0 else ''}{word} {unit}"
+        for (i, j), row in cells.items():
+            number = row.difference
+            text = f"{'+' if number > 0 else ''}{quote(number, row.bed_std, 'N', significant=2)}"
             if row.share is not None:
                 text += f"   ({_signed(100.0 * row.share, 2)} %)"
             if row.known:
-                text += f"\n{row.known}" + (f", ± {std} {unit} between them" if row.bed_std is not None else "")
-            dark = abs(number) > 0.62 * bound
+                text += f"\n{row.known}"
+            dark = number < -0.45 * bound or number > 0.75 * bound  # of the map, purple is the darker end
             axis.text(j, i, text, ha="center", va="center", fontsize=8.5, color="white" if dark else INK)
         bar = figure.colorbar(image, ax=axis, pad=0.015, fraction=0.05)
-        bar.set_label(f"spring-damper − bed [{unit}]")
+        bar.set_label("spring-damper − bed [N]")
         bar.outline.set_visible(False)
     return Plot(
         "gap",
         "Where the spring-damper departs",
         "Mean drag of the spring-damper minus the bed's on the way in, by depth and speed; in brackets as a share of "
         "the bed's. Orange: the spring-damper pushes back too hard; purple: too softly."
-        + (
-            " Below: how many beds it is of, and the standard deviation of the bed's drag between them." if told else ""
-        ),
+        + (" Below: of how many beds; ±: the standard deviation of the bed's drag between them." if told else ""),
         figure,
     )
 
