@@ -34,8 +34,8 @@ def _bare(hint: Any) -> Any:
     origin, inside = get_origin(hint), get_args(hint)
     if origin is Annotated:
         return _bare(inside[0])
-    if hint is int:
-        return float  # cyclopts would round 1.5 to 2; `as_typed` makes whole numbers of it again
+    if hint is int:  # cyclopts would round 1.5 to 2; `as_typed` makes whole numbers of it again
+        return Annotated[float, Parameter(metavar="INT")]
     if not inside or origin is Literal:
         return hint
     if origin in (Union, UnionType):

@@ -97,7 +97,7 @@ class Contact:
     rate: float
     slip: float
     load: float
-    """Normal force that presses [N], 0 where the ground pulls."""
+    """Normal force that presses [N], as friction sees it; 0 where the ground pulls."""
     h: float
     d: float
     friction_bound: float
@@ -214,9 +214,9 @@ class System:
             top, held = modes.deepest(n, depth)
             at = max(depth, crater * top * (1 + 1e-15) + _SLIGHT)  # touching: on the ground's side of the surface
             top, held = max(top, at), max(held, at)
-            elastic, lost, _, side, factor_s, factor_d = model.contact(p, s, self.q, at, rate, slip, top, held)
+            elastic, lost, _, side, factor_s, factor_d, grip = model.contact(p, s, self.q, at, rate, slip, top, held)
             normal = elastic + lost
-            load = max(normal, 0.0)
+            load = max(normal + grip, 0.0)
             power += lost * rate - side * slip
             if self.sheds and at >= top and rate > 0:
                 power += self._shed(at, slip, elastic) * rate
@@ -289,10 +289,10 @@ class System:
             return 0.0, 0.0
 
         def load(z: float, rate: float) -> float:
-            elastic, lost, *_ = self.model.contact(
+            elastic, lost, *_, grip = self.model.contact(
                 self.p, self.s, self.q, z, rate, contact.slip, max(top, z), max(held, z)
             )
-            return elastic + lost
+            return elastic + lost + grip
 
         rate, dr = contact.rate, 1e-6 * abs(contact.rate) + 1e-12
         by_rate = (load(depth, rate + dr) - load(depth, rate - dr)) / (2 * dr)

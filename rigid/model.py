@@ -16,7 +16,7 @@ the numbers of the ground's law:
   inertia, the force on it, and what is positive while its mode holds;
 - ``crater(p)``: share of the deepest depth at which a spike on the way up leaves the ground;
 - ``contact(p, s, q, depth, rate, slip, top, held)``: elastic normal force, dissipative normal force, stored energy,
-  tangential drag, factors on mu_s and mu_d.
+  tangential drag, factors on mu_s and mu_d, load that friction sees beside the normal force.
 """
 
 from __future__ import annotations
@@ -212,7 +212,9 @@ def model_source(terms: Sequence[Term], law: SurfaceLaw) -> str:
     out += ["    factor_s = 1.0", "    factor_d = 1.0"]
     for call in _calls(every, "friction_factor", "s, slip"):
         out += [f"    more_s, more_d = {call}", "    factor_s = factor_s * more_s", "    factor_d = factor_d * more_d"]
-    out += ["    return elastic, lost, stored, side, factor_s, factor_d\n"]
+    out += ["    grip = 0.0"]
+    out += [f"    grip = grip + {call}" for call in _calls(every, "grip", "s, depth, held")]
+    out += ["    return elastic, lost, stored, side, factor_s, factor_d, grip\n"]
     return "\n".join(out)
 
 

@@ -80,6 +80,12 @@ def _drag(values: Mapping[str, Array]) -> Columns:
     return found | {"inertial-drag.power": 2.0 + np.asarray(values["inertial-drag.power_change"], dtype=float)}
 
 
+def _gripping(values: Mapping[str, Array], *, reach: float) -> Columns:
+    force = np.asarray(values["adhesion.force"], dtype=float)
+    log_reach = np.asarray(values["adhesion.log_reach"], dtype=float)
+    return {"adhesion.force": force, "adhesion.reach": reach * np.exp(log_reach), "adhesion.grip": np.ones_like(force)}
+
+
 def _scaled(
     amplitude: str, scale: str, typical: float, *, shift: float = 0.0, log: str
 ) -> Callable[[Mapping[str, Array]], Columns]:
@@ -108,6 +114,7 @@ def tumble_forms(
         own: effects from files.
     """
     force, moment = 0.02 * weight, 0.005 * weight
+    pulls = tuple({"adhesion.force": a * force, "adhesion.log_reach": s} for a, s in ((3, 0.0), (10, 1.5), (10, -1.0)))
     forms = [
         TumbleForm(
             effect="wheel-vibration",
@@ -246,9 +253,18 @@ def tumble_forms(
                 _log("adhesion.log_reach"),
             ),
             physical=_scaled("adhesion.force", "adhesion.reach", max(sinkage, 1e-6), log="adhesion.log_reach"),
-            starts=tuple(
-                {"adhesion.force": a * force, "adhesion.log_reach": s} for a, s in ((3, 0.0), (10, 1.5), (10, -1.0))
+            starts=pulls,
+        ),
+        TumbleForm(
+            effect="adhesion",
+            name="that friction does not lose",
+            amplitude="adhesion.force",
+            parameters=(
+                _free("adhesion.force", "N", force, lowest=0.0, highest=20 * weight),
+                _log("adhesion.log_reach"),
             ),
+            physical=partial(_gripping, reach=max(sinkage, 1e-6)),
+            starts=pulls,
         ),
         TumbleForm(
             effect="rate-friction",

@@ -41,6 +41,7 @@ _SHAPES: Mapping[str, _Shape] = {
     "clock-offset:constant": _Shape("clock-offset.drift", 0.0, 0.01, -0.2, 0.2),
     "camera-scale:same in x and y": _Shape("camera-scale.bend", 0.0, 0.5, -10.0, 10.0, "1/m2"),
     "adhesion:mobilised": _Shape("adhesion.sharpness", 0.0, 0.7, -1.0, 2.0),
+    "adhesion:that friction does not lose": _Shape("adhesion.sharpness", 0.0, 0.7, -1.0, 2.0),
 }
 """By the id of the plain form."""
 

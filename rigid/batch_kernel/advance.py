@@ -217,11 +217,11 @@ def make_advance(parts: SimpleNamespace) -> Any:
                         rate = -(py + pt * d)
                         slip = px - pt * h
                         at = ti.max(depth, crater * deepest * (1.0 + 1e-15) + 1e-300)
-                        elastic, lost, stored, side, factor_s, factor_d = contact(
+                        elastic, lost, stored, side, factor_s, factor_d, grip = contact(
                             p, s, q, at, rate, slip, ti.max(deepest, at), ti.max(since, at)
                         )
                         normal = elastic + lost
-                        press = ti.max(normal, 0.0)
+                        press = ti.max(normal + grip, 0.0)
                         fx += side
                         fy += normal
                         ft += normal * d - side * h

@@ -32,7 +32,9 @@ def make_stand(parts: SimpleNamespace) -> Any:
             low, high = 0.0, s.length
             for _ in range(200):  # the depth at which a row carries half the weight
                 middle = 0.5 * (low + high)
-                elastic, lost, stored, side, factor_s, factor_d = contact(p, s, q, middle, 0.0, 0.0, middle, middle)
+                elastic, lost, stored, side, factor_s, factor_d, grip = contact(
+                    p, s, q, middle, 0.0, 0.0, middle, middle
+                )
                 if elastic < share:
                     low = middle
                 else:
@@ -71,8 +73,10 @@ def make_stand(parts: SimpleNamespace) -> Any:
                         h, d = arms(ti.cos(angle), ti.sin(angle), s.length, radius)
                         z = h - at_y
                         in_z = ti.max(z, 1e-300)
-                        elastic, lost, stored, side, factor_s, factor_d = contact(p, s, q, in_z, 0.0, 0.0, in_z, in_z)
-                        press = ti.max(elastic, 0.0)
+                        elastic, lost, stored, side, factor_s, factor_d, grip = contact(
+                            p, s, q, in_z, 0.0, 0.0, in_z, in_z
+                        )
+                        press = ti.max(elastic + grip, 0.0)
                         fy += elastic
                         ft += elastic * d
                         load += press

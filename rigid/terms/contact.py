@@ -102,6 +102,18 @@ def held_back(s, depth, held, force, reach, sharpness):
     return pull, work
 
 
+def gripping(s, depth, held, force, reach, sharpness, grip):
+    """The share `grip` of the same pull, which presses the tip and the ground together all the same."""
+    more = 0.0
+    if force != 0.0 and grip != 0.0:
+        x = max(held - depth, 0.0) / reach
+        left = exp(-x)
+        twice = left * left
+        share = (1.0 - sharpness) * (1.0 - left) + sharpness * (1.0 - twice) / (1.0 + twice)
+        more = grip * force * share
+    return more
+
+
 def rate_friction_factor(s, slip, change, speed, power):
     """mu_d (1 + c |u|^p / (|u|^p + u_0^p)): grows (c > 0) or falls (c < 0) and saturates."""
     u = abs(slip)
@@ -185,10 +197,14 @@ CONTACT_EFFECTS: tuple[Term, ...] = (
                       summary="retreat over which it is mobilised"),
             Parameter(name="sharpness", unit="1", default=0.0, lowest=-1.0, highest=2.5,
                       summary="m: 0 as 1 - exp, 1 as tanh of the retreat over that reach"),
+            Parameter(name="grip", unit="1", default=0.0, lowest=0.0, highest=1.0,
+                      summary="share of the pull that friction does not lose: at 0 its bound goes with the net normal "
+                              "force, at 1 with what the ground presses alone"),
         ),
-        source="pull-off force of cohesive ground; mobilised over a distance so that rest is well defined",
-        limits="breaks where the tip leaves the surface; friction does not see the pull",
-        hooks={"hold": held_back},
+        source="pull-off force of cohesive ground; mobilised over a distance so that rest is well defined; friction "
+               "of what sticks together goes with the load and the adhesion (Derjaguin 1934, Z. Phys. 88:661)",
+        limits="breaks where the tip leaves the surface",
+        hooks={"hold": held_back, "grip": gripping},
     ),
     Term(
         id="rate-friction", summary="friction depends on the sliding speed", acts="mu_d",

@@ -22,6 +22,7 @@ the fixed ones listed below, then the term's own parameters, by name, in any num
 | `unload`             | depth, top, force         | that force [N] where the tip has been down to `top`, altered, |
 |                      |                           | at `top` itself it is left; not on laws with a memory        |
 | `hold`               | s, depth, held            | pull [N], energy stored [J]; held: deepest since it touched   |
+| `grip`               | s, depth, held            | load that friction sees beside the normal force [N]          |
 | `rate_force`         | s, depth, rate            | normal force [N] that dissipates, by the rate of sinking     |
 | `side_force`         | s, depth, slip            | tangential force [N] on the tip against its slip speed       |
 | `friction_factor`    | s, slip                   | factors on mu_s and mu_d [1]                                 |
@@ -62,6 +63,7 @@ FIXED_ARGUMENTS: dict[str, tuple[str, ...]] = {
     "stiffen": ("depth", "force", "work"),
     "unload": ("depth", "top", "force"),
     "hold": ("s", "depth", "held"),
+    "grip": ("s", "depth", "held"),
     "rate_force": ("s", "depth", "rate"),
     "side_force": ("s", "depth", "slip"),
     "friction_factor": ("s", "slip"),

@@ -27,7 +27,7 @@ VALUES = {
     "tip-radius": {"radius": 0.011},
     "depth-hardening": {"exponent": 1.35, "reference": 2e-3, "bend": 60.0},
     "plastic-sinkage": {"share": 0.25, "bend": 0.6},
-    "adhesion": {"force": 0.8, "reach": 3e-3, "sharpness": 0.6},
+    "adhesion": {"force": 0.8, "reach": 3e-3, "sharpness": 0.6, "grip": 0.7},
     "inertial-drag": {"normal": 40.0, "sideways": 7.0, "power": 1.7},
     "wire-compliance": {"stiffness": 3e3, "damping": 25.0},
 }
@@ -98,13 +98,14 @@ class Derived:
             stored = trial.stiffness * (z ** (2 + e) / (2 + e) + b * z ** (3 + e) / (3 + e)) / (z0 ** (e - a) * TOP**a)
             if "plastic-sinkage" in on:
                 stored *= 1 - f
-            force = -sp.diff(stored, Y)  # on y, of depth alone
+            force, grip = -sp.diff(stored, Y), sp.Integer(0)  # on y, of depth alone; what friction sees beside it
             if "adhesion" in on:
                 a, reach, m_s = on["adhesion"]["force"], on["adhesion"]["reach"], on["adhesion"]["sharpness"]
                 x = (TOP - depth) / reach
                 held = a * reach * ((1 - m_s) * (x - 1 + sp.exp(-x)) + m_s * sp.log(sp.cosh(x)))
                 stored += held
                 force += -sp.diff(held, Y)
+                grip = on["adhesion"]["grip"] * sp.diff(held, Y)
             energy += stored
             drag = on.get("inertial-drag", {"normal": 0, "sideways": 0, "power": 2})
             lost = sp.Integer(0)
@@ -116,10 +117,12 @@ class Derived:
                     work[k] -= inert * sp.diff(sink, SPEED[k])
             # The horizontal speed of the material point that touches: the ball turns with the platform.
             slide = U - W * ((length - r) * sp.cos(gamma) + r)
-            side = -drag["sideways"] * sp.Abs(slide) * slide - slip.get(n, 0) * trial.sliding_friction * (force + lost)
+            side = -drag["sideways"] * sp.Abs(slide) * slide - slip.get(n, 0) * trial.sliding_friction * (
+                force + lost + grip
+            )
             for k in range(3):
                 work[k] += side * sp.diff(slide, SPEED[k])
-            self.slips[n], self.loads[n] = slide, force + lost
+            self.slips[n], self.loads[n] = slide, force + lost + grip
         M = sp.Matrix(size, size, lambda i, k: sp.diff(T, speed[i], speed[k]))
         right = sp.Matrix(
             [sp.diff(T, pose[k]) - dot(sp.diff(T, speed[k])) - sp.diff(energy, pose[k]) - sp.diff(D, speed[k]) + work[k]
