@@ -168,7 +168,10 @@ def work_plot(run: RunFolder) -> Plot | None:
                 mean, spread = by_speed(driven, speeds, prefix + key, 1e3)
                 where = np.arange(len(speeds)) + shift
                 axis.bar(where, mean, 0.36, color=colour, hatch="///" if prefix else "", edgecolor="white", lw=0.6)
-                axis.errorbar(where, mean, spread, fmt="none", ecolor=INK, elinewidth=1.0, capsize=3)
+                if prefix:
+                    spread = np.zeros_like(spread)  # one law: its runs differ in where they start only
+                else:
+                    axis.errorbar(where, mean, spread, fmt="none", ecolor=INK, elinewidth=1.0, capsize=3)
                 for x, y, s in zip(where, mean, np.nan_to_num(spread), strict=True):
                     if np.isfinite(y):
                         _above(axis, x, max(y, 0.0) + s, plain(y, 2 if abs(y) < 0.1 else 3))

@@ -146,8 +146,10 @@ def set_down_plot(run: RunFolder) -> Plot | None:
         axis = figure.add_subplot()
         end, begin = 1.15 * max(_settled(r) + _touch(r.bed) for r in sets if r.bed is not None), 0.0
         dots = 0
-        for r in sets:
-            for series, colour, style in ((r.bed, BED, "-"), (r.model, MODEL, (0, (4, 2)))):
+        for i, r in enumerate(sets):
+            # One law: its runs differ in where they start only, and dashes that overlap look like a full line.
+            model = None if any(s.model is not None for s in sets[:i]) else r.model
+            for series, colour, style in ((r.bed, BED, "-"), (model, MODEL, (0, (4, 2)))):
                 if series is not None:
                     shown = (series.time <= end) & (series.time >= -0.1 * end)
                     axis.plot(1e3 * series.time[shown], 1e3 * series.depth[shown], color=colour, ls=style, lw=1.4)
@@ -163,6 +165,8 @@ def set_down_plot(run: RunFolder) -> Plot | None:
             depths = [1e3 * n for r in sets if (n := number_of(r.quantities, key)) is not None]
             if depths:
                 spread = float(np.std(depths, ddof=1)) if len(depths) > 1 else None
+                if what != "bed":  # one law here; between beds it is the fits that differ
+                    spread = _std_of(run, "sinkage_spring_damper", 1e3)
                 rests.append((float(np.mean(depths)), spread, what, colour))
         axis.invert_yaxis()
         low, high = sorted(axis.get_ylim())
@@ -173,9 +177,7 @@ def set_down_plot(run: RunFolder) -> Plot | None:
             if spread:
                 axis.axhspan(depth - spread, depth + spread, color=colour, alpha=0.12, lw=0)
             last = max(depth, last + gap)
-            # one law: its beds differ in their start only
-            known = None if what != "bed" and spread is not None and spread < 0.005 else spread
-            number = quote(1e-3 * depth, None if known is None else 1e-3 * known, "m", significant=2)
+            number = quote(1e-3 * depth, None if spread is None else 1e-3 * spread, "m", significant=2)
             axis.text(1.01, last, f"{what}: {number}", color=colour, va="center", transform=axis.get_yaxis_transform())
         axis.set_xlim(1e3 * begin, 1e3 * end)
         axis.axhline(0.0, color=GREY, lw=0.8)
@@ -267,6 +269,14 @@ def spread_plot(run: RunFolder) -> Plot | None:
 
 
 # ---- parts ---------------------------------------------------------------------------------------------------------
+
+
+def _std_of(run: RunFolder, name: str, scale: float) -> float | None:
+    """The standard deviation of a quantity of the run; None where unknown."""
+    quantities = run.result.get("quantities")
+    entry = quantities.get(name) if isinstance(quantities, dict) else None
+    std = entry.get("std") if isinstance(entry, dict) else None
+    return scale * std if isinstance(std, int | float) and std > 0 else None
 
 
 def _unit_label(title: str, unit: str) -> str:
