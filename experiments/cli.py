@@ -78,6 +78,7 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
         out: Path | None = None,
         json: bool = False,
         quiet: bool = False,
+        verbose: bool = False,
         **given: Any,
     ) -> int:
         with refusing():
@@ -99,7 +100,7 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
         def work(progress: Progress) -> dict[str, Any]:
             return experiment.run(settings, folder.path, progress=progress)
 
-        return carry_out(folder, work, as_json=json, quiet=quiet)
+        return carry_out(folder, work, as_json=json, quiet=quiet, verbose=verbose)
 
     flags = [
         inspect.Parameter(
@@ -120,7 +121,8 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
         about = Parameter(help="The other of the two.", negative="", show_default=False)
         parameters.append(first.replace(name="other", annotation=Annotated[Path | None, about]))
     parameters += [option_of(name, field) for name, field in fields.items() if name != experiment.subject]
-    parameters += [*flags, reserved_option("out"), reserved_option("json"), reserved_option("quiet")]
+    parameters += [*flags, *map(reserved_option, ("out", "json", "quiet"))]
+    parameters += [reserved_option("verbose")] if experiment.headline else []
     command.__signature__ = inspect.Signature(parameters, return_annotation=int)  # type: ignore[attr-defined]
     command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     command.__name__ = experiment.name.replace(" ", "_")
@@ -138,6 +140,7 @@ def _stray(word: str, settings_class: type[BaseModel]) -> str:
 
 _Json = Annotated[bool, Parameter(help="Print the result as JSON on stdout and nothing else.", negative="")]
 _Quiet = Annotated[bool, Parameter(help="Show no progress.", negative="")]
+_Verbose = Annotated[bool, Parameter(help="Print every number and finding, as the report has them.", negative="")]
 
 
 def _resume(
@@ -146,6 +149,7 @@ def _resume(
     *,
     json: _Json = False,
     quiet: _Quiet = False,
+    verbose: _Verbose = False,
 ) -> int:
     """Finish a run that was stopped, failed or killed, from its last checkpoint."""
     with refusing():
@@ -156,10 +160,14 @@ def _resume(
             pass
     if run.status == "done" and (folder / "result.json").exists():
         say(f"the run in {folder} is done")
-        return show_folder(run, as_json=json)
+        return show_folder(run, as_json=json, verbose=verbose)
     if run.version != __version__:
         say(f"warning: the run was begun by version {run.version}, this is {__version__}")
-    return carry_out(run, lambda progress: experiment.resume(run.path, progress=progress), as_json=json, quiet=quiet)
+
+    def work(progress: Progress) -> dict[str, Any]:
+        return experiment.resume(run.path, progress=progress)
+
+    return carry_out(run, work, as_json=json, quiet=quiet, verbose=verbose)
 
 
 def _bench(

@@ -19,6 +19,7 @@ _RESERVED = {
     "out": (Path | None, None, "The run's folder; runs/<command>-<time> if not given."),
     "json": (bool, False, "Print result.json on stdout and nothing else."),
     "quiet": (bool, False, "Show no progress."),
+    "verbose": (bool, False, "Print every number and finding in the end, as the report has them."),
 }
 
 

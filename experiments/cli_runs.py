@@ -3,6 +3,7 @@
 import math
 import shutil
 import sys
+import textwrap
 import traceback
 from collections.abc import Callable
 from typing import Any
@@ -11,7 +12,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from experiments import registry
 from experiments.cli_streams import RefusedError, say, stdout_to_stderr
+from experiments.headline import Headline
 from experiments.progress import Progress, make_progress
 from experiments.runfolder import RunFolder, write_text
 from vis.numbers import digits_for
@@ -22,7 +25,14 @@ DONE, FAILED, BAD_INPUT, STOPPED = 0, 1, 2, 3
 """Exit statuses of the command line."""
 
 
-def carry_out(folder: RunFolder, work: Callable[[Progress], dict[str, Any]], *, as_json: bool, quiet: bool) -> int:
+def carry_out(
+    folder: RunFolder,
+    work: Callable[[Progress], dict[str, Any]],
+    *,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool = False,
+) -> int:
     """Do the `work` of a run whose folder is there; keep its status; show what came out."""
     say(f"run folder {folder.path}")
     fresh = not folder.has_work
@@ -61,15 +71,18 @@ def carry_out(folder: RunFolder, work: Callable[[Progress], dict[str, Any]], *, 
             traceback.print_exc()
             say(f"failed; what there was is in {folder.path}")
             return FAILED
-    return show_folder(folder, as_json=as_json)
+    return show_folder(folder, as_json=as_json, verbose=verbose)
 
 
-def show_folder(folder: RunFolder, *, as_json: bool) -> int:
-    """Show the result of a finished run on stdout, as JSON or as a table; return the exit status."""
+def show_folder(folder: RunFolder, *, as_json: bool, verbose: bool = False) -> int:
+    """Show the result of a finished run on stdout, as JSON or as a table; return the exit status.
+
+    The table is short where the experiment has a short one, unless `verbose`.
+    """
     if as_json:
         print((folder.path / "result.json").read_text(encoding="utf-8"), end="")
     else:
-        _show_result(folder)
+        _show_result(folder, verbose=verbose)
     return DONE
 
 
@@ -110,11 +123,40 @@ def _unit(unit: str, value: Any) -> str:
     return "" if unit == "1" or value is None else unit
 
 
-def _show_result(folder: RunFolder) -> None:
-    """The numbers of result.json in a short table on stdout, the warnings, and where the report is."""
+def _show_result(folder: RunFolder, *, verbose: bool) -> None:
+    """The numbers of result.json in a table on stdout, findings and warnings, and where the report is."""
     result = folder.read_result()
     console = Console(file=sys.stdout, highlight=False)
     console.print(result.get("title", ""), markup=False, style="italic")
+    experiment = registry.EXPERIMENTS.get(folder.command)
+    headline = experiment.headline_of(result) if experiment is not None and not verbose else None
+    if headline is not None:
+        _show_headline(headline, console)
+    else:
+        _show_all(result, console)
+    report = folder.path / "report.html"
+    if headline is not None and headline.left:
+        rest = "in the report, or with" if report.exists() else "with"
+        print(f"{headline.left} more findings and all numbers: {rest} `hedgebed resume {folder.path} --verbose`")
+    print(f"{'report' if report.exists() else 'folder'}: {report if report.exists() else folder.path}")
+
+
+def _show_headline(headline: Headline, console: Console) -> None:
+    """A short table, what to be warned of, and the findings that matter most."""
+    table = Table(box=None, pad_edge=False)
+    for place, name in enumerate(headline.head):
+        table.add_column(name, justify="left" if place == 0 else "right", no_wrap=place > 0)
+    for row in headline.rows:
+        table.add_row(*map(Text, row))
+    console.print(table, markup=False)
+    for mark, texts in (("warning: ", headline.warnings), ("- ", headline.sentences)):
+        for text in texts:
+            folded = textwrap.wrap(text, console.width, initial_indent=mark, subsequent_indent=" " * len(mark))
+            print("\n".join(folded))
+
+
+def _show_all(result: dict[str, Any], console: Console) -> None:
+    """Every quantity, the tables, findings and warnings."""
     table = Table(box=None, pad_edge=False)
     table.add_column("quantity")
     table.add_column("value", justify="right")
@@ -143,5 +185,3 @@ def _show_result(folder: RunFolder) -> None:
         console.print(f"- {sentence}", markup=False)
     for warning in result.get("warnings", []):
         console.print(f"warning: {warning}", markup=False)
-    report = folder.path / "report.html"
-    print(f"{'report' if report.exists() else 'folder'}: {report if report.exists() else folder.path}")

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import time
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -26,16 +27,17 @@ from .findings import Findings, bed_entry, bed_quantities
 from .kept_material import MATERIAL_COPY, keep_material
 from .kept_runs import read_run, write_run
 from .memory import memory_there
+from .penetrate_plan import RAIN, PenetratePlan
 from .progress import Progress
 from .reference import compare_with, read_reference
 from .remarks import overlap_warning, softening_note
-from .reporting import write_report
+from .reporting import PictureCosts, write_report
 from .run_campaign import SpikeSensors, campaign_of, check_target, place_campaign
 from .runfolder import RunFolder
 from .settings import PenetrateSettings, expected_grain_count
 from .softening import Softening, bearing_gradient, drop_depth, soften_material
 from .stopping import held_back
-from .units import Unit, deepest, expected_time, make_run, make_spike, plan_units, shown_units
+from .units import Unit, deepest, expected_time, make_run, make_spike, plan_units, share_done, shown_units
 
 __all__ = ["check", "choose_softness", "fingerprint", "resume", "run"]
 
@@ -45,14 +47,8 @@ MOST_GRAINS = 2**26
 """More are refused."""
 MOST_STEPS = 1e9
 """Of the grains, in all runs; more are refused."""
-RAIN = 2.5
-"""Height of the loose column that a bed is rained from, over the bed's depth [1]."""
 SHIPPED_RESULT = Path(__file__).parent.parent / "docs" / "results" / "penetrate" / "result.json"
 """The result of the case that ships, in a checkout."""
-PLOTTED, PICTURE, ANIMATED = 10.0, 5.0, 1.0
-"""About what the plots of a report take, the pictures of one run, and a frame of the animation [s]."""
-PREPARATION = 1.5
-"""What the preparation of a bed costs, in seconds of the bed's clock; from the cache next to nothing."""
 
 
 def run(settings: PenetrateSettings, folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
@@ -282,7 +278,7 @@ def prepare_bed(settings: PenetrateSettings, seed: int, young: float, progress: 
             arch=settings.arch,
             threads=settings.threads,
             cache=settings.cache,
-            progress=BedProgress(progress, f"bed of seed {seed}", asked_to_stop),
+            progress=BedProgress(progress, f"bed of seed {seed}", asked_to_stop, tapped=settings.packing is not None),
         )
 
 
@@ -300,14 +296,21 @@ def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progres
         progress.message(softening_note(settings, softening))
         dropped = f", a dropped spike moves {settings.mass:.4g} kg" if settings.drop_speeds else ""
         progress.message(f"the load is {settings.weight:.4g} N{dropped}")
-        _plan(settings, units, folder, progress)
+        plan = PenetratePlan(
+            settings,
+            units,
+            folder,
+            progress,
+            step=bed_step(settings, softening.young),
+            stiffness=_expected_stiffness(settings),
+        )
         for seed in settings.seeds:
-            _run_seed(settings, seed, [unit for unit in units if unit.seed == seed], softening, folder, progress)
+            _run_seed(settings, seed, [unit for unit in units if unit.seed == seed], softening, folder, progress, plan)
         result = _conclude(settings, units, softening, folder, progress)
         folder.write_result(result)
         _write_campaign(settings, result, folder, progress)
         progress.stage("report", total=1.0)
-        write_report(folder.path, progress)
+        write_report(folder.path, progress, _picture_costs(folder.path, result))
     return result
 
 
@@ -326,18 +329,15 @@ def _write_campaign(settings: PenetrateSettings, result: dict[str, Any], folder:
     progress.message(f"campaign {target}: `hedgebed diagnose {target}` says what the spring-damper lacks")
 
 
-def _plan(settings: PenetrateSettings, units: list[Unit], folder: RunFolder, progress: Progress) -> None:
-    """Tell the progress what is to come, in seconds of the bed's clock."""
-    stiffness = _expected_stiffness(settings)
-    costs: dict[str, float] = {}
-    for seed in settings.seeds:
-        todo = [unit for unit in units if unit.seed == seed and not folder.is_done(unit.id)]
-        if todo:
-            costs[f"bed of seed {seed}"] = PREPARATION
-        costs |= {unit.title: expected_time(settings, unit, stiffness) for unit in todo}
-    drawn = len(shown_units(units)) if settings.frame_count else 0
-    pictures = drawn * PICTURE + settings.frame_count * (drawn > 0) * ANIMATED
-    progress.plan(costs | {"spring-damper": 0.05}, seconds={"report": PLOTTED + pictures})
+def _picture_costs(folder: Path, result: dict[str, Any]) -> PictureCosts:
+    """What the report has to draw, by the frames that are there."""
+    from vis.frames import frame_names, read_frames
+
+    frames = {}
+    for name in frame_names(folder):
+        with suppress(ValueError, OSError):  # the report says what it cannot read
+            frames[name] = len(read_frames(folder, name))
+    return PictureCosts(frames, result["quantities"]["grain_count"]["value"])
 
 
 def _run_seed(
@@ -347,6 +347,7 @@ def _run_seed(
     softening: Softening,
     folder: RunFolder,
     progress: Progress,
+    plan: PenetratePlan,
 ) -> None:
     """All runs of one seed that are not finished yet, each from the same bed."""
     todo = [unit for unit in units if not folder.is_done(unit.id)]
@@ -358,6 +359,7 @@ def _run_seed(
         raise RuntimeError(f"the bed of seed {seed}: {error}") from error
     except RuntimeError as error:
         raise RuntimeError(f"the bed of seed {seed} could not be prepared: {error}; {_remedy(error)}") from error
+    plan.bed_is_there()
     facts = _bed_facts(bed, seed, softening)
     ground = BedGround(bed, make_spike(settings))
     start = ground.state()
@@ -370,20 +372,26 @@ def _run_seed(
         ground.restore(start)
         bed.max_overlap = 0.0
         bed.mark_origin()
-        _run_unit(settings, unit, ground, folder, progress, shown=unit.id in shown_units(plan_units(settings)))
+        _run_unit(settings, unit, ground, folder, progress, plan)
 
 
 def _run_unit(
-    settings: PenetrateSettings, unit: Unit, ground: BedGround, folder: RunFolder, progress: Progress, *, shown: bool
+    settings: PenetrateSettings,
+    unit: Unit,
+    ground: BedGround,
+    folder: RunFolder,
+    progress: Progress,
+    plan: PenetratePlan,
 ) -> None:
     """One run to its end, from its checkpoint where there is one."""
     bed = ground.bed
     stepper = make_run(settings, unit, ground)
-    stepper.expected_time = expected_time(settings, unit, _expected_stiffness(settings))
+    expected, sure = plan.expected_time(unit), False
     kept = folder.load_checkpoint(unit.id)
     if kept is not None:
         stepper.restore(kept)
         progress.message(f"{unit.title}: goes on at {stepper.time:.4g} s")
+    shown = unit.id in shown_units(plan_units(settings))
     frames = _Frames(settings, unit, stepper, folder, resumed=kept is not None) if shown else None
     progress.stage(unit.title, total=1.0)
     saved = time.monotonic()
@@ -392,8 +400,10 @@ def _run_unit(
         folder.save_checkpoint(name, stepper.state())
 
     def on_step(stepper: Run) -> None:
-        nonlocal saved
-        progress.update(stepper.fraction)
+        nonlocal saved, expected, sure
+        if unit.kind == "drop" and stepper.at_bottom:  # from its first stop on the end is known
+            expected, sure = stepper.time + settings.after_stop, True
+        progress.update(share_done(stepper, expected, sure=sure))
         stop = asked_to_stop()
         if not stepper.done and (stop or time.monotonic() - saved >= settings.checkpoint_interval):
             keep(unit.id)
@@ -413,6 +423,7 @@ def _run_unit(
         raise RuntimeError(
             f"{unit.title}: {error}; {_remedy(error)}; the state is in checkpoint/{unit.id}.failed.npz"
         ) from error
+    plan.is_over(unit, stepper.time)
     write_run(folder, unit.id, series)
     folder.mark_done(
         unit.id,

@@ -4,7 +4,8 @@ Work reports to a `Progress`; the terminal, a log file and a script each have th
 ```
 with make_progress() as progress:
     progress.plan({"prepare": 40.0, "drive 0.1 m/s": 20.0},     # relative costs, for the time of the whole
-                  seconds={"report": 30.0})                     # what is known in seconds
+                  seconds={"report": 30.0},                     # what is known in seconds
+                  unit=1.5)                                     # a first guess at what a unit of cost takes [s]
     progress.stage("prepare", total=steps)
     progress.update(done)
     progress.message("the bed is settled")
@@ -15,18 +16,26 @@ Everything is written to stderr; stdout belongs to results.
 import sys
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from types import TracebackType
 from typing import Self, TextIO
 
 from rich.console import Console
-from rich.progress import BarColumn, TaskID, TextColumn
+from rich.progress import BarColumn, ProgressColumn, Task, TaskID, TextColumn
 from rich.progress import Progress as Bars
+from rich.text import Text
 
-__all__ = ["LineProgress", "LiveProgress", "Progress", "duration", "make_progress"]
+__all__ = ["LineProgress", "LiveProgress", "Progress", "as_expected", "duration", "make_progress"]
 
 
 _SAYS_SOMETHING = 0.03
 """Share of a stage from which on its pace so far is taken for its pace."""
+_A_MOMENT = 1.0
+"""A stage that told its first share sooner has gone on from an earlier one's, or does little at a time [s]."""
+_GUESSED = 15.0
+"""A first guess of the rate weighs as much as so much work done [s]."""
+_LATE = 0.15
+"""What a stage that is late is said to take yet, over how late it is [1]."""
 
 
 def duration(seconds: float | None) -> str:
@@ -38,60 +47,119 @@ def duration(seconds: float | None) -> str:
     return f"{hours}:{minute:02d}:{second:02d}" if hours else f"{minute}:{second:02d}"
 
 
+def as_expected(passed: float) -> float:
+    """Share done of what nobody knows the end of, when it has taken `passed` times what was expected [1].
+
+    From four fifths on it nears 1 ever more slowly, 0.84 at the time expected, 0.92 at twice that: what is late is
+    not said to be over.
+    """
+    return passed if passed <= 0.8 else 1.0 - 0.16 / passed
+
+
+@dataclass
+class _Pace:
+    """How fast one stage goes, read off the shares of it that were told."""
+
+    began: float
+    first: tuple[float, float] | None = None  # when it told its first share [s], and that
+    last: float = 0.0  # when it told its last [s]
+    share: float = 0.0
+
+    def tell(self, now: float, share: float) -> None:
+        self.first = self.first or (now, share)
+        self.last, self.share = now, share
+
+    @property
+    def gained(self) -> float:
+        """What was done since the first share was told, which may have waited for compilers or a file."""
+        return self.share - self.first[1] if self.first else 0.0
+
+    def work(self) -> float | None:
+        """How long the whole stage takes at its pace, without what it waited for at first [s]."""
+        if self.first is None or self.gained < _SAYS_SOMETHING:
+            return None
+        return (self.last - self.first[0]) / self.gained
+
+    def so_far(self) -> float | None:
+        """As `work`, where there was hardly more than one share to go by: with what it may have waited for."""
+        told = self.first is not None and self.share >= _SAYS_SOMETHING and self.first[0] - self.began >= _A_MOMENT
+        return (self.last - self.began) / self.share if told else None
+
+    def over(self, now: float) -> float:
+        """`work` of a stage that ends now."""
+        if self.first is None or self.work() is None:
+            return now - self.began
+        return (now - self.first[0]) / (1.0 - self.first[1])
+
+
 class Progress:
     """Keeps count, shows nothing. Also the interface that work reports to.
 
     `stage_fraction`, `fraction` are in 0..1, or None where a total was not given; `remaining()` is in seconds.
 
-    The whole is reckoned in time: a stage that is over counts what it took, the one under way what it seems to take,
-    those to come their costs at the rate so far. A stage that was over without an `update` found its work done, as a
-    bed in the cache, and says nothing about the rate. A share once shown is never taken back.
+    The whole is reckoned in time: what has passed over that and what is to come. Stages to come take their costs at the
+    rate so far; the one under way moves from its cost to its own pace as it goes. A stage that was over without an
+    `update` found its work done, as a bed in the cache, and says nothing about the rate. A share once shown is never
+    taken back.
     """
 
     def __init__(self, *, clock: Callable[[], float] = time.monotonic):
         self._clock = clock
-        self._began = self._planned = self._stage_began = clock()
+        self._began = self._planned = clock()
         self._costs: dict[str, float] = {}
         self._seconds: dict[str, float] = {}
-        self._took: dict[str, float] = {}  # stages of the plan that are over -> time [s]
-        self._idle: set[str] = set()  # those of them that had nothing to do
+        self._unit: float | None = None
+        self._over: set[str] = set()  # stages of the plan that are over
+        self._work: dict[str, float] = {}  # those of them that had something to do -> how long it took [s]
         self._open = ""  # the stage of the plan that is under way
-        self._opened = clock()
-        self._worked = False  # whether it has done anything yet
+        self._opened = _Pace(clock())
         self._reached = 0.0  # the largest share of the whole that was told
         self.stage_name = ""
+        self._pace = self._opened
         self._total: float | None = None
         self._done = 0.0
 
-    def plan(self, costs: Mapping[str, float], *, seconds: Mapping[str, float] | None = None) -> None:
+    def plan(
+        self, costs: Mapping[str, float], *, seconds: Mapping[str, float] | None = None, unit: float | None = None
+    ) -> None:
         """Say which stages are to come and what each costs, in any one unit: the time of the whole follows from it.
 
-        Stages in `seconds` come after those and are known by the time they take. Calling it again starts the reckoning
+        Stages in `seconds` come after those and are known by the time they take. `unit` is a first guess at what one
+        unit of cost takes [s]; without, nothing is said until there is a pace. Calling it again starts the reckoning
         afresh: do so once the bed is there and only the runs remain.
         """
         every = dict(costs) | dict(seconds or {})
         if any(not cost >= 0 for cost in every.values()):
             raise ValueError(f"a stage cannot cost less than nothing: {every}")
-        self._costs, self._seconds = dict(costs), dict(seconds or {})
-        self._took, self._idle, self._reached = {}, set(), 0.0
+        self._costs, self._seconds, self._unit = dict(costs), dict(seconds or {}), unit
+        self._over, self._work, self._reached = set(), {}, 0.0
         self._open = self.stage_name if self.stage_name in every else ""
-        self._planned = self._opened = self._clock()
+        self._planned = self._clock()
+        self._opened = _Pace(self._planned)
+
+    def expect(self, costs: Mapping[str, float]) -> None:
+        """Stages of the plan that have not begun cost this after all; others are left as they are."""
+        begun = self._over | {self._open}
+        self._costs |= {name: cost for name, cost in costs.items() if name in self._costs and name not in begun}
 
     def stage(self, name: str, total: float | None = None) -> None:
         """Begin the stage `name`, which ends at `total` (in whatever unit `update` counts; None if unknown).
 
         A stage of the plan ends when the next one of the plan begins; others may come and go within it.
         """
+        self._pace = _Pace(self._clock())
         if name in self._costs or name in self._seconds:
             self._end_stage()
-            self._open, self._opened, self._worked = name, self._clock(), False
+            self._open, self._opened = name, self._pace
         self.stage_name, self._total, self._done = name, total, 0.0
-        self._stage_began = self._clock()
 
     def update(self, done: float) -> None:
         """`done` of the stage's total is done (not: more than last time). Less than before is not believed."""
         self._done = max(self._done, float(done))
-        self._worked = True
+        share, now = self.stage_fraction, self._clock()
+        self._pace.tell(now, share or 0.0)
+        if self._opened is not self._pace and self._opened.first is None:
+            self._opened.tell(now, 0.0)  # something is done within it
 
     def message(self, text: str) -> None:
         """Tell the person something: a warning, a finding."""
@@ -103,9 +171,9 @@ class Progress:
 
     def _end_stage(self) -> None:
         if self._open:
-            self._took[self._open] = self._clock() - self._opened
-            if not self._worked:
-                self._idle.add(self._open)
+            self._over.add(self._open)
+            if self._opened.first is not None:
+                self._work[self._open] = self._opened.over(self._clock())
         self._open = ""
 
     def __enter__(self) -> Self:
@@ -122,6 +190,11 @@ class Progress:
         return self._clock() - self._began
 
     @property
+    def stage_worked(self) -> bool:
+        """Whether the stage has had anything to do yet."""
+        return self._pace.first is not None
+
+    @property
     def stage_fraction(self) -> float | None:
         """How much of the stage is done, 0..1; None if its total is unknown."""
         if self._total is None or self._total <= 0:
@@ -131,62 +204,68 @@ class Progress:
     @property
     def fraction(self) -> float | None:
         """How much of the plan is done, 0..1, never less than before; None without a plan."""
-        done, whole = self._reckon()
-        if whole <= 0:
-            return 1.0 if self._took else None
-        self._reached = max(self._reached, min(done / whole, 1.0))
+        if not self._costs and not self._seconds:
+            return None
+        rest, spent = self.remaining(), self._clock() - self._planned
+        if rest is not None and (spent > 0 or self._over):
+            self._reached = max(self._reached, spent / (spent + rest) if rest > 0 else 1.0)
         return self._reached
-
-    def _reckon(self) -> tuple[float, float]:
-        """What is done and the whole [s], or in the unit of the costs before any time has passed."""
-        share = self.stage_fraction if self.stage_name == self._open else None
-        spent = self._clock() - self._opened if self._open else 0.0
-        seems = spent / share if share is not None and share >= _SAYS_SOMETHING else None
-        rate = self._rate(seems)
-        done = whole = 0.0
-        for name in (*self._costs, *self._seconds):
-            expected = self._seconds[name] if name in self._seconds else self._costs[name] * rate
-            if name == self._open:
-                expected = seems if seems else max(expected, spent)
-                done += (share or 0.0) * expected
-            elif name in self._took:
-                nothing_known = self._clock() <= self._planned
-                expected = expected if nothing_known else self._took[name]
-                done += expected
-            whole += expected
-        return done, whole
-
-    def _rate(self, seems: float | None) -> float:
-        """Time per unit of cost [s], of the stages that had something to do; 1 before there is one."""
-        worked = {name: took for name, took in self._took.items() if name in self._costs and name not in self._idle}
-        if seems and self._open in self._costs:
-            worked[self._open] = seems
-        cost = sum(self._costs[name] for name in worked)
-        took = sum(worked.values())
-        return took / cost if took > 0 and cost > 0 else 1.0
 
     def stage_remaining(self) -> float | None:
         """How long the stage has to go [s]; None as long as nothing can be said."""
-        return _remaining(self.stage_fraction, self._clock() - self._stage_began)
+        if self._open and self.stage_name == self._open:
+            return self._left_of(self._expected(self._open, self._rate()))
+        whole = self._pace.work() or self._pace.so_far()
+        return None if whole is None else (1.0 - self._pace.share) * whole
 
     def remaining(self) -> float | None:
         """How long the whole plan has to go [s]; None as long as nothing can be said."""
-        if not self._says_something():
+        rate, rest = self._rate(), 0.0
+        for name in (*self._costs, *self._seconds):
+            if name in self._over:
+                continue
+            expected = self._expected(name, rate)
+            left = self._left_of(expected) if name == self._open else expected
+            if left is None:
+                return None
+            rest += left
+        return rest
+
+    def _expected(self, name: str, rate: float | None) -> float | None:
+        """How long a stage that is not over should take, by the plan [s]."""
+        return self._seconds[name] if name in self._seconds else None if rate is None else self._costs[name] * rate
+
+    def _left_of(self, expected: float | None) -> float | None:
+        """How long the stage under way has to go, which by the plan takes `expected` [s].
+
+        Half way through its own pace alone counts. Between two shares time goes on; a stage that is late is not said
+        to be over at once.
+        """
+        pace = self._opened
+        own, weight = pace.work(), min(1.0, 2.0 * pace.gained)
+        if own is None:
+            own, weight = pace.so_far(), 1.0 if expected is None else 0.0
+        if own is None and expected is None:
             return None
-        done, whole = self._reckon()
-        return max(whole - done, 0.0)
+        whole = own if expected is None else expected if own is None else (1.0 - weight) * expected + weight * own
+        assert whole is not None
+        left = (1.0 - pace.share) * whole
+        passed = self._clock() - (pace.last if pace.first else pace.began)
+        return left - passed if (1.0 + _LATE) * passed < left else _LATE * passed
 
-    def _says_something(self) -> bool:
-        """Whether anything tells how fast it goes: a stage that did its work, or enough of the one under way."""
-        if not self._open:
-            return bool(self._took)
-        share = self.stage_fraction if self.stage_name == self._open else None
-        worked = any(took > 0 for name, took in self._took.items() if name not in self._idle)
-        return worked or (share is not None and share >= _SAYS_SOMETHING)
-
-
-def _remaining(fraction: float | None, elapsed: float) -> float | None:
-    return None if not fraction else elapsed * (1.0 - fraction) / fraction
+    def _rate(self) -> float | None:
+        """Time per unit of cost [s], of the stages that had something to do and the first guess; None: unknown."""
+        took = sum(work for name, work in self._work.items() if name in self._costs)
+        cost = sum(self._costs[name] for name in self._work if name in self._costs)
+        if self._open in self._costs:
+            own, weight = self._opened.work(), self._opened.gained
+            if own is None and not cost and self._unit is None:
+                own, weight = self._opened.so_far(), 1.0
+            if own is not None:
+                took, cost = took + weight * own, cost + weight * self._costs[self._open]
+        if self._unit is not None:
+            took, cost = took + _GUESSED, cost + _GUESSED / self._unit
+        return took / cost if took > 0 and cost > 0 else None
 
 
 class LineProgress(Progress):
@@ -234,6 +313,22 @@ class LineProgress(Progress):
         self._last = last
 
 
+class _ToGo(ProgressColumn):
+    """The time to go, counted down where nothing new is told for a while; never to nothing."""
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        super().__init__()
+        self._clock = clock
+
+    def render(self, task: Task) -> Text:
+        """See the class."""
+        rest, told = task.fields["rest"], task.fields["told"]
+        if rest is None:
+            return Text("")
+        passed = self._clock() - told
+        return Text(f"{duration(rest - passed if passed < (1 - _LATE) * rest else _LATE * rest)} to go")
+
+
 class LiveProgress(Progress):
     """Bars on a terminal: the whole, where there is a plan, and the stage under way."""
 
@@ -243,7 +338,7 @@ class LiveProgress(Progress):
             TextColumn("{task.description}", markup=False),
             BarColumn(bar_width=30),
             TextColumn("{task.fields[percent]:>5}", markup=False),
-            TextColumn("{task.fields[rest]}", markup=False),
+            _ToGo(clock),
             console=console or Console(stderr=True),
             transient=True,
             refresh_per_second=4,
@@ -258,7 +353,8 @@ class LiveProgress(Progress):
             total=None if fraction is None else 1.0,
             completed=fraction or 0.0,
             percent="" if fraction is None else f"{100 * fraction:.0f} %",
-            rest="" if rest is None else f"{duration(rest)} to go",
+            rest=rest,
+            told=self._clock(),
         )
 
     def _refresh(self) -> None:
@@ -268,14 +364,16 @@ class LiveProgress(Progress):
         if self._stage is not None:
             self._show(self._stage, self.stage_fraction, self.stage_remaining())
 
-    def plan(self, costs: Mapping[str, float], *, seconds: Mapping[str, float] | None = None) -> None:
-        super().plan(costs, seconds=seconds)
+    def plan(
+        self, costs: Mapping[str, float], *, seconds: Mapping[str, float] | None = None, unit: float | None = None
+    ) -> None:
+        super().plan(costs, seconds=seconds, unit=unit)
         if self._whole is None:
-            self._whole = self._bars.add_task("all", total=1.0, percent="", rest="")
+            self._whole = self._bars.add_task("all", total=1.0, percent="", rest=None, told=0.0)
         self._refresh()
 
     def stage(self, name: str, total: float | None = None) -> None:
-        before, began = self.stage_name, self._stage_began
+        before, began = self.stage_name, self._pace.began
         super().stage(name, total)
         self._bars.start()
         if before:
@@ -284,7 +382,7 @@ class LiveProgress(Progress):
             )
         if self._stage is not None:
             self._bars.remove_task(self._stage)
-        self._stage = self._bars.add_task(name, total=None, percent="", rest="")
+        self._stage = self._bars.add_task(name, total=None, percent="", rest=None, told=0.0)
         self._refresh()
 
     def update(self, done: float) -> None:

@@ -16,6 +16,8 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from experiments.headline import Headline
+
 __all__ = ["EXPERIMENTS", "Experiment", "Preset", "find_experiment"]
 
 CASES = Path(__file__).parent / "cases"
@@ -44,6 +46,8 @@ class Experiment:
     """The setting that the command's first argument is (its first two, of a setting of two), instead of a case file."""
     example: str = ""
     """Of what has no default because its case is the question: one that ships, a file in experiments/cases."""
+    headline: str = ""
+    """"module:function" from a result to the `Headline` that is shown in the end; all there is where it is empty."""
 
     def settings_class(self) -> type[BaseModel]:
         """The settings class. Quick: it imports no Taichi."""
@@ -57,6 +61,11 @@ class Experiment:
     def resume(self, folder: Path, *, progress: Any) -> dict[str, Any]:
         """Finish the run in `folder`; return the result."""
         return import_module(self.module).resume(folder, progress=progress)
+
+    def headline_of(self, result: dict[str, Any]) -> Headline | None:
+        """The short form of a result; None where it is shown in full."""
+        module, _, name = self.headline.partition(":")
+        return getattr(import_module(module), name)(result) if module else None
 
     def code(self) -> str:
         """The module's ``fingerprint()`` of the code that computes, empty where it has none."""
@@ -78,6 +87,7 @@ EXPERIMENTS: dict[str, Experiment] = {
             "How far a spike sinks into a bed, what the bed pushes back with, and how wrong the spring-damper is.",
             settings="experiments.settings:PenetrateSettings",
             module="experiments.penetrate",
+            headline="experiments.headline:penetrate_headline",
             presets=(
                 Preset(
                     "full",

@@ -52,7 +52,7 @@ def fake(monkeypatch):
 
     monkeypatch.setattr(penetrate, "prepare_bed", prepare)
     monkeypatch.setattr(penetrate, "find_material", lambda name: SAND)
-    monkeypatch.setattr(penetrate, "write_report", lambda folder, progress: None)
+    monkeypatch.setattr(penetrate, "write_report", lambda *given: None)
     monkeypatch.setattr(penetrate, "bed_step", lambda settings, young: 2e-5)
     return made
 
@@ -140,7 +140,7 @@ import test_penetrate as here
 penetrate.prepare_bed = lambda settings, seed, young, progress: FakeBed(
     size=settings.bed_size, seed=seed, hardness=here.hard(seed), rate=0.5, unload=4000.0)
 penetrate.find_material = lambda name: here.SAND
-penetrate.write_report = lambda folder, progress: None
+penetrate.write_report = lambda *given: None
 penetrate.bed_step = lambda settings, young: 2e-5
 folder, settings = sys.argv[1], PenetrateSettings(**(here.QUICK | here.KILLABLE))
 advance = FakeBed.advance

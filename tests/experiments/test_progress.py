@@ -5,7 +5,8 @@ import io
 import pytest
 from rich.console import Console
 
-from experiments.progress import LineProgress, LiveProgress, Progress, duration, make_progress
+from experiments.bed_progress import BedProgress
+from experiments.progress import LineProgress, LiveProgress, Progress, as_expected, duration, make_progress
 
 
 class Clock:
@@ -49,6 +50,7 @@ def test_the_whole_follows_from_the_costs_of_the_stages(clock):
     assert progress.remaining() == pytest.approx(50)
     progress.stage("fill", total=4)
     assert progress.fraction == pytest.approx(30 / 40)
+    clock.now += 5
     progress.update(2)
     assert progress.fraction == pytest.approx(35 / 40)
     progress.close()
@@ -73,11 +75,12 @@ def test_a_stage_outside_the_plan_belongs_to_the_one_it_comes_within(clock):
     progress.plan({"prepare": 3.0, "dig": 1.0})
     progress.stage("prepare")
     progress.stage("rain", total=2)
+    clock.now += 1
     progress.update(1)
     assert progress.stage_fraction == 0.5
-    assert progress.fraction == 0.0
+    assert progress.remaining() is None and progress.fraction == 0.0  # nothing tells how far the plan is
     progress.stage("level", total=2)
-    assert progress.fraction == 0.0
+    clock.now += 2
     progress.stage("dig", total=2)
     assert progress.fraction == 0.75
 
@@ -90,7 +93,7 @@ def test_a_bed_that_was_in_the_cache_counts_nothing(clock):
     clock.now += 0.5
     progress.stage("drive", total=1.0)
     clock.now += 9.5
-    assert progress.fraction < 0.6
+    assert progress.fraction == 0.0
     progress.update(0.5)
     assert progress.remaining() == pytest.approx(9.5 + 19.0)
     assert progress.fraction == pytest.approx(10.0 / 38.5)
@@ -106,8 +109,13 @@ def test_the_whole_goes_on_at_least_as_long_as_the_stage(clock):
     progress.stage("report", total=1.0)
     clock.now += 30
     progress.update(0.1)
-    assert progress.stage_remaining() == pytest.approx(270)
-    assert progress.remaining() == pytest.approx(270)
+    assert progress.remaining() == progress.stage_remaining() == pytest.approx(36)  # nine tenths of what was planned
+    clock.now += 30
+    progress.update(0.35)
+    assert progress.remaining() == pytest.approx(0.65 * (0.5 * 40 + 0.5 * 120))  # half way to its own pace
+    clock.now += 30
+    progress.update(0.6)
+    assert progress.remaining() == progress.stage_remaining() == pytest.approx(0.4 * 120)
 
 
 def test_a_share_once_told_is_never_taken_back(clock):
@@ -124,6 +132,83 @@ def test_a_share_once_told_is_never_taken_back(clock):
     shares = [share for share, _ in told]
     assert shares == sorted(shares)
     assert shares[-1] == pytest.approx(1.0)
+
+
+def test_a_first_guess_tells_from_the_start_and_gives_way_to_what_is_measured(clock):
+    progress = Progress(clock=clock)
+    progress.plan({"bed": 60.0, "drive": 60.0}, unit=2.0)
+    assert progress.remaining() == pytest.approx(240)
+    progress.stage("bed", total=1.0)
+    clock.now += 20  # compilers
+    progress.update(0.0)
+    for done in range(1, 11):
+        clock.now += 6
+        progress.update(done / 10)
+    # 60 s for a cost of 60, beside a guess of 2 s for each that weighs 15 s
+    assert progress.remaining() == pytest.approx(60 * 75 / 67.5, rel=1e-6)
+
+
+def test_what_a_stage_waited_for_at_first_is_not_its_pace(clock):
+    progress = Progress(clock=clock)
+    progress.plan({"bed": 1.0, "next bed": 1.0})
+    progress.stage("bed", total=100)
+    clock.now += 50  # compilers
+    progress.update(1)
+    clock.now += 49
+    progress.update(50)
+    assert progress.stage_remaining() == pytest.approx(50)
+    assert progress.remaining() == pytest.approx(150)
+
+
+def test_between_two_updates_the_time_to_go_counts_down_but_never_to_nothing(clock):
+    progress = Progress(clock=clock)
+    progress.plan({}, seconds={"report": 40.0})
+    progress.stage("report", total=1.0)
+    clock.now += 30
+    assert progress.remaining() == pytest.approx(10)
+    clock.now += 50
+    assert progress.remaining() == pytest.approx(0.15 * 80)
+
+
+def test_what_is_to_come_can_be_expected_to_cost_otherwise(clock):
+    progress = Progress(clock=clock)
+    progress.plan({"bed 1": 10.0, "bed 2": 10.0, "drive": 5.0}, unit=1.0)
+    progress.stage("bed 1", total=1.0)
+    progress.expect({"bed 1": 0.0, "bed 2": 0.0, "other": 3.0})
+    assert progress.remaining() == pytest.approx(15)
+
+
+@pytest.mark.parametrize("late", [0.5, 1.0, 3.0])
+def test_what_is_late_is_never_said_to_be_over(late):
+    assert as_expected(0.8) == pytest.approx(0.8) and as_expected(0.79) < 0.8 < as_expected(0.81)
+    assert as_expected(late) < 1
+
+
+def test_a_bed_in_preparation_goes_by_time(clock):
+    """The pieces of a bed of 20,182 grains as they were told, one a second: calming and resting are not announced."""
+    progress = Progress(clock=clock)
+    progress.plan({"bed": 1.0}, unit=60.0)
+    bed = BedProgress(progress, "bed", lambda: False)
+    bed.stage("rain", 1.0)
+    told = []
+    fallen = [0.03 * k for k in range(1, 28)]
+    calmed = [1.0, 0.10, 0.13, 1.0]
+    settled = [0, 0.35, 0.20, 0.52, 0.42, 0.62, 0.59, 0.68, 0.76, 0.80, 0.86, 0.87, 0.89, 0.94, 0.98, 0.98, 1.0]
+    rested = [0.95, 0.88, 0.89, 0.85, 0.80, 0.82, 0.81, 0.87, 0.88, 0.95, 0.97, 0.97, 0.97, 0.94]
+    for done in fallen + calmed:
+        bed.update(done)
+        told.append(progress.stage_fraction)
+    bed.stage("settle", 1.0)
+    for done in settled + rested:
+        bed.update(done)
+        told.append(progress.stage_fraction)
+    assert told == sorted(told)
+    down, calm, still = len(fallen) - 1, len(fallen + calmed) - 1, len(fallen + calmed + settled) - 1
+    assert told[down] == pytest.approx(0.30, abs=0.06)
+    assert told[calm] == pytest.approx(0.42, abs=0.03)
+    assert told[still] == pytest.approx(0.74, abs=0.03)
+    assert 0.9 < told[-1] < 1
+    assert progress.fraction is not None
 
 
 def test_a_cost_below_nothing_is_refused():
