@@ -25,16 +25,10 @@ from rigid.trial import Trial
 from .campaign import Campaign, EffectTable, Recording, TumbleCampaign, TumbleModel, write_campaign, write_model
 from .campaign.tables import (
     FORMAT,
-    HEDGEHOG_ROWS,
-    ImuSensor,
-    PlatformTable,
-    PoseSensor,
     RigTable,
-    TumbleSensors,
     TumbleSurface,
     TumbleTrial,
     TumbleUncertainty,
-    WheelSensor,
     WheelTable,
 )
 from .campaign_settings import CampaignSettings
@@ -45,6 +39,7 @@ from .runfolder import RunFolder
 from .surfaces import find_surface
 from .tumble_platform import torque_within_limit
 from .tumble_settings import TrialSettings, TumbleSettings
+from .tumble_tables import platform_table, sensor_set, sensor_tables, trial_table
 from .tumble_trial import TumblePlan, plan_tumble
 from .whole_runs import whole_run
 
@@ -62,7 +57,7 @@ _DRAWN = ("mass", "inertia", "stiffness", "damping", "mu_s", "mu_d")
 def check(settings: CampaignSettings) -> None:
     """Raise ValueError, naming key, value and what would do, for what the settings class cannot see."""
     conditions = _conditions(settings)
-    _sensors(settings)
+    sensor_set(settings)
     for number, condition in enumerate(conditions, 1):
         for trial in (condition.plan.trial, _true_trial(settings, condition, number, _truth(settings, conditions))):
             simulate(trial, duration=1e-3)  # that it can stand
@@ -136,19 +131,6 @@ def _within_limit(plan: TumblePlan, duration: float) -> Trial:
     return torque_within_limit(plan.trial, max_wheel_speed=plan.max_wheel_speed, duration=duration)[0]
 
 
-def _sensors(settings: CampaignSettings) -> SensorSet:
-    return SensorSet(
-        camera_rate=settings.camera_rate,
-        imu_rate=settings.imu_rate,
-        wheel_rate=settings.wheel_rate,
-        pose_std=settings.pose_std,
-        imu_std=settings.imu_std,
-        wheel_std=settings.wheel_std,
-        imu_window=settings.imu_window,
-        lead=settings.lead,
-    )
-
-
 def _truth(settings: CampaignSettings, conditions: Sequence[_Condition]) -> dict[str, Any]:
     """The true values of what all trials share, drawn within the stated uncertainties."""
     stated = conditions[0].plan.trial
@@ -204,7 +186,7 @@ def _make(settings: CampaignSettings, conditions: Sequence[_Condition], progress
     """Draw what is true, and record every trial."""
     first = conditions[0].plan
     truth = _truth(settings, conditions)
-    sensors = _sensors(settings)
+    sensors = sensor_set(settings)
     recordings: dict[tuple[str, str], Recording] = {}
     true_trials, rows = [], []
     progress.stage("trials", total=float(len(conditions)))
@@ -250,14 +232,11 @@ def write_tumble_campaign(
         return None
     shared = {name: getattr(settings, name) for name in TrialSettings.model_fields}
     plain = CampaignSettings()
-    factor = settings.campaign_noise
-    x, y, theta = (factor * std for std in plain.pose_std)
-    gyro, ax, ay = (factor * std for std in plain.imu_std)
+    noisy = sensor_set(plain, noise=settings.campaign_noise)
     own = CampaignSettings(
         **shared, name=f"a tumble on {plan.surface}", rig=() if settings.gravity is not None else plain.rig,
         gravity=(settings.gravity,) if settings.gravity is not None else (), seed=settings.campaign_seed,
-        trials=settings.campaign_trials, pose_std=(x, y, theta), imu_std=(gyro, ax, ay),
-        wheel_std=factor * plain.wheel_std,
+        trials=settings.campaign_trials, pose_std=noisy.pose_std, imu_std=noisy.imu_std, wheel_std=noisy.wheel_std,
     )  # fmt: skip
     within = replace(plan, trial=_within_limit(plan, settings.duration))
     made = _make(own, [_Condition(f"{n:03d}", within) for n in range(1, settings.campaign_trials + 1)], progress)
@@ -268,17 +247,14 @@ def write_tumble_campaign(
 
 
 def _trial_table(name: str, trial: Trial) -> TumbleTrial:
-    return TumbleTrial(
-        id=name,
+    return trial_table(
+        name,
         gravity_sim=trial.gravity_sim,
         torque=trial.torque,
         actuator=trial.actuator,
         torque_until=trial.torque_until,
         wheel_speed_0=trial.wheel_speed_0,
-        counterweight=trial.counterweight if trial.counterweight > 0 else None,
-        pose=f"{name}-pose.csv",
-        imu=f"{name}-imu.csv",
-        wheel=f"{name}-wheel.csv",
+        counterweight=trial.counterweight,
     )
 
 
@@ -291,11 +267,11 @@ def _tables(settings: CampaignSettings, plan: TumblePlan, values: dict[str, Any]
         "format": FORMAT,
         "kind": "tumble",
         "name": settings.name,
-        "platform": PlatformTable(
+        "platform": platform_table(
             mass=values["mass"],
             inertia=values["inertia"],
             spike_length=trial.spike_length,
-            spike_count=None if trial.spike_count == HEDGEHOG_ROWS else trial.spike_count,
+            spike_count=trial.spike_count,
         ),
         "wheel": WheelTable(inertia=trial.wheel_inertia),
         "rig": rig,
@@ -304,11 +280,7 @@ def _tables(settings: CampaignSettings, plan: TumblePlan, values: dict[str, Any]
             granular=known.granular if known is not None else False,
             **{name: values[name] for name in ("stiffness", "damping", "mu_s", "mu_d")},
         ),
-        "sensors": TumbleSensors(
-            pose=PoseSensor(std=settings.pose_std),
-            imu=ImuSensor(std=settings.imu_std, window=settings.imu_window),
-            wheel=WheelSensor(std=(settings.wheel_std,)),
-        ),
+        "sensors": sensor_tables(sensor_set(settings)),
     }
 
 

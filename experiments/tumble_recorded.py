@@ -22,22 +22,17 @@ from rigid.sensors import Motion, SensorSet, measure, sensor_times
 
 from .campaign import Campaign, Recording, TumbleCampaign, write_campaign
 from .campaign.tables import (
-    HEDGEHOG_ROWS,
-    ImuSensor,
-    PlatformTable,
-    PoseSensor,
     RigTable,
-    TumbleSensors,
     TumbleSurface,
     TumbleTrial,
     TumbleUncertainty,
-    WheelSensor,
     WheelTable,
 )
 from .campaign_settings import CampaignSettings
 from .run_campaign import check_target
 from .runfolder import RunFolder, read_series
 from .strict import StrictSettings
+from .tumble_tables import platform_table, sensor_set, sensor_tables, trial_table
 
 __all__ = ["TumbleRecording", "campaign_of_tumbles", "write_tumbles_campaign"]
 
@@ -85,7 +80,8 @@ def campaign_of_tumbles(run: str | Path, *, recording: TumbleRecording | None = 
     first = results[0]
     for folder, result in zip(folders[1:], results[1:], strict=True):
         _check_alike(folder, result, folders[0], first)
-    sensors = _sensors(recording.noise)
+    plain = CampaignSettings()
+    sensors = sensor_set(plain, noise=recording.noise)
     recordings: dict[tuple[str, str], Recording] = {}
     trials = []
     for number, (folder, result) in enumerate(zip(folders, results, strict=True), 1):
@@ -96,13 +92,11 @@ def campaign_of_tumbles(run: str | Path, *, recording: TumbleRecording | None = 
             recordings[name, sensor] = Recording(getattr(measured, sensor))
     stiffness, damping, sigmas, said = _law(first, recording.fitted)
     trial = _numbers(first)
-    plain = CampaignSettings()
-    count = int(first["spike_count"])
     tables = TumbleCampaign(
         format="hedgehog-campaign/1", kind="tumble", name=f"tumbles on {_ground(first)}",
-        platform=PlatformTable(
+        platform=platform_table(
             mass=trial["mass"], inertia=trial["inertia"], spike_length=trial["spike_length"],
-            spike_count=None if count == HEDGEHOG_ROWS else count,
+            spike_count=int(first["spike_count"]),
         ),
         wheel=WheelTable(inertia=trial["wheel_inertia"]),
         rig=RigTable(gravity=trial["gravity"]) if trial["counterweight"] > 0 else None,
@@ -114,10 +108,7 @@ def campaign_of_tumbles(run: str | Path, *, recording: TumbleRecording | None = 
             mass=plain.sigma_mass, inertia=plain.sigma_inertia, mu_s=plain.sigma_mu_s, mu_d=plain.sigma_mu_d,
             gravity_sim=plain.sigma_gravity_sim, **sigmas,
         ),
-        sensors=TumbleSensors(
-            pose=PoseSensor(std=sensors.pose_std), imu=ImuSensor(std=sensors.imu_std, window=sensors.imu_window),
-            wheel=WheelSensor(std=(sensors.wheel_std,)),
-        ),
+        sensors=sensor_tables(sensors),
         notes={
             "made_by": f"hedgebed {__version__} tumble on {_ground(first)}", "stiffness_and_damping": said,
             "code": str(first.get("code", "")), "noise_seed": seed,
@@ -163,16 +154,6 @@ def _check_alike(folder: Path, result: Mapping[str, Any], first_folder: Path, fi
             )
 
 
-def _sensors(noise: float) -> SensorSet:
-    plain = CampaignSettings()
-    x, y, theta = (noise * std for std in plain.pose_std)
-    gyro, ax, ay = (noise * std for std in plain.imu_std)
-    return SensorSet(
-        camera_rate=plain.camera_rate, imu_rate=plain.imu_rate, wheel_rate=plain.wheel_rate, pose_std=(x, y, theta),
-        imu_std=(gyro, ax, ay), wheel_std=noise * plain.wheel_std, imu_window=plain.imu_window, lead=plain.lead,
-    )  # fmt: skip
-
-
 def _record(folder: Path, result: Mapping[str, Any], sensors: SensorSet, *, seed: tuple[int, ...]) -> Any:
     """What the sensors make of a run's series; straight lines between its rows, a millisecond apart at most."""
     series, motion = read_series(folder / "trajectory.csv"), read_series(folder / "series" / "motion.csv")
@@ -196,12 +177,8 @@ def _record(folder: Path, result: Mapping[str, Any], sensors: SensorSet, *, seed
 
 def _trial(name: str, result: Mapping[str, Any]) -> TumbleTrial:
     numbers = _numbers(result)
-    return TumbleTrial(
-        id=name, gravity_sim=numbers["gravity_sim"], torque=numbers["torque"], actuator=result["actuator"],
-        torque_until=numbers["torque_until"], wheel_speed_0=numbers["wheel_speed_0"],
-        counterweight=numbers["counterweight"] if numbers["counterweight"] > 0 else None,
-        pose=f"{name}-pose.csv", imu=f"{name}-imu.csv", wheel=f"{name}-wheel.csv",
-    )  # fmt: skip
+    given = ("gravity_sim", "torque", "torque_until", "wheel_speed_0", "counterweight")
+    return trial_table(name, actuator=result["actuator"], **{key: numbers[key] for key in given})
 
 
 def _law(first: Mapping[str, Any], fitted: str | None) -> tuple[float, float, dict[str, float], str]:

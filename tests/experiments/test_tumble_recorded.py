@@ -10,8 +10,9 @@ import pytest
 from experiments.campaign import read_campaign
 from experiments.campaign_settings import CampaignSettings
 from experiments.cli import main
-from experiments.synthesis import _sensors, record
+from experiments.synthesis import record
 from experiments.tumble_settings import TumbleSettings
+from experiments.tumble_tables import sensor_set
 from experiments.tumble_trial import plan_tumble
 
 
@@ -35,7 +36,7 @@ def test_a_tumble_is_recorded_as_its_own_model_would_be(runs, tmp_path):
     campaign = read_campaign(into)
     assert [(trial.id, trial.torque) for trial in campaign.tables.trial] == [("001", 0.22), ("002", 0.125)]
     trial = plan_tumble(TumbleSettings(surface="sand", torque=0.22, rig=0.0085, duration=0.3)).trial
-    sensors = replace(_sensors(CampaignSettings()), pose_std=(0, 0, 0), imu_std=(0, 0, 0), wheel_std=0)
+    sensors = replace(sensor_set(CampaignSettings()), pose_std=(0, 0, 0), imu_std=(0, 0, 0), wheel_std=0)
     expected, _ = record(trial, duration=0.3, sensors=sensors, seed=None)
     tolerance = {"x_m": 5e-5, "y_m": 2e-4, "theta_rad": 1.5e-3, "gyro_rad_s": 3e-3, "ax_m_s2": 0.02, "ay_m_s2": 0.02,
                  "omega_rad_s": 0.1}  # fmt: skip
