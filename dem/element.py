@@ -166,7 +166,7 @@ def press_element(
     runtime.start(threads=threads)
     top = float((positions[:, 2] + radii).max())
     bed = Bed.from_grains(
-        material,
+        material.with_rolling(),
         positions=positions,
         radii=radii,
         size=(*period, size[2] * grain),

@@ -37,6 +37,8 @@ _NAME = re.compile(r"[a-z0-9][a-z0-9._+-]*")
 COHESIONS = ("none", "dmt", "jkr")
 """The laws of cohesion, see ``dem.cohesion``."""
 LEAST_RESTITUTION = 0.01
+LEAST_ROLLING = 1e-9
+"""A rolling friction that resists nothing [1]: with none at all rolling is left out of a bed, on its bodies as well."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +101,10 @@ class Material:
         """The same material with another Young's modulus [Pa]."""
         return replace(self, young=young)
 
+    def with_rolling(self) -> Material:
+        """The same material, so that bodies of its bed can have a rolling friction where its grains have none."""
+        return replace(self, rolling_friction=max(self.rolling_friction, LEAST_ROLLING))
+
     def for_grain(self, diameter: float) -> Material:
         """The same material in grains of another mean diameter [m], with the strength that it has in its own.
 
@@ -146,7 +152,12 @@ class Facing:
             refuse("poisson", "be at least 0 and below 0.5")
 
     def refuse_for(self, material: Material) -> None:
-        """Raise ValueError for a surface energy, where the material has no law of cohesion."""
+        """Raise ValueError for a surface energy where the material has no law of cohesion, and likewise for rolling."""
+        if self.rolling_friction and not material.rolling_friction:
+            raise ValueError(
+                f"rolling_friction = {self.rolling_friction} needs rolling, which a bed of {material.name!r} leaves "
+                f"out, as its grains have no rolling friction; {LEAST_ROLLING:g} for theirs would do"
+            )
         if self.surface_energy and material.cohesion == "none":
             raise ValueError(
                 f"surface_energy = {self.surface_energy} J/m2 needs a law: the material {material.name!r} has cohesion "

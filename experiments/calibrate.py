@@ -35,11 +35,18 @@ __all__ = ["check", "fingerprint", "resume", "run"]
 
 _SEEDS = 1000
 """Between the seeds of two points: samples of one seed would be strong, or weak, all alike."""
-_COLUMNS = {"strain": "strain", "height": "height_m", "shear": "shear_Pa", "normal": "normal_Pa"}
 
 
 def check(settings: CalibrateSettings) -> None:
-    """Raise ValueError for ranges with which no material can be."""
+    """Raise ValueError for ranges with which no material can be, and a bed too narrow for an angle of repose."""
+    if any(target.state == "drained" for target in settings.wanted.values()):
+        from dem.repose import check_width
+
+        length, _, depth = (settings.grain * side for side in settings.repose_size)
+        try:
+            check_width(length, slot=None, grain=settings.grain, depth=depth)
+        except ValueError as error:
+            raise ValueError(f"repose_size, times grain: {error}") from None
     for end in (0, 1):
         material_at(settings, {key: pair[end] for key, pair in settings.free.items()})
 
@@ -90,7 +97,7 @@ class _Work:
                     )
                 except BedFailure as failure:
                     raise RuntimeError(f"{_said(values)}, {test.name}: {failure.reason}") from failure
-                self.folder.write_series(name, {column: getattr(series, key) for key, column in _COLUMNS.items()})
+                self.folder.write_series(name, series)
                 kept = {"values": values, "summary": summary}
                 self.folder.mark_done(name, kept)
             runs[test] = kept["summary"]
@@ -148,12 +155,12 @@ def _said(values: Mapping[str, float]) -> str:
 def _carry_out(settings: CalibrateSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
     targets = list(settings.wanted.values())
     wanted = {target.name: Wanted(target.value, target.tolerance) for target in targets if target.fit}
-    strengths = [target for target in targets if target.state]
+    simulated = [target for target in targets if target.state]
     beds = [target for target in targets if not target.state]
     with folder.lock(), held_back() as asked_to_stop:
         work = _Work(settings, folder, progress, asked_to_stop, targets)
         each = len(tests_for(settings, [t for t in targets if t.fit], seed=0))
-        checks = settings.checks * len(settings.check_seeds) * len(tests_for(settings, strengths, seed=0))
+        checks = settings.checks * len(settings.check_seeds) * len(tests_for(settings, simulated, seed=0))
         progress.plan(
             {"explore": each * settings.most_points, "check": checks, **{t.name: 10.0 for t in beds}},
             seconds={"report": 10.0},
@@ -172,7 +179,7 @@ def _carry_out(settings: CalibrateSettings, folder: RunFolder, progress: Progres
         rounds: list[tuple[float, dict[str, float], dict[str, tuple[float, float | None] | None]]] = []
         while len(rounds) < settings.checks:
             best = {key: float(f"{value:.3g}") for key, value in zip(settings.free, fit.best, strict=True)}
-            found = work.check(len(rounds), best, strengths)
+            found = work.check(len(rounds), best, simulated)
             responses = work.responses()
             fit = find_best(responses, wanted, settings.free)
             off = {name: abs(found[name][0] - one.value) / one.tolerance for name, one in wanted.items()}

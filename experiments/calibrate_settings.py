@@ -26,8 +26,9 @@ class Figure:
     """A bulk figure that can be a target.
 
     Attributes:
-        unit: its unit. state: in which a sample is sheared for it, "loose" or "dense"; "" for one of a laboratory bed,
-            which takes minutes and is compared at the end but not fitted. words: what it is.
+        unit: its unit. words: what it is.
+        state: in which a sample is sheared for it, "loose" or "dense"; "drained" for that of a bed which drains through
+            a slot; "" for one of a laboratory bed, which takes minutes and is compared at the end but not fitted.
     """
 
     unit: str
@@ -41,6 +42,7 @@ FIGURES = {
     "cohesion": Figure("Pa", "loose", "cohesion at large strain"),
     "peak_cohesion": Figure("Pa", "dense", "cohesion at the largest strength"),
     "sample_density": Figure("kg/m3", "loose", "bulk density of a sample under the lid before it is sheared"),
+    "angle_of_repose": Figure("degrees", "drained", "angle of the slopes that stay where a bed drains through a slot"),
     "packing_loose": Figure("1", "", "packing fraction of a bed rained in and fluffed"),
     "packing_dense": Figure("1", "", "packing fraction of a bed rained in and tapped until taps gain nothing"),
     "bulk_density_loose": Figure("kg/m3", "", "bulk density of a bed rained in and fluffed"),
@@ -54,6 +56,7 @@ FREE = {
 }
 """What may be free, with its unit. bond_number: pull-off force of two grains over the weight of one."""
 _PLANES = ("shear", "triaxial")
+_SHEARED = ("loose", "dense")
 _FIXED = tuple(f.name for f in fields(Material) if f.name not in ("name", "sources", "grain"))
 
 
@@ -67,8 +70,10 @@ class Target:
         figure: which of ``FIGURES`` it is: its name, if nothing else is said.
         plane: of a friction angle: "shear", stresses on the plane of shear as a shear box or a ring shear tester reads
             them, or "triaxial", the angle of triaxial compression.
-        state: in which the sample is sheared: "loose" or "dense".
+        state: in which the sample is sheared: "loose" or "dense"; "drained" of an angle of repose.
         fit: whether the parameters are fitted to it, or it is only compared at the end.
+        through: of a friction angle: "tests", a straight line through the tests of all pressures, or "origin", one
+            through the origin as well, as a laboratory has it that tells an angle and no cohesion.
     """
 
     name: str
@@ -79,6 +84,7 @@ class Target:
     plane: str = "shear"
     state: str = ""
     fit: bool = True
+    through: str = "tests"
 
     @property
     def unit(self) -> str:
@@ -109,7 +115,8 @@ class CalibrateSettings(StrictSettings):
     targets: dict[str, dict[str, Any]] = Field(
         {},
         description="The figures: [targets.critical_friction_angle] value = 31.5, tolerance = 1.5, source = '...'; "
-        "also figure = '...' where it has another name, plane = 'shear' or 'triaxial', state = 'loose' or 'dense', "
+        "also figure = '...' where it has another name, plane = 'shear' or 'triaxial', through = 'tests' or 'origin', "
+        "state = 'loose' or 'dense', "
         "fit = false to compare only.",
     )
     grain: Positive = Field(0.004, description="Mean grain diameter [m]; surface energies hold for it.")
@@ -162,6 +169,11 @@ class CalibrateSettings(StrictSettings):
     )
     bed_size: tuple[Positive, Positive, Positive] = Field(
         (0.04, 0.04, 0.035), description="Laboratory beds, for packing fractions: widths and depth [m]."
+    )
+    repose_size: tuple[Positive, Positive, Positive] = Field(
+        (32.0, 6.0, 8.0),
+        description="Bed that is drained for an angle of repose: widths (periodic; slopes along the first) and depth "
+        "[mean diameters].",
     )
     threads: int | None = Field(None, ge=1, le=1024, description="CPU threads; all there are if not given.")
 
@@ -249,10 +261,14 @@ def _target(name: str, given: dict[str, Any]) -> Target:
         raise ValueError(f"{called}.source = {given['source']!r} must say where the figure comes from")
     figure = FIGURES[kind]
     state = given.get("state", figure.state)
-    if state != figure.state and (not figure.state or state not in ("loose", "dense")):
+    if state != figure.state and not (state in _SHEARED and figure.state in _SHEARED):
         raise ValueError(f"{called}.state = {state!r} must be 'loose' or 'dense', of a strength")
     if given.get("plane", "shear") not in _PLANES or ("plane" in given and "friction_angle" not in kind):
         raise ValueError(f"{called}.plane = {given['plane']!r} must be 'shear' or 'triaxial', of a friction angle")
+    if given.get("through", "tests") not in ("tests", "origin") or (
+        "through" in given and "friction_angle" not in kind
+    ):
+        raise ValueError(f"{called}.through = {given['through']!r} must be 'tests' or 'origin', of a friction angle")
     fit = given.get("fit", bool(figure.state))
     if not isinstance(fit, bool):
         raise ValueError(f"{called}.fit = {fit!r} must be true or false")

@@ -1,4 +1,4 @@
-"""The tests behind a calibration: what a sheared sample says, and the bulk figures that follow from several.
+"""The tests behind a calibration: what a sheared sample or a drained bed says, and the bulk figures that follow.
 
 Stresses at large strain are means over the second half of the strain, their standard error that of five parts of it;
 the largest strength is that of the stress ratio averaged over a twentieth of strain.
@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,8 @@ import numpy as np
 from dem.element import ElementShear, shear_element
 from dem.materials import Material
 
+from .bed_repose import BEARING
+from .bed_tests import stiff_enough
 from .calibrate_settings import CalibrateSettings, Target
 
 __all__ = ["SampleTest", "figures_of", "laboratory_figure", "run_test", "summary_of", "tests_for", "triaxial_angle"]
@@ -29,11 +31,12 @@ __all__ = ["SampleTest", "figures_of", "laboratory_figure", "run_test", "summary
 _WINDOW = 0.05
 """Strain over which the largest strength is averaged."""
 _PARTS = 5
+_COLUMNS = {"strain": "strain", "height": "height_m", "shear": "shear_Pa", "normal": "normal_Pa"}
 
 
 @dataclass(frozen=True)
 class SampleTest:
-    """One sample: in which state it is sheared, the pressure [Pa], the seed."""
+    """One sample: in which state it is sheared, the pressure [Pa], the seed; a bed is "drained", without a pressure."""
 
     state: str
     pressure: float
@@ -42,20 +45,26 @@ class SampleTest:
     @property
     def name(self) -> str:
         """For files."""
-        return f"{self.state}-{self.pressure:g}-seed{self.seed}"
+        pressed = f"-{self.pressure:g}" if self.pressure else ""
+        return f"{self.state}{pressed}-seed{self.seed}"
 
 
 def tests_for(settings: CalibrateSettings, targets: Sequence[Target], *, seed: int) -> list[SampleTest]:
     """The tests that these targets need, of one set of parameters and one seed."""
     states = dict.fromkeys(target.state for target in targets if target.state)
     pressures = settings.pressures if settings.base.cohesion != "none" else settings.pressures[-1:]
-    return [SampleTest(state, pressure, seed) for state in states for pressure in pressures]
+    return [SampleTest(state, p, seed) for state in states for p in ((0.0,) if state == "drained" else pressures)]
 
 
 def run_test(
     stuff: Material, test: SampleTest, settings: CalibrateSettings, *, tell: Callable[[float], None]
-) -> tuple[dict[str, Any], ElementShear]:
-    """Carry a test out: its summary, as ``summary_of`` gives it, and its series. Raises BedFailure."""
+) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """Carry a test out: what is kept of it, of a sheared sample as ``summary_of`` gives it, and its series.
+
+    Raises BedFailure.
+    """
+    if test.state == "drained":
+        return _drain(stuff, test, settings, tell)
     run = shear_element(
         stuff,
         pressure=test.pressure,
@@ -69,7 +78,58 @@ def run_test(
         threads=settings.threads,
         tell=tell,
     )
-    return summary_of(run, stuff.density), run
+    return summary_of(run, stuff.density), {column: getattr(run, key) for key, column in _COLUMNS.items()}
+
+
+class _Preparing:
+    """Shows the preparation of a bed as the first half of a test."""
+
+    def __init__(self, tell: Callable[[float], None]) -> None:
+        self.tell, self.part = tell, 0
+
+    def stage(self, name: str, total: float | None = None) -> None:
+        """The next part begins."""
+        self.part += 1
+
+    def update(self, done: float) -> None:
+        """``done`` of it, 0 to 1."""
+        self.tell(0.5 - 0.5 ** (self.part + min(1.0, max(0.0, done))))
+
+
+def _drain(
+    stuff: Material, test: SampleTest, settings: CalibrateSettings, tell: Callable[[float], None]
+) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """The angle of repose of one bed as rained, as ``hedgebed bed test repose`` has it."""
+    from dem import Bed
+    from dem.repose import angle_of_repose
+
+    length, width, depth = (settings.grain * side for side in settings.repose_size)
+    sizes = {"grain": settings.grain, "spread": settings.spread}
+    bed = Bed.prepare(
+        stuff.with_rolling(),  # the plate is rough
+        size=(length, width, depth),
+        **sizes,
+        gravity=settings.gravity,
+        seed=test.seed,
+        young=stiff_enough(stuff, depth=depth, **sizes, gravity=settings.gravity, bearing=BEARING),
+        threads=settings.threads,
+        cache=False,
+        progress=_Preparing(tell),
+    )
+    packing = bed.packing_fraction
+    found = angle_of_repose(bed, tell=lambda share: tell(0.5 + 0.5 * share))
+    summary = {
+        "angle": found.angle,
+        "error": found.error,
+        "flanks": [asdict(flank) for flank in found.flanks],
+        "slot": found.slot,
+        "size": list(bed.size),
+        "packing_before": packing,
+        "young": bed.material.young,
+        "grain_count": bed.grain_count,
+        "max_overlap": bed.max_overlap,
+    }
+    return summary, {"x_m": found.distance, "thickness_m": found.thickness}
 
 
 def summary_of(run: ElementShear, density: float) -> dict[str, Any]:
@@ -136,11 +196,15 @@ def figures_of(
         if not target.state:
             continue
         kept = [summary for test, summary in runs.items() if test.state == target.state]
+        if target.state == "drained":
+            angles, errors = ([summary[name] for summary in kept] for name in ("angle", "error"))
+            found[target.name] = (float(np.mean(angles)), float(np.linalg.norm(errors)) / len(errors))
+            continue
         key = "peak_" if target.figure.startswith("peak") else ""
         normal = np.array([summary[f"{key}normal"] for summary in kept])
         shear = np.array([summary[f"{key}shear"] for summary in kept])
         error = np.array([summary["error"] for summary in kept])
-        start, slope, start_error, slope_error = _line(normal, shear, error)
+        start, slope, start_error, slope_error = _line(normal, shear, error, origin=target.through == "origin")
         angle = math.degrees(math.atan(slope))
         angle_error = math.degrees(slope_error / (1 + slope**2))
         if target.figure == "sample_density":
@@ -156,10 +220,13 @@ def figures_of(
     return found
 
 
-def _line(normal: np.ndarray, shear: np.ndarray, error: np.ndarray) -> tuple[float, float, float, float]:
-    """Where a straight line begins, its slope, and their standard errors; through the origin for one test."""
-    if len(normal) == 1:
-        return 0.0, float(shear[0] / normal[0]), 0.0, float(error[0] / normal[0])
+def _line(
+    normal: np.ndarray, shear: np.ndarray, error: np.ndarray, *, origin: bool
+) -> tuple[float, float, float, float]:
+    """Where a straight line begins, its slope, and their standard errors; through the origin for one test, or asked."""
+    if len(normal) == 1 or origin:
+        along = normal / (normal @ normal)
+        return 0.0, float(along @ shear), 0.0, math.sqrt(float(along**2 @ error**2))
     off = normal - normal.mean()
     along = off / (off @ off)
     level = 1 / len(normal) - normal.mean() * along

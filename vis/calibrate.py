@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from vis.bed_repose import flank_lines
 from vis.page import Page, Section, Tile, code, figure, table, text, write_page
 from vis.plot_parts import Plot, legend_above, new_panels
 from vis.style import BED, GREY, INK, MODEL, styled
@@ -32,7 +33,7 @@ def write_calibration_report(folder: str | Path, *, progress: Callable[[float], 
     figures = folder / "figures"
     figures.mkdir(exist_ok=True)
     plots = [_response(folder, result, key) for key in settings["free"]]
-    plots += [_residuals(result), _tests(folder, result)]
+    plots += [_residuals(result), *_tests(folder, result), *_slopes(folder, result)]
     drawn = [figure(plot.save(figures), title=plot.title, caption=plot.caption) for plot in plots]
     tell(0.8)
     quantities = result["quantities"]
@@ -156,15 +157,21 @@ def _residuals(result: Mapping[str, Any]) -> Plot:
     return Plot("residuals", "What is left", "Bars: two standard errors of the check.", drawing)
 
 
-def _tests(folder: Path, result: Mapping[str, Any]) -> Plot:
-    """The stress ratio of the check's tests over strain."""
-    free = result["curves"]
-    tests = [
+def _checked(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """The tests of the check that counts."""
+    return [
         test
         for test in result["tests"]
         if test["test"].startswith("check")
-        and all(test["values"][key] == result["quantities"][key]["value"] for key in free)
+        and all(test["values"][key] == result["quantities"][key]["value"] for key in result["curves"])
     ]
+
+
+def _tests(folder: Path, result: Mapping[str, Any]) -> list[Plot]:
+    """The stress ratio of the check's tests over strain."""
+    tests = [test for test in _checked(result) if test["state"] != "drained"]
+    if not tests:
+        return []
     states = list(dict.fromkeys(test["state"] for test in tests))
     pressures = sorted({test["pressure"] for test in tests})
     with styled():
@@ -187,4 +194,22 @@ def _tests(folder: Path, result: Mapping[str, Any]) -> Plot:
             Line2D([], [], color=(BED, MODEL, INK, GREY)[k % 4], label=f"{p:g} Pa") for k, p in enumerate(pressures)
         ]
         legend_above(drawing, handles)
-    return Plot("tests", "The check's tests", "A line a seed, smoothed over a sixtieth of the strain.", drawing)
+    return [Plot("tests", "The check's tests", "A line a seed, smoothed over a sixtieth of the strain.", drawing)]
+
+
+def _slopes(folder: Path, result: Mapping[str, Any]) -> list[Plot]:
+    """What the drained beds of the check left."""
+    tests = [test for test in _checked(result) if test["state"] == "drained"]
+    if not tests:
+        return []
+    with styled():
+        drawing, axes = new_panels(len(tests), height=2.4, sharey=True)
+        for axis, test in zip(axes, tests, strict=True):
+            columns, _ = read_columns(folder / test["series"])
+            axis.plot(1e3 * columns["x_m"], 1e3 * columns["thickness_m"], color=BED, marker=".", ls="none")
+            flank_lines(axis, test, start=0.5 * test["slot"], period=test["size"][0], colour=MODEL)
+            axis.set_title(f"seed {test['seed']}: {test['angle']:.1f} ± {test['error']:.1f}°")
+            axis.set_xlabel("x [mm]")
+            axis.set_ylim(bottom=0.0)
+        axes[0].set_ylabel("thickness [mm]")
+    return [Plot("slopes", "Slopes of the check's beds", "Heights are not to the scale of x.", drawing)]

@@ -19,12 +19,4 @@ CASES = [
         "design data, unverified",
         waits_for=TESTS.format(test="repose"),
     ),
-    Case(
-        "friction-angle",
-        FAMILY,
-        "Friction angle by direct shear or triaxial",
-        "30 to 33 degrees for Toyoura sand at critical state",
-        "design data, from a second source",
-        waits_for=TESTS.format(test="shear"),
-    ),
 ]

@@ -97,6 +97,19 @@ def test_friction_angle_and_cohesion_are_those_of_the_line_through_the_tests():
     slope_error = math.sqrt(2) * 5 / 700
     assert found["critical_friction_angle"][1] == pytest.approx(math.degrees(slope_error / (1 + tangent**2)))
     assert found["cohesion"][1] == pytest.approx(5 / 700 * math.hypot(1000, 300))
+    whole = Target("whole", 1, 1, "", "critical_friction_angle", "shear", "loose", through="origin")
+    steeper = tangent + 120 * 1300 / (300**2 + 1000**2)  # least squares without a cohesion
+    assert figures_of([whole], runs)["whole"][0] == pytest.approx(math.degrees(math.atan(steeper)))
+
+
+def test_an_angle_of_repose_needs_one_bed_and_no_pressures():
+    settings = sticky(targets=sticky().targets | {"angle_of_repose": ANGLE})
+    tests = calibrate_tests.tests_for(settings, list(settings.wanted.values()), seed=7)
+    assert [test.name for test in tests] == ["loose-500-seed7", "loose-1000-seed7", "drained-seed7"]
+    found = figures_of([settings.wanted["angle_of_repose"]], {tests[-1]: {"angle": 33.0, "error": 0.7}})
+    assert found["angle_of_repose"] == pytest.approx((33.0, 0.7))
+    with pytest.raises(ValueError, match=r"repose_size, times grain: size: x = 0\.08 m is too narrow"):
+        calibrate.check(settings.model_copy(update={"repose_size": (20.0, 6.0, 8.0)}))
 
 
 def test_the_triaxial_angle_of_triaxial_compression_is_its_own():
@@ -126,7 +139,7 @@ def test_a_calibration_finds_the_grains_and_resumes(tmp_path, monkeypatch, capsy
     def run_test(stuff, test, settings, *, tell):
         calls.append(test)
         run = made_up_run(stuff, test.pressure, 1000 * len(calls))
-        return summary_of(run, stuff.density), run
+        return summary_of(run, stuff.density), {c: getattr(run, k) for k, c in calibrate_tests._COLUMNS.items()}
 
     monkeypatch.setattr(calibrate, "run_test", run_test)
     ring = {"figure": "critical_friction_angle", "value": 50.0, "tolerance": 2.0, "source": "made up", "fit": False}
@@ -161,6 +174,8 @@ def test_a_calibration_finds_the_grains_and_resumes(tmp_path, monkeypatch, capsy
         ({"targets": {"critical_friction_angle": {"value": 31.0}}}, "tolerance must be given"),
         ({"targets": {"critical_friction_angle": ANGLE | {"tolerance": 0}}}, "tolerance = 0 must be positive"),
         ({"targets": {"critical_friction_angle": ANGLE | {"plane": "oblique"}}}, "must be 'shear' or 'triaxial'"),
+        ({"targets": {"angle_of_repose": ANGLE | {"state": "loose"}}}, "state = 'loose' must be"),
+        ({"targets": {"cohesion": COHESION | {"through": "origin"}}}, "through = 'origin' must be"),
         ({"targets": {"packing_loose": ANGLE | {"fit": True}}}, "takes minutes and is compared only"),
         ({"targets": {"cohesion": COHESION}}, "of grains that do not stick"),
         ({"free": {"rolling": (0.1, 0.2)}}, "free.rolling is no parameter that can be found"),
