@@ -94,7 +94,7 @@ class PenetrateSettings(StrictSettings):
     drop_time: Positive = Field(0.8, description="A drop that has not come to rest ends after this [s].")
     lowering_speed: Positive = Field(0.1, description="Speed at which a spike is lowered to be set down [m/s].")
     rest_time: Positive = Field(0.04, description="For how long the signs of rest must hold [s].")
-    other_speeds: tuple[Positive, ...] = Field((0.2,), description="Speeds driven on the seeds after the first [m/s].")
+    other_speeds: tuple[Positive, ...] = Field((0.4,), description="Speeds driven on the seeds after the first [m/s].")
     other_drop_speeds: tuple[Positive, ...] = Field((0.15,), description="Drops on the seeds after the first [m/s].")
 
     # Beside it

@@ -137,8 +137,8 @@ def test_beside_a_bed_that_does_not_spring_back_the_amended_law_closes_the_gap(t
     )  # fmt: skip
     monkeypatch.setattr(penetrate, "find_material", lambda name: sand)
     monkeypatch.setattr(penetrate, "bed_step", lambda settings, young: STEP)
-    monkeypatch.setattr(penetrate, "write_report", lambda folder, progress: None)
-    monkeypatch.setattr(amended_runs, "write_report", lambda folder, progress: None)
+    monkeypatch.setattr(penetrate, "write_report", lambda *given: None)
+    monkeypatch.setattr(amended_runs, "write_report", lambda *given: None)
     (tmp_path / "model.toml").write_text(MODEL + CRATER)
     settings = PenetrateSettings(
         **QUICK, model=str(tmp_path / "model.toml"), campaign=str(tmp_path / "c"), campaign_force_std=0.01

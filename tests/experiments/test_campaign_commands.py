@@ -117,7 +117,7 @@ def tumbles(tmp_path_factory):
     )
     folder = tmp_path_factory.mktemp("made")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(synthesis, "write_report", lambda folder, progress: None)
+        patch.setattr(synthesis, "write_report", lambda *given: None)
         synthesis.run(settings, folder / "run")
     return read_campaign(folder / "run" / "campaign")
 
@@ -204,7 +204,7 @@ def grains(tmp_path_factory):
             ),
         )  # fmt: skip
         patch.setattr(penetrate, "find_material", lambda name: sand)
-        patch.setattr(penetrate, "write_report", lambda folder, progress: None)
+        patch.setattr(penetrate, "write_report", lambda *given: None)
         patch.setattr(penetrate, "bed_step", lambda settings, young: 2e-5)
         penetrate.run(PenetrateSettings(**settings.model_dump()), folder)
     from experiments.runfolder import RunFolder

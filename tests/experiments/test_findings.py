@@ -26,7 +26,7 @@ def fake(monkeypatch):
 
     monkeypatch.setattr(penetrate, "prepare_bed", prepare)
     monkeypatch.setattr(penetrate, "find_material", lambda name: SAND)
-    monkeypatch.setattr(penetrate, "write_report", lambda folder, progress: None)
+    monkeypatch.setattr(penetrate, "write_report", lambda *given: None)
     monkeypatch.setattr(penetrate, "bed_step", lambda settings, young: 2e-5)
 
 
