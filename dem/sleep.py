@@ -6,9 +6,12 @@ The rules, in numbers of ``Sleep``; d is the mean diameter, m the mean mass, g g
   ``calm`` sqrt(d / g), no grain that it touches moves faster, and no body but the floor is within ``reach`` d.
 * Asleep it stands still, an unmovable grain to those awake, and its contacts with other sleepers keep their springs.
 * It wakes when a body comes within ``reach`` d; when the spring force of a contact with a grain awake has changed by
-  ``force`` m g since the two last were alike, be it that the contact opens or closes; when a grain awake that is listed
-  with it moves faster than ``waking_speed`` sqrt(g d). For the last two all sleepers in its cell of the grid and the 26
-  around it wake with it. Looked at every ``every`` steps, and whenever lists are made.
+  ``force`` m g, and by ``share`` of what it was, since the two last were alike, be it that the contact opens or closes;
+  when a grain awake that is listed with it moves faster than ``waking_speed`` sqrt(g d). For the last two all sleepers
+  in its cell of the grid and the 26 around it wake with it. Looked at every ``every`` steps, and when lists are made.
+
+Whether a packing that bears F yields under a change of F goes by their ratio, for friction has no force of its own;
+hence ``share``. ``force`` is for contacts that carry next to nothing.
 
 In memory those awake come first, in the order of the curve, and chunks, lists and loops are theirs alone; that is all
 that the step knows of sleep. Who sleeps changes when lists are made, on steps that do not depend on how a run is cut,
@@ -48,11 +51,13 @@ class Sleep:
     reach: float = 3.0
     """No grain this near to a body sleeps [d]."""
     force: float = 1.0
-    """Change of a contact's force that wakes [m g]."""
+    """Change of a contact's force that wakes [m g], and"""
+    share: float = 0.5
+    """the least of it over the force itself [1]; both must be reached."""
     waking_speed: float = 5e-2
     """Speed of a neighbour that wakes [sqrt(g d)]."""
-    every: int = 20
-    """Steps between two looks."""
+    every: int = 50
+    """Steps between two looks: what wakes makes new lists, and those cost as much as four steps of all grains."""
 
     def __post_init__(self):
         for field in fields(self):
@@ -98,7 +103,7 @@ class Sleeper:
         if steps % self.rules.every:
             return False
         if self.awake < self.bed.grain_count:
-            e.look(self.limit, self.fast, rest)
+            e.look(self.limit, self.rules.share, self.fast, rest)
         self.leaving = False
         if steps % self.rest_every == 0:
             e.look_for_rest(self.slow, _LOOKS_OF_CALM, self.reach, rest, e.shapes)
@@ -112,7 +117,7 @@ class Sleeper:
         if all_awake:
             rest.woken.fill(1)
         elif self.awake < self.bed.grain_count:
-            e.look(self.limit, self.fast, rest)
+            e.look(self.limit, self.rules.share, self.fast, rest)
         e.stir(self.bed.time_step, self.reach, int(self.leaving), rest, e.shapes)
         rest.news.fill(0)
         if self.leaving:

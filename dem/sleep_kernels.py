@@ -105,19 +105,21 @@ class Sleepers:
         return found
 
     @ti.kernel
-    def look(self, limit: float, fast: float, rest: ti.template()):
-        """Raise the flags of sleepers that are to wake: a contact's force changed by ``limit`` [N], a ``fast`` [m/s]
-        neighbour."""
+    def look(self, limit: float, share: float, fast: float, rest: ti.template()):
+        """Raise the flags of sleepers that are to wake: a contact's force changed by ``limit`` [N] and this share of
+        it, a ``fast`` [m/s] neighbour."""
         for _ in range(1):
             self.ticket[QUEUE] = 0
         for w in range(self.cpu_items):
             c = self.next_chunk(w, True)
             while c < self.count[CHUNKS]:
-                self.look_around(c, ti.cast(limit, self.real), ti.cast(fast, self.real), rest)
+                self.look_around(
+                    c, ti.cast(limit, self.real), ti.cast(share, self.real), ti.cast(fast, self.real), rest
+                )
                 c = self.next_chunk(w, False)
 
     @ti.func
-    def look_around(self, c, limit, fast, rest: ti.template()):
+    def look_around(self, c, limit, share, fast, rest: ti.template()):
         start, end = self.chunk_range(c)
         awake = self.count[AWAKE]
         for i in range(start, end):
@@ -128,7 +130,9 @@ class Sleepers:
                 j = bits & INDEX_MASK
                 if j >= awake:
                     f = self.spring_force(self.position[i], self.position[j], bits, self.slide[s])
-                    if quick or (f - rest.force[s]).norm_sqr() > limit * limit:
+                    before = rest.force[s]
+                    least = ti.max(limit * limit, share * share * before.norm_sqr())
+                    if quick or (f - before).norm_sqr() > least:
                         rest.woken[self.id[j]] = 1
                         rest.news[WOKEN] = 1
 

@@ -34,6 +34,8 @@ class Surface:
     granular: bool = False
     grains: str | None = None
     """The material of `dem` whose grains a bed of it is made of."""
+    packing: float | None = None
+    """Packing fraction of the samples that those grains were calibrated with [1]; None: of no certain one."""
     guess: bool = False
     """Whether nothing but judgement stands behind the numbers."""
 

@@ -69,8 +69,9 @@ class TumbleBedSettings(StrictSettings):
         False, description="On a bed: whether grains at rest are left out until something reaches them (docs/bed.md)."
     )
     sleep_force: Positive = Field(
-        1.0, description="Of sleep: change of a contact's force that wakes a grain, over its weight [1]."
+        1.0, description="Of sleep: change of a contact's force that wakes a grain, over its weight [1], and"
     )
+    sleep_share: Positive = Field(0.5, description="Of sleep: the least of it over the force itself [1].")
     frame_count: int = Field(30, ge=0, le=1000, description="On a bed: frames for ParaView; 0: none.")
     checkpoint_interval: Positive = Field(60.0, description="On a bed: time between checkpoints [s].")
     threads: int | None = Field(None, ge=1, description="On a bed: threads; all cores if not given.")

@@ -9,16 +9,14 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from coupling import MOST_REVERSAL, BedFooting, CoupledTumble, LawFooting, platform_members
+from coupling import BedFooting, CoupledTumble, LawFooting, platform_members
 from dem import Bed, Sleep
 from dem.materials import Material
 from dem.materials import material as find_material
-from dem.prepare import fingerprint
 from rigid.planar import simulate
 from rigid.rig import STANDARD_GRAVITY
 from rigid.trajectory import Trajectory
@@ -27,16 +25,17 @@ from rigid.trial import Trial
 from .bed_progress import BedProgress
 from .progress import Progress
 from .reporting import write_report
-from .runfolder import RunFolder, write_series
+from .runfolder import RunFolder
 from .settings import expected_grain_count
 from .softening import Softening, soften_material
 from .stopping import held_back
 from .surfaces import find_surface, surface_names
 from .tumble_bed_settings import TumbleBedSettings
 from .tumble_grains_frames import TumbleFrames
+from .tumble_grains_result import conclude, sinkage_start, write_trajectory
 from .tumble_platform import torque_within_limit
 from .tumble_settings import TumbleSettings
-from .tumble_steppers import is_plain, own_quantities, stepper_of, words
+from .tumble_steppers import is_plain, stepper_of
 from .tumble_trial import TumblePlan, plan_tumble
 
 __all__ = ["Forecast", "check_on_grains", "tumble_on_grains"]
@@ -96,7 +95,7 @@ def tumble_on_grains(settings: TumbleSettings, folder: RunFolder, progress: Prog
             raise RuntimeError(f"the bed could not be prepared: {error}; change young, max_overlap or seed") from error
         run = _stepper(settings, plan, bed, forecast)
         series = _follow(settings, run, folder, progress)
-        result = _conclude(settings, plan, run, series, forecast, softening, folder)
+        result = conclude(settings, plan, run, series, forecast.trajectory, softening, folder)
         folder.write_result(result)
         progress.stage("report", total=1.0)
         write_report(folder.path, progress)
@@ -260,7 +259,7 @@ def _stepper(settings: TumbleSettings, plan: TumblePlan, bed: Bed, forecast: For
     bed.max_overlap = 0.0
     bed.mark_origin()
     if settings.sleep:
-        bed.let_sleep(Sleep(force=settings.sleep_force))
+        bed.let_sleep(Sleep(force=settings.sleep_force, share=settings.sleep_share))
     return stepper_of(
         settings, plan.trial, footing, duration=settings.duration, substeps=settings.substeps,
         extrapolation=settings.extrapolation, iterations=settings.iterations, tip_radius=0.5 * settings.spike_diameter,
@@ -287,7 +286,7 @@ def _follow(settings: TumbleSettings, run: CoupledTumble, folder: RunFolder, pro
         if in_hand and run.placed:
             in_hand = False
             held = run.placing_steps * run.master.macro_step
-            progress.message(f"set down after {held:.3g} s: {1e3 * _sinkage_start(run):.3g} mm deep")
+            progress.message(f"set down after {held:.3g} s: {1e3 * sinkage_start(run):.3g} mm deep")
         stop = asked_to_stop()
         if not run.done and (stop or time.monotonic() - saved >= settings.checkpoint_interval):
             folder.save_checkpoint(CHECKPOINT, run.state())
@@ -311,126 +310,3 @@ def _follow(settings: TumbleSettings, run: CoupledTumble, folder: RunFolder, pro
         ) from error
     folder.save_checkpoint(CHECKPOINT, run.state())
     return series
-
-
-def write_trajectory(folder: Path, run: CoupledTumble) -> Trajectory:
-    """trajectory.csv and the series of a run, as far as it has come."""
-    from .tumble import motion_columns, trajectory_columns
-
-    found = run.trajectory()
-    (folder / "series").mkdir(exist_ok=True)
-    write_series(folder / "trajectory.csv", trajectory_columns(found))
-    write_series(folder / "series" / "motion.csv", motion_columns(found))
-    rows = run.columns
-    columns: dict[str, Any] = {"t_s": rows["time"], "given_J": rows["given"], "taken_J": rows["taken"]}
-    for row in range(run.trial.spike_count):
-        for k, (name, unit) in enumerate((("normal", "N"), ("along", "N"), ("slip", "m_s"), ("sinkage", "m"))):
-            columns[f"{name}_{row}_{unit}"] = run.feet[:, k, row]
-    write_series(folder / "series" / "feet.csv", columns)
-    samples = run.samples
-    units = {"time": "t_s", "momentum_error": "momentum_error_N_s", "grain_steps": "grain_steps"}
-    write_series(folder / "series" / "bed.csv", {units.get(name, f"{name}_J"): v for name, v in samples.items()})
-    return found
-
-
-def _conclude(
-    settings: TumbleSettings,
-    plan: TumblePlan,
-    run: CoupledTumble,
-    series: Trajectory,
-    forecast: Forecast,
-    softening: Softening,
-    folder: RunFolder,
-) -> dict[str, Any]:
-    from .tumble import quantities_of, result_of, trajectory_columns
-
-    write_trajectory(folder.path, run)
-    write_series(folder.path / "series" / "spring-damper.csv", trajectory_columns(forecast.trajectory))
-    result = result_of(settings, plan, series, run.body.wheel_at_limit)
-    bed, books = run.footing.bed, run.master.books  # type: ignore[attr-defined]
-    result["title"] = words(settings, f"A tumble on a bed of {plan.surface}: {result['title'].partition(': ')[2]}")
-    result["code"] = fingerprint()
-    added, rests = own_quantities(run)
-    result["quantities"] |= _own_quantities(run) | added
-    result |= {"tables": [rests]} if rests is not None else {}
-    result["quantities"]["energy_residual"]["note"] += (
-        "; dissipated is what the bed took less what it is measured to hold more, so what the bed holds cancels: this "
-        "checks platform and coupling, not the grains (dissipation_reversal sees energy that they make)"
-    )
-    result["grains"] = {
-        "mode": "rig: grains at 1 g" if plan.trial.counterweight > 0 else "flight: grains at the platform's gravity",
-        "series": {
-            "own": "trajectory.csv", "feet": "series/feet.csv", "bed": "series/bed.csv",
-            "beside": "series/spring-damper.csv",
-        },
-        "grain_count": int(bed.grain_count), "packing_fraction": float(bed.packing_fraction),
-        "surface": float(bed.surface), "young": softening.young, "softer_than_real": softening.factor,
-        "time_step": float(bed.time_step), "macro_step": run.master.macro_step,
-        "max_overlap": float(bed.max_overlap), "seed": settings.seed, "steps": run.master.count,
-        **_grain_steps(settings, run), "worst_guess": books.worst_guess, "largest_force": books.largest_force,
-        "beside": quantities_of(forecast.trajectory),
-        "beside_transitions": [
-            {"time": float(t), "state": state, "theta": float(theta)}
-            for t, state, theta in forecast.trajectory.transitions
-        ],
-    }  # fmt: skip
-    made = run.dissipation_reversal
-    if made > MOST_REVERSAL:
-        result["warnings"].append(
-            f"dissipation_reversal = {made:.2g} is above {MOST_REVERSAL:g}: the bed made energy, so this run's "
-            f"numbers are not to be trusted; fewer substeps tell whether it is the coupling"
-        )
-    across = settings.spike_diameter / settings.grain
-    if across < 10:
-        result["warnings"].append(
-            f"a spike is {across:.2g} grains across: 10 are wanted for a number to be quoted, 5 for a quick look"
-        )
-    if find_surface(plan.surface).granular:
-        result["warnings"].append("one bed of one seed: two valid beds differ, so differences need several seeds")
-    return result
-
-
-def _sinkage_start(run: CoupledTumble) -> float:
-    """Mean depth of the two rows that it stands on when the torque begins [m]."""
-    return float(run.feet[0, 3, [0, -1]].mean())
-
-
-def _grain_steps(settings: TumbleSettings, run: CoupledTumble) -> dict[str, Any]:
-    """Grains computed, step by step, since the torque began, and how many there would be with all of them awake."""
-    done = run.samples["grain_steps"]
-    steps = (run.master.count - run.placing_steps) * settings.substeps
-    whole = steps * int(run.footing.bed.grain_count)  # type: ignore[attr-defined]
-    own = float(done[-1] - done[0])
-    return {
-        "sleep": settings.sleep, "grain_steps": own, "grain_steps_all_awake": float(whole),
-        "awake_share": own / whole if whole else None, "grain_steps_lowering": float(done[0]),
-        "lowering_time": run.placing_steps * run.master.macro_step,
-    }  # fmt: skip
-
-
-def _own_quantities(run: CoupledTumble) -> dict[str, dict[str, Any]]:
-    """What a tumble on grains has beyond the planar model's numbers."""
-    sinkage = run.feet[:, 3]
-    gap = run.columns["given"] - run.columns["taken"]
-    found = {
-        "sinkage_start": (_sinkage_start(run), "m", "of the two rows it stands on, mean, when the torque begins"),
-        "sinkage_largest": (float(sinkage.max()), "m", "of any row"),
-        "largest_row_force": (float(run.feet[:, 0].max()), "N", "upwards, mean of one macro step"),
-        "exchange_residual": (
-            float(np.abs(gap - gap[0]).max()) / run.energy_scale, "1",
-            "work that the body gives less what the bed takes, largest, over max(|work of the torque|, W l)",
-        ),
-        "dissipation_reversal": (
-            run.dissipation_reversal, "1",
-            "largest fall of the dissipated energy below what it was before, over max(|work of the torque|, W l), at "
-            f"the times of series/bed.csv: energy that the bed made beyond what it dissipated; a warning above "
-            f"{MOST_REVERSAL:g}",
-        ),
-        "momentum_residual": (
-            float(run.samples["momentum_error"].max()), "N s",
-            "largest of body and grains together, less the impulses of gravity and floor",
-        ),
-    }  # fmt: skip
-    return {
-        name: {"value": value, "std": None, "unit": unit, "note": note} for name, (value, unit, note) in found.items()
-    }

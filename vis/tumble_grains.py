@@ -104,12 +104,14 @@ def _draw_feet(feet: Mapping[str, NDArray[np.float64]]) -> Figure:
     time = feet["t_s"]
     count = sum(name.startswith("normal_") for name in feet)
     window = max(1, round(5e-3 / float(np.median(np.diff(time))))) if len(time) > 1 else 1
+    kernel = np.ones(min(window, len(time)))
+    held = np.convolve(np.ones(len(time)), kernel, mode="same")  # fewer at both ends
     for row in range(count):
         normal, sinkage = feet[f"normal_{row}_N"], 1e3 * feet[f"sinkage_{row}_m"]
         if not normal.any():
             continue
         colour = _ROWS[row % len(_ROWS)]
-        force.plot(time, np.convolve(normal, np.full(window, 1 / window), mode="same"), color=colour, lw=1.0)
+        force.plot(time, np.convolve(normal, kernel, mode="same") / held, color=colour, lw=1.0)
         depth.plot(time, np.where(sinkage > 0, sinkage, np.nan), color=colour, lw=1.4, label=f"row {row}")
     force.set_ylabel("N of a row [N]")
     depth.set_ylabel("sinkage [mm]")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from coupling import CoupledTumble, LawFooting, LeftTheBedError
-from experiments import tumble, tumble_grains
+from experiments import tumble, tumble_grains, tumble_grains_result
 from experiments.cli import main
 from experiments.runfolder import RunFolder
 from experiments.softening import Softening
@@ -86,9 +86,9 @@ def test_the_result_dates_the_wheels_limit_and_warns_of_energy_that_the_ground_m
     run = CoupledTumble(plan.trial, footing, duration=0.1, max_wheel_speed=plan.max_wheel_speed)
     if false:
         footing.energies = lambda: {"springs": run.body.time}
-    result = tumble_grains._conclude(
-        settings, plan, run, run.run(), tumble_grains._forecast(settings, plan), Softening(1e7, 1.0, 1.0, 7e10),
-        SimpleNamespace(path=tmp_path),
+    beside = tumble_grains._forecast(settings, plan).trajectory
+    result = tumble_grains_result.conclude(
+        settings, plan, run, run.run(), beside, Softening(1e7, 1.0, 1.0, 7e10), SimpleNamespace(path=tmp_path),
     )  # fmt: skip
     assert result["wheel_at_limit"] == pytest.approx(plan.trial.wheel_inertia / 0.125, rel=1e-9)
     assert any("max_wheel_speed = 1 rad/s, at 0.0096 s" in said for said in result["warnings"])

@@ -1,0 +1,154 @@
+"""What comes of a tumble on grains: its series, and the result that stands beside the spring-damper's."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from coupling import MOST_REVERSAL, CoupledTumble
+from dem.prepare import fingerprint
+from rigid.trajectory import Trajectory
+
+from .runfolder import RunFolder, write_series
+from .softening import Softening
+from .surfaces import find_surface
+from .tumble_settings import TumbleSettings
+from .tumble_steppers import own_quantities, words
+from .tumble_trial import TumblePlan
+
+__all__ = ["conclude", "sinkage_start", "write_trajectory"]
+
+PACKING_OFF = 0.02
+"""A bed whose packing differs by more from that at which its grains were calibrated is worth a warning [1]."""
+
+
+def write_trajectory(folder: Path, run: CoupledTumble) -> Trajectory:
+    """trajectory.csv and the series of a run, as far as it has come."""
+    from .tumble import motion_columns, trajectory_columns
+
+    found = run.trajectory()
+    (folder / "series").mkdir(exist_ok=True)
+    write_series(folder / "trajectory.csv", trajectory_columns(found))
+    write_series(folder / "series" / "motion.csv", motion_columns(found))
+    rows = run.columns
+    columns: dict[str, Any] = {"t_s": rows["time"], "given_J": rows["given"], "taken_J": rows["taken"]}
+    for row in range(run.trial.spike_count):
+        for k, (name, unit) in enumerate((("normal", "N"), ("along", "N"), ("slip", "m_s"), ("sinkage", "m"))):
+            columns[f"{name}_{row}_{unit}"] = run.feet[:, k, row]
+    write_series(folder / "series" / "feet.csv", columns)
+    samples = run.samples
+    units = {"time": "t_s", "momentum_error": "momentum_error_N_s", "grain_steps": "grain_steps"}
+    write_series(folder / "series" / "bed.csv", {units.get(name, f"{name}_J"): v for name, v in samples.items()})
+    return found
+
+
+def conclude(
+    settings: TumbleSettings,
+    plan: TumblePlan,
+    run: CoupledTumble,
+    series: Trajectory,
+    beside: Trajectory,
+    softening: Softening,
+    folder: RunFolder,
+) -> dict[str, Any]:
+    """The result, its series written. `beside`: the same trial on the spring-damper."""
+    from .tumble import quantities_of, result_of, trajectory_columns
+
+    write_trajectory(folder.path, run)
+    write_series(folder.path / "series" / "spring-damper.csv", trajectory_columns(beside))
+    result = result_of(settings, plan, series, run.body.wheel_at_limit)
+    bed, books = run.footing.bed, run.master.books  # type: ignore[attr-defined]
+    result["title"] = words(settings, f"A tumble on a bed of {plan.surface}: {result['title'].partition(': ')[2]}")
+    result["code"] = fingerprint()
+    added, rests = own_quantities(run)
+    result["quantities"] |= _own_quantities(run) | added
+    result |= {"tables": [rests]} if rests is not None else {}
+    result["quantities"]["energy_residual"]["note"] += (
+        "; dissipated is what the bed took less what it is measured to hold more, so what the bed holds cancels: this "
+        "checks platform and coupling, not the grains (dissipation_reversal sees energy that they make)"
+    )
+    result["grains"] = {
+        "mode": "rig: grains at 1 g" if plan.trial.counterweight > 0 else "flight: grains at the platform's gravity",
+        "series": {
+            "own": "trajectory.csv", "feet": "series/feet.csv", "bed": "series/bed.csv",
+            "beside": "series/spring-damper.csv",
+        },
+        "grain_count": int(bed.grain_count), "packing_fraction": float(bed.packing_fraction),
+        "surface": float(bed.surface), "young": softening.young, "softer_than_real": softening.factor,
+        "time_step": float(bed.time_step), "macro_step": run.master.macro_step,
+        "max_overlap": float(bed.max_overlap), "seed": settings.seed, "steps": run.master.count,
+        **_grain_steps(settings, run), "worst_guess": books.worst_guess, "largest_force": books.largest_force,
+        "beside": quantities_of(beside),
+        "beside_transitions": [
+            {"time": float(t), "state": state, "theta": float(theta)}
+            for t, state, theta in beside.transitions
+        ],
+    }  # fmt: skip
+    made = run.dissipation_reversal
+    if made > MOST_REVERSAL:
+        result["warnings"].append(
+            f"dissipation_reversal = {made:.2g} is above {MOST_REVERSAL:g}: the bed made energy, so this run's "
+            f"numbers are not to be trusted; fewer substeps tell whether it is the coupling"
+        )
+    across = settings.spike_diameter / settings.grain
+    if across < 10:
+        result["warnings"].append(
+            f"a spike is {across:.2g} grains across: 10 are wanted for a number to be quoted, 5 for a quick look"
+        )
+    surface = find_surface(plan.surface)
+    if surface.packing is not None and abs(bed.packing_fraction - surface.packing) > PACKING_OFF:
+        result["warnings"].append(
+            f"the bed's packing fraction is {bed.packing_fraction:.3g}, and its grains ({surface.grains}) were "
+            f"calibrated at {surface.packing:g}: what they show is not {plan.surface}"
+        )
+    if surface.granular:
+        result["warnings"].append("one bed of one seed: two valid beds differ, so differences need several seeds")
+    return result
+
+
+def sinkage_start(run: CoupledTumble) -> float:
+    """Mean depth of the two rows that it stands on when the torque begins [m]."""
+    return float(run.feet[0, 3, [0, -1]].mean())
+
+
+def _grain_steps(settings: TumbleSettings, run: CoupledTumble) -> dict[str, Any]:
+    """Grains computed, step by step, since the torque began, and how many there would be with all of them awake."""
+    done = run.samples["grain_steps"]
+    steps = (run.master.count - run.placing_steps) * settings.substeps
+    whole = steps * int(run.footing.bed.grain_count)  # type: ignore[attr-defined]
+    own = float(done[-1] - done[0])
+    return {
+        "sleep": settings.sleep, "grain_steps": own, "grain_steps_all_awake": float(whole),
+        "awake_share": own / whole if whole else None, "grain_steps_lowering": float(done[0]),
+        "lowering_time": run.placing_steps * run.master.macro_step,
+    }  # fmt: skip
+
+
+def _own_quantities(run: CoupledTumble) -> dict[str, dict[str, Any]]:
+    """What a tumble on grains has beyond the planar model's numbers."""
+    sinkage = run.feet[:, 3]
+    gap = run.columns["given"] - run.columns["taken"]
+    found = {
+        "sinkage_start": (sinkage_start(run), "m", "of the two rows it stands on, mean, when the torque begins"),
+        "sinkage_largest": (float(sinkage.max()), "m", "of any row"),
+        "largest_row_force": (float(run.feet[:, 0].max()), "N", "upwards, mean of one macro step"),
+        "exchange_residual": (
+            float(np.abs(gap - gap[0]).max()) / run.energy_scale, "1",
+            "work that the body gives less what the bed takes, largest, over max(|work of the torque|, W l)",
+        ),
+        "dissipation_reversal": (
+            run.dissipation_reversal, "1",
+            "largest fall of the dissipated energy below what it was before, over max(|work of the torque|, W l), at "
+            f"the times of series/bed.csv: energy that the bed made beyond what it dissipated; a warning above "
+            f"{MOST_REVERSAL:g}",
+        ),
+        "momentum_residual": (
+            float(run.samples["momentum_error"].max()), "N s",
+            "largest of body and grains together, less the impulses of gravity and floor",
+        ),
+    }  # fmt: skip
+    return {
+        name: {"value": value, "std": None, "unit": unit, "note": note} for name, (value, unit, note) in found.items()
+    }
