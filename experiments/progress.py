@@ -13,6 +13,7 @@ with make_progress() as progress:
 Everything is written to stderr; stdout belongs to results.
 """
 
+import math
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -45,6 +46,16 @@ def duration(seconds: float | None) -> str:
     minutes, second = divmod(round(max(seconds, 0.0)), 60)
     hours, minute = divmod(minutes, 60)
     return f"{hours}:{minute:02d}:{second:02d}" if hours else f"{minute}:{second:02d}"
+
+
+def _to_go(seconds: float) -> str:
+    """The time to go as it is shown; never nothing, for then it would be over."""
+    return f"{duration(max(seconds, 1.0))} to go"
+
+
+def _percent(share: float) -> str:
+    """A share as it is shown; 100 % is said of the whole only."""
+    return f"{math.floor(100 * share + 1e-6)} %"
 
 
 def as_expected(passed: float) -> float:
@@ -286,20 +297,20 @@ class LineProgress(Progress):
     def _where(self) -> str:
         parts = []
         if (fraction := self.stage_fraction) is not None:
-            parts.append(f"{100 * fraction:.0f} %")
+            parts.append(_percent(fraction))
         if (rest := self.stage_remaining()) is not None:
-            parts.append(f"{duration(rest)} to go")
+            parts.append(_to_go(rest))
         if (whole := self.fraction) is not None:
-            parts.append(f"all {100 * whole:.0f} %")
+            parts.append(f"all {_percent(whole)}")
             if (rest := self.remaining()) is not None:
-                parts.append(f"{duration(rest)} to go")
+                parts.append(_to_go(rest))
         return ", ".join(parts)
 
     def stage(self, name: str, total: float | None = None) -> None:
         super().stage(name, total)
-        where = "" if (whole := self.fraction) is None else f" (all {100 * whole:.0f} %"
+        where = "" if (whole := self.fraction) is None else f" (all {_percent(whole)}"
         if where:
-            where += ")" if (rest := self.remaining()) is None else f", {duration(rest)} to go)"
+            where += ")" if (rest := self.remaining()) is None else f", {_to_go(rest)})"
         self._write(f"{name}{where}")
 
     def update(self, done: float) -> None:
@@ -326,7 +337,7 @@ class _ToGo(ProgressColumn):
         if rest is None:
             return Text("")
         passed = self._clock() - told
-        return Text(f"{duration(rest - passed if passed < (1 - _LATE) * rest else _LATE * rest)} to go")
+        return Text(_to_go(rest - passed if passed < (1 - _LATE) * rest else _LATE * rest))
 
 
 class LiveProgress(Progress):
@@ -352,7 +363,7 @@ class LiveProgress(Progress):
             task,
             total=None if fraction is None else 1.0,
             completed=fraction or 0.0,
-            percent="" if fraction is None else f"{100 * fraction:.0f} %",
+            percent="" if fraction is None else _percent(fraction),
             rest=rest,
             told=self._clock(),
         )
