@@ -18,6 +18,7 @@ __all__ = [
     "Cone",
     "Cylinder",
     "Facing",
+    "Graded",
     "LogNormal",
     "MATERIALS",
     "Material",
@@ -32,6 +33,7 @@ __all__ = [
     "Tube",
     "Uniform",
     "material",
+    "measure_grading",
     "mesh_from_file",
 ]
 
@@ -41,6 +43,8 @@ os.environ.setdefault("TI_LOG_LEVEL", "error")
 
 if TYPE_CHECKING:
     from .bed import Bed, BedFailure
+    from .graded import Graded
+    from .grading import measure_grading
     from .materials import MATERIALS, SAND, Facing, Material, material
     from .mesh import Mesh, Polyhedron, mesh_from_file
     from .shapes import Ball, Cone, Cylinder, Plane
@@ -50,6 +54,8 @@ if TYPE_CHECKING:
 
 _ROOMS = {
     "bed": ("Bed", "BedFailure"),
+    "graded": ("Graded",),
+    "grading": ("measure_grading",),
     "materials": ("Facing", "MATERIALS", "Material", "SAND", "material"),
     "mesh": ("Mesh", "Polyhedron", "mesh_from_file"),
     "shapes": ("Ball", "Cone", "Cylinder", "Plane"),

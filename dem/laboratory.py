@@ -13,6 +13,8 @@ import numpy as np
 
 from . import runtime
 from .bed import Bed, BedFailure
+from .graded import Graded
+from .grading import measure_grading
 from .lid import Lid
 from .materials import Facing, Material
 from .measure import packing_profile
@@ -78,7 +80,7 @@ def prepare_as(
     *,
     stages: Sequence[str | Stage],
     size: Sequence[float],
-    grain: float | Sizes,
+    grain: float | Sizes | Graded,
     spread: float | None = None,
     gravity: float = 9.81,
     seed: int = 1,
@@ -112,10 +114,11 @@ def prepare_as(
     )  # fmt: skip
     stuff, sizes, (x, y, z) = wanted.material, wanted.sizes, wanted.size
     plan = [parse_stage(stage) if isinstance(stage, str) else stage for stage in stages]
-    check_stages(plan, size=wanted.size, grain=sizes.mean, sizes=sizes, cohesive=stuff.cohesion != "none")
+    check_stages(plan, size=wanted.size, grain=sizes.mean, sizes=wanted.local, cohesive=stuff.cohesion != "none")
     recipe = wanted.recipe() | {"stages": [str(stage) for stage in plan]}
     runtime.start(arch=arch, threads=threads, precision=precision)
-    depth = (z + _SURPLUS_DIAMETERS * sizes.mean) * (DENSEST_UNIFORM if isinstance(sizes, Uniform) else 0.70)
+    dense = DENSEST_UNIFORM if isinstance(wanted.local, Uniform) else 0.70
+    depth = (z + _SURPLUS_DIAMETERS * wanted.coarsest) * dense
     work = Laboratory(
         wanted.rain(depth * x * y),
         stages=plan,
@@ -123,6 +126,7 @@ def prepare_as(
         progress=progress,
         path=None if keep is None else Path(keep),
         recipe=recipe,
+        graded=sizes if isinstance(sizes, Graded) else None,
     )
     work.find(arch=arch, threads=threads)
     return Prepared(wanted.finish(work.run(), recipe), recipe, work.reports)
@@ -140,12 +144,17 @@ class Laboratory(Preparation):
         progress: Any,
         path: Path | None,
         recipe: dict[str, Any] | None = None,
+        graded: Graded | None = None,
     ):
-        """``path``: as for ``Preparation``; ``recipe``: what is kept there is gone on with only for the same one."""
+        """``path``: as for ``Preparation``; ``recipe``: what is kept there is gone on with only for the same one.
+
+        ``graded``: where sizes belong; every stage's report then says in its notes how they lie.
+        """
         super().__init__(bed, grain=grain, depth=bed.size[2], packing=None, progress=progress, path=path)
         self.stages = list(stages)
         self.reports: list[StageReport] = []
         self._recipe = recipe
+        self._graded = graded
 
     def run(self) -> Bed:
         """Go on to the end; the bed. Raises as ``prepare_as`` does."""
@@ -164,6 +173,8 @@ class Laboratory(Preparation):
                 self._progress.stage(str(stage), 1.0)
             said = work[stage.name](stage)
             self.bed.measure_surface()
+            if self._graded is not None:
+                said["grading"] = asdict(measure_grading(self.bed, self._graded))
             self.reports.append(measure_stage(self.bed, str(stage), grain=self._grain, across=self._left, notes=said))
             self.notes = {}
             self.keep()

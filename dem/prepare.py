@@ -20,9 +20,11 @@ import numpy as np
 
 from . import runtime
 from .bed import Bed, BedFailure
+from .graded import Graded
+from .grading import measure_grading, surface_under
 from .materials import Facing, Material
 from .materials import material as find_material
-from .packing import draw_radii, rain_column, rain_positions
+from .packing import RAIN_COLUMN, draw_radii, rain_column, rain_positions
 from .recipe import check_packing
 from .sizes import Sizes, Uniform, describe, sizes_of
 from .stages import Preparation
@@ -59,7 +61,7 @@ class Specification:
 
     material: Material
     size: tuple[float, float, float]
-    sizes: Sizes
+    sizes: Sizes | Graded
     gravity: float
     seed: int
     young: float
@@ -76,7 +78,7 @@ class Specification:
         material: str | Material,
         *,
         size: Sequence[float],
-        grain: float | Sizes,
+        grain: float | Sizes | Graded,
         spread: float | None,
         gravity: float,
         seed: int,
@@ -85,9 +87,13 @@ class Specification:
         **others: Any,
     ) -> Specification:
         """Check the options of ``prepare_bed`` and choose the modulus where it is None. Raises ValueError."""
-        sizes = sizes_of(grain, spread)
+        if isinstance(grain, Graded) and spread is not None:
+            raise ValueError(f"spread = {spread} is for a mean diameter; Graded has a spread of its own")
+        sizes = grain if isinstance(grain, Graded) else sizes_of(grain, spread)
         stuff = find_material(material, grain=sizes.mean)
         check_options(size, sizes.mean, gravity, seed, max_overlap)
+        if isinstance(sizes, Graded):
+            sizes.check(size)
         x, y, z = (float(s) for s in size)
         if young is None:
             young = soft_enough(stuff, size=(x, y, z), sizes=sizes, gravity=gravity, max_overlap=max_overlap)
@@ -101,6 +107,16 @@ class Specification:
             max_overlap=float(max_overlap),
             **others,
         )
+
+    @property
+    def local(self) -> Sizes:
+        """The sizes of grains side by side: those under the footprints where the bed is graded."""
+        return self.sizes.local if isinstance(self.sizes, Graded) else self.sizes
+
+    @property
+    def coarsest(self) -> float:
+        """Mean diameter of the grains where they are largest [m]."""
+        return self.sizes.largest(self.size) if isinstance(self.sizes, Graded) else self.sizes.mean
 
     def recipe(self) -> dict[str, Any]:
         """What shapes the bed, as JSON takes it, with the code's digest; threads do not."""
@@ -122,8 +138,11 @@ class Specification:
     def rain(self, volume: float) -> Bed:
         """Grains of this solid volume [m3] in the air, at rest, in a loose column."""
         rng = np.random.default_rng(self.seed)
-        radii = draw_radii(rng, volume, self.sizes)
-        positions = rain_positions(rng, radii, self.size[:2])
+        if isinstance(self.sizes, Graded):
+            positions, radii = self.sizes.column(rng, volume, self.size)
+        else:
+            radii = draw_radii(rng, volume, self.sizes)
+            positions = rain_positions(rng, radii, self.size[:2])
         top = float((positions[:, 2] + radii).max())
         bed = Bed.from_grains(
             self.material,
@@ -145,9 +164,21 @@ class Specification:
         return bed
 
     def finish(self, bed: Bed, recipe: dict[str, Any]) -> Bed:
-        """The prepared bed at time 0, bound by ``max_overlap``, with displacements counted from here."""
+        """The prepared bed at time 0, bound by ``max_overlap``, with displacements counted from here.
+
+        Of a graded bed ``surface`` is that under the footprints; warns where its small grains did not stay in place.
+        """
         bed.material = self.material.softened(self.young)
         bed.recipe = recipe
+        if isinstance(self.sizes, Graded):
+            bed.surface = surface_under(bed, self.sizes)
+            found = measure_grading(bed, self.sizes)
+            if not found.held:
+                warnings.warn(
+                    f"the grading did not hold: {100 * found.strayed_share:.2g} % of the grains' volume lies farther "
+                    f"out than it belongs, {100 * found.drained_share:.2g} % could fall through; try a smaller growth",
+                    stacklevel=3,
+                )
         bed.overlap_limit = self.max_overlap
         bed.mark_origin()
         bed.max_overlap = 0.0
@@ -170,7 +201,7 @@ def prepare_bed(
     material: str | Material,
     *,
     size: Sequence[float],
-    grain: float | Sizes,
+    grain: float | Sizes | Graded,
     spread: float | None = None,
     packing: float | None = None,
     gravity: float = 9.81,
@@ -191,7 +222,7 @@ def prepare_bed(
         material: a name, the file of a material or a Material; its surface energy is taken for these grains, where it
             says for which it holds (``Material.for_grain``).
         size: lateral periods (x, y) and depth after levelling (z) [m].
-        grain: mean diameter [m], or a distribution of ``dem.sizes``.
+        grain: mean diameter [m], a distribution of ``dem.sizes``, or ``dem.Graded``: sizes by place.
         spread: with a mean diameter: diameters are uniform within +- this share of it [1]; 0.15 when None.
         packing: bulk packing fraction [1]; the bed is tapped until it is reached, and where it is denser than that
             loosened from below first. As rained when None.
@@ -226,7 +257,7 @@ def prepare_bed(
     )  # fmt: skip
     stuff, sizes = wanted.material, wanted.sizes
     if packing is not None:
-        check_packing(packing, sizes, cohesive=stuff.cohesion != "none")
+        check_packing(packing, wanted.local, cohesive=stuff.cohesion != "none")
     recipe = wanted.recipe() | {
         "grain": float(sizes.mean),
         "spread": sizes.spread if isinstance(sizes, Uniform) else None,
@@ -269,14 +300,15 @@ def prepare_bed(
 
 
 def soft_enough(
-    material: Material, *, size: Sequence[float], sizes: Sizes, gravity: float, max_overlap: float
+    material: Material, *, size: Sequence[float], sizes: Sizes | Graded, gravity: float, max_overlap: float
 ) -> float:
     """Young's modulus that a bed is given where none is asked for [Pa]: for the rain, and a tip in half its depth."""
     bulk = _EXPECTED_PACKING * material.density
+    column = RAIN_COLUMN if isinstance(sizes, Graded) else rain_column(sizes)
     return choose_young(
         material,
         pressure=(1 + BEARING) * bulk * gravity * size[2],
-        speed=math.sqrt(2 * gravity * rain_column(sizes) * size[2]),
+        speed=math.sqrt(2 * gravity * column * size[2]),
         max_overlap=max_overlap,
         diameter=sizes.mean,
     )
@@ -302,4 +334,4 @@ def check_options(size, grain, gravity, seed, max_overlap) -> None:
 def _rain(wanted: Specification) -> Bed:
     """The grains in the air, at rest, in a loose column, for a bed that is cut level."""
     x, y, z = wanted.size
-    return wanted.rain(0.60 * max(z * (1 + _SURPLUS), z + _SURPLUS_DIAMETERS * wanted.sizes.mean) * x * y)
+    return wanted.rain(0.60 * max(z * (1 + _SURPLUS), z + _SURPLUS_DIAMETERS * wanted.coarsest) * x * y)

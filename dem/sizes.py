@@ -10,10 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.special import ndtr, ndtri
+
+if TYPE_CHECKING:
+    from .graded import Graded
 
 __all__ = ["LogNormal", "Normal", "Sieve", "Sizes", "Uniform", "describe", "sizes_of"]
 
@@ -247,6 +250,6 @@ def sizes_of(grain: float | Sizes, spread: float | None = None) -> Sizes:
     return Uniform(float(grain), float(spread))
 
 
-def describe(sizes: Sizes) -> dict[str, Any]:
+def describe(sizes: Sizes | Graded) -> dict[str, Any]:
     """What it is, in plain values that JSON takes."""
     return {"kind": type(sizes).__name__} | asdict(sizes)

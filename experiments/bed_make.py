@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from .bed_settings import BedSettings
+from .bed_graded import grading_told
+from .bed_settings import GRADED, BedSettings
 from .bed_work import check_memory, check_name, finish_bed, prepared_in
 from .progress import Progress
 from .runfolder import RunFolder
@@ -22,8 +23,11 @@ def check(settings: BedSettings) -> None:
 
     check_name(settings.name)
     check_options(settings.size, settings.grain, settings.gravity, settings.seed, settings.max_overlap)
-    check_memory(settings.size, settings.grain, settings.spread)
-    stuff, sizes = material(settings.material, grain=settings.grain), Uniform(settings.grain, settings.spread)
+    graded = settings.sizes
+    share = 1.0 if graded is None else graded.share(settings.size)
+    check_memory(settings.size, settings.grain, settings.spread, share=share)
+    sizes = Uniform(settings.grain, settings.spread) if graded is None else graded
+    stuff = material(settings.material, grain=settings.grain)
     young = settings.young or soft_enough(
         stuff, size=settings.size, sizes=sizes, gravity=settings.gravity, max_overlap=settings.max_overlap
     )
@@ -45,11 +49,14 @@ def fingerprint() -> str:
 
 
 def _carry_out(settings: BedSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
-    options = settings.model_dump(exclude={"name"})
+    options = settings.model_dump(exclude={"name", "coarse", *GRADED})
+    if (graded := settings.sizes) is not None:
+        options |= {"grain": graded, "spread": None}
     with folder.lock():
         prepared = prepared_in(folder, progress, options, name=settings.name)
+        told = {} if graded is None else grading_told(prepared)
         title = f"A bed of {prepared.recipe['material']['name']}: {' '.join(settings.stages)}"
-        return finish_bed(folder, prepared, progress, experiment="bed make", title=title, name=settings.name)
+        return finish_bed(folder, prepared, progress, experiment="bed make", title=title, name=settings.name, **told)
 
 
 run, resume = whole_run("bed make", BedSettings, _carry_out, check=check)

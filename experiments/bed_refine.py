@@ -9,10 +9,12 @@ from dataclasses import replace
 from typing import Any
 
 from dem.bedfile import find_bed, read_preparation
+from dem.graded import Graded
 from dem.laboratory import Prepared
 from dem.materials import Material
 from dem.sizes import LogNormal, Normal, Sieve, Sizes, Uniform
 
+from .bed_graded import grading_told
 from .bed_settings import BedRefineSettings
 from .bed_work import check_memory, check_name, finish_bed, prepared_in
 from .progress import Progress
@@ -70,12 +72,16 @@ def refined_options(settings: BedRefineSettings) -> tuple[dict[str, Any], Prepar
     return options, coarse
 
 
-def _sizes(described: dict[str, Any]) -> Sizes:
+def _sizes(described: dict[str, Any]) -> Sizes | Graded:
+    if described["kind"] == "Graded":
+        return Graded.of(described)
     kinds = {"Uniform": Uniform, "Normal": Normal, "LogNormal": LogNormal, "Sieve": Sieve}
     return kinds[described["kind"]](**{key: value for key, value in described.items() if key != "kind"})
 
 
-def _scaled(sizes: Sizes, share: float) -> Sizes:
+def _scaled(sizes: Sizes | Graded, share: float) -> Sizes | Graded:
+    if isinstance(sizes, Graded):
+        return replace(sizes, fine=sizes.fine * share, coarse=sizes.coarse * share)
     if isinstance(sizes, Sieve):
         return replace(sizes, scale=sizes.scale * share)
     return replace(sizes, mean=sizes.mean * share)
@@ -88,14 +94,18 @@ def check(settings: BedRefineSettings) -> None:
 
     check_name(settings.name)
     options, _ = refined_options(settings)
-    sizes: Sizes = options["grain"]
+    sizes: Sizes | Graded = options["grain"]
     check_options(options["size"], sizes.mean, options["gravity"], options["seed"], options["max_overlap"])
-    check_memory(options["size"], sizes.mean, 0.0)
+    share = 1.0
+    if isinstance(sizes, Graded):
+        sizes.check(options["size"])
+        share = sizes.share(options["size"])
+    check_memory(options["size"], sizes.mean, 0.0, share=share)
     check_stages(
         [parse_stage(stage) for stage in options["stages"]],
         size=options["size"],
         grain=sizes.mean,
-        sizes=sizes,
+        sizes=sizes.local if isinstance(sizes, Graded) else sizes,
         cohesive=options["material"].cohesion != "none",
     )
 
@@ -126,6 +136,8 @@ def _carry_out(settings: BedRefineSettings, folder: RunFolder, progress: Progres
                 "surface-energy": "surface energy",
             }
             said.append(f"the grains' {kept[settings.keep]} is kept: surface_energy = {stuff.surface_energy:.4g} J/m2")
+        graded = isinstance(options["grain"], Graded)
+        told = grading_told(prepared) if graded else {}
         title = f"{settings.bed} with grains of {1e3 * options['grain'].mean:.4g} mm"
         return finish_bed(
             folder,
@@ -134,8 +146,9 @@ def _carry_out(settings: BedRefineSettings, folder: RunFolder, progress: Progres
             experiment="bed refine",
             title=title,
             name=settings.name,
-            tables=[table],
-            warnings=said,
+            tables=[table, *told.get("tables", [])],
+            warnings=[*said, *told.get("warnings", [])],
+            quantities=told.get("quantities"),
         )
 
 

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from dem.graded import Graded
 from dem.recipe import check_stages, parse_stage
 from dem.sizes import Uniform
 
@@ -16,6 +17,8 @@ __all__ = ["BedRefineSettings", "BedSettings"]
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 SeedNumber = Annotated[int, Field(ge=0, lt=2**31)]
+GRADED = ("footprints", "fine_depth", "growth")
+"""Settings that a graded bed alone has, beside ``coarse``."""
 _NAME = "Name under which the bed is kept on the shelf (HEDGEBED_BEDS); in the run's folder alone if not given."
 
 
@@ -34,6 +37,20 @@ class BedSettings(StrictSettings):
     )
     grain: Positive = Field(0.004, description="Mean grain diameter [m].")
     spread: float = Field(0.15, ge=0, le=0.5, description="Grain diameters are uniform within 1 +- this [1].")
+    coarse: Positive | None = Field(
+        None,
+        description="A graded bed: mean diameter of the coarsest grains, away from the footprints, under which "
+        "it is `grain` [m]; one size throughout if not given.",
+    )
+    footprints: tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], ...] = Field(
+        (), description="A graded bed: along x, where each strip of fine grains begins and ends [m]."
+    )
+    fine_depth: Positive | None = Field(
+        None, description="A graded bed: how deep the fine grains reach [m]; to the floor if not given."
+    )
+    growth: Positive | None = Field(
+        None, description="A graded bed: growth of the mean diameter with distance [1]; 0.15 if not given."
+    )
     gravity: Positive = Field(STANDARD_GRAVITY, description="Gravity of the grains [m/s2].")
     seed: SeedNumber = Field(1, description="Seed of sizes and positions.")
     name: str | None = Field(None, min_length=1, description=_NAME)
@@ -50,6 +67,8 @@ class BedSettings(StrictSettings):
     def _can_be(self) -> BedSettings:
         from dem.materials import material
 
+        if self.sizes is not None:
+            self.sizes.check(self.size)
         stages = [parse_stage(stage) for stage in self.stages]
         check_stages(
             stages,
@@ -59,6 +78,28 @@ class BedSettings(StrictSettings):
             cohesive=material(self.material).cohesion != "none",
         )
         return self
+
+    @property
+    def sizes(self) -> Graded | None:
+        """Sizes by place, where the bed is graded. Raises ValueError for what cannot be, or is given by halves."""
+        if self.coarse is None:
+            given = [name for name in GRADED if getattr(self, name) not in (None, ())]
+            if given:
+                raise ValueError(
+                    f"{', '.join(given)}: only of a graded bed; coarse = {2 * self.grain:g} would make one"
+                )
+            return None
+        ends = self.footprints
+        if not ends or len(ends) % 2:
+            raise ValueError(f"footprints = {list(ends)} must be pairs: where each begins and ends along x [m]")
+        return Graded(
+            fine=self.grain,
+            coarse=self.coarse,
+            footprints=tuple(zip(ends[::2], ends[1::2], strict=True)),
+            depth=self.fine_depth,
+            spread=self.spread,
+            **({} if self.growth is None else {"growth": self.growth}),
+        )
 
 
 class BedRefineSettings(StrictSettings):

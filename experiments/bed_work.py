@@ -27,9 +27,9 @@ _COSTS = {"rain": 3.0, "level": 1.0, "fluff": 3.0, "compact": 6.0, "packing": 6.
 """What a stage costs beside others; guesses, for the time that is shown."""
 
 
-def check_memory(size: tuple[float, float, float], grain: float, spread: float) -> None:
-    """Raise ValueError for more grains than there is memory for."""
-    count = 1.2 * expected_grain_count(size, grain, spread)
+def check_memory(size: tuple[float, float, float], grain: float, spread: float, *, share: float = 1.0) -> None:
+    """Raise ValueError for more grains than there is memory for; ``share``: of those of a bed with one size, graded."""
+    count = 1.2 * share * expected_grain_count(size, grain, spread)
     need, there = count * BYTES_PER_GRAIN, memory_there().free
     if need > 0.8 * there:
         least = grain * (need / (0.8 * there)) ** (1 / 3)
@@ -108,8 +108,9 @@ def finish_bed(
     name: str | None,
     tables: list[dict[str, Any]] | None = None,
     warnings: list[str] | None = None,
+    quantities: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """Write series, frame, result and report of a prepared bed; return the result."""
+    """Write series, frame, result and report of a prepared bed; return the result. ``quantities``: more of them."""
     bed, last = prepared.bed, prepared.reports[-1]
     assert bed is not None
     entries = []
@@ -123,7 +124,7 @@ def finish_bed(
             what = {"pass": np.arange(len(trace)), "packing": trace}
             entries[-1]["trace_series"] = folder.write_series(f"{safe}.passes", what)
     _write_frame(folder.path, bed)
-    quantities = {
+    own = {
         "packing_fraction": quantity(last.packing_fraction, "1", "between two diameters above the floor and two below"),
         "coordination_number": quantity(last.coordination_number, "1", "contacts of a grain, the floor's included"),
         "surface": quantity(last.surface, "m", "height where the packing falls to half"),
@@ -144,7 +145,7 @@ def finish_bed(
         "code": prepared.recipe["code"],
         "title": title,
         "status": "done",
-        "quantities": quantities,
+        "quantities": own | (quantities or {}),
         "stages": entries,
         "tables": [_stage_table(prepared.reports), *(tables or [])],
         "bed": {"file": "bed.npz", "name": name, "surface": {"value": bed.surface, "unit": "m"}, **prepared.recipe},
