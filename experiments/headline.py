@@ -5,6 +5,7 @@ Everything else is in the report and in result.json, and with ``--verbose`` on t
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from statistics import fmean, stdev
@@ -50,7 +51,8 @@ def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
         rows.append(("its drag is off by (rms, way in)", "", _quoted(numbers["drag_gap"], "%")))
     warnings, said = list(result.get("warnings", [])), list(result.get("departures", {}).get("sentences", []))
     moved = _moved(result.get("reference", {}).get("moved", {}))
-    own = [text for text in said if not text.startswith("Against the reference")]
+    # Of a finding that goes on, as to how far beds differ, the first sentence.
+    own = [re.split(r"(?<=\.)\s+(?=[A-Z])", text)[0] for text in said if not text.startswith("Against the reference")]
     shown = [*own[: max(_OF_FINDINGS, _SAID - len(warnings)) - len(moved)], *moved]
     return Headline(
         ("", "bed", "spring-damper"),

@@ -35,6 +35,8 @@ _A_MOMENT = 1.0
 """A stage that told its first share sooner has gone on from an earlier one's, or does little at a time [s]."""
 _GUESSED = 15.0
 """A first guess of the rate weighs as much as so much work done [s]."""
+_MOST_SLOWER = 3.0
+"""Times known in seconds follow the machine's pace over the one guessed up to so much, either way [1]."""
 _LATE = 0.15
 """What a stage that is late is said to take yet, over how late it is [1]."""
 
@@ -124,6 +126,7 @@ class Progress:
         self._work: dict[str, float] = {}  # those of them that had something to do -> how long it took [s]
         self._open = ""  # the stage of the plan that is under way
         self._opened = _Pace(clock())
+        self._waited = 0.0  # until the first share of all was told [s]
         self._reached = 0.0  # the largest share of the whole that was told
         self.stage_name = ""
         self._pace = self._opened
@@ -143,7 +146,7 @@ class Progress:
         if any(not cost >= 0 for cost in every.values()):
             raise ValueError(f"a stage cannot cost less than nothing: {every}")
         self._costs, self._seconds, self._unit = dict(costs), dict(seconds or {}), unit
-        self._over, self._work, self._reached = set(), {}, 0.0
+        self._over, self._work, self._waited, self._reached = set(), {}, 0.0, 0.0
         self._open = self.stage_name if self.stage_name in every else ""
         self._planned = self._clock()
         self._opened = _Pace(self._planned)
@@ -168,6 +171,8 @@ class Progress:
         """`done` of the stage's total is done (not: more than last time). Less than before is not believed."""
         self._done = max(self._done, float(done))
         share, now = self.stage_fraction, self._clock()
+        if not self._counts_down() and (share or 0.0) < _SAYS_SOMETHING:
+            self._waited = now - self._opened.began
         self._pace.tell(now, share or 0.0)
         if self._opened is not self._pace and self._opened.first is None:
             self._opened.tell(now, 0.0)  # something is done within it
@@ -217,7 +222,8 @@ class Progress:
         """How much of the plan is done, 0..1, never less than before; None without a plan."""
         if not self._costs and not self._seconds:
             return None
-        rest, spent = self.remaining(), self._clock() - self._planned
+        waiting = 0.0 if self._counts_down() else self._clock() - self._opened.began
+        rest, spent = self.remaining(), self._clock() - self._planned - self._waited - waiting
         if rest is not None and (spent > 0 or self._over):
             self._reached = max(self._reached, spent / (spent + rest) if rest > 0 else 1.0)
         return self._reached
@@ -243,8 +249,11 @@ class Progress:
         return rest
 
     def _expected(self, name: str, rate: float | None) -> float | None:
-        """How long a stage that is not over should take, by the plan [s]."""
-        return self._seconds[name] if name in self._seconds else None if rate is None else self._costs[name] * rate
+        """How long a stage that is not over should take, by the plan [s]; known times on a machine as was guessed."""
+        if name in self._seconds:
+            slower = rate / self._unit if rate is not None and self._unit else 1.0
+            return self._seconds[name] * min(max(slower, 1 / _MOST_SLOWER), _MOST_SLOWER)
+        return None if rate is None else self._costs[name] * rate
 
     def _left_of(self, expected: float | None) -> float | None:
         """How long the stage under way has to go, which by the plan takes `expected` [s].
@@ -261,8 +270,12 @@ class Progress:
         whole = own if expected is None else expected if own is None else (1.0 - weight) * expected + weight * own
         assert whole is not None
         left = (1.0 - pace.share) * whole
-        passed = self._clock() - (pace.last if pace.first else pace.began)
+        passed = self._clock() - (pace.last if pace.first else pace.began) if self._counts_down() else 0.0
         return left - passed if (1.0 + _LATE) * passed < left else _LATE * passed
+
+    def _counts_down(self) -> bool:
+        """Whether time that passes is work done: before anything has told a share, compilers are waited for."""
+        return self._opened.first is not None or self._open not in self._costs or bool(self._work)
 
     def _rate(self) -> float | None:
         """Time per unit of cost [s], of the stages that had something to do and the first guess; None: unknown."""
@@ -336,7 +349,7 @@ class _ToGo(ProgressColumn):
         rest, told = task.fields["rest"], task.fields["told"]
         if rest is None:
             return Text("")
-        passed = self._clock() - told
+        passed = max(self._clock() - told, 0.0)
         return Text(_to_go(rest - passed if passed < (1 - _LATE) * rest else _LATE * rest))
 
 
@@ -365,7 +378,7 @@ class LiveProgress(Progress):
             completed=fraction or 0.0,
             percent="" if fraction is None else _percent(fraction),
             rest=rest,
-            told=self._clock(),
+            told=self._clock() if self._counts_down() else math.inf,
         )
 
     def _refresh(self) -> None:

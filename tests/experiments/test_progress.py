@@ -170,6 +170,29 @@ def test_between_two_updates_the_time_to_go_counts_down_but_never_to_nothing(clo
     assert progress.remaining() == pytest.approx(0.15 * 80)
 
 
+def test_while_compilers_are_waited_for_nothing_is_done_and_nothing_counts_down(clock):
+    progress = Progress(clock=clock)
+    progress.plan({"bed": 30.0}, seconds={"report": 10.0}, unit=1.0)
+    progress.stage("bed", total=100)
+    clock.now += 60
+    assert (progress.fraction, progress.remaining()) == (0.0, pytest.approx(40))
+    progress.update(1)
+    assert progress.fraction == 0.0
+    clock.now += 15
+    progress.update(51)
+    assert progress.fraction == pytest.approx(0.5 * 30 / 40, abs=0.02)
+
+
+def test_times_known_in_seconds_follow_a_slower_machine(clock):
+    progress = Progress(clock=clock)
+    progress.plan({"bed": 1000.0}, seconds={"report": 10.0}, unit=0.1)
+    progress.stage("bed", total=1.0)
+    progress.update(0.0)
+    clock.now += 200
+    progress.update(0.999)
+    assert progress.remaining() == pytest.approx(10 * 215 / 115, rel=0.02)  # the guess weighs 15 s
+
+
 def test_what_is_to_come_can_be_expected_to_cost_otherwise(clock):
     progress = Progress(clock=clock)
     progress.plan({"bed 1": 10.0, "bed 2": 10.0, "drive": 5.0}, unit=1.0)
@@ -229,10 +252,10 @@ def test_lines_come_when_a_stage_begins_and_then_rarely(clock):
     lines = stream.getvalue().splitlines()
     assert lines == [
         "[   0:00] dig (all 0 %)",
-        "[   0:10] dig: 40 %, 0:15 to go, all 20 %, 0:40 to go",
-        "[   0:20] dig: 80 %, 0:05 to go, all 40 %, 0:30 to go",
+        "[   0:10] dig: 40 %, 0:15 to go, all 19 %, 0:40 to go",
+        "[   0:20] dig: 80 %, 0:05 to go, all 39 %, 0:30 to go",
         "[   0:25] found [water]",
-        "[   0:25] fill (all 50 %, 0:25 to go)",
+        "[   0:25] fill (all 49 %, 0:25 to go)",
     ]
 
 
