@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from .astray import allowed, astray, astray_held_out
 from .bounds import Bound, bounds_met
 from .colour import Colour, find_colours, whitener_for
 from .equivalence import Rival
@@ -41,6 +42,10 @@ _NEXT_TO_NOTHING = 0.01
 """The same share, of trials fitted and of trials held out, where it is louder: a form that is off by a tenth of its
 effect. In made-up campaigns of penetration two dozen right names left 0.011 at most of the fitted trials; of things
 outside the library names left 0.08 and more, but for one shock, which a crust explained on those it was fitted to."""
+_ASKED = 3
+"""Hypotheses that are asked whether a trial of its own way is all that speaks against them."""
+_SEEN_ELSEWHERE = 3.0
+"""Nats by which a name must be better than none on the other trials, where one trial goes its own way."""
 _CERTAIN = 0.5
 """Share of what the base model leaves, fitted and predicted, that a name must take away to be certain beside something
 that has no name."""
@@ -141,12 +146,18 @@ class Diagnosis:
 
 
 def diagnose(
-    problem: Problem, *, thorough: bool = False, seed: int = 0, tell: Tell | None = None, gates: Path | None = None
+    problem: Problem,
+    *,
+    thorough: bool = False,
+    seed: int = 0,
+    tell: Tell | None = None,
+    gates: Path | None = None,
+    aside: Sequence[Finding] = (),
 ) -> Diagnosis:
     """Diagnose a campaign. `tell(what, share done)` hears of progress; the same campaign gives the same answer.
 
     `thorough`: nulls by full refits, which takes as long as it takes; they are kept in the folder `gates`, if given,
-    for the next campaign of the same design.
+    for the next campaign of the same design. `aside`: fitted trials that are to take no part (`astray`).
     """
     tell = tell or (lambda what, done: None)
     if hasattr(problem, "prepare"):
@@ -158,8 +169,13 @@ def diagnose(
     odd = odd_trials(_whitened_fit(replace(base.model, trials=tuple(t.id for t in problem.trials))))
     if odd:
         findings += odd
-        aside = {finding.trial for finding in odd}
-        fitted, held_out = split_trials([t for t in problem.trials if t.id not in aside])
+        at_odds = {finding.trial for finding in odd}
+        fitted, held_out = split_trials([t for t in problem.trials if t.id not in at_odds])
+        base = _whitened_fit(base.model.on(fitted))
+    if aside:
+        findings += aside
+        gone = {finding.trial for finding in aside}
+        fitted = tuple(trial for trial in fitted if trial not in gone)
         base = _whitened_fit(base.model.on(fitted))
     scatter, model_std = _scatter(base, held_out)
     base = fit(replace(base.model, scatter=scatter), base.values) if scatter else base
@@ -200,7 +216,12 @@ def diagnose(
     tell("verdict", 0.0)
     choice = replace(choice, best=replace(choice.best, fit=settled(choice.best.fit)))
     held = _held_out_verdict(choice.best.fit, held_out, seed) if held_out else None
-    verdict = _verdict(choice, held, held_out)
+    verdict = _verdict(choice, held, held_out, seed)
+    if not aside and (gone_astray := _own_ways(base, choice, verdict, held_out, seed)):
+        tell("a trial goes its own way: once more without it", 0.0)
+        anew = diagnose(problem, thorough=thorough, seed=seed, tell=tell, gates=gates, aside=gone_astray)
+        if anew.verdict != "unknown":
+            return anew
     return told.finish(base, choice, colours, model_std, verdict, held=held)
 
 
@@ -282,7 +303,31 @@ def _held_out_verdict(found: Fit, held_out: tuple[str, ...], seed: int) -> Verdi
     return held_out_gate(found, held_out, held_out_fit(found.model, held_out, found.values), seed=seed)
 
 
-def _verdict(choice: Choice, held: Verdict | None, held_out: tuple[str, ...]) -> str:
+def _own_ways(base: Fit, choice: Choice, verdict: str, held_out: tuple[str, ...], seed: int) -> tuple[Finding, ...]:
+    """Trials that go ways of their own, where the base model explains all others and a name nothing but them, or where
+    a name explains all others and nothing has a name as it is."""
+    gone = astray(base, held_out, seed=seed)
+    if verdict == "unknown":
+        for other in () if gone else _likeliest(choice):
+            gone = gone or astray(other.fit, held_out, seed=seed)
+    elif gone:
+        rest = tuple(t for t in base.model.trials if t not in {finding.trial for finding in gone})
+        plain = score(fit(base.model.on(rest)))
+        if score(fit(choice.best.fit.model.on(rest), choice.best.fit.values)) > plain + _SEEN_ELSEWHERE:
+            return ()
+    return gone
+
+
+def _likeliest(choice: Choice) -> list[Hypothesis]:
+    """The best, and the likeliest single names."""
+    found = {choice.best.effects: choice.best} if choice.best.effects else {}
+    for _, tried in sorted(choice.table, key=lambda row: -row[1].score):
+        if len(tried.effects) == 1 and len(found) < _ASKED:
+            found.setdefault(tried.effects, tried)
+    return list(found.values())
+
+
+def _verdict(choice: Choice, held: Verdict | None, held_out: tuple[str, ...], seed: int) -> str:
     """A name stands where its model leaves nothing, on the trials that were fitted and on those that were not, or too
     little to speak of, or what a form that is not nature's leaves; and where it needs no number that the campaign all
     but excludes. Else something is unknown."""
@@ -290,6 +335,9 @@ def _verdict(choice: Choice, held: Verdict | None, held_out: tuple[str, ...]) ->
     if not choice.best.effects or any(bound.strains for bound in bounds_met(found)):
         return "unknown"
     passed = choice.left.passed and (held is None or held.passed)
+    if choice.left.passed and not passed:  # or what is held out follows for a while only
+        values = held_out_fit(found.model, held_out, found.values)
+        passed = astray_held_out(found, held_out, values, allowed(len(held_out)), seed=seed) is not None
     if not passed:
         after = _gap(found.model.problem, found.model, _values_of_all(found, held_out), found.model.trials, held_out)
         passed = max(after.fit, after.held_out or 0.0) <= SMALL or _of_form(choice, held_out)

@@ -22,6 +22,7 @@ from rigid.trajectory import STATES
 from .own import OwnEffect
 from .problem import Finding, Form, Parameter, Samples, TrialInfo, Values
 from .tumble_data import CHANNELS, TumbleData, tumble_data
+from .tumble_follow import followed_until
 from .tumble_forms import TumbleForm, tumble_forms
 from .tumble_forward import SHARED, Forward, Prediction
 from .tumble_guess import Guesser
@@ -35,6 +36,8 @@ Array = NDArray[np.float64]
 
 _UNITS = {"mass": "kg", "inertia": "kg m2", "stiffness": "N/m", "damping": "N s/m", "mu_s": "1", "mu_d": "1"}
 _STEP = 0.02  # of finite differences, in sigmas: contacts make smaller ones rough
+_SCAN = np.linspace(-3.0, 3.0, 25)
+"""Standard deviations of a trial's simulated gravity that are looked at where it goes its own way."""
 _SCATTER_STD = 0.1
 """How far friction and bed may differ between replicates while they are asked whether they do [1]."""
 
@@ -293,6 +296,19 @@ class TumbleProblem:
     def refine(self, asked: Sequence[tuple[Sequence[Form], Values]], trials: Sequence[str]) -> list[dict[str, float]]:
         """The same for several sets of forms at once, all of whose values are given (`tumble_guess`)."""
         return self._guesser.refine([(_ours(forms), values) for forms, values in asked], trials)
+
+    def follows(self, values: Values, forms: Sequence[Form], trial: str) -> float | None:
+        """The moment [s] up to which the model follows a trial, with the simulated gravity that takes it farthest; None
+        where that is no good part of it (`tumble_follow`)."""
+        data, sigma = self.data.trials[self._index[trial]], self.data.tables.uncertainty.gravity_sim
+        scan = 1 + sigma * _SCAN if sigma > 0 else np.ones(1)
+        points = [values, *({**values, f"gravity_sim[{trial}]": data.gravity_sim * float(g)} for g in scan)]
+        found = self._predict(points, forms, [trial])[0]
+        moments = [
+            followed_until(data, np.where(np.isfinite(value), (data.value - value) / data.std, LOST), state)
+            for value, state in zip(found.value, found.state, strict=True)
+        ]
+        return max((moment for moment in moments if moment is not None), default=None)
 
     @cached_property
     def _guesser(self) -> Guesser:

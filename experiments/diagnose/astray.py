@@ -1,0 +1,109 @@
+"""Trials that follow the model up to a moment and go another way from there.
+
+Where a tip is only just caught, or only just touches, the smallest thing decides which way a trial goes on: two
+integrators part there, and so do a model and nature. What comes after says nothing of what the model lacks, but would
+be most of what it leaves. Such a trial is set aside, and said, only as the last resort: where nothing else explains the
+campaign, where one model passes the gate on all the others, fitted and held out, and where it follows this trial, too,
+for a good part of its time. Few may be: what shows in one trial of six is hardly an effect, what shows in two is.
+Beside a name that the others call for, one of the trials that were fitted and one of those held out may.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from .bounds import bounds_met
+from .evidence import held_out_fit
+from .fitting import Fit, fit
+from .gate import held_out_gate, open_gate
+from .problem import Finding
+
+__all__ = ["allowed", "astray", "astray_held_out"]
+
+_ONE_OF = 6
+"""Of so many trials one may have gone its own way; of fewer one."""
+_FAR = 3.0
+"""Chi-square per sample beyond which a trial is one of those that the model does not explain; a single trial that goes
+its own way may bend the fit to one other as far."""
+
+
+def allowed(trials: int) -> int:
+    """How many of a campaign's trials may be astray."""
+    return max(1, round(trials / _ONE_OF))
+
+
+def astray(found: Fit, held_out: Sequence[str], *, seed: int = 0) -> tuple[Finding, ...]:
+    """The fitted trials without which this model passes the gate and which it follows at first; () if there are none.
+
+    `found`: the model on all fitted trials, and where fits begin. Problems that cannot say how far they follow
+    (`follows`) have none.
+    """
+    problem, trials = found.model.problem, found.model.trials
+    if not hasattr(problem, "follows"):
+        return ()
+    most = allowed(len(trials))
+    bare = not found.model.forms  # then one of all of them: what shows in two trials may be an effect
+    left = {trial: float(found.modes[rows] @ found.modes[rows]) / (rows.stop - rows.start)
+            for trial, rows in found.model.rows().items()}  # fmt: skip
+    if sum(per_sample > _FAR for per_sample in left.values()) > most + 1:
+        return ()  # that is no affair of single trials
+    order = sorted(trials, key=lambda trial: -left[trial])
+    for count in range(1, most + 1):
+        rest = tuple(trial for trial in trials if trial not in order[:count])
+        if len(rest) < 3:
+            break
+        learned = _refitted(found, rest)
+        if any(bound.strains for bound in bounds_met(learned)) or not open_gate(learned, seed=seed)[1].passed:
+            continue
+        values = held_out_fit(learned.model, held_out, learned.values)
+        others = allowed(len(trials) + len(held_out)) - count if bare else allowed(len(held_out))
+        if astray_held_out(learned, held_out, values, others, seed=seed) is None:
+            return ()
+        told = [_finding(learned, trial, learned.values) for trial in order[:count]]
+        return tuple(one for one in told if one is not None) if None not in told else ()
+    return ()
+
+
+def astray_held_out(
+    found: Fit, held_out: Sequence[str], values: Mapping[str, float], most: int, *, seed: int = 0
+) -> tuple[str, ...] | None:
+    """Those held-out trials, `most` at most, that the model follows at first only, all others passing the gate.
+
+    None where there are more, or others.
+    """
+    problem = found.model.problem
+    if not held_out or held_out_gate(found, held_out, values, seed=seed).passed:
+        return ()
+    failing = [t for t in held_out if not held_out_gate(found, (t,), values, seed=seed).passed]
+    if not failing or len(failing) > most or not hasattr(problem, "follows"):
+        return None
+    if any(problem.follows(values, found.model.forms, trial) is None for trial in failing):
+        return None
+    rest = tuple(trial for trial in held_out if trial not in failing)
+    if rest and not held_out_gate(found, rest, values, seed=seed).passed:
+        return None
+    return tuple(failing)
+
+
+def _refitted(found: Fit, trials: tuple[str, ...]) -> Fit:
+    """On these trials alone, looked for anew: on all of them the fit was bent."""
+    model = found.model.on(trials)
+    if not model.forms or not hasattr(model.problem, "refine"):
+        return fit(model)
+    (values,) = model.problem.refine([(model.forms, found.values)], trials)
+    return fit(model, values)
+
+
+def _finding(found: Fit, trial: str, values: Mapping[str, float]) -> Finding | None:
+    problem = found.model.problem
+    until: float | None = problem.follows(values, found.model.forms, trial)  # type: ignore[attr-defined]
+    if until is None:
+        return None
+    end = float(np.max(problem.samples(trial).time))
+    what = (
+        f"trial {trial} follows the model that explains the others up to {until:.2f} s and goes another way from "
+        "there, after a touch or a catch that hangs on next to nothing: it is set aside"
+    )
+    return Finding(trial=trial, what=what, from_s=until, to_s=end, set_aside=True)

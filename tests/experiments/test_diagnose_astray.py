@@ -1,0 +1,59 @@
+"""Trials that go their own way from a touch or a catch on: set aside where all others call for one model, and said."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tumble_campaigns import CONDITIONS, campaign
+
+from experiments.campaign import Recording
+from experiments.diagnose.astray import allowed, astray
+from experiments.diagnose.fitting import Model, Whitener, fit
+from experiments.diagnose.tumble_problem import make_problem
+
+FITTED, HELD_OUT = ("001", "002", "003", "004"), ("005", "006")
+SIX = (*CONDITIONS, {"torque": 0.18, "gravity_sim": 0.0834}, {"torque": 0.18, "gravity_sim": 0.147})
+
+
+def gone(made, trial, moment):
+    """The campaign with this trial's rotation ever faster than it was, from a moment [s] on."""
+    columns = dict(made.recordings[trial, "imu"].columns)
+    late = np.maximum(columns["t_s"] - moment, 0.0)
+    columns["gyro_rad_s"] = columns["gyro_rad_s"] + late
+    columns["ax_m_s2"] = columns["ax_m_s2"] + 2.0 * late
+    return replace(made, recordings={**made.recordings, (trial, "imu"): Recording(columns)})
+
+
+@pytest.fixture(scope="module")
+def made():
+    return campaign(seed=4, off=0.5, conditions=SIX)
+
+
+@pytest.fixture(scope="module")
+def moment(made):
+    """When the model's state changes in trial 001, after 0.4 s [s]."""
+    problem = make_problem(made)
+    values = fit(Model(problem, Whitener.white(problem), FITTED)).values
+    gyro = problem.samples("001").channel == "gyro"
+    state, time = problem.phases(values, (), "001")[gyro], problem.samples("001").time[gyro]
+    return min(float(t) for t in time[1:][state[1:] != state[:-1]] if t > 0.4)
+
+
+def astray_in(made):
+    problem = make_problem(made)
+    return astray(fit(Model(problem, Whitener.white(problem), FITTED)), HELD_OUT)
+
+
+def test_one_trial_that_parts_from_the_model_at_an_event_is_set_aside_and_said(made, moment):
+    (finding,) = astray_in(gone(made, "001", moment))
+    assert finding.trial == "001" and finding.set_aside and "goes another way" in finding.what
+    assert moment - 0.1 < finding.from_s < moment + 0.3  # judged in pieces of 80 ms
+
+
+def test_what_two_trials_of_six_show_is_no_affair_of_single_trials(made, moment):
+    assert allowed(6) == 1
+    assert astray_in(gone(gone(made, "001", moment), "002", moment)) == ()
+
+
+def test_a_trial_that_never_follows_the_model_has_not_gone_astray(made):
+    assert astray_in(gone(made, "001", 0.0)) == ()
