@@ -113,7 +113,8 @@ class BedFooting:
     bed : dem.Bed.
     origin : (x, y) in the bed of the body's x = y = 0 [m].
     copies : how many of each member there are side by side [1].
-    touch : normal force over `copies` from which a member counts as touching [N].
+    touch : force over `copies`, in whatever direction, from which a member counts as touching [N]: a spike in sand may
+        be held sideways, or back, where nothing bears it.
     bounded : whether a member that comes down beyond the bed's ends along x is an error; it is periodic there.
     friction, restitution, rolling_friction, young, poisson : of a grain and a member, as `Bed.add_body` has them.
 
@@ -249,7 +250,7 @@ class BedFooting:
             lowest = float(ends[k, 2]) - member.radius
             if lowest < 0 and member.row != HULL:
                 sinkage[member.row] = -lowest
-            if force[2] > self.touch * self.copies:
+            if np.linalg.norm(force) > self.touch * self.copies:
                 point = halfway + arms[k] - np.array([0.0, 0.0, member.radius])
                 along = np.array([force[0], force[1], 0.0])
                 contacts[member.row] = Contact(point, float(force[2]), tangential_force=along)

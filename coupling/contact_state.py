@@ -3,7 +3,8 @@
 Over a window of 5 ms the means of each row's normal force N, of its horizontal force F and of the horizontal speed u of
 its lowest material point are taken. A row
 
-- *touches* while N is above 1 % of the weight on the surface;
+- *touches* while the force on it, N and F together, is above 1 % of the weight on the surface: sand pushes a spike that
+  is in it sideways where nothing bears it any more;
 - *slides* while |F| is at least mu_d N, F is against u and |u| is above 2 mm/s; what touches and does not slide sticks.
   mu_d is the surface's, as the spring-damper has it.
 
@@ -23,7 +24,7 @@ __all__ = ["CREEP", "TOUCH_SHARE", "WINDOW", "ContactReader", "state_of"]
 WINDOW = 5e-3
 """Over which forces and speeds are averaged [s]."""
 TOUCH_SHARE = 0.01
-"""Normal force of a row that touches, over the weight [1]."""
+"""Force on a row that touches, over the weight [1]."""
 CREEP = 2e-3
 """Horizontal speed up to which a row counts as held [m/s]."""
 
@@ -52,7 +53,7 @@ class ContactReader:
         self._ring[0] = normal, along, slip
         self._filled = min(self._filled + 1, len(self._ring))
         n, f, u = self._ring[: self._filled].mean(axis=0)
-        touching = n > TOUCH_SHARE * self.weight
+        touching = np.hypot(n, f) > TOUCH_SHARE * self.weight
         sliding = (abs(f) >= self.mu_d * n) & (f * u < 0) & (abs(u) > CREEP)
         return state_of(touching, sliding)
 

@@ -23,6 +23,7 @@ def read(normal, along, slip, *, steps=10, reader=None):
         ((0.5, 0.0), (0.16, 0.0), (0.01, 0.0), "pivot"),  # it drives, and does not resist
         ((0.5, 0.0), (-0.16, 0.0), (0.5 * CREEP, 0.0), "pivot"),  # it creeps
         ((0.5, 0.5), (-0.16, 0.0), (0.01, 0.0), "pivot"),
+        ((0.0, 0.0), (0.7, 0.0), (-0.1, 0.0), "slip"),  # sand pushes it from behind and nothing bears it
         ((0.0, 0.0), (0.0, 0.0), (0.3, 0.3), "hop"),
     ],
 )
