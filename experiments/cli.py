@@ -18,7 +18,7 @@ from pydantic import BaseModel
 
 from experiments import registry
 from experiments.cli_options import as_typed, option_of, reserved_option
-from experiments.cli_runs import BAD_INPUT, DONE, FAILED, STOPPED, carry_out, show_folder
+from experiments.cli_runs import BAD_INPUT, DONE, FAILED, STOPPED, carry_out, redraw_old_report, show_folder
 from experiments.cli_streams import (
     RefusedError,
     fault_words,
@@ -160,6 +160,7 @@ def _resume(
             pass
     if run.status == "done" and (folder / "result.json").exists():
         say(f"the run in {folder} is done")
+        redraw_old_report(run, quiet=quiet)
         return show_folder(run, as_json=json, verbose=verbose)
     if run.version != __version__:
         say(f"warning: the run was begun by version {run.version}, this is {__version__}")

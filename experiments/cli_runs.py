@@ -19,7 +19,7 @@ from experiments.progress import Progress, make_progress
 from experiments.runfolder import RunFolder, write_text
 from vis.numbers import digits_for
 
-__all__ = ["BAD_INPUT", "DONE", "FAILED", "STOPPED", "carry_out", "show_folder"]
+__all__ = ["BAD_INPUT", "DONE", "FAILED", "STOPPED", "carry_out", "redraw_old_report", "show_folder"]
 
 DONE, FAILED, BAD_INPUT, STOPPED = 0, 1, 2, 3
 """Exit statuses of the command line."""
@@ -72,6 +72,19 @@ def carry_out(
             say(f"failed; what there was is in {folder.path}")
             return FAILED
     return show_folder(folder, as_json=as_json, verbose=verbose)
+
+
+def redraw_old_report(folder: RunFolder, *, quiet: bool) -> None:
+    """Make the report anew where it is older than the result that it is of."""
+    result, report = folder.path / "result.json", folder.path / "report.html"
+    if not report.exists() or report.stat().st_mtime_ns >= result.stat().st_mtime_ns:
+        return
+    from experiments.reporting import write_report
+
+    say("its report is older than result.json and is made anew")
+    with folder.lock(), stdout_to_stderr(), make_progress(quiet=quiet) as progress:
+        progress.stage("report", total=1.0)
+        write_report(folder.path, progress)
 
 
 def show_folder(folder: RunFolder, *, as_json: bool, verbose: bool = False) -> int:

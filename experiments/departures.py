@@ -17,7 +17,7 @@ from vis.numbers import quote
 
 from .fit import Fit, fit_rows, spread
 
-__all__ = ["departure_table", "departures", "depth_exponent", "sentences"]
+__all__ = ["departure_table", "departures", "depth_exponent", "rate_change", "sentences"]
 
 Known = tuple[float, float | None]
 """A number and its standard deviation, None where unknown."""
@@ -27,7 +27,7 @@ BANDS = 4
 
 
 def departures(
-    driven: Sequence[Penetration],
+    by_bed: Sequence[Sequence[Penetration]],
     models: Mapping[str, Penetration],
     beds: Mapping[str, Penetration],
     fit: Fit,
@@ -36,19 +36,22 @@ def departures(
 ) -> dict[str, Any]:
     """The entry "departures" of result.json: table, exponents, returned work and sentences.
 
-    `driven` are the bed's driven runs; `beds` and `models` all runs by id, in the bed and on the spring-damper;
+    `by_bed` are the driven runs, bed by bed; `beds` and `models` all runs by id, in the bed and on the spring-damper;
     `sinkage` the resting depth (bed, model) [m], each with its spread between seeds (None: unknown).
     """
+    driven = [run for runs in by_bed for run in runs]
     table = departure_table(driven, fit)
     exponents = depth_exponent(driven)
+    rate = rate_change(by_bed, fit)
     pairs = [(beds[name], models[name]) for name in models]
     ways_out = [(_returned(bed), _returned(model)) for bed, model in pairs if bed.kind == "driven"]
     pull_out = [(mine, law) for mine, law in ways_out if mine is not None and law is not None]
     returned = tuple(float(np.mean(values)) for values in zip(*pull_out, strict=True)) if pull_out else None
     drops = [(bed, model) for bed, model in pairs if bed.kind == "drop"]
     return {
-        "sentences": sentences(table, exponents, returned, drops, sinkage),
+        "sentences": sentences(table, exponents, returned, drops, sinkage, rate=rate),
         "table": table,
+        "rate": rate,
         "exponents": [
             {"speed": speed, "exponent": value, "std": std, "beds": count}
             for speed, (value, std, count) in exponents.items()
@@ -96,6 +99,42 @@ def departure_table(driven: Sequence[Penetration], fit: Fit, bands: int = BANDS)
     return table
 
 
+def rate_change(by_bed: Sequence[Sequence[Penetration]], fit: Fit) -> dict[str, Any] | None:
+    """How the mean drag of the way in changes from the slowest to the fastest speed, in the beds that have both.
+
+    Mean over those beds, [1]: "bed" and its standard deviation "bed_std" (None for one bed), "model", "beds" how many;
+    "slow" and "fast" are the speeds [m/s]. Of beds with other speeds the widest pair counts. None where no bed was
+    driven at two speeds.
+    """
+    means: list[dict[float, tuple[float, float]]] = []
+    for bed in by_bed:
+        drags = ((speed, _mean_drag(runs[0], fit)) for speed, runs in _by_speed(bed).items())
+        means.append({speed: drag for speed, drag in drags if drag is not None and drag[0] > 0})
+    pairs = {(min(found), max(found)) for found in means if len(found) > 1}
+    if not pairs:
+        return None
+    slow, fast = max(pairs, key=lambda pair: pair[1] / pair[0])
+    both = [(found[slow], found[fast]) for found in means if slow in found and fast in found]
+    own = [after[0] / before[0] - 1 for before, after in both]
+    law = [after[1] / before[1] - 1 for before, after in both if before[1] > 0]
+    return {
+        "slow": slow,
+        "fast": fast,
+        "beds": len(own),
+        "bed": float(np.mean(own)),
+        "bed_std": spread(own),
+        "model": float(np.mean(law)) if law else None,
+    }
+
+
+def _mean_drag(run: Penetration, fit: Fit) -> tuple[float, float] | None:
+    """Mean force of bed and law over the way in [N]; None where there is none."""
+    rows = fit_rows(run)
+    if not rows.any():
+        return None
+    return float(run.force[rows].mean()), float(fit.force(run.depth[rows], run.velocity[rows]).mean())
+
+
 def depth_exponent(driven: Sequence[Penetration]) -> dict[float, tuple[float, float | None, int]]:
     """Exponent n of F ~ z^n on the way in, per speed: mean over the beds, standard deviation between them, how many.
 
@@ -133,9 +172,11 @@ def sentences(
     returned: tuple[float, ...] | None,
     drops: Sequence[tuple[Penetration, Penetration]],
     sinkage: tuple[Known, Known] | None,
+    *,
+    rate: Mapping[str, Any] | None = None,
 ) -> list[str]:
     """What the numbers say, one finding a sentence."""
-    said = [text for part in (_by_depth(table), _by_rate(table)) for text in part]
+    said = [*_by_depth(table), *_by_rate(rate)]
     if exponents:
         shown = "; ".join(
             f"{_plain(quote(value, std, '1', significant=2))} at {speed:g} m/s ({_beds(count)})"
@@ -218,31 +259,24 @@ def _by_depth(table: Sequence[Mapping[str, Any]]) -> list[str]:
         if worst["beds"] == 1 and apart:
             least = max(apart, key=lambda row: row["beds"])
             text += (
-                f". How far beds differ at that speed is not known; at {least['speed']:g} m/s {_beds(least['beds'])} "
-                f"do by {_percent(least['gap_std'])} (one standard deviation)"
+                f". Beds differ: at {least['speed']:g} m/s the gaps of {_beds(least['beds'])} have a standard "
+                f"deviation of {_percent(least['gap_std'])}"
             )
         said.append(f"{text}.")
     return said
 
 
-def _by_rate(table: Sequence[Mapping[str, Any]]) -> list[str]:
-    """How the force changes from the slowest to the fastest run, in the bed and in the law, over all depths."""
-    speeds = sorted({row["speed"] for row in table})
-    if len(speeds) < 2:
+def _by_rate(rate: Mapping[str, Any] | None) -> list[str]:
+    """How the force changes from the slowest to the fastest run, in the same beds and in the law, over all depths."""
+    if rate is None:
         return []
-    slow = [row for row in table if row["speed"] == speeds[0]]
-    fast = [row for row in table if row["speed"] == speeds[-1]]
-    ratio = {}
-    for side in ("bed_force", "model_force"):
-        before, after = sum(row[side] for row in slow), sum(row[side] for row in fast)
-        if before <= 0:
-            return []
-        ratio[side] = after / before
-    counts = [min(row["beds"] for row in rows) for rows in (slow, fast)]
-    whose = f"({_beds(counts[0])})" if counts[0] == counts[1] else f"({_beds(counts[0])}, then {_beds(counts[1])})"
+    whose = "in the one bed that has both" if rate["beds"] == 1 else f"{_beds(rate['beds'])}"
+    if rate["bed_std"] is not None:
+        whose += f", {_percent(rate['bed_std'])} apart"
+    law = f", the spring-damper's by {_signed(rate['model'])} %" if rate["model"] is not None else ""
     return [
-        f"From {speeds[0]:g} to {speeds[-1]:g} m/s the bed's drag changes by {_signed(ratio['bed_force'] - 1)} % "
-        f"{whose}, the spring-damper's by {_signed(ratio['model_force'] - 1)} %."
+        f"From {rate['slow']:g} to {rate['fast']:g} m/s the bed's drag changes by {_signed(rate['bed'])} % ({whose})"
+        f"{law}."
     ]
 
 

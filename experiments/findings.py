@@ -162,17 +162,21 @@ class Findings:
         return [(unit, self.beds[unit.id]) for unit in self.units if (unit.kind, unit.seed) == (kind, seed)]
 
     def _work_returned(self, runs: Runs, own: Runs, note: str) -> dict[str, Any]:
-        """Mean share of the work put in that driven runs give back; spread between seeds over the speeds they share.
+        """Mean share of the work put in that driven runs give back, and its spread, at the speeds that all seeds have.
 
-        The spread is that of `own`: the law of each seed by itself differs, where the pooled law is one.
+        The spread is that of `own`: the law of each seed by itself differs, where the pooled law is one. Where seeds
+        have no speed in common, it is the mean of all, its spread unknown.
         """
         shared = self.shared_conditions()
+        driven = [unit for unit in self.units if unit.kind == "driven"]
+        counted = [unit for unit in driven if unit.condition in shared] or driven
         by_seed = [
-            _mean([_returned(own[u.id]) for u, _ in self._runs("driven", seed) if u.condition in shared])
+            _mean([_returned(own[unit.id]) for unit in counted if unit.seed == seed and unit.id in own])
             for seed in self.seeds
         ]
-        mean = _mean([_returned(runs[unit.id]) for unit in self.units if unit.kind == "driven"])
-        return _quantity(mean, spread(by_seed), "1", note)
+        speeds = ", ".join(f"{speed:g}" for speed in dict.fromkeys(unit.speed for unit in counted))
+        mean = _mean([_returned(runs[unit.id]) for unit in counted])
+        return _quantity(mean, spread(by_seed), "1", f"{note}; at {speeds} m/s" if speeds else note)
 
     def run_entries(self, notes: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
         """The entry "runs": one per run, the model's numbers under model_*; `notes` are what was kept of each."""
@@ -222,7 +226,8 @@ class Findings:
             (numbers[name]["value"], numbers[name]["std"]) for name in ("sinkage_dem", "sinkage_spring_damper")
         )
         pair = (sunk, law) if sunk[0] is not None and law[0] is not None else None
-        found = departures(self.of("driven"), self.models, self.beds, self.fit, sinkage=pair)
+        by_bed = [runs for seed in self.seeds if (runs := self.of("driven", seed))]
+        found = departures(by_bed, self.models, self.beds, self.fit, sinkage=pair)
         notes = remarks(self)
         found |= notes
         found["sentences"] += notes.values()

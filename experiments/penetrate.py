@@ -200,6 +200,7 @@ def choose_softness(settings: PenetrateSettings) -> Softening:
     bulk = 0.6 * material.density
     area = math.pi * settings.tip_diameter**2 / 4
     stiffness = bearing_gradient(bulk, settings.gravity, material.friction) * area
+    fastest, speed = settings.fastest
     drops = [
         drop_depth(speed, settings.mass, settings.weight, stiffness)
         for speed in (*settings.drop_speeds, *settings.other_drop_speeds)
@@ -212,14 +213,8 @@ def choose_softness(settings: PenetrateSettings) -> Softening:
         gravity=settings.gravity,
         bed_height=settings.bed_size[2],
         depth=min(deepest(settings), max(settings.depth, *drops) if drops else settings.depth),
-        speed=max(
-            *settings.speeds,
-            *settings.other_speeds,
-            *settings.drop_speeds,
-            *settings.other_drop_speeds,
-            settings.retreat_speed,
-            settings.lowering_speed,
-        ),
+        speed=speed,
+        fastest=fastest,
         fall=RAIN * settings.bed_size[2],
         pressure=settings.weight / area,
     )

@@ -267,10 +267,7 @@ class PenetrateSettings(StrictSettings):
         """
         macro = self.substeps * time_step
         limit = 0.5 * self.grain / macro
-        keys = ("speeds", "drop_speeds", "other_speeds", "other_drop_speeds", "retreat_speed", "lowering_speed")
-        listed = [(key, getattr(self, key)) for key in keys]
-        every = [(key, v) for key, value in listed for v in (value if isinstance(value, tuple) else (value,))]
-        key, value = max(every, key=lambda pair: pair[1])
+        key, value = self.fastest
         if value <= limit:
             return None
         ratio = value / limit
@@ -294,6 +291,14 @@ class PenetrateSettings(StrictSettings):
             f"{key} = {value:g} m/s takes the spike through {0.5 * ratio:.2g} grains in one step ({self.substeps} x "
             f"{time_step:.3g} s): at most {limit:.3g} m/s would do"
         )
+
+    @property
+    def fastest(self) -> tuple[str, float]:
+        """The key and the value of the largest speed that is set [m/s]."""
+        keys = ("speeds", "drop_speeds", "other_speeds", "other_drop_speeds", "retreat_speed", "lowering_speed")
+        listed = [(key, getattr(self, key)) for key in keys]
+        every = [(key, v) for key, value in listed for v in (value if isinstance(value, tuple) else (value,))]
+        return max(every, key=lambda pair: pair[1])
 
     @property
     def tip_height(self) -> float:

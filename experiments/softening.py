@@ -1,7 +1,8 @@
 """How soft the grains may be: Young's modulus from the overlap that a run allows itself.
 
 The step of a DEM run goes with 1 / sqrt(E), so grains are made as soft as the largest overlap `max_overlap` (share of a
-grain's diameter) allows at the pressures and speeds of *this* run, and never stiffer than the real grains.
+grain's diameter) allows at the pressures and speeds of *this* run; where not even the real grains are stiff enough,
+that is refused.
 
 1. Pressure under the tip, from 3D-RFT (Agarwal et al. 2023, arXiv 2205.14920), a flat plate going straight down:
        p = 0.876 xi_n z + lambda rho_b v^2,   xi_n = rho_b g (894 mu^3 - 386 mu^2 + 89 mu), mu held to 0.3-0.9,
@@ -99,12 +100,14 @@ def soften(
     fall: float = 0.0,
     packing: float = 0.6,
     surface_energy: float = 0.0,
+    fastest: str = "speed",
 ) -> Softening:
     """Young's modulus that keeps overlaps below `max_overlap` (see the module). All SI; `grain` is the mean diameter.
 
     `depth` is the deepest the tip goes, `speed` its fastest, `pressure` what the load alone presses with, `fall` how
-    deep a grain fell when the bed was made, `surface_energy` that of the grains [J/m2], 0 without cohesion. Raises
-    ValueError for an overlap that is no share of a diameter.
+    deep a grain fell when the bed was made, `surface_energy` that of the grains [J/m2], 0 without cohesion; `fastest`
+    is the key that set the speed. Raises ValueError for an overlap that is no share of a diameter, and where the real
+    grains, `real_young`, are too soft to keep it.
     """
     if not 0 < max_overlap <= 0.2:
         raise ValueError(f"max_overlap is {max_overlap}: it must be above 0 and at most 0.2 of a diameter")
@@ -119,10 +122,22 @@ def soften(
         0.75 * 1.25 * mass * squared / (bound * grain) ** 2.5 / math.sqrt(0.5 * grain) * (1 - poisson**2)
         for squared, bound in ((speed**2, max_overlap), (2 * gravity * fall, max(max_overlap, RAIN_OVERLAP)))
     )
+    if struck > real_young:
+        raise ValueError(
+            f"{fastest} = {speed:g} m/s makes the grains overlap by more than max_overlap = {max_overlap:g} of a "
+            f"diameter even at their own E = {real_young:.3g} Pa: at most "
+            f"{0.99 * speed * math.sqrt(real_young / struck):.3g} m/s would do"
+        )
+    if static > real_young:
+        raise ValueError(
+            f"max_overlap = {max_overlap:g} of a diameter cannot be kept at the {highest:.3g} Pa expected under the "
+            f"tip: it asks for E = {static:.2g} Pa, where the grains have {real_young:.3g} Pa; about "
+            f"{max_overlap * (static / real_young) ** (2 / 3):.2g}, or less depth, load or gravity, would do"
+        )
     return Softening(min(real_young, max(static, struck, landed)), highest, speed, real_young)
 
 
-def soften_material(material: Any, *, young: float | None, **case: float) -> Softening:
+def soften_material(material: Any, *, young: float | None, fastest: str = "speed", **case: float) -> Softening:
     """`soften` for the grains of a material; where `young` [Pa] is set, that, with what presses and how fast.
 
     `case` are the options of `soften` that are not the material's. Raises ValueError as `soften` does.
@@ -133,6 +148,7 @@ def soften_material(material: Any, *, young: float | None, **case: float) -> Sof
         friction=material.friction,
         real_young=material.young,
         surface_energy=material.surface_energy,
+        fastest=fastest,
         **case,
     )
     return chosen if young is None else Softening(young, chosen.pressure, chosen.speed, material.young)

@@ -8,7 +8,7 @@ import pytest
 from fake_bed import FakeBed
 
 from coupling import drive, drop
-from experiments.departures import departure_table, departures, depth_exponent, sentences
+from experiments.departures import departure_table, departures, depth_exponent, rate_change, sentences
 from experiments.fit import (
     Fit,
     drag_gap,
@@ -98,7 +98,7 @@ def test_departures_are_said_by_depth_and_speed():
     assert [row["beds"] for row in table] == [1] * 8 and table[0]["bed_std"] is None
     law = SpringDamper(stiffness=fit.stiffness, damping=fit.damping, time_step=2e-5)
     models = {"a": drive(SPIKE, into=law, speed=0.1, depth=0.02)}
-    found = departures(driven, models, {"a": driven[0]}, fit, sinkage=((0.002, 0.0003), (0.003, None)))
+    found = departures([driven], models, {"a": driven[0]}, fit, sinkage=((0.002, 0.0003), (0.003, None)))
     text = " ".join(found["sentences"])
     assert "In the top 5 mm the spring-damper pushes" in text and "too hard at" in text and "too softly at" in text
     assert "sinks 2.0 ± 0.3 mm into the bed; the spring-damper says 3.0 mm, 50 % deeper" in text
@@ -121,7 +121,25 @@ def test_departures_are_told_with_the_spread_between_beds():
     assert slow["gap_std"] == pytest.approx(np.sqrt(0.08), rel=1e-6)
     first = sentences(table, depth_exponent(driven), None, [], None)[0]
     assert "11 % too hard at 0.4 m/s" in first and "one bed)" in first
-    assert "not known; at 0.1 m/s 2 beds do by 28 % (one standard deviation)" in first
+    assert "at 0.1 m/s the gaps of 2 beds have a standard deviation of 28 %" in first
+
+
+def test_a_change_with_speed_is_that_of_the_beds_that_have_both_speeds():
+    """F = K z + C v to Z: the mean goes with K Z / 2 + C v. A third, harder bed at one speed has no say in it."""
+
+    def bed(hardness, speeds):
+        return [drive(SPIKE, into=FakeBed(hardness=hardness, rate=1.0), speed=v, depth=0.02) for v in speeds]
+
+    beds = [bed(80.0, (0.1, 0.4)), bed(120.0, (0.1, 0.4)), bed(500.0, (0.4,))]
+    rate = rate_change(beds, Fit(100.0, 0.5, None, None, ()))
+    own = [0.3 / (0.8 + 0.1), 0.3 / (1.2 + 0.1)]
+    assert (rate["slow"], rate["fast"], rate["beds"]) == (0.1, 0.4, 2)
+    assert rate["bed"] == pytest.approx(np.mean(own), rel=0.01)
+    assert rate["bed_std"] == pytest.approx(np.std(own, ddof=1), rel=0.02)
+    assert rate["model"] == pytest.approx(0.15 / 1.05, rel=0.01)
+    (said,) = sentences([], {}, None, [], None, rate=rate)
+    assert "changes by +28 % (2 beds, 7.3 % apart), the spring-damper's by +14 %" in said
+    assert rate_change(beds[2:], Fit(100.0, 0.5, None, None, ())) is None
 
 
 def test_a_peak_of_one_grain_is_told_apart_from_the_beds():

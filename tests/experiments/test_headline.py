@@ -1,6 +1,7 @@
 """What a run of penetrate shows in the end: a short table, warnings, the findings that matter, the report's path."""
 
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -43,3 +44,20 @@ def test_warnings_are_never_left_out_and_a_reference_is_one_sentence():
     assert headline.sentences[-1] == "Against the reference, K +10 %, C +10 %, the sinkage +10 %."
     assert headline.left >= found - 2
     assert penetrate_headline({"quantities": {"stiffness": {"value": 1.0}}}) is None  # without a bed
+
+
+def test_a_report_older_than_its_result_is_made_anew(tmp_path, capsys, monkeypatch):
+    from experiments import reporting
+    from experiments.runfolder import RunFolder
+    from experiments.settings import PenetrateSettings
+
+    drawn = []
+    monkeypatch.setattr(reporting, "write_report", lambda folder, progress: drawn.append(folder))
+    folder = RunFolder.create(tmp_path / "run", "penetrate", PenetrateSettings())
+    shutil.copy(SHIPPED, folder.path)
+    (folder.path / "report.html").write_text("")
+    folder.set_status("done")
+    assert main(["resume", str(folder.path)]) == 0 and drawn == []
+    os.utime(folder.path / "report.html", (1e9, 1e9))
+    assert main(["resume", str(folder.path), "--quiet"]) == 0 and drawn == [folder.path]
+    assert "older than result.json" in capsys.readouterr().err

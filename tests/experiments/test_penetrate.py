@@ -396,8 +396,12 @@ def test_coarse_tips_can_be_asked_for():
     ("given", "words"),
     [
         ({"grain": 2e-5, "tip_diameter": 0.012}, r"grain = 2e-05 m makes about .* GB are free: grains of"),
-        ({"speeds": (3000.0,)}, r"speeds = 3000 m/s takes the spike through"),
-        ({"speeds": (1000.0,), "time_step": 2e-5}, "time_step = 2e-05 s takes a spike at speeds = 1000 m/s"),
+        (
+            {"speeds": (3000.0,)},
+            r"speeds = 3000 m/s makes the grains overlap by more than max_overlap = 0.05 .* m/s would",
+        ),
+        ({"speeds": (100.0,)}, r"speeds = 100 m/s takes the spike through"),
+        ({"speeds": (100.0,), "time_step": 2e-5}, "time_step = 2e-05 s takes a spike at speeds = 100 m/s"),
         ({"young": 1e8, "substeps": 1000}, r"young = 1e.08 Pa takes a spike at .* would do"),
         ({"substeps": 1000}, "substeps = 1000 takes a spike .* at most 150 would do"),
         ({"young": 1e12}, r"young = 1e.12 Pa is more than sand itself has: at most 7e.10 Pa would do"),

@@ -43,7 +43,10 @@ def test_grains_that_stick_are_as_stiff_as_their_pull_asks_for():
 
 def test_fast_spikes_need_stiffer_grains_and_real_grains_are_the_bound():
     assert soften(max_overlap=0.05, **(SAND | {"speed": 20.0})).young > 40 * soften(max_overlap=0.05, **SAND).young
-    assert soften(max_overlap=1e-4, **(SAND | {"speed": 1000.0})).young == 7e10
+    with pytest.raises(ValueError, match=r"drop_speeds = 1000 m/s .* even at their own E = 7e\+10 Pa: at most 149 m/s"):
+        soften(max_overlap=0.05, fastest="drop_speeds", **(SAND | {"speed": 1000.0}))
+    with pytest.raises(ValueError, match=r"max_overlap = 0.0001 .* cannot be kept at .* about 0.011, or less depth"):
+        soften(max_overlap=1e-4, **(SAND | {"depth": 5.0, "speed": 0.01}))
     with pytest.raises(ValueError, match="max_overlap"):
         soften(max_overlap=0.0, **SAND)
 
