@@ -11,13 +11,10 @@ is the same, and its twisting is Marshall's, as ours.
 
 from __future__ import annotations
 
+import io
 import math
-import os
-import subprocess
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -29,14 +26,14 @@ from dem.timestep import time_step_for
 
 from ..calibrate_tests import summary_of, triaxial_angle
 from .case import Case, Comparison, Curve, Outcome, Plot
-from .peers import PEERS, lammps_restitution
+from .peers import PEERS, lammps_restitution, run_peer
 
-__all__ = ["CASES", "Sheared", "in_lammps"]
+__all__ = ["CASES", "Sheared", "in_lammps", "lammps_law"]
 
 GRAIN, PRESSURE, SIZE = 0.004, 1000.0, (10.0, 8.0, 10.0)  # [m], [Pa], [mean diameters]
-SPREAD, INERTIAL, STRAIN, SEED = 0.15, 0.01, 2.0, 1
+SPREAD, INERTIAL, STRAIN, SEEDS = 0.15, 0.01, 2.0, (1, 2, 3)
 ROLLING = (0.0, 0.356)  # friction is 0.5; the second is that of sand-calibrated
-BAND = 1.5  # [degrees]; standard errors of samples as small as these are 0.3 to 0.8
+BAND = 1.5  # [degrees]; the standard error of one sample is 0.3 to 0.8
 LIMIT = 600.0  # for LAMMPS [s]
 _EVERY, _PARTS = 20, 5
 
@@ -57,6 +54,19 @@ class Sheared:
     ratio: np.ndarray
 
 
+def lammps_law(stuff: Material, young: float, grain: float, *, friction: float | None = None) -> str:
+    """LAMMPS' words for these grains, softened to ``young`` [Pa]; with a ``friction`` of its own, a wall as rough."""
+    stiff = 0.1 * young * grain
+    mass = stuff.density * math.pi / 6 * grain**3
+    damping = 0.3 * 2 * math.sqrt(0.5 * stiff * mass)
+    return (
+        f"hertz/material {young:g} {lammps_restitution(stuff.restitution):.16g} {stuff.poisson:g} "
+        f"tangential mindlin NULL 1.0 {stuff.friction if friction is None else friction:g} "
+        f"rolling sds {stiff:g} {damping:g} {stuff.rolling_friction if friction is None else friction:g} "
+        "twisting marshall damping tsuji"
+    )
+
+
 def _stuff(rolling: float) -> Material:
     return replace(SAND, name="sheared", friction=0.5, rolling_friction=rolling)
 
@@ -65,10 +75,10 @@ def _degrees(ratio: float) -> float:
     return math.degrees(math.atan(ratio))
 
 
-def _here(stuff: Material, tell: Callable[[float], None]) -> tuple[Sheared, ElementShear]:
+def _here(stuff: Material, seed: int, tell: Callable[[float], None]) -> tuple[Sheared, ElementShear]:
     run = shear_element(
         stuff, pressure=PRESSURE, grain=GRAIN, size=SIZE, spread=SPREAD, strain=STRAIN, inertial_number=INERTIAL,
-        seed=SEED, threads=1, tell=tell,
+        seed=seed, threads=1, tell=tell,
     )  # fmt: skip
     said = summary_of(run, stuff.density)
     ratio = said["shear"] / said["normal"]
@@ -80,31 +90,12 @@ def _here(stuff: Material, tell: Callable[[float], None]) -> tuple[Sheared, Elem
     return found, run
 
 
-def in_lammps(stuff: Material, *, young: float, packing: float, seed: int = SEED) -> Sheared:
+def in_lammps(stuff: Material, *, young: float, packing: float, seed: int) -> Sheared:
     """Shear grains of this material, softened to ``young`` [Pa], at a packing fraction [1].
 
     Raises RuntimeError with LAMMPS' last lines where it fails.
     """
-    program = PEERS["lammps"].find()
-    with tempfile.TemporaryDirectory(prefix="hedgebed-peer-") as name:
-        folder = Path(name)
-        for file, text in zip(("grains.data", "deck"), _input(stuff, young, packing, seed), strict=True):
-            (folder / file).write_text(text, encoding="ascii")
-        done = subprocess.run(
-            [str(program), "-in", "deck", "-log", "log.txt", "-screen", "none"],
-            cwd=folder,
-            check=False,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=LIMIT,
-            env={**os.environ, "OMP_NUM_THREADS": "1"},
-        )
-        rows, log = folder / "stress.txt", folder / "log.txt"
-        if done.returncode != 0 or not rows.is_file():
-            said = (log.read_text(errors="replace") if log.exists() else "") + done.stdout + done.stderr
-            raise RuntimeError(f"LAMMPS failed: {' | '.join(said.splitlines()[-4:])}")
-        table = np.loadtxt(rows)
+    table = np.loadtxt(io.StringIO(run_peer("lammps", *_input(stuff, young, packing, seed), "stress.txt", limit=LIMIT)))
     strain, (xx, yy, zz, xy, xz, yz) = STRAIN * np.arange(1, len(table) + 1) / len(table), table[:, 1:].T
     late = strain > 0.5 * STRAIN
     parts = np.array([part.mean() for part in np.array_split((-xy / yy)[late], _PARTS)])
@@ -147,18 +138,11 @@ def _input(stuff: Material, young: float, packing: float, seed: int) -> tuple[st
     unit = GRAIN * math.sqrt(stuff.density / PRESSURE)
     rate = INERTIAL / unit
     mass = stuff.density * math.pi / 6 * GRAIN**3
-    law = (
-        f"hertz/material {young:g} {lammps_restitution(stuff.restitution):.16g} {stuff.poisson:g} "
-        f"tangential mindlin NULL 1.0 {stuff.friction:g} damping tsuji"
-    )
-    if stuff.rolling_friction:
-        stiff = 0.1 * young * GRAIN
-        law += f" rolling sds {stiff:g} {0.3 * 2 * math.sqrt(stiff * mass / 2):g} {stuff.rolling_friction:g}"
-        law += " twisting marshall"
     squeezing = round(30 * unit / step)
     deck = [
         "units si", "atom_style sphere", "comm_modify vel yes", "boundary p p p", "newton off", "read_data grains.data",
-        "neighbor 4e-4 bin", "neigh_modify delay 0 every 1 check yes", "pair_style granular", f"pair_coeff * * {law}",
+        "neighbor 4e-4 bin", "neigh_modify delay 0 every 1 check yes", "pair_style granular",
+        f"pair_coeff * * {lammps_law(stuff, young, GRAIN)}",
         f"timestep {step:.17g}", "fix motion all nve/sphere", f"fix calm all viscous {mass / unit:.17g}",
         f"fix squeeze all deform 1 y final 0 {solid / (packing * width * depth):.17g} remap x", "thermo 10000",
         f"run {squeezing}", "unfix squeeze", "unfix calm", "compute stress all pressure NULL virial",
@@ -169,41 +153,57 @@ def _input(stuff: Material, young: float, packing: float, seed: int) -> tuple[st
     return "\n".join(lines) + "\n", "\n".join(deck) + "\n"
 
 
+def _smooth(strain: np.ndarray, ratio: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """The ratio averaged over a fiftieth of the strain, at these strains."""
+    kernel = np.ones(max(1, len(ratio) // 50))
+    return np.interp(at, strain, np.convolve(ratio, kernel / len(kernel), "same"))
+
+
+def _each(found: list[Sheared]) -> str:
+    return ", ".join(f"{one.angle:.1f}" for one in found)
+
+
 def _compute(tell: Callable[[float], None]) -> Outcome:
     if PEERS["lammps"].find() is None:
         return Outcome(skipped=f"LAMMPS is not installed (apt install {PEERS['lammps'].package})")
     rows, curves, words = [], [], []
+    parts = len(ROLLING) * len(SEEDS)
     for k, rolling in enumerate(ROLLING):
-        stuff = _stuff(rolling)
-        here, run = _here(stuff, lambda share, k=k: tell((k + 0.7 * share) / len(ROLLING)))  # type: ignore[misc]
-        packing = float(run.packing[run.inside_strain > 0.5 * STRAIN].mean())
-        there = in_lammps(stuff, young=run.young, packing=packing)
-        tell((k + 1) / len(ROLLING))
+        stuff, here, there = _stuff(rolling), [], []
+        runs: list[ElementShear] = []
+        for m, seed in enumerate(SEEDS):
+            begin = (k * len(SEEDS) + m) / parts
+            one, run = _here(stuff, seed, lambda share, begin=begin: tell(begin + 0.7 * share / parts))  # type: ignore[misc]
+            here.append(one)
+            runs.append(run)
+        packing = float(np.mean([run.packing[run.inside_strain > 0.5 * STRAIN].mean() for run in runs]))
+        there = [in_lammps(stuff, young=runs[0].young, packing=packing, seed=seed) for seed in SEEDS]
         about = f"rolling friction {rolling:g}"
-        rows.append(Comparison(f"{about}, plane of shear", "degrees", there.angle, here.angle, BAND, False))
-        rows.append(Comparison(f"{about}, triaxial", "degrees", there.triaxial, here.triaxial, BAND, False))
-        for label, one in (("LAMMPS", there), ("bed", here)):
-            kernel = np.ones(max(1, len(one.ratio) // 50))
-            curves.append(
-                Curve(
-                    f"{label}, {rolling:g}",
-                    np.convolve(one.strain, kernel / len(kernel), "valid"),
-                    np.convolve(one.ratio, kernel / len(kernel), "valid"),
-                    label == "bed",
-                )
-            )
+        for name, words_of in (("angle", "plane of shear"), ("triaxial", "triaxial")):
+            theirs, ours = (float(np.mean([getattr(one, name) for one in found])) for found in (there, here))
+            rows.append(Comparison(f"{about}, {words_of}", "degrees", theirs, ours, BAND, False))
+        for label, found in (("LAMMPS", there), ("bed", here)):
+            strain = np.linspace(0.05, 0.98 * STRAIN, 60)
+            ratio = np.mean([_smooth(one.strain, one.ratio, strain) for one in found], axis=0)
+            curves.append(Curve(f"{label}, {rolling:g}", strain, ratio, label == "bed"))
         words.append(
-            f"{about}: {run.grain_count} grains, critical packing {packing:.3f}, standard errors {here.error:.1f} and "
-            f"{there.error:.1f} degrees (LAMMPS), where the pressure was {there.pressure:.0f} Pa for ours of "
-            f"{here.pressure:.0f}"
+            f"{about}: {runs[0].grain_count} grains, critical packing {packing:.3f}, angles on the plane of shear "
+            f"{_each(here)} and in LAMMPS {_each(there)}, where the pressure was "
+            f"{np.mean([one.pressure for one in there]):.0f} Pa for ours of {PRESSURE:g}"
         )
     remark = (
         f"{'; '.join(words)}. Spheres within {100 * SPREAD:g} %, friction 0.5, restitution 0.5, inertial number "
-        f"{INERTIAL:g}, means over the strain from {0.5 * STRAIN:g} to {STRAIN:g}. Ours between rough planes 10 "
-        "diameters apart, theirs without walls."
+        f"{INERTIAL:g}, means over {len(SEEDS)} samples and the strain from {0.5 * STRAIN:g} to {STRAIN:g}. Ours "
+        "between rough planes 10 diameters apart, theirs without walls."
     )
     return Outcome(rows, [Plot("Stress ratio", "shear strain [1]", "shear over normal stress [1]", curves)], [remark])
 
+
+WHY = (
+    "without rolling friction all agree; with it the triaxial angles do (29.5 degrees over eight samples in LAMMPS, "
+    "2026-11-22) and those on the plane of shear do not, 26.4 +- 0.3 there. Why is not known; the bed's planes "
+    "are ten diameters apart, LAMMPS has none, and a higher sample is to tell"
+)
 
 CASES = [
     Case(
@@ -214,6 +214,7 @@ CASES = [
         "LAMMPS of Debian, run here; the band is ours",
         _compute,
         slow=True,
-        seconds=150,
+        seconds=200,
+        reason=WHY,
     )
 ]

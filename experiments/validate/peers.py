@@ -33,7 +33,7 @@ from dem import Bed, Material
 from . import cloud
 from .case import Case, Comparison, Curve, Outcome, Plot
 
-__all__ = ["CASES", "Assembly", "PEERS", "Peer", "compare", "dense", "pairs"]
+__all__ = ["CASES", "Assembly", "PEERS", "Peer", "compare", "dense", "lammps_restitution", "pairs", "run_peer"]
 
 FAMILY = "The same assembly in other codes"
 YOUNG, POISSON, DENSITY = 5e7, 0.3, 2600.0
@@ -153,26 +153,34 @@ def ours(assembly: Assembly, restitution: float, friction: float) -> np.ndarray:
 
 def theirs(peer: str, assembly: Assembly, restitution: float, friction: float) -> np.ndarray:
     """The same by a peer, in one process. Raises RuntimeError with its last lines where it fails."""
-    program = PEERS[peer].find()
+    text = run_peer(peer, _data(assembly), _deck(peer, assembly, restitution, friction), "dump.txt", limit=LIMIT)
+    return _read_dump(text, assembly)
+
+
+def run_peer(peer: str, data: str, deck: str, wanted: str, *, limit: float) -> str:
+    """Run a peer, in one process, on a deck that reads ``grains.data``: the text of the file ``wanted`` that it writes.
+
+    Raises RuntimeError with its last lines where it fails, TimeoutExpired after ``limit`` [s].
+    """
     with tempfile.TemporaryDirectory(prefix="hedgebed-peer-") as name:
         folder = Path(name)
-        (folder / "grains.data").write_text(_data(assembly), encoding="ascii")
-        (folder / "deck").write_text(_deck(peer, assembly, restitution, friction), encoding="ascii")
+        (folder / "grains.data").write_text(data, encoding="ascii")
+        (folder / "deck").write_text(deck, encoding="ascii")
         done = subprocess.run(
-            [str(program), "-in", "deck", "-log", "log.txt", "-screen", "none"],
+            [str(PEERS[peer].find()), "-in", "deck", "-log", "log.txt", "-screen", "none"],
             cwd=folder,
             check=False,
             capture_output=True,
             text=True,
             errors="replace",
-            timeout=LIMIT,
+            timeout=limit,
             env={**os.environ, "OMP_NUM_THREADS": "1"},
         )
         log = folder / "log.txt"
-        if done.returncode != 0 or not (folder / "dump.txt").is_file():
+        if done.returncode != 0 or not (folder / wanted).is_file():
             said = (log.read_text(errors="replace") if log.exists() else "") + done.stdout + done.stderr
             raise RuntimeError(f"{PEERS[peer].name} failed: {' | '.join(said.splitlines()[-4:])}")
-        return _read_dump((folder / "dump.txt").read_text(encoding="ascii"), assembly)
+        return (folder / wanted).read_text(encoding="ascii")
 
 
 def _data(assembly: Assembly) -> str:

@@ -22,9 +22,9 @@ from . import (
     oblique,
     one_grain,
     peers,
-    pending,
     restitution,
     silo,
+    slump,
     spinning,
 )
 from .case import Case
@@ -38,6 +38,7 @@ NEEDS = {
     "peers": ("cloud.py",),
     "spinning": ("oblique.py",),
     "friction_angle": ("peers.py",),
+    "slump": ("peers.py", "friction_angle.py"),
     "dosta": ("peers.py",),
     "low_gravity": ("drops.py", "parts.py"),
     "impact": ("drops.py", "parts.py"),
@@ -58,11 +59,11 @@ _MODULES = (
     large_body,
     peers,
     friction_angle,
+    slump,
     dosta,
     low_gravity,
     impact,
     intrusion,
-    pending,
 )
 SUITE: tuple[Case, ...] = tuple(case for module in _MODULES for case in module.CASES)
 
