@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from .bounds import bounds_met
+from .bounds import is_strained
 from .evidence import held_out_fit
 from .fitting import Fit, fit
 from .gate import held_out_gate, open_gate
@@ -55,7 +55,7 @@ def astray(found: Fit, held_out: Sequence[str], *, seed: int = 0) -> tuple[Findi
         if len(rest) < 3:
             break
         learned = _refitted(found, rest)
-        if any(bound.strains for bound in bounds_met(learned)) or not open_gate(learned, seed=seed)[1].passed:
+        if is_strained(learned) or not open_gate(learned, seed=seed)[1].passed:
             continue
         values = held_out_fit(learned.model, held_out, learned.values)
         others = allowed(len(trials) + len(held_out)) - count if bare else allowed(len(held_out))

@@ -7,11 +7,12 @@ bends what it has. Such a model does not explain the data, however little it lea
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 
 from .fitting import Fit
 
-__all__ = ["Bound", "bounds_met"]
+__all__ = ["Bound", "bounds_met", "is_strained"]
 
 _FAR = 5.0
 """Standard deviations from the stated value that no true number has (chance 6e-7)."""
@@ -41,6 +42,12 @@ class Bound:
             end = ", the end of its range" if self.at_bound else ""
             return f"{value} ({self.sigmas:+.1f} sigma{end})"
         return f"{value} (the most or least that the library allows)"
+
+
+def is_strained(found: Fit) -> bool:
+    """Whether the model needs numbers that the campaign all but excludes, but for those that its forms redefine."""
+    redefined = {name for form in found.model.forms for name in form.redefines}
+    return any(b.strains and re.split(r"[@\[]", b.parameter)[0] not in redefined for b in bounds_met(found))
 
 
 def bounds_met(found: Fit) -> tuple[Bound, ...]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from .astray import allowed, astray, astray_held_out
-from .bounds import Bound, bounds_met
+from .bounds import Bound, bounds_met, is_strained
 from .colour import Colour, find_colours, whitener_for
 from .equivalence import Rival
 from .evidence import SMALL, Hypothesis, excess, held_out_fit, inflation, score, signature_matrix
@@ -210,8 +210,7 @@ def diagnose(
             tell=lambda done: tell("making the null of what is left", done),
         )[1]  # fmt: skip
         choice = replace(choice, left=left)
-    strained = any(bound.strains for bound in bounds_met(base))
-    if not choice.best.effects and not strained and choice.left.score < choice.left.threshold + _MARGIN:
+    if not choice.best.effects and not is_strained(base) and choice.left.score < choice.left.threshold + _MARGIN:
         return told.finish(base, None, colours, model_std, "none", last=choice.left)
     tell("verdict", 0.0)
     choice = replace(choice, best=replace(choice.best, fit=settled(choice.best.fit)))
@@ -332,7 +331,7 @@ def _verdict(choice: Choice, held: Verdict | None, held_out: tuple[str, ...], se
     little to speak of, or what a form that is not nature's leaves; and where it needs no number that the campaign all
     but excludes. Else something is unknown."""
     found = choice.best.fit
-    if not choice.best.effects or any(bound.strains for bound in bounds_met(found)):
+    if not choice.best.effects or is_strained(found):
         return "unknown"
     passed = choice.left.passed and (held is None or held.passed)
     if choice.left.passed and not passed:  # or what is held out follows for a while only

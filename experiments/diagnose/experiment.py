@@ -19,6 +19,7 @@ from experiments.progress import Progress
 from experiments.runfolder import RunFolder
 from hedgebed import __version__
 
+from .bounds import is_strained
 from .diagnosis import Diagnosis, diagnose
 from .document import write_diagnosis
 from .own import load_own
@@ -138,7 +139,13 @@ def _result(found: Diagnosis, said: dict[str, Any]) -> dict[str, Any]:
     warnings = [finding.what for finding in said_once(found.findings)]
     for model, bounds, meaning in (
         ("the base model", found.bounds_before, "it bends them because it lacks something"),
-        ("the best model", found.bounds_after if found.forms else (), "it does not explain the data"),
+        (
+            "the best model",
+            found.bounds_after if found.forms else (),
+            "it does not explain the data"
+            if is_strained(found.best)
+            else "beside the effects named it means another thing",
+        ),
     ):
         strained = [bound.words for bound in bounds if bound.strains]
         if strained:

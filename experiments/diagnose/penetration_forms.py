@@ -49,6 +49,7 @@ class Library:
 
 
 _Add = Callable[..., None]
+_REDEFINED = {"depth-hardening": ("stiffness",), "layering": ("stiffness",)}
 
 
 def make_library(scales: Scales, *, retreats: bool, speeds_differ: bool) -> Library:
@@ -85,6 +86,7 @@ def make_library(scales: Scales, *, retreats: bool, speeds_differ: bool) -> Libr
         form = Form(
             effect=effect, name=name, parameters=tuple(parameters), amplitude=names[0],
             starts=tuple(dict(zip(names, start, strict=True)) for start in starts), linear=len(names) == 1,
+            redefines=_REDEFINED.get(effect, ()),
         )  # fmt: skip
         forms.append(form)
         slots[form.id] = table
@@ -111,11 +113,11 @@ def _add_hardening(add: _Add) -> None:
 
 def _add_layering(add: _Add) -> None:
     # A layer is sharp: its edge is narrower than a quarter of D. What changes all the way down is hardening.
-    effect, edge, width = "layering", ("layer_depth", "depth", math.log(0.15), math.log(1.25)), math.log(0.12)
-    starts = tuple((a, math.log(x)) for x in (0.3, 0.55, 0.85) for a in (0.4, -0.25))
-    add(effect, "slope", ("layer_slope", "spring", 0.8, -1.5, 20.0), edge, starts=starts)
-    sharp = tuple((a, math.log(x), math.log(0.04)) for x in (0.3, 0.55, 0.85) for a in (0.3, -0.2))
+    effect, edge, width = "layering", ("layer_depth", "depth", math.log(0.03), math.log(1.25)), math.log(0.12)
+    starts = tuple((a, math.log(x), math.log(0.02)) for x in (0.1, 0.3, 0.55, 0.85) for a in (0.4, -0.25))
     narrow = ("layer_width", "depth", math.log(0.005), width)
+    add(effect, "slope", ("layer_slope", "spring", 0.8, -1.5, 20.0), edge, narrow, starts=starts)
+    sharp = tuple((a, math.log(x), math.log(0.04)) for x in (0.1, 0.3, 0.55, 0.85) for a in (0.3, -0.2))
     add(effect, "factor", ("layer_factor", "plain", 0.8, -0.95, 20.0), edge, narrow, starts=sharp)
     add(effect, "step", ("layer_step", "spring force", 0.5, -2.0, 10.0), edge, narrow, starts=sharp)
     add(effect, "crust", ("layer_bump", "spring force", 0.4, 0.0, 10.0),

@@ -199,7 +199,9 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
         if n[k, LAYER_BUMP] != 0.0:
             grown += n[k, LAYER_BUMP] * ti.exp(-0.5 * away * away)
         if n[k, LAYER_SLOPE] != 0.0:
-            grown += n[k, LAYER_SLOPE] * ti.max(depth - n[k, LAYER_DEPTH], 0.0)
+            width = n[k, LAYER_WIDTH]  # a corner that is rounded over it, and no force at the surface
+            corner = ti.log(1.0 + ti.exp(-ti.abs(away))) - ti.log(1.0 + ti.exp(-n[k, LAYER_DEPTH] / width))
+            grown += n[k, LAYER_SLOPE] * (ti.max(depth - n[k, LAYER_DEPTH], 0.0) + width * corner)
         return grown if depth > 0.0 else 0.0
 
     @ti.func

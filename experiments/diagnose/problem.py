@@ -70,6 +70,9 @@ class Form:
     starts: tuple[Values, ...] = ()
     """Values of the form's parameters to begin fits from, amplitudes that can be seen, other signs and lengths among
     them; every one is tried. Empty: 1 and, where the bounds allow, -1 scale of the amplitude."""
+    redefines: tuple[str, ...] = ()
+    """Base parameters that mean another thing beside this form (a straight spring's slope is not that of a bent one
+    at its beginning): what was stated of them is no measure of it."""
     linear: bool = False
     """Whether the residuals are close to linear in all of the form's parameters (then one start does)."""
 

@@ -54,13 +54,18 @@ some hundredths: on the suite of hidden effects 3 to 4 %."""
 
 
 def _plain(
-    effect: str, form: str, *parameters: Parameter, starts: tuple[Mapping[str, float], ...] = (), form_std: float = 0.0
+    effect: str,
+    form: str,
+    *parameters: Parameter,
+    starts: tuple[Mapping[str, float], ...] = (),
+    form_std: float = 0.0,
+    redefines: tuple[str, ...] = (),
 ) -> TumbleForm:
     """A form whose parameters are the term's own."""
     names = tuple(p.name for p in parameters)
     return TumbleForm(
         effect=effect, name=form, parameters=parameters, amplitude=names[0], starts=starts, physical=_same(*names),
-        form_std=form_std,
+        form_std=form_std, redefines=redefines,
     )  # fmt: skip
 
 
@@ -208,11 +213,13 @@ def tumble_forms(
             "straight while shallow",
             _free("depth-hardening.bend", "1/m", 0.03 / max(sinkage, 1e-6), lowest=-1e6, highest=1e6),
             starts=tuple({"depth-hardening.bend": b / max(sinkage, 1e-6)} for b in (0.005, 0.05, 0.5, -0.03, -0.4)),
+            redefines=("stiffness",),
         ),
         TumbleForm(
             effect="depth-hardening",
             name="power",
             amplitude="depth-hardening.exponent_change",
+            redefines=("stiffness",),
             parameters=(
                 _free("depth-hardening.exponent_change", "1", 0.1, lowest=-0.65, highest=2.5),
                 _log("depth-hardening.log_reference"),
