@@ -47,8 +47,8 @@ _ASKED = 3
 _SEEN_ELSEWHERE = 3.0
 """Nats by which a name must be better than none on the other trials, where one trial goes its own way."""
 _CERTAIN = 0.5
-"""Share of what the base model leaves, fitted and predicted, that a name must take away to be certain beside something
-that has no name."""
+"""Share of what the base model leaves, fitted, predicted and held out, that a name must take away to be certain beside
+something that has no name."""
 
 
 @dataclass(frozen=True)
@@ -380,10 +380,10 @@ class _Told:
         best = choice.best.fit if choice is not None else base
         base_values, best_values = _values_of_all(base, held_out), _values_of_all(best, held_out)
         effects = choice.best.effects if choice is not None else ()
-        if verdict == "unknown" and choice is not None and effects:
-            effects = effects if _certain(base, choice) else ()
         before = _gap(problem, base.model, base_values, fitted, held_out)
         after = before if verdict == "none" else _gap(problem, best.model, best_values, fitted, held_out)
+        if verdict == "unknown" and choice is not None and effects:
+            effects = effects if _certain(base, choice) and _closes(before.held_out, after.held_out) else ()
         where = [] if verdict == "none" else places(base.model, base_values, (*fitted, *held_out))
         rivals = _smallest(choice) if choice is not None and verdict == "ambiguous" else ()
         alternatives = tuple(next(e for e in rival.effects if e not in effects) for rival in rivals)
@@ -412,6 +412,11 @@ def _certain(base: Fit, choice: Choice) -> bool:
     if predicted is None or choice.predicted is None:
         return True
     return choice.predicted.chi_square - choice.predicted.count < _CERTAIN * (predicted.chi_square - predicted.count)
+
+
+def _closes(before: float | None, after: float | None) -> bool:
+    """Whether most of what the base model leaves of trials held out is taken away, too; true where there are none."""
+    return before is None or after is None or after - 1 < _CERTAIN * max(before - 1, 0.0)
 
 
 def _smallest(choice: Choice) -> tuple[Hypothesis, ...]:

@@ -1,12 +1,14 @@
 """The penetration model of diagnose: forces and motions against closed forms, and what is made of the data."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from penetration_campaigns import DAMPING, GRAVITY, MASS, STIFFNESS, campaign_of, driven_trial, drop_trial
 
 from experiments.campaign import Recording, read_model
+from experiments.diagnose.bounds import is_strained
 from experiments.diagnose.fitting import Model, Whitener, fit
 from experiments.diagnose.penetration_depth import smooth_depth
 from experiments.diagnose.penetration_law import SLOTS, fall, push, slot_table
@@ -64,6 +66,33 @@ def test_a_crater_pushes_back_along_the_loading_curve_pressed_into_what_is_left(
     force = pushed(depth, np.gradient(depth), crater_share=0.4)
     back = depth[50:]
     assert force[50:] == pytest.approx(np.maximum(STIFFNESS * (back - 0.4 * 0.02) / 0.6, 0.0), abs=1e-12)
+
+
+def test_a_layers_second_slope_sets_in_over_its_width_and_adds_no_force_at_the_surface():
+    # K z + K' w (ln(1 + e^((z - z1) / w)) - ln(1 + e^(-z1 / w))), whose slope is K at first and K + K' far below.
+    depth, more, z1, w = np.linspace(1e-6, 0.02, 400), 0.6 * STIFFNESS, 0.008, 0.001
+    force = pushed(depth, np.zeros_like(depth), layer_slope=more, layer_depth=z1, layer_width=w)
+    expected = STIFFNESS * depth + more * w * (np.logaddexp(0, (depth - z1) / w) - np.logaddexp(0, -z1 / w))
+    assert force == pytest.approx(expected, rel=1e-12, abs=1e-12)
+    assert force[0] == pytest.approx(STIFFNESS * depth[0], rel=1e-3)
+    assert np.diff(force)[-1] / np.diff(depth)[-1] == pytest.approx(STIFFNESS + more, rel=1e-4)
+
+
+def test_what_is_stated_of_a_spring_says_nothing_of_one_that_is_bent():
+    trials = [(f"d{k}", "driven", v, driven_trial(base, speed=v, seed=k)) for k, v in enumerate((0.01, 0.1))]
+    problem = make_problem(campaign_of(trials))
+    names = ("depth-hardening:exponential", "shaft-friction:constant")
+    bent, rubbed = (next(form for form in problem.forms if form.id == name) for name in names)
+    found = fit(Model(problem, Whitener.white(problem), ("d0", "d1")))
+    far = {**found.values, "stiffness": problem.base[0].value + 6 * problem.base[0].std}
+    strained = replace(found, values=far)
+    assert problem.base[0].name == "stiffness" and is_strained(strained)
+
+    def beside(form):
+        model, values = found.model.with_forms([form]), {**far, form.amplitude: 0.1}
+        return is_strained(replace(strained, model=model, values=values))
+
+    assert beside(rubbed) and not beside(bent)
 
 
 def test_the_fitted_stiffness_and_damping_of_exact_trials_are_the_true_ones():
