@@ -20,7 +20,7 @@ from .campaign import Campaign, PenetrationCampaign, Recording, TumbleCampaign, 
 from .campaign_settings import CheckSettings
 from .diagnose.problem import Finding
 from .diagnose.telling import findings_in_words
-from .plausible import find_implausible, loud_sensors, said_once
+from .plausible import find_implausible, loud_sensors, said_once, without_companions
 from .progress import Progress
 from .replicas import Condition, condition_of, condition_words, odd_replicates
 from .reporting import write_report
@@ -49,7 +49,8 @@ def find_faults(campaign: Campaign) -> list[Finding]:
         found = _faults_of_data(campaign)
     jumped = {finding.trial for finding in found if _jumps(finding)}
     odd = [finding for finding in odd_replicates(campaign) if finding.trial not in jumped]
-    return [*_missing_sensors(campaign), *find_implausible(campaign), *found, *odd, *loud_sensors(campaign)]
+    told = [*_missing_sensors(campaign), *find_implausible(campaign), *found, *odd, *loud_sensors(campaign)]
+    return without_companions(campaign, told)
 
 
 def _jumps(finding: Finding) -> bool:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,6 +23,7 @@ from experiments.runfolder import write_text
 
 __all__ = ["Recording", "read_recording", "write_recording"]
 
+_DECIMAL_COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+([eE][-+]?[0-9]+)?")
 _MOST_SAID = 5
 """Faults of one kind that are said of one file; of the rest the number."""
 
@@ -72,7 +74,7 @@ def read_recording(path: Path, wanted: Sequence[tuple[str, str]]) -> Recording:
     time that runs backwards or is missing in a row with numbers, and a file without rows.
     """
     header, rows = _read_cells(path)
-    faults = _header_faults(path, header)
+    faults = _other_csv(path, header, rows) or _header_faults(path, header)
     if faults:
         _refuse(faults)
     chosen: list[tuple[int, Callable[[float], float]]] = []
@@ -152,6 +154,20 @@ def write_recording(path: Path, recording: Recording) -> None:
     ]
     writer.writerows(zip(*cells, *recording.extra.values(), strict=True))
     write_text(path, out.getvalue())
+
+
+def _other_csv(path: Path, header: list[str], rows: list[tuple[int, list[str]]]) -> list[str]:
+    """Cells parted by semicolons or tabs, and decimal commas, as spreadsheets of some languages write them."""
+    expected = "commas between cells and points in numbers were expected"
+    for mark, name in ((";", "semicolons"), ("\t", "tabs")):
+        if len(header) == 1 and mark in header[0]:
+            comma = any("," in cell for cell in (mark.join(",".join(row) for _, row in rows[:5])).split(mark))
+            also = ", and its numbers have decimal commas" if comma else ""
+            return [f"{path}: its cells are parted by {name}{also}; {expected}"]
+    twice = len(rows) > 3 and all(1.5 * len(header) <= len(row) <= 2 * len(header) for _, row in rows[:20])
+    if twice or any(_DECIMAL_COMMA.fullmatch(cell.strip()) for _, row in rows[:5] for cell in row):
+        return [f"{path}: its numbers look as if they had decimal commas; {expected}"]
+    return []
 
 
 def _header_faults(path: Path, header: list[str]) -> list[str]:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from .lags import find_lag, pieces
 from .problem import Finding
 from .stuck import stuck_rows
 from .tumble_data import CHANNELS, TrialData, TumbleData
@@ -28,6 +29,7 @@ _SPAN = 0.08  # s that they cover
 _SURE = 25.0  # squared standard deviations by which a clock that is right must be off
 _SENSORS = {"the camera": ("theta", "x", "y"), "the IMU": ("gyro",), "the wheel": ("wheel",)}  # what is smooth
 _ALL = {"the camera": ("theta", "x", "y"), "the IMU": ("gyro", "ax", "ay"), "the wheel": ("wheel",)}
+_MOVED = 0.02  # s by which a clock must have jumped to be told from the motion on either side
 _LONG = 40  # rows that a marker may be lost for before it counts as gone for good
 
 
@@ -145,6 +147,47 @@ def _clocks(trial: TrialData, keep: NDArray[np.bool_], findings: list[Finding]) 
                 f"it had not: all that follows is set aside",
             ))  # fmt: skip
             break
+    _clocks_apart(trial, keep, findings)
+
+
+def _clocks_apart(trial: TrialData, keep: NDArray[np.bool_], findings: list[Finding]) -> None:
+    """The same for camera and IMU, told from one another: the angle is late against the gyro from a gap on."""
+    angle, rate = (np.flatnonzero(trial.of(name) & keep) for name in ("theta", "gyro"))
+    if not len(angle) or not len(rate):
+        return
+    std = (float(trial.std[angle[0]]), float(trial.std[rate[0]]))
+
+    def between(angle: NDArray[np.intp], rate: NDArray[np.intp], near: float) -> tuple[float, bool]:
+        """The lag, and whether it is another than `near`, which it else is."""
+        found = find_lag(
+            trial.time[angle], trial.value[angle], trial.time[rate], trial.value[rate], std=std, near=near
+        )  # fmt: skip
+        return (near, False) if found is None or not found.is_another else (found.value, True)
+
+    for sensor, rows, sign in (("the IMU", rate, -1.0), ("the camera", angle, 1.0)):
+        parts = [rows[low:high] for low, high in pieces(trial.time[rows])]
+        first: float | None = None
+        for number, part in enumerate(parts):
+            seen, felt = (angle, part) if sensor == "the IMU" else (part, rate)
+            lag, another = between(seen, felt, first or 0.0)
+            if first is None:
+                first = lag
+                continue
+            jumped = sign * (lag - first)
+            if not another or jumped < _MOVED:
+                continue
+            start = float(trial.time[part[0]])
+            before = float(trial.time[parts[number - 1][-1]])
+            whole = np.isin(trial.channel, [CHANNELS.index(name) for name in _ALL[sensor]])
+            keep &= ~(whole & (trial.time > before))
+            other = "camera's angle" if sensor == "the IMU" else "gyro"
+            findings.append(Finding(
+                trial=trial.id, channel=_SENSORS[sensor][0], from_s=start, to_s=float(trial.time[rows].max()),
+                set_aside=True,
+                what=f"the clock of {sensor} jumps forward by about {jumped:.2g} s while the motion, as the {other} "
+                f"has it, goes on as if it had not: all that follows is set aside",
+            ))  # fmt: skip
+            return
 
 
 def _surprise(

@@ -16,9 +16,9 @@ from experiments.diagnose.problem import Finding
 
 from .penetration import penetration_oddities
 from .tumble import tumble_oddities
-from .words import times
+from .words import times, unit_words
 
-__all__ = ["find_implausible", "loud_sensors", "said_once"]
+__all__ = ["find_implausible", "loud_sensors", "said_once", "without_companions"]
 
 Array = NDArray[np.float64]
 
@@ -26,10 +26,45 @@ _MANY = 4
 """Trials of which the same is said once."""
 _LOUD = 2.0
 """Times the stated noise from which on a sensor is called louder."""
+_QUIET = 0.1
+"""And quieter: coloured noise has less of it from row to row than in all, but not so little."""
+_NAMED = ("looks like", "would say so", "the sign is reversed", "is counted", "clock")
+"""Words of a finding that says the cause."""
+_FOLLOWS = ("by a jump that no motion makes", "jumps so often", "what [sensors.", "its zero is to be taken off")
+"""Words of findings that a named cause makes of itself."""
+_TOGETHER = (frozenset(("x", "y", "theta")), frozenset(("gyro", "ax", "ay")), frozenset(("wheel",)),
+             frozenset(("depth",)), frozenset(("force",)), frozenset(("accel",)))  # fmt: skip
+"""Channels of one sensor."""
 
 
 def find_implausible(campaign: Campaign) -> list[Finding]:
-    """What cannot be as it stands, a sentence each, trial after trial."""
+    """What cannot be as it stands, a sentence each, trial after trial, what is alike in many of them once."""
+    return said_once(_each_implausible(campaign))
+
+
+def without_companions(campaign: Campaign, found: Sequence[Finding]) -> list[Finding]:
+    """`found` without what a cause that is named makes of itself: a marker "lost", a zero "off", a "louder" sensor.
+
+    A column in degrees under a heading in radians jumps and scatters 57 times as much as is stated: said once.
+    """
+    named = [f for f in _each_implausible(campaign) if f.channel and any(words in f.what for words in _NAMED)]
+
+    def follows(finding: Finding) -> bool:
+        if not any(words in finding.what for words in _FOLLOWS) or any(words in finding.what for words in _NAMED):
+            return False
+        channel = finding.channel or ""
+        for cause in named:
+            mine = finding.trial in ("", cause.trial)
+            alike = any(cause.channel in sensor and channel in sensor for sensor in _TOGETHER)
+            if mine and (alike or (channel == "theta" and "theta_rad looks like" in cause.what)):
+                return True
+        return False
+
+    return [finding for finding in found if not follows(finding)]
+
+
+def _each_implausible(campaign: Campaign) -> list[Finding]:
+    """What cannot be, trial after trial."""
     tables = campaign.tables
     found: list[Finding] = []
     for trial in tables.trial:
@@ -41,7 +76,7 @@ def find_implausible(campaign: Campaign) -> list[Finding]:
             assert isinstance(trial, TumbleTrial)
             odd = list(tumble_oddities(campaign, tables, trial))
         found += [Finding(trial=trial.id, channel=channel, what=f"trial {trial.id}: {what}") for channel, what in odd]
-    return said_once(found)
+    return found
 
 
 def said_once(found: Sequence[Finding]) -> list[Finding]:
@@ -62,7 +97,7 @@ def said_once(found: Sequence[Finding]) -> list[Finding]:
 
 
 def loud_sensors(campaign: Campaign) -> list[Finding]:
-    """Sensors whose readings scatter from row to row by far more than the noise that campaign.toml states.
+    """Sensors whose readings scatter from row to row by far more, or far less, than the noise that is stated.
 
     Fourth differences, of which a smooth motion leaves little; the median of a trial, so that touches do not count; the
     median over the trials. A bed whose grains jam and give way makes the force do the same, and the sentence says so.
@@ -86,8 +121,22 @@ def loud_sensors(campaign: Campaign) -> list[Finding]:
         if ratio > _LOUD:
             words = f"{column} scatters from row to row by {ratio * stated[name, column]:.2g}, {times(ratio)} what "
             cause = f"[sensors.{name}] states: a louder sensor, or something that moves as fast as it is read"
-            found.append(Finding(trial="", what=words + cause))
+            found.append(Finding(trial="", channel=_channel(column), what=words + cause))
+        elif ratio < _QUIET and name != "depth":  # a driven depth is smooth, and only its smoothing asks for its noise
+            unit = unit_words(1 / ratio) if ratio > 0 else None
+            found.append(Finding(
+                trial="", channel=_channel(column),
+                what=f"[sensors.{name}] states {stated[name, column]:.2g} for {column}, {times(1 / ratio)} what it "
+                f"scatters from row to row: {unit or 'stated too large, or smoothed when it was recorded'}; noise that "
+                f"is stated too large hides what a model lacks",
+            ))  # fmt: skip
     return found
+
+
+def _channel(column: str) -> str:
+    """``theta`` for ``theta_rad``, ``wheel`` for ``omega_rad_s``."""
+    name = column.split("_")[0]
+    return "wheel" if name == "omega" else name
 
 
 def _noises(

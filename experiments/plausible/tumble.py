@@ -11,21 +11,14 @@ from numpy.typing import NDArray
 from experiments.campaign import Campaign, Recording, TumbleCampaign
 from experiments.campaign.tables import TumbleTrial
 
+from .tables import gravity_oddities
+from .turning import clock_oddities, sideways_oddities, turning_oddities
 from .words import OFF, ZERO, Odd, said, times, unit_words
 
 __all__ = ["tumble_oddities"]
 
 Array = NDArray[np.float64]
 
-_SCALE = 0.1
-"""Relative difference of gyro and camera that neither noise nor a clock makes."""
-_TURNS = {
-    -1.0: "one of the two has its sign reversed: clockwise is positive",
-    180 / math.pi: "gyro_rad_s looks like degrees a second: gyro_deg_s would say so",
-    math.pi / 180: "theta_rad looks like degrees: theta_deg would say so",
-    30 / math.pi: "gyro_rad_s looks like revolutions a minute: gyro_rpm would say so",
-}
-_NO_TURN = "one of the two has another scale, or is not about the axis of rotation"
 _LATE = 0.03
 """Seconds by which the wheel may begin to change late before t = 0 is doubted."""
 
@@ -40,10 +33,16 @@ def tumble_oddities(campaign: Campaign, tables: TumbleCampaign, trial: TumbleTri
                 "starts",
             )
             return
-    turning = list(_turning(pose, imu)) if pose is not None and imu is not None else []
+    yield from gravity_oddities(tables, trial)
+    turning: list[Odd] = []
+    if pose is not None and imu is not None:
+        clocks, told = clock_oddities(tables, pose, imu)
+        yield from clocks
+        turning = [] if told else list(turning_oddities(pose, imu))
     yield from turning
     if pose is not None:
         yield from _start(tables, pose, angle=not turning)
+        yield from sideways_oddities(tables, trial, pose, imu if not turning else None)
     if imu is not None:
         yield from _at_rest(tables, trial, imu)
     if wheel is not None:
@@ -62,6 +61,14 @@ def _start(tables: TumbleCampaign, pose: Recording, *, angle: bool) -> Iterator[
         if len(early) < 2:
             continue
         there = float(np.median(early))
+        if value and abs(there / value * 1e3 - 1) < 0.15:
+            length = tables.platform.spike_length
+            yield said(
+                channel,
+                f"{column} is {there:.4g} at the start where spike_length = {length:g} puts it at {value:.4g} m: ",
+                f"[platform] spike_length looks like mm, {1e-3 * length:g} m would fit",
+            )
+            return
         words = unit_words(there / value) if value else None
         if words is not None:
             yield said(channel, f"{column} is {there:.4g} at the start where {value:.4g} was expected; {words}")
@@ -75,28 +82,6 @@ def _start(tables: TumbleCampaign, pose: Recording, *, angle: bool) -> Iterator[
                 f"{times(abs(there - value) / std)} the camera's noise: its zero is to be taken off (up to 3 times ",
                 "is allowed for)",
             )
-
-
-def _turning(pose: Recording, imu: Recording) -> Iterator[Odd]:
-    """The gyro, integrated, against the camera's angle."""
-    angle, rate = pose["theta_rad"], imu["gyro_rad_s"]
-    seen, felt = np.isfinite(angle), np.isfinite(rate)
-    if min(seen.sum(), felt.sum()) < 20:
-        return
-    time, steps = imu.time[felt], np.diff(imu.time[felt])
-    if steps.max() > max(10 * np.median(steps), 0.05):
-        return
-    turned = np.concatenate([[0.0], np.cumsum(0.5 * (rate[felt][1:] + rate[felt][:-1]) * steps)])
-    inside = seen & (pose.time >= time[0]) & (pose.time <= time[-1])
-    if inside.sum() < 20:
-        return
-    by_gyro, by_camera = np.interp(pose.time[inside], time, turned), angle[inside]
-    if np.ptp(by_camera) == 0 or np.ptp(by_gyro) == 0 or abs(np.corrcoef(by_gyro, by_camera)[0, 1]) < 0.98:
-        return
-    slope = float(np.polyfit(by_camera, by_gyro, 1)[0])
-    if abs(slope - 1) > _SCALE:
-        words = next((words for ratio, words in _TURNS.items() if abs(slope / ratio - 1) < _SCALE), _NO_TURN)
-        yield said("gyro", f"the gyro turns {slope:.3g} times as far as the camera's angle; {words}")
 
 
 def _at_rest(tables: TumbleCampaign, trial: TumbleTrial, imu: Recording) -> Iterator[Odd]:
@@ -149,6 +134,8 @@ def _wheel(tables: TumbleCampaign, trial: TumbleTrial, wheel: Recording) -> Iter
             yield said("wheel", f"the wheel's speed begins to change at {late:.3g} s; t = 0 is when the torque starts")
             return
         words = "the torque or the wheel's inertia is another"
+        if abs(slope / expected * 1e3 - 1) < 0.15:
+            words = f"torque = {trial.torque:g} looks like mN m: {1e-3 * trial.torque:g} N m would fit"
     if words is not None:
         yield said(
             "wheel",

@@ -241,6 +241,8 @@ def test_what_is_wrong_with_a_table_is_said_by_file_and_key(tmp_path, old, new, 
         ("y_m,theta_rad", "y_m,y_m", ["line 1", "column 'y_m' is there 2 times"]),
         (POSE, "t_s,x_m,y_m,theta_rad\n", ["no row of numbers"]),
         (POSE, "", ["line 1", "no header"]),
+        (POSE, POSE.replace(",", ";").replace(".", ","), ["parted by semicolons", "decimal commas"]),
+        (POSE, POSE.replace(".", ","), ["decimal commas"]),
     ],
 )
 def test_what_is_wrong_with_a_recording_is_said_by_file_and_line(tmp_path, old, new, said):

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.campaign import Campaign, Recording, read_campaign
+from experiments.campaign import Campaign, Recording, TumbleCampaign, read_campaign
 from experiments.campaign.templates import TEMPLATES, new_campaign
 from experiments.inspection import find_faults, unnamed_files
 
@@ -65,6 +65,52 @@ def lost_for_a_while(columns: dict[str, np.ndarray]) -> None:
 def test_what_is_wrong_with_a_recording_is_said(kind, trial, sensor, change, said):
     told = [finding.what for finding in find_faults(changed(kind, trial, sensor, change)) if finding.trial == trial]
     assert any(said in what for what in told), told
+
+
+def shifted(column: str, by: float, since: float) -> Callable[[dict[str, np.ndarray]], None]:
+    """The clock of a sensor jumps forward by that much at that time."""
+
+    def change(columns: dict[str, np.ndarray]) -> None:
+        columns[column] += by * (columns[column] > since)
+
+    return change
+
+
+def anticlockwise(columns: dict[str, np.ndarray]) -> None:
+    for name in {"theta_rad", "gyro_rad_s"} & set(columns):
+        columns[name] *= -1
+
+
+@pytest.mark.parametrize(
+    ("changes", "tables", "said"),
+    [
+        ({"imu": shifted("t_s", 0.4, 0.5)}, {}, ["the clock of the IMU jumps forward by about 0.4 s", "set aside"]),
+        ({"imu": shifted("t_s", 0.1, 0.5)}, {}, ["the clock of the IMU jumps forward by about 0.1 s", "set aside"]),
+        ({"pose": shifted("t_s", 0.2, -1.0)}, {}, ["the camera's angle comes 0.2 s after the gyro", "t = 0"]),
+        ({"imu": times("ax_m_s2", -1.0)}, {}, ["ax_m_s2 rises as the platform turns clockwise", "sign is reversed"]),
+        ({"pose": anticlockwise, "imu": anticlockwise}, {}, ["theta falls at the start", "anticlockwise"]),
+        ({"pose": times("theta_rad", 57.3)}, {}, ["theta_deg would say so"]),
+        ({}, {"spike_length": 200.0}, ["[platform] spike_length looks like mm, 0.2 m would fit"]),
+        ({}, {"torque": 220.0}, ["torque = 220 looks like mN m: 0.22 N m would fit"]),
+        ({}, {"gravity_sim": 0.0085}, ["counterweight = 5.21 kg leaves 0.883 N", "units of g: 0.08336 m/s2 would"]),
+        ({}, {"std": (5e-4, 5e-4, 0.17)}, ["[sensors.pose] states 0.17 for theta_rad", "degrees"]),
+    ],
+)
+def test_a_mistake_in_a_tumble_is_said_once_by_its_cause(changes, tables, said):
+    """What a newcomer got wrong without a word, or with the wrong one; what follows from it is not said beside it."""
+    campaign = read_campaign(TEMPLATES / "template-tumble")
+    recordings = {key: value for key, value in campaign.recordings.items() if key[0] == "001"}
+    for sensor, change in changes.items():
+        columns = {name: column.copy() for name, column in recordings["001", sensor].columns.items()}
+        change(columns)
+        recordings["001", sensor] = Recording(columns)
+    given = campaign.tables.model_dump(mode="python", exclude_none=True)
+    given["trial"] = (given["trial"][0],)
+    for key, value in tables.items():
+        place = {"spike_length": given["platform"], "std": given["sensors"]["pose"]}.get(key, given["trial"][0])
+        place[key] = value
+    told = [finding.what for finding in find_faults(Campaign(TumbleCampaign(**given), recordings))]
+    assert len(told) == 1 and all(words in told[0] for words in said), told
 
 
 def test_nothing_is_wrong_with_the_templates():
