@@ -240,7 +240,7 @@ def tumble_forms(
             "plastic-sinkage",
             "share",
             _free("plastic-sinkage.share", "1", 0.1, lowest=0.0, highest=0.93),
-            starts=({"plastic-sinkage.share": 0.15}, {"plastic-sinkage.share": 0.5}),
+            starts=tuple({"plastic-sinkage.share": f} for f in (0.15, 0.5, 0.85)),
         ),
         _plain(
             "plastic-sinkage",
@@ -249,7 +249,7 @@ def tumble_forms(
             Parameter(
                 name="plastic-sinkage.bend", unit="1", value=0.0, std=1.0, scale=0.3, lowest=0.0, highest=4.0, step=0.01
             ),
-            starts=tuple({"plastic-sinkage.share": f, "plastic-sinkage.bend": 0.4} for f in (0.05, 0.15, 0.5)),
+            starts=tuple({"plastic-sinkage.share": f, "plastic-sinkage.bend": 0.3} for f in (0.05, 0.15, 0.5, 0.85)),
         ),
         TumbleForm(
             effect="adhesion",
