@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -34,8 +35,7 @@ class Findings:
     """All that is read off the finished runs of one experiment.
 
     `units` and `beds` are the runs and their series in the bed; `fit` is the law fitted to all of them, `seed_fits`
-    those of the seeds, `models` (id -> series) the same runs on the law, `seed_models` the driven runs that all seeds
-    have, each on its own seed's law.
+    those of the seeds, `models` (id -> series) the same runs on the law.
     """
 
     def __init__(self, settings: PenetrateSettings, units: Sequence[Unit], beds: Runs, time_step: float) -> None:
@@ -44,12 +44,6 @@ class Findings:
         self.seed_fits: dict[int, Fit] = self._fit_seeds()
         self.models: dict[str, Penetration] = {
             unit.id: model_run(settings, unit, self.beds[unit.id], self.fit, time_step) for unit in self.units
-        }
-        shared = self.shared_conditions()
-        self.seed_models: dict[str, Penetration] = {
-            unit.id: model_run(settings, unit, self.beds[unit.id], self.seed_fits[unit.seed], time_step)
-            for unit in self.units
-            if unit.kind == "driven" and unit.condition in shared
         }
 
     def of(self, kind: str, seed: int | None = None) -> list[Penetration]:
@@ -100,12 +94,7 @@ class Findings:
                 drag_gap(self.of("driven"), self.fit), spread(gaps), "1",
                 "rms difference over rms drag, way in, all driven runs; spread over the speeds that all seeds have",
             ),
-            "work_returned_dem": self._work_returned(
-                self.beds, self.beds, "work of the way out over work in, driven runs"
-            ),
-            "work_returned_spring_damper": self._work_returned(
-                self.models, self.seed_models, "the same on the fitted law; spread: on the laws fitted to each bed"
-            ),
+            **self._work_returned,
             "load": _quantity(load, 0.0, "N", "on the spike, set down and dropped; (m + m_b) g_sim / 4 unless set"),
             **({"drop_mass": dropped} if self.of("drop") else {}),
             **self.standing_stiffness(),
@@ -161,22 +150,28 @@ class Findings:
     def _runs(self, kind: str, seed: int) -> list[tuple[Unit, Penetration]]:
         return [(unit, self.beds[unit.id]) for unit in self.units if (unit.kind, unit.seed) == (kind, seed)]
 
-    def _work_returned(self, runs: Runs, own: Runs, note: str) -> dict[str, Any]:
-        """Mean share of the work put in that driven runs give back, and its spread, at the speeds that all seeds have.
+    @cached_property
+    def _work_returned(self) -> dict[str, dict[str, Any]]:
+        """Mean share of the work put in that driven runs give back, of the bed and of the law.
 
-        The spread is that of `own`: the law of each seed by itself differs, where the pooled law is one. Where seeds
-        have no speed in common, it is the mean of all, its spread unknown.
+        Beds tell a spread where all were driven at the same speeds; the laws fitted to each bed always do: each makes
+        all the runs.
         """
-        shared = self.shared_conditions()
         driven = [unit for unit in self.units if unit.kind == "driven"]
-        counted = [unit for unit in driven if unit.condition in shared] or driven
-        by_seed = [
-            _mean([_returned(own[unit.id]) for unit in counted if unit.seed == seed and unit.id in own])
-            for seed in self.seeds
+        alike = {unit.condition for unit in driven} <= self.shared_conditions()
+        own = [_mean([_returned(run) for run in self.of("driven", seed)]) for seed in self.seeds]
+        laws = [
+            _mean([_returned(model_run(self.settings, u, self.beds[u.id], fit, self.time_step)) for u in driven])
+            for fit in self.seed_fits.values()
         ]
-        speeds = ", ".join(f"{speed:g}" for speed in dict.fromkeys(unit.speed for unit in counted))
-        mean = _mean([_returned(runs[unit.id]) for unit in counted])
-        return _quantity(mean, spread(by_seed), "1", f"{note}; at {speeds} m/s" if speeds else note)
+        bed, law = (_mean([_returned(runs[unit.id]) for unit in driven]) for runs in (self.beds, self.models))
+        note = "work of the way out over work in, driven runs"
+        return {
+            "work_returned_dem": _quantity(bed, spread(own) if alike else None, "1", note),
+            "work_returned_spring_damper": _quantity(
+                law, spread(laws), "1", "the same on the fitted law; spread: on the laws fitted to each bed"
+            ),
+        }
 
     def run_entries(self, notes: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
         """The entry "runs": one per run, the model's numbers under model_*; `notes` are what was kept of each."""

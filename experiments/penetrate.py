@@ -510,8 +510,8 @@ def _conclude(
         warnings.append(near)
     if len(settings.seeds) < 3:
         warnings.append("fewer than three seeds: the spread between beds is not known well")
-    codes = {note.get("code") for note in notes.values()} | {folder.code, fingerprint()}
-    if len(codes - {None, ""}) > 1:
+    codes = ({note.get("code") for note in notes.values()} | {folder.code}) - {None, ""}
+    if len(codes) > 1:
         warnings.append(
             "parts of this run were computed by different versions of the code: it may not repeat to the bit"
         )
@@ -528,7 +528,7 @@ def _conclude(
         "format": "hedgebed-result/1",
         "experiment": "penetrate",
         "version": __version__,
-        "code": fingerprint(),
+        "code": codes.pop() if len(codes) == 1 else fingerprint(),
         "title": f"A {1e3 * settings.tip_diameter:g} mm spike in {find_material(settings).name}",
         "status": "done",
         "quantities": quantities,

@@ -210,7 +210,8 @@ def _push(run: RunFolder) -> dict[str, str] | None:
     depth = max((float(r.bed.depth.max()) for r in run.of_kind("driven") if r.bed is not None), default=None)
     to = f" to {quote(depth, unit='m')}" if depth is not None else ""
     speed, high = max(by_speed, key=lambda peak: peak[1][0])
-    note = f"at most, driven in{to} at {speed:g}{NBSP}m/s"
+    note = f"largest, driven in{to} at {speed:g}{NBSP}m/s"
+    note += " (mean of the beds' largest)" if high[1] is not None else ""
     others = [f"{quote(*peak, 'N')} at {other:g}{NBSP}m/s" for other, peak in by_speed if other != speed]
     return {"value": quote(*high, "N"), "note": f"{note}; {joined(others)}" if others else note}
 

@@ -215,8 +215,15 @@ def test_a_run_taken_up_by_other_code_says_so(fake, tmp_path, monkeypatch):
     penetrate.run(settings, tmp_path / "run")
     assert tomllib.loads((tmp_path / "run" / "run.toml").read_text())["code"] == "before"
     monkeypatch.setattr(penetrate, "fingerprint", lambda: "after")
+
+    def mixed(result):
+        return any("different versions of the code" in text for text in result["warnings"])
+
+    result = penetrate.resume(tmp_path / "run")  # nothing of the bed was left to compute
+    assert result["code"] == "before" and not mixed(result)
+    (tmp_path / "run" / "checkpoint" / "seed1-drop-0.1.done.json").unlink()
     result = penetrate.resume(tmp_path / "run")
-    assert result["code"] == "after" and any("different versions of the code" in text for text in result["warnings"])
+    assert result["code"] == "after" and mixed(result)
 
 
 def test_a_failing_bed_leaves_its_state(fake, tmp_path, monkeypatch):
