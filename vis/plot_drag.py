@@ -134,7 +134,7 @@ def gap_plot(run: RunFolder) -> Plot | None:
                 text += f"   ({_signed(100.0 * row.share, 2)} %)"
             if row.known:
                 text += f"\n{row.known}"
-            dark = number < -0.45 * bound or number > 0.75 * bound  # of the map, purple is the darker end
+            dark = number < -0.45 * bound or number > 0.6 * bound  # of the map, purple is the darker end
             axis.text(j, i, text, ha="center", va="center", fontsize=8.5, color="white" if dark else INK)
         bar = figure.colorbar(image, ax=axis, pad=0.015, fraction=0.05)
         bar.set_label("spring-damper − bed [N]")
