@@ -126,7 +126,7 @@ def soften(
         raise ValueError(
             f"{fastest} = {speed:g} m/s makes the grains overlap by more than max_overlap = {max_overlap:g} of a "
             f"diameter even at their own E = {real_young:.3g} Pa: at most "
-            f"{0.99 * speed * math.sqrt(real_young / struck):.3g} m/s would do"
+            f"{0.99 * speed * math.sqrt(real_young / struck):.3g} m/s, or a larger max_overlap, would do"
         )
     if static > real_young:
         raise ValueError(

@@ -405,7 +405,7 @@ def test_coarse_tips_can_be_asked_for():
         ({"grain": 2e-5, "tip_diameter": 0.012}, r"grain = 2e-05 m makes about .* GB are free: grains of"),
         (
             {"speeds": (3000.0,)},
-            r"speeds = 3000 m/s makes the grains overlap by more than max_overlap = 0.05 .* m/s would",
+            r"speeds = 3000 m/s makes the grains overlap by more than max_overlap = 0.05 .* m/s, or",
         ),
         ({"speeds": (100.0,)}, r"speeds = 100 m/s takes the spike through"),
         ({"speeds": (100.0,), "time_step": 2e-5}, "time_step = 2e-05 s takes a spike at speeds = 100 m/s"),
