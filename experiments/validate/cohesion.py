@@ -143,7 +143,7 @@ def _hanging(name: str) -> Comparison:
     bed.advance(round(0.02 / bed.time_step))
     fell = bed.grains()["displacement"][:, 2] > 1e-5
     load = share**2  # of the weight over the pull-off force, as r^3 / r
-    found = 0.5 * (load[~fell].max() + load[fell].min()) if fell.any() and not fell.all() else math.nan
+    found = 0.5 * float(load[~fell].max() + load[fell].min()) if fell.any() and not fell.all() else math.nan
     closed = pull * math.pi * GAMMA * RADIUS
     return Comparison("pull-off, by the heaviest that hangs and the lightest that falls", "mN", 1e3 * closed,
                       1e3 * closed * found, 3e-3)  # fmt: skip
