@@ -176,7 +176,8 @@ def _show_all(result: dict[str, Any], console: Console) -> None:
     quantities = result.get("quantities", {})
     spreads = any(_spread(quantity) for quantity in quantities.values())
     if spreads:
-        table.add_column("spread (std)", justify="right")
+        fitted = result.get("experiment") == "diagnose"
+        table.add_column("standard error" if fitted else "spread (std)", justify="right")
     table.add_column("unit")
     for name, quantity in quantities.items():
         value, std = quantity.get("value"), quantity.get("std")

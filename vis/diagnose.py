@@ -88,7 +88,7 @@ def _page(said: Mapping[str, Any], result: Mapping[str, Any], drawn: Mapping[str
     ]
     sections = [
         Section("", [listing(result["departures"]["sentences"]), *_there(drawn, "trajectories")]),
-        Section("What is left", [_gap_table(gap), *_there(drawn, "residuals"), *_phase_table(said),
+        Section("What is left", [_gap_table(gap), *_in_units(said), *_there(drawn, "residuals"), *_phase_table(said),
                                  *_there(drawn, "latent")]),
         Section("Where the base model fails", _where(said)),
         Section("Candidates", [*_there(drawn, "evidence"), *_evidence(said)]),
@@ -122,6 +122,30 @@ def _gap_table(gap: Mapping[str, Any]) -> Block:
     return table(("", "base model", "best model"), rows, title="The gap, chi-square per sample (1: the sensors' noise)")
 
 
+def _in_units(said: Mapping[str, Any]) -> list[Block]:
+    """The gap in the channels' units, and by condition."""
+    blocks = []
+    cells = {(row["channel"], row["held_out"]): row for row in said.get("by_channel", [])}
+
+    def rms(name: str, held: bool, stage: str) -> str:
+        row = cells.get((name, held))
+        return _DASH if row is None else short(row[f"rms_{stage}"], 3)
+
+    names = dict.fromkeys((row["channel"], row["unit"]) for row in said.get("by_channel", []))
+    if names:
+        rows = [(name, unit, *(rms(name, held, stage) for held in (False, True) for stage in ("before", "after")))
+                for name, unit in names]  # fmt: skip
+        head = ("channel", "unit", "fitted: before", "after", "held out: before", "after")
+        blocks.append(table(head, rows, title="Measured less modelled, root mean square, the sensors' noise included"))
+    conditions = said.get("by_condition", [])
+    if len(conditions) > 1:
+        lines = [(_settings(row["settings"]), ", ".join(row["trials"]), short(row["before"], 3), short(row["after"], 3))
+                 for row in conditions]  # fmt: skip
+        blocks.append(table(("condition", "trials", "before", "after"), lines,
+                            title="Chi-square per sample by condition"))  # fmt: skip
+    return blocks
+
+
 def _phase_table(said: Mapping[str, Any]) -> list[Block]:
     """By phase and channel, fitted trials beside held-out ones."""
     rows: dict[tuple[str, str], dict[bool, Mapping[str, Any]]] = {}
@@ -149,7 +173,19 @@ def _where(said: Mapping[str, Any]) -> list[Block]:
         for p in said["where"]
     ]  # fmt: skip
     head = ("trial", "settings", "channel", "phase", "from [s]", "to [s]", "chi-square beyond noise")
-    return [table(head, rows, title="The worst stretches")]
+    return [table(head, rows, title="The worst stretches"), *_parted(said)]
+
+
+def _parted(said: Mapping[str, Any]) -> list[Block]:
+    """When each trial parts from the base model, channel by channel, in the order in which they do."""
+    trials: dict[str, list[str]] = {}
+    for row in said.get("parted", []):
+        trials.setdefault(row["trial"], []).append(f"{row['channel']} {row['at_s']:.3g}")
+    if not trials:
+        return []
+    title = "First parts from the base model at [s]: a running mean of nine samples beyond 5 standard errors"
+    return [table(("trial", "channel and time"), [(trial, ", ".join(times)) for trial, times in trials.items()],
+                  title=title, words=True)]  # fmt: skip
 
 
 def _settings(settings: Mapping[str, float]) -> str:
@@ -167,27 +203,39 @@ def _evidence(said: Mapping[str, Any]) -> list[Block]:
     rows = [(row["candidate"], f"{row['score']:.1f}", f"{row['left']:.3g}") for row in said.get("evidence", [])]
     if not rows:
         return [text("Nothing was left that a candidate could explain: none was tried.")]
-    head = ("candidate (effect:form)", "evidence over the base model [nats]", "excess a sample")
+    head = ("candidate (effect:form)", "evidence over the base model [nats]", "chi-square a sample beyond noise")
     return [table(head, rows, title="Every candidate that was tried, the likeliest first")]
 
 
 def _numbers(said: Mapping[str, Any]) -> list[Block]:
+    ends = {stage: {bound["parameter"] for bound in bounds if bound["at_bound"]}
+            for stage, bounds in said.get("at_bounds", {}).items()}  # fmt: skip
+
+    def error(entry: Mapping[str, Any], name: str, stage: str) -> str:
+        return "at its end" if name in ends.get(stage, ()) else short(entry["std"], 2)
+
     effects = [
-        (effect["id"], name, short(entry["value"], 4), short(entry["std"], 2), _unit(entry["unit"]))
+        (effect["id"], name, short(entry["value"], 4), error(entry, f"{effect['id']}.{name}", "after"),
+         _unit(entry["unit"]))
         for effect in said["effects"] for name, entry in effect["parameters"].items()
     ]  # fmt: skip
     after = said["base"]["after"]
     base = [
-        (name, short(entry["value"], 4), short(entry["std"], 2), short(after[name]["value"], 4),
-         short(after[name]["std"], 2), _unit(entry["unit"]))
+        (name, short(entry["value"], 4), error(entry, name, "before"), short(after[name]["value"], 4),
+         error(after[name], name, "after"), _unit(entry["unit"]))
         for name, entry in said["base"]["before"].items() if name in after
     ]  # fmt: skip
     blocks = []
     if effects:
-        blocks.append(table(("effect", "parameter", "value", "std", "unit"), effects, title="What was added"))
+        blocks.append(
+            table(("effect", "parameter", "value", "standard error", "unit"), effects, title="What was added")
+        )
     if base:
-        head = ("parameter", "before", "std", "after", "std", "unit")
+        head = ("parameter", "before", "standard error", "after", "standard error", "unit")
         blocks.append(table(head, base, title="The base model's parameters"))
+    if blocks:
+        blocks.append(text("Standard errors hold if the model is right and the noise is as it was found; what the form "
+                           "of an effect leaves open is not in them.", small=True))  # fmt: skip
     return blocks
 
 
@@ -227,7 +275,8 @@ def _told_apart(said: Mapping[str, Any]) -> list[Block]:
         f"Other names in the place of {first['effect']}. The angle is that between what the two change in the data "
         "(0: these trials see them as one); conditions left out in turn are predicted, chi-square a sample"
     )
-    return [table(head, cells, title=caption), listing([row["what_would_tell"] for row in others])]
+    close = [row["what_would_tell"] for row in others if not row["told_apart"]]
+    return [table(head, cells, title=caption), *([listing(close)] if close else [])]
 
 
 def _there(drawn: Mapping[str, Block], *names: str) -> list[Block]:

@@ -4,7 +4,7 @@
 diagnosis.json       the contract (diagnosis.schema.json beside this file), and how sure, in `evidence` and `gate`
 model.toml           the model with what was added: `hedgebed tumble --model` and `penetrate --model` run it
 latent.csv           where the verdict is unknown: what the model lacks, row by row
-evidence.csv         every candidate: its score, what it leaves, its parameters
+evidence.csv         every candidate: its score, and the chi-square a sample that it leaves beyond what noise makes
 series/<trial>.<channel>.csv    t_s,measured,before,after,phase
 ```
 """
@@ -19,7 +19,10 @@ import numpy as np
 from experiments.runfolder import write_json, write_series
 
 from .diagnosis import Diagnosis
+from .effect_words import confirmation
 from .evidence import excess, inflation
+from .gaps import Gaps
+from .localise import phases_of
 from .telling import PhaseTable
 
 __all__ = ["document", "write_diagnosis"]
@@ -76,16 +79,19 @@ def document(found: Diagnosis) -> dict[str, Any]:
 
 
 def _next(found: Diagnosis) -> str:
-    """The next experiment, the trial with the largest gap by its name."""
+    """The next experiment: of what is named, one that confirms it; the trial with the largest gap by its name."""
+    if found.verdict == "named":
+        return confirmation(found.effects[0])
     sums: dict[str, float] = {}
     for place in found.where:
         sums[place.trial] = sums.get(place.trial, 0.0) + place.excess
+    advice = found.next_experiment
+    if found.problem.kind == "tumble":
+        advice = advice.replace("in the bed or the spike", "in the platform, the rig or the surface")
     if not sums:
-        return found.next_experiment
+        return advice
     worst = max(sums, key=lambda trial: sums[trial])
-    return found.next_experiment.replace(
-        "the trial with the largest gap", f"trial {worst}, the one with the largest gap,"
-    )
+    return advice.replace("the trial with the largest gap", f"trial {worst}, the one with the largest gap,")
 
 
 def _equivalence(found: Diagnosis) -> list[dict[str, Any]]:
@@ -120,14 +126,14 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
             "candidate": np.array([r["candidate"] for r in rows]),
             "effects": np.array([" + ".join(r["effects"]) for r in rows]),
             "score": np.array([r["score"] for r in rows]),
-            "chi_square_left": np.array([r["left"] for r in rows]),
+            "excess_per_sample": np.array([r["left"] for r in rows]),
         })  # fmt: skip
-    phase_table = PhaseTable()
+    phase_table, gaps = PhaseTable(), Gaps()
     for trial in problem.trials:
         before = problem.compare(found.base_values, (), trial.id)
         after = problem.compare(found.best_values, found.forms, trial.id)
         samples = problem.samples(trial.id)
-        phases = problem.phases(found.base_values, (), trial.id)
+        phases = phases_of(problem, found.base_values, (), trial.id)
         for channel, columns in before.items():
             if not len(columns["t_s"]):  # a sensor that recorded nothing
                 continue
@@ -137,10 +143,15 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
             if len(columns["t_s"]) == int(rows_here.sum()):
                 std = samples.std[rows_here]
                 columns |= {"std": std, "phase": phases[rows_here]}
-                left = [(columns["measured"] - columns[stage]) / std for stage in ("before", "after")]
-                phase_table.add(channel, phases[rows_here], *left, held_out=trial.id in found.held_out)
+                rest = [columns["measured"] - columns[stage] for stage in ("before", "after")]
+                held = trial.id in found.held_out
+                phase_table.add(channel, phases[rows_here], *(part / std for part in rest), held_out=held)
+                gaps.add(
+                    trial.id, channel, columns["t_s"], rest[0], rest[1], std, settings=trial.settings, held_out=held
+                )
             write_series(folder / "series" / f"{trial.id}.{channel}.csv", columns)
     said["by_phase"] = phase_table.rows
+    said["by_channel"], said["by_condition"], said["parted"] = gaps.by_channel, gaps.by_condition, gaps.parted
     write_json(folder / "diagnosis.json", said)
     return said
 

@@ -24,7 +24,7 @@ from .diagnosis import Diagnosis, diagnose
 from .document import write_diagnosis
 from .own import load_own
 from .problem import Problem
-from .telling import findings_in_words, told_tables, where_sentences
+from .telling import findings_in_words, sure_sentences, told_tables, where_sentences
 
 __all__ = ["check", "diagnose_campaign", "resume", "run"]
 
@@ -105,6 +105,20 @@ def _carry_out(settings: DiagnoseSettings, folder: RunFolder, progress: Progress
     return result
 
 
+def _quantity(entry: dict[str, Any], *, at_end: bool) -> dict[str, Any]:
+    """A fitted number with its standard error; at the end of its range it has none."""
+    if at_end:
+        return {**entry, "std": None, "note": "at the end of its range: no standard error"}
+    return {**entry, "note": "standard error of the fit, right if the model is and the noise is as it was found"}
+
+
+def _whose(found: Diagnosis) -> str:
+    """What replicates differ by: grains lie otherwise in each bed, a hard surface has none."""
+    tables = getattr(found.problem, "tables", None)
+    surface = getattr(tables, "surface", None)
+    return "the bed's" if getattr(surface, "granular", True) else "the surface's, the rig's or the start's"
+
+
 def _result(found: Diagnosis, said: dict[str, Any]) -> dict[str, Any]:
     names = " and ".join(found.effects) or "nothing"
     title = {
@@ -120,20 +134,25 @@ def _result(found: Diagnosis, said: dict[str, Any]) -> dict[str, Any]:
         for stage, gap in (("before", found.before), ("after", found.after))
         for part, value in (("fit", gap.fit), ("held_out", gap.held_out))
     }  # fmt: skip
+    at_end = {
+        stage: {bound["parameter"] for bound in bounds if bound["at_bound"]}
+        for stage, bounds in said["at_bounds"].items()
+    }
     for stage in ("before", "after"):
         for name, entry in said["base"][stage].items():
-            quantities[f"{name}_{stage}"] = entry
+            quantities[f"{name}_{stage}"] = _quantity(entry, at_end=name in at_end[stage])
     for effect in said["effects"]:
         for name, entry in effect["parameters"].items():
-            quantities[f"{effect['id']}.{name}"] = entry
-    sentences = [*where_sentences(said), f"Next experiment: {said['next_experiment']}"]
+            quantities[f"{effect['id']}.{name}"] = _quantity(entry, at_end=f"{effect['id']}.{name}" in at_end["after"])
+    sentences = [*sure_sentences(said), *where_sentences(said), f"Next experiment: {said['next_experiment']}"]
     if "latent" in said:
         sentences.insert(0, f"What is missing depends on {said['latent']['depends_on']}.")
     more = getattr(found.problem, "remarks", None)
     sentences += more(found.best_values, found.forms) if more is not None else []
     sentences += [colour.sentence for colour in found.colours.values()]
     sentences += [
-        f"Replicates differ by more than the sensors: {kind}, standard deviation {std:.3g} (relative); it is the bed's."
+        f"Replicates differ by more than the sensors: {kind}, standard deviation {std:.3g} (relative); "
+        f"it is {_whose(found)}."
         for kind, std in found.model_std.items()
     ]
     warnings = [finding.what for finding in said_once(found.findings)]

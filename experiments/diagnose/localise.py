@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .fitting import Model
 from .problem import Array, Form, Problem, Values
 
-__all__ = ["Place", "depends_on", "latent_table", "places"]
+__all__ = ["Place", "depends_on", "latent_table", "phases_of", "places"]
 
 _SURE = 4.0
 """Standard deviations by which the energy of a stretch must exceed that of noise."""
@@ -40,7 +40,7 @@ def places(model: Model, values: Values, trials: Sequence[str]) -> list[Place]:
     out = []
     for trial in trials:
         samples = problem.samples(trial)
-        phases = problem.phases(values, model.forms, trial)
+        phases = phases_of(problem, values, model.forms, trial)
         for channel in dict.fromkeys(samples.channel.tolist()):
             rows = np.flatnonzero(samples.channel == channel)
             time, rest, phase = samples.time[rows], found[trial][rows], phases[rows]
@@ -57,6 +57,12 @@ def places(model: Model, values: Values, trials: Sequence[str]) -> list[Place]:
     out.sort(key=lambda place: -place.excess)
     whole = sum(place.excess for place in out)
     return [place for place in out[:_MOST] if place.excess > 0.005 * whole]
+
+
+def phases_of(problem: Problem, values: Values, forms: Sequence[Form], trial: str) -> NDArray[np.str_]:
+    """The phase at each sample; a platform stands until the torque starts, whatever a model says of then."""
+    phases = problem.phases(values, forms, trial)
+    return np.where(problem.samples(trial).time < 0, "stand", phases) if problem.kind == "tumble" else phases
 
 
 def _runs(phase: NDArray[np.str_]) -> list[tuple[int, int]]:

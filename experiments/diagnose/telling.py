@@ -9,15 +9,18 @@ from typing import Any
 
 import numpy as np
 
+from .effect_words import meaning
 from .problem import Array, Finding
 
-__all__ = ["PhaseTable", "findings_in_words", "told_tables", "setting_words", "where_sentences"]
+__all__ = ["PhaseTable", "findings_in_words", "setting_words", "sure_sentences", "told_tables", "where_sentences"]
 
 _UNITS = {"N_m": "N m", "m_s2": "m/s2", "m_s": "m/s", "m": "m"}
 _OTHER = 0.01
 """Relative difference from which on two settings are two."""
 _MORE = 0.05
 """Nats by which a set of names must beat each of its parts to be listed."""
+_STANDING = 2.0
+"""Chi-square per sample of a platform that stands from which on it is explained."""
 _MAINLY = 0.5
 """Share of what is beyond the noise from which on a phase, a channel or a setting is said to hold it."""
 
@@ -61,7 +64,58 @@ def where_sentences(said: Mapping[str, Any]) -> list[str]:
         f"{first['to_s']:.4g} s."
     )
     settings = _settings(places, total)
-    return [said_first, *([f"Most of it is at {settings}."] if settings else [])]
+    return [said_first, *([f"Most of it is at {settings}."] if settings else []), *_parted(said)]
+
+
+def sure_sentences(said: Mapping[str, Any]) -> list[str]:
+    """What is named, how sure that is against the nearest rival, and what it does to the trials held out."""
+    if said["verdict"] not in ("named", "ambiguous") or not said["effects"]:
+        return []
+    sentences = [words for effect in said["effects"] if (words := meaning(effect["id"]))]
+    name = " + ".join(effect["id"] for effect in said["effects"])
+    own = {effect["id"] for effect in said["effects"]}
+    best = next((row for row in said["evidence"] if set(row["effects"]) == own), None)
+    sure = f"How sure: {name} is {best['score']:.0f} nats likelier than the base model" if best is not None else ""
+    gap = said["gap"]
+    if gap["before"]["held_out"] is not None:
+        out = f"on the trials that took no part it takes the gap from {gap['before']['held_out']:.3g} to "
+        out += f"{gap['after']['held_out']:.3g} (1 is noise)"
+        sure += f"; {out}" if sure else f"How sure: {out}"
+    rivals = said["equivalence"][1:]
+    if rivals:
+        near = min(rivals, key=lambda row: row["evidence_behind"])
+        apart = "these trials tell the two apart" if near["told_apart"] else "these trials do not tell the two apart"
+        sure += (
+            f"; the nearest other name, {near['effect']}, is {near['evidence_behind']:.0f} nats behind, "
+            if sure
+            else ""
+        )
+        sure += f"{near['angle_deg']:.0f} degrees away in what it changes (0: the same): {apart}"
+    return [*sentences, *([f"{sure}."] if sure else [])]
+
+
+def _parted(said: Mapping[str, Any]) -> list[str]:
+    """Which channel first parts from the base model, and when; and what a camera's zero at its end means."""
+    sentences = []
+    parted = [row for row in said.get("parted", []) if row["at_s"] >= 0]
+    if parted:
+        times = [min(row["at_s"] for row in parted if row["trial"] == trial)
+                 for trial in dict.fromkeys(row["trial"] for row in parted)]  # fmt: skip
+        first = min(parted, key=lambda row: row["at_s"])
+        sentences.append(
+            f"Trials part from the base model at {min(times):.3g} to {max(times):.3g} s, first of all "
+            f"{first['channel']} of trial {first['trial']} at {first['at_s']:.3g} s (a running mean of nine "
+            f"samples beyond 5 sigma)."
+        )
+    standing = [row for row in said.get("by_phase", []) if row["phase"] == "stand" and row["before"] > _STANDING
+                and row["channel"] in ("x", "y", "theta")]  # fmt: skip
+    if standing:
+        names = ", ".join(dict.fromkeys(row["channel"] for row in standing))
+        sentences.append(
+            f"In phase stand, before, {names} are off by more than noise: the camera's zero is fitted to the whole "
+            f"trial, up to 3 std of the sensor, and follows what is missing later on; nothing is wrong while it stands."
+        )
+    return sentences
 
 
 def _shares(places: Sequence[Mapping[str, Any]], key: str, total: float) -> str:
@@ -110,6 +164,7 @@ def told_tables(said: Mapping[str, Any]) -> list[dict[str, Any]]:
             row = cells.get((*key, held_out))
             return "-" if row is None else f"{row[stage]:.3g}"
 
+        tables += _in_units(said)
         tables.append({
             "title": "chi-square per sample by phase and channel",
             "head": ["phase", "channel", "fitted: before", "after", "held out: before", "after"],
@@ -127,8 +182,37 @@ def told_tables(said: Mapping[str, Any]) -> list[dict[str, Any]]:
     if chosen:
         tables.append({
             "title": "candidates, the best form of each",
-            "head": ["candidate", "evidence over the base model [nats]", "excess a sample"],
+            "head": ["candidate", "evidence over the base model [nats]", "chi-square a sample beyond noise"],
             "rows": [[row["candidate"], f"{row['score']:.1f}", f"{row['left']:.3g}"] for row in chosen],
+        })  # fmt: skip
+    return tables
+
+
+def _in_units(said: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The gap by channel in its unit, and by condition where there are several."""
+    tables = []
+    channels = said.get("by_channel", [])
+    if channels:
+        cells = {(row["channel"], row["held_out"]): row for row in channels}
+        names = list(dict.fromkeys((row["channel"], row["unit"]) for row in channels))
+
+        def rms(name: str, held: bool, stage: str) -> str:
+            row = cells.get((name, held))
+            return "-" if row is None else f"{row[f'rms_{stage}']:.3g}"
+
+        tables.append({
+            "title": "measured less modelled, root mean square (after: with the sensors' noise)",
+            "head": ["channel", "unit", "fitted: before", "after", "held out: before", "after"],
+            "rows": [[name, unit, *(rms(name, held, stage) for held in (False, True) for stage in ("before", "after"))]
+                     for name, unit in names],
+        })  # fmt: skip
+    conditions = said.get("by_condition", [])
+    if len(conditions) > 1:
+        tables.append({
+            "title": "chi-square per sample by condition",
+            "head": ["condition", "trials", "before", "after"],
+            "rows": [[", ".join(setting_words(*pair) for pair in row["settings"].items()), ", ".join(row["trials"]),
+                      f"{row['before']:.3g}", f"{row['after']:.3g}"] for row in conditions],
         })  # fmt: skip
     return tables
 

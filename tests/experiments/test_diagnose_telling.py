@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.diagnose.telling import PhaseTable, told_tables, where_sentences
+from experiments.diagnose.effect_words import confirmation
+from experiments.diagnose.gaps import Gaps
+from experiments.diagnose.telling import PhaseTable, sure_sentences, told_tables, where_sentences
 
 
 def test_chi_square_by_phase_is_that_of_the_residuals_of_all_trials_of_a_kind():
@@ -50,3 +52,35 @@ def test_the_table_of_candidates_has_every_name_once_and_sets_that_beat_their_pa
     (table,) = told_tables(said)
     assert [cells[0] for cells in table["rows"]] == ["a:1 + b:1", "a:1", "b:1", "c:1"]
     assert table["rows"][1][1] == "20.0"
+
+
+def test_the_gap_is_told_in_millimetres_by_condition_and_from_when_on():
+    # 3 mm where the camera has 0.5 mm, from 0.5 s on: 6 sigma a sample, the mean of nine beyond 5 at three.
+    gaps, time = Gaps(), np.linspace(0.0, 1.0, 101)
+    rest = np.where(time > 0.495, 3e-3, 0.0)
+    for trial, torque in (("a", 0.1), ("b", 0.2)):
+        before = rest if trial == "a" else 0 * rest
+        gaps.add(
+            trial, "x", time, before, 0 * rest, np.full(101, 5e-4), settings={"torque_N_m": torque}, held_out=False
+        )
+    (row,) = gaps.by_channel
+    assert (row["unit"], row["rms_after"]) == ("mm", 0.0)
+    assert row["rms_before"] == pytest.approx(3 * np.sqrt(51 / 202))
+    assert [(row["trials"], row["before"]) for row in gaps.by_condition] == [
+        (["a"], pytest.approx(36 * 51 / 101)), (["b"], 0.0)]  # fmt: skip
+    (parted,) = gaps.parted
+    assert parted["trial"] == "a" and parted["at_s"] == pytest.approx(0.5, abs=0.03)
+
+
+def test_how_sure_a_name_is_stands_in_words_with_its_nearest_rival():
+    said = {
+        "verdict": "named", "effects": [{"id": "umbilical"}], "evidence": [{"effects": ["umbilical"], "score": 267.6}],
+        "gap": {"before": {"held_out": 153.0}, "after": {"held_out": 0.97}},
+        "equivalence": [{"effect": "umbilical"},
+                        {"effect": "com-offset", "evidence_behind": 209.0, "angle_deg": 9.0, "told_apart": True}],
+    }  # fmt: skip
+    what, sure = sure_sentences(said)
+    assert what == "umbilical: the cable to the platform pulls or drags on its rotation."
+    for words in ("268 nats", "from 153 to 0.97", "com-offset, is 209 nats behind", "9 degrees", "tell the two apart"):
+        assert words in sure
+    assert "remove the cable" in confirmation("umbilical")

@@ -1,0 +1,83 @@
+"""The gap in units: rms by channel, when a trial first parts from the base model, and the gap by condition."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from .problem import Array
+
+__all__ = ["Gaps", "unit_of"]
+
+#: channel -> (unit, factor on SI)
+_UNITS: dict[str, tuple[str, float]] = {
+    "x": ("mm", 1e3), "y": ("mm", 1e3), "theta": ("degrees", 180 / math.pi), "gyro": ("rad/s", 1.0),
+    "ax": ("m/s2", 1.0), "ay": ("m/s2", 1.0), "wheel": ("rad/s", 1.0), "depth": ("mm", 1e3), "force": ("N", 1.0),
+    "accel": ("m/s2", 1.0),
+}  # fmt: skip
+_WINDOW = 9
+"""Samples of the running mean."""
+_SIGMAS = 5.0
+"""Standard errors of that mean at which a trial has parted."""
+
+
+def unit_of(channel: str) -> tuple[str, float]:
+    """The unit in which a channel is told, and its size in SI units."""
+    return _UNITS.get(channel, ("SI", 1.0))
+
+
+class Gaps:
+    """Gathered channel by channel and trial by trial."""
+
+    def __init__(self) -> None:
+        self._channels: dict[tuple[str, bool], list[float]] = {}
+        self._conditions: dict[tuple[tuple[str, float], ...], tuple[set[str], list[float]]] = {}
+        self._parted: list[dict[str, Any]] = []
+
+    def add(
+        self, trial: str, channel: str, time: Array, before: Array, after: Array, std: Array,
+        *, settings: Mapping[str, float], held_out: bool,
+    ) -> None:  # fmt: skip
+        """One channel of one trial: measured less modelled of both models, in the channel's SI unit; shapes [n]."""
+        if not len(time):
+            return
+        sums = self._channels.setdefault((channel, held_out), [0.0, 0.0, 0.0])
+        trials, over = self._conditions.setdefault(tuple(sorted(settings.items())), (set(), [0.0, 0.0, 0.0]))
+        trials.add(trial)
+        for target, scale in ((sums, np.ones(len(std))), (over, std)):
+            target[0] += len(time)
+            target[1] += float(np.sum((before / scale) ** 2))
+            target[2] += float(np.sum((after / scale) ** 2))
+        if len(time) >= _WINDOW:
+            mean = np.convolve(before / std, np.ones(_WINDOW) / _WINDOW, mode="valid") * math.sqrt(_WINDOW)
+            away = np.flatnonzero(np.abs(mean) > _SIGMAS)
+            if len(away):
+                self._parted.append({"trial": trial, "channel": channel, "at_s": float(time[away[0] + _WINDOW // 2]),
+                                     "held_out": held_out})  # fmt: skip
+
+    @property
+    def by_channel(self) -> list[dict[str, Any]]:
+        """Root mean square of measured less modelled, in the channel's unit (mm, degrees)."""
+        return [
+            {"channel": channel, "unit": unit_of(channel)[0], "held_out": held_out, "samples": int(count),
+             "rms_before": unit_of(channel)[1] * math.sqrt(before / count),
+             "rms_after": unit_of(channel)[1] * math.sqrt(after / count)}
+            for (channel, held_out), (count, before, after) in sorted(self._channels.items())
+        ]  # fmt: skip
+
+    @property
+    def by_condition(self) -> list[dict[str, Any]]:
+        """Chi-square per sample by the trials' settings."""
+        return [
+            {"settings": dict(settings), "trials": sorted(trials), "samples": int(count), "before": before / count,
+             "after": after / count}
+            for settings, (trials, (count, before, after)) in sorted(self._conditions.items())
+        ]  # fmt: skip
+
+    @property
+    def parted(self) -> list[dict[str, Any]]:
+        """When each channel of each trial first parts from the base model: its running mean is beyond 5 errors."""
+        return sorted(self._parted, key=lambda row: (row["trial"], row["at_s"]))
