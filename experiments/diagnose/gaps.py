@@ -18,6 +18,8 @@ _UNITS: dict[str, tuple[str, float]] = {
     "ax": ("m/s2", 1.0), "ay": ("m/s2", 1.0), "wheel": ("rad/s", 1.0), "depth": ("mm", 1e3), "force": ("N", 1.0),
     "accel": ("m/s2", 1.0),
 }  # fmt: skip
+_ZEROED = ("x", "y", "theta")
+"""Channels whose zero is fitted in each trial."""
 _WINDOW = 9
 """Samples of the running mean."""
 _SIGMAS = 5.0
@@ -52,8 +54,10 @@ class Gaps:
             target[1] += float(np.sum((before / scale) ** 2))
             target[2] += float(np.sum((after / scale) ** 2))
         if len(time) >= _WINDOW:
-            mean = np.convolve(before / std, np.ones(_WINDOW) / _WINDOW, mode="valid") * math.sqrt(_WINDOW)
-            away = np.flatnonzero(np.abs(mean) > _SIGMAS)
+            standing = time < 0  # a camera's zero, fitted to the whole trial, is no parting
+            zero = float(before[standing].mean()) if channel in _ZEROED and standing.sum() > 1 else 0.0
+            mean = np.convolve((before - zero) / std, np.ones(_WINDOW) / _WINDOW, mode="valid") * math.sqrt(_WINDOW)
+            away = np.flatnonzero((np.abs(mean) > _SIGMAS) & (time[_WINDOW // 2 :][: len(mean)] >= 0))
             if len(away):
                 self._parted.append({"trial": trial, "channel": channel, "at_s": float(time[away[0] + _WINDOW // 2]),
                                      "held_out": held_out})  # fmt: skip

@@ -28,8 +28,8 @@ _LOUD = 2.0
 """Times the stated noise from which on a sensor is called louder."""
 _QUIET = 0.1
 """And quieter: coloured noise has less of it from row to row than in all, but not so little."""
-_NAMED = ("looks like", "would say so", "the sign is reversed", "is counted", "clock")
-"""Words of a finding that says the cause."""
+_NAMED = ("looks like", "would say so")
+"""Words of a finding that names a unit."""
 _FOLLOWS = ("by a jump that no motion makes", "jumps so often", "what [sensors.", "its zero is to be taken off")
 """Words of findings that a named cause makes of itself."""
 _TOGETHER = (frozenset(("x", "y", "theta")), frozenset(("gyro", "ax", "ay")), frozenset(("wheel",)),

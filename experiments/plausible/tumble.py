@@ -42,7 +42,8 @@ def tumble_oddities(campaign: Campaign, tables: TumbleCampaign, trial: TumbleTri
     yield from turning
     if pose is not None:
         yield from _start(tables, pose, angle=not turning)
-        yield from sideways_oddities(tables, trial, pose, imu if not turning else None)
+        if not any("looks like" in odd.what for odd in turning):
+            yield from sideways_oddities(tables, trial, pose, imu if not turning else None)
     if imu is not None:
         yield from _at_rest(tables, trial, imu)
     if wheel is not None:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from experiments.campaign import Recording, TumbleCampaign
 from experiments.campaign.tables import TumbleTrial
@@ -35,6 +36,8 @@ _ONE_MOTION = 1.5
 """Misfit over the noise's, up to which each half is one motion: a marker that jumps is no clock."""
 _FIRST = 0.3
 """Radians of the first turn, in which a platform still pivots about the row that it stands on."""
+_ROWS = 9
+"""Rows whose median is taken."""
 _SURE_OF_AXES = 0.9
 """Correlation from which on one column follows another."""
 
@@ -115,6 +118,8 @@ def sideways_oddities(
     sensor = tables.sensors.pose
     assert sensor is not None
     angle, x = pose["theta_rad"], pose["x_m"]
+    if np.isfinite(angle).sum() > _ROWS:  # single rows of a lost marker turn nothing
+        angle = np.where(np.isfinite(angle), median_filter(angle, size=_ROWS, mode="nearest"), np.nan)
     known = np.isfinite(angle) & np.isfinite(x) & (pose.time >= 0)
     far = np.flatnonzero(known & (np.abs(angle) > _FIRST))
     known &= np.arange(len(angle)) <= (far[0] if len(far) else len(angle))

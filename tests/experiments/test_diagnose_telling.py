@@ -68,7 +68,10 @@ def test_the_gap_is_told_in_millimetres_by_condition_and_from_when_on():
     assert row["rms_before"] == pytest.approx(3 * np.sqrt(51 / 202))
     assert [(row["trials"], row["before"]) for row in gaps.by_condition] == [
         (["a"], pytest.approx(36 * 51 / 101)), (["b"], 0.0)]  # fmt: skip
-    (parted,) = gaps.parted
+    offset = np.where(np.linspace(-0.2, 1.0, 121) < 0.295, 2e-3, 5e-3)  # the zero alone is no parting
+    gaps.add("c", "y", np.linspace(-0.2, 1.0, 121), offset, 0 * offset, np.full(121, 5e-4), settings={}, held_out=False)
+    parted, later = gaps.parted
+    assert later["trial"] == "c" and later["at_s"] == pytest.approx(0.3, abs=0.03)
     assert parted["trial"] == "a" and parted["at_s"] == pytest.approx(0.5, abs=0.03)
 
 
