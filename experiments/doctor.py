@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.table import Table
 
 from experiments import probes
-from experiments.memory import memory_there
+from experiments.memory import cores_there, memory_there
 from hedgebed import __version__
 
 __all__ = ["Finding", "cache_folder", "examine", "show"]
@@ -88,8 +88,7 @@ def _taichi(arch: str, answer: dict[str, Any]) -> Finding:
 
 
 def _threads() -> Finding:
-    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return Finding("threads", True, f"{usable} usable of {os.cpu_count()}")
+    return Finding("threads", True, f"{cores_there()} usable of {os.cpu_count()}")
 
 
 def _memory() -> Finding:

@@ -1,10 +1,10 @@
-"""How much memory there is for this process: of the machine, and of the container where one sets a limit."""
+"""How much memory and how many cores there are for this process: of the machine, or of the container with its limits."""
 
 import os
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["Memory", "memory_there"]
+__all__ = ["Memory", "cores_there", "memory_there"]
 
 _V2, _V1 = Path("/sys/fs/cgroup"), Path("/sys/fs/cgroup/memory")
 
@@ -16,6 +16,11 @@ class Memory:
     total: int
     free: int
     limit: int | None
+
+
+def cores_there() -> int:
+    """How many cores this process may run on."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def memory_there() -> Memory:

@@ -8,7 +8,6 @@ states is compared in `experiments.paper_claims`.
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field, replace
@@ -21,6 +20,7 @@ from hedgebed import __version__
 from rigid.planar import simulate
 from rigid.trial import Trial
 
+from .memory import cores_there
 from .paper_claims import claims, first_lasting
 from .paper_settings import PaperSettings
 from .paper_transitions import HARD
@@ -215,7 +215,7 @@ def _all(jobs: Sequence[Job], workers: int, progress: Progress) -> list[dict[str
 
 def _carry_out(settings: PaperSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
     jobs = plan_jobs(settings)
-    workers = settings.workers or len(os.sched_getaffinity(0))
+    workers = settings.workers or cores_there()
     with folder.lock():
         progress.plan({"trials": float(len(jobs)), "report": 0.1 * len(jobs)})
         progress.stage("trials", total=float(len(jobs)))

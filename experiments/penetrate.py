@@ -26,7 +26,7 @@ from .bed_progress import BedProgress
 from .findings import Findings, bed_entry, bed_quantities
 from .kept_material import MATERIAL_COPY, keep_material
 from .kept_runs import read_run, write_run
-from .memory import memory_there
+from .memory import cores_there, memory_there
 from .penetrate_plan import RAIN, PenetratePlan
 from .progress import Progress
 from .reference import compare_with, read_reference
@@ -113,6 +113,9 @@ def _check_grain_count(settings: PenetrateSettings) -> None:
 
 def _check_arch(settings: PenetrateSettings) -> None:
     """Start what is not on every machine, so that it is missed before there is a folder."""
+    cores = cores_there()
+    if settings.threads is not None and settings.threads > cores:
+        raise ValueError(f"threads = {settings.threads} is more than the cores there are: at most {cores} would do")
     if settings.arch == "cpu":
         return
     from dem import runtime

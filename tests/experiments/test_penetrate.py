@@ -413,6 +413,7 @@ def test_coarse_tips_can_be_asked_for():
         ({"substeps": 1000}, "substeps = 1000 takes a spike .* at most 150 would do"),
         ({"young": 1e12}, r"young = 1e.12 Pa is more than sand itself has: at most 7e.10 Pa would do"),
         ({"young": 1e4}, "young = 10000 Pa is so soft"),
+        ({"threads": 1024}, r"threads = 1024 is more than the cores there are: at most \d+ would do"),
         ({"load": 10.0}, "load = 10 N puts .* would do"),
         ({"drop_speeds": (2.0,)}, r"drop_speeds = 2 m/s with mass = 0.1 kg would go about .* at most .* m/s"),
         ({"speeds": (1e-9,)}, r"speeds = 1e-09 m/s asks for .* at most 1e.09 in all"),
