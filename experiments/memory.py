@@ -1,4 +1,4 @@
-"""How much memory and how many cores there are for this process: of the machine, or of the container with its limits."""
+"""How much memory and how many cores there are for this process: of the machine, or of a container with limits."""
 
 import os
 from dataclasses import dataclass
