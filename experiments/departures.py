@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from coupling import Penetration
-from vis.numbers import quote
+from vis.numbers import foldable, quote
 
 from .fit import Fit, fit_rows, spread
 
@@ -73,12 +73,8 @@ def departure_table(driven: Sequence[Penetration], fit: Fit, bands: int = BANDS)
     table: list[dict[str, float | None]] = []
     for speed, runs in _by_speed(driven).items():
         for low, high in pairwise(edges):
-            means = []
-            for run in runs:
-                rows = fit_rows(run) & (run.depth > low) & (run.depth <= high)
-                if rows.any():
-                    law = fit.force(run.depth[rows], run.velocity[rows])
-                    means.append((float(run.force[rows].mean()), float(law.mean())))
+            drags = (_mean_drag(run, fit, low, high) for run in runs)
+            means = [drag for drag in drags if drag is not None]
             if not means:
                 continue
             bed, model = (float(value) for value in np.mean(means, axis=0))
@@ -127,9 +123,9 @@ def rate_change(by_bed: Sequence[Sequence[Penetration]], fit: Fit) -> dict[str, 
     }
 
 
-def _mean_drag(run: Penetration, fit: Fit) -> tuple[float, float] | None:
-    """Mean force of bed and law over the way in [N]; None where there is none."""
-    rows = fit_rows(run)
+def _mean_drag(run: Penetration, fit: Fit, above: float = 0.0, to: float = np.inf) -> tuple[float, float] | None:
+    """Mean force of bed and law over the way in, in a band of depth [m] [N]; None where there is none."""
+    rows = fit_rows(run) & (run.depth > above) & (run.depth <= to)
     if not rows.any():
         return None
     return float(run.force[rows].mean()), float(fit.force(run.depth[rows], run.velocity[rows]).mean())
@@ -179,7 +175,7 @@ def sentences(
     said = [*_by_depth(table), *_by_rate(rate)]
     if exponents:
         shown = "; ".join(
-            f"{_plain(quote(value, std, '1', significant=2))} at {speed:g} m/s ({_beds(count)})"
+            f"{foldable(quote(value, std, '1', significant=2))} at {speed:g} m/s ({_beds(count)})"
             for speed, (value, std, count) in exponents.items()
         )
         said.append(f"Going in, the bed's force grows with depth to the power {shown}. The spring's: to the power 1.")
@@ -187,8 +183,8 @@ def sentences(
         bed, law = sinkage
         against = f", {_deeper(law[0] / bed[0])}" if bed[0] > 0 else ""
         said.append(
-            f"Set down under its load the spike sinks {_plain(quote(*bed, 'm', significant=2))} into the bed; the "
-            f"spring-damper says {_plain(quote(*law, 'm', significant=2))}{against}."
+            f"Set down under its load the spike sinks {foldable(quote(*bed, 'm', significant=2))} into the bed; the "
+            f"spring-damper says {foldable(quote(*law, 'm', significant=2))}{against}."
         )
     if returned is not None:
         back = f"gives back {_share(returned[0])} of the work put in"
@@ -220,11 +216,9 @@ def _of_drops(drops: Sequence[tuple[Penetration, Penetration]]) -> list[str]:
         )  # fmt: skip
         parts.append(f"{'its' if peaks else _WHOSE} deepest point is {gap}")
     said = [f"In drops {', and '.join(parts)}."] if parts else []
-    calm = [
-        smoothed_peak(model, bed.stop_time / 10) / smoothed_peak(bed, bed.stop_time / 10) - 1
-        for bed, model in stopped
-        if bed.stop_time and smoothed_peak(bed, bed.stop_time / 10) > 0
-    ]
+    windows = [(bed, model, bed.stop_time / 10) for bed, model in stopped if bed.stop_time]
+    calmed = [(smoothed_peak(bed, window), smoothed_peak(model, window)) for bed, model, window in windows]
+    calm = [law / bed - 1 for bed, law in calmed if bed > 0]
     if calm and peaks:
         gap = _compared(float(np.mean(calm)), "above the bed's", "below the bed's", "as high as the bed's")
         ranged = f" ({_range(calm)})" if len(calm) > 1 else ""
@@ -250,8 +244,8 @@ def _by_depth(table: Sequence[Mapping[str, Any]]) -> list[str]:
         pushes = _compared(worst["gap"], "too hard", "too softly", "as hard as the bed")
         text = (
             f"{where} the spring-damper pushes {pushes} at {worst['speed']:g} m/s "
-            f"({_plain(quote(worst['model_force'], None, 'N'))} against "
-            f"{_plain(quote(worst['bed_force'], worst['bed_std'], 'N'))}, {_beds(worst['beds'])})"
+            f"({foldable(quote(worst['model_force'], None, 'N'))} against "
+            f"{foldable(quote(worst['bed_force'], worst['bed_std'], 'N'))}, {_beds(worst['beds'])})"
         )
         if len(others) > 1:
             text += f"; over all speeds the gap there is {_range(others)}"
@@ -309,11 +303,6 @@ def _percent(value: float) -> str:
 
 def _share(value: float) -> str:
     return f"{100 * value:.0f} %" if abs(value) >= 0.095 else f"{100 * value:.1f} %"
-
-
-def _plain(text: str) -> str:
-    """Without spaces that do not break: the sentences are shown on terminals too."""
-    return text.replace("\N{NO-BREAK SPACE}", " ")
 
 
 def _beds(count: float) -> str:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from statistics import fmean, stdev
 from typing import Any
 
-from vis.numbers import quote
+from vis.numbers import foldable, quote
 
 __all__ = ["Headline", "penetrate_headline"]
 
@@ -56,9 +56,9 @@ def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
     shown = [*own[: max(_OF_FINDINGS, _SAID - len(warnings)) - len(moved)], *moved]
     return Headline(
         ("", "bed", "spring-damper"),
-        tuple(tuple(_plain(cell) for cell in row) for row in rows),
-        tuple(map(_plain, warnings)),
-        tuple(map(_plain, shown)),
+        tuple(tuple(foldable(cell) for cell in row) for row in rows),
+        tuple(map(foldable, warnings)),
+        tuple(map(foldable, shown)),
         len(said) - len(shown),
     )
 
@@ -116,8 +116,3 @@ def _both(bed: Mapping[str, Any], law: Mapping[str, Any], unit: str = "") -> Pai
 def _quoted(entry: Mapping[str, Any], unit: str = "") -> str:
     # A law computed once has no spread, and is no more exact for that.
     return "-" if entry["value"] is None else quote(entry["value"], entry["std"] or None, unit or entry["unit"])
-
-
-def _plain(text: str) -> str:
-    """Without spaces that do not break, which a terminal cannot fold."""
-    return text.replace("\N{NO-BREAK SPACE}", " ")

@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from vis.numbers import quote
+from vis.numbers import foldable, quote
 
 from .fit import Moments, fit_moments, gap_of_moments
 
@@ -151,7 +151,7 @@ def _listed(conditions: Sequence[Condition]) -> str:
 
 
 def _words(value: float, std: float | None, unit: str) -> str:
-    return quote(value, std, unit, significant=3).replace("\N{NO-BREAK SPACE}", " ")
+    return foldable(quote(value, std, unit, significant=3))
 
 
 def _differences(other: Mapping[str, Any], result: Mapping[str, Any]) -> list[str]:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from coupling import overdamped_below
-from vis.numbers import quote
+from vis.numbers import foldable, quote
 
 from .settings import STANDARD_GRAVITY, PenetrateSettings
 from .softening import Softening
@@ -223,5 +223,4 @@ def _narrow(findings: Findings) -> str | None:
 
 def _words(entry: Mapping[str, Any]) -> str:
     """A quantity as a person quotes it: by its spread, else with two figures."""
-    text = quote(entry["value"], entry["std"], entry["unit"], significant=2)
-    return text.replace("\N{NO-BREAK SPACE}", " ")
+    return foldable(quote(entry["value"], entry["std"], entry["unit"], significant=2))

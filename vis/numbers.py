@@ -13,7 +13,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-__all__ = ["column", "digits_for", "plain", "quantity", "quote", "short"]
+__all__ = ["column", "digits_for", "foldable", "plain", "quantity", "quote", "short"]
 
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 _SCALED = {"J", "s", "Pa", "W", "kg"}
@@ -86,6 +86,11 @@ def quote(value: float | None, std: float | None = None, unit: str = "1", *, sig
         decimals = digits_for(std / scale)
         text = f"{_fixed(value / scale, decimals)}{_SPACE}±{_SPACE}{_fixed(std / scale, decimals)}"
     return f"{text}{_SPACE}{shown}" if shown else text
+
+
+def foldable(text: str) -> str:
+    """With plain spaces for those that do not break, which a terminal cannot fold."""
+    return text.replace(_SPACE, " ")
 
 
 def quantity(entry: Any, *, unit: str | None = None, significant: int | None = None) -> str:
