@@ -76,7 +76,8 @@ def platform_members(
 
     A spike is a rod of this `diameter` [m] with a ball at its end, `clear` [m] long, and lies in the plane of motion
     (the Hedgehog's own lean sideways by 21 degrees). The hull is a cylinder about the axis of rotation, `hull_radius`
-    [m] thick and as wide as the bed, `width` [m]; 0: none. Raises ValueError for a spike thicker than long.
+    [m] thick and as wide as the bed, `width` [m]; 0: none. Rods go on into it, however long `clear` is, so that no
+    grain gets between shaft and hull. Raises ValueError for a spike thicker than long.
     """
     radius = 0.5 * diameter
     if not 0 < diameter < clear <= spike_length:
@@ -88,12 +89,13 @@ def platform_members(
     if slots < 3:
         raise ValueError(f"spike_count = {count}: rows that share a body must be far apart; 6, 8 or 16 would do")
     inner = row_tips(spike_length - radius, count)
+    shaft = max(clear, spike_length - hull_radius + radius) if hull_radius > 0 else clear
     members = []
     for row, at in enumerate(inner):
         up = -at / np.linalg.norm(at)  # along the shaft, towards the centre
         angle = math.atan2(up[0], up[2])
         turn = np.array([math.cos(0.5 * angle), 0.0, math.sin(0.5 * angle), 0.0])
-        members.append(Member(row=row, at=at, turn=turn, radius=radius, length=clear - radius, slot=row % slots))
+        members.append(Member(row=row, at=at, turn=turn, radius=radius, length=shaft - radius, slot=row % slots))
     if hull_radius > 0:
         half = math.sqrt(0.5)
         members.append(
@@ -203,17 +205,13 @@ class BedFooting:
             )
 
     def _deepest_overlap(self, grains: Mapping[str, Any], pose: Pose, lift: float = 0.0) -> tuple[float, int]:
-        """Largest overlap of a member and a grain [m], and the member's row. A rod's flat ends count as round."""
-        centres, radii = grains["position"], grains["radius"]
+        """Largest overlap of a member and a grain [m], and the member's row."""
         worst = (-math.inf, HULL)
+        raised = grains["position"] - np.array([0.0, 0.0, lift])
         for index in self._lowest(to_matrix(pose.turn)):
             member = self.members[index]
-            position, turn = self._member_pose(member, pose)
-            axis = to_matrix(turn)[:, 2]
-            away = self._nearest_image(centres - (position + np.array([0.0, 0.0, lift])))
-            along = np.clip(away @ axis, -member.below, member.length)
-            overlap = member.radius + radii - np.linalg.norm(away - along[:, None] * axis, axis=1)
-            worst = max(worst, (float(overlap.max()), member.row))
+            distance = self._surface_of(member, Pose(*self._member_pose(member, pose)), raised)[0]
+            worst = max(worst, (float((grains["radius"] - distance).max()), member.row))
         return worst
 
     # The step ------------------------------------------------------------------------------------------------------
@@ -320,15 +318,27 @@ class BedFooting:
         ]
 
     def _surface_of(self, member: Member, pose: Pose, points: Vector) -> tuple[Vector, Vector, Vector]:
-        """Distance of points to a member placed there, outward normal, curvature; round where a rod has a ball."""
+        """Distance of points to a member placed there, outward normal, curvature: round where a rod has a ball.
+
+        As `dem.shapes` has it for a point outside: a rod's other end is flat. Points within count from its side.
+        """
         matrix = to_matrix(pose.turn)
-        away = self._nearest_image(points - pose.position)
-        along = away @ matrix[:, 2]
-        on = np.clip(along, -member.below, member.length)
-        from_axis = away - on[:, None] * matrix[:, 2]
-        size = np.linalg.norm(from_axis, axis=1)
-        curvature = np.where((along < 0) | (member.length == 0), 1.0 / member.radius, 0.0) * (member.below == 0)
-        return size - member.radius, from_axis / size[:, None], curvature
+        local = self._nearest_image(points - pose.position) @ matrix
+        size = np.hypot(local[:, 0], local[:, 1])
+        across = local[:, :2] / np.maximum(size, 1e-30)[:, None]
+        flat = np.maximum(local[:, 2] - member.length, 0.0) + np.minimum(local[:, 2] + member.below, 0.0)
+        side = size - member.radius
+        beside = np.where(flat != 0, np.maximum(side, 0.0), side)
+        distance = np.where(flat != 0, np.hypot(beside, flat), side)
+        out = np.where(flat != 0, beside / np.where(flat != 0, distance, 1.0), 1.0)
+        normal = np.column_stack([out[:, None] * across, flat / np.where(flat != 0, distance, 1.0)])
+        curvature = np.zeros(len(local))
+        if not member.below:
+            ball = (local[:, 2] < 0) | (member.length == 0)
+            length = np.linalg.norm(local[ball], axis=1)
+            distance[ball], normal[ball] = length - member.radius, local[ball] / length[:, None]
+            curvature[ball] = 1.0 / member.radius
+        return distance, normal @ matrix.T, curvature
 
     def _nearest_image(self, away: Vector) -> Vector:
         size = np.array(self.bed.size, dtype=float)[:2]

@@ -1,6 +1,7 @@
 """The master on grains: a body is a grain, Hertz, books with the grains in them, order in H, refusals, restart."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -216,6 +217,38 @@ def test_a_platform_that_comes_down_beyond_the_bed_says_so():
     with pytest.raises(LeftTheBedError, match=r"spike 7 came down .* m ahead of the bed, which is 0.12 m long"):
         run.run()
     assert "master.count" in run.state()
+
+
+def test_the_spring_in_the_books_is_the_one_felt_all_over_a_spike_and_no_grain_gets_behind_its_shaft():
+    """One grain at a time on the ball, the shaft, its flat upper end and that end's edge; lossless, so force = spring.
+
+    Under a hull the shaft's upper end lies within it.
+    """
+    clear, radius, deep = 0.015, 4e-3, 2e-5
+    rod = platform_members(spike_length=0.04, count=8, diameter=2 * radius, clear=clear)[0]
+    rod = replace(rod, at=np.zeros(3), turn=NO_TURN)
+    up, reach, edge = clear - radius, RADIUS - deep, math.sqrt(0.5)
+    places = {
+        "ball": (edge * (radius + reach), -edge * (radius + reach)), "shaft": (radius + reach, 0.5 * up),
+        "end": (0.5 * radius, up + reach), "edge": (radius + edge * reach, up + edge * reach),
+    }  # fmt: skip
+    for where, (aside, high) in places.items():
+        bed = bed_of([(0.03 + aside, 0.03, 0.05 + high)], gravity=0.0)
+        bed.surface = 0.05
+        footing = BedFooting(bed, [rod], origin=(0.03, 0.03), young=YOUNG, poisson=POISSON)
+        pose = Pose(np.zeros(3), NO_TURN)
+        felt = footing.step(pose, Twist(np.zeros(3), np.zeros(3)), bed.time_step).wrench.force
+        pushes = footing.pushes()[1]
+        assert np.linalg.norm(felt) > 1e-3
+        assert pushes.sum(axis=0) == pytest.approx(felt, rel=1e-3, abs=1e-9), where
+        held = footing.energies()["normal"]
+        assert held == pytest.approx(0.4 * deep * np.linalg.norm(felt), rel=1e-2), where
+    *spikes, hull = platform_members(
+        spike_length=0.2, count=8, diameter=0.012, clear=0.04, hull_radius=0.14, width=0.036
+    )
+    for spike in spikes:
+        end = np.linalg.norm(spike.at) - spike.length  # from the axis, on the spike's own line
+        assert math.hypot(end, spike.radius) < hull.radius
 
 
 def test_members_that_share_a_body_of_the_bed_lie_opposite():
