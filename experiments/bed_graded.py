@@ -1,4 +1,4 @@
-"""What a graded bed adds to the result of `bed make` and `bed refine`; and where a tumble wants fine grains."""
+"""What a graded bed adds to results of `bed make` and `bed refine`; where a tumble wants fine grains, which it met."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from coupling import CoupledTumble
 from dem.graded import THROAT, Graded
 from dem.grading import MOST_DRAINED, MOST_STRAYED
 from dem.laboratory import Prepared
 from rigid.trajectory import Trajectory
 
-__all__ = ["grading_told", "graded_under", "places_touched"]
+__all__ = ["coarsest_touched", "grading_told", "graded_under", "places_touched"]
 
 
 def grading_told(prepared: Prepared) -> dict[str, Any]:
@@ -147,3 +148,18 @@ def graded_under(
     beside = margin * spike_diameter
     strips = [(max(0.0, origin + low - beside), min(length, origin + high + beside)) for low, high in ways]
     return Graded(fine=grain, coarse=coarse, footprints=tuple(merged(strips)), spread=spread, **options)
+
+
+def coarsest_touched(run: CoupledTumble, graded: Graded, *, size: Sequence[float]) -> float:
+    """The largest mean diameter that belongs where tips of a tumble on such a bed were [m].
+
+    Args:
+        size: of the bed, both widths and the depth [m].
+    """
+    footing: Any = run.footing
+    trial, rows, depth = run.trial, run.columns, run.feet[:, 3]
+    half = math.pi / trial.spike_count
+    angles = rows["theta"][:, None] + half + 2 * half * np.arange(trial.spike_count)
+    x = footing.origin[0] + rows["x"][:, None] - trial.spike_length * np.sin(angles)
+    within = depth > 0
+    return float(graded.diameter(x[within], footing.origin[2] - depth[within], size).max(initial=graded.fine))

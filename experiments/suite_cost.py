@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .settings import expected_grain_count
 from .tumble_settings import TumbleSettings
 
 __all__ = ["Cost", "cost_of_tumble"]
@@ -55,6 +54,7 @@ def cost_of_tumble(settings: TumbleSettings) -> Cost:
     from .tumble_grains import (
         RAIN,
         _check_bed,
+        _count,
         _forecast,
         _grain_gravity,
         _lowering_speed,
@@ -73,7 +73,7 @@ def cost_of_tumble(settings: TumbleSettings) -> Cost:
     soft = _material(plan).softened(softening.young)
     smallest = settings.grain * (1 - settings.spread)
     step = time_step_for(soft, diameter=smallest, max_overlap=settings.max_overlap, wanted=None)
-    grains = expected_grain_count(settings.bed_size, settings.grain, settings.spread)
+    grains = _count(settings, forecast)
     gravity = _grain_gravity(plan.trial)
     fall = math.sqrt(2 * RAIN * settings.bed_size[2] / gravity)
     steps = (settings.duration + SET_DOWN / _lowering_speed(settings, plan)) / step

@@ -28,6 +28,11 @@ class TumbleBedSettings(StrictSettings):
         description="On a bed: its length along the motion, its width for one spike (both periodic) and its depth [m].",
     )
     grain: Positive = Field(0.003, description="On a bed: mean grain diameter [m].")
+    coarse: Positive | None = Field(
+        None,
+        description="On a bed: graded: `grain` is the mean diameter under the expected footprints, this the largest "
+        "away from them [m]; one size throughout if not given.",
+    )
     spread: float = Field(0.15, ge=0, le=0.5, description="On a bed: grain diameters are uniform within 1 +- this [1].")
     seed: int = Field(1, ge=0, lt=2**31, description="On a bed: seed of its grains.")
     young: Positive | None = Field(

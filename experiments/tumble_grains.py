@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from coupling import BedFooting, CoupledTumble, LawFooting, platform_members
-from dem import Bed, Sleep
+from dem import Bed, Graded, Sleep
 from dem.materials import Material
 from dem.materials import material as find_material
 from rigid.planar import simulate
@@ -22,6 +22,7 @@ from rigid.rig import STANDARD_GRAVITY
 from rigid.trajectory import Trajectory
 from rigid.trial import Trial
 
+from .bed_graded import graded_under
 from .bed_progress import BedProgress
 from .progress import Progress
 from .reporting import write_report
@@ -90,12 +91,13 @@ def tumble_on_grains(settings: TumbleSettings, folder: RunFolder, progress: Prog
         step_time = settings.duration + 0.3  # with the setting down
         progress.plan({"bed": 1.0, "tumble": step_time}, seconds={"report": 10.0})
         try:
-            bed = _prepare(settings, plan, softening, progress)
+            bed = _prepare(settings, plan, forecast, softening, progress)
         except RuntimeError as error:
             raise RuntimeError(f"the bed could not be prepared: {error}; change young, max_overlap or seed") from error
         run = _stepper(settings, plan, bed, forecast)
         series = _follow(settings, run, folder, progress)
-        result = conclude(settings, plan, run, series, forecast.trajectory, softening, folder)
+        graded = _graded(settings, forecast)
+        result = conclude(settings, plan, run, series, forecast.trajectory, softening, folder, graded)
         folder.write_result(result)
         progress.stage("report", total=1.0)
         write_report(folder.path, progress)
@@ -198,12 +200,38 @@ def _check_bed(settings: TumbleSettings, forecast: Forecast) -> None:
         )
     if settings.grain > spike:
         raise ValueError(f"grain = {settings.grain:g} m is larger than the spike: at most {spike:g} m would do")
-    count = expected_grain_count(settings.bed_size, settings.grain, settings.spread)
+    count = _count(settings, forecast)
     if count > MOST_GRAINS:
         larger = settings.grain * (count / MOST_GRAINS) ** (1 / 3)
         raise ValueError(
             f"grain = {settings.grain:g} m makes about {count:.3g} grains: {larger:.2g} m or a smaller bed would do"
         )
+
+
+def _count(settings: TumbleSettings, forecast: Forecast) -> float:
+    """About how many grains there will be. Raises ValueError for sizes by place that do not fit the bed."""
+    graded = _graded(settings, forecast)
+    count = expected_grain_count(settings.bed_size, settings.grain, settings.spread)
+    if graded is None:
+        return count
+    graded.check(settings.bed_size)
+    return count * graded.share(settings.bed_size)
+
+
+def _origin(settings: TumbleSettings, forecast: Forecast) -> float:
+    """x in the bed of the platform's start [m]: the footprints expected lie in the middle."""
+    return 0.5 * settings.bed_size[0] - 0.5 * (forecast.behind + forecast.ahead)
+
+
+def _graded(settings: TumbleSettings, forecast: Forecast) -> Graded | None:
+    """Fine grains where the forecast's tips come down, two spikes' diameters deeper than they go; None: one size."""
+    if settings.coarse is None:
+        return None
+    return graded_under(
+        forecast.trajectory, length=settings.bed_size[0], origin=_origin(settings, forecast),
+        spike_diameter=settings.spike_diameter, grain=settings.grain, spread=settings.spread, coarse=settings.coarse,
+        depth=min(settings.bed_size[2], forecast.deepest + 2 * settings.spike_diameter),
+    )  # fmt: skip
 
 
 def _softness(settings: TumbleSettings, plan: TumblePlan, forecast: Forecast) -> Softening:
@@ -222,13 +250,16 @@ def _softness(settings: TumbleSettings, plan: TumblePlan, forecast: Forecast) ->
     )
 
 
-def _prepare(settings: TumbleSettings, plan: TumblePlan, softening: Softening, progress: Progress) -> Bed:
+def _prepare(
+    settings: TumbleSettings, plan: TumblePlan, forecast: Forecast, softening: Softening, progress: Progress
+) -> Bed:
+    graded = _graded(settings, forecast)
     with held_back() as asked_to_stop:
         return Bed.prepare(
             _material(plan),
             size=settings.bed_size,
-            grain=settings.grain,
-            spread=settings.spread,
+            grain=settings.grain if graded is None else graded,
+            spread=settings.spread if graded is None else None,
             gravity=_grain_gravity(plan.trial),
             seed=settings.seed,
             young=softening.young,
@@ -250,9 +281,8 @@ def _members(settings: TumbleSettings, plan: TumblePlan) -> list[Any]:
 
 def _stepper(settings: TumbleSettings, plan: TumblePlan, bed: Bed, forecast: Forecast) -> CoupledTumble:
     """The run, the footprints expected put in the middle of the bed."""
-    middle = 0.5 * (forecast.behind + forecast.ahead)
     footing = BedFooting(
-        bed, _members(settings, plan), origin=(0.5 * bed.size[0] - middle, 0.5 * bed.size[1]), copies=COPIES,
+        bed, _members(settings, plan), origin=(_origin(settings, forecast), 0.5 * bed.size[1]), copies=COPIES,
         touch=TOUCH * plan.trial.weight / COPIES, friction=settings.spike_friction,
         restitution=settings.spike_restitution,
     )  # fmt: skip

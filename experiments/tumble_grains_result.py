@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 
 from coupling import MOST_REVERSAL, CoupledTumble
+from dem import Graded
 from dem.prepare import fingerprint
 from rigid.trajectory import Trajectory
 
+from .bed_graded import coarsest_touched
 from .runfolder import RunFolder, write_series
 from .softening import Softening
 from .surfaces import find_surface
@@ -52,8 +54,9 @@ def conclude(
     beside: Trajectory,
     softening: Softening,
     folder: RunFolder,
+    graded: Graded | None = None,
 ) -> dict[str, Any]:
-    """The result, its series written. `beside`: the same trial on the spring-damper."""
+    """The result, its series written. `beside`: the trial on the spring-damper; `graded`: the bed's sizes by place."""
     from .tumble import quantities_of, result_of, trajectory_columns
 
     write_trajectory(folder.path, run)
@@ -92,7 +95,19 @@ def conclude(
             f"dissipation_reversal = {made:.2g} is above {MOST_REVERSAL:g}: the bed made energy, so this run's "
             f"numbers are not to be trusted; fewer substeps tell whether it is the coupling"
         )
-    across = settings.spike_diameter / settings.grain
+    coarsest = settings.grain
+    if graded is not None:
+        coarsest = coarsest_touched(run, graded, size=settings.bed_size)
+        result["grains"]["graded"] = {
+            "fine": graded.fine, "coarse": graded.coarse, "footprints": [list(strip) for strip in graded.footprints],
+            "depth": graded.depth, "growth": graded.growth, "coarsest_touched": coarsest,
+        }  # fmt: skip
+        if coarsest > settings.grain:
+            result["warnings"].append(
+                f"tips were in grains of {1e3 * coarsest:.3g} mm, beyond the spring-damper's footprints, under which "
+                f"they have {1e3 * settings.grain:.3g} mm"
+            )
+    across = settings.spike_diameter / coarsest
     if across < 10:
         result["warnings"].append(
             f"a spike is {across:.2g} grains across: 10 are wanted for a number to be quoted, 5 for a quick look"

@@ -9,7 +9,7 @@ import pytest
 
 from dem import Bed, Graded, measure_grading
 from dem.bedfile import read_preparation
-from experiments.bed_graded import graded_under, places_touched
+from experiments.bed_graded import coarsest_touched, graded_under, places_touched
 from experiments.bed_refine import refined_options
 from experiments.bed_settings import BedRefineSettings
 from experiments.cli import BAD_INPUT, DONE, main
@@ -96,3 +96,11 @@ def test_fine_grains_lie_where_the_tips_of_a_forecast_come_down():
     assert graded.diameter(np.array([0.2 + pitch]), np.array([0.01]), (0.6, 0.06, 0.05))[0] == 0.006
     with pytest.raises(ValueError, match=r"grain = 0.003 m is more than a fifth of spike_diameter = 0.012 m"):
         graded_under(forecast, grain=0.003, **options)
+    for shift, coarsest in ((0.0, 0.0024), (0.5 * pitch, 0.006)):  # as forecast, and half a pitch ahead of it
+        depth = np.zeros((len(theta), 4, 8))
+        depth[:, 3, 7] = 0.01  # the tip ahead
+        run = SimpleNamespace(
+            trial=forecast.trial, columns={"theta": theta, "x": x + shift}, feet=depth,
+            footing=SimpleNamespace(origin=np.array([0.2, 0.03, 0.05])),
+        )  # fmt: skip
+        assert coarsest_touched(run, graded, size=(0.6, 0.06, 0.05)) == pytest.approx(coarsest, rel=1e-9)

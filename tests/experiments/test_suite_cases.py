@@ -20,17 +20,23 @@ def test_every_case_of_every_experiment_is_valid_and_found_by_its_name():
     assert all(case.settings.ground == "bed" for case in found)
     assert find_case(Path(found[0].name), CASES) == found[0].path
     counts = {number: sum(case.experiment == number for case in found) for number in suite.EXPERIMENTS}
-    assert counts == {1: 18, 2: 6, 3: 3, 4: 2, 5: 3, 6: 8}
+    assert counts == {1: 20, 2: 6, 3: 3, 4: 4, 5: 5, 6: 8}
 
 
 def test_cases_that_can_share_a_bed_do():
     """What shapes a bed is the same, its modulus given: then `Bed.prepare` finds it in the cache."""
     shaping = ("bed_size", "grain", "spread", "young", "max_overlap", "seed")
-    for names in (("grains1-sand", "grains5"), ("grains1-look",)):
-        beds = {tuple(getattr(case.settings, key) for key in shaping) for case in suite.cases(names)}
-        assert len(beds) == 1 and None not in next(iter(beds))
-    trials = {tuple(getattr(case.settings, key) for key in shaping) for case in suite.cases(["grains6"])}
-    assert len(trials) == 2  # two seeds
+
+    def beds(*names):
+        return {tuple(getattr(case.settings, key) for key in shaping) for case in suite.cases(names)}
+
+    for names, seeds in (
+        (("grains1-sand", "grains5-landing"), 1), (("grains1-look", "grains5-look"), 3), (("grains3-row",), 3),
+        (("grains6",), 2),
+    ):  # fmt: skip
+        found = beds(*names)
+        assert len(found) == len({bed[-1] for bed in found}) == seeds
+        assert not any(None in bed for bed in found)
 
 
 @pytest.fixture

@@ -35,6 +35,11 @@ def on_bed(**more):
         ({"bed_size": (0.4, 0.06, 0.03)}, r"bed_size = 0.03 m deep .* 0.043 m would do"),
         ({"grain": 0.013}, r"grain = 0.013 m is larger than the spike: at most 0.012 m would do"),
         ({"grain": 0.0003}, r"grain = 0.0003 m makes about .* 0.00\d+ m or a smaller bed would do"),
+        ({"coarse": 0.006}, r"grain = 0.003 m is more than a fifth of spike_diameter = 0.012 m .* 0.0024 m would do"),
+        (
+            {"coarse": 0.007, "grain": 0.0024, "bed_size": (0.4, 0.036, 0.046)},
+            r"coarse = 0.007 m makes grains of .* coarse = 0.006 m would do",
+        ),
         ({"surface": "steel"}, r"surface = 'steel' has no grains .* sand, jsc1a would do"),
         ({"spike_clear": 0.01}, r"spike_diameter = 0.012 m, spike_clear = 0.01 m"),
     ],
