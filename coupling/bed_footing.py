@@ -118,6 +118,7 @@ class BedFooting:
     touch : force over `copies`, in whatever direction, from which a member counts as touching [N]: a spike in sand may
         be held sideways, or back, where nothing bears it.
     bounded : whether a member that comes down beyond the bed's ends along x is an error; it is periodic there.
+    begin : where the bed counts as beginning along x, one period long [m]; the body may start beyond its cell that way.
     friction, restitution, rolling_friction, young, poisson : of a grain and a member, as `Bed.add_body` has them.
 
     The members wait far above until `place`. Raises ValueError for more slots than a bed takes.
@@ -135,6 +136,7 @@ class BedFooting:
         copies: float = 1.0,
         touch: float = 0.0,
         bounded: bool = True,
+        begin: float = 0.0,
         friction: float | None = None,
         restitution: float | None = None,
         rolling_friction: float | None = None,
@@ -142,6 +144,7 @@ class BedFooting:
         poisson: float = 0.3,
     ) -> None:
         self.bed, self.members, self.copies, self.touch, self.bounded = bed, list(members), copies, touch, bounded
+        self._begin = begin
         self.origin = np.array([origin[0], origin[1], float(bed.surface)])
         """Where the body's (0, 0, 0) is in the bed [m], shape (3,)."""
         self._slots = [
@@ -259,7 +262,7 @@ class BedFooting:
 
     def _check_inside(self, member: Member, x: float, lowest: float) -> None:
         what = "the hull" if member.row == HULL else f"spike {member.row}"
-        at, length = self.origin[0] + x, float(self.bed.size[0])
+        at, length = self.origin[0] + x - self._begin, float(self.bed.size[0])
         if self.bounded and not 0 <= at <= length:
             way = "ahead of" if at > length else "behind"
             raise LeftTheBedError(

@@ -35,6 +35,12 @@ class TumbleBedSettings(StrictSettings):
     )
     spread: float = Field(0.15, ge=0, le=0.5, description="On a bed: grain diameters are uniform within 1 +- this [1].")
     seed: int = Field(1, ge=0, lt=2**31, description="On a bed: seed of its grains.")
+    place: float = Field(
+        0.0,
+        allow_inf_nan=False,
+        description="On a bed: how far along it from its middle the platform is set down [m]; the bed goes on "
+        "periodically, so other grains lie there.",
+    )
     young: Positive | None = Field(
         None, description="On a bed: Young's modulus of the softened grains [Pa]; from max_overlap if not given."
     )

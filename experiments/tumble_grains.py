@@ -198,6 +198,11 @@ def _check_bed(settings: TumbleSettings, forecast: Forecast) -> None:
             f"bed_size = {depth:g} m deep is too shallow: on the spring-damper a tip goes {forecast.deepest:.2g} m "
             f"deep, so with two spikes' diameters below it {least:.2g} m would do"
         )
+    if settings.place and settings.coarse is not None:
+        raise ValueError(
+            f"place = {settings.place:g} m with coarse = {settings.coarse:g} m: a graded bed is fine in its middle, "
+            f"where the platform must stand; place = 0 or another seed would do"
+        )
     if settings.grain > spike:
         raise ValueError(f"grain = {settings.grain:g} m is larger than the spike: at most {spike:g} m would do")
     count = _count(settings, forecast)
@@ -219,8 +224,8 @@ def _count(settings: TumbleSettings, forecast: Forecast) -> float:
 
 
 def _origin(settings: TumbleSettings, forecast: Forecast) -> float:
-    """x in the bed of the platform's start [m]: the footprints expected lie in the middle."""
-    return 0.5 * settings.bed_size[0] - 0.5 * (forecast.behind + forecast.ahead)
+    """x in the bed of the platform's start [m]: the footprints expected lie in the middle, or `place` from there."""
+    return settings.place + 0.5 * settings.bed_size[0] - 0.5 * (forecast.behind + forecast.ahead)
 
 
 def _graded(settings: TumbleSettings, forecast: Forecast) -> Graded | None:
@@ -282,8 +287,8 @@ def _members(settings: TumbleSettings, plan: TumblePlan) -> list[Any]:
 def _stepper(settings: TumbleSettings, plan: TumblePlan, bed: Bed, forecast: Forecast) -> CoupledTumble:
     """The run, the footprints expected put in the middle of the bed."""
     footing = BedFooting(
-        bed, _members(settings, plan), origin=(_origin(settings, forecast), 0.5 * bed.size[1]), copies=COPIES,
-        touch=TOUCH * plan.trial.weight / COPIES, friction=settings.spike_friction,
+        bed, _members(settings, plan), origin=(_origin(settings, forecast), 0.5 * bed.size[1]), begin=settings.place,
+        copies=COPIES, touch=TOUCH * plan.trial.weight / COPIES, friction=settings.spike_friction,
         restitution=settings.spike_restitution,
     )  # fmt: skip
     bed.max_overlap = 0.0

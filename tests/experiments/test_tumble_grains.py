@@ -37,6 +37,10 @@ def on_bed(**more):
         ({"grain": 0.0003}, r"grain = 0.0003 m makes about .* 0.00\d+ m or a smaller bed would do"),
         ({"coarse": 0.006}, r"grain = 0.003 m is more than a fifth of spike_diameter = 0.012 m .* 0.0024 m would do"),
         (
+            {"coarse": 0.006, "grain": 0.0024, "place": 0.1, "bed_size": (0.4, 0.036, 0.046)},
+            r"place = 0.1 m with coarse = 0.006 m: .* place = 0 or another seed would do",
+        ),
+        (
             {"coarse": 0.007, "grain": 0.0024, "bed_size": (0.4, 0.036, 0.046)},
             r"coarse = 0.007 m makes grains of .* coarse = 0.006 m would do",
         ),
