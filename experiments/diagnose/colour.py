@@ -7,19 +7,25 @@ do not call for it, the noise stays as stated.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 from scipy.fft import idct
 from scipy.optimize import minimize
 
 from .fitting import Fit, Whitener
 from .problem import Array
 
-__all__ = ["Colour", "find_colours", "whitener_for"]
+__all__ = ["Colour", "find_colours", "find_loud", "whitener_for"]
 
 _FAST = 0.15
 """Share of the band that counts as slow and is left out."""
+_FASTER = 0.5
+"""The same where a model leaves much: what a motion leaves falls with the frequency."""
+_QUIET, _LOUD = 0.25, 1.5
+"""Share of all pieces that count as the quiet ones, and how loud these must be, in mean square."""
 _SURE = 16.0
 """Twice the log likelihood that two more numbers must gain: chance 3e-4 under white noise."""
 _PIECES, _PIECE = 8, 24
@@ -90,6 +96,32 @@ def find_colours(found: Fit) -> dict[str, Colour]:
                 colours[name] = colour
                 break
     return colours
+
+
+def find_loud(found: Fit) -> dict[str, Colour]:
+    """Channels that are louder than stated, white, where the model may leave much: looked for in the upper half of the
+    band, in the quiet pieces of the recordings. What a model lacks does not fill that all the time, noise does."""
+    model = found.model
+    squares: dict[str, list[float]] = {}
+    freedom: dict[str, list[float]] = {}
+    for trial, rows in model.rows().items():
+        channels = list(dict.fromkeys(model.problem.samples(trial).channel.tolist()))
+        for name, block in zip(channels, model.whitener.block_slices(trial), strict=True):
+            count = block.stop - block.start
+            fast = np.arange(count) / max(count, 1) > _FASTER
+            if fast.sum() < _PIECE:
+                continue
+            residual = idct(np.where(fast, found.modes[rows][block], 0.0), norm="ortho")
+            for piece in np.array_split(residual, max(1, min(_PIECES, count // _PIECE))):
+                squares.setdefault(name, []).append(float(np.mean(piece**2)) / (1 - _FASTER))
+                freedom.setdefault(name, []).append((1 - _FASTER) * len(piece))
+    loud = {}
+    for name, own in squares.items():
+        dof = float(np.median(freedom[name]))
+        level = float(np.quantile(own, _QUIET)) / (float(stats.chi2.ppf(_QUIET, dof)) / dof)
+        if level > _LOUD:
+            loud[name] = Colour(name, math.sqrt(level), 0.0)
+    return loud
 
 
 def _pieces(found: Fit, channel: str) -> tuple[float, float]:

@@ -12,7 +12,8 @@ import numpy as np
 
 from .astray import allowed, astray, astray_held_out
 from .bounds import Bound, bounds_met, is_strained
-from .colour import Colour, find_colours, whitener_for
+from .colour import Colour, find_colours, find_loud, whitener_for
+from .effect_words import confirmation
 from .equivalence import Rival
 from .evidence import SMALL, Hypothesis, excess, held_out_fit, inflation, score, signature_matrix
 from .fitting import Fit, Model, Whitener, fit, settled
@@ -29,6 +30,8 @@ Tell = Callable[[str, float], None]
 
 _MOST_FOR_COLOUR = 2.5
 """Chi-square per sample above which motion, not noise, fills the fast modes too."""
+_OTHER = 0.1
+"""Change of a noise's persistence, and relative change of its size, from which on it is another one."""
 _REFITS = 400
 """Made-up campaigns of a thorough null."""
 _MARGIN = 1.5
@@ -244,10 +247,15 @@ def _coloured(found: Fit, colours: Mapping[str, Colour]) -> Fit:
 
 
 def _colours_of(found: Fit) -> dict[str, Colour]:
-    """Colours of the noise, where the misfit is small enough for the fast modes to hold nothing else."""
+    """Colours of the noise, where the misfit is small enough for the fast modes to hold nothing else; where it is not,
+    how loud the noise is, if it is all the time."""
+    loud: dict[str, Colour] = {}
     if found.chi_square > _MOST_FOR_COLOUR * found.count:
-        return {}
-    return find_colours(found)
+        loud = find_loud(found)
+        rest = _coloured(found, loud)
+        if not loud or rest.chi_square > _MOST_FOR_COLOUR * rest.count:
+            return loud
+    return loud | find_colours(found)
 
 
 def _scatter(found: Fit, held_out: tuple[str, ...]) -> tuple[tuple[Parameter, ...], dict[str, float]]:
@@ -269,11 +277,9 @@ def _unscattered(found: Fit) -> dict[str, float]:
 
 
 def _differ(one: Mapping[str, Colour], other: Mapping[str, Colour]) -> bool:
-    names = set(one) | set(other)
-    return any(
-        abs((one[n].persistence if n in one else 0.0) - (other[n].persistence if n in other else 0.0)) > 0.1
-        for n in names
-    )
+    white = Colour("", 1.0, 0.0)
+    pairs = [(one.get(name, white), other.get(name, white)) for name in set(one) | set(other)]
+    return any(abs(a.persistence - b.persistence) > _OTHER or abs(a.std - b.std) > _OTHER * b.std for a, b in pairs)
 
 
 def _gap(problem: Problem, model: Model, values: Mapping[str, float], fitted: tuple[str, ...],
@@ -398,14 +404,15 @@ class _Told:
             after=after, fitted=fitted, held_out=held_out, gate_before=self.first,
             gate_after=last or (choice.left if choice is not None else self.first), gate_held_out=held, choice=choice,
             colours=colours, model_std=model_std, findings=tuple(self.findings), depends_on=told, shares=shares,
-            next_experiment=_next(problem, best, choice, rival_forms, verdict),
+            next_experiment=_next(problem, best, choice, rival_forms, verdict, where),
         )  # fmt: skip
 
 
 def _certain(base: Fit, choice: Choice) -> bool:
     """Whether what was found is there for certain although something else is too: it takes most of what the base model
-    leaves away, of what was fitted and of conditions left out in turn."""
-    if excess(choice.best.fit) >= _CERTAIN * excess(base):
+    leaves away, of what was fitted and of conditions left out in turn, without a number that the campaign excludes:
+    with one, the name may be no more than what bends nearest to something else."""
+    if is_strained(choice.best.fit) or excess(choice.best.fit) >= _CERTAIN * excess(base):
         return False
     trials = [trial for trial in base.model.problem.trials if trial.id in base.model.trials]
     predicted = predict(base, folds_of(trials)) if choice.predicted is not None else None
@@ -425,19 +432,21 @@ def _smallest(choice: Choice) -> tuple[Hypothesis, ...]:
     return (first, *(h for h in others[:1] if h.score > choice.best.score - _AS_LIKELY))
 
 
-def _next(problem: Problem, best: Fit, choice: Choice | None, rivals: tuple[Form, ...], verdict: str) -> str:
-    if verdict == "none":
+def _next(
+    problem: Problem, best: Fit, choice: Choice | None, rivals: tuple[Form, ...], verdict: str, where: Sequence[Place]
+) -> str:
+    """The next experiment: what tells two names apart, confirms one, or comes back where nothing has a name."""
+    if verdict == "none" or choice is None:
         return "None is needed: the base model explains what these sensors can see."
-    if verdict == "unknown":
-        return (
-            "Repeat the trial with the largest gap twice without changing anything: what comes back is in the bed or "
-            "the spike, what does not is in the room."
-        )
-    assert choice is not None
-    if rivals:
+    if verdict == "named":
+        return confirmation(choice.best.effects[0])
+    if verdict == "ambiguous":
         return problem.next_experiment(best.model.forms[0], rivals[0], best.values)
-    others = [h for what, h in choice.table if len(h.forms) == 1 and h.effects[0] not in choice.best.effects]
-    if not others:
-        return "None is needed: no rival comes near."
-    second = max(others, key=lambda h: h.score)
-    return problem.next_experiment(best.model.forms[0], second.forms[0], best.values)
+    sums: dict[str, float] = {}
+    for place in where:
+        sums[place.trial] = sums.get(place.trial, 0.0) + place.excess
+    worst = f"trial {max(sums, key=lambda trial: sums[trial])}, the one with the largest gap," if sums else "a trial"
+    return (
+        f"Repeat {worst} twice without changing anything: what comes back is in {problem.whole}, what does not is in "
+        "the room."
+    )

@@ -19,7 +19,6 @@ import numpy as np
 from experiments.runfolder import write_json, write_series
 
 from .diagnosis import Diagnosis
-from .effect_words import confirmation
 from .evidence import excess, inflation
 from .gaps import Gaps
 from .localise import phases_of
@@ -74,24 +73,8 @@ def document(found: Diagnosis) -> dict[str, Any]:
          "set_aside": f.set_aside}
         for f in found.findings
     ]  # fmt: skip
-    said["next_experiment"] = _next(found)
+    said["next_experiment"] = found.next_experiment
     return said
-
-
-def _next(found: Diagnosis) -> str:
-    """The next experiment: of what is named, one that confirms it; the trial with the largest gap by its name."""
-    if found.verdict == "named":
-        return confirmation(found.effects[0])
-    sums: dict[str, float] = {}
-    for place in found.where:
-        sums[place.trial] = sums.get(place.trial, 0.0) + place.excess
-    advice = found.next_experiment
-    if found.problem.kind == "tumble":
-        advice = advice.replace("in the bed or the spike", "in the platform, the rig or the surface")
-    if not sums:
-        return advice
-    worst = max(sums, key=lambda trial: sums[trial])
-    return advice.replace("the trial with the largest gap", f"trial {worst}, the one with the largest gap,")
 
 
 def _equivalence(found: Diagnosis) -> list[dict[str, Any]]:

@@ -18,7 +18,7 @@ from scipy.fft import dct
 
 from .problem import Array, Form, Parameter, Problem, Values
 
-__all__ = ["Fit", "Model", "Whitener", "fit", "linearised", "settled"]
+__all__ = ["Fit", "Model", "Whitener", "fit", "linearised", "settled", "settled_slopes"]
 
 _ROUNDS = 30
 _DAMPINGS = (0.0, 1e-3, 1e-1, 10.0)
@@ -243,29 +243,35 @@ def linearised(model: Model, values: Values) -> tuple[Array, Array]:
 
 
 def settled(found: Fit) -> Fit:
-    """The same with its Jacobian taken over steps that are worth a standard deviation of the data, both ways.
+    """The same with its Jacobian taken over steps worth a standard deviation of the data (`settled_slopes`)."""
+    return replace(found, jacobian=settled_slopes(found.model, found.values)[1])
+
+
+def settled_slopes(model: Model, values: Values) -> tuple[Array, Array]:
+    """As `linearised`, over steps that are worth a standard deviation of the data, both ways.
 
     A fit's own steps are hundredths of what was stated or of a typical size. Where data tell a thousand times more,
     such a step reaches over the next branch of sticking and slipping, and a jump is taken for a slope: standard errors
-    would come out far too small.
+    would come out far too small, and what is uncertain far too loud.
     """
-    model, names = found.model, [p.name for p in found.model.parameters]
     parameters = model.parameters
+    names = [p.name for p in parameters]
     steps = np.array([p.step if p.step is not None else 1e-4 * p.scale for p in parameters])
     low, high = np.array([p.lowest for p in parameters]), np.array([p.highest for p in parameters])
-    x = np.array([found.values[name] for name in names])
+    x = np.array([values.get(p.name, p.value) for p in parameters], dtype=float)
     groups, rows = _groups(parameters), model.rows()
-    slopes = np.zeros_like(found.jacobian)
+    now, slopes = np.zeros(0), np.zeros((0, len(x)))
     for _ in range(_SETTLING):
         points = []
         for members in groups:
             for sign in (1.0, -1.0):
-                point = dict(found.values)
+                point = dict(values)
                 for k in members:
                     point[names[k]] = float(np.clip(x[k] + sign * steps[k], low[k], high[k]))
                 points.append(point)
-        there = model.evaluate([found.values, *points])
+        there = model.evaluate([values, *points])
         now, made = there[0], there[1:]
+        slopes = np.zeros((len(now), len(x)))
         for place, members in enumerate(groups):
             for k in members:
                 where = slice(None) if parameters[k].trial is None else rows[parameters[k].trial or ""]
@@ -278,10 +284,9 @@ def settled(found: Fit) -> Fit:
                 sizes = [float(np.linalg.norm(side)) for side in sides]
                 # A jump on one side is that side's: the other one tells the slope.
                 slope = np.mean(sides, axis=0) if max(sizes) < 2 * min(sizes) else sides[int(np.argmin(sizes))]
-                slopes[:, k] = 0.0
                 slopes[where, k] = slope * parameters[k].scale
                 steps[k] = min(steps[k], 1.0 / max(min(sizes), 1e-300))
-    return replace(found, jacobian=slopes)
+    return now, slopes
 
 
 def _groups(parameters: Sequence[Parameter]) -> list[list[int]]:

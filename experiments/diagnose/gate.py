@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from .fitting import Fit, Model, fit, linearised
+from .fitting import Fit, Model, fit, settled_slopes
 from .problem import Array, Values
 
 __all__ = ["Gate", "Verdict", "held_out_gate", "low_modes", "open_gate"]
@@ -149,7 +149,7 @@ def held_out_gate(found: Fit, trials: Sequence[str], values: Values, *, seed: in
     nuisances take up taken out.
     """
     model = found.model.on(trials)
-    modes, jacobian = linearised(model, values)
+    modes, jacobian = settled_slopes(model, values)
     slow = low_modes(model)
     shared = np.array([p.trial is None for p in model.parameters], dtype=bool)
     scales = np.array([p.scale for p in model.parameters])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from experiments.campaign.tables import PenetrationTrial
 
 from .penetration_depth import SmoothDepth, smooth_depth
 from .problem import Array, Finding, TrialInfo
+from .replicates import parted
 from .stuck import stuck_rows
 
 __all__ = ["Prepared", "prepare"]
@@ -73,7 +74,20 @@ def prepare(campaign: Campaign) -> tuple[list[Prepared], list[Finding]]:
     if not trials:
         said = "; ".join(finding.what for finding in findings)
         raise ValueError(f"no trial of {tables.name!r} can be used: {said}")
-    return trials, findings
+    infos = parted([trial.info for trial in trials], {trial.info.id: _path(trial) for trial in trials})
+    return [replace(trial, info=info) for trial, info in zip(trials, infos, strict=True)], findings
+
+
+def _path(trial: Prepared) -> tuple[float, ...]:
+    """What makes another path of a drive at the same nominal speed: depth, way back and duration; of a drop how long it
+    is looked at. Nothing of pushes by hand, of which each goes its own."""
+    lasted = float(np.ptp(trial.time))
+    if trial.smooth is None:
+        return (lasted,)
+    if trial.table.speed is None:
+        return ()
+    deepest = max(float(trial.smooth.depth.max()), 1e-9)
+    return deepest, 2.0 - float(trial.smooth.depth[-1]) / deepest, lasted
 
 
 def stds(tables: PenetrationCampaign, driven: bool) -> tuple[float, float]:

@@ -50,6 +50,7 @@ class PenetrationProblem:
     """One campaign; see `problem.Problem` for what the members mean."""
 
     kind = "penetration"
+    whole = "the bed or the spike"
 
     def __init__(self, campaign: Campaign, *, own: Sequence[OwnEffect] = ()) -> None:
         tables = campaign.tables
@@ -272,7 +273,7 @@ class PenetrationProblem:
             shallow = (smooth.depth > 0) & (smooth.depth < depth_here)
             below = float(np.median(np.abs(trial.other[shallow]))) if shallow.any() else 0.0
             start = max(jump, below) + np.abs(by_depth).max() * smooth.depth_std
-            touch = start * (np.abs(smooth.depth) < 3 * smooth.depth_std)
+            touch = start * _touching(trial)
             turn = _turning(smooth.speed, smooth.speed_std, trial.other, std_force)
             doubtful = np.sqrt(1 + (bend**2 + touch**2 + turn**2) / std_force**2)
             left, sizes, _ = np.linalg.svd(factor / std_force / doubtful[:, None], full_matrices=False)
@@ -303,7 +304,13 @@ class PenetrationProblem:
         force = self._run([values], forms, [this])[0][0]
         ((_, by_depth, _),) = self._slopes(values, forms, [this])
         std = stds(self.tables, True)[1]
-        rest = (this.other - force) / np.sqrt(std**2 + (by_depth * this.smooth.depth_std) ** 2)
+        doubt = np.abs(by_depth) * this.smooth.depth_std
+        touch = _touching(this)
+        if touch.any():  # the force begins with a jump: half of what it may be over what the depth leaves open
+            most = float(_off_surface(this)[touch].max())
+            deep, shallow = (self._run([values], forms, [this], (shift, 0.0))[0][0] for shift in (most, -most))
+            doubt = np.where(touch, np.maximum(doubt, 0.5 * np.abs(deep - shallow)), doubt)
+        rest = (this.other - force) / np.sqrt(std**2 + doubt**2)
         return float(rest @ rest), len(rest)
 
     # What is seen -----------------------------------------------------------------------------------------------------
@@ -446,6 +453,20 @@ class PenetrationProblem:
             f"Drive the spike in and out at two speeds a factor of ten apart, to twice the depth reached here: "
             f"{first.effect} and {second.effect} part where speed, direction and depth change one at a time."
         )
+
+
+def _touching(trial: Prepared) -> NDArray[np.bool_]:
+    """Rows of a driven trial that may lie on either side of the surface."""
+    assert trial.smooth is not None
+    return np.abs(trial.smooth.depth) < _off_surface(trial)
+
+
+def _off_surface(trial: Prepared) -> Array:
+    """How far from the surface [m] a row may be and yet lie on its other side: the depth's error, and the way of one
+    row, since depth and force are not read at one and the same instant."""
+    assert trial.smooth is not None
+    smooth = trial.smooth
+    return 3 * smooth.depth_std + np.abs(smooth.speed) * np.gradient(trial.time)
 
 
 def _turning(speed: Array, std: Array, force: Array, noise: float) -> Array:

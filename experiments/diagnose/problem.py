@@ -132,6 +132,10 @@ class Problem(Protocol):
         """``penetration`` or ``tumble``."""
 
     @property
+    def whole(self) -> str:
+        """All that takes part in a trial, as in "what comes back is in ..."."""
+
+    @property
     def trials(self) -> tuple[TrialInfo, ...]:
         """The trials that can be used, in the campaign's order."""
 

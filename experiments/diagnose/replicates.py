@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from .fitting import Fit, fit
 from .gate import low_modes
 from .problem import Finding, Parameter, Problem, TrialInfo
 
-__all__ = ["find_scatter", "groups_of", "odd_trials", "split_trials"]
+__all__ = ["find_scatter", "groups_of", "odd_trials", "parted", "split_trials"]
 
 _SURE = 1e-4
 _LEAST = 0.005
@@ -22,6 +22,8 @@ _LEAST = 0.005
 _AT_ODDS = 20.0
 """How many times as far from its replicates as they are from one another, in mean square, a trial is at odds."""
 
+_ANOTHER = 1.1
+"""Ratio of two depths or durations from which on trials do not go through the same."""
 _SIZEABLE = 0.2
 """And by which share of what the base model leaves it must differ: small errors of the path count for more there."""
 
@@ -32,6 +34,24 @@ def groups_of(trials: Sequence[TrialInfo]) -> dict[tuple[object, ...], list[str]
     for trial in trials:
         found.setdefault(trial.condition, []).append(trial.id)
     return found
+
+
+def parted(trials: Sequence[TrialInfo], sizes: Mapping[str, Sequence[float]]) -> tuple[TrialInfo, ...]:
+    """The same, those of one condition parted where they do not go through the same: trials that go half as deep, last
+    half as long or do not come back are no replicates of the others.
+
+    `sizes`: id -> what was measured of a trial (its depth, its duration), above 0, as many numbers for all trials of a
+    condition. Sorted, they are cut where one exceeds the one before by more than a tenth.
+    """
+    found = {trial.id: trial for trial in trials}
+    for ids in groups_of(trials).values():
+        for numbers in zip(*(sizes[id] for id in ids), strict=True):
+            order = np.argsort(numbers, kind="stable")
+            ranked = np.array(numbers)[order]
+            place = np.concatenate([[0], np.cumsum(ranked[1:] > _ANOTHER * ranked[:-1])])
+            for k, where in zip(order, place, strict=True):
+                found[ids[k]] = replace(found[ids[k]], condition=(*found[ids[k]].condition, int(where)))
+    return tuple(found[trial.id] for trial in trials)
 
 
 def split_trials(trials: Sequence[TrialInfo]) -> tuple[tuple[str, ...], tuple[str, ...]]:

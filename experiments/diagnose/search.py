@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .bounds import is_strained
 from .equivalence import CLOSE, Rival, compare
 from .evidence import SMALL, Hypothesis, best_start, excess, score
 from .fitting import Fit, Model, fit
@@ -211,14 +212,16 @@ class Search:
         return best
 
     def _worth(self, best: Hypothesis, new: Hypothesis) -> bool:
-        """Whether a further name is more than the misfit of the first one's form."""
+        """Whether a further name is more than the misfit of the first one's form: it takes most of what is left
+        away, or needs no more the number that the campaign excludes."""
         left = max(excess(best.fit), 0.0)
         gained, better = excess(best.fit) - excess(new.fit), new.score - best.score
-        if better >= _WORTH_MORE and gained >= _SHARE * left:
+        relieved = is_strained(best.fit) and not is_strained(new.fit)
+        if better >= _WORTH_MORE and (gained >= _SHARE * left or relieved):
             if gained >= _SHARE_OF_BASE * excess(self.base.fit):
                 return True
             # Little beside what the first name explains, but much for the sensors: then conditions left out decide.
-            if left > (SMALL - 1) * best.fit.count:
+            if left > (SMALL - 1) * best.fit.count or relieved:
                 return self._predicts(best, new, alone=better >= _WORTH_ALONE)
         seen = len(best.effects) < 2 and left > 2 * np.sqrt(2.0 * best.fit.count)
         if not seen or better < _WORTH_BOTH or gained < _SHARE_BOTH * left:

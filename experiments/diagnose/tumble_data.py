@@ -6,6 +6,7 @@ Nothing is averaged or resampled. Whitening divides by the std that campaign.tom
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -63,9 +64,11 @@ class TrialData:
         return self.channel == CHANNELS.index(name)
 
     @property
-    def condition(self) -> tuple[float, float, str]:
-        """What replicates share: stated gravity [m/s2], torque [N m] and actuator."""
-        return (self.gravity_sim, self.torque, self.actuator)
+    def condition(self) -> tuple[object, ...]:
+        """What replicates share: stated gravity [m/s2], torque [N m], actuator, until when [s] (as far as the trial is
+        looked at), the wheel's first speed [rad/s] and the counterweight [kg]."""
+        until = self.torque_until if self.torque_until < self.end else math.inf
+        return (self.gravity_sim, self.torque, self.actuator, until, self.wheel_speed_0, self.counterweight)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,6 +21,7 @@ from rigid.trajectory import STATES
 
 from .own import OwnEffect
 from .problem import Finding, Form, Parameter, Samples, TrialInfo, Values
+from .replicates import parted
 from .tumble_data import CHANNELS, TumbleData, tumble_data
 from .tumble_follow import followed_until
 from .tumble_forms import TumbleForm, tumble_forms
@@ -46,6 +47,7 @@ class TumbleProblem:
     """One campaign of tumbles: a `Problem`."""
 
     kind = "tumble"
+    whole = "the platform, the rig or the surface"
     least_scatter = 0.01
     """Contact makes each trial's friction and bed uncertain by some tenths of a percent; less is not asked for."""
 
@@ -66,14 +68,15 @@ class TumbleProblem:
     @cached_property
     def trials(self) -> tuple[TrialInfo, ...]:
         """In the campaign's order."""
-        return tuple(
+        told = [
             TrialInfo(
                 id=trial.id,
                 condition=trial.condition,
                 settings={"torque_N_m": trial.torque, "gravity_m_s2": trial.gravity_sim},
             )
             for trial in self.data.trials
-        )
+        ]
+        return parted(told, {trial.id: (max(trial.end, 1e-9),) for trial in self.data.trials})
 
     @cached_property
     def base(self) -> tuple[Parameter, ...]:
@@ -162,8 +165,7 @@ class TumbleProblem:
         told = {
             "tables": tables.model_dump(mode="json", exclude={"name", "notes", "trial"}),
             "trials": [
-                [*trial.condition, trial.counterweight, str(trial.torque_until), trial.wheel_speed_0, trial.end]
-                + np.bincount(trial.channel, minlength=len(CHANNELS)).tolist()
+                [*map(str, trial.condition), trial.end] + np.bincount(trial.channel, minlength=len(CHANNELS)).tolist()
                 for trial in self.data.trials
             ],
         }

@@ -5,12 +5,13 @@ import pytest
 from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial
 
 from experiments.diagnose.bounds import bounds_met
-from experiments.diagnose.colour import find_colours
+from experiments.diagnose.colour import find_colours, find_loud
 from experiments.diagnose.diagnosis import diagnose
 from experiments.diagnose.fitting import Model, Whitener, fit, settled
 from experiments.diagnose.gate import held_out_gate, open_gate
 from experiments.diagnose.penetration_problem import make_problem
 from experiments.diagnose.problem import Parameter, Samples, TrialInfo
+from experiments.diagnose.replicates import groups_of, parted
 
 COUNT = 400
 
@@ -107,6 +108,23 @@ def test_noise_that_is_there_all_the_time_has_a_colour_and_a_burst_has_none():
     found = fitted(Line(noise=burst))
     assert found.chi_square > 2 * found.count
     assert find_colours(found) == {}
+
+
+def test_noise_twice_as_loud_is_told_from_a_model_that_leaves_as_much():
+    loud = fitted(Line(noise=lambda random, trial: 2.0 * random.standard_normal(COUNT)))
+    (colour,) = find_loud(loud).values()
+    assert colour.std == pytest.approx(2.0, abs=0.25) and loud.chi_square > 3 * loud.count
+    for misfit in (lambda t: 8.0 * np.sin(t / 5), lambda t: 8.0 * ((t > 30) & (t < 45))):
+        off = fitted(
+            Line(noise=lambda random, trial, f=misfit: random.standard_normal(COUNT) + f(np.linspace(0, 100, COUNT)))
+        )
+        assert off.chi_square > 3 * off.count and find_loud(off) == {}
+
+
+def test_trials_that_go_another_way_are_no_replicates():
+    trials = [TrialInfo(id=id, condition=("driven", 0.01)) for id in "abcd"]
+    told = parted(trials, {"a": (10.0, 1.0), "b": (30.0, 1.0), "c": (10.5, 1.0), "d": (10.2, 1.8)})
+    assert [sorted(ids) for ids in groups_of(told).values()] == [["a", "c"], ["b"], ["d"]]
 
 
 def test_a_stiffness_that_was_stated_wrong_is_not_passed_over():
