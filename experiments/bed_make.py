@@ -7,6 +7,7 @@ from typing import Any
 from .bed_graded import grading_told
 from .bed_settings import GRADED, BedSettings
 from .bed_work import check_memory, check_name, finish_bed, prepared_in
+from .kept_material import MATERIAL_COPY, keep_material
 from .progress import Progress
 from .runfolder import RunFolder
 from .whole_runs import whole_run
@@ -53,10 +54,11 @@ def _carry_out(settings: BedSettings, folder: RunFolder, progress: Progress) -> 
     if (graded := settings.sizes) is not None:
         options |= {"grain": graded, "spread": None}
     with folder.lock():
+        options["material"] = keep_material(settings.material, folder.path)
         prepared = prepared_in(folder, progress, options, name=settings.name)
         told = {} if graded is None else grading_told(prepared)
         title = f"A bed of {prepared.recipe['material']['name']}: {' '.join(settings.stages)}"
         return finish_bed(folder, prepared, progress, experiment="bed make", title=title, name=settings.name, **told)
 
 
-run, resume = whole_run("bed make", BedSettings, _carry_out, check=check)
+run, resume = whole_run("bed make", BedSettings, _carry_out, check=check, material_copy=MATERIAL_COPY)

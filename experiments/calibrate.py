@@ -26,6 +26,7 @@ from .calibrate_fit import Response, Wanted, design, find_best, next_point
 from .calibrate_result import Simulated, calibration_result, material_toml
 from .calibrate_settings import CalibrateSettings, Target, material_at
 from .calibrate_tests import SampleTest, figures_of, laboratory_figure, run_test, tests_for
+from .kept_material import BASE_COPY, keep_material
 from .progress import Progress
 from .runfolder import RunFolder, write_text
 from .stopping import held_back
@@ -158,6 +159,8 @@ def _carry_out(settings: CalibrateSettings, folder: RunFolder, progress: Progres
     simulated = [target for target in targets if target.state]
     beds = [target for target in targets if not target.state]
     with folder.lock(), held_back() as asked_to_stop:
+        material = keep_material(settings.material, folder.path, copy=BASE_COPY)
+        settings = settings.model_copy(update={"material": material})
         work = _Work(settings, folder, progress, asked_to_stop, targets)
         each = len(tests_for(settings, [t for t in targets if t.fit], seed=0))
         checks = settings.checks * len(settings.check_seeds) * len(tests_for(settings, simulated, seed=0))
@@ -250,4 +253,4 @@ def _of_bed(work: _Work, target: Target, stuff: Material) -> tuple[float, float 
     return share * kept["value"], None if kept["error"] is None else share * kept["error"]
 
 
-run, resume = whole_run("bed calibrate", CalibrateSettings, _carry_out, check=check)
+run, resume = whole_run("bed calibrate", CalibrateSettings, _carry_out, check=check, material_copy=BASE_COPY)

@@ -6,23 +6,25 @@ from pathlib import Path
 
 from .runfolder import write_text
 
-__all__ = ["MATERIAL_COPY", "keep_material"]
+__all__ = ["BASE_COPY", "MATERIAL_COPY", "keep_material"]
 
 MATERIAL_COPY = "material.toml"
 """The copy's name in the run's folder."""
+BASE_COPY = "base.toml"
+"""Its name in that of a calibration, whose material.toml is what it found."""
 
 
-def keep_material(name: str, folder: Path) -> str:
-    """From where the run takes its material: ``name`` of one that ships, or the copy in ``folder``, made if it lacks.
+def keep_material(name: str, folder: Path, *, copy: str = MATERIAL_COPY) -> str:
+    """What the run takes its material from: ``name`` of one that ships, or ``copy`` in ``folder``, made if it lacks.
 
     Raises ValueError for a name that is none and a file that will not do, unless the copy is there.
     """
     from dem.materials import MATERIALS, material
 
-    copy = folder / MATERIAL_COPY
+    kept = folder / copy
     if name.lower() in MATERIALS:
         return name
-    if not copy.exists():
+    if not kept.exists():
         material(name)
-        write_text(copy, Path(name).read_text(encoding="utf-8"))
-    return str(copy)
+        write_text(kept, Path(name).read_text(encoding="utf-8"))
+    return str(kept)

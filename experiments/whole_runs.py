@@ -23,8 +23,12 @@ def whole_run(
     carry_out: Callable[[Settings, RunFolder, Progress], Result],
     *,
     check: Callable[[Settings], None],
+    material_copy: str = "",
 ) -> tuple[Callable[..., Result], Callable[..., Result]]:
-    """The `run` and the `resume` of the experiment `name`, whose work on a folder is `carry_out`."""
+    """The `run` and the `resume` of the experiment `name`, whose work on a folder is `carry_out`.
+
+    ``material_copy``: the file in the folder that `resume` takes the material from, where there is one.
+    """
 
     def run(settings: Settings, folder: str | Path, *, progress: Progress | None = None) -> Result:
         """Carry it out into `folder` and return the result, as result.json has it.
@@ -40,6 +44,8 @@ def whole_run(
         fields = settings_class.model_fields
         # run.toml has them all: those at their defaults are said to be so again.
         given = {k: value for k, value in kept.settings.items() if k not in fields or value != fields[k].default}
+        if material_copy and (kept.path / material_copy).is_file():
+            given["material"] = str(kept.path / material_copy)
         return carry_out(settings_class(**given), kept, progress or Progress())
 
     return run, resume

@@ -3,8 +3,10 @@
 import pytest
 from fake_bed import FakeBed
 
-from dem.materials import SAND, read_material
-from experiments import penetrate
+from dem.materials import SAND, material, read_material
+from experiments import bed_make, bed_work, calibrate, penetrate
+from experiments.bed_settings import BedSettings
+from experiments.calibrate_settings import CalibrateSettings
 from experiments.kept_material import keep_material
 from experiments.settings import PenetrateSettings
 
@@ -34,6 +36,35 @@ def test_a_run_goes_on_without_the_file_that_its_material_came_from(tmp_path, mo
     assert read_material(out / "material.toml").density == 2700.0
     given.unlink()
     assert penetrate.resume(out)["bed"] == first["bed"]
+
+
+def test_a_bed_and_a_calibration_go_on_without_the_file_that_their_material_came_from(tmp_path, monkeypatch):
+    """The calibration's material.toml is what it finds; what it began with is base.toml."""
+    used = []
+
+    def stopped(stuff, *_, **options):
+        used.append(material(stuff).density)
+        raise RuntimeError("stopped")
+
+    monkeypatch.setattr(bed_work, "prepare_as", lambda **options: stopped(options["material"]))
+    monkeypatch.setattr(calibrate, "run_test", stopped)
+    given = tmp_path / "mine.toml"
+    wanted = {"critical_friction_angle": {"value": 30.0, "tolerance": 2.0, "source": "a guess"}}
+    fitted = {"name": "new", "free": {"friction": (0.3, 0.6)}, "targets": wanted}
+    ways = (
+        (bed_make, BedSettings, {}, "material.toml"),
+        (calibrate, CalibrateSettings, fitted, "base.toml"),
+    )
+    for module, settings, options, copy in ways:
+        given.write_text(FILE)
+        out = tmp_path / copy.replace(".toml", "")
+        with pytest.raises(RuntimeError, match="stopped"):
+            module.run(settings(material=str(given), **options), out)
+        given.unlink()
+        with pytest.raises(RuntimeError, match="stopped"):
+            module.resume(out)
+        assert (out / copy).read_text() == FILE
+    assert used == [2700.0] * 4
 
 
 def test_a_material_that_ships_needs_no_copy_and_one_that_is_none_is_refused(tmp_path):
