@@ -31,8 +31,8 @@ def test_cases_that_can_share_a_bed_do():
         return {tuple(getattr(case.settings, key) for key in shaping) for case in suite.cases(names)}
 
     for names, seeds in (
-        (("grains1-sand", "grains5-landing"), 1), (("grains1-look", "grains5-look"), 3), (("grains3-row",), 3), (("grains3-look",), 3),
-        (("grains6",), 2),
+        (("grains1-sand", "grains5-landing"), 1), (("grains1-look", "grains5-look"), 3), (("grains3-row",), 3),
+        (("grains3-look",), 3), (("grains6",), 2),
     ):  # fmt: skip
         found = beds(*names)
         assert len(found) == len({bed[-1] for bed in found}) == seeds
