@@ -293,6 +293,14 @@ class BedFooting:
         found = bed_energies(self.bed, bodies=self._surfaces())
         return {name: self.copies * value for name, value in found.items()}
 
+    def keep_book(self) -> None:
+        """See `Bed.keep_book`."""
+        self.bed.keep_book()
+
+    def work_taken(self) -> dict[str, float]:
+        """`Bed.work_taken`, `copies` times [J]."""
+        return {name: self.copies * value for name, value in self.bed.work_taken.items()}
+
     def pushes(self) -> tuple[Vector, Vector]:
         """Where grains touch the members now [m], and the normal springs' forces on them [N], shape [n, 3] both.
 

@@ -109,6 +109,8 @@ class CoupledTumble:
             rows, weight=trial.weight, mu_d=trial.sliding_friction, macro_step=self.master.macro_step
         )
         self._every = max(1, round(energy_interval / self.master.macro_step))
+        self.energy_interval = self._every * self.master.macro_step
+        """Between measurements of what the footing holds [s]."""
         self.placed = lowering_speed is None
         """Whether the hand has let go."""
         self.placing_steps = 0
@@ -121,6 +123,8 @@ class CoupledTumble:
         self._frames = 0
         self.energy_names: tuple[str, ...] = ()
         """What the footing's energies are, in the order of `samples`."""
+        self.work_names: tuple[str, ...] = ()
+        """Likewise of a bed's book of what its contacts took (`Bed.work_taken`)."""
         if self.placed:
             self.body.touching = rests
             self._begin()
@@ -210,6 +214,8 @@ class CoupledTumble:
         self.master.open_books()
         start = self.footing.momentum() if isinstance(self.footing, BedFooting) else np.zeros(3)
         self._momentum = start
+        if isinstance(self.footing, BedFooting):
+            self.footing.keep_book()
         self._keep(self.master.last)
         self._measure()
 
@@ -255,7 +261,9 @@ class CoupledTumble:
             fallen = np.array([0.0, -self.trial.weight * self.body.time])
             off = float(np.linalg.norm((self.footing.momentum() - self._momentum)[[0, 2]] + moving - fallen))
         computed = self.footing.grain_steps if isinstance(self.footing, BedFooting) else 0
-        self._samples.append([self.body.time, off, computed, *found.values()])
+        taken = self.footing.work_taken() if isinstance(self.footing, BedFooting) else {}
+        self.work_names = tuple(f"{name}_work" for name in taken)
+        self._samples.append([self.body.time, off, computed, *found.values(), *taken.values()])
 
     # What came of it -----------------------------------------------------------------------------------------------
 
@@ -276,9 +284,10 @@ class CoupledTumble:
 
     @property
     def samples(self) -> dict[str, np.ndarray]:
-        """Of the footing, by time: `time` [s], `momentum_error` [N s], `grain_steps` of a bed so far, energies [J]."""
-        table = np.array(self._samples, dtype=float).reshape(-1, 3 + len(self.energy_names))
-        return dict(zip(("time", "momentum_error", "grain_steps", *self.energy_names), table.T, strict=True))
+        """Of the footing, by time: `time` [s], `momentum_error` [N s], `grain_steps` of a bed so far, energies [J],
+        work that its contacts took [J]."""
+        names = ("time", "momentum_error", "grain_steps", *self.energy_names, *self.work_names)
+        return dict(zip(names, np.array(self._samples, dtype=float).reshape(-1, len(names)).T, strict=True))
 
     @property
     def balance(self) -> np.ndarray:
@@ -309,11 +318,48 @@ class CoupledTumble:
         lost = self.dissipated
         return float((np.maximum.accumulate(lost) - lost).max()) / self.energy_scale
 
+    @property
+    def losses(self) -> dict[str, np.ndarray]:
+        """What a bed lost by measurement [J], at each time of `samples`: to normal dashpots, to friction (with the
+        tangential dashpot), to rolling and twisting. Empty on a law."""
+        if not self.work_names:
+            return {}
+        samples = self.samples
+
+        def less_springs(part: str) -> np.ndarray:
+            return np.asarray(samples[f"{part}_work"] - (samples[part] - samples[part][0]))
+
+        friction, rolling = less_springs("tangential"), less_springs("turning")
+        return {"damping": samples["damping_work"], "friction": friction, "rolling": rolling}
+
+    @property
+    def book_gap(self) -> np.ndarray:
+        """What a bed lost by measurement less `dissipated` [J], at each time of `samples`; empty on a law.
+
+        Here nothing cancels: it is the energy that the grains' integrator made (above 0) or lost, and what `energies`
+        or the losses have wrong.
+        """
+        lost = list(self.losses.values())
+        return np.sum(lost, axis=0) - self.dissipated if lost else np.zeros(0)
+
+    @property
+    def energy_residual(self) -> float:
+        """Largest energy that is not accounted for, over `energy_scale` [1].
+
+        Of the body and the exchange (`balance`) and, on a bed, with what the grains hold and lost, each measured.
+        """
+        balance, gap = self.balance, self.book_gap
+        worst = float(np.abs(balance).max())
+        if gap.size:
+            at = np.searchsorted(self.columns["time"], self.samples["time"])
+            worst = max(worst, float(np.abs(balance[at] + gap).max()))
+        return worst / self.energy_scale
+
     def trajectory(self) -> Trajectory:
         """As the planar model's integrators give it, what the footing holds as stored energy.
 
-        `dissipated` is what the footing took less what it holds more than at the start: by difference, not measured. So
-        what it holds cancels in `energy_residual`; see `dissipation_reversal`.
+        `dissipated` is what the footing took less what it holds more than at the start, at every row; of a bed that is
+        measured as well, at the times of `samples` (`losses`).
         """
         rows, samples = self.columns, self.samples
         tally = Tally(self.trial, rows["x"][0], rows["y"][0], 0.0)
@@ -326,7 +372,6 @@ class CoupledTumble:
             tally.see(rows["time"][k], rows["vx"][k], rows["vy"][k], rows["omega"][k], 0.0, rows["torque_work"][k], 0.0)
         held = np.sum([samples[name] for name in self.energy_names], axis=0)
         stored = np.interp(rows["time"], samples["time"], held)
-        residual = float(np.abs(self.balance).max()) / self.energy_scale
         shared = {name: rows[name] for name in COLUMNS[:14]}
         return Trajectory(
             trial=self.trial,
@@ -339,7 +384,7 @@ class CoupledTumble:
             max_speed=tally.max_speed,
             time_of_max_speed=tally.time_of_max_speed,
             max_angular_velocity=tally.max_spin,
-            energy_residual=residual,
+            energy_residual=self.energy_residual,
             notes={"macro_step": self.master.macro_step},
             **shared,
         )
@@ -359,8 +404,11 @@ class CoupledTumble:
             "tumble.rows": np.array(self._rows, dtype=float).reshape(-1, len(COLUMNS)),
             "tumble.states": np.array(self._states, dtype=np.int8),
             "tumble.feet": self.feet,
-            "tumble.samples": np.array(self._samples, dtype=float).reshape(-1, 3 + len(self.energy_names)),
+            "tumble.samples": np.array(self._samples, dtype=float).reshape(
+                -1, 3 + len(self.energy_names) + len(self.work_names)
+            ),
             "tumble.energies": np.array(self.energy_names, dtype=str),
+            "tumble.works": np.array(self.work_names, dtype=str),
             "tumble.momentum": np.asarray(self._momentum, dtype=float),
         }
         own |= {f"reader.{key}": value for key, value in self.reader.state().items()}
@@ -378,6 +426,7 @@ class CoupledTumble:
         self._feet = list(np.asarray(state["tumble.feet"]))
         self._samples = np.asarray(state["tumble.samples"]).tolist()
         self.energy_names = tuple(str(name) for name in np.asarray(state["tumble.energies"]))
+        self.work_names = tuple(str(name) for name in np.asarray(state["tumble.works"]))
         self._momentum = np.array(state["tumble.momentum"], dtype=float)
         self.reader.restore({key[7:]: value for key, value in state.items() if key.startswith("reader.")})
         self.master.restore(state)

@@ -13,6 +13,7 @@ from . import runtime, state
 from .cohesion import COHESIONS, jkr_range
 from .contact import effective_moduli, pair_parameters
 from .engine import MOST_PRIMITIVES, take_engine
+from .ledger import PARTS
 from .lists import MOST_BODIES
 from .materials import Facing, Material
 from .materials import material as find_material
@@ -453,6 +454,31 @@ class Bed:
         e.tally(rows)
         return rows[:-1], float(rows[-1, 0])
 
+    # ------------------------------------------------------------------ the book of what is lost
+
+    def keep_book(self) -> None:
+        """From here on what contacts take is summed (``work_taken``), from 0; a tenth or so more time a step.
+
+        A drag (``advance``) is not in it.
+        """
+        self._check_valid()
+        self._engine.open_ledger()
+
+    @property
+    def work_taken(self) -> dict[str, float]:
+        """Work done against the contacts of grains, bodies and floor since ``keep_book`` [J], by ``dem.ledger``.
+
+        damping: against normal dashpots, all of it lost. tangential, turning: against tangential forces, and against
+        rolling and twisting torques; less what their springs hold more than then (``dem.energy.bed_energies``) it is
+        lost too.
+
+        Raises:
+            ValueError: no book is kept.
+        """
+        if not self._engine.ledger.on:
+            raise ValueError("this bed keeps no book of what contacts take: keep_book() opens it")
+        return dict(zip(PARTS, self._engine.ledger.sums().tolist(), strict=True))
+
     # ------------------------------------------------------------------ time
 
     @property
@@ -526,11 +552,11 @@ class Bed:
 
     def _make_lists(self, *, all_awake: bool = False) -> None:
         e = self._engine
-        e.keep_lists(e.rest)
+        e.keep_lists(e.rest, e.ledger)
         if self._sleeper is not None:
             self._sleeper.rearrange(all_awake=all_awake)
         e.sort(*self.gravity, e.rest)
-        e.make_lists(self._skin, e.shapes, e.rest)
+        e.make_lists(self._skin, e.shapes, e.rest, e.ledger)
         self.list_count += 1
         self._since_lists = 0
         code, value = (int(v) for v in e.problem[None])
@@ -561,7 +587,8 @@ class Bed:
     def _push(self, elapsed: float = 0.0) -> None:
         """Forces where the grains are; ``elapsed`` is the time by which contacts have slid since they were computed."""
         self._tallied = None
-        self._engine.push_all(elapsed, self._engine.shapes, self._engine.rest)
+        e = self._engine
+        e.push_all(elapsed, e.shapes, e.rest, e.ledger)
 
     def _shift_velocities(self, part: float) -> None:
         self._engine.shift_velocities(part * self.time_step)

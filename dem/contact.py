@@ -167,8 +167,8 @@ def contact_force(
     and ``v_t`` the slip, across n, both half a step before [m/s]; ``overlap`` [m], ``radius``, ``mass`` the effective
     ones, ``dt`` the time since the last force; 0 where forces are computed anew, which leaves the history alone. ``u``
     the history, updated in place: tangential displacement [m] and ``past`` [kg m/s], 0 for a new contact.
-    Returns (normal force [N], tangential force vector [N], tangential stiffness [N/m], contact radius [m], sqrt(m*
-    S_n), load that presses the surfaces together [N]).
+    Returns (normal force [N], what of it is the dashpot's [N], tangential force vector [N], tangential stiffness [N/m],
+    contact radius [m], sqrt(m* S_n), load that presses the surfaces together [N]).
     """
     a = ti.sqrt(radius * overlap)
     spring = a * 0.0
@@ -210,7 +210,7 @@ def contact_force(
     if dt > 0.0:
         u.xyz = share * stretch
         u.w = 0.5 * (momentum + dt * f_n)
-    return f_n, f_t, k_t, a, root, load
+    return f_n, f_n - spring, f_t, k_t, a, root, load
 
 
 @ti.func

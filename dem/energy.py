@@ -1,8 +1,10 @@
 """What a bed holds: kinetic energy, height, and the springs of its contacts, read from its state.
 
 The springs are those of ``dem.contact``: Hertz's 4/15 (2 E*) a d^2 (which is 2/5 F d), and half the stiffness of now
-times the square of the stretch for the tangential, rolling and twisting ones. What dashpots and sliding take is not
-measured: the engine keeps no book of it (``experiments.validate.energy`` does, for a few grains).
+times the square of the stretch for the tangential, rolling and twisting ones. Cohesion is counted with the normal ones,
+from where the pair has parted: DMT's -2 pi w R* d, and JKR's force integrated over the overlap,
+    U = 8 E* a^5 / (15 R*^2) - 4/3 sqrt(2 pi w E*) a^(7/2) / R* + pi w a^2 - (the same where the pair parts).
+What dashpots and sliding take is ``dem.ledger``'s.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .cohesion import COHESIONS, DMT, JKR
 from .lists import INDEX_BITS, INDEX_MASK
 
 if TYPE_CHECKING:
@@ -21,7 +24,7 @@ __all__ = ["bed_energies", "body_pushes"]
 
 Array = np.ndarray
 Gap = Callable[[Array], tuple[Array, Array, Array]]
-_TWO_E, _EIGHT_G = 0, 1  # of a row of pair parameters
+_TWO_E, _EIGHT_G, _PI_W = 0, 1, 7  # of a row of pair parameters
 
 
 def bed_energies(bed: Bed, *, bodies: Mapping[int, Gap]) -> dict[str, float]:
@@ -35,19 +38,15 @@ def bed_energies(bed: Bed, *, bodies: Mapping[int, Gap]) -> dict[str, float]:
     Returns:
         kinetic (translation and rotation, at the time of the positions), potential (of gravity, from z = 0), normal,
         tangential, turning (springs of all contacts, bodies and floor included).
-
-    Raises:
-        ValueError: grains with cohesion, whose contacts store energy in another way.
     """
-    if bed.material.cohesion != "none":
-        raise ValueError(f"cohesion = {bed.material.cohesion!r}: the energy of such contacts is not measured yet")
     grains = bed.grains()
     moving = 0.5 * grains["mass"] @ (grains["velocity"] ** 2).sum(axis=1)
     turning = 0.2 * (grains["mass"] * grains["radius"] ** 2) @ (grains["spin"] ** 2).sum(axis=1)
     height = -(grains["mass"] @ (grains["position"] @ np.array(bed.gravity, dtype=float)))
     state = bed.state()
     surfaces: dict[int, Gap] = {0: _floor} if bed._has_floor else {}
-    springs = _pairs(bed, state) + _near(state, surfaces | dict(bodies))
+    law = COHESIONS[bed.material.cohesion]
+    springs = _pairs(bed, state, law) + _near(state, surfaces | dict(bodies), law)
     names = ("normal", "tangential", "turning")
     found = {"kinetic": float(moving + turning), "potential": float(height)}
     return found | {name: float(value) for name, value in zip(names, springs, strict=True)}
@@ -82,22 +81,48 @@ def _floor(points: Array) -> tuple[Array, Array, Array]:
 
 
 def _springs(
-    row: Array, overlap: Array, radius: Array, stretch: Array, turned: Array, normal: Array, share: Any
+    law: int, row: Array, overlap: Array, radius: Array, stretch: Array, turned: Array, normal: Array, share: Any
 ) -> Array:
     """Normal, tangential and turning springs of contacts [J], shape (3,); ``row`` their pairs' parameters."""
-    a = np.sqrt(radius * overlap)
+    a, pressed = _normal_spring(law, row, overlap, radius)
     k_t = row[..., _EIGHT_G] * a
     twist = (turned * normal).sum(axis=1)
     roll = (turned**2).sum(axis=1) - twist**2
     held = (
-        4 / 15 * row[..., _TWO_E] * a * overlap**2,
+        pressed,
         0.5 * k_t * (stretch**2).sum(axis=1),
         0.5 * k_t * (radius**2 * roll + 0.5 * a**2 * twist**2),
     )
     return np.array([float((share * part).sum()) for part in held])
 
 
-def _pairs(bed: Bed, state: Mapping[str, Array]) -> Array:
+def _normal_spring(law: int, row: Array, overlap: Array, radius: Array) -> tuple[Array, Array]:
+    """Contact radius [m] and energy [J] at an overlap, both 0 where the pair has parted."""
+    two_e, pi_w = row[..., _TWO_E], row[..., _PI_W]
+    if law == JKR and pi_w > 0:
+        unit = (4 * pi_w * radius**2 / two_e) ** (1 / 3)
+        d = overlap * radius / unit**2
+        least = 0.25 ** (1 / 3)
+        touching = d > -0.75 * least
+        d = np.maximum(d, -0.75 * least)
+        # The contact radius over ``unit`` is s^2, s the larger root of s^4 - s = d (``dem.cohesion``).
+        u = np.cbrt(1 / 16 + np.sqrt(np.maximum(0.0, 1 / 256 + d**3 / 27)))
+        m = u - d / (3 * u)
+        m = np.where(d > 0, 0.125 / (m * m + np.maximum(d, 0.0)), m)
+        s = 0.5 * (np.sqrt(2 * m) + np.sqrt(np.maximum(0.0, 2 / np.sqrt(2 * m) - 2 * m)))
+
+        def curve(s: Any) -> Any:
+            return 16 / 15 * s**10 - 8 / 3 * s**7 + s**4
+
+        # With 2 pi w = E* unit^3 / R^2 every term has pi w unit^2 for a factor.
+        return np.where(touching, unit * s**2, 0.0), np.where(touching, pi_w * unit**2 * (curve(s) - curve(least)), 0.0)
+    pressed = np.maximum(0.0, overlap)
+    a = np.sqrt(radius * pressed)
+    energy = 4 / 15 * two_e * a * pressed**2
+    return a, energy - 2 * pi_w * radius * pressed if law == DMT else energy
+
+
+def _pairs(bed: Bed, state: Mapping[str, Array], law: int) -> Array:
     """Of two grains. A pair within a chunk is listed once, one across chunks by both."""
     count = bed.grain_count
     position = state["position"].astype(float)
@@ -120,9 +145,9 @@ def _pairs(bed: Bed, state: Mapping[str, Array]) -> Array:
         i, j, d, slide, turned, share = (np.concatenate(pair) for pair in parts)
     length = np.linalg.norm(d, axis=1)
     r_i, r_j = position[i, 3], position[j, 3]
-    overlap = np.maximum(0.0, r_i + r_j - length)
+    overlap = r_i + r_j - length
     row = np.array(bed._engine.grain_pair[None], dtype=float)
-    return _springs(row, overlap, r_i * r_j / (r_i + r_j), slide[:, :3], turned, d / length[:, None], share)
+    return _springs(law, row, overlap, r_i * r_j / (r_i + r_j), slide[:, :3], turned, d / length[:, None], share)
 
 
 def _asleep(bed: Bed, state: Mapping[str, Array]) -> tuple[Array, ...]:
@@ -140,7 +165,7 @@ def _asleep(bed: Bed, state: Mapping[str, Array]) -> tuple[Array, ...]:
     return i, j, d, slide, turned[:, :3], share
 
 
-def _near(state: Mapping[str, Array], surfaces: Mapping[int, Gap]) -> Array:
+def _near(state: Mapping[str, Array], surfaces: Mapping[int, Gap], law: int) -> Array:
     """Of a grain and a body."""
     rows = [state[name] for name in ("near_grain", "near_body", "near_slide", "near_roll")]
     if "sleep_numbers" in state:
@@ -153,9 +178,9 @@ def _near(state: Mapping[str, Array], surfaces: Mapping[int, Gap]) -> Array:
         mine = rows[1] == body
         centres = state["position"][rows[0][mine]].astype(float)
         distance, normal, curvature = surface(centres[:, :3])
-        overlap = np.maximum(0.0, centres[:, 3] - distance)
+        overlap = centres[:, 3] - distance
         radius = centres[:, 3] / (1 + centres[:, 3] * curvature)
         slide, turned = (values[mine].astype(float) for values in rows[2:])
         row = state["body_pair"][body].astype(float)
-        total += _springs(row, overlap, radius, slide[:, :3], turned[:, :3], normal, 1.0)
+        total += _springs(law, row, overlap, radius, slide[:, :3], turned[:, :3], normal, 1.0)
     return total

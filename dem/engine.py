@@ -26,6 +26,7 @@ import taichi as ti
 from . import runtime
 from .cohesion import JKR
 from .contact import PAIR_WIDTH, adhesive_range, contact_force, turning_torque
+from .ledger import NO_LEDGER, Bookkeeping, Ledger
 from .lists import (
     ALL_CHUNKS,
     AWAKE,
@@ -97,7 +98,7 @@ def _roomy(count: int, *, least: int) -> int:
 
 
 @ti.data_oriented
-class Engine(Lists, Shapes, Sleepers):
+class Engine(Lists, Shapes, Sleepers, Bookkeeping):
     """Grains, lists and bodies in Taichi fields, and the kernels that advance them.
 
     Args:
@@ -270,6 +271,8 @@ class Engine(Lists, Shapes, Sleepers):
         self._meshes = []
         self.rest: Any = EVERYONE  # the table of those that sleep, likewise
         self._kept_rest: Rest | None = None
+        self.ledger: Any = NO_LEDGER  # the table of the book of dissipation, likewise
+        self._kept_ledger: Ledger | None = None
         self.grain_pair = F(PAIR_WIDTH, real, ())
         # Step control: moved is written by move and read by push; halted is written by push and read by move.
         self.moved = ti.field(ti.i32, ())
@@ -302,6 +305,7 @@ class Engine(Lists, Shapes, Sleepers):
         self.clear_pushes()
         self.clear_shapes()
         self.rest = EVERYONE
+        self.ledger = NO_LEDGER
 
     def let_sleep(self) -> None:
         """From here on kernels know of sleep; all are awake still."""
@@ -320,6 +324,19 @@ class Engine(Lists, Shapes, Sleepers):
         """All are awake, and the kernels are those that know of no sleep."""
         self.rest = EVERYONE
         self.count[AWAKE], self.count[CHUNKS] = self.grain_count, self.chunk_count
+
+    def open_ledger(self) -> None:
+        """From here on kernels keep the book of what contacts take."""
+        if self._kept_ledger is None:
+            self._kept_ledger = Ledger(
+                rows=self.pair.shape[0], near=self.near_grain.shape[0], chunks=self.overlap.shape[0], real=self.real
+            )
+        self.ledger = self._kept_ledger
+        self.ledger.clear()
+
+    def close_ledger(self) -> None:
+        """The kernels are those that keep no book."""
+        self.ledger = NO_LEDGER
 
     def read(self, name: str) -> np.ndarray:
         """A field as a numpy array: the rows of the grains or chunks there are, or all of them."""
@@ -351,9 +368,9 @@ class Engine(Lists, Shapes, Sleepers):
         if self.gpu:
             self.done[None] = 0
             for _ in range(min(most, STEPS_PER_LAUNCH)):
-                self.run_on_gpu(dt, limit, *gravity, keep, self.shapes, self.rest)
+                self.run_on_gpu(dt, limit, *gravity, keep, self.shapes, self.rest, self.ledger)
         else:
-            self.run(dt, limit, *gravity, keep, min(most, STEPS_PER_LAUNCH), self.shapes, self.rest)
+            self.run(dt, limit, *gravity, keep, min(most, STEPS_PER_LAUNCH), self.shapes, self.rest, self.ledger)
         return int(self.done[None]), bool(self.halted[None])
 
     @ti.func
@@ -411,7 +428,7 @@ class Engine(Lists, Shapes, Sleepers):
             self.body_turn[b] = s / s.norm()
 
     @ti.func
-    def push(self, c, dt, shapes: ti.template(), rest: ti.template()):
+    def push(self, c, dt, shapes: ti.template(), rest: ti.template(), ledger: ti.template()):
         """Forces between the grains of a chunk and all that they touch."""
         start, end = self.chunk_range(c)
         # First find out which pairs touch, without a branch that a processor would have to guess; then their forces.
@@ -439,6 +456,8 @@ class Engine(Lists, Shapes, Sleepers):
             if touching != (code < 0):
                 self.pair[s] = ~code
                 if code < 0:
+                    if ti.static(ledger.on):
+                        self.book_pair(c, s, i, bits & INDEX_MASK, d, ledger.nothing(), dt, rest, ledger)
                     self.slide[s] = ti.Vector.zero(self.real, 4)
                     if ti.static(self.rolling):
                         self.roll[s] = ti.Vector.zero(self.real, 3)
@@ -479,7 +498,7 @@ class Engine(Lists, Shapes, Sleepers):
             turning = (arm_i - back) * w_i.xyz + (arm_j - back) * w_j.xyz
             v_t = (1.0 + h * v_n) * v_t - turning.cross(n)
             u = self.slide[s]
-            f_n, f_t, k_t, a, root, load = contact_force(
+            f_n, damped, f_t, k_t, a, root, load = contact_force(
                 p, n, v_n, v_t, overlap, radius, mass, dt, u, self.tensile, self.cohesion
             )
             self.slide[s] = u
@@ -499,9 +518,11 @@ class Engine(Lists, Shapes, Sleepers):
             if ti.static(rest.on):
                 if j >= self.count[AWAKE]:
                     held -= f
+            if ti.static(ledger.on):
+                self.book_pair(c, s, i, j, d, ledger.parts(damped, f_t, turn), dt, rest, ledger)
             largest = ti.max(largest, overlap * by_sum)
         for s in range(c * self.count[NEAR_ROOM], self.near_end[c]):
-            largest = ti.max(largest, self.push_near(c, s, dt, shapes))
+            largest = ti.max(largest, self.push_near(c, s, dt, shapes, ledger))
         self.overlap[c] = ti.max(self.overlap[c], largest)
         if ti.static(rest.on):
             rest.held[c] = rest.held[c] + held
@@ -517,7 +538,7 @@ class Engine(Lists, Shapes, Sleepers):
         return d
 
     @ti.func
-    def push_near(self, c, s, dt, shapes: ti.template()):
+    def push_near(self, c, s, dt, shapes: ti.template(), ledger: ti.template()):
         """Force between a grain and a body; returns overlap over diameter."""
         i = self.near_grain[s]
         b = self.near_body[s]
@@ -529,32 +550,22 @@ class Engine(Lists, Shapes, Sleepers):
         overlap = x.w - distance
         result = ti.cast(0.0, self.real)
         if overlap > -self.body_range(b, x.w, curvature):
-            v_i = self.velocity[i]
-            w_i = self.spin[i]
             arm_i = x.w - overlap
-            body_spin = self.body_spin[b]
-            # As the body sees the grain; then half a step ago, where the velocities are: the normal, and the arms.
-            path = v_i.xyz - self.body_velocity[b]
-            v = path - body_spin.cross(arm + arm_i * n)
-            v_n = v.dot(n)
-            turning = body_spin.cross(n) + (curvature / (1.0 + curvature * arm_i)) * (v - v_n * n)
-            middle = n - 0.5 * dt * turning
-            v += 0.5 * dt * body_spin.cross(path)
-            v -= (arm_i - 0.5 * dt * v_n) * (w_i.xyz - body_spin).cross(middle)
-            v_t = v - v.dot(n) * middle
+            v_n, v_t, spin, parting = self.near_rates(i, b, n, curvature, arm, arm_i, dt)
             radius = x.w / (1.0 + x.w * curvature)
             p = self.body_pair[b]
             u = self.near_slide[s]
-            f_n, f_t, k_t, a, root, load = contact_force(
-                p, n, v_n, v_t, overlap, radius, v_i.w, dt, u, self.tensile, self.cohesion
+            f_n, damped, f_t, k_t, a, root, load = contact_force(
+                p, n, v_n, v_t, overlap, radius, self.velocity[i].w, dt, u, self.tensile, self.cohesion
             )
             self.near_slide[s] = u
             f = f_n * n + f_t
             t = arm_i * f_t.cross(n)
             t_body = -arm.cross(f)
+            turn = ti.Vector.zero(self.real, 3)
             if ti.static(self.rolling):
                 q = self.near_roll[s]
-                turn = turning_torque(p, n, w_i.xyz - body_spin, load, k_t, a, radius, root, dt, q)
+                turn = turning_torque(p, n, spin, load, k_t, a, radius, root, dt, q)
                 self.near_roll[s] = q
                 t += turn
                 t_body -= turn
@@ -564,10 +575,38 @@ class Engine(Lists, Shapes, Sleepers):
                 self.pushes[c, b][k] = self.pushes[c, b][k] - f[k]
                 self.pushes[c, b][k + 3] = self.pushes[c, b][k + 3] + t_body[k]
             result = overlap / (2.0 * x.w)
+            if ti.static(ledger.on):
+                now = ledger.parts(damped, f_t, turn)
+                ledger.add(c, ledger.took(ledger.near_last[s], now, parting, v_t, spin, dt))
+                ledger.near_last[s] = now
         else:
+            if ti.static(ledger.on):
+                before = ledger.near_last[s]
+                if before.norm_sqr() > 0.0:
+                    v_n, v_t, spin, parting = self.near_rates(i, b, n, curvature, arm, x.w - overlap, dt)
+                    ledger.add(c, ledger.took(before, ledger.nothing(), parting, v_t, spin, dt))
+                    ledger.near_last[s] = ledger.nothing()
             self.near_slide[s] = ti.Vector.zero(self.real, 4)
             self.near_roll[s] = ti.Vector.zero(self.real, 3)
         return result
+
+    @ti.func
+    def near_rates(self, i, b, n, curvature, arm, arm_i, dt):
+        """How fast a grain parts from a body, slides on it and turns, and the first across the middle normal.
+
+        As the body sees the grain; then half a step ago, where the velocities are: the normal, and the arms.
+        """
+        w_i = self.spin[i].xyz
+        body_spin = self.body_spin[b]
+        path = self.velocity[i].xyz - self.body_velocity[b]
+        v = path - body_spin.cross(arm + arm_i * n)
+        v_n = v.dot(n)
+        turning = body_spin.cross(n) + (curvature / (1.0 + curvature * arm_i)) * (v - v_n * n)
+        middle = n - 0.5 * dt * turning
+        v += 0.5 * dt * body_spin.cross(path)
+        v -= (arm_i - 0.5 * dt * v_n) * (w_i - body_spin).cross(middle)
+        v_t = v - v.dot(n) * middle
+        return v_n, v_t, w_i - body_spin, v.dot(middle)
 
     @ti.kernel
     def run(
@@ -581,6 +620,7 @@ class Engine(Lists, Shapes, Sleepers):
         steps: int,
         shapes: ti.template(),
         rest: ti.template(),
+        ledger: ti.template(),
     ):
         """Up to ``steps`` steps on a CPU; stops by itself where new lists are needed.
 
@@ -627,7 +667,7 @@ class Engine(Lists, Shapes, Sleepers):
                                 self.done[None] = phase // 2
                                 here = False
                             else:
-                                self.push(c, dt, shapes, rest)
+                                self.push(c, dt, shapes, rest, ledger)
                             ti.atomic_add(self.ticket[FINISHED], 1)
 
     @ti.kernel
@@ -641,6 +681,7 @@ class Engine(Lists, Shapes, Sleepers):
         keep: float,
         shapes: ti.template(),
         rest: ti.template(),
+        ledger: ti.template(),
     ):
         """One step on a GPU, where every grain is a chunk; nothing where new lists are needed, as in ``run``."""
         for c in range(self.count[CHUNKS]):
@@ -648,21 +689,21 @@ class Engine(Lists, Shapes, Sleepers):
                 self.move(c, dt, limit, ti.Vector([gx, gy, gz]), keep)
         for c in range(self.count[CHUNKS]):
             if self.moved[None] == 0:
-                self.push(c, dt, shapes, rest)
+                self.push(c, dt, shapes, rest, ledger)
                 if c == 0:
                     self.done[None] = self.done[None] + 1
             elif c == 0:
                 self.halted[None] = 1
 
     @ti.kernel
-    def push_all(self, dt: float, shapes: ti.template(), rest: ti.template()):
+    def push_all(self, dt: float, shapes: ti.template(), rest: ti.template(), ledger: ti.template()):
         """The forces of the step that was interrupted by new lists."""
         for _ in range(1):
             self.ticket[QUEUE] = 0
         for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
             c = self.next_chunk(w, True)
             while c < self.count[CHUNKS]:
-                self.push(c, dt, shapes, rest)
+                self.push(c, dt, shapes, rest, ledger)
                 c = self.next_chunk(w, False)
 
     # ------------------------------------------------------------------ what the host reads

@@ -205,14 +205,14 @@ class Lists:
             self.torque[i] = ti.Vector.zero(self.real, 3)
 
     @ti.kernel
-    def keep_lists(self, rest: ti.template()):
+    def keep_lists(self, rest: ti.template(), ledger: ti.template()):
         """Put the lists aside, so that the new ones can take the history over."""
         for _ in range(1):
             self.ticket[QUEUE] = 0
         for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
             c = self.next_chunk(w, True)
             while c < self.count[CHUNKS]:
-                self.keep_chunk(c, rest)
+                self.keep_chunk(c, rest, ledger)
                 c = self.next_chunk(w, False)
         if ti.static(rest.on):
             for i in range(self.count[AWAKE], self.count[GRAINS]):
@@ -221,7 +221,7 @@ class Lists:
                 self.near_first[i] = -1
 
     @ti.func
-    def keep_chunk(self, c, rest: ti.template()):
+    def keep_chunk(self, c, rest: ti.template(), ledger: ti.template()):
         start, end = self.chunk_range(c)
         for i in range(start, end):
             self.old_start[i] = self.pair_start[i]
@@ -236,6 +236,8 @@ class Lists:
                         self.old_roll[s] = self.roll[s]
                     if ti.static(rest.on):
                         rest.old_force[s] = rest.force[s]
+                    if ti.static(ledger.on):
+                        ledger.old_last[s] = ledger.last[s]
         self.old_near_end[c] = self.near_end[c]
         base = c * self.count[NEAR_ROOM]
         for k in range(self.near_end[c] - base):
@@ -246,6 +248,8 @@ class Lists:
             self.old_near_body[s] = self.near_body[s]
             self.old_near_slide[s] = self.near_slide[s]
             self.old_near_roll[s] = self.near_roll[s]
+            if ti.static(ledger.on):
+                ledger.old_near_last[s] = ledger.near_last[s]
 
     @ti.func
     def find_old(self, i, j):
@@ -258,7 +262,7 @@ class Lists:
         return found
 
     @ti.kernel
-    def make_lists(self, skin: float, shapes: ti.template(), rest: ti.template()):
+    def make_lists(self, skin: float, shapes: ti.template(), rest: ti.template(), ledger: ti.template()):
         """New pair and near lists for the sorted grains; history comes over from the lists put aside."""
         for b in range(MOST_BODIES):
             self.body_listed[b] = self.body_position[b]
@@ -268,7 +272,7 @@ class Lists:
         for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
             c = self.next_chunk(w, True)
             while c < self.count[CHUNKS]:
-                self.list_chunk(c, ti.cast(skin, self.real), shapes, rest)
+                self.list_chunk(c, ti.cast(skin, self.real), shapes, rest, ledger)
                 c = self.next_chunk(w, False)
         if ti.static(rest.on):
             for i in range(self.count[AWAKE], self.count[GRAINS]):
@@ -285,7 +289,7 @@ class Lists:
             self.halted[None] = 0
 
     @ti.func
-    def list_chunk(self, c, skin, shapes: ti.template(), rest: ti.template()):
+    def list_chunk(self, c, skin, shapes: ti.template(), rest: ti.template(), ledger: ti.template()):
         start, end = self.chunk_range(c)
         base = c * self.count[CHUNK_ROOM]
         s = base
@@ -327,16 +331,16 @@ class Lists:
                                     if d.norm_sqr() < reach * reach:
                                         if s < base + self.count[CHUNK_ROOM]:
                                             image = (mi + 1 + 3 * (mj + 1)) << INDEX_BITS
-                                            self.list_pair(s, i, j, j | image, rest)
+                                            self.list_pair(s, i, j, j | image, rest, ledger)
                                         s += 1
                             r += self.count[CELLS]
             self.pair_end[i] = ti.min(s, base + self.count[CHUNK_ROOM])
         if s > base + self.count[CHUNK_ROOM]:
             self.problem[None] = ti.Vector([2, s - base])
-        self.list_near(c, start, end, skin, shapes, rest)
+        self.list_near(c, start, end, skin, shapes, rest, ledger)
 
     @ti.func
-    def list_pair(self, s, i, j, code, rest: ti.template()):
+    def list_pair(self, s, i, j, code, rest: ti.template(), ledger: ti.template()):
         oi, oj = self.came_from[i], self.came_from[j]
         self.first[s] = i
         sign = ti.cast(1.0, self.real)
@@ -358,9 +362,15 @@ class Lists:
                 self.roll[s] = ti.Vector.zero(self.real, 3)
         if ti.static(rest.on):
             self.list_sleeper(s, i, j, code, old, rest)
+        if ti.static(ledger.on):
+            ledger.last[s] = ledger.nothing()
+            if old >= 0:
+                last = sign * ledger.old_last[old]
+                last[0] = sign * last[0]  # the normal part is the same from either side
+                ledger.last[s] = last
 
     @ti.func
-    def list_near(self, c, start, end, skin, shapes: ti.template(), rest: ti.template()):
+    def list_near(self, c, start, end, skin, shapes: ti.template(), rest: ti.template(), ledger: ti.template()):
         base = c * self.count[NEAR_ROOM]
         s = base
         for i in range(start, end):
@@ -380,11 +390,15 @@ class Lists:
                         self.near_body[s] = b
                         self.near_slide[s] = ti.Vector.zero(self.real, 4)
                         self.near_roll[s] = ti.Vector.zero(self.real, 3)
+                        if ti.static(ledger.on):
+                            ledger.near_last[s] = ledger.nothing()
                         o = self.near_first[self.came_from[i]]
                         while o >= 0:
                             if self.old_near_body[o] == b:
                                 self.near_slide[s] = self.old_near_slide[o]
                                 self.near_roll[s] = self.old_near_roll[o]
+                                if ti.static(ledger.on):
+                                    ledger.near_last[s] = ledger.old_near_last[o]
                             o = self.next_near(o, self.came_from[i])
                         if ti.static(rest.on):
                             self.wake_near(s, i, b, rest)

@@ -66,6 +66,8 @@ def take(bed: Bed) -> dict[str, np.ndarray]:
     state |= e.shape_state()
     if bed._sleeper is not None:
         state |= bed._sleeper.state(rows)
+    if e.ledger.on:
+        state |= e.ledger.state(rows, near)
     state["numbers"] = np.array(
         [
             bed.steps,
@@ -113,6 +115,10 @@ def put_back(bed: Bed, state: dict[str, np.ndarray]) -> None:
     e.write("near_end", (state["near_count"] + np.arange(e.chunk_count) * e.near_room).astype(np.int32))
     for name in ("near_grain", "near_body", "near_slide", "near_roll"):
         e.write(name, state[name], near)
+    e.close_ledger()
+    if "ledger_taken" in state:
+        e.open_ledger()
+        e.ledger.restore(state, rows, near)
     numbers = [int(v) for v in state["numbers"]]
     bed.steps, bodies, bed.list_count, bed._since_lists, bed._reaction_steps, floor = numbers
     bed._has_floor, bed._tallied = bool(floor), None

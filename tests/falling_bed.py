@@ -44,7 +44,7 @@ DOZING = {"speed": 0.5, "calm": 0.02, "reach": 0.2, "force": 3.0, "waking_speed"
 
 def make(threads=None, precision="float64", cohesion="none", body="spike", sleep=False):
     """The bed at time 0, with a ball-tipped cylinder (or ``solids``) that is pulled through it at a slant; at Bond
-    number 1 or 0."""
+    number 1 or 0. Where grains ``sleep`` it keeps a book."""
     dem.engine.GRAINS_PER_CHUNK = GRAINS_PER_CHUNK
     rng = np.random.default_rng(7)
     i = np.arange(300)
@@ -66,6 +66,7 @@ def make(threads=None, precision="float64", cohesion="none", body="spike", sleep
     bed.move_body(number, velocity=(0.05, 0.02, -0.5), spin=(0.0, 0.0, 20.0))
     if sleep:
         bed.let_sleep(Sleep(**DOZING))
+        bed.keep_book()
     return bed
 
 

@@ -81,6 +81,7 @@ def write_tumble_report(
         page = replace(page, sections=[sweep_section(result, figures, swept), *page.sections])
     if "grains" in result:
         tables = {name: read_columns(folder / file) for name, file in result["grains"]["series"].items()}
+        tables["motion"] = motion, states
         page = replace(page, sections=[*page.sections[:1], grains_section(result, figures, tables), *page.sections[1:]])
     if pictures if pictures is not None else "grains" in result and (folder / "frames" / "tumble.pvd").exists():
         from vis.tumble_pictures import make_tumble_pictures
@@ -240,7 +241,8 @@ def _draw_energy(
         rest.plot(time, scale * residual, color=INK, lw=1.0)
         rest.set_xlabel("time [s]")
         rest.set_ylabel(f"gained − work + dissipated [{unit}]")
-    residual_words = quantity(result["quantities"].get("energy_residual"))
+    own = result["quantities"].get("coupling_residual")
+    residual_words = quantity(own if own is not None else result["quantities"].get("energy_residual"))
     caption = (
         f"Left: what the torque put in, what the platform, counterweight and surface hold, and what friction and "
         f"damping took. Right: what is left over. Its largest, over the work of the torque or W l, is {residual_words}."

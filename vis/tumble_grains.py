@@ -25,12 +25,19 @@ _ROWS = (BED, MODEL, "#009E73", "#CC79A7", GREY, "#56B4E9", "#E69F00", INK)
 
 
 def grains_section(result: Mapping[str, Any], figures: Path, tables: Mapping[str, Columns]) -> Section:
-    """The section, its figures drawn into `figures`. `tables`: the run's own, feet and beside."""
+    """The section, its figures drawn into `figures`. `tables`: the run's own, motion, feet, bed and beside."""
     feet, beside = tables["feet"][0], tables["beside"][0]
     own = tables["own"][0]
     with styled():
         _draw_paths(own, beside).savefig(figures / "beside.png", dpi=130)
         _draw_feet(feet).savefig(figures / "feet.png", dpi=130)
+        books = (
+            _books(tables["motion"][0], feet, tables["bed"][0])
+            if "damping_lost_J" in tables.get("bed", ({}, ()))[0]
+            else None
+        )
+        if books is not None:
+            _draw_books(books).savefig(figures / "books.png", dpi=130)
     grains = result["grains"]
     facts = (
         f"{grains['mode']}. {grains['grain_count']} grains, packing {short(grains['packing_fraction'], 3)}, "
@@ -51,6 +58,13 @@ def grains_section(result: Mapping[str, Any], figures: Path, tables: Mapping[str
         ),
         text(facts, small=True),
     ]  # fmt: skip
+    if books is not None:
+        blocks.append(figure(
+            figures / "books.png", title="Where the energy went",
+            caption="Left: work of the torque; energy that platform and counterweight gained; what the grains hold "
+            "more (moving, lifted, in springs), and lost to dashpots, friction and rolling resistance: all measured, "
+            "none by difference. Right: what is left over, of all together and of platform and exchange alone.",
+        ))  # fmt: skip
     return Section("On grains, beside the spring-damper", blocks)
 
 
@@ -68,6 +82,50 @@ def _compared(result: Mapping[str, Any]) -> list[tuple[str, ...]]:
         cells = ["–" if value is None else f"{short(scale * value, 3)}{unit}" for value in values]
         rows.append((label, *cells))
     return rows
+
+
+def _books(
+    motion: Mapping[str, NDArray[np.float64]],
+    feet: Mapping[str, NDArray[np.float64]],
+    bed: Mapping[str, NDArray[np.float64]],
+) -> dict[str, NDArray[np.float64]]:
+    """The books at the times of ``bed`` [mJ]."""
+    time = bed["t_s"]
+
+    def at(columns: Mapping[str, NDArray[np.float64]], name: str) -> NDArray[np.float64]:
+        values = 1e3 * np.interp(time, columns["t_s"], columns[name])
+        return np.asarray(values - values[0])
+
+    book = {"time": time, "torque": at(motion, "torque_work_J"), "taken": at(feet, "taken_J")}
+    book["body"] = at(motion, "kinetic_J") + at(motion, "potential_J")
+    names = ("kinetic", "potential", "normal", "tangential", "turning")
+    held = 1e3 * np.sum([bed[f"{name}_J"] for name in names], axis=0)
+    book["held"] = held - held[0]
+    for name in ("damping", "friction", "rolling"):
+        book[name] = 1e3 * bed[f"{name}_lost_J"]
+    lost = book["damping"] + book["friction"] + book["rolling"]
+    book["coupling"] = book["body"] - book["torque"] + book["taken"]
+    book["all"] = book["body"] - book["torque"] + book["held"] + lost
+    return book
+
+
+def _draw_books(book: Mapping[str, NDArray[np.float64]]) -> Figure:
+    drawing, ((where, left),) = _panels(1, 2, 3.4)
+    lines = (
+        ("torque", "work of the torque", INK), ("body", "platform", MODEL), ("held", "grains hold", "#56B4E9"),
+        ("damping", "dashpots", "#E69F00"), ("friction", "friction", BED), ("rolling", "rolling resistance", "#CC79A7"),
+    )  # fmt: skip
+    for name, label, colour in lines:
+        where.plot(book["time"], book[name], color=colour, lw=1.4, label=label)
+    where.set_xlabel("time [s]")
+    where.set_ylabel("energy [mJ]")
+    left.plot(book["time"], 1e3 * book["all"], color=INK, lw=1.2, label="all together")
+    left.plot(book["time"], 1e3 * book["coupling"], color=GREY, lw=1.2, ls=(0, (4, 2)), label="platform and exchange")
+    left.set_xlabel("time [s]")
+    left.set_ylabel("left over [µJ]")
+    left.legend(frameon=False, fontsize="small")
+    drawing.legend(handles=where.lines, loc="outside upper left", ncols=6, fontsize="small")
+    return drawing
 
 
 def _panels(rows: int, columns: int, height: float) -> tuple[Figure, Any]:

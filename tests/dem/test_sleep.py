@@ -90,8 +90,9 @@ def test_woken_at_once_they_go_on_as_if_they_had_not_slept(layer):
     assert np.abs(after["position"] - before["position"]).max() < 1e-6 * D
 
 
-def test_the_bits_depend_on_neither_threads_nor_cuts_nor_where_it_goes_on(tmp_path):
-    """Grains that fall, with rules under which they doze off and wake often."""
+def test_the_bits_depend_on_neither_threads_nor_cuts_nor_where_it_goes_on(tmp_path, monkeypatch):
+    """Grains that fall, with rules under which they doze off and wake often; the book of what they lose too."""
+    monkeypatch.setattr(dem.engine, "GRAINS_PER_CHUNK", falling_bed.GRAINS_PER_CHUNK)
     path = tmp_path / "other.npz"
     command = [sys.executable, falling_bed.__file__, "fresh", str(path), "600", "1", "100", "none", "spike", "sleep"]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}

@@ -103,7 +103,7 @@ def test_the_result_dates_the_wheels_limit_and_warns_of_energy_that_the_ground_m
     assert any("max_wheel_speed = 1 rad/s, at 0.0096 s" in said for said in result["warnings"])
     reversal = result["quantities"]["dissipation_reversal"]["value"]
     assert any("dissipation_reversal" in said for said in result["warnings"]) == false == (reversal > 1e-3)
-    assert "cancels" in result["quantities"]["energy_residual"]["note"]
+    assert "dissipated_friction" not in result["quantities"]  # a law keeps no such book
 
 
 def test_a_run_that_leaves_the_bed_says_where_and_keeps_its_state_and_series(tmp_path, monkeypatch, capsys):
