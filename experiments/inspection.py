@@ -20,7 +20,7 @@ from .campaign import Campaign, PenetrationCampaign, Recording, TumbleCampaign, 
 from .campaign_settings import CheckSettings
 from .diagnose.problem import Finding
 from .diagnose.telling import findings_in_words
-from .plausible import find_implausible, loud_sensors, said_once, without_companions
+from .plausible import find_implausible, loud_sensors, missing_sensors, said_once, without_companions
 from .progress import Progress
 from .replicas import Condition, condition_of, condition_words, odd_replicates
 from .reporting import write_report
@@ -49,7 +49,7 @@ def find_faults(campaign: Campaign) -> list[Finding]:
         found = _faults_of_data(campaign)
     jumped = {finding.trial for finding in found if _jumps(finding)}
     odd = [finding for finding in odd_replicates(campaign) if finding.trial not in jumped]
-    told = [*_missing_sensors(campaign), *find_implausible(campaign), *found, *odd, *loud_sensors(campaign)]
+    told = [*missing_sensors(campaign), *find_implausible(campaign), *found, *odd, *loud_sensors(campaign)]
     return without_companions(campaign, told)
 
 
@@ -66,22 +66,6 @@ def unnamed_files(folder: Path, campaign: Campaign) -> list[Finding]:
         return []
     shown = ", ".join(left[:_LISTED]) + (f" and {len(left) - _LISTED} more" if len(left) > _LISTED else "")
     return [Finding(trial="", what=f"{shown}: in the folder, but no trial names {'it' if len(left) == 1 else 'them'}")]
-
-
-def _missing_sensors(campaign: Campaign) -> list[Finding]:
-    tables = campaign.tables
-    if not isinstance(tables, TumbleCampaign):
-        return []
-    found = []
-    for sensor in ("pose", "imu", "wheel"):
-        without = [trial.id for trial in tables.trial if sensor not in trial.files]
-        if len(without) == len(tables.trial):
-            found.append(
-                Finding(trial="", what=f"no trial has a recording of {sensor}: what only it tells stays unknown")
-            )
-        else:
-            found += [Finding(trial=id, what=f"trial {id} has no recording of {sensor}, others have") for id in without]
-    return found
 
 
 def _faults_of_data(campaign: Campaign) -> list[Finding]:

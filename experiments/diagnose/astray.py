@@ -20,7 +20,7 @@ from .fitting import Fit, fit
 from .gate import held_out_gate, open_gate
 from .problem import Finding
 
-__all__ = ["allowed", "astray", "astray_held_out"]
+__all__ = ["allowed", "astray", "astray_finding", "astray_held_out"]
 
 _ONE_OF = 6
 """Of so many trials one may have gone its own way; of fewer one."""
@@ -61,28 +61,34 @@ def astray(found: Fit, held_out: Sequence[str], *, seed: int = 0) -> tuple[Findi
         others = allowed(len(trials) + len(held_out)) - count if bare else allowed(len(held_out))
         if astray_held_out(learned, held_out, values, others, seed=seed) is None:
             return ()
-        told = [_finding(learned, trial, learned.values) for trial in order[:count]]
+        told = [astray_finding(learned, trial, learned.values) for trial in order[:count]]
         return tuple(one for one in told if one is not None) if None not in told else ()
     return ()
 
 
 def astray_held_out(
-    found: Fit, held_out: Sequence[str], values: Mapping[str, float], most: int, *, seed: int = 0
+    found: Fit, held_out: Sequence[str], values: Mapping[str, float], most: int, *, seed: int = 0, enough: float = 0.0
 ) -> tuple[str, ...] | None:
     """Those held-out trials, `most` at most, that the model follows at first only, all others passing the gate.
 
-    None where there are more, or others.
+    `enough`: chi-square per sample up to which trials pass in any case. None where there are more, or others.
     """
     problem = found.model.problem
-    if not held_out or held_out_gate(found, held_out, values, seed=seed).passed:
+
+    def explained(trials: Sequence[str]) -> bool:
+        left = [problem.chi_square(values, found.model.forms, trial) for trial in trials]
+        per_sample = sum(total for total, _ in left) / max(1, sum(count for _, count in left))
+        return per_sample <= enough or held_out_gate(found, trials, values, seed=seed).passed
+
+    if not held_out or explained(held_out):
         return ()
-    failing = [t for t in held_out if not held_out_gate(found, (t,), values, seed=seed).passed]
+    failing = [t for t in held_out if not explained((t,))]
     if not failing or len(failing) > most or not hasattr(problem, "follows"):
         return None
     if any(problem.follows(values, found.model.forms, trial) is None for trial in failing):
         return None
     rest = tuple(trial for trial in held_out if trial not in failing)
-    if rest and not held_out_gate(found, rest, values, seed=seed).passed:
+    if rest and not explained(rest):
         return None
     return tuple(failing)
 
@@ -96,14 +102,16 @@ def _refitted(found: Fit, trials: tuple[str, ...]) -> Fit:
     return fit(model, values)
 
 
-def _finding(found: Fit, trial: str, values: Mapping[str, float]) -> Finding | None:
+def astray_finding(found: Fit, trial: str, values: Mapping[str, float], *, set_aside: bool = True) -> Finding | None:
+    """What is said of a trial that follows the model up to a moment only; None where it does not even that."""
     problem = found.model.problem
     until: float | None = problem.follows(values, found.model.forms, trial)  # type: ignore[attr-defined]
     if until is None:
         return None
     end = float(np.max(problem.samples(trial).time))
+    done = "it is set aside" if set_aside else "it was held out, and stays in the gap"
     what = (
         f"trial {trial} follows the model that explains the others up to {until:.2f} s and goes another way from "
-        "there, after a touch or a catch that hangs on next to nothing: it is set aside"
+        f"there, after a touch or a catch that hangs on next to nothing: {done}"
     )
-    return Finding(trial=trial, what=what, from_s=until, to_s=end, set_aside=True)
+    return Finding(trial=trial, what=what, from_s=until, to_s=end, set_aside=set_aside)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .astray import allowed, astray, astray_held_out
+from .astray import allowed, astray, astray_finding, astray_held_out
 from .bounds import Bound, bounds_met, is_strained
 from .colour import Colour, find_colours, find_loud, whitener_for
 from .effect_words import confirmation
@@ -21,7 +22,7 @@ from .gate import Verdict, held_out_gate, open_gate
 from .localise import Place, depends_on, latent_table, places
 from .prediction import Predicted, folds_of, predict
 from .problem import Finding, Form, Parameter, Problem
-from .replicates import find_scatter, groups_of, odd_trials, split_trials
+from .replicates import exchanged, find_scatter, groups_of, odd_trials, split_trials
 from .search import Choice, choose
 
 __all__ = ["Diagnosis", "Gap", "diagnose"]
@@ -156,11 +157,13 @@ def diagnose(
     tell: Tell | None = None,
     gates: Path | None = None,
     aside: Sequence[Finding] = (),
+    looked_at: Sequence[str] = (),
 ) -> Diagnosis:
     """Diagnose a campaign. `tell(what, share done)` hears of progress; the same campaign gives the same answer.
 
     `thorough`: nulls by full refits, which takes as long as it takes; they are kept in the folder `gates`, if given,
-    for the next campaign of the same design. `aside`: fitted trials that are to take no part (`astray`).
+    for the next campaign of the same design. `aside`: fitted trials that are to take no part (`astray`). `looked_at`:
+    trials that must not be held out, others are in their place: the base model explains all but these.
     """
     tell = tell or (lambda what, done: None)
     if hasattr(problem, "prepare"):
@@ -174,6 +177,9 @@ def diagnose(
         findings += odd
         at_odds = {finding.trial for finding in odd}
         fitted, held_out = split_trials([t for t in problem.trials if t.id not in at_odds])
+        base = _whitened_fit(base.model.on(fitted))
+    if looked_at:
+        fitted, held_out = exchanged(problem.trials, fitted, held_out, looked_at)
         base = _whitened_fit(base.model.on(fitted))
     if aside:
         findings += aside
@@ -191,14 +197,19 @@ def diagnose(
         tell=lambda done: tell("making the gate's null", done),
     )  # fmt: skip
     told = _Told(problem, first, findings, held_out)
+    again = partial(diagnose, problem, thorough=thorough, seed=seed, tell=tell, gates=gates)
     if first.passed:
+        if missed := () if looked_at else _missed(base, held_out, seed):
+            tell("what is left shows in trials that were held out: others are held out", 0.0)
+            return again(aside=aside, looked_at=missed)
+        findings += _held_out_ways(base, held_out, seed)
         return told.finish(base, None, colours, model_std, "none")
     choice = choose(base, tell=tell, seed=seed)
     if choice.best.effects:  # with the motion out of the way replicates are compared once more
-        scatter, again = _scatter(choice.best.fit, held_out)
-        if set(again) != set(model_std):
+        scatter, fresh_std = _scatter(choice.best.fit, held_out)
+        if set(fresh_std) != set(model_std):
             tell("replicates are found to differ otherwise: choosing again", 0.0)
-            model_std = again
+            model_std = fresh_std
             base = _rescattered(base, scatter)
             choice = choose(base, tell=tell, seed=seed)
     fresh = _colours_of(_plain(choice.best.fit))
@@ -214,6 +225,9 @@ def diagnose(
         )[1]  # fmt: skip
         choice = replace(choice, left=left)
     if not choice.best.effects and not is_strained(base) and choice.left.score < choice.left.threshold + _MARGIN:
+        if missed := () if looked_at else _missed(base, held_out, seed):
+            return again(aside=aside, looked_at=missed)
+        findings += _held_out_ways(base, held_out, seed)
         return told.finish(base, None, colours, model_std, "none", last=choice.left)
     tell("verdict", 0.0)
     choice = replace(choice, best=replace(choice.best, fit=settled(choice.best.fit)))
@@ -221,9 +235,11 @@ def diagnose(
     verdict = _verdict(choice, held, held_out, seed)
     if not aside and (gone_astray := _own_ways(base, choice, verdict, held_out, seed)):
         tell("a trial goes its own way: once more without it", 0.0)
-        anew = diagnose(problem, thorough=thorough, seed=seed, tell=tell, gates=gates, aside=gone_astray)
+        anew = again(aside=gone_astray, looked_at=looked_at)
         if anew.verdict != "unknown":
             return anew
+    if verdict in ("named", "ambiguous") and held is not None and not held.passed:
+        findings += _held_out_ways(choice.best.fit, held_out, seed)
     return told.finish(base, choice, colours, model_std, verdict, held=held)
 
 
@@ -308,6 +324,30 @@ def _held_out_verdict(found: Fit, held_out: tuple[str, ...], seed: int) -> Verdi
     return held_out_gate(found, held_out, held_out_fit(found.model, held_out, found.values), seed=seed)
 
 
+def _missed(base: Fit, held_out: tuple[str, ...], seed: int) -> tuple[str, ...]:
+    """Trials held out that the base model does not explain, although it does all that were fitted."""
+    if not held_out:
+        return ()
+    found = settled(base)
+    values = held_out_fit(found.model, held_out, found.values)
+    if astray_held_out(found, held_out, values, allowed(len(held_out)), seed=seed) is not None:
+        return ()
+    after = _gap(found.model.problem, found.model, _values_of_all(found, held_out), found.model.trials, held_out)
+    if (after.held_out or 0.0) <= SMALL:
+        return ()
+    return tuple(t for t in held_out if not held_out_gate(found, (t,), values, seed=seed).passed) or held_out
+
+
+def _held_out_ways(found: Fit, held_out: tuple[str, ...], seed: int) -> list[Finding]:
+    """Trials held out that go ways of their own: they stay in the gap, and it is said."""
+    if not held_out:
+        return []
+    found = settled(found)
+    values = held_out_fit(found.model, held_out, found.values)
+    gone = astray_held_out(found, held_out, values, allowed(len(held_out)), seed=seed, enough=SMALL) or ()
+    return [own for trial in gone if (own := astray_finding(found, trial, values, set_aside=False)) is not None]
+
+
 def _own_ways(base: Fit, choice: Choice, verdict: str, held_out: tuple[str, ...], seed: int) -> tuple[Finding, ...]:
     """Trials that go ways of their own, where the base model explains all others and a name nothing but them, or where
     a name explains all others and nothing has a name as it is."""
@@ -339,13 +379,14 @@ def _verdict(choice: Choice, held: Verdict | None, held_out: tuple[str, ...], se
     found = choice.best.fit
     if not choice.best.effects or is_strained(found):
         return "unknown"
-    passed = choice.left.passed and (held is None or held.passed)
-    if choice.left.passed and not passed:  # or what is held out follows for a while only
+    after = _gap(found.model.problem, found.model, _values_of_all(found, held_out), found.model.trials, held_out)
+    fits, predicts = choice.left.passed, held is None or held.passed
+    little = after.fit <= SMALL and (after.held_out or 0.0) <= SMALL
+    passed = (fits and predicts) or little or _of_form(choice, held_out)
+    if not passed and (fits or after.fit <= SMALL):  # or what is held out follows for a while only
         values = held_out_fit(found.model, held_out, found.values)
-        passed = astray_held_out(found, held_out, values, allowed(len(held_out)), seed=seed) is not None
-    if not passed:
-        after = _gap(found.model.problem, found.model, _values_of_all(found, held_out), found.model.trials, held_out)
-        passed = max(after.fit, after.held_out or 0.0) <= SMALL or _of_form(choice, held_out)
+        most = allowed(len(held_out))
+        passed = astray_held_out(found, held_out, values, most, seed=seed, enough=SMALL) is not None
     return ("ambiguous" if choice.alternatives else "named") if passed else "unknown"
 
 

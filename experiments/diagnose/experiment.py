@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from experiments.campaign import Campaign, read_campaign
 from experiments.diagnose_settings import DiagnoseSettings
-from experiments.plausible import find_implausible, said_once
+from experiments.plausible import find_implausible, missing_sensors, said_once
 from experiments.progress import Progress
 from experiments.runfolder import RunFolder
 from hedgebed import __version__
@@ -71,7 +71,8 @@ def diagnose_campaign(
         gates = cache_folder() / "gates"
     with threadpool_limits(1):  # matrices are small: threads of the linear algebra only get in each other's way
         found = diagnose(problem, thorough=thorough, seed=seed, tell=tell, gates=gates)
-    return replace(found, findings=(*find_implausible(measured), *findings_in_words(found.findings)))
+    seen = (*missing_sensors(measured), *find_implausible(measured), *findings_in_words(found.findings))
+    return replace(found, findings=seen)
 
 
 def _make_problem(folder: Path, effect_file: Sequence[str | Path]) -> tuple[Campaign, Problem]:

@@ -103,6 +103,8 @@ def depends_on(table: Mapping[str, NDArray[np.generic]]) -> tuple[str, dict[str,
     others, so that noise explains nothing. A column that only says which trial it is counts as the trial.
     """
     shares: dict[str, float] = {}
+    if not len(table["trial"]):
+        return "nothing that can be told: no sensor that was recorded tells a force", shares
     latents = [name for name in table if name.startswith("latent_")]
     ids, which = np.unique(np.asarray(table["trial"]), return_inverse=True)
     others = [name for name in table if name != "trial" and name not in latents and not _labels(table[name], which)]

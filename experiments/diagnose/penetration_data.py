@@ -22,8 +22,8 @@ _FEWEST = 12
 """Rows that a trial must have to say anything."""
 _AROUND = 20
 """Rows on either side of a gap that tell whether the clock has jumped."""
-_LOST = 40
-"""Rows for which a marker may be lost before it counts as gone for good."""
+_LONG = 0.02
+"""Share of a recording from which on a stretch without rows is said."""
 _SMOOTH, _ROUGH = 1.7, 3.0
 """Chi-square a row up to which a polynomial goes through both sides of a gap, and beyond which it does not."""
 _OUTLIER = 8.0
@@ -133,6 +133,14 @@ def _one(
         say(f"the clock jumps by {time[jump] - time[jump - 1]:.3g} s where the motion goes on as if it had not; all "
             f"that follows is set aside", rows=rows)  # fmt: skip
         time, depth, other = time[:jump], depth[:jump], other[:jump]
+    steps = np.diff(time)
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    for k in np.flatnonzero(steps > np.maximum(10 * usual, _LONG * float(np.ptp(time)) if len(time) else 0.0)):
+        findings.append(Finding(
+            trial=table.id, from_s=float(time[k]), to_s=float(time[k + 1]),
+            what=f"trial {table.id}: there is no row from {time[k]:.4g} to {time[k + 1]:.4g} s, where one every "
+            f"{usual:.3g} s is usual: kept as a gap",
+        ))  # fmt: skip
     for name, values, std in (("depth", depth, std_depth), (channel, other, std_other)):
         # A depth cannot jump; a force can, where a tip touches for a moment, but not beyond all that it is elsewhere.
         known = values[np.isfinite(values)]
@@ -151,9 +159,9 @@ def _one(
     step = _step(time, depth, std_depth)
     while step is not None:
         size = depth[step] - depth[step - 1]
-        back = _step(time[: step + _LOST], depth[: step + _LOST], std_depth, after=step)
-        if back is not None and abs(depth[back] - depth[back - 1] + size) > 0.5 * abs(size):
-            back = None
+        back = _step(time, depth, std_depth, after=step)
+        while back is not None and abs(depth[back] - depth[back - 1] + size) > 0.5 * abs(size):
+            back = _step(time, depth, std_depth, after=back)  # until one takes it back
         rows = np.arange(step, len(depth) if back is None else back)
         stays = "stays there, as where a marker is lost; it is set aside from there on"
         comes = f"comes back {len(rows)} rows later, as where a marker is lost for a while; these are set aside"
@@ -257,6 +265,7 @@ def _clock_jump(time: Array, values: Array, std: float) -> int | None:
 
     One polynomial is laid through the rows on both sides of a gap, once with the times as they stand and once with the
     gap closed, of the lowest degree up to 3 that fits the second: where the clock jumped, it does not fit the first.
+    A few rows tell that of a fast motion, as many as the gap is long of a slow one.
     """
     known = np.flatnonzero(np.isfinite(values))
     t, v = time[known], values[known]
@@ -265,17 +274,19 @@ def _clock_jump(time: Array, values: Array, std: float) -> int | None:
     gaps = np.diff(t)
     usual = float(np.median(gaps))
     for k in np.flatnonzero(gaps > 4 * usual) + 1:
-        if k < _AROUND or k > len(t) - _AROUND:
+        most = min(k, len(t) - k)
+        if most < _AROUND:
             continue
-        near = slice(k - _AROUND, k + _AROUND)
-        as_read = t[near] - t[k]
-        closed = as_read + np.where(as_read < 0, gaps[k - 1] - usual, 0.0)
-        for degree in (1, 2, 3):
-            stands, shut = (_beyond(degree, clock, v[near], std) for clock in (as_read, closed))
-            if shut < _SMOOTH:
-                break
-        if stands > max(_ROUGH, 2.5 * shut) and shut < _SMOOTH:
-            return int(known[k])
+        for around in dict.fromkeys((_AROUND, min(most, max(_AROUND, round(gaps[k - 1] / usual))))):
+            near = slice(k - around, k + around)
+            as_read = t[near] - t[k]
+            closed = as_read + np.where(as_read < 0, gaps[k - 1] - usual, 0.0)
+            for degree in (1, 2, 3):
+                stands, shut = (_beyond(degree, clock, v[near], std) for clock in (as_read, closed))
+                if shut < _SMOOTH:
+                    break
+            if stands > max(_ROUGH, 2.5 * shut) and shut < _SMOOTH:
+                return int(known[k])
     return None
 
 

@@ -25,6 +25,7 @@ from .penetration_forms import Library, Scales, make_library, physical, unit_of
 from .penetration_law import PHASES, SLOTS, fall, push, slot_table
 from .penetration_remarks import Push, remarks
 from .problem import Array, Finding, Form, Parameter, Samples, TrialInfo, Values
+from .slopes import acceleration
 
 __all__ = ["PenetrationProblem", "make_problem"]
 
@@ -373,14 +374,19 @@ class PenetrationProblem:
         return found
 
     def latent(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
-        """The force [N] that the model lacks; of a drop m (g - a) over the model's, at the accelerometer's rows."""
+        """The force [N] that the model lacks; of a drop m (g - a) over the model's, at the accelerometer's rows, or
+        from its depth where it has none."""
         this = self._trials[trial]
         depth, speed, _, model = self._state(values, forms, trial)
         rows = this.has_other
         if this.driven:
             missing = this.other - model
         else:
-            missing = (self.tables.spike.mass or 1.0) * (model[:, 2] - this.other)
+            behind = this.other - model[:, 2]
+            if not rows.any():
+                rows, behind = this.has_depth, np.zeros(len(this.time))
+                behind[rows] = acceleration(this.time[rows], (this.depth - model[:, 0])[rows])
+            missing = -(self.tables.spike.mass or 1.0) * behind
         deepest = np.maximum.accumulate(np.maximum(depth, 0.0))
         columns = {"t_s": this.time, "latent_force_N": missing, "depth_m": depth, "velocity_m_s": speed,
                    "retreat_m": deepest - depth}  # fmt: skip

@@ -14,7 +14,7 @@ from .fitting import Fit, fit
 from .gate import low_modes
 from .problem import Finding, Parameter, Problem, TrialInfo
 
-__all__ = ["find_scatter", "groups_of", "odd_trials", "parted", "split_trials"]
+__all__ = ["exchanged", "find_scatter", "groups_of", "odd_trials", "parted", "split_trials"]
 
 _SURE = 1e-4
 _LEAST = 0.005
@@ -91,6 +91,28 @@ def split_trials(trials: Sequence[TrialInfo]) -> tuple[tuple[str, ...], tuple[st
         out.append(left[best[len(best) // 2]].pop())
     held = set(out)
     return tuple(t.id for t in trials if t.id not in held), tuple(t.id for t in trials if t.id in held)
+
+
+def exchanged(
+    trials: Sequence[TrialInfo], fitted: Sequence[str], held_out: Sequence[str], wanted: Sequence[str]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """A split in which the `wanted` held-out trials are fitted, and as many others held out: their replicates
+    first, then trials that share most of their condition."""
+    condition = {trial.id: trial.condition for trial in trials}
+    held = [trial for trial in held_out if trial not in wanted]
+    for trial in [trial for trial in held_out if trial in wanted]:
+        left = [other for other in fitted if other not in held]
+        if not left:
+            break
+
+        def shared(other: str, mine: tuple[object, ...] = condition[trial]) -> int:
+            return sum(a == b for a, b in zip(condition[other], mine, strict=False))
+
+        held.append(max(left, key=shared))
+    out = set(held)
+    whole = {*fitted, *held_out}
+    every = [trial.id for trial in trials if trial.id in whole]
+    return tuple(t for t in every if t not in out), tuple(t for t in every if t in out)
 
 
 def find_scatter(found: Fit) -> tuple[tuple[Parameter, ...], dict[str, float]]:

@@ -29,8 +29,9 @@ _SPAN = 0.08  # s that they cover
 _SURE = 25.0  # squared standard deviations by which a clock that is right must be off
 _SENSORS = {"the camera": ("theta", "x", "y"), "the IMU": ("gyro",), "the wheel": ("wheel",)}  # what is smooth
 _ALL = {"the camera": ("theta", "x", "y"), "the IMU": ("gyro", "ax", "ay"), "the wheel": ("wheel",)}
+_END = 0.1  # s by which a channel must be shorter than the others to be said
 _MOVED = 0.02  # s by which a clock must have jumped to be told from the motion on either side
-_LONG = 40  # rows that a marker may be lost for before it counts as gone for good
+_OFTEN = 4  # times that a marker may be lost before nothing is set aside where half of the rows would be
 
 
 def checked(data: TumbleData) -> tuple[TumbleData, list[Finding]]:
@@ -45,6 +46,7 @@ def checked(data: TumbleData) -> tuple[TumbleData, list[Finding]]:
             if len(mine) < 8:
                 continue
             _gaps(trial, name, mine, findings)
+            _ends(trial, name, keep, findings)
             stuck = stuck_rows(trial.value[mine]) if name != "wheel" else mine[:0]  # in a hop it turns evenly
             if len(stuck):
                 keep[mine[stuck]] = False
@@ -70,7 +72,8 @@ def checked(data: TumbleData) -> tuple[TumbleData, list[Finding]]:
 def _jumps(
     trial: TrialData, name: str, mine: NDArray[np.intp], keep: NDArray[np.bool_], findings: list[Finding]
 ) -> None:
-    """Rows between two opposite steps that no motion makes, and all that follows a step that is never taken back."""
+    """Rows between two opposite steps that no motion makes, however far apart, and the shorter side of a step that is
+    never taken back."""
     time, value, std = trial.time[mine], trial.value[mine], trial.std[mine[0]]
     steps_in_time = np.diff(time)
     lost = np.maximum(steps_in_time / max(float(np.median(steps_in_time)), 1e-12), 1.0)
@@ -79,12 +82,11 @@ def _jumps(
     usual = median_filter(size, size=2 * _NEAR + 1, mode="nearest")
     steps = np.flatnonzero(size > _FAR * np.sqrt(2) * std + _STEEP * usual)
     odd = np.zeros(len(mine), dtype=bool)
-    k = 0
+    k = times = 0
     while k < len(steps):
         here = steps[k]
-        back = next(
-            (e for e in steps[k + 1 :] if abs(change[e] + change[here]) < 0.5 * size[here] and e - here <= _LONG), None
-        )
+        back = next((e for e in steps[k + 1 :] if abs(change[e] + change[here]) < 0.5 * size[here]), None)
+        times += 1
         if back is None:
             after = time > time[here]
             odd |= after if after.mean() <= 0.5 else ~after
@@ -94,7 +96,7 @@ def _jumps(
             k = int(np.searchsorted(steps, back)) + 1
     if not odd.any():
         return
-    if odd.mean() > _SHARE:
+    if odd.mean() > _SHARE and times > _OFTEN:
         findings.append(
             Finding(
                 trial=trial.id,
@@ -214,6 +216,22 @@ def _surprise(
         return float((moved - slope * gap) ** 2 / (place**2 + (doubt * gap) ** 2 + bend**2))
 
     return off(after - before), off(usual)
+
+
+def _ends(trial: TrialData, name: str, keep: NDArray[np.bool_], findings: list[Finding]) -> None:
+    """A channel that begins later or ends earlier than what is kept of the others; not one whose clock is off, which
+    does both."""
+    time, whole = trial.time[trial.of(name)], trial.time[keep]
+    longest = max(float(np.ptp(own)) for other in CHANNELS if len(own := trial.time[trial.of(other) & keep]))
+    least = max(10 * float(np.median(np.diff(time))), _END)
+    first, last = float(whole.min()), float(whole.max())
+    for low, high, words in (
+        (first, float(time[0]), f"before {time[0]:.3g} s, others begin at {first:.3g} s"),
+        (float(time[-1]), last, f"after {time[-1]:.3g} s, others go on to {last:.3g} s"),
+    ):
+        if min(high - low, longest - float(np.ptp(time))) > least:
+            findings.append(Finding(trial=trial.id, channel=name, from_s=low, to_s=high,
+                                    what=f"{name} has no valid row {words}: the rest is used"))  # fmt: skip
 
 
 def _gaps(trial: TrialData, name: str, mine: NDArray[np.intp], findings: list[Finding]) -> None:

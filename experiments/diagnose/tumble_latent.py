@@ -4,7 +4,8 @@ At every row of the IMU, measured less modelled specific force, turned into the 
 times the inertia that resists (m along the surface, m + m_b along the normal in the rig); and J times the difference
 in angular acceleration, the slope of the gyro's difference over a few rows. Beside them stand the modelled motion, its
 state and the wheel, for whoever looks for what it depends on. Where model and measurement have gone apart, their states
-differ, and it is the sum of what is missing and of what follows from it; the first seconds tell most.
+differ, and it is the sum of what is missing and of what follows from it; the first seconds tell most. A trial without
+an IMU has it from the camera's rows: inertia times the second derivative of measured less modelled place and angle.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .slopes import acceleration, slope
 from .tumble_data import CHANNELS, TrialData
 from .tumble_forward import Prediction
 
@@ -22,7 +24,8 @@ _ROWS = 5  # over which the slope of the gyro is taken
 
 
 def latent_columns(data: TrialData, prediction: Prediction, *, mass: float, inertia: float) -> dict[str, Array]:
-    """Columns of latent.csv for one trial, one row an IMU's row with all three readings; empty without an IMU.
+    """Columns of latent.csv for one trial, one row an IMU's row with all three readings, or the camera's where there is
+    none; empty without either.
 
     Args:
         data: the trial.
@@ -30,35 +33,35 @@ def latent_columns(data: TrialData, prediction: Prediction, *, mass: float, iner
         mass: of the platform [kg].
         inertia: of the platform [kg m2].
     """
-    value, state, motion = prediction.value[0], prediction.state[0], prediction.motion[0]
-    rows = {name: np.flatnonzero(data.channel == CHANNELS.index(name)) for name in ("gyro", "ax", "ay")}
-    shared = np.intersect1d(np.intersect1d(data.time[rows["gyro"]], data.time[rows["ax"]]), data.time[rows["ay"]])
-    at = {name: own[np.searchsorted(data.time[own], shared)] for name, own in rows.items()}
-    gap = {name: data.value[own] - value[own] for name, own in at.items()}
-    moved = motion[at["gyro"]]
-    sine, cosine = np.sin(moved[:, 2]), np.cos(moved[:, 2])
-    # Body x in the world is (cos, -sin), body y (sin, cos).
-    along = gap["ax"] * cosine + gap["ay"] * sine
-    normal = gap["ay"] * cosine - gap["ax"] * sine
+    shared, gap, rows = _gaps(data, prediction.value[0], ("gyro", "ax", "ay"))
+    felt = len(shared) > 0
+    if not felt:
+        shared, gap, rows = _gaps(data, prediction.value[0], ("x", "y", "theta"))
+    state, moved = prediction.state[0][rows], prediction.motion[0][rows]
+    if felt:
+        sine, cosine = np.sin(moved[:, 2]), np.cos(moved[:, 2])
+        # Body x in the world is (cos, -sin), body y (sin, cos).
+        along = gap["ax"] * cosine + gap["ay"] * sine
+        normal = gap["ay"] * cosine - gap["ax"] * sine
+        turning = slope(shared, gap["gyro"], rows=_ROWS)
+    else:
+        along, normal, turning = (acceleration(shared, gap[name]) for name in ("x", "y", "theta"))
     names = ("x_m", "y_m", "theta_rad", "vx_m_s", "vy_m_s", "omega_rad_s", "wheel_rad_s")
     return {
         "t_s": shared,
         "latent_force_x_N": mass * along,
         "latent_force_y_N": (mass + data.counterweight) * normal,
-        "latent_torque_N_m": inertia * _slope(shared, gap["gyro"]),
+        "latent_torque_N_m": inertia * turning,
         **{name: moved[:, k] for k, name in enumerate(names)},
-        "state": state[at["gyro"]].astype(float),
+        "state": state.astype(float),
     }
 
 
-def _slope(time: Array, values: Array) -> Array:
-    """Slope of a straight line through each `_ROWS` neighbouring rows."""
-    if len(time) < 2:
-        return np.zeros(len(time))
-    half = _ROWS // 2
-    slopes = np.empty(len(time))
-    for k in range(len(time)):
-        own = slice(max(0, k - half), k + half + 1)
-        t = time[own] - time[own].mean()
-        slopes[k] = float(t @ values[own]) / max(float(t @ t), 1e-12)
-    return slopes
+def _gaps(data: TrialData, value: Array, names: tuple[str, ...]) -> tuple[Array, dict[str, Array], NDArray[np.intp]]:
+    """The times at which all of these channels were read, measured less modelled there, and the first one's rows."""
+    rows = {name: np.flatnonzero(data.channel == CHANNELS.index(name)) for name in names}
+    shared = data.time[rows[names[0]]]
+    for name in names[1:]:
+        shared = np.intersect1d(shared, data.time[rows[name]])
+    at = {name: own[np.searchsorted(data.time[own], shared)] for name, own in rows.items()}
+    return shared, {name: data.value[own] - value[own] for name, own in at.items()}, at[names[0]]

@@ -5,6 +5,6 @@ derivative of the depth was asked for: each fits no effect of any library and wo
 aside for it; a person has to say what is right. `hedgebed campaign check` and `hedgebed diagnose` both say it.
 """
 
-from .findings import find_implausible, loud_sensors, said_once, without_companions
+from .findings import find_implausible, loud_sensors, missing_sensors, said_once, without_companions
 
-__all__ = ["find_implausible", "loud_sensors", "said_once", "without_companions"]
+__all__ = ["find_implausible", "loud_sensors", "missing_sensors", "said_once", "without_companions"]

@@ -18,7 +18,7 @@ from .penetration import penetration_oddities
 from .tumble import tumble_oddities
 from .words import times, unit_words
 
-__all__ = ["find_implausible", "loud_sensors", "said_once", "without_companions"]
+__all__ = ["find_implausible", "loud_sensors", "missing_sensors", "said_once", "without_companions"]
 
 Array = NDArray[np.float64]
 
@@ -160,3 +160,20 @@ def _scatter(values: Array) -> float | None:
     if len(known) < 40 or np.mean(np.diff(known) == 0) > 0.2:
         return None
     return float(np.median(np.abs(np.diff(known, 4)))) / 0.6745 / math.sqrt(70)
+
+
+def missing_sensors(campaign: Campaign) -> list[Finding]:
+    """Sensors of a tumble that no trial has, or some have not."""
+    tables = campaign.tables
+    if not isinstance(tables, TumbleCampaign):
+        return []
+    found = []
+    for sensor in ("pose", "imu", "wheel"):
+        without = [trial.id for trial in tables.trial if sensor not in trial.files]
+        if len(without) == len(tables.trial):
+            found.append(
+                Finding(trial="", what=f"no trial has a recording of {sensor}: what only it tells stays unknown")
+            )
+        else:
+            found += [Finding(trial=id, what=f"trial {id} has no recording of {sensor}, others have") for id in without]
+    return found

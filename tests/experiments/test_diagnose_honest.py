@@ -11,7 +11,7 @@ from experiments.diagnose.fitting import Model, Whitener, fit, settled
 from experiments.diagnose.gate import held_out_gate, open_gate
 from experiments.diagnose.penetration_problem import make_problem
 from experiments.diagnose.problem import Parameter, Samples, TrialInfo
-from experiments.diagnose.replicates import groups_of, parted
+from experiments.diagnose.replicates import exchanged, groups_of, parted, split_trials
 
 COUNT = 400
 
@@ -119,6 +119,26 @@ def test_noise_twice_as_loud_is_told_from_a_model_that_leaves_as_much():
             Line(noise=lambda random, trial, f=misfit: random.standard_normal(COUNT) + f(np.linspace(0, 100, COUNT)))
         )
         assert off.chi_square > 3 * off.count and find_loud(off) == {}
+
+
+def test_a_trial_that_was_held_out_and_is_fitted_is_exchanged_for_its_replicate():
+    trials = [TrialInfo(id=id, condition=(id[0], "x")) for id in ("a1", "b1", "a2", "b2", "a3", "b3")]
+    fitted, held = exchanged(trials, ("a1", "b1", "a2", "b2"), ("a3", "b3"), ("b3",))
+    assert held == ("a3", "b1") or held == ("b1", "a3")
+    assert set(fitted) == {"a1", "a2", "b2", "b3"}
+
+
+def test_what_shows_in_a_held_out_trial_alone_is_not_passed_over():
+    # Replicates at two speeds, and one of those held out in a bed a quarter stiffer: nothing is left of the others.
+    trials = pushed(base, (0.01, 0.03, 0.1, 0.02, 0.05))
+    held = split_trials(make_problem(campaign_of(trials)).trials)[1]
+    stiffer = {
+        id: driven_trial(lambda z, v, top: 1.25 * base(z, v, top), speed=speed, retreat=True, seed=int(id))
+        for id, _, speed, _ in trials
+    }
+    trials = [(id, mode, v, stiffer[id] if id == held[0] else rows) for id, mode, v, rows in trials]
+    found = diagnose(make_problem(campaign_of(trials)))
+    assert found.verdict != "none" and held[0] in found.fitted
 
 
 def test_trials_that_go_another_way_are_no_replicates():

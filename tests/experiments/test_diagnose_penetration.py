@@ -10,6 +10,7 @@ from penetration_campaigns import DAMPING, GRAVITY, MASS, STIFFNESS, campaign_of
 from experiments.campaign import Recording, read_model
 from experiments.diagnose.bounds import is_strained
 from experiments.diagnose.fitting import Model, Whitener, fit
+from experiments.diagnose.localise import depends_on
 from experiments.diagnose.penetration_depth import smooth_depth
 from experiments.diagnose.penetration_law import SLOTS, fall, push, slot_table
 from experiments.diagnose.penetration_problem import make_problem
@@ -168,6 +169,29 @@ def test_a_depth_that_jumps_and_stays_is_set_aside_from_there_on():
     assert any(finding.set_aside and "jumps" in finding.what for finding in problem.findings)
 
 
+def test_a_marker_that_is_lost_for_long_and_comes_back_costs_these_rows_only():
+    recording = driven_trial(base, speed=0.01)
+    depth = recording["depth_m"].copy()
+    depth[100:220] += 0.012
+    problem = make_problem(campaign_of([("d", "driven", 0.01, Recording({**recording.columns, "depth_m": depth}))]))
+    assert len(problem.samples("d").time) == 280
+    assert any("comes back 120 rows later" in finding.what for finding in problem.findings)
+
+
+def test_a_clock_that_jumps_in_a_slow_push_ends_it_and_rows_that_lack_are_a_gap():
+    # 10 mm/s, 5 ms a row: 0.5 s is 5 mm, 50 noises of the depth, over as many rows on either side.
+    whole = driven_trial(base, speed=0.01).columns
+    jumped = {**whole, "t_s": np.where(np.arange(400) < 150, whole["t_s"], whole["t_s"] + 0.5)}
+    lacking = {name: np.delete(column, np.s_[150:250]) for name, column in whole.items()}
+    counts, words = [], []
+    for columns in (jumped, lacking):
+        problem = make_problem(campaign_of([("d", "driven", 0.01, Recording(columns))]))
+        counts.append(len(problem.samples("d").time))
+        words.append(" ".join(finding.what for finding in problem.findings))
+    assert counts == [150, 300]
+    assert "the clock jumps by 0.505 s" in words[0] and "there is no row from" in words[1]
+
+
 def test_lone_readings_and_gaps_are_left_out_and_a_clock_that_jumps_ends_the_trial():
     recording = driven_trial(base, speed=0.01)
     depth, force = recording["depth_m"].copy(), recording["force_N"].copy()
@@ -181,6 +205,26 @@ def test_lone_readings_and_gaps_are_left_out_and_a_clock_that_jumps_ends_the_tri
     assert len(problem.samples("d").time) == 300 - 10 - 1
     said = " ".join(finding.what for finding in problem.findings)
     assert "clock jumps" in said and "far from its neighbours" in said and "gaps" in said
+
+
+def test_a_drop_without_an_accelerometer_has_its_latent_force_from_the_depth():
+    """m d2(z_model - z)/dt2, which an accelerometer reads at once; a parabola's error over 13 rows is 2.6 N."""
+    whole = drop_trial(lambda z, v: base(z, v) + 30.0, speed=1.0)
+    blind = Recording({**whole.columns, "accel_m_s2": np.full(151, np.nan)})
+    read, seen = (
+        make_problem(campaign_of([("1", "drop", 1.0, recording)], doubt=(0.0, 0.0))).latent({}, (), "1")
+        for recording in (whole, blind)
+    )
+    inside = slice(15, 135)
+    assert len(seen["t_s"]) == 151 and np.ptp(read["latent_force_N"][inside]) > 20
+    there = np.interp(seen["t_s"], read["t_s"], read["latent_force_N"])
+    apart = (seen["latent_force_N"] - there)[inside]
+    assert np.sqrt(np.mean(apart**2)) < 2 * 2.6 and abs(apart.mean()) < 2.6
+
+
+def test_nothing_that_can_be_told_is_said_where_no_sensor_tells_a_force():
+    empty = {"trial": np.zeros(0, dtype=str), "t_s": np.zeros(0), "latent_force_x_N": np.zeros(0)}
+    assert depends_on(empty)[0].startswith("nothing that can be told")
 
 
 def test_a_fitted_model_file_reads_back_with_its_effects(tmp_path):

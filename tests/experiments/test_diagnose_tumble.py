@@ -178,7 +178,7 @@ def test_a_marker_that_jumps_is_set_aside_and_said():
 def test_a_marker_that_is_lost_for_a_while_or_for_good_is_set_aside():
     made = campaign(seed=1, conditions=CONDITIONS[2:3])
     pose = made.recordings["001", "pose"]
-    for lost in (slice(60, 75), slice(130, None)):
+    for lost in (slice(60, 75), slice(40, 115), slice(130, None)):
         y = pose["y_m"].copy()
         y[lost] -= 0.03
         columns = dict(pose.columns) | {"y_m": y}
