@@ -15,6 +15,7 @@ from rich.text import Text
 from experiments import registry
 from experiments.cli_streams import RefusedError, say, stdout_to_stderr
 from experiments.headline import Headline
+from experiments.kernel_cache import free_kernel_cache
 from experiments.progress import Progress, make_progress
 from experiments.runfolder import RunFolder, write_text
 from vis.numbers import digits_for
@@ -36,6 +37,7 @@ def carry_out(
     """Do the `work` of a run whose folder is there; keep its status; show what came out."""
     say(f"run folder {folder.path}")
     fresh = not folder.has_work
+    free_kernel_cache()
     with stdout_to_stderr():
         try:
             with folder.lock():

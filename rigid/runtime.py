@@ -38,7 +38,11 @@ def ensure(*, threads: int | None = None) -> None:
     if threads is None:
         threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
     with contextlib.redirect_stdout(io.StringIO()):
+        # Taichi's own way to share a loop out gives a thread at least 512 items (make_cpu_multithreaded_range_for.cpp):
+        # a batch of some hundred trials would be one thread's. Without it blocks are as small as the kernels ask for.
+        # Its optimisations take longer than LLVM's, which do the same work: steps run as fast without them.
         ti.init(
             arch=ti.cpu, cpu_max_num_threads=threads, default_fp=ti.f64, default_ip=ti.i32, fast_math=False,
-            cfg_optimization=False, log_level=ti.ERROR,
+            cfg_optimization=False, advanced_optimization=False, make_cpu_multithreading_loop=False,
+            log_level=ti.ERROR,
         )  # fmt: skip

@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from experiments.campaign import Campaign, read_campaign
 from experiments.diagnose_settings import DiagnoseSettings
+from experiments.kernel_cache import free_kernel_cache
 from experiments.plausible import find_implausible, missing_sensors, said_once
 from experiments.progress import Progress
 from experiments.runfolder import RunFolder
@@ -54,6 +55,7 @@ def diagnose_campaign(
 
     `effect_file`: Python files with effects of one's own (`own`), which stand among the candidates.
     """
+    free_kernel_cache()
     measured, problem = _make_problem(Path(campaign), effect_file)
     told = progress or Progress()
     stage = [""]

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.fft import dct
 
 from .problem import Array, Form, Parameter, Problem, Values
+from .together import each
 
 __all__ = ["Fit", "Model", "Whitener", "fit", "linearised", "settled", "settled_slopes"]
 
@@ -24,6 +25,8 @@ _ROUNDS = 30
 _DAMPINGS = (0.0, 1e-3, 1e-1, 10.0)
 _SETTLING = 3
 """Rounds in which the steps of a settled Jacobian are found."""
+_MANY = 2**15
+"""Residuals from which threads are worth their while."""
 _ENOUGH = 0.02
 """Change of chi-square below which a fit has ended: a hundredth of what one sigma is worth."""
 
@@ -51,11 +54,11 @@ class Whitener:
         return Whitener(blocks, weights)
 
     def modes(self, trial: str, residuals: Array) -> Array:
-        """Modes of the residuals of a trial, shape [sample_count]."""
+        """Modes of the residuals of a trial, shape [sample_count], or [point_count, sample_count]."""
         if trial in self.kept:
             residuals = residuals * self.kept[trial]
-        parts = [dct(residuals[rows], norm="ortho") for rows in self.blocks[trial]]
-        return np.concatenate(parts) * self.weights[trial]
+        parts = [dct(np.take(residuals, rows, axis=-1), norm="ortho", axis=-1) for rows in self.blocks[trial]]
+        return np.concatenate(parts, axis=-1) * self.weights[trial]
 
     def block_slices(self, trial: str) -> list[slice]:
         """Where each channel's modes stand."""
@@ -113,7 +116,13 @@ class Model:
         held = self.held
         whole = points if held is None else [{**held, **point} for point in points]
         found = self.problem.evaluate(whole, self.forms, self.trials)
-        return [np.concatenate([self.whitener.modes(id, one[id]) for id in self.trials]) for one in found]
+
+        def modes(trial: str) -> Array:
+            return self.whitener.modes(trial, np.stack([one[trial] for one in found]))
+
+        many = len(found) * sum(len(self.whitener.weights[id]) for id in self.trials) >= _MANY
+        parts = each(modes, self.trials, threads=None if many else 1)
+        return [np.concatenate([part[k] for part in parts]) for k in range(len(found))]
 
     def rows(self) -> dict[str, slice]:
         """Where each trial's modes stand."""

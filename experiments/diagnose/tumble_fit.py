@@ -13,12 +13,14 @@ batched model.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .together import each
 from .tumble_forms import TumbleForm
 from .tumble_forward import SHARED, Forward
 from .tumble_steps import (
@@ -152,19 +154,19 @@ class Fitter:
                 for name, array in form.physical(given).items():
                     columns.setdefault(name, np.full(total, self.forward.neutral(name)))[rows] = array
             at += len(points)
-        predictions = self.forward.predict(columns | {"gravity": gravity}, trials=self.trials, horizon=horizon)
-        answers: list[Answers] = []
-        at = 0
-        for _, points in asked:
-            rows = slice(at, at + len(points))
-            own: Answers = []
-            for trial, prediction in zip(self.trials, predictions, strict=True):
-                data = self.forward.data.trials[trial]
-                until = np.inf if horizon >= 1 else horizon * data.end
-                own.append(whiten(data, prediction.value[rows], until=until))
-            answers.append(own)
-            at += len(points)
-        return answers
+        predictions = self.forward.predict(
+            columns | {"gravity": gravity}, trials=self.trials, states=False, horizon=horizon
+        )
+
+        edges = np.cumsum([0, *(len(points) for _, points in asked)]).tolist()
+
+        def whitened(place: int) -> list[Array]:
+            data = self.forward.data.trials[self.trials[place]]
+            rows = whiten(data, predictions[place].value, until=np.inf if horizon >= 1 else horizon * data.end)
+            return [rows[low:high].copy() for low, high in itertools.pairwise(edges)]  # a fit keeps no other's
+
+        residuals = each(whitened, range(len(self.trials)), threads=self.forward.threads)
+        return [list(own) for own in zip(*residuals, strict=True)]
 
     def _way(self, space: Space, start: Start) -> Way:
         return Way(space, start, self.trials, len(self.forward.data.trials), self.sigma_gravity)

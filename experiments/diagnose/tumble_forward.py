@@ -9,7 +9,7 @@ mean specific force is taken by parts as in `rigid.sensors`.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -20,7 +20,9 @@ from rigid.model import parameter_names
 from rigid.terms import EFFECTS, Term
 
 from .own import OwnEffect
-from .tumble_data import CHANNELS, TrialData, TumbleData
+from .together import each
+from .tumble_data import TrialData, TumbleData
+from .tumble_readings import Grid, Optics
 
 __all__ = ["Forward", "OWN_TO_A_TRIAL", "Prediction", "SHARED", "neutral"]
 
@@ -31,7 +33,11 @@ SHARED = ("mass", "inertia", "stiffness", "damping", "mu_s", "mu_d")
 OWN_TO_A_TRIAL = ("gravity", "bed", "friction")
 """Factors that every trial has of its own."""
 _MOST_BYTES = 1.5e8
-"""Of the sampled motion held at a time."""
+"""Of the sampled motion of the lanes that share the end of their last step."""
+_HELD_BYTES = 3.2e7
+"""Of the sampled motion held at a time, in a buffer that is kept: it stays near the caches, and needs no new pages."""
+_SETS_AT_ONCE = 16
+"""Sets of parameters whose samples one thread turns into readings at a time."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +47,7 @@ class Prediction:
     value: Array
     """Shape [set_count, sample_count], in the order of `TrialData.value`; NaN where a set cannot stand or run."""
     state: NDArray[np.int8]
-    """Number into rigid.STATES at each sample, shape [set_count, sample_count]."""
+    """Number into rigid.STATES at each sample, shape [set_count, sample_count]; or [.., 0]."""
     motion: Array
     """x, y, theta, vx, vy, omega, wheel_speed at each sample, shape [set_count, sample_count, 7]; or [.., 0, 7]."""
 
@@ -79,7 +85,8 @@ class Forward:
             "stiffness": tables.surface.stiffness, "damping": tables.surface.damping,
             "mu_s": tables.surface.mu_s, "mu_d": tables.surface.sliding_friction,
         }  # fmt: skip
-        self._grids = [_Grid(trial, data.window) for trial in data.trials]
+        self._grids = [Grid(trial, data.window) for trial in data.trials]
+        self._buffer = np.empty(0)
         self.simulated = 0
         """How many trials have been simulated so far."""
 
@@ -96,12 +103,14 @@ class Forward:
         sets: Mapping[str, Array],
         *,
         trials: Sequence[int] | None = None,
+        states: bool = True,
         motion: bool = False,
         horizon: float = 1.0,
     ) -> list[Prediction]:
         """Predictions, one a trial (of `trials`, all by default), for all sets at once.
 
-        After the share `horizon` of a trial's time nothing is simulated, and what is given is of no meaning.
+        After the share `horizon` of a trial's time nothing is simulated, and what is given is of no meaning. `states`
+        and `motion`: whether these are wanted too. The same bits come out however many threads there are.
 
         Raises ValueError for a name there is not.
         """
@@ -117,10 +126,17 @@ class Forward:
         for k, name in enumerate(("camera-scale.scale", "camera-scale.bend")):
             lens[:, k] = sets.get(name, neutral(name))
         slope = np.asarray(sets.get("slope.angle", np.zeros(count)), dtype=float)
-        found = []
+        found = {}
+        for trial in chosen:
+            samples = len(self.data.trials[trial].time)
+            found[trial] = Prediction(
+                np.zeros((count, samples)),
+                np.zeros((count, samples if states else 0), dtype=np.int8),
+                np.zeros((count, samples if motion else 0, 7)),
+            )
         for lanes in self._chunks(chosen, count):
-            found += self._run(lanes, columns, terms, clock, lens, slope, motion, horizon)
-        return _joined(found, chosen, count)
+            self._run(lanes, columns, terms, clock, lens, slope, horizon, found)
+        return [found[trial] for trial in chosen]
 
     def _columns(self, sets: Mapping[str, Array], count: int, terms: tuple[Term, ...]) -> dict[str, Array]:
         every = (*EFFECTS.values(), *(own.term for own in self.own))
@@ -148,21 +164,22 @@ class Forward:
         room: dict[float, float] = {}
         for trial in chosen:
             grid = self._grids[trial]
-            each = 88.0 * grid.size
-            most = max(1, int(_MOST_BYTES / each))
+            lane = 88.0 * grid.size
+            most = max(1, int(_MOST_BYTES / lane))
             for first in range(0, count, most):
                 last = min(first + most, count)
-                if room.get(grid.end, 0.0) < each * (last - first):
+                if room.get(grid.end, 0.0) < lane * (last - first):
                     chunks.setdefault(grid.end, []).append([])
                     room[grid.end] = _MOST_BYTES
                 chunks[grid.end][-1].append((trial, first, last))
-                room[grid.end] -= each * (last - first)
+                room[grid.end] -= lane * (last - first)
         return [chunk for same_end in chunks.values() for chunk in same_end]
 
     def _run(
         self, lanes: list[tuple[int, int, int]], columns: Mapping[str, Array], terms: tuple[Term, ...],
-        clock: Array, lens: Array, slope: Array, motion: bool, horizon: float,
-    ) -> list[tuple[int, int, Prediction]]:  # fmt: skip
+        clock: Array, lens: Array, slope: Array, horizon: float, found: Mapping[int, Prediction],
+    ) -> None:  # fmt: skip
+        """Simulate these lanes and put their readings into `found`."""
         from rigid.batch_kernel import CHANNELS as RECORDED
         from rigid.batch_kernel import SUMMARY, batch_kernel
         from rigid.runtime import ensure
@@ -170,42 +187,57 @@ class Forward:
 
         ensure(threads=self.threads)
         stand, advance = batch_kernel(terms, "spring-damper", self.data.tables.platform.rows)
+        sampled = {}
+        for trial, first, last in lanes:
+            until = np.inf if horizon >= 1 else horizon * self.data.trials[trial].end + self.data.window
+            sampled[trial, first] = self._grids[trial].times(clock[first:last], until)
         total = sum(last - first for _, first, last in lanes)
-        width = max(self._grids[trial].size for trial, _, _ in lanes)
+        width = max(times.shape[1] for times, _ in sampled.values())
         numbers = np.empty((total, 16 + len(parameter_names(terms))))
         times = np.empty((total, width))
-        at, end = 0, 0.0
+        at = 0
         for trial, first, last in lanes:
-            rows, grid = slice(at, at + last - first), self._grids[trial]
+            rows = slice(at, at + last - first)
             self._fill(numbers[rows], self.data.trials[trial], trial, columns, terms, slice(first, last))
-            until = np.inf if horizon >= 1 else horizon * self.data.trials[trial].end + self.data.window
-            own = np.minimum(grid.times(clock[first:last]), until)
-            times[rows, : grid.size] = own
-            times[rows, grid.size :] = own[:, -1:]
-            end = max(end, float(own.max()))
+            own = sampled[trial, first][0]
+            times[rows, : own.shape[1]] = own
+            times[rows, own.shape[1] :] = own[:, -1:]
             at += last - first
         poses = np.zeros((total, 2))
         stand(numbers, poses)
-        summary = np.full((total, len(SUMMARY)), np.nan)
-        series = np.full((total, width, len(RECORDED)), np.nan)
-        end += 1e-9
+        end = float(times.max()) + 1e-9
         steps = math.ceil(end / self.time_step)
-        advance(numbers, poses, times, self.time_step, steps, end, LAUNCH_DISTANCE, summary, series)
-        self.simulated += total
-        series[~np.isin(summary[:, SUMMARY.index("status")], (0.0, 1.0))] = np.nan
-        found, at = [], 0
-        for trial, first, last in lanes:
-            rows = slice(at, at + last - first)
-            local = self.data.trials[trial].local_gravity
-            pull = columns["gravity"][first:last, trial] * self.data.trials[trial].gravity_sim
-            pull = pull if local is None else np.full(last - first, local)
-            grid, sets = self._grids[trial], slice(first, last)
-            value, state, moved = grid.read(
-                series[rows, : grid.size], clock[sets], pull, slope[sets], lens[sets], motion
+        most = max(1, int(_HELD_BYTES / (8 * width * len(RECORDED))))
+        for begin in range(0, total, most):
+            rows = slice(begin, min(begin + most, total))
+            summary = np.full((rows.stop - begin, len(SUMMARY)), np.nan)
+            series = self._held(len(summary), width, len(RECORDED))
+            advance(
+                numbers[rows], poses[rows], times[rows], self.time_step, steps, end, LAUNCH_DISTANCE, summary, series
             )
-            found.append((trial, first, Prediction(value, state, moved)))
-            at += last - first
-        return found
+            series[~np.isin(summary[:, SUMMARY.index("status")], (0.0, 1.0))] = np.nan
+
+            def read(piece: tuple[int, int, int, int, int], series: Array = series) -> None:
+                trial, first, low, high, row = piece
+                local, sets = self.data.trials[trial].local_gravity, slice(low, high)
+                pull = columns["gravity"][sets, trial] * self.data.trials[trial].gravity_sim
+                pull = pull if local is None else np.full(high - low, local)
+                place, one = sampled[trial, first][1], found[trial]
+                self._grids[trial].read(
+                    series[row : row + high - low], place if len(place) == 1 else place[low - first : high - first],
+                    Optics(clock[sets], pull, slope[sets], lens[sets]), horizon,
+                    one.value[sets], one.state[sets], one.motion[sets],
+                )  # fmt: skip
+
+            each(read, list(_pieces(lanes, rows)), threads=self.threads)
+        self.simulated += total
+
+    def _held(self, *shape: int) -> Array:
+        """Room for the motion of some lanes; what is in it is of no meaning, and its next user overwrites it."""
+        size = math.prod(shape)
+        if len(self._buffer) < size:
+            self._buffer = np.empty(size)
+        return self._buffer[:size].reshape(shape)
 
     def _fill(
         self, numbers: Array, trial: TrialData, index: int, columns: Mapping[str, Array], terms: tuple[Term, ...],
@@ -232,138 +264,12 @@ class Forward:
         numbers[:, -1] = 1.0  # the spring-damper gives all back
 
 
-class _Grid:
-    """When one trial is to be sampled, and how its samples become readings."""
-
-    def __init__(self, trial: TrialData, window: float) -> None:
-        self.window = window
-        self.channel = trial.channel
-        imu = np.isin(trial.channel, [CHANNELS.index(name) for name in ("gyro", "ax", "ay")])
-        force = np.isin(trial.channel, [CHANNELS.index(name) for name in ("ax", "ay")])
-        self.camera_time, self.camera_row = np.unique(trial.time[~imu], return_inverse=True)
-        self.imu_time, self.imu_row = np.unique(trial.time[imu], return_inverse=True)
-        self.camera_at, self.imu_at = np.cumsum(~imu) - 1, np.cumsum(imu) - 1  # of a sample, among its clock's
-        self.imu, self.force = imu, force
-        self.parts = 3 if window > 0 and force.any() else 1
-        self.size = len(self.camera_time) + self.parts * len(self.imu_time)
-        half = 0.5 * window if self.parts == 3 else 0.0
-        latest = max(self.camera_time[-1:].tolist() + (self.imu_time[-1:] + half).tolist())
-        self.end = round(max(latest, 1e-3), 1)
-        self._sorted: dict[tuple[float, float], tuple[Array, NDArray[np.intp]]] = {}
-
-    def _true(self, clock: tuple[float, float]) -> Array:
-        """True times [s] of the IMU's rows, its clock being off by the first and gaining the second in a second."""
-        return (self.imu_time - clock[0]) / (1.0 + clock[1])
-
-    def _plain(self, clock: tuple[float, float]) -> tuple[Array, NDArray[np.intp]]:
-        """Rising sample times for a clock that is off and gains, and where each reading's sample has gone."""
-        if clock not in self._sorted:
-            if len(self._sorted) > 64:
-                self._sorted.clear()
-            true = self._true(clock)
-            half = 0.5 * self.window
-            parts = (true - half, true, true + half) if self.parts == 3 else (true,)
-            wanted = np.maximum(np.concatenate([self.camera_time, *parts]), 0.0)
-            order = np.argsort(wanted, kind="stable")
-            place = np.empty_like(order)
-            place[order] = np.arange(len(order))
-            self._sorted[clock] = (wanted[order], place)
-        return self._sorted[clock]
-
-    def times(self, clock: Array) -> Array:
-        """Sample times [s], never below 0, shape [set_count, size]."""
-        return np.stack([self._plain((float(offset), float(drift)))[0] for offset, drift in clock])
-
-    def read(
-        self, series: Array, clock: Array, pull: Array, slope: Array, lens: Array, motion: bool
-    ) -> tuple[Array, NDArray[np.int8], Array]:
-        """Readings and states, shape [set_count, sample_count], from the sampled motion of one trial.
-
-        Args:
-            series: as the batch recorded it at `times`, shape [set_count, size, channel].
-            clock: by what the IMU's is off [s] and what it gains in a second [1], shape [set_count, 2].
-            pull: local gravity [m/s2], shape [set_count] like the rest.
-            slope: of the surface [rad].
-            lens: the camera's scale [1] and what it grows by with the distance's square [1/m2], shape [set_count, 2].
-            motion: whether to give the motion at every sample too.
-        """
-        count = len(series)
-        value = np.empty((count, len(self.channel)))
-        state = np.empty((count, len(self.channel)), dtype=np.int8)
-        moved = np.empty((count, len(self.channel), 7)) if motion else np.empty((count, 0, 7))
-        for one in np.unique(clock, axis=0):
-            sets = np.flatnonzero((clock == one).all(axis=1))
-            self._read(series, sets, (float(one[0]), float(one[1])), pull, slope, lens, value, state, moved)
-        return value, state, moved
-
-    def _read(
-        self, series: Array, sets: NDArray[np.intp], clock: tuple[float, float], pull: Array, slope: Array, lens: Array,
-        value: Array, state: NDArray[np.int8], moved: Array,
-    ) -> None:  # fmt: skip
-        place = self._plain(clock)[1]
-        here = series if len(sets) == len(series) else series[sets]
-        cameras, imus = len(self.camera_time), len(self.imu_time)
-        camera = here[:, place[:cameras]]
-        parts = [here[:, place[cameras + k * imus : cameras + (k + 1) * imus]] for k in range(self.parts)]
-        middle = parts[self.parts // 2] if imus else camera[:, :0]
-        seen = lens[sets, 0, None]
-        if lens[sets, 1].any():
-            away = (camera[:, :, 0] - camera[:, :1, 0]) ** 2 + (camera[:, :, 1] - camera[:, :1, 1]) ** 2
-            seen = seen + lens[sets, 1, None] * away
-        readings = {
-            "x": seen * camera[:, :, 0], "y": seen * camera[:, :, 1],
-            "theta": camera[:, :, 2], "wheel": np.abs(camera[:, :, 8]), "gyro": middle[:, :, 5],
-        }  # fmt: skip
-        if self.force.any():
-            readings["ax"], readings["ay"] = self._specific_force(parts, clock, pull[sets], slope[sets])
-        for number, name in enumerate(CHANNELS):
-            mine = np.flatnonzero(self.channel == number)
-            if not len(mine):
-                continue
-            rows = self.imu_row[self.imu_at[mine]] if self.imu[mine[0]] else self.camera_row[self.camera_at[mine]]
-            source = middle if self.imu[mine[0]] else camera
-            value[np.ix_(sets, mine)] = readings[name][:, rows]
-            numbers = source[:, rows, 9]
-            state[np.ix_(sets, mine)] = np.where(np.isfinite(numbers), numbers, 0).astype(np.int8)
-            if moved.shape[1]:
-                moved[np.ix_(sets, mine)] = source[:, rows][:, :, (0, 1, 2, 3, 4, 5, 8)]
-
-    def _specific_force(
-        self, parts: list[Array], clock: tuple[float, float], pull: Array, slope: Array
-    ) -> tuple[Array, Array]:
-        """In body axes [m/s2]: mean over the window by parts (`rigid.sensors`), the integral by Simpson's rule."""
-        gx, gy = (pull * np.sin(slope))[:, None], (pull * np.cos(slope))[:, None]
-        if self.parts == 1:
-            at = parts[0]
-            sine, cosine = np.sin(at[:, :, 2]), np.cos(at[:, :, 2])
-            moves = self._true(clock) >= 0
-            ax, ay = np.where(moves, at[:, :, 6], 0.0) + gx, np.where(moves, at[:, :, 7], 0.0) + gy
-            return ax * cosine - ay * sine, ax * sine + ay * cosine
-        along, up, over_x, over_y = [], [], [], []
-        for at in parts:
-            sine, cosine = np.sin(at[:, :, 2]), np.cos(at[:, :, 2])
-            along.append(at[:, :, 3] * cosine - at[:, :, 4] * sine)
-            up.append(at[:, :, 3] * sine + at[:, :, 4] * cosine)
-            over_x.append(at[:, :, 5] * up[-1] + gx * cosine - gy * sine)
-            over_y.append(gx * sine + gy * cosine - at[:, :, 5] * along[-1])
-        weights = (1 / 6, 4 / 6, 1 / 6)
-        mean_x = sum(w * over for w, over in zip(weights, over_x, strict=True))
-        mean_y = sum(w * over for w, over in zip(weights, over_y, strict=True))
-        return (along[2] - along[0]) / self.window + mean_x, (up[2] - up[0]) / self.window + mean_y
-
-
-def _joined(found: list[tuple[int, int, Prediction]], chosen: Sequence[int], count: int) -> list[Prediction]:
-    """The pieces of every trial put together, in the order of `chosen`."""
-    joined = []
-    for trial in chosen:
-        own = [piece for at, _, piece in sorted((f for f in found if f[0] == trial), key=lambda f: f[1])]
-        joined.append(
-            own[0]
-            if len(own) == 1
-            else Prediction(
-                np.concatenate([piece.value for piece in own]),
-                np.concatenate([piece.state for piece in own]),
-                np.concatenate([piece.motion for piece in own]),
-            )
-        )
-    return joined
+def _pieces(lanes: Sequence[tuple[int, int, int]], rows: slice) -> Iterator[tuple[int, int, int, int, int]]:
+    """What of the lanes lies within some rows, in pieces of `_SETS_AT_ONCE` sets: trial, first set of its lanes, first
+    set of the piece, set after its last, and the first's row among those rows."""
+    at = 0
+    for trial, first, last in lanes:
+        low, high = max(first, first + rows.start - at), min(last, first + rows.stop - at)
+        for begin in range(low, high, _SETS_AT_ONCE):
+            yield trial, first, begin, min(begin + _SETS_AT_ONCE, high), at + begin - first - rows.start
+        at += last - first

@@ -22,6 +22,7 @@ from rigid.trajectory import STATES
 from .own import OwnEffect
 from .problem import Finding, Form, Parameter, Samples, TrialInfo, Values
 from .replicates import parted
+from .together import each
 from .tumble_data import CHANNELS, TumbleData, tumble_data
 from .tumble_follow import followed_until
 from .tumble_forms import TumbleForm, tumble_forms
@@ -180,11 +181,13 @@ class TumbleProblem:
         self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[str]
     ) -> list[dict[str, Array]]:
         """Whitened residuals of each trial at each point."""
-        found = self._predict(points, forms, trials)
-        residuals = {}
-        for trial, prediction in zip(trials, found, strict=True):
-            residuals[trial] = whiten(self.data.trials[self._index[trial]], prediction.value)
-        return [{trial: residuals[trial][k] for trial in trials} for k in range(len(points))]
+        found = self._predict(points, forms, trials, states=False)
+
+        def whitened(place: int) -> Array:
+            return whiten(self.data.trials[self._index[trials[place]]], found[place].value)
+
+        residuals = each(whitened, range(len(trials)), threads=self.forward.threads)
+        return [{trial: rows[k] for trial, rows in zip(trials, residuals, strict=True)} for k in range(len(points))]
 
     def rewhiten(self, values: Values, forms: Sequence[Form]) -> None:
         """The whitening does not depend on the values."""
@@ -328,8 +331,9 @@ class TumbleProblem:
         )
 
     def _predict(
-        self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[str], *, motion: bool = False
-    ) -> list[Prediction]:
+        self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[str], *, states: bool = True,
+        motion: bool = False,
+    ) -> list[Prediction]:  # fmt: skip
         columns = {
             name: np.array([values.get(name, value) for values in points])
             for name, value in self.forward.nominal.items()
@@ -343,7 +347,8 @@ class TumbleProblem:
             assert isinstance(form, TumbleForm)
             own = {p.name: np.array([values.get(p.name, p.value) for values in points]) for p in form.parameters}
             columns |= form.physical(own)
-        return self.forward.predict(columns, trials=[self._index[trial] for trial in trials], motion=motion)
+        chosen = [self._index[trial] for trial in trials]
+        return self.forward.predict(columns, trials=chosen, states=states, motion=motion)
 
     def _residual(self, values: Values, forms: Sequence[Form], trial: str) -> Array:
         data = self.data.trials[self._index[trial]]

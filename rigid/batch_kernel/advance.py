@@ -42,7 +42,7 @@ def make_advance(parts: SimpleNamespace) -> Any:
         summary: ti.types.ndarray(dtype=ti.f64, ndim=2),
         series: ti.types.ndarray(dtype=ti.f64, ndim=3),
     ):
-        ti.loop_config(block_dim=16)
+        ti.loop_config(block_dim=4)
         for i in range(numbers.shape[0]):
             s = trial_state(numbers, i)
             p = load_parameters(numbers, i)

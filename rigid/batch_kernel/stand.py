@@ -20,7 +20,7 @@ def make_stand(parts: SimpleNamespace) -> Any:
         numbers: ti.types.ndarray(dtype=ti.f64, ndim=2),
         poses: ti.types.ndarray(dtype=ti.f64, ndim=2),
     ):
-        ti.loop_config(block_dim=64)
+        ti.loop_config(block_dim=4)
         for i in range(numbers.shape[0]):
             s = trial_state(numbers, i)
             p = load_parameters(numbers, i)
@@ -32,6 +32,8 @@ def make_stand(parts: SimpleNamespace) -> Any:
             low, high = 0.0, s.length
             for _ in range(200):  # the depth at which a row carries half the weight
                 middle = 0.5 * (low + high)
+                if not low < middle < high:
+                    break  # nothing lies between them
                 elastic, lost, stored, side, factor_s, factor_d, grip = contact(
                     p, s, q, middle, 0.0, 0.0, middle, middle
                 )
