@@ -286,23 +286,7 @@ class Bed:
             raise ValueError(f"position = {tuple(position)} must be 3 finite numbers [m]")
         if body >= MOST_BODIES or used + len(parts) > MOST_PRIMITIVES:
             raise ValueError(f"a bed takes at most {MOST_BODIES} bodies of {MOST_PRIMITIVES} primitives in all")
-        stuff = self.material
-        facing.refuse_for(stuff)
-        star, shear = effective_moduli(
-            stuff.young,
-            stuff.poisson,
-            math.inf if facing.young is None else facing.young,
-            stuff.poisson if facing.young is None else facing.poisson,
-        )
-        e.body_pair[body] = pair_parameters(
-            effective_young=star,
-            effective_shear=shear,
-            restitution=_or(facing.restitution, stuff.restitution),
-            friction=_or(facing.friction, stuff.friction),
-            rolling_friction=_or(facing.rolling_friction, stuff.rolling_friction),
-            surface_energy=_or(facing.surface_energy, stuff.surface_energy),
-            tensile=self._settings["tensile"],
-        )
+        self._face(body, facing)
         e.put_shapes(used, parts)
         e.body_primitives[body] = [used, used + len(parts)]
         e.body_extent[body] = min(1e35, max(p.extent() for p in parts))
@@ -314,6 +298,26 @@ class Bed:
         if body == FLOOR and any(isinstance(p, Plane) for p in parts):
             self._has_floor = True
         return body
+
+    def _face(self, body: int, facing: Facing) -> None:
+        """How grains touch a body, from now on. Raises ValueError as ``Facing.refuse_for`` does."""
+        stuff = self.material
+        facing.refuse_for(stuff)
+        star, shear = effective_moduli(
+            stuff.young,
+            stuff.poisson,
+            math.inf if facing.young is None else facing.young,
+            stuff.poisson if facing.young is None else facing.poisson,
+        )
+        self._engine.body_pair[body] = pair_parameters(
+            effective_young=star,
+            effective_shear=shear,
+            restitution=_or(facing.restitution, stuff.restitution),
+            friction=_or(facing.friction, stuff.friction),
+            rolling_friction=_or(facing.rolling_friction, stuff.rolling_friction),
+            surface_energy=_or(facing.surface_energy, stuff.surface_energy),
+            tensile=self._settings["tensile"],
+        )
 
     def move_body(
         self,

@@ -21,8 +21,8 @@ from .repose import COLUMN, Flank, measure_flanks, thickness_profile
 __all__ = ["LEAST", "MOST", "VerticalCut", "check_width", "cohesion_of", "cut_and_load"]
 
 LEAST, MOST = 0.1, 4.0
-"""Gravities between which a face is tried, over the bed's own [1]; the grains of a bed are soft beyond (see
-``dem.shearing.MOST_PRESSURE``)."""
+"""Gravities between which a face is tried if nothing else is said, over the bed's own [1]; the grains of a bed may be
+too soft beyond (see ``dem.shearing.MOST_PRESSURE``), which its overlaps show."""
 STEP = math.sqrt(2.0)
 """Gravity rises by this factor; where a face has fallen the middle is tried as well."""
 # Slope of the wedge that is watched behind a face: tan(45 - 30/2 degrees), Rankine's for a friction angle of 30.
@@ -79,21 +79,28 @@ def cohesion_of(height: float, unit_weight: float, friction_angle: float) -> flo
 
 
 def cut_and_load(
-    bed: Bed, *, width: float | None = None, tell: Callable[[float], None] = lambda share: None
+    bed: Bed,
+    *,
+    width: float | None = None,
+    most: float = MOST,
+    tell: Callable[[float], None] = lambda share: None,
 ) -> VerticalCut:
     """Cut a strip out about x = 0 at a tenth of the bed's gravity and let gravity rise until a face falls.
 
     Args:
         bed: level; used up by it. width: of the strip [m]; the bed's height when None.
+        most: gravity to which a face is tried, over the bed's own [1]: the step of 1.41 next to it.
         tell: called with the share done, 0 to 1; a guess.
 
     Raises:
-        ValueError: a tilted bed; a strip that leaves too little for two faces.
+        ValueError: a tilted bed; a strip that leaves too little for two faces; a ``most`` that is not above ``LEAST``.
         BedFailure: the bed did not come to rest, or its own reasons.
     """
     grain = 2 * float(bed.grains()["radius"].mean())
     if bed.gravity[0] or bed.gravity[1] or not bed.gravity[2] < 0:
         raise ValueError(f"gravity = {bed.gravity} m/s2: a level bed under gravity is needed")
+    if not LEAST < most < math.inf:
+        raise ValueError(f"most = {most}: a gravity above {LEAST:g} of the bed's own would do")
     check_width(width, width=bed.size[0], height=bed.surface, grain=grain)
     width = bed.surface if width is None else width
     own, height, packing = -bed.gravity[2], bed.surface, bed.packing_fraction
@@ -114,7 +121,7 @@ def cut_and_load(
 
     trials: list[tuple[float, float]] = []
     stood, fell, before, kept = 0.0, None, None, bed.state()
-    levels = [LEAST * STEP**k for k in range(round(math.log(MOST / LEAST, STEP)) + 1)]
+    levels = [LEAST * STEP**k for k in range(round(math.log(most / LEAST, STEP)) + 1)]
     for k, level in enumerate(levels):
         share = _watch(bed, level * own, height, grain, watched, moved)
         trials.append((level, share))

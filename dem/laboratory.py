@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from .grading import measure_grading
 from .lid import Lid
 from .materials import Facing, Material
 from .measure import packing_profile
+from .pouring import poured, poured_on, touching_as
 from .prepare import BEARING, Specification
 from .recipe import DENSEST_UNIFORM, FLUFF, Stage, check_stages, parse_stage
 from .sizes import Sizes, Uniform
@@ -119,14 +120,18 @@ def prepare_as(
     runtime.start(arch=arch, threads=threads, precision=precision)
     dense = DENSEST_UNIFORM if isinstance(wanted.local, Uniform) else 0.70
     depth = (z + _SURPLUS_DIAMETERS * wanted.coarsest) * dense
+    own, first = stuff.softened(wanted.young), wanted
+    if plan[0].dry:
+        first = replace(wanted, material=poured(stuff, friction=plan[0].value), floor=poured_on(wanted.floor))
     work = Laboratory(
-        wanted.rain(depth * x * y),
+        first.rain(depth * x * y),
         stages=plan,
         grain=sizes.mean,
         progress=progress,
         path=None if keep is None else Path(keep),
         recipe=recipe,
         graded=sizes if isinstance(sizes, Graded) else None,
+        sticking=lambda bed: touching_as(bed, own, floor=wanted.floor),
     )
     work.find(arch=arch, threads=threads)
     return Prepared(wanted.finish(work.run(), recipe), recipe, work.reports)
@@ -145,21 +150,25 @@ class Laboratory(Preparation):
         path: Path | None,
         recipe: dict[str, Any] | None = None,
         graded: Graded | None = None,
+        sticking: Callable[[Bed], Bed] | None = None,
     ):
         """``path``: as for ``Preparation``; ``recipe``: what is kept there is gone on with only for the same one.
 
-        ``graded``: where sizes belong; every stage's report then says in its notes how they lie.
+        ``graded``: where sizes belong; every stage's report then says in its notes how they lie. ``sticking``: gives
+        the same grains, which touch as their material says (the stage 'stick').
         """
         super().__init__(bed, grain=grain, depth=bed.size[2], packing=None, progress=progress, path=path)
         self.stages = list(stages)
         self.reports: list[StageReport] = []
         self._recipe = recipe
         self._graded = graded
+        self._sticking = sticking
 
     def run(self) -> Bed:
         """Go on to the end; the bed. Raises as ``prepare_as`` does."""
         work = {
             "rain": self._rain_down,
+            "stick": self._stick,
             "level": self._level,
             "fluff": self._loosen,
             "compact": self._compact,
@@ -209,6 +218,15 @@ class Laboratory(Preparation):
             self.notes = {"settle": {}}
         self._settle(ENERGY_RATIO, self.notes["settle"])
         return {}
+
+    def _stick(self, stage: Stage) -> dict[str, Any]:
+        assert self._sticking is not None
+        notes = self.notes
+        if not notes:
+            notes |= {"before": self.bed.packing_fraction, "settle": {}}
+            self.bed = self._sticking(self.bed)
+        self._settle(ENERGY_RATIO, notes["settle"])
+        return {"before": notes["before"]}
 
     def _level(self, stage: Stage) -> dict[str, Any]:
         notes = self.notes

@@ -22,6 +22,7 @@ class Lid:
     """A lid over the whole bed. What it remembers is in ``notes``, so that its work can be kept between two pieces.
 
     The servo moves it down at a speed in proportion to the force that lacks, and at ``_SPEED`` sqrt(g d) at most.
+    Grains do not stick to it: those that do would hang on it when it is lifted, and tear the bed open.
     """
 
     def __init__(self, bed: Bed, notes: dict[str, Any], *, grain: float, fall_time: float, drag_time: float):
@@ -34,7 +35,8 @@ class Lid:
         if "body" not in notes:
             grains = bed.grains()
             top = float((grains["position"][:, 2] + grains["radius"]).max())
-            body = bed.add_body([Plane(normal=(0.0, 0.0, -1.0))], position=(0.0, 0.0, top + 0.01 * grain))
+            plane = Plane(normal=(0.0, 0.0, -1.0))
+            body = bed.add_body([plane], position=(0.0, 0.0, top + 0.01 * grain), surface_energy=0.0)
             notes |= {"body": body, "began": bed.time, "held": 0.0, "lifting": 0.0}
 
     @property

@@ -1,7 +1,8 @@
 """The stages of a preparation as in the laboratory: what each takes, how it is written, what cannot be is refused.
 
-A stage is written as its name, with a number after a colon where it takes one: ``rain``, ``level``, ``fluff``,
-``compact:0.61``, ``compact:0.58@lid``, ``compact:densest``, ``packing:0.57``, ``cut:0.02``, ``tilt:20``.
+A stage is written as its name, with a number after a colon where it takes one: ``rain``, ``rain:dry``, ``rain:0.2``,
+``stick``, ``level``, ``fluff``, ``compact:0.61``, ``compact:0.58@lid``, ``compact:densest``, ``packing:0.57``,
+``cut:0.02``, ``tilt:20``.
 """
 
 from __future__ import annotations
@@ -17,7 +18,9 @@ from .sizes import Sizes, Uniform
 __all__ = ["STAGES", "Stage", "check_packing", "check_stages", "parse_stage"]
 
 STAGES = {
-    "rain": "grains fall from a loose column",
+    "rain": "grains fall from a loose column; 'dry' without adhesion, or also with the friction given and no rolling "
+    "friction, until 'stick'",
+    "stick": "grains that were poured so touch as their material says: adhesion, friction, rolling friction come back",
     "level": "grains above a height are taken away: the bed's depth, or the height given [m]",
     "fluff": "the bed is lifted apart from below to 1.4 times its height, or as often as given, and sinks back slowly",
     "compact": "to a packing fraction, by tapping or (@lid) by a lid under servo control; or 'densest' that taps reach",
@@ -31,12 +34,15 @@ LOOSEST, DENSEST_UNIFORM, DENSEST = 0.5, 0.64, 0.74
 LOOSEST_STICKY = 0.1
 FLUFF = 1.4
 """How many times its height a fluffed bed has before it sinks back [1]."""
-_FILLS = ("fluff", "level", "compact", "packing")
+_FILLS = ("stick", "fluff", "level", "compact", "packing")
 
 
 @dataclass(frozen=True)
 class Stage:
-    """One stage. ``value``: what stands after the colon, None where nothing does; ``by``: "tap" or "lid" (compact)."""
+    """One stage.
+
+    ``value``: what stands after the colon, None where no number does; ``by``: "tap" or "lid" (compact), "dry" (rain).
+    """
 
     name: str
     value: float | None = None
@@ -46,7 +52,14 @@ class Stage:
         if self.name == "compact":
             what = "densest" if self.value is None else f"{self.value:.12g}"
             return f"compact:{what}" + ("@lid" if self.by == "lid" else "")
+        if self.dry and self.value is None:
+            return "rain:dry"
         return self.name if self.value is None else f"{self.name}:{self.value:.12g}"
+
+    @property
+    def dry(self) -> bool:
+        """Whether grains are poured that do not stick, and may have less friction, until 'stick'."""
+        return self.name == "rain" and self.by == "dry"
 
 
 def parse_stage(words: str) -> Stage:
@@ -62,8 +75,10 @@ def parse_stage(words: str) -> Stage:
         rest, _, by = rest.partition("@")
         if by not in ("tap", "lid"):
             raise ValueError(f"stages: {words!r}: a bed is compacted by 'tap' or 'lid', not by {by!r}")
-    if name == "rain" and colon:
-        raise ValueError(f"stages: {words!r}: rain takes no number")
+    if name == "rain" and rest == "dry":
+        return Stage(name, by="dry")
+    if name == "stick" and colon:
+        raise ValueError(f"stages: {words!r}: 'stick' takes no number")
     if name in ("compact", "packing", "cut", "tilt") and not rest:
         example = {"compact": "compact:0.6", "packing": "packing:0.58", "cut": "cut:0.02", "tilt": "tilt:20"}[name]
         raise ValueError(f"stages: {words!r} lacks its number: {example} would do ({STAGES[name]})")
@@ -76,10 +91,11 @@ def parse_stage(words: str) -> Stage:
     try:
         value = float(rest)
     except ValueError:
-        raise ValueError(f"stages: {words!r}: {rest!r} is no number ({STAGES[name]})") from None
+        hint = "; 'dry', or a friction," if name == "rain" else ""
+        raise ValueError(f"stages: {words!r}: {rest!r} is no number{hint} ({STAGES[name]})") from None
     if not math.isfinite(value) or value <= 0:
         raise ValueError(f"stages: {words!r}: {rest} must be positive ({STAGES[name]})")
-    return Stage(name, value, by)
+    return Stage(name, value, "dry" if name == "rain" else by)
 
 
 def check_packing(packing: float, sizes: Sizes, *, cohesive: bool, key: str = "packing") -> None:
@@ -108,6 +124,7 @@ def check_stages(stages: Sequence[Stage], *, size: Sequence[float], grain: float
         raise ValueError("stages is empty: 'rain' at least would do")
     if stages[0].name != "rain":
         raise ValueError(f"stages begins with {str(stages[0])!r}: a bed begins with 'rain'")
+    _check_sticking(stages, cohesive=cohesive)
     for before, stage in itertools.pairwise(stages):
         if stage.name == "rain":
             raise ValueError("stages: 'rain' comes once, at the beginning")
@@ -133,3 +150,17 @@ def check_stages(stages: Sequence[Stage], *, size: Sequence[float], grain: float
             )
         elif stage.name == "tilt" and value is not None and not value < 90:
             raise ValueError(f"stages: {str(stage)!r} [degrees]: below 90 would do")
+
+
+def _check_sticking(stages: Sequence[Stage], *, cohesive: bool) -> None:
+    """What is poured without adhesion, or with less friction, has 'stick' once behind it, and nothing else has."""
+    rain, times = stages[0], [stage.name for stage in stages].count("stick")
+    if rain.dry and rain.value is None and not cohesive:
+        raise ValueError(f"stages: {str(rain)!r}: these grains do not stick anyway; 'rain' would do")
+    if rain.dry and times != 1:
+        raise ValueError(
+            f"stages: {str(rain)!r} needs 'stick' once behind it ({times} found), where the grains get back what "
+            f"their material has"
+        )
+    if times and not rain.dry:
+        raise ValueError("stages: 'stick' is for what was poured without: 'rain:dry' at the beginning would do")

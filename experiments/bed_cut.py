@@ -34,7 +34,7 @@ def _carry_out(settings: BedCutSettings, folder: RunFolder, progress: Progress) 
         from dem.cutting import cut_and_load
 
         first = about(bed)
-        found = cut_and_load(bed, width=settings.width, tell=tell)
+        found = cut_and_load(bed, width=settings.width, most=settings.most, tell=tell)
         columns = {"x_m": found.after[0], "thickness_m": found.after[1]}
         if found.before is not None:
             columns["thickness_standing_m"] = found.before[1]
@@ -60,9 +60,7 @@ def _carry_out(settings: BedCutSettings, folder: RunFolder, progress: Progress) 
         }
 
     def result(runs: list[dict[str, Any]]) -> dict[str, Any]:
-        return _result(runs, settings.friction_angle)
-
-    from dem.cutting import MOST
+        return _result(runs, settings.friction_angle, settings.most)
 
     return carry_out(
         settings,
@@ -71,12 +69,12 @@ def _carry_out(settings: BedCutSettings, folder: RunFolder, progress: Progress) 
         test=test,
         result=result,
         report="vis.bed_cut:write_cut_report",
-        bearing=1.0 + MOST,
+        bearing=1.0 + settings.most,
     )
 
 
-def _result(runs: list[dict[str, Any]], friction_angle: float | None) -> dict[str, Any]:
-    from dem.cutting import LEAST, MOST, cohesion_of
+def _result(runs: list[dict[str, Any]], friction_angle: float | None, most: float) -> dict[str, Any]:
+    from dem.cutting import LEAST, cohesion_of
 
     of = partial(quantity, runs)
 
@@ -113,7 +111,7 @@ def _result(runs: list[dict[str, Any]], friction_angle: float | None) -> dict[st
             run["id"],
             f"{1e3 * run['height']:.3g}",
             f"{run['stood']:.2g} g" if run["stood"] else f"not at {LEAST:g} g",
-            f"{run['fell']:.2g} g" if run["fell"] else f"not at {MOST:g} g",
+            f"{run['fell']:.2g} g" if run["fell"] else f"not at {most:g} g",
             "-" if run["critical_height"] is None else f"{1e3 * run['critical_height']:.3g}",
             "-" if run["slumped_to"] is None else f"{run['slumped_to']:.1f}",
         ]
@@ -135,12 +133,14 @@ def _result(runs: list[dict[str, Any]], friction_angle: float | None) -> dict[st
         )
     warnings = []
     if not any(run["stood"] for run in runs):
-        most = max(cohesion_of(run["high"], run["unit_weight"], friction_angle or 30.0) for run in runs)
+        bound = max(cohesion_of(run["high"], run["unit_weight"], friction_angle or 30.0) for run in runs)
         warnings.append(
-            f"no face stood at {LEAST:g} of the bed's gravity: its cohesion is less than {most:.2g} Pa, and may be none"
+            f"no face stood at {LEAST:g} of the bed's gravity: its cohesion is less than {bound:.2g} Pa, or none"
         )
     elif any(run["fell"] is None for run in runs):
-        warnings.append(f"not every face fell at {MOST:g} times the bed's gravity: a deeper bed would tell its height")
+        warnings.append(
+            f"not every face fell at {most:g} times the bed's gravity: more ('most') or a deeper bed would tell"
+        )
     return {
         "title": f"Vertical cut in {runs[0]['material']}",
         "quantities": quantities,

@@ -47,6 +47,10 @@ def refined_options(settings: BedRefineSettings) -> tuple[dict[str, Any], Prepar
         stuff = replace(stuff, surface_energy=stuff.surface_energy * share**power, grain=grain)
     last = [stage for stage in recipe["stages"] if stage.partition(":")[0] in ("cut", "tilt")]
     first = [stage for stage in recipe["stages"] if stage not in last]
+    # Once grains stick nothing brings them closer: what was poured without adhesion comes to its packing before.
+    if "stick" in first:
+        last = [*first[first.index("stick") :], *last]
+        first = first[: first.index("stick")]
     levelled = first[-1] if first[-1].partition(":")[0] == "level" else None
     # Before it was levelled: a shallow bed's packing is read lower, its floor and surface weighing in it.
     before = coarse.reports[len(first) - (1 if levelled is None else 2)]

@@ -29,8 +29,8 @@ class BedSettings(StrictSettings):
     stages: tuple[str, ...] = Field(
         ("rain", "level"),
         min_length=1,
-        description="What is done, in this order: rain, level[:HEIGHT], fluff[:TIMES], compact:PACKING[@lid], "
-        "compact:densest, packing:PACKING, cut:WIDTH, tilt:DEGREES.",
+        description="What is done, in this order: rain[:dry|:FRICTION], stick, level[:HEIGHT], fluff[:TIMES], "
+        "compact:PACKING[@lid], compact:densest, packing:PACKING, cut:WIDTH, tilt:DEGREES.",
     )
     size: tuple[Positive, Positive, Positive] = Field(
         (0.04, 0.04, 0.03), description="Bed: both widths (periodic) and depth of grains [m]."

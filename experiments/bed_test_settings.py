@@ -84,6 +84,9 @@ class BedCutSettings(BedTestSettings):
 
     size: Size = Field((0.128, 0.024, 0.04), description=_SIZE)
     width: Positive | None = Field(None, description="Width of the cut [m]; the bed's height if not given.")
+    most: float = Field(
+        4.0, ge=0.2, le=100, description="Gravity to which it rises if no face falls [of the bed's own]."
+    )
     friction_angle: float | None = Field(
         None,
         ge=0,

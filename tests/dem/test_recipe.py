@@ -6,7 +6,7 @@ from dem import LogNormal, Uniform
 from dem.recipe import Stage, check_packing, check_stages, parse_stage
 
 WRITTEN = ["rain", "level", "level:0.03", "fluff", "fluff:1.6", "compact:0.61", "compact:0.58@lid", "compact:densest"]
-WRITTEN += ["packing:0.57", "cut:0.02", "tilt:20"]
+WRITTEN += ["packing:0.57", "cut:0.02", "tilt:20", "rain:dry", "rain:0.2", "stick"]
 BED = {"size": (0.1, 0.1, 0.04), "grain": 0.004, "sizes": Uniform(0.004), "cohesive": False}
 
 
@@ -24,13 +24,14 @@ def test_what_stands_behind_the_colon_is_the_stage_s_number():
     ("words", "said"),
     [
         ("rian", "'rian' is no stage; did you mean 'rain'"),
-        ("shake", "'shake' is no stage; there is rain, level"),
+        ("shake", "'shake' is no stage; there is rain, stick"),
         ("compact", r"'compact' lacks its number: compact:0.6 would do"),
         ("compact:0.6@hand", "by 'tap' or 'lid', not by 'hand'"),
         ("compact:densest@lid", "a lid takes a packing fraction"),
         ("tilt:steep", "'steep' is no number"),
         ("cut:-0.01", "-0.01 must be positive"),
-        ("rain:2", "rain takes no number"),
+        ("rain:wet", "'wet' is no number; 'dry', or a friction,"),
+        ("stick:2", "'stick' takes no number"),
     ],
 )
 def test_words_that_are_no_stage_are_refused(words, said):
@@ -51,6 +52,10 @@ def test_words_that_are_no_stage_are_refused(words, said):
         (["rain", "fluff:3"], "1.02 to 2 times"),
         (["rain", "cut:0.09"], r"width less six grains, 0\.076 m"),
         (["rain", "tilt:95"], "below 90"),
+        (["rain:dry", "stick"], "'rain:dry': these grains do not stick anyway"),
+        (["rain:0.2", "level"], r"'rain:0.2' needs 'stick' once behind it \(0 found\)"),
+        (["rain", "stick"], "'stick' is for what was poured without"),
+        (["rain:0.2", "cut:0.02", "stick"], "'stick' after 'cut:0.02' would undo it"),
     ],
 )
 def test_stages_that_cannot_be_are_refused_before_any_work(stages, said):
