@@ -1,6 +1,7 @@
 """The recordings of a tumble campaign as the fit wants them: one flat list of samples a trial, and when to simulate.
 
 Contract: a trial's samples are ordered camera x, y, theta, then gyro, ax, ay, then wheel; gaps (NaN) are left out.
+A specific force read at the very instant at which the torque sets in or ends is left out, too: it jumps there.
 Nothing is averaged or resampled. Whitening divides by the std that campaign.toml states.
 """
 
@@ -23,6 +24,9 @@ CHANNELS = ("x", "y", "theta", "gyro", "ax", "ay", "wheel")
 
 _LATEST = 1e3
 """Seconds after the torque by which a trial must have begun: unix time would be simulated for years."""
+_FELT = ("ax", "ay")
+_SWITCH = 1e-3
+"""How far from the moment at which the torque sets in or ends a force read at an instant must be [s]."""
 _COLUMNS = {
     "x": ("pose", "x_m", 0), "y": ("pose", "y_m", 1), "theta": ("pose", "theta_rad", 2),
     "gyro": ("imu", "gyro_rad_s", 0), "ax": ("imu", "ax_m_s2", 1), "ay": ("imu", "ay_m_s2", 2),
@@ -113,6 +117,9 @@ def tumble_data(campaign: Campaign) -> TumbleData:
                     f"expected, without noise no residual can be weighed"
                 )
             good = np.isfinite(recording[column])
+            if name in _FELT and tables.sensors.imu is not None and tables.sensors.imu.window == 0:
+                for moment in (0.0, trial.torque_until):  # the force jumps there: neither side is wrong
+                    good &= np.abs(recording.time - moment) > _SWITCH
             time, value = recording.time[good], recording[column][good]
             parts.append((time, value, np.full(len(time), std), np.full(len(time), number, dtype=np.int8)))
         if not parts or not sum(len(part[0]) for part in parts):

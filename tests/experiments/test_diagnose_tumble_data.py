@@ -44,6 +44,19 @@ def test_a_clock_that_jumps_forward_ends_its_sensor_and_is_said(sensor, channels
         assert rest.max() < at if name in channels else rest.max() > 1.1
 
 
+@pytest.mark.parametrize("window", [0.0, 0.004])
+def test_a_force_read_at_the_instant_at_which_the_torque_sets_in_tells_nothing(window):
+    """There it jumps by torque / (inertia about the tip) x length: a clock 10 us off would seem to explain it."""
+    made = campaign(seed=1, conditions=CONDITIONS[:1])
+    imu = made.tables.sensors.imu.model_copy(update={"window": window})
+    tables = made.tables.model_copy(update={"sensors": made.tables.sensors.model_copy(update={"imu": imu})})
+    (trial,) = tumble_data(Campaign(tables, made.recordings)).trials
+    at = np.abs(made.recordings["001", "imu"].time) < 1e-9
+    assert at.sum() == 1
+    for name, left in (("gyro", 1), ("ax", int(window > 0)), ("ay", int(window > 0))):
+        assert (np.abs(trial.time[trial.of(name)]) < 1e-3).sum() == left
+
+
 def test_rows_that_were_lost_are_a_gap_and_no_jump_of_the_clock():
     made = campaign(seed=1, conditions=CONDITIONS[:1])
     recording = made.recordings["001", "pose"]
