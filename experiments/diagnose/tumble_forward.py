@@ -36,7 +36,7 @@ _MOST_BYTES = 1.5e8
 """Of the sampled motion of the lanes that share the end of their last step."""
 _HELD_BYTES = 3.2e7
 """Of the sampled motion held at a time, in a buffer that is kept: it stays near the caches, and needs no new pages."""
-_SETS_AT_ONCE = 16
+_SETS_AT_ONCE = 64
 """Sets of parameters whose samples one thread turns into readings at a time."""
 
 

@@ -19,7 +19,7 @@ data = tumble_data(campaign(conditions=CONDITIONS[:3]))
 for threads in (1, 3):
     ti.reset()
     together.cores_there = lambda: threads
-    count = 40  # pieces of 16 sets, and clocks of their own
+    count = 70  # more than one piece of each trial, and clocks of their own
     sets = {"mass": np.linspace(0.5, 1.01, count) * data.tables.platform.mass}
     clocks = {"clock-offset.offset": np.linspace(-1e-3, 1e-3, count)}
     told = hashlib.sha256()
