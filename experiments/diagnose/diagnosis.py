@@ -451,9 +451,11 @@ class _Told:
 
 def _certain(base: Fit, choice: Choice) -> bool:
     """Whether what was found is there for certain although something else is too: it takes most of what the base model
-    leaves away, of what was fitted and of conditions left out in turn, without a number that the campaign excludes:
-    with one, the name may be no more than what bends nearest to something else."""
-    if is_strained(choice.best.fit) or excess(choice.best.fit) >= _CERTAIN * excess(base):
+    leaves away, of what was fitted and of conditions left out in turn, without a number that the campaign excludes or
+    a scale that ends where the library does: with one, it may be no more than what bends nearest to something else."""
+    amplitudes = {form.amplitude for form in choice.best.forms}
+    ends = any(not met.strains and met.parameter not in amplitudes for met in bounds_met(choice.best.fit))
+    if ends or is_strained(choice.best.fit) or excess(choice.best.fit) >= _CERTAIN * excess(base):
         return False
     trials = [trial for trial in base.model.problem.trials if trial.id in base.model.trials]
     predicted = predict(base, folds_of(trials)) if choice.predicted is not None else None

@@ -143,7 +143,29 @@ class Search:
         for form, one in zip(forms, made, strict=True):
             if form.effect not in best or one.score > best[form.effect].score:
                 best[form.effect] = one
+        if guess is None:
+            best = {effect: self._from_its_like(one) for effect, one in best.items()}
         return sorted(best.values(), key=lambda h: -h.score)
+
+    def _from_its_like(self, one: Hypothesis) -> Hypothesis:
+        """The best of the forms that share scales with this single one, begun where it ended: what a pull's reach is to
+        one form it is to the next."""
+        best, (plain,) = one, one.forms
+        if one.score < self.base.score + _WORTH or excess(one.fit) < 2 * np.sqrt(2.0 * one.fit.count):
+            return one
+        scales = {p.name for p in plain.parameters} - {plain.amplitude}
+        for form in one.fit.model.problem.forms:
+            if form is plain or form.effect != plain.effect or not scales & {p.name for p in form.parameters}:
+                continue
+            start = form.starts[0] if form.starts else {}
+            values = {**start, **one.fit.values, form.amplitude: one.fit.values[plain.amplitude]}
+            found = fit(one.fit.model.with_forms([form]), values)
+            made = Hypothesis(found, score(found))
+            self.table.append((form.id, made))
+            if form.id not in self._alone or found.objective < self._alone[form.id].fit.objective:
+                self._alone[form.id] = Hypothesis(found, 0.0)
+            best = made if made.score > best.score else best
+        return best
 
     def _bent(self, hypothesis: Hypothesis) -> Hypothesis:
         """With forms of another shape (the problem's `shapes`) where that helps, from where the plain ones are."""

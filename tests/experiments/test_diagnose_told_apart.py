@@ -10,12 +10,13 @@ from experiments.diagnose import gate
 from experiments.diagnose.diagnosis import diagnose
 from experiments.diagnose.document import document
 from experiments.diagnose.equivalence import CLOSE, compare
-from experiments.diagnose.evidence import Hypothesis, score
+from experiments.diagnose.evidence import Hypothesis, excess, score
 from experiments.diagnose.fitting import Model, Whitener, fit
 from experiments.diagnose.gate import open_gate
 from experiments.diagnose.penetration_problem import make_problem
 from experiments.diagnose.prediction import folds_of, predict
 from experiments.diagnose.problem import TrialInfo
+from experiments.diagnose.search import Search
 
 
 def constant(z, v, top=0.0):
@@ -96,3 +97,25 @@ def test_a_null_of_full_refits_is_made_once_for_a_design(tmp_path, monkeypatch):
     assert again.threshold == first.threshold and heard.score == pytest.approx(said.score)
     with pytest.raises(AssertionError, match="anew"):  # another model is another null
         open_gate(base, signatures=columns, refit=True, draws=7, folder=tmp_path)
+
+
+def test_a_form_begins_where_another_of_its_effect_that_shares_its_scales_has_ended():
+    """A pull that grows with the root of the depth: from the plain pull's reach and size the growing one is reached."""
+
+    def held(z, v, top):
+        back = (top - z) / 1e-3
+        return STIFFNESS * z + DAMPING * max(v, 0.0) - 12.0 * math.sqrt(top / 0.02) * math.tanh(back)
+
+    trials = [
+        (f"{k}", "driven", 0.01, driven_trial(held, speed=0.01, depth=depth, retreat=True, seed=k))
+        for k, depth in enumerate((0.006, 0.012, 0.02))
+    ]
+    problem = make_problem(campaign_of(trials))
+    first = fit(Model(problem, Whitener.white(problem), ("0", "1", "2")))
+    forms = {form.id: form for form in problem.forms}
+    plain = forms["adhesion:held"]
+    found = fit(first.model.with_forms([plain]), {**first.values, **plain.starts[0]})
+    best = Search(first, tell=lambda what, done: None)._from_its_like(Hypothesis(found, score(found)))
+    assert best.forms == (forms["adhesion:held by depth"],)
+    assert excess(best.fit) < 0.1 * excess(found)
+    assert best.fit.values["adhesion.pull_growth"] == pytest.approx(0.5, abs=0.1)
