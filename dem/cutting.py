@@ -27,8 +27,10 @@ STEP = math.sqrt(2.0)
 """Gravity rises by this factor; where a face has fallen the middle is tried as well."""
 # Slope of the wedge that is watched behind a face: tan(45 - 30/2 degrees), Rankine's for a friction angle of 30.
 _WEDGE = math.tan(math.radians(30.0))
-# It has fallen where half of the wedge's grains have moved by more than so many diameters.
-_FALLEN = 1.0
+# It has fallen where this share of the wedge's grains have moved by more than so many diameters. Wedges of larger
+# friction angles are steeper and smaller (0.46 of the one that is watched at 60 degrees), and their toe stays: faces of
+# grains that stick slumped to where they stand again after 0.38 had moved at one gravity, where none had before.
+_FALLEN_SHARE, _FALLEN = 0.2, 1.0
 # Gravity rises over one time in which a grain falls the bed's height, in so many pieces; then the face is watched for
 # so many of them, and on until it is calm (energy of a wedge's grain in m g d), at most for so many.
 _PIECES, _WATCH, _CALM, _LONGEST = 10, 2.0, 1e-3, 10.0
@@ -126,7 +128,7 @@ def cut_and_load(
         share = _watch(bed, level * own, height, grain, watched, moved)
         trials.append((level, share))
         tell(0.8 * (k + 1) / len(levels))
-        if share > 0.5:
+        if share > _FALLEN_SHARE:
             fell = level
             break
         stood, kept = level, bed.state()
@@ -137,7 +139,7 @@ def cut_and_load(
         middle = math.sqrt(stood * fell)
         share = _watch(bed, middle * own, height, grain, watched, moved)
         trials.append((middle, share))
-        if share > 0.5:
+        if share > _FALLEN_SHARE:
             fell = middle
         else:
             stood = middle
@@ -224,7 +226,7 @@ def _watch(
         bed.advance(steps)
         waited += steps * bed.time_step / fall
         share = moved()
-        if share > 0.5 or waited > _LONGEST:
+        if share > _FALLEN_SHARE or waited > _LONGEST:
             return share
         g = bed.grains()
         speed = (g["velocity"] ** 2).sum(axis=1)

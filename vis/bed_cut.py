@@ -23,8 +23,8 @@ __all__ = ["write_cut_report"]
 METHOD = (
     "A strip is dug out of a level bed at a tenth of its gravity, which leaves two vertical faces as high as the bed. "
     "Then gravity rises by factors of 1.41, up to four times the bed's own, as in a centrifuge: a face of height h at "
-    "n g is loaded as one of n h at g. A face has fallen once half of the grains in front of Rankine's plane behind it "
-    "(60 degrees from the horizontal) have moved by more than a diameter; between the last gravity that both faces "
+    "n g is loaded as one of n h at g. A face has fallen once a fifth of the grains in front of Rankine's plane behind "
+    "it (60 degrees from the horizontal) have moved by more than a diameter; between the last gravity that both faces "
     "bore and the one at which one of them fell the middle is tried as well.",
     "Critical height: geometric middle of the heights, at the bed's own gravity, that stood and that fell. Cohesion by "
     "Terzaghi's plane wedge without tension cracks, c = gamma H / 4 tan(45 + phi / 2); an upper bound solution, so "
