@@ -124,7 +124,7 @@ def test_a_face_of_grains_that_stick_stands_to_a_height_of_their_strength(tmp_pa
     monkeypatch.setenv("HEDGEBED_CACHE", str(tmp_path))
     stuff = replace(SAND, name="sticky", cohesion="dmt", surface_energy=0.1)
     bed = Bed.prepare(stuff, size=(18 * GRAIN, 6 * GRAIN, 6 * GRAIN), grain=GRAIN, seed=1, threads=1)
-    pull_off = 4 * math.pi * stuff.surface_energy * GRAIN / 2
+    pull_off = 4 * math.pi * stuff.surface_energy * GRAIN / 4  # 4 pi gamma R*, R* = d / 4
     strength = bed.packing_fraction * bed.coordination_number * pull_off / (math.pi * GRAIN**2)
     cut = cut_and_load(bed, width=4 * GRAIN)
     assert cut.critical_height is not None and cut.stood < cut.fell <= cut.stood * 2**0.5
