@@ -329,7 +329,8 @@ class Search:
         return [h.forms[0] for h in sorted(alone, key=lambda h: -h.score)]
 
     def _backward(self, best: Hypothesis) -> Hypothesis:
-        """Without what is no longer needed."""
+        """Without what is no longer needed. A further name stands by what lets one in (`_worth`): beside it a fit may
+        have found a branch of sticking and slipping on which the others do as well alone."""
         while len(best.forms) > 1:
             shorter = []
             for form in best.forms:
@@ -337,8 +338,8 @@ class Search:
                 found = fit(best.fit.model.with_forms(rest), best.fit.values)
                 shorter.append(Hypothesis(found, score(found)))
             kept = max(shorter, key=lambda h: h.score)
-            needed = _WORTH if len(kept.effects) < len(best.effects) else 0.5
-            if kept.score < best.score - needed:
+            fewer = len(kept.effects) < len(best.effects)
+            if kept.score < best.score - (_WORTH if fewer else 0.5) and not (fewer and not self._worth(kept, best)):
                 break
             best = kept
         return _ordered(best)
