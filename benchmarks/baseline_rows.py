@@ -162,7 +162,5 @@ def fall_numbers(problem: Any, values: Mapping[str, float], trial: str) -> tuple
 
 
 def force_std(problem: Any, values: Mapping[str, float], trial: str) -> Array:
-    """Noise of a driven trial's residual force [N], shape [row_count]: the sensor's, and slope times the depth's."""
-    this = problem._trials[trial]
-    ((_, by_depth, _),) = problem._slopes(values, (), [this])
-    return np.hypot(problem.samples(trial).std, by_depth * this.smooth.depth_std)
+    """Noise of a driven trial's residual force [N], shape [row_count]: the sensor's and what the depth's error adds."""
+    return np.asarray(problem.gap_std(values, (), trial))

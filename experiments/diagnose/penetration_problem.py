@@ -301,18 +301,22 @@ class PenetrationProblem:
         if not this.driven:
             (rest,) = self.evaluate([values], forms, [trial])
             return float(rest[trial] @ rest[trial]), len(rest[trial])
-        assert this.smooth is not None
         force = self._run([values], forms, [this])[0][0]
+        rest = (this.other - force) / self.gap_std(values, forms, trial)
+        return float(rest @ rest), len(rest)
+
+    def gap_std(self, values: Values, forms: Sequence[Form], trial: str) -> Array:
+        """Of each row of a driven trial's force, as docs/diagnose.md has it for the gap [N], shape [n]."""
+        this = self._trials[trial]
+        assert this.smooth is not None
         ((_, by_depth, _),) = self._slopes(values, forms, [this])
-        std = stds(self.tables, True)[1]
         doubt = np.abs(by_depth) * this.smooth.depth_std
         touch = _touching(this)
         if touch.any():  # the force begins with a jump: half of what it may be over what the depth leaves open
             most = float(_off_surface(this)[touch].max())
             deep, shallow = (self._run([values], forms, [this], (shift, 0.0))[0][0] for shift in (most, -most))
             doubt = np.where(touch, np.maximum(doubt, 0.5 * np.abs(deep - shallow)), doubt)
-        rest = (this.other - force) / np.sqrt(std**2 + doubt**2)
-        return float(rest @ rest), len(rest)
+        return np.hypot(stds(self.tables, True)[1], doubt)
 
     # What is seen -----------------------------------------------------------------------------------------------------
 
