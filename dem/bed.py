@@ -461,7 +461,7 @@ class Bed:
     # ------------------------------------------------------------------ the book of what is lost
 
     def keep_book(self) -> None:
-        """From here on what contacts take is summed (``work_taken``), from 0; a tenth or so more time a step.
+        """From here on what contacts take is summed (``work_taken``), from 0; about a fifth more time a step.
 
         A drag (``advance``) is not in it.
         """
