@@ -19,6 +19,7 @@ from .equivalence import Rival
 from .evidence import SMALL, Hypothesis, excess, held_out_fit, inflation, score, signature_matrix
 from .fitting import Fit, Model, Whitener, fit, settled
 from .gate import Verdict, held_out_gate, open_gate
+from .jitter import Jitter, find_jitter, steepness
 from .localise import Place, depends_on, latent_table, places
 from .prediction import Predicted, folds_of, predict
 from .problem import Finding, Form, Parameter, Problem
@@ -90,6 +91,7 @@ class Diagnosis:
     """The best model's on the trials held out; None where there are none, or where no model was chosen."""
     choice: Choice | None
     colours: Mapping[str, Colour]
+    jitters: tuple[Jitter, ...]
     model_std: Mapping[str, float]
     findings: tuple[Finding, ...]
     next_experiment: str
@@ -171,7 +173,9 @@ def diagnose(
     tell("fitting the base model", 0.0)
     findings = list(problem.findings)
     fitted, held_out = split_trials(problem.trials)
-    base = _whitened_fit(Model(problem, Whitener.white(problem), fitted))
+    if hasattr(problem, "shake"):
+        problem.shake({})
+    base, jitters = _jittered(_whitened_fit(Model(problem, Whitener.white(problem), fitted)), held_out)
     odd = odd_trials(_whitened_fit(replace(base.model, trials=tuple(t.id for t in problem.trials))))
     if odd:
         findings += odd
@@ -196,7 +200,7 @@ def diagnose(
         base, signatures=columns, seed=seed, refit=thorough, draws=_REFITS if thorough else 600, folder=gates,
         tell=lambda done: tell("making the gate's null", done),
     )  # fmt: skip
-    told = _Told(problem, first, findings, held_out)
+    told = _Told(problem, first, findings, held_out, jitters)
     again = partial(diagnose, problem, thorough=thorough, seed=seed, tell=tell, gates=gates)
     if first.passed:
         if missed := () if looked_at else _missed(base, held_out, seed):
@@ -212,6 +216,20 @@ def diagnose(
             model_std = fresh_std
             base = _rescattered(base, scatter)
             choice = choose(base, tell=tell, seed=seed)
+    if choice.best.effects:  # times too: slopes are those of the motion as it is now known
+        best, fresh_jitters = _jittered(choice.best.fit, held_out, jitters)
+        if fresh_jitters:
+            base = fit(base.model, base.values)
+            if {j.channels for j in fresh_jitters} != {j.channels for j in jitters}:
+                tell("times are found to jitter: choosing again", 0.0)
+                choice = choose(base, tell=tell, seed=seed)
+            else:
+                left = open_gate(best, seed=seed)[1]
+                choice = replace(
+                    choice, base=Hypothesis(base, score(base)), best=Hypothesis(best, score(best)), left=left
+                )
+            jitters = fresh_jitters
+            told = replace(told, jitters=jitters)
     fresh = _colours_of(_plain(choice.best.fit))
     if _differ(fresh, colours):  # seen only now that the motion is out of the way: weigh once more
         best = _coloured(_plain(choice.best.fit), fresh)
@@ -248,6 +266,17 @@ def _whitened_fit(model: Model) -> Fit:
     found = fit(model)
     model.problem.rewhiten(found.values, ())
     return fit(model, found.values)
+
+
+def _jittered(found: Fit, held_out: tuple[str, ...], known: tuple[Jitter, ...] = ()) -> tuple[Fit, tuple[Jitter, ...]]:
+    """With times that jitter taken into account, at the slopes of this fit; and the clocks found here or `known`."""
+    jitters = tuple({jitter.channels: jitter for jitter in (*known, *find_jitter(found))}.values())
+    if not jitters:
+        return found, ()
+    problem: Any = found.model.problem
+    problem.shake(steepness(problem, jitters, _values_of_all(found, held_out), found.model.forms))
+    problem.rewhiten(found.values, found.model.forms)
+    return fit(found.model, found.values), jitters
 
 
 def _plain(found: Fit) -> Fit:
@@ -416,6 +445,7 @@ class _Told:
     first: Verdict
     findings: list[Finding]
     held_out: tuple[str, ...]
+    jitters: tuple[Jitter, ...]
 
     def finish(
         self, base: Fit, choice: Choice | None, colours: Mapping[str, Colour], model_std: Mapping[str, float],
@@ -437,6 +467,7 @@ class _Told:
         rival_forms = tuple(next(f for f in rival.forms if f.effect == e)
                             for rival, e in zip(rivals, alternatives, strict=True))  # fmt: skip
         told, shares = "", dict[str, float]()
+        findings = (*self.findings, *(jitter.finding for jitter in self.jitters))
         if verdict == "unknown":
             told, shares = depends_on(latent_table(problem, best_values, best.model.forms))
         return Diagnosis(
@@ -444,8 +475,8 @@ class _Told:
             effects=effects, alternatives=alternatives, rivals=rival_forms, where=tuple(where), before=before,
             after=after, fitted=fitted, held_out=held_out, gate_before=self.first,
             gate_after=last or (choice.left if choice is not None else self.first), gate_held_out=held, choice=choice,
-            colours=colours, model_std=model_std, findings=tuple(self.findings), depends_on=told, shares=shares,
-            next_experiment=_next(problem, best, choice, rival_forms, verdict, where),
+            colours=colours, jitters=self.jitters, model_std=model_std, findings=findings, depends_on=told,
+            shares=shares, next_experiment=_next(problem, best, choice, rival_forms, verdict, where),
         )  # fmt: skip
 
 

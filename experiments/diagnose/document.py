@@ -66,7 +66,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
     }  # fmt: skip
     said["evidence"] = _evidence(found)
     said["equivalence"] = _equivalence(found)
-    said["noise"] = {c.channel: {"std": c.std, "persistence": c.persistence} for c in found.colours.values()}
+    said["noise"] = _noise(found)
     said["model_std"] = dict(found.model_std)
     said["findings"] = [
         {"trial": f.trial, "what": f.what, "channel": f.channel, "from_s": f.from_s, "to_s": f.to_s,
@@ -137,6 +137,15 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
     said["by_channel"], said["by_condition"], said["parted"] = gaps.by_channel, gaps.by_condition, gaps.parted
     write_json(folder / "diagnosis.json", said)
     return said
+
+
+def _noise(found: Diagnosis) -> dict[str, dict[str, float]]:
+    """Of the channels whose noise is not as stated: its size over the stated one, how it persists, and its clock."""
+    noise = {c.channel: {"std": c.std, "persistence": c.persistence} for c in found.colours.values()}
+    for jitter in found.jitters:
+        for channel in jitter.channels:
+            noise.setdefault(channel, {"std": 1.0, "persistence": 0.0})["time_jitter_s"] = jitter.std
+    return noise
 
 
 def _base_values(found: Diagnosis) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from experiments.campaign import Campaign, EffectTable, PenetrationCampaign, PenetrationModel, write_model
 
+from .jitter import Shaken
 from .own import PENETRATION_HOOKS, OwnEffect, own_parameters, own_starts
 from .penetration_data import Prepared, prepare, stds
 from .penetration_forms import Library, Scales, make_library, physical, unit_of
@@ -52,6 +54,8 @@ class PenetrationProblem:
 
     kind = "penetration"
     whole = "the bed or the spike"
+    clocks = (("force",), ("depth", "accel"))
+    """Channels whose times come from one clock."""
 
     def __init__(self, campaign: Campaign, *, own: Sequence[OwnEffect] = ()) -> None:
         tables = campaign.tables
@@ -85,6 +89,8 @@ class PenetrationProblem:
         self.forms: tuple[Form, ...] = (*self._library.forms, *(_own_form(effect) for effect in own))
         self._own_slots = {name: len(SLOTS) + place for place, name in enumerate(_own_names(own))}
         self._whitening: dict[str, tuple[Array, Array, Array]] = {}
+        self._shaken: dict[str, Shaken] = {}
+        self._along: Mapping[str, Array] = {}
         self.rewhiten({}, ())
 
     # What is fitted ---------------------------------------------------------------------------------------------------
@@ -244,17 +250,45 @@ class PenetrationProblem:
         return [{id: self._residuals(self._trials[id], models[id][k]) for id in trials} for k in range(len(points))]
 
     def _residuals(self, trial: Prepared, model: Array) -> Array:
-        std_depth, std_other = stds(self.tables, trial.driven)
-        if trial.driven:
-            directions, shrink, doubtful = self._whitening[trial.info.id]
-            rest = (trial.other - model) / std_other / doubtful
-            rest = rest - directions @ (shrink * (directions.T @ rest)) if len(shrink) else rest
-        else:
-            rest = np.concatenate([
-                (trial.depth - model[:, 0])[trial.has_depth] / std_depth,
-                (trial.other - model[:, 2])[trial.has_other] / std_other,
-            ])  # fmt: skip
-        return np.where(np.isfinite(rest), np.clip(rest, -1e5, 1e5), _FAILED)
+        if not trial.driven:
+            rest, shaken = self._missed(trial, model), self._shaken.get(trial.info.id)
+            return rest if shaken is None else shaken.whitened(rest)
+        directions, shrink, doubtful = self._whitening[trial.info.id]
+        rest = (trial.other - model) / stds(self.tables, True)[1] / doubtful
+        rest = rest - directions @ (shrink * (directions.T @ rest)) if len(shrink) else rest
+        return _bounded(rest)
+
+    def _missed(self, trial: Prepared, model: Array) -> Array:
+        """Measured less modelled over the stated noise, of a drop."""
+        return _bounded(_of_drop(trial, trial.depth - model[:, 0], trial.other - model[:, 2], self.tables))
+
+    def readings(self, values: Values, forms: Sequence[Form], trials: Sequence[str], late: float) -> dict[str, Array]:
+        """What the model reads `late` seconds after each sample's time, over the stated noise, shape [sample_count]."""
+        moved = [self._trials[id] for id in trials]
+        found = {}
+        for drops in (False, True):
+            chosen = [replace(t, time=t.time + late) if drops else t for t in moved if t.driven != drops]
+            for trial, out in zip(chosen, self._run([values], forms, chosen) if chosen else (), strict=True):
+                if drops:
+                    found[trial.info.id] = _of_drop(trial, out[0][:, 0], out[0][:, 2], self.tables)
+                else:  # along the path as it was smoothed
+                    force = np.interp(trial.time + late, trial.time, out[0])
+                    found[trial.info.id] = force / stds(self.tables, True)[1]
+        return found
+
+    def shake(self, along: Mapping[str, Array]) -> None:
+        """Take times that jitter into the whitening from now on (of driven trials: from the next `rewhiten` on).
+
+        `along`: what one standard deviation of jitter changes in each sample, over its stated noise, by trial; {} for
+        times as they stand.
+        """
+        self._along = dict(along)
+        self._shaken = {}
+        for id, own in along.items():
+            trial = self._trials[id]
+            if not trial.driven and own.any():
+                row = np.concatenate([np.flatnonzero(trial.has_depth), np.flatnonzero(trial.has_other)])
+                self._shaken[id] = Shaken.of(own, row, np.zeros((len(own), 0)))
 
     def rewhiten(self, values: Values, forms: Sequence[Form]) -> None:
         """Take the error of the smoothed depth into the whitening, at these values."""
@@ -276,7 +310,8 @@ class PenetrationProblem:
             start = max(jump, below) + np.abs(by_depth).max() * smooth.depth_std
             touch = start * _touching(trial)
             turn = _turning(smooth.speed, smooth.speed_std, trial.other, std_force)
-            doubtful = np.sqrt(1 + (bend**2 + touch**2 + turn**2) / std_force**2)
+            shaken = self._along.get(trial.info.id, 0.0)
+            doubtful = np.sqrt(1 + (bend**2 + touch**2 + turn**2) / std_force**2 + shaken**2)
             left, sizes, _ = np.linalg.svd(factor / std_force / doubtful[:, None], full_matrices=False)
             kept = sizes > 1e-3
             self._whitening[trial.info.id] = (left[:, kept], 1 - 1 / np.sqrt(1 + sizes[kept] ** 2), doubtful)
@@ -299,8 +334,8 @@ class PenetrationProblem:
         """The sum of docs/diagnose.md; see `Problem`."""
         this = self._trials[trial]
         if not this.driven:
-            (rest,) = self.evaluate([values], forms, [trial])
-            return float(rest[trial] @ rest[trial]), len(rest[trial])
+            missed = self._missed(this, self._run([values], forms, [this])[0][0])
+            return float(missed @ missed), len(missed)
         force = self._run([values], forms, [this])[0][0]
         rest = (this.other - force) / self.gap_std(values, forms, trial)
         return float(rest @ rest), len(rest)
@@ -556,3 +591,13 @@ def _speeds(trial: Prepared) -> Array:
     inside = trial.smooth.depth > 0
     fast = trial.smooth.speed[inside] if inside.any() else trial.smooth.speed
     return np.percentile(np.maximum(fast, 0.0), [20, 90])
+
+
+def _of_drop(trial: Prepared, depth: Array, acceleration: Array, tables: PenetrationCampaign) -> Array:
+    """Columns of all rows as samples, over the stated noise."""
+    std_depth, std_other = stds(tables, False)
+    return np.concatenate([depth[trial.has_depth] / std_depth, acceleration[trial.has_other] / std_other])
+
+
+def _bounded(rest: Array) -> Array:
+    return np.where(np.isfinite(rest), np.clip(rest, -1e5, 1e5), _FAILED)

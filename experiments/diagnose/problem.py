@@ -9,6 +9,9 @@ r(v) - r(v0) + noise.
 Names of values: a base parameter by its own name (``stiffness``), a nuisance of a trial as ``gravity_sim[001]``, an
 effect's as ``pendulum.curvature``. Units are SI. A parameter that is not among the values given has its `value`.
 
+Where times may jitter (`jitter`), a kind of trial has `clocks` (channels whose times come from one clock), `readings`
+(what the model reads so many seconds later) and `shake` (takes jitter into the whitening) as well.
+
 A kind of trial is a class with these members (no base class to inherit), made by a function
 ``make_problem(campaign: Campaign) -> Problem`` in ``experiments/diagnose/<kind>_problem.py``.
 """

@@ -10,6 +10,7 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +20,7 @@ from experiments.campaign import Campaign, EffectTable, TumbleModel, write_model
 from rigid.terms import EFFECTS
 from rigid.trajectory import STATES
 
+from .jitter import Shaken
 from .own import OwnEffect
 from .problem import Finding, Form, Parameter, Samples, TrialInfo, Values
 from .replicates import parted
@@ -49,6 +51,8 @@ class TumbleProblem:
 
     kind = "tumble"
     whole = "the platform, the rig or the surface"
+    clocks = (("x", "y", "theta"), ("gyro", "ax", "ay"), ("wheel",))
+    """Channels whose times come from one clock."""
     least_scatter = 0.01
     """Contact makes each trial's friction and bed uncertain by some tenths of a percent; less is not asked for."""
 
@@ -65,6 +69,7 @@ class TumbleProblem:
         self.forward = Forward(data, threads=threads, own=own)
         self.findings = tuple(findings)
         self._index = {trial.id: k for k, trial in enumerate(data.trials)}
+        self._shaken: dict[str, Shaken] = {}
 
     @cached_property
     def trials(self) -> tuple[TrialInfo, ...]:
@@ -184,13 +189,44 @@ class TumbleProblem:
         found = self._predict(points, forms, trials, states=False)
 
         def whitened(place: int) -> Array:
-            return whiten(self.data.trials[self._index[trials[place]]], found[place].value)
+            data, value = self.data.trials[self._index[trials[place]]], found[place].value
+            if (shaken := self._shaken.get(data.id)) is None:
+                return whiten(data, value)
+            rest = (data.value - value) / data.std
+            good = np.isfinite(rest).all(axis=1, keepdims=True)
+            return np.where(good, shaken.whitened(np.where(good, rest, LOST)), LOST)
 
         residuals = each(whitened, range(len(trials)), threads=self.forward.threads)
         return [{trial: rows[k] for trial, rows in zip(trials, residuals, strict=True)} for k in range(len(points))]
 
     def rewhiten(self, values: Values, forms: Sequence[Form]) -> None:
         """The whitening does not depend on the values."""
+
+    def readings(self, values: Values, forms: Sequence[Form], trials: Sequence[str], late: float) -> dict[str, Array]:
+        """What the model reads `late` seconds after each sample's time, over the stated noise, shape [sample_count]."""
+        moved = replace(self.data, trials=tuple(replace(trial, time=trial.time + late) for trial in self.data.trials))
+        forward = Forward(moved, threads=self.forward.threads, own=self.forward.own) if late else self.forward
+        found = self._predict([values], forms, trials, states=False, forward=forward)
+        return {
+            trial: one.value[0] / self.data.trials[self._index[trial]].std
+            for trial, one in zip(trials, found, strict=True)
+        }
+
+    def shake(self, along: Mapping[str, Array]) -> None:
+        """Take times that jitter into the whitening from now on.
+
+        `along`: what one standard deviation of jitter changes in each sample, over its stated noise, by trial; {} for
+        times as they stand. Readings of one clock with one time share an error.
+        """
+        self._shaken = {}
+        for id, own in along.items():
+            data = self.data.trials[self._index[id]]
+            if own.any():
+                clock = np.array([next(k for k, names in enumerate(self.clocks) if name in names) for name in CHANNELS])
+                at = np.column_stack([clock[data.channel], data.time])
+                row = np.unique(at, axis=0, return_inverse=True)[1].reshape(-1)
+                zeros = [ZERO_STD * data.of(name) for name in ("x", "y", "theta")]
+                self._shaken[id] = Shaken.of(own, row, np.column_stack(zeros))
 
     def chi_square(self, values: Values, forms: Sequence[Form], trial: str) -> tuple[float, int]:
         """With the camera's zero at its most probable value."""
@@ -332,7 +368,7 @@ class TumbleProblem:
 
     def _predict(
         self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[str], *, states: bool = True,
-        motion: bool = False,
+        motion: bool = False, forward: Forward | None = None,
     ) -> list[Prediction]:  # fmt: skip
         columns = {
             name: np.array([values.get(name, value) for values in points])
@@ -348,7 +384,7 @@ class TumbleProblem:
             own = {p.name: np.array([values.get(p.name, p.value) for values in points]) for p in form.parameters}
             columns |= form.physical(own)
         chosen = [self._index[trial] for trial in trials]
-        return self.forward.predict(columns, trials=chosen, states=states, motion=motion)
+        return (forward or self.forward).predict(columns, trials=chosen, states=states, motion=motion)
 
     def _residual(self, values: Values, forms: Sequence[Form], trial: str) -> Array:
         data = self.data.trials[self._index[trial]]
