@@ -93,7 +93,8 @@ def _landing(run: Landing) -> dict[str, dict[str, Any]]:
     touched = next((k for k, state in enumerate(states) if state != "hop"), None)
     left = None
     if touched is not None:
-        left = next((k for k in range(touched, len(states)) if states[k] == "hop"), None)
+        # Going up: sand that was only grazed is let go of on the way down too.
+        left = next((k for k in range(touched, len(states)) if states[k] == "hop" and rows["vy"][k] > 0), None)
     came = float(-rows["vy"][touched]) if touched is not None else None
     speed = np.maximum(np.hypot(rows["vx"], rows["vy"]), np.abs(rows["omega"]) * run.trial.spike_length)
     moving = np.flatnonzero(speed > 2e-3)

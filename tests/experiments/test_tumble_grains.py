@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from coupling import CoupledTumble, LawFooting, LeftTheBedError
-from experiments import tumble, tumble_grains, tumble_grains_result
+from experiments import tumble, tumble_grains, tumble_grains_result, tumble_steppers
 from experiments.cli import main
 from experiments.runfolder import RunFolder
 from experiments.softening import Softening
@@ -134,6 +134,18 @@ def test_a_run_that_leaves_the_bed_says_where_and_keeps_its_state_and_series(tmp
     state = RunFolder.open(out).load_checkpoint("tumble.failed")
     assert state is not None and state["master.count"] == 50
     assert len((out / "trajectory.csv").read_text().splitlines()) == 1 + 51
+
+
+def test_a_landing_that_lets_go_of_the_sand_on_its_way_down_has_not_rebounded():
+    """Touched at -0.05 m/s, let go of still going down, left at +0.02: restitution 0.4; without the last, none."""
+    speeds = np.array([-0.05, -0.05, -0.04, -0.01, 0.02, 0.02])
+    states = ["hop", "pivot", "hop", "pivot", "hop", "hop"]
+    for end, share in ((6, 0.4), (4, None)):
+        rows = {"time": np.arange(end), "vx": 0 * speeds[:end], "vy": speeds[:end], "omega": 0 * speeds[:end]}
+        rows["kinetic_energy"] = speeds[:end] ** 2
+        run = SimpleNamespace(columns=rows, states=states[:end], trial=SimpleNamespace(spike_length=0.2))
+        found = tumble_steppers._landing(run)["restitution"]["value"]
+        assert found == (share and pytest.approx(share))
 
 
 @pytest.mark.slow
