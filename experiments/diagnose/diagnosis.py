@@ -209,6 +209,7 @@ def diagnose(
         findings += _held_out_ways(base, held_out, seed)
         return told.finish(base, None, colours, model_std, "none")
     choice = choose(base, tell=tell, seed=seed)
+    base = choice.base.fit
     if choice.best.effects:  # with the motion out of the way replicates are compared once more
         scatter, fresh_std = _scatter(choice.best.fit, held_out)
         if set(fresh_std) != set(model_std):
@@ -216,6 +217,7 @@ def diagnose(
             model_std = fresh_std
             base = _rescattered(base, scatter)
             choice = choose(base, tell=tell, seed=seed)
+            base = choice.base.fit
     if choice.best.effects:  # times too: slopes are those of the motion as it is now known
         best, fresh_jitters = _jittered(choice.best.fit, held_out, jitters)
         if fresh_jitters:
@@ -223,6 +225,7 @@ def diagnose(
             if {j.channels for j in fresh_jitters} != {j.channels for j in jitters}:
                 tell("times are found to jitter: choosing again", 0.0)
                 choice = choose(base, tell=tell, seed=seed)
+                base = choice.base.fit
             else:
                 left = open_gate(best, seed=seed)[1]
                 choice = replace(

@@ -16,6 +16,14 @@ def test_errors_of_parameters_are_no_effect():
     assert found.before.fit < 1.05
 
 
+def test_a_base_fit_on_another_branch_of_one_trial_is_no_effect():
+    """From where the fits of a scale, a ball or an arc end the base model itself finds the way."""
+    campaign, _ = make_hidden_tumble(7001, kind="null", trials=6)
+    found = diagnose(make_problem(campaign))
+    assert found.verdict == "none"
+    assert found.before.fit < 1.03
+
+
 def test_a_slope_is_named_with_its_angle_and_closes_the_gap_on_trials_held_out():
     campaign, told = make_hidden_tumble(7, kind="slope", strength=10.0, trials=8)
     found = diagnose(make_problem(campaign))
