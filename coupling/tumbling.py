@@ -255,13 +255,12 @@ class CoupledTumble:
         """What the footing holds, by how much the momentum of all is off, and the grains computed."""
         found = self.footing.energies()
         self.energy_names = tuple(found)
-        off = 0.0
+        off, computed, taken = 0.0, 0, dict[str, float]()
         if isinstance(self.footing, BedFooting):
+            computed, taken = self.footing.grain_steps, self.footing.work_taken()
             moving = self.body.rates[:2] * self.body.inertia[:2]
             fallen = np.array([0.0, -self.trial.weight * self.body.time])
             off = float(np.linalg.norm((self.footing.momentum() - self._momentum)[[0, 2]] + moving - fallen))
-        computed = self.footing.grain_steps if isinstance(self.footing, BedFooting) else 0
-        taken = self.footing.work_taken() if isinstance(self.footing, BedFooting) else {}
         self.work_names = tuple(f"{name}_work" for name in taken)
         self._samples.append([self.body.time, off, computed, *found.values(), *taken.values()])
 
@@ -287,7 +286,13 @@ class CoupledTumble:
         """Of the footing, by time: `time` [s], `momentum_error` [N s], `grain_steps` of a bed so far, energies [J],
         work that its contacts took [J]."""
         names = ("time", "momentum_error", "grain_steps", *self.energy_names, *self.work_names)
-        return dict(zip(names, np.array(self._samples, dtype=float).reshape(-1, len(names)).T, strict=True))
+        return dict(zip(names, self._sample_table.T, strict=True))
+
+    @property
+    def _sample_table(self) -> np.ndarray:
+        """The samples as rows, also where there are none yet."""
+        count = 3 + len(self.energy_names) + len(self.work_names)
+        return np.array(self._samples, dtype=float).reshape(-1, count)
 
     @property
     def balance(self) -> np.ndarray:
@@ -404,9 +409,7 @@ class CoupledTumble:
             "tumble.rows": np.array(self._rows, dtype=float).reshape(-1, len(COLUMNS)),
             "tumble.states": np.array(self._states, dtype=np.int8),
             "tumble.feet": self.feet,
-            "tumble.samples": np.array(self._samples, dtype=float).reshape(
-                -1, 3 + len(self.energy_names) + len(self.work_names)
-            ),
+            "tumble.samples": self._sample_table,
             "tumble.energies": np.array(self.energy_names, dtype=str),
             "tumble.works": np.array(self.work_names, dtype=str),
             "tumble.momentum": np.asarray(self._momentum, dtype=float),

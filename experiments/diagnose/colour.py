@@ -65,15 +65,12 @@ def find_colours(found: Fit) -> dict[str, Colour]:
     """
     powers: dict[str, list[Array]] = {}
     places: dict[str, list[Array]] = {}
-    model = found.model
-    for trial, rows in model.rows().items():
-        channels = list(dict.fromkeys(model.problem.samples(trial).channel.tolist()))
-        for name, block in zip(channels, model.whitener.block_slices(trial), strict=True):
-            count = block.stop - block.start
-            frequency = np.arange(count) / count
-            fast = frequency > _FAST
-            powers.setdefault(name, []).append(found.modes[rows][block][fast] ** 2)
-            places.setdefault(name, []).append(frequency[fast])
+    for _, name, rows in found.model.channel_rows():
+        modes = found.modes[rows]
+        frequency = np.arange(len(modes)) / len(modes)
+        fast = frequency > _FAST
+        powers.setdefault(name, []).append(modes[fast] ** 2)
+        places.setdefault(name, []).append(frequency[fast])
     colours = {}
     for name, parts in powers.items():
         power, frequency = np.concatenate(parts), np.concatenate(places[name])
@@ -101,20 +98,16 @@ def find_colours(found: Fit) -> dict[str, Colour]:
 def find_loud(found: Fit) -> dict[str, Colour]:
     """Channels that are louder than stated, white, where the model may leave much: looked for in the upper half of the
     band, in the quiet pieces of the recordings. What a model lacks does not fill that all the time, noise does."""
-    model = found.model
     squares: dict[str, list[float]] = {}
     freedom: dict[str, list[float]] = {}
-    for trial, rows in model.rows().items():
-        channels = list(dict.fromkeys(model.problem.samples(trial).channel.tolist()))
-        for name, block in zip(channels, model.whitener.block_slices(trial), strict=True):
-            count = block.stop - block.start
-            fast = np.arange(count) / max(count, 1) > _FASTER
-            if fast.sum() < _PIECE:
-                continue
-            residual = idct(np.where(fast, found.modes[rows][block], 0.0), norm="ortho")
-            for piece in np.array_split(residual, max(1, min(_PIECES, count // _PIECE))):
-                squares.setdefault(name, []).append(float(np.mean(piece**2)) / (1 - _FASTER))
-                freedom.setdefault(name, []).append((1 - _FASTER) * len(piece))
+    for _, name, rows in found.model.channel_rows():
+        modes = found.modes[rows]
+        fast = np.arange(len(modes)) / max(len(modes), 1) > _FASTER
+        if fast.sum() < _PIECE:
+            continue
+        for piece in _cut(idct(np.where(fast, modes, 0.0), norm="ortho")):
+            squares.setdefault(name, []).append(float(np.mean(piece**2)) / (1 - _FASTER))
+            freedom.setdefault(name, []).append((1 - _FASTER) * len(piece))
     loud = {}
     for name, own in squares.items():
         dof = float(np.median(freedom[name]))
@@ -126,18 +119,20 @@ def find_loud(found: Fit) -> dict[str, Colour]:
 
 def _pieces(found: Fit, channel: str) -> tuple[float, float]:
     """Medians, over the pieces of all recordings of a channel, of the mean square and the lag-one correlation."""
-    model, squares, lags = found.model, [], []
-    for trial, rows in model.rows().items():
-        channels = list(dict.fromkeys(model.problem.samples(trial).channel.tolist()))
-        for name, block in zip(channels, model.whitener.block_slices(trial), strict=True):
-            if name != channel or block.stop - block.start < 2:
-                continue
-            residual = idct(found.modes[rows][block], norm="ortho")
-            for piece in np.array_split(residual, max(1, min(_PIECES, len(residual) // _PIECE))):
-                square = float(np.mean(piece**2))
-                squares.append(square)
-                lags.append(float(np.mean(piece[1:] * piece[:-1])) / max(square, 1e-300))
+    squares, lags = [], []
+    for _, name, rows in found.model.channel_rows():
+        if name != channel or rows.stop - rows.start < 2:
+            continue
+        for piece in _cut(idct(found.modes[rows], norm="ortho")):
+            square = float(np.mean(piece**2))
+            squares.append(square)
+            lags.append(float(np.mean(piece[1:] * piece[:-1])) / max(square, 1e-300))
     return float(np.median(squares)), float(np.median(lags))
+
+
+def _cut(residual: Array) -> list[Array]:
+    """The pieces of one recording of a channel."""
+    return np.array_split(residual, max(1, min(_PIECES, len(residual) // _PIECE)))
 
 
 def _steady(colour: Colour, square: float, lag: float) -> bool:

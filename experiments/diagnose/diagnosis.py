@@ -202,12 +202,17 @@ def diagnose(
     )  # fmt: skip
     told = _Told(problem, first, findings, held_out, jitters)
     again = partial(diagnose, problem, thorough=thorough, seed=seed, tell=tell, gates=gates)
-    if first.passed:
+
+    def nothing(last: Verdict | None = None) -> Diagnosis:
+        """None is missing as far as the fitted trials tell; once more with others held out where these tell more."""
         if missed := () if looked_at else _missed(base, held_out, seed):
             tell("what is left shows in trials that were held out: others are held out", 0.0)
             return again(aside=aside, looked_at=missed)
-        findings += _held_out_ways(base, held_out, seed)
-        return told.finish(base, None, colours, model_std, "none")
+        findings.extend(_held_out_ways(base, held_out, seed))
+        return told.finish(base, None, colours, model_std, "none", last=last)
+
+    if first.passed:
+        return nothing()
     choice = choose(base, tell=tell, seed=seed)
     base = choice.base.fit
     if choice.best.effects:  # with the motion out of the way replicates are compared once more
@@ -246,10 +251,7 @@ def diagnose(
         )[1]  # fmt: skip
         choice = replace(choice, left=left)
     if not choice.best.effects and not is_strained(base) and choice.left.score < choice.left.threshold + _MARGIN:
-        if missed := () if looked_at else _missed(base, held_out, seed):
-            return again(aside=aside, looked_at=missed)
-        findings += _held_out_ways(base, held_out, seed)
-        return told.finish(base, None, colours, model_std, "none", last=choice.left)
+        return nothing(choice.left)
     tell("verdict", 0.0)
     choice = replace(choice, best=replace(choice.best, fit=settled(choice.best.fit)))
     held = _held_out_verdict(choice.best.fit, held_out, seed) if held_out else None

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -128,6 +128,13 @@ class Model:
         """Where each trial's modes stand."""
         edges = np.cumsum([0, *(len(self.whitener.weights[id]) for id in self.trials)]).tolist()
         return {id: slice(edges[k], edges[k + 1]) for k, id in enumerate(self.trials)}
+
+    def channel_rows(self) -> Iterator[tuple[str, str, slice]]:
+        """Trial, channel and where its modes stand, of all trials that are fitted."""
+        for trial, rows in self.rows().items():
+            channels = dict.fromkeys(self.problem.samples(trial).channel.tolist())
+            for channel, block in zip(channels, self.whitener.block_slices(trial), strict=True):
+                yield trial, channel, slice(rows.start + block.start, rows.start + block.stop)
 
 
 @dataclass(frozen=True)

@@ -75,11 +75,8 @@ class Gate:
 def low_modes(model: Model) -> dict[tuple[str, str], np.ndarray]:
     """Rows of the slow modes of each trial's channels, among the rows of the model."""
     found = {}
-    for trial, rows in model.rows().items():
-        channels = list(dict.fromkeys(model.problem.samples(trial).channel.tolist()))
-        for name, block in zip(channels, model.whitener.block_slices(trial), strict=True):
-            count = min(LOW_MODES, block.stop - block.start)
-            found[(trial, name)] = rows.start + block.start + np.arange(count)
+    for trial, name, rows in model.channel_rows():
+        found[(trial, name)] = rows.start + np.arange(min(LOW_MODES, rows.stop - rows.start))
     return found
 
 
