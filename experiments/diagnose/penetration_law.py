@@ -36,6 +36,7 @@ SLOTS = (
     "crater_share", "crater_bend", "unload_stiffness",
     "drag", "drag_onset", "drag_reach", "drag_deep", "drag_both", "drag_tip",
     "shaft", "shaft_deep", "shaft_square", "shaft_viscous", "shaft_slow", "shaft_speed",
+    "shaft_broad", "shaft_growth", "shaft_turn",
     "pull", "pull_reach", "pull_deep", "pull_growth", "pull_ever", "pull_short", "pull_viscous",
     "pull_sharpness", "shift_depth", "shift_speed",
 )  # fmt: skip
@@ -45,7 +46,8 @@ PHASES = ("free", "in", "rest", "out")
 
 _SLOT = {name: place for place, name in enumerate(SLOTS)}
 _NEVER_ZERO = {"reference": 0.01, "speed_scale": 1e-4, "radius_depth": 1e-4, "layer_depth": 0.01, "layer_width": 1e-3,
-               "hardening_reach": 1e-3, "drag_reach": 1e-3, "pull_reach": 1e-3, "shaft_speed": 1e-2}  # fmt: skip
+               "hardening_reach": 1e-3, "drag_reach": 1e-3, "pull_reach": 1e-3, "shaft_speed": 1e-2,
+               "shaft_turn": 1e-2}  # fmt: skip
 _STEP = 5e-4
 """Longest step of a drop [s]: sqrt(m / K) of a spike on sand is tens of ms, so the error is below 1e-8 of the depth;
 `fall` takes shorter ones where a lane is stiffer."""
@@ -164,6 +166,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
     CRATER, UNLOAD = S["crater_share"], S["unload_stiffness"]
     DRAG, DRAG_DEEP, DRAG_BOTH, DRAG_TIP = S["drag"], S["drag_deep"], S["drag_both"], S["drag_tip"]
     DRAG_ONSET, DRAG_REACH = S["drag_onset"], S["drag_reach"]
+    SHAFT_BROAD, SHAFT_GROWTH, SHAFT_TURN = S["shaft_broad"], S["shaft_growth"], S["shaft_turn"]
     SHAFT, SHAFT_DEEP, SHAFT_SQUARE, SHAFT_VISCOUS, SHAFT_SLOW, SHAFT_SPEED = (
         S["shaft"], S["shaft_deep"], S["shaft_square"], S["shaft_viscous"], S["shaft_slow"], S["shaft_speed"],
     )  # fmt: skip
@@ -243,6 +246,9 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
             total += (n[k, SHAFT] + n[k, SHAFT_DEEP] * x + n[k, SHAFT_SQUARE] * x * x) * way + n[k, SHAFT_VISCOUS] * v
             if n[k, SHAFT_SLOW] != 0.0:
                 total += n[k, SHAFT_SLOW] * ti.exp(-ti.abs(v) / n[k, SHAFT_SPEED]) * way
+            if n[k, SHAFT_BROAD] != 0.0:
+                turning = v / ti.sqrt(v * v + n[k, SHAFT_TURN] * n[k, SHAFT_TURN])
+                total += n[k, SHAFT_BROAD] * ti.pow(ti.max(x, 1e-12), n[k, SHAFT_GROWTH]) * turning
             if back > 0.0:
                 held = back / n[k, PULL_REACH]
                 grown = n[k, PULL]
