@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
-from .penetration_drive import find_drive
+from .penetration_drive import Drive, Holds, find_drive
 
 __all__ = ["SmoothDepth", "smooth_depth"]
 
@@ -48,6 +48,8 @@ class SmoothDepth:
     """Factor of the depth's error: the error is this times standard normal numbers [m], shape [n, p]."""
     speed_error: Array
     """Of the slope's, the same numbers [m/s], shape [n, p]."""
+    holds: Holds = ()
+    """Which of its levels of speed are 0; () where it is no motion of levels."""
 
     @property
     def depth_std(self) -> Array:
@@ -60,8 +62,10 @@ class SmoothDepth:
         return np.sqrt((self.speed_error**2).sum(axis=1))
 
 
-def smooth_depth(time: Array, depth: Array, std: float) -> SmoothDepth:
+def smooth_depth(time: Array, depth: Array, std: float, *, alike: Holds = ()) -> SmoothDepth:
     """Smooth a depth column [m] at times [s], both of shape [n], with noise of standard deviation `std` [m].
+
+    `alike`: the holds of most of the machine's other pushes.
 
     Raises ValueError for fewer than two rows.
     """
@@ -70,7 +74,8 @@ def smooth_depth(time: Array, depth: Array, std: float) -> SmoothDepth:
     span = time[-1] - time[0]
     u = (time - time[0]) / (span if span > 0 else 1.0)
     noise = max(std, 1e-9 * max(float(np.ptp(depth)), 1e-9))
-    curve, change, ways, hidden, intervals = _curve(u, depth / noise)
+    drive = find_drive(u, depth / noise, alike=alike) if len(u) >= _DRIVEN else None
+    curve, change, ways, hidden, intervals = _curve(u, depth / noise, drive)
     rest = depth - noise * curve
     chosen: tuple[float, Array, Array, int] | None = None
     for finer in _FINER:  # bends over the whole: gentle ones unless the column shows others
@@ -86,13 +91,14 @@ def smooth_depth(time: Array, depth: Array, std: float) -> SmoothDepth:
         root = _shrunk(basis, fixed, rest, noise)[2]
         errors = basis @ root, slopes @ root
     span = span if span > 0 else 1.0
-    return SmoothDepth(best, speed / span, errors[0], errors[1] / span)
+    holds = drive.resting if drive is not None and hidden is not ways else ()
+    return SmoothDepth(best, speed / span, errors[0], errors[1] / span, holds)
 
 
 _Columns = tuple[Array, Array]
 
 
-def _curve(u: Array, measured: Array) -> tuple[Array, Array, _Columns, _Columns, int]:
+def _curve(u: Array, measured: Array, drive: Drive | None) -> tuple[Array, Array, _Columns, _Columns, int]:
     """A curve, its slope, columns and their slopes by which it may be moved, those by which it may be off without the
     noise showing it, and how many intervals of bends it may hide.
 
@@ -100,7 +106,6 @@ def _curve(u: Array, measured: Array) -> tuple[Array, Array, _Columns, _Columns,
     """
     n = len(u)
     limit = n + 2 * np.sqrt(2 * n)  # down to the noise
-    drive = find_drive(u, measured) if n >= _DRIVEN else None
     good = drive is not None and drive.chi_square < limit
     best: tuple[float, Array, Array, list[float], int] | None = None
     enough = 0

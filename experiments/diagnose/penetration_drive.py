@@ -14,10 +14,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Drive", "find_drive"]
+__all__ = ["Drive", "Holds", "find_drive"]
 
 Array = NDArray[np.float64]
+Holds = tuple[bool, ...]
+"""Which levels are at rest."""
 
+_ALIKE = 6.0
+"""Twice the logarithm of the odds (20 to 1) that a machine's pushes go alike."""
 _MOST_RAMPS = 10
 _FIRST_WIDTH = 0.05
 """Of a ramp when it is added, of the record."""
@@ -47,7 +51,7 @@ class Drive:
     """Shape [ramp_count]; 0 for a corner."""
     round: bool
     """Whether the speed of a ramp changes as a raised cosine, not in proportion to time."""
-    resting: tuple[bool, ...]
+    resting: Holds
     """Which levels are 0 for certain."""
     chi_square: float = np.inf
 
@@ -56,9 +60,12 @@ class Drive:
         """Numbers that were chosen from the data; a width, which the few rows of its ramp tell, for half a one."""
         return 1 + len(self.levels) - sum(self.resting) + 1.5 * len(self.middles)
 
-    def criterion(self, rows: int) -> float:
-        """Bayesian information criterion (Schwarz, Annals of Statistics 6 (1978), 461), up to a constant."""
-        return self.chi_square + np.log(rows) * self.count
+    def criterion(self, rows: int, alike: Holds = ()) -> float:
+        """Bayesian information criterion (Schwarz, Annals of Statistics 6 (1978), 461), up to a constant.
+
+        `alike`: where most of the machine's other pushes hold, which is likelier beforehand.
+        """
+        return self.chi_square + np.log(rows) * self.count - (_ALIKE if self.resting == alike else 0.0)
 
     def curve(self, u: Array) -> tuple[Array, Array]:
         """Depth and speed at times u, shapes [n]."""
@@ -121,8 +128,11 @@ class Drive:
         return np.column_stack(on), np.column_stack(gone)
 
 
-def find_drive(u: Array, measured: Array) -> Drive:
-    """The motion behind depths `measured` (over their noise) at times `u` from 0 to 1, shapes [n]."""
+def find_drive(u: Array, measured: Array, *, alike: Holds = ()) -> Drive:
+    """The motion behind depths `measured` (over their noise) at times `u` from 0 to 1, shapes [n].
+
+    `alike`: which levels are at rest in most of the machine's other pushes.
+    """
     n = len(u)
     block = max(1, -(-n // _BLOCKS))
     edges = np.arange(0, n, block)
@@ -149,17 +159,18 @@ def find_drive(u: Array, measured: Array) -> Drive:
         else:
             tried.append(drive)
             idle += 1
-    plain = min((_pared(one, t, y, root, n) for one in tried), key=lambda one: one.criterion(n))
+    plain = min((_pared(one, t, y, root, n, alike) for one in tried), key=lambda one: one.criterion(n, alike))
     found = [plain]
     if len(plain.middles):  # a raised cosine is as steep as a straight ramp of two thirds of its width
-        found.append(_pared(_fitted(replace(plain, widths=1.5 * plain.widths, round=True), t, y, root), t, y, root, n))
+        rounder = _fitted(replace(plain, widths=1.5 * plain.widths, round=True), t, y, root)
+        found.append(_pared(rounder, t, y, root, n, alike))
     if block > 1:
         found = [_fitted(one, u, measured, np.ones(n), most=8) for one in found]
     found = [_level_fit(replace(one, widths=np.maximum(one.widths, 1.0 / n)), u, measured, np.ones(n)) for one in found]
-    return min(found, key=lambda one: one.criterion(n))
+    return min(found, key=lambda one: one.criterion(n, alike))
 
 
-def _pared(drive: Drive, t: Array, y: Array, root: Array, n: int) -> Drive:
+def _pared(drive: Drive, t: Array, y: Array, root: Array, n: int, alike: Holds) -> Drive:
     """With levels at rest, without needless ramps, and with holds in others, as the criterion asks for it."""
     tried: set[tuple[object, ...]] = set()
     while True:
@@ -187,7 +198,7 @@ def _pared(drive: Drive, t: Array, y: Array, root: Array, n: int) -> Drive:
                 continue
             tried.add(mark)
             one = _fitted(one, t, y, root, most=10)
-            if one.criterion(n) < drive.criterion(n):
+            if one.criterion(n, alike) < drive.criterion(n, alike):
                 better = one
                 break
         if better is None:
