@@ -31,7 +31,7 @@ __all__ = ["PHASES", "SLOTS", "fall", "push", "slot_table"]
 SLOTS = (
     "mass", "gravity", "stiffness", "damping", "reference", "speed_scale", "radius_depth",
     "hardening_power", "hardening_quadratic", "hardening_cubic", "hardening_exponential",
-    "hardening_early", "hardening_reach",
+    "hardening_early", "hardening_reach", "hardening_level", "hardening_sharpness",
     "layer_depth", "layer_width", "layer_slope", "layer_step", "layer_factor", "layer_bump",
     "crater_share", "crater_bend", "unload_stiffness",
     "drag", "drag_onset", "drag_reach", "drag_deep", "drag_both", "drag_tip",
@@ -160,6 +160,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
     REFERENCE, SPEED_SCALE, RADIUS_DEPTH = S["reference"], S["speed_scale"], S["radius_depth"]
     POWER, QUADRATIC, CUBIC = S["hardening_power"], S["hardening_quadratic"], S["hardening_cubic"]
     EXPONENTIAL, EARLY, EARLY_REACH = S["hardening_exponential"], S["hardening_early"], S["hardening_reach"]
+    LEVEL, LEVEL_SHARPNESS = S["hardening_level"], S["hardening_sharpness"]
     LAYER_DEPTH, LAYER_WIDTH, LAYER_SLOPE = S["layer_depth"], S["layer_width"], S["layer_slope"]
     LAYER_STEP, LAYER_FACTOR, LAYER_BUMP = S["layer_step"], S["layer_factor"], S["layer_bump"]
     BEND = S["crater_bend"]
@@ -181,6 +182,14 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
     Cube = ti.types.ndarray(dtype=ti.f64, ndim=3)
 
     @ti.func
+    def mobilised(share: ti.f64, sharpness: ti.f64) -> ti.f64:
+        """Of a bound, `share` being the way over its reach: 1 - exp(-x), or x / (1 + x^p)^(1/p) of a sharpness p."""
+        part = 1.0 - ti.exp(-share)
+        if sharpness > 0.0:
+            part = share / ti.pow(1.0 + ti.pow(ti.max(share, 1e-12), sharpness), 1.0 / sharpness)
+        return part
+
+    @ti.func
     def loading(z: ti.f64, n: ti.template(), k: ti.i32) -> ti.f64:
         depth = ti.max(z, 0.0)
         x = depth / n[k, REFERENCE]
@@ -191,6 +200,8 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
             y = n[k, EXPONENTIAL] * x
             if ti.abs(y) > 1e-6:
                 grown *= (ti.exp(ti.min(y, 30.0)) - 1.0) / y
+        if n[k, LEVEL] * x > 1e-6:
+            grown *= mobilised(n[k, LEVEL] * x, n[k, LEVEL_SHARPNESS]) / (n[k, LEVEL] * x)
         grown *= 1.0 + n[k, QUADRATIC] * x + n[k, CUBIC] * x * x
         if n[k, EARLY] != 0.0:
             grown += n[k, EARLY] * (1.0 - ti.exp(-depth / n[k, EARLY_REACH]))
@@ -206,14 +217,6 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
             corner = ti.log(1.0 + ti.exp(-ti.abs(away))) - ti.log(1.0 + ti.exp(-n[k, LAYER_DEPTH] / width))
             grown += n[k, LAYER_SLOPE] * (ti.max(depth - n[k, LAYER_DEPTH], 0.0) + width * corner)
         return grown if depth > 0.0 else 0.0
-
-    @ti.func
-    def mobilised(share: ti.f64, sharpness: ti.f64) -> ti.f64:
-        """Of a pull, `share` being the retreat over its reach: 1 - exp(-x), or x / (1 + x^p)^(1/p) of a sharpness p."""
-        part = 1.0 - ti.exp(-share)
-        if sharpness > 0.0:
-            part = share / ti.pow(1.0 + ti.pow(ti.max(share, 1e-12), sharpness), 1.0 / sharpness)
-        return part
 
     @ti.func
     def force(z: ti.f64, v: ti.f64, way: ti.f64, top: ti.f64, deepest: ti.f64, n: ti.template(), k: ti.i32) -> ti.f64:
