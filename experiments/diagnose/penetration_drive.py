@@ -53,12 +53,15 @@ class Drive:
     """Whether the speed of a ramp changes as a raised cosine, not in proportion to time."""
     resting: Holds
     """Which levels are 0 for certain."""
+    even: bool = False
+    """Whether the ramps' widths change in proportion, as with one acceleration for all of them."""
     chi_square: float = np.inf
 
     @property
     def count(self) -> float:
         """Numbers that were chosen from the data; a width, which the few rows of its ramp tell, for half a one."""
-        return 1 + len(self.levels) - sum(self.resting) + 1.5 * len(self.middles)
+        ramps = len(self.middles)
+        return 1 + len(self.levels) - sum(self.resting) + ramps + 0.5 * (min(ramps, 1) if self.even else ramps)
 
     def criterion(self, rows: int, alike: Holds = ()) -> float:
         """Bayesian information criterion (Schwarz, Annals of Statistics 6 (1978), 461), up to a constant.
@@ -84,7 +87,7 @@ class Drive:
                 if abs(jump) * widths[k] * float(np.linalg.norm(by_width)) > _HIDDEN:
                     break
         count = len(self.levels)
-        return replace(self, widths=widths, resting=(False,) * count)
+        return replace(self, widths=widths, resting=(False,) * count, even=False)
 
     def changes(self, u: Array) -> tuple[Array, Array]:
         """Derivatives of depth and speed by the chosen numbers (start, levels, middles, widths), shapes [n, count]."""
@@ -100,8 +103,9 @@ class Drive:
             wider.append(jump * by_width)
             faster.append(jump * rate_by_width)
         if rises:
-            depth.append(np.column_stack(wider))
-            speed += [np.column_stack(rises), np.column_stack(faster)]
+            each = self._shares[:, None] if self.even else np.eye(len(rises))
+            depth.append(np.column_stack(wider) @ each)
+            speed += [np.column_stack(rises), np.column_stack(faster) @ each]
         return np.hstack(depth), np.hstack(speed)
 
     def moved(self, step: Array) -> Drive:
@@ -111,12 +115,19 @@ class Drive:
         levels, widths = self.levels.copy(), self.widths
         levels[free] += step[1 : 1 + len(free)]
         middles = np.clip(self.middles + step[1 + len(free) : 1 + len(free) + k], -0.02, 1.02)
-        widths = np.clip(widths + step[1 + len(free) + k :], 0.0, 1.0)
+        wider = step[1 + len(free) + k :]
+        widths = np.clip(widths + (self._shares * wider[0] if self.even and k else wider), 0.0, 1.0)
         middles = np.maximum.accumulate(middles)
         if len(middles) > 1:  # a ramp ends before the next begins
             room = np.diff(middles) / np.maximum(0.5 * (widths[1:] + widths[:-1]), 1e-12)
             widths = widths * np.minimum(1.0, np.minimum(np.append(room, 1.0), np.insert(room, 0, 1.0)))
         return replace(self, start=self.start + float(step[0]), levels=levels, middles=middles, widths=widths)
+
+    @property
+    def _shares(self) -> Array:
+        """The ramps' widths over their mean."""
+        mean = float(self.widths.mean())
+        return self.widths / mean if mean > 1e-9 else np.ones(len(self.widths))
 
     def _columns(self, u: Array) -> tuple[Array, Array]:
         """How far each ramp has gone (0 to 1), and its integral; before them the time itself. Shapes [n, 1 + ramps]."""
@@ -164,6 +175,8 @@ def find_drive(u: Array, measured: Array, *, alike: Holds = ()) -> Drive:
     if len(plain.middles):  # a raised cosine is as steep as a straight ramp of two thirds of its width
         rounder = _fitted(replace(plain, widths=1.5 * plain.widths, round=True), t, y, root)
         found.append(_pared(rounder, t, y, root, n, alike))
+    if len(plain.middles) > 1:
+        found += [_fitted(_evened(one), t, y, root) for one in found]
     if block > 1:
         found = [_fitted(one, u, measured, np.ones(n), most=8) for one in found]
     found = [_level_fit(replace(one, widths=np.maximum(one.widths, 1.0 / n)), u, measured, np.ones(n)) for one in found]
@@ -204,6 +217,12 @@ def _pared(drive: Drive, t: Array, y: Array, root: Array, n: int, alike: Holds) 
         if better is None:
             return drive
         drive = better
+
+
+def _evened(drive: Drive) -> Drive:
+    """With one acceleration in all ramps."""
+    jumps = np.abs(np.diff(drive.levels))
+    return replace(drive, widths=jumps * float(drive.widths.sum() / max(jumps.sum(), 1e-300)), even=True)
 
 
 def _without(drive: Drive, k: int) -> Drive:

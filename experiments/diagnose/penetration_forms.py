@@ -109,6 +109,8 @@ def _add_hardening(add: _Add) -> None:
     add(effect, "exponential", ("hardening_exponential", "plain", 0.8, -8.0, 6.0), starts=((0.5,), (-0.5,)))
     add(effect, "early", ("hardening_early", "spring force", 0.5, 0.0, 20.0), ("hardening_reach", "depth", -4.0, 0.0),
         starts=((0.1, -2.5), (0.2, -1.0)))  # fmt: skip
+    add(effect, "a power added", ("hardening_grown", "plain", 0.8, -0.6, 20.0),
+        ("hardening_exponent", "plain", 0.3, 3.0), starts=((0.3, 1.0), (-0.2, 1.0)))  # fmt: skip
     # Towards a bound, a hyperbola (Kondner, J. Soil Mech. Found. Div. 89 (1963), 115) where the sharpness is 1.
     add(effect, "levelling off", ("hardening_level", "plain", 0.8, 0.0, 20.0),
         ("hardening_sharpness", "plain", 0.7, 5.0), starts=((0.3, 1.5), (1.0, 1.5)))  # fmt: skip
