@@ -32,7 +32,7 @@ SLOTS = (
     "mass", "gravity", "stiffness", "damping", "reference", "speed_scale", "radius_depth",
     "hardening_power", "hardening_quadratic", "hardening_cubic", "hardening_exponential",
     "hardening_early", "hardening_reach", "hardening_level", "hardening_sharpness",
-    "hardening_grown", "hardening_exponent",
+    "hardening_steeper",
     "layer_depth", "layer_width", "layer_slope", "layer_step", "layer_factor", "layer_bump",
     "crater_share", "crater_bend", "unload_stiffness",
     "drag", "drag_onset", "drag_reach", "drag_deep", "drag_both", "drag_tip",
@@ -161,7 +161,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
     REFERENCE, SPEED_SCALE, RADIUS_DEPTH = S["reference"], S["speed_scale"], S["radius_depth"]
     POWER, QUADRATIC, CUBIC = S["hardening_power"], S["hardening_quadratic"], S["hardening_cubic"]
     EXPONENTIAL, EARLY, EARLY_REACH = S["hardening_exponential"], S["hardening_early"], S["hardening_reach"]
-    GROWN, EXPONENT = S["hardening_grown"], S["hardening_exponent"]
+    STEEPER = S["hardening_steeper"]
     LEVEL, LEVEL_SHARPNESS = S["hardening_level"], S["hardening_sharpness"]
     LAYER_DEPTH, LAYER_WIDTH, LAYER_SLOPE = S["layer_depth"], S["layer_width"], S["layer_slope"]
     LAYER_STEP, LAYER_FACTOR, LAYER_BUMP = S["layer_step"], S["layer_factor"], S["layer_bump"]
@@ -199,14 +199,15 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
         if n[k, POWER] != 0.0:
             grown *= ti.pow(ti.max(x, 1e-9), n[k, POWER])
         if n[k, EXPONENTIAL] != 0.0:
-            y = n[k, EXPONENTIAL] * x
-            if ti.abs(y) > 1e-6:
-                grown *= (ti.exp(ti.min(y, 30.0)) - 1.0) / y
+            rise = n[k, EXPONENTIAL] * x
+            if ti.abs(rise) > 1e-6:
+                grown *= (ti.exp(ti.min(rise, 30.0)) - 1.0) / rise
         if n[k, LEVEL] * x > 1e-6:
             grown *= mobilised(n[k, LEVEL] * x, n[k, LEVEL_SHARPNESS]) / (n[k, LEVEL] * x)
-        if n[k, GROWN] != 0.0:
-            grown *= ti.max(1.0 + n[k, GROWN] * ti.pow(ti.max(x, 1e-9), n[k, EXPONENT]), 0.0)
-        grown *= 1.0 + n[k, QUADRATIC] * x + n[k, CUBIC] * x * x
+        y = x  # of the quadratic form, with a power of its own
+        if n[k, STEEPER] != 0.0:
+            y = ti.pow(ti.max(x, 1e-9), 1.0 + n[k, STEEPER])
+        grown *= 1.0 + n[k, QUADRATIC] * y + n[k, CUBIC] * x * x
         if n[k, EARLY] != 0.0:
             grown += n[k, EARLY] * (1.0 - ti.exp(-depth / n[k, EARLY_REACH]))
         away = (depth - n[k, LAYER_DEPTH]) / n[k, LAYER_WIDTH]
