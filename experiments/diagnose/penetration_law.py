@@ -8,7 +8,8 @@ depth typical of the campaign, so that amplitudes of one effect's forms compare.
 
 A drop is integrated by the classical Runge-Kutta method, each step cut where the spike turns, leaves or comes back
 (found by halving), since friction and damper jump there. At a turning point the forces of both directions are tried:
-where neither moves the spike, it rests for good.
+where neither moves the spike, it rests for good. `shaft_turn`, the speed over which friction changes its direction, is
+that of driven spikes: in a drop, which is slow for an instant only, it changes at once.
 """
 
 # Taichi reads the annotations and the source of kernels: no `from __future__ import annotations` here.
@@ -224,7 +225,9 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
         return grown if depth > 0.0 else 0.0
 
     @ti.func
-    def force(z: ti.f64, v: ti.f64, way: ti.f64, top: ti.f64, deepest: ti.f64, n: ti.template(), k: ti.i32) -> ti.f64:
+    def force(
+        z: ti.f64, v: ti.f64, way: ti.f64, top: ti.f64, deepest: ti.f64, n: ti.template(), k: ti.i32, driven: ti.i32
+    ) -> ti.f64:  # fmt: skip
         total = 0.0
         if z > 0.0:
             most, ever = ti.max(top, z), ti.max(deepest, z)
@@ -255,7 +258,9 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
             if n[k, SHAFT_SLOW] != 0.0:
                 total += n[k, SHAFT_SLOW] * ti.exp(-ti.abs(v) / n[k, SHAFT_SPEED]) * way
             if n[k, SHAFT_BROAD] != 0.0:
-                turning = v / ti.sqrt(v * v + n[k, SHAFT_TURN] * n[k, SHAFT_TURN])
+                turning = way
+                if driven == 1:
+                    turning = v / ti.sqrt(v * v + n[k, SHAFT_TURN] * n[k, SHAFT_TURN])
                 total += n[k, SHAFT_BROAD] * ti.pow(ti.max(x, 1e-12), n[k, SHAFT_GROWTH]) * turning
             if back > 0.0:
                 held = back / n[k, PULL_REACH]
@@ -284,7 +289,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
                     top = 0.0
                 top, deepest = ti.max(top, z), ti.max(deepest, z)
                 way = ti.tanh(v / numbers[k, SPEED_SCALE])
-                out[k, row - starts[path]] = force(z, v, way, top, deepest, numbers, k)
+                out[k, row - starts[path]] = force(z, v, way, top, deepest, numbers, k, 1)
 
     @ti.kernel
     def fall_all(numbers: Table, lane_path: Whole, starts: Whole, times: Line, speeds: Line, steps: Line, out: Cube):
@@ -315,7 +320,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
                         for stage in range(4):
                             a = g
                             if inside == 1:
-                                a = g - force(ti.max(zs, 1e-300), vs, way, top, deepest, numbers, k) / m
+                                a = g - force(ti.max(zs, 1e-300), vs, way, top, deepest, numbers, k, 0) / m
                             weight = dt / 6.0 if stage == 0 or stage == 3 else dt / 3.0
                             z1 += weight * vs
                             v1 += weight * a
@@ -349,7 +354,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
                                 down, up = 0.0, 0.0
                                 for side in range(2):
                                     tried = 1.0 - 2.0 * side
-                                    a = g - force(z, 0.0, tried, top, deepest, numbers, k) / m
+                                    a = g - force(z, 0.0, tried, top, deepest, numbers, k, 0) / m
                                     if side == 0:
                                         down = a
                                     else:
@@ -365,7 +370,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
                     else:
                         pushed = 0.0
                         if inside == 1 and resting == 0:
-                            pushed = force(z, v, way, top, deepest, numbers, k)
+                            pushed = force(z, v, way, top, deepest, numbers, k, 0)
                         out[k, at, 0] = z
                         out[k, at, 1] = v
                         out[k, at, 2] = 0.0 if resting == 1 else g - pushed / m
