@@ -132,7 +132,7 @@ def test_a_drive_that_ramps_up_holds_and_comes_back_is_found_with_its_ramps():
         smooth = smooth_depth(time, depth + 2e-4 * np.random.default_rng(seed).standard_normal(len(time)), 2e-4)
         off = smooth.speed - np.interp(time, fine, speed)
         assert smooth.holds == (True, False, True, False)
-        assert np.abs(off[held]).max() < 1e-3 and np.sqrt(np.mean(off**2)) < 1e-3  # a spline's is 2.4e-3
+        assert np.abs(off[held]).max() < 1e-3 and np.sqrt(np.mean(off**2)) < 6e-4  # 1.4e-3 and 2.4e-3 of a spline
 
 
 def test_a_smooth_motion_is_given_no_ramps():
