@@ -98,7 +98,7 @@ def _refitted(found: Fit, trials: tuple[str, ...]) -> Fit:
     model = found.model.on(trials)
     if not model.forms or not hasattr(model.problem, "refine"):
         return fit(model)
-    (values,) = model.problem.refine([(model.forms, found.values)], trials)
+    (values,) = model.problem.refine([(model.forms, found.values)], trials, apart=model.scatter)
     return fit(model, values)
 
 

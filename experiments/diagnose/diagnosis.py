@@ -22,8 +22,8 @@ from .gate import Verdict, held_out_gate, open_gate
 from .jitter import Jitter, find_jitter, steepness
 from .localise import Place, depends_on, latent_table, places
 from .prediction import Predicted, folds_of, predict
-from .problem import Finding, Form, Parameter, Problem
-from .replicates import exchanged, find_scatter, groups_of, odd_trials, split_trials
+from .problem import Finding, Form, Problem
+from .replicates import Scatter, exchanged, find_scatter, groups_of, odd_trials, split_trials, with_scatter
 from .search import Choice, choose
 
 __all__ = ["Diagnosis", "Gap", "diagnose"]
@@ -190,8 +190,8 @@ def diagnose(
         gone = {finding.trial for finding in aside}
         fitted = tuple(trial for trial in fitted if trial not in gone)
         base = _whitened_fit(base.model.on(fitted))
-    scatter, model_std = _scatter(base, held_out)
-    base = fit(replace(base.model, scatter=scatter), base.values) if scatter else base
+    scatter = _scatter(base, held_out)
+    base, model_std = _rescattered(base, scatter) if scatter.parameters else base, scatter.model_std
     colours = _colours_of(base)
     base = _coloured(base, colours)
     tell("is anything left?", 0.0)
@@ -216,10 +216,10 @@ def diagnose(
     choice = choose(base, tell=tell, seed=seed)
     base = choice.base.fit
     if choice.best.effects:  # with the motion out of the way replicates are compared once more
-        scatter, fresh_std = _scatter(choice.best.fit, held_out)
-        if set(fresh_std) != set(model_std):
+        scatter = _scatter(choice.best.fit, held_out)
+        if set(scatter.model_std) != set(model_std):
             tell("replicates are found to differ otherwise: choosing again", 0.0)
-            model_std = fresh_std
+            model_std = scatter.model_std
             base = _rescattered(base, scatter)
             choice = choose(base, tell=tell, seed=seed)
             base = choice.base.fit
@@ -308,17 +308,20 @@ def _colours_of(found: Fit) -> dict[str, Colour]:
     return loud | find_colours(found)
 
 
-def _scatter(found: Fit, held_out: tuple[str, ...]) -> tuple[tuple[Parameter, ...], dict[str, float]]:
+def _scatter(found: Fit, held_out: tuple[str, ...]) -> Scatter:
     """Asked of all trials, and of the model without any scatter so far."""
     model = replace(found.model, scatter=())
     if all(len(ids) < 2 for ids in groups_of(model.problem.trials).values()):
-        return (), {}
+        return Scatter()
     return find_scatter(fit(model.on((*model.trials, *held_out)), _unscattered(found)))
 
 
-def _rescattered(found: Fit, scatter: tuple[Parameter, ...]) -> Fit:
-    """The same with this scatter and no other."""
-    return fit(replace(found.model, scatter=scatter), _unscattered(found))
+def _rescattered(found: Fit, scatter: Scatter) -> Fit:
+    """The same with this scatter and no other, from where it was asked for and, with none, from here."""
+    model = replace(found.model, scatter=scatter.parameters)
+    if not scatter.parameters:
+        return fit(model, _unscattered(found))
+    return with_scatter(model, {**_unscattered(found), **scatter.values})
 
 
 def _unscattered(found: Fit) -> dict[str, float]:

@@ -126,7 +126,7 @@ class Search:
         guess = getattr(model.problem, "guess", None)
         if guess is not None and forms:  # which looks for all of them together
             self.tell("looking for where the candidates' fits begin", 0.0)
-            guess(forms[:1], model.trials, self.base.fit.values)
+            guess(forms[:1], model.trials, self.base.fit.values, apart=model.scatter)
         made: list[Hypothesis] = []
         for k, form in enumerate(forms):
             self.tell(f"trying {form.effect} ({form.name})", k / max(1, len(forms)))
@@ -299,7 +299,8 @@ class Search:
         places = [start.values for start in starts]
         refine = getattr(model.problem, "refine", None)
         if refine is not None and starts:  # a search of its own, for models whose contacts make a likelihood jump
-            places = refine([((*model.forms, *start.forms), start.values) for start in starts], model.trials)
+            asked = [((*model.forms, *start.forms), start.values) for start in starts]
+            places = refine(asked, model.trials, apart=model.scatter)
         begun = []
         for start, values in zip(starts, places, strict=True):
             longer = model.with_forms((*model.forms, *start.forms))
