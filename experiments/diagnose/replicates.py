@@ -21,6 +21,8 @@ _LEAST = 0.005
 """Relative scatter below this is not the bed's: the smoothing of a depth column does as much."""
 _SAYS_SOMETHING = 0.5
 """Share of what is known of a trial's number that must come from its data."""
+_LOOKS = 12
+"""Steps with all kinds of scatter at once; what is found is fitted in full."""
 _AT_ODDS = 20.0
 """How many times as far from its replicates as they are from one another, in mean square, a trial is at odds."""
 
@@ -134,7 +136,7 @@ def find_scatter(found: Fit) -> Scatter:
     if not groups or not offered:
         return Scatter()
     every = tuple(p for parameters in offered.values() for p in parameters)
-    wide = fit(replace(found.model, scatter=every), found.values)
+    wide = fit(replace(found.model, scatter=every), found.values, rounds=_LOOKS)
     kinds = _scattered(wide, offered, groups)
     while kinds:
         active = tuple(replace(p, std=std) for kind, std in kinds.items() for p in offered[kind])

@@ -36,6 +36,8 @@ _FOLLOWED = 8
 """Effects that are looked for over the whole of every trial."""
 _ROUNDS, _MORE_ROUNDS = 6, 12
 """Steps over the whole of every trial, of all that are followed and of those that are near the best."""
+_ALL_THE_WAY = 4
+"""So many sets of effects at a time are refined with as many steps as are followed to the end."""
 _HOPELESS = 30.0
 """Times the best one's chi-square, over part of a trial, beyond which a start is given up."""
 
@@ -114,9 +116,16 @@ class Guesser:
             own = {p.name: values[p.name] for form in forms for p in form.parameters}
             starts.append(Start(forms=tuple(forms), values=own, scan=True, horizons=_GROWING, apart=tuple(apart)))
             starts.append(self._start(forms, values, apart))
-        fits = fitter.fit(starts, steps=12)
-        pairs = zip(fits[::2], fits[1::2], asked, strict=True)
-        return [self._told(min(a, b, key=lambda fit: fit.cost), trials, values) for a, b, (_, values) in pairs]
+        few = len(asked) <= _ALL_THE_WAY
+        fits = fitter.fit(starts, steps=_MORE_ROUNDS if few else _ROUNDS)
+        best = [min(pair, key=lambda fit: fit.cost) for pair in zip(fits[::2], fits[1::2], strict=True)]
+        if not few:  # of many only the most promising go on
+            going = sorted(range(len(best)), key=lambda k: best[k].cost)[:_ALL_THE_WAY]
+            more = [Start(forms=best[k].forms, values=best[k].values, gravity=best[k].gravity, apart=tuple(apart))
+                    for k in going]  # fmt: skip
+            for k, found in zip(going, fitter.fit(more, steps=_MORE_ROUNDS - _ROUNDS), strict=True):
+                best[k] = min(best[k], found, key=lambda fit: fit.cost)
+        return [self._told(found, trials, values) for found, (_, values) in zip(best, asked, strict=True)]
 
     def _start(self, forms: Sequence[TumbleForm], values: Values, apart: Sequence[Parameter]) -> Start:
         gravity = np.array(
