@@ -117,7 +117,7 @@ class SpatialBody:
         self.time = self.torque_work = 0.0
 
     def start(self, lag: float) -> None:
-        """Free of contact, with the velocity given for the time of its pose: the momentum is brought to its own time."""
+        """Free of contact, its velocity given for the time of its pose: the momentum is brought to its own time."""
         self._lag, self._force = lag, self.trial.weight.copy()
         self.momentum = self.momentum + 0.5 * lag * self._force
 

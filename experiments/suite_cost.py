@@ -24,8 +24,8 @@ FALL_TIMES = 1.5
 docs/performance.md, rounded up."""
 
 AWAKE = 8300 * 3e-3**3 / 0.036
-"""Grains that a motor's tumble keeps awake on average, times their diameter cubed, over the bed's width [m2]: the most of
-the three looks on 3 mm (docs/experiments.md: 15, 25 and 28 % of 29,797). A brake shakes the whole bed (79, 84 %)."""
+"""Grains that a motor's tumble keeps awake on average, times their diameter cubed, over the bed's width [m2]: the most
+of the three looks on 3 mm (docs/experiments.md: 15, 25 and 28 % of 29,797). A brake shakes all of it (79, 84 %)."""
 
 
 @dataclass(frozen=True)
