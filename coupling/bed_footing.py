@@ -17,13 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rigid.platform import Platform
 from rigid.quaternions import multiply, to_matrix
 from rigid.reaction import Contact
 
 from .footing import FootReaction, row_tips
 from .poses import Pose, Twist, Vector, Wrench, chord_share, matrices
 
-__all__ = ["HULL", "BedFooting", "LeftTheBedError", "Member", "ball_member", "platform_members"]
+__all__ = ["HULL", "BedFooting", "LeftTheBedError", "Member", "ball_member", "platform_members", "spatial_members"]
 
 HULL = -1
 """Row number of what is no spike."""
@@ -107,6 +108,38 @@ def platform_members(
     return members
 
 
+def spatial_members(platform: Platform) -> list[Member]:
+    """Each spike of `platform` by itself, where it is, and the ball inside its hull, about its centre of mass.
+
+    A spike is a rod with a ball at its end, as thick as the platform says, that goes on into the hull. Of the hull
+    grains meet the largest ball about the centre that fits into it, later than a face or a corner. Raises ValueError
+    for a platform without spikes.
+    """
+    radius = platform.tip_radius
+    if radius <= 0:
+        raise ValueError(
+            f"tip_radius of {platform.name} is 0: grains can touch a platform on spikes with round ends; give it some"
+        )
+    hull = platform.hull()
+    corners = hull.vertices[hull.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    inside = float(np.abs((normals * corners[:, 0]).sum(axis=1)).min())
+    members = []
+    for row, tip in enumerate(platform.tips):
+        reach = float(np.linalg.norm(tip))
+        up = -tip / reach
+        # The shortest turn from z to `up`.
+        half = np.array([1.0 + up[2], -up[1], up[0], 0.0])
+        turn = half / np.linalg.norm(half) if up[2] > -1 + 1e-9 else np.array([0.0, 1.0, 0.0, 0.0])
+        at = tip * (1 - radius / reach) - platform.centre_of_mass
+        length = max(reach - inside, radius)
+        members.append(Member(row=row, at=at, turn=turn, radius=radius, length=length, slot=row))
+    still = np.array([1.0, 0.0, 0.0, 0.0])
+    members.append(Member(row=HULL, at=-platform.centre_of_mass, turn=still, radius=inside, slot=len(members)))
+    return members
+
+
 class BedFooting:
     """`bed` under a body made of `members`.
 
@@ -119,6 +152,7 @@ class BedFooting:
         be held sideways, or back, where nothing bears it.
     bounded : whether a member that comes down beyond the bed's ends along x is an error; it is periodic there.
     begin : where the bed counts as beginning along x, one period long [m]; the body may start beyond its cell that way.
+    bounded_across : likewise along y, where a body in space may go.
     friction, restitution, rolling_friction, young, poisson : of a grain and a member, as `Bed.add_body` has them.
 
     The members wait far above until `place`. Raises ValueError for more slots than a bed takes.
@@ -137,6 +171,7 @@ class BedFooting:
         touch: float = 0.0,
         bounded: bool = True,
         begin: float = 0.0,
+        bounded_across: bool = False,
         friction: float | None = None,
         restitution: float | None = None,
         rolling_friction: float | None = None,
@@ -144,7 +179,7 @@ class BedFooting:
         poisson: float = 0.3,
     ) -> None:
         self.bed, self.members, self.copies, self.touch, self.bounded = bed, list(members), copies, touch, bounded
-        self._begin = begin
+        self._begin, self._bounded_across = begin, bounded_across
         self.origin = np.array([origin[0], origin[1], float(bed.surface)])
         """Where the body's (0, 0, 0) is in the bed [m], shape (3,)."""
         self._slots = [
@@ -255,20 +290,23 @@ class BedFooting:
                 point = halfway + arms[k] - np.array([0.0, 0.0, member.radius])
                 along = np.array([force[0], force[1], 0.0])
                 contacts[member.row] = Contact(point, float(force[2]), tangential_force=along)
-                self._check_inside(member, float(ends[k, 0]), lowest)
+                self._check_inside(member, ends[k], lowest)
         floor = rows[0, :3] if self.bodies[0] > 0 else np.zeros(3)
         self.impulse = self.impulse + dt * (self._mass * np.array(self.bed.gravity, dtype=float) - floor)
         return FootReaction(wrench, contacts, sinkage)
 
-    def _check_inside(self, member: Member, x: float, lowest: float) -> None:
+    def _check_inside(self, member: Member, end: Vector, lowest: float) -> None:
         what = "the hull" if member.row == HULL else f"spike {member.row}"
-        at, length = self.origin[0] + x - self._begin, float(self.bed.size[0])
-        if self.bounded and not 0 <= at <= length:
-            way = "ahead of" if at > length else "behind"
-            raise LeftTheBedError(
-                f"{what} came down {abs(at - length) if at > length else abs(at):.3g} m {way} the bed, which is "
-                f"{length:g} m long, at x = {x:.4g} m from the start"
-            )
+        sides = ((self.bounded, self._begin, "ahead of", "behind"), (self._bounded_across, 0.0, "left of", "right of"))
+        for axis, (bounded, begin, beyond, before) in enumerate(sides):
+            at, length = self.origin[axis] + float(end[axis]) - begin, float(self.bed.size[axis])
+            if bounded and not 0 <= at <= length:
+                way, off = (beyond, at - length) if at > length else (before, -at)
+                size = f"{length:g} m {'wide' if axis else 'long'}"
+                raise LeftTheBedError(
+                    f"{what} came down {off:.3g} m {way} the bed, which is {size}, at {'xy'[axis]} = "
+                    f"{float(end[axis]):.4g} m from the start"
+                )
         if member.row != HULL and lowest + self.origin[2] < member.radius:
             raise LeftTheBedError(
                 f"{what} sank {-lowest:.3g} m, to within its radius of the floor: the bed is {self.origin[2]:.3g} m "

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from rigid.grounds import SpringDamper, SurfaceGround
 from rigid.reaction import Contact
+from rigid.spatial import SpatialTrial
 from rigid.trial import Trial
 
 from .poses import Pose, Twist, Vector, Wrench, chord_share, matrices
@@ -110,6 +111,17 @@ class LawFooting:
             for _ in range(trial.spike_count)
         ]
         return cls(row_tips(trial.spike_length, trial.spike_count), grounds)
+
+    @classmethod
+    def of_spatial(cls, trial: SpatialTrial) -> LawFooting:
+        """The surface law of a trial in space under each tip of its platform, about the centre of mass."""
+        grounds = [
+            SurfaceGround(
+                law=trial.ground, parameters=trial.ground_parameters, mu_s=trial.mu_s, mu_d=trial.sliding_friction
+            )
+            for _ in trial.platform.tips
+        ]
+        return cls(trial.platform.tips - trial.platform.centre_of_mass, grounds)
 
     @property
     def name(self) -> str:

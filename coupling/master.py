@@ -15,18 +15,48 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from .footing import Footing, FootReaction
-from .planar_body import PlanarBody
-from .poses import Twist, Wrench
+from .poses import Pose, Twist, Wrench
 
-__all__ = ["Master", "StepBooks"]
+__all__ = ["Body", "Master", "StepBooks"]
 
 _WEIGHTS = ((1.0,), (2.0, -1.0), (3.0, -3.0, 1.0))
 """Of the last wrenches, the newest first, by order of extrapolation."""
+
+
+@runtime_checkable
+class Body(Protocol):
+    """Whatever a footing can push: `coupling.PlanarBody`, `coupling.SpatialBody`."""
+
+    @property
+    def pose(self) -> Pose:
+        """Where it is."""
+
+    @property
+    def twist(self) -> Twist:
+        """How it moves, half a lag after the time of its pose."""
+
+    def twist_now(self, lag: float) -> Twist:
+        """How it moves at the time of its pose."""
+
+    def predict(self, dt: float, guess: Wrench, lag: float) -> Twist:
+        """The twist to hold over the next `dt` [s], under the guess at the ground's wrench."""
+
+    def resolve(self, dt: float, twist: Twist, reaction: FootReaction) -> Wrench:
+        """The whole wrench of the ground: `reaction` with the friction that its Coulomb bounds leave open."""
+
+    def advance(self, dt: float, twist: Twist, wrench: Wrench) -> None:
+        """Take the step: along `twist`, with the impulse of `wrench`."""
+
+    def state(self) -> dict[str, Any]:
+        """All that its next steps depend on: a flat dict of numpy arrays."""
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go back to what `state` gave."""
 
 
 @dataclass(slots=True)
@@ -65,7 +95,7 @@ class Master:
 
     def __init__(
         self,
-        body: PlanarBody,
+        body: Body,
         footing: Footing,
         *,
         substeps: int = 10,
@@ -126,7 +156,7 @@ class Master:
             if _apart(wrench, trial) <= self.tolerance * books.largest_force:
                 break
             trial = wrench
-        before = body.rates.copy()
+        before = body.twist
         body.advance(dt, held, wrench)
         self._book(held, wrench, before)
         books.worst_guess = max(books.worst_guess, _apart(wrench, expected))
@@ -135,11 +165,9 @@ class Master:
         self.count += 1
         return reaction
 
-    def _book(self, held: Twist, wrench: Wrench, before: np.ndarray) -> None:
+    def _book(self, held: Twist, wrench: Wrench, before: Twist) -> None:
         dt, lag = self.macro_step, self.footing.lag
-        mean = 0.5 * (before + self.body.rates)
-        push = np.array([wrench.force[0], wrench.force[2], wrench.torque[1]])
-        self.books.given -= dt * float(push @ mean)
+        self.books.given -= dt * wrench.power(_mean(before, self.body.twist))
         self.books.taken -= dt * wrench.power(held)
         if lag and self._held is not None:
             # The last force of the step before was met by grains half with its twist, half with the one now held.
@@ -154,10 +182,8 @@ class Master:
         lag, books = self.footing.lag, self.books
         if not lag or self._held is None:
             return books.given, books.taken
-        rates = 0.5 * (self.body.rates + self.body.rates_now(lag))
-        push = np.array([self.wrench.force[0], self.wrench.force[2], self.wrench.torque[1]])
         return (
-            books.given + 0.5 * lag * float(push @ rates),
+            books.given + 0.5 * lag * self.wrench.power(_mean(self.body.twist, self.body.twist_now(lag))),
             books.taken + 0.5 * lag * self.wrench.power(self._held),
         )
 
@@ -191,6 +217,10 @@ class Master:
 
 def _unpack(row: np.ndarray) -> Wrench:
     return Wrench(row[:3].copy(), row[3:].copy())
+
+
+def _mean(one: Twist, other: Twist) -> Twist:
+    return Twist(0.5 * (one.velocity + other.velocity), 0.5 * (one.spin + other.spin))
 
 
 def _size(wrench: Wrench) -> float:

@@ -88,6 +88,11 @@ class PlanarBody:
         self.rates = np.zeros(3)
         self.time = self.torque_work = 0.0
 
+    def start(self, rates: Vector, lag: float) -> None:
+        """Free of contact, with `rates` at the time of its pose: brought to their own time."""
+        self.acceleration = np.array([0.0, -self.trial.weight, 0.0]) / self.inertia
+        self.rates = rates + 0.5 * lag * self.acceleration
+
     # What a footing sees -------------------------------------------------------------------------------------------
 
     @property
@@ -133,9 +138,24 @@ class PlanarBody:
 
     # What it has ---------------------------------------------------------------------------------------------------
 
+    @property
+    def twist(self) -> Twist:
+        """`rates` in space."""
+        return _twist(self.rates)
+
+    def twist_now(self, lag: float) -> Twist:
+        """`rates_now` in space."""
+        return _twist(self.rates_now(lag))
+
     def rates_now(self, lag: float) -> Vector:
         """Rates of x, z and theta at the time of the pose, shape (3,)."""
         return self.rates - 0.5 * lag * self.acceleration
+
+    @property
+    def momentum(self) -> Vector:
+        """Of platform and counterweight, at the time of the rates [N s], shape (3,)."""
+        along, up = self.inertia[:2] * self.rates[:2]
+        return np.array([along, 0.0, up])
 
     def kinetic_energy(self, lag: float) -> float:
         """Of platform and counterweight [J], without the wheel's spin."""

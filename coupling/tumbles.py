@@ -161,10 +161,6 @@ class Landing(CoupledTumble):
             self.footing.check_start(body.pose)
         elif isinstance(self.footing, LawFooting):
             self.footing.place(body.pose)
-        body.rates = self._comes.copy()
+        body.start(self._comes, self.footing.lag)
         super()._begin()
         self._states[0] = STATES.index("hop")
-        # The balance of momentum counts from rest; this body comes with some.
-        self._momentum = self._momentum + np.array([body.rates[0], 0.0, body.rates[1]]) * body.inertia[[0, 0, 1]]
-        self._samples.clear()
-        self._measure()

@@ -17,6 +17,7 @@ from rigid.trajectory import STATES, Tally, Trajectory, Transition
 from rigid.trial import Trial
 
 from .bed_footing import BedFooting
+from .books import Books
 from .contact_state import ContactReader, state_of
 from .footing import Footing, FootReaction, LawFooting
 from .master import Master
@@ -47,7 +48,7 @@ COLUMNS = (
 """Of a row: the planar model's names; work on the footing as the body and as the footing sees it [J]."""
 
 
-class CoupledTumble:
+class CoupledTumble(Books):
     """The platform of `trial` on `footing`, followed for `duration` [s] from where the torque begins.
 
     Parameters
@@ -119,18 +120,16 @@ class CoupledTumble:
         self._rows: list[list[float]] = []
         self._states: list[int] = []
         self._feet: list[np.ndarray] = []
-        self._samples: list[list[float]] = []
         self._frames = 0
-        self.energy_names: tuple[str, ...] = ()
-        """What the footing's energies are, in the order of `samples`."""
-        self.work_names: tuple[str, ...] = ()
-        """Likewise of a bed's book of what its contacts took (`Bed.work_taken`)."""
+        self._no_samples()
         if self.placed:
             self.body.touching = rests
             self._begin()
         else:
             assert lowering_speed is not None
             self.body.take_in_hand(lowering_speed)
+
+    _free = (0, 2)
 
     # How far -------------------------------------------------------------------------------------------------------
 
@@ -211,11 +210,7 @@ class CoupledTumble:
             )
 
     def _begin(self) -> None:
-        self.master.open_books()
-        start = self.footing.momentum() if isinstance(self.footing, BedFooting) else np.zeros(3)
-        self._momentum = start
-        if isinstance(self.footing, BedFooting):
-            self.footing.keep_book()
+        self._open_books(self.body.momentum)
         self._keep(self.master.last)
         self._measure()
 
@@ -252,17 +247,9 @@ class CoupledTumble:
         self._states.append(STATES.index(state))
 
     def _measure(self) -> None:
-        """What the footing holds, by how much the momentum of all is off, and the grains computed."""
-        found = self.footing.energies()
-        self.energy_names = tuple(found)
-        off, computed, taken = 0.0, 0, dict[str, float]()
-        if isinstance(self.footing, BedFooting):
-            computed, taken = self.footing.grain_steps, self.footing.work_taken()
-            moving = self.body.rates[:2] * self.body.inertia[:2]
-            fallen = np.array([0.0, -self.trial.weight * self.body.time])
-            off = float(np.linalg.norm((self.footing.momentum() - self._momentum)[[0, 2]] + moving - fallen))
-        self.work_names = tuple(f"{name}_work" for name in taken)
-        self._samples.append([self.body.time, off, computed, *found.values(), *taken.values()])
+        body = self.body
+        fallen = np.array([0.0, 0.0, -self.trial.weight * body.time])
+        self._sample(body.time, body.momentum - fallen)
 
     # What came of it -----------------------------------------------------------------------------------------------
 
@@ -282,83 +269,9 @@ class CoupledTumble:
         return [STATES[code] for code in self._states]
 
     @property
-    def samples(self) -> dict[str, np.ndarray]:
-        """Of the footing, by time: `time` [s], `momentum_error` [N s], `grain_steps` of a bed so far, energies [J],
-        work that its contacts took [J]."""
-        names = ("time", "momentum_error", "grain_steps", *self.energy_names, *self.work_names)
-        return dict(zip(names, self._sample_table.T, strict=True))
-
-    @property
-    def _sample_table(self) -> np.ndarray:
-        """The samples as rows, also where there are none yet."""
-        count = 3 + len(self.energy_names) + len(self.work_names)
-        return np.array(self._samples, dtype=float).reshape(-1, count)
-
-    @property
-    def balance(self) -> np.ndarray:
-        """Energy of the body gained, less the torque's work, plus what the footing took [J]: 0 but for the coupling."""
-        rows = self.columns
-        energy = rows["kinetic_energy"] + rows["potential_energy"]
-        return energy - energy[0] - rows["torque_work"] + rows["taken"] - rows["taken"][0]
-
-    @property
     def energy_scale(self) -> float:
         """max(|work of the torque|, W l) [J], which residuals are relative to."""
         return max(float(np.abs(self.columns["torque_work"]).max()), self.trial.weight * self.trial.spike_length)
-
-    @property
-    def dissipated(self) -> np.ndarray:
-        """What the footing took less what it holds more than at the start [J], at each time of `samples`."""
-        rows, samples = self.columns, self.samples
-        held = np.sum([samples[name] for name in self.energy_names], axis=0)
-        taken = rows["taken"][np.searchsorted(rows["time"], samples["time"])]
-        return taken - taken[0] - (held - held[0])
-
-    @property
-    def dissipation_reversal(self) -> float:
-        """Largest fall of `dissipated` below what it was before, over `energy_scale` [1]: energy that the footing made.
-
-        What it makes while it dissipates more elsewhere does not show.
-        """
-        lost = self.dissipated
-        return float((np.maximum.accumulate(lost) - lost).max()) / self.energy_scale
-
-    @property
-    def losses(self) -> dict[str, np.ndarray]:
-        """What a bed lost by measurement [J], at each time of `samples`: to normal dashpots, to friction (with the
-        tangential dashpot), to rolling and twisting. Empty on a law."""
-        if not self.work_names:
-            return {}
-        samples = self.samples
-
-        def less_springs(part: str) -> np.ndarray:
-            return np.asarray(samples[f"{part}_work"] - (samples[part] - samples[part][0]))
-
-        friction, rolling = less_springs("tangential"), less_springs("turning")
-        return {"damping": samples["damping_work"], "friction": friction, "rolling": rolling}
-
-    @property
-    def book_gap(self) -> np.ndarray:
-        """What a bed lost by measurement less `dissipated` [J], at each time of `samples`; empty on a law.
-
-        Here nothing cancels: it is the energy that the grains' integrator made (above 0) or lost, and what `energies`
-        or the losses have wrong.
-        """
-        lost = list(self.losses.values())
-        return np.sum(lost, axis=0) - self.dissipated if lost else np.zeros(0)
-
-    @property
-    def energy_residual(self) -> float:
-        """Largest energy that is not accounted for, over `energy_scale` [1].
-
-        Of the body and the exchange (`balance`) and, on a bed, with what the grains hold and lost, each measured.
-        """
-        balance, gap = self.balance, self.book_gap
-        worst = float(np.abs(balance).max())
-        if gap.size:
-            at = np.searchsorted(self.columns["time"], self.samples["time"])
-            worst = max(worst, float(np.abs(balance[at] + gap).max()))
-        return worst / self.energy_scale
 
     def trajectory(self) -> Trajectory:
         """As the planar model's integrators give it, what the footing holds as stored energy.
@@ -409,15 +322,9 @@ class CoupledTumble:
             "tumble.rows": np.array(self._rows, dtype=float).reshape(-1, len(COLUMNS)),
             "tumble.states": np.array(self._states, dtype=np.int8),
             "tumble.feet": self.feet,
-            "tumble.samples": self._sample_table,
-            "tumble.energies": np.array(self.energy_names, dtype=str),
-            "tumble.works": np.array(self.work_names, dtype=str),
-            "tumble.momentum": np.asarray(self._momentum, dtype=float),
         }
         own |= {f"reader.{key}": value for key, value in self.reader.state().items()}
-        return own | self.master.state()
-
-    _momentum = np.zeros(3)
+        return own | self._books_state() | self.master.state()
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go back to what `state` gave."""
@@ -427,10 +334,7 @@ class CoupledTumble:
         self._rows = np.asarray(state["tumble.rows"]).tolist()
         self._states = [int(code) for code in state["tumble.states"]]
         self._feet = list(np.asarray(state["tumble.feet"]))
-        self._samples = np.asarray(state["tumble.samples"]).tolist()
-        self.energy_names = tuple(str(name) for name in np.asarray(state["tumble.energies"]))
-        self.work_names = tuple(str(name) for name in np.asarray(state["tumble.works"]))
-        self._momentum = np.array(state["tumble.momentum"], dtype=float)
+        self._restore_books(state)
         self.reader.restore({key[7:]: value for key, value in state.items() if key.startswith("reader.")})
         self.master.restore(state)
 

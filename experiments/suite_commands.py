@@ -37,7 +37,7 @@ def _list(
     work: _Work = WORK,
     json: Annotated[bool, Parameter(help="Print it as JSON on stdout and nothing else.", negative="")] = False,
 ) -> int:
-    """List the cases: what each costs on two quiet cores with every grain computed, and whether it has a result."""
+    """List the cases: what each costs on two quiet cores by an estimate, and whether it has a result."""
     with refusing(), stdout_to_stderr():
         rows = [_row(case, results, work) for case in cases(names)]
     if json:

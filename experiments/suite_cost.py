@@ -23,6 +23,10 @@ FALL_TIMES = 1.5
 """What rain and rest take, over the time of a fall from the column's top: 0.27 s to 0.2 s for the beds of 80 mm in
 docs/performance.md, rounded up."""
 
+AWAKE = 8300 * 3e-3**3 / 0.036
+"""Grains that a motor's tumble keeps awake on average, times their diameter cubed, over the bed's width [m2]: the most
+of the three looks on 3 mm (docs/experiments.md: 15, 25 and 28 % of 29,797). A brake shakes all of it (79, 84 %)."""
+
 
 @dataclass(frozen=True)
 class Cost:
@@ -34,7 +38,7 @@ class Cost:
     bed_seconds: float
     """Preparing the bed, once for all cases that share it [s]."""
     run_seconds: float
-    """The tumble, every grain computed [s]."""
+    """The tumble [s]; a motor's with sleep, as many grains awake as in the looks, otherwise every grain computed."""
     grain_steps: float
     """Of the tumble."""
 
@@ -45,7 +49,7 @@ class Cost:
 
 
 def cost_of_tumble(settings: TumbleSettings) -> Cost:
-    """The estimate for a tumble with ``ground = "bed"``: every grain computed, two cores with nothing beside.
+    """The estimate for a tumble with ``ground = "bed"`` on two cores with nothing beside.
 
     Raises ValueError for a bed that will not do, as the run itself would.
     """
@@ -65,22 +69,25 @@ def cost_of_tumble(settings: TumbleSettings) -> Cost:
     )
 
     plan = _plan(settings)
-    _material(plan)
+    material = _material(plan)
     _members(settings, plan)
     forecast = _forecast(settings, plan)
-    _check_bed(settings, forecast)
+    _check_bed(settings, forecast, material)
     softening = _softness(settings, plan, forecast)
-    soft = _material(plan).softened(softening.young)
+    soft = material.softened(softening.young)
     smallest = settings.grain * (1 - settings.spread)
     step = time_step_for(soft, diameter=smallest, max_overlap=settings.max_overlap, wanted=None)
     grains = _count(settings, forecast)
     gravity = _grain_gravity(plan.trial)
     fall = math.sqrt(2 * RAIN * settings.bed_size[2] / gravity)
     steps = (settings.duration + SET_DOWN / _lowering_speed(settings, plan)) / step
-    rate = _rate(grains)
+    computed = grains
+    if settings.sleep and settings.actuator == "motor":
+        computed = min(grains, AWAKE * settings.bed_size[1] / settings.grain**3)
     return Cost(
-        grains=grains, time_step=step, bed_seconds=FALL_TIMES * fall / step * grains / rate,
-        run_seconds=steps * grains / rate + steps / settings.substeps * MACRO_STEP, grain_steps=steps * grains,
+        grains=grains, time_step=step, bed_seconds=FALL_TIMES * fall / step * grains / _rate(grains),
+        run_seconds=steps * computed / _rate(computed) + steps / settings.substeps * MACRO_STEP,
+        grain_steps=steps * computed,
     )  # fmt: skip
 
 

@@ -34,6 +34,11 @@ class TumbleBedSettings(StrictSettings):
         "away from them [m]; one size throughout if not given.",
     )
     spread: float = Field(0.15, ge=0, le=0.5, description="On a bed: grain diameters are uniform within 1 +- this [1].")
+    bed_stages: tuple[str, ...] | None = Field(
+        None,
+        description="On a bed: how it is prepared, as `hedgebed bed make --stages` has it (rain:dry compact:0.57 stick "
+        "level, for grains that stick); rained and levelled if not given.",
+    )
     seed: int = Field(1, ge=0, lt=2**31, description="On a bed: seed of its grains.")
     place: float = Field(
         0.0,

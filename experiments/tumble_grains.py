@@ -24,6 +24,7 @@ from rigid.trial import Trial
 
 from .bed_graded import graded_under
 from .bed_progress import BedProgress
+from .bed_staged import check_bed_stages, staged_bed
 from .progress import Progress
 from .reporting import write_report
 from .runfolder import RunFolder
@@ -75,9 +76,9 @@ class Forecast:
 def check_on_grains(settings: TumbleSettings) -> None:
     """Raise ValueError, naming key, value and what would do, for a bed that will not do for this trial."""
     plan = _plan(settings)
-    _material(plan)
+    material = _material(plan)
     _members(settings, plan)
-    _check_bed(settings, _forecast(settings, plan))
+    _check_bed(settings, _forecast(settings, plan), material)
 
 
 def tumble_on_grains(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
@@ -178,7 +179,7 @@ def _forecast(settings: TumbleSettings, plan: TumblePlan) -> Forecast:
     )  # fmt: skip
 
 
-def _check_bed(settings: TumbleSettings, forecast: Forecast) -> None:
+def _check_bed(settings: TumbleSettings, forecast: Forecast, material: Material) -> None:
     spike, (length, width, depth) = settings.spike_diameter, settings.bed_size
     margin = MARGIN * spike
     need = forecast.ahead - forecast.behind + 2 * margin
@@ -202,6 +203,10 @@ def _check_bed(settings: TumbleSettings, forecast: Forecast) -> None:
         raise ValueError(
             f"place = {settings.place:g} m with coarse = {settings.coarse:g} m: a graded bed is fine in its middle, "
             f"where the platform must stand; place = 0 or another seed would do"
+        )
+    if settings.bed_stages is not None:
+        check_bed_stages(
+            settings.bed_stages, material, size=settings.bed_size, grain=settings.grain, spread=settings.spread
         )
     if settings.grain > spike:
         raise ValueError(f"grain = {settings.grain:g} m is larger than the spike: at most {spike:g} m would do")
@@ -259,20 +264,23 @@ def _prepare(
     settings: TumbleSettings, plan: TumblePlan, forecast: Forecast, softening: Softening, progress: Progress
 ) -> Bed:
     graded = _graded(settings, forecast)
+    options: dict[str, Any] = {
+        "size": settings.bed_size,
+        "grain": settings.grain if graded is None else graded,
+        "spread": settings.spread if graded is None else None,
+        "gravity": _grain_gravity(plan.trial),
+        "seed": settings.seed,
+        "young": softening.young,
+        "max_overlap": settings.max_overlap,
+        "threads": settings.threads,
+        "cache": settings.cache,
+    }
     with held_back() as asked_to_stop:
-        return Bed.prepare(
-            _material(plan),
-            size=settings.bed_size,
-            grain=settings.grain if graded is None else graded,
-            spread=settings.spread if graded is None else None,
-            gravity=_grain_gravity(plan.trial),
-            seed=settings.seed,
-            young=softening.young,
-            max_overlap=settings.max_overlap,
-            threads=settings.threads,
-            cache=settings.cache,
-            progress=BedProgress(progress, "bed", asked_to_stop),
-        )
+        if settings.bed_stages is not None:
+            return staged_bed(
+                _material(plan), settings.bed_stages, **options, progress=progress, asked_to_stop=asked_to_stop
+            )
+        return Bed.prepare(_material(plan), **options, progress=BedProgress(progress, "bed", asked_to_stop))
 
 
 def _members(settings: TumbleSettings, plan: TumblePlan) -> list[Any]:

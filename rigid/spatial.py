@@ -109,6 +109,11 @@ class SpatialTrial:
             return np.array([0.0, 0.0, -mass * self.gravity])
         return mass * np.asarray(self.gravity, dtype=float)
 
+    @property
+    def sliding_friction(self) -> float:
+        """mu_d [1]."""
+        return 0.5 * self.mu_s if self.mu_d is None else self.mu_d
+
     def motion(self) -> Motion:
         """Its equations of motion."""
         law = find_law(self.ground)
@@ -116,7 +121,7 @@ class SpatialTrial:
         return Motion(
             self.platform, law=law, numbers=law.numbers(self.ground_parameters),
             rebound=1.0 if rebound is None else rebound, mu_s=self.mu_s,
-            mu_d=0.5 * self.mu_s if self.mu_d is None else self.mu_d, weight=self.weight,
+            mu_d=self.sliding_friction, weight=self.weight,
             counterweight=self.counterweight,
         )  # fmt: skip
 

@@ -15,14 +15,19 @@ CONDITIONS = (
 )
 
 
-def campaign(*, effects=(), seed=None, off=0.0, conditions=CONDITIONS, duration=1.2, window=0.004) -> Campaign:
-    """Trials of the accurate integrator through the rig's sensors, true numbers `off` sigmas away from those stated."""
+def campaign(
+    *, effects=(), seed=None, off=0.0, conditions=CONDITIONS, duration=1.2, window=0.004, friction=()
+) -> Campaign:
+    """Trials of the accurate integrator through the rig's sensors, true numbers `off` sigmas away from those stated,
+    and each trial's own factor on both coefficients of friction."""
     true = {name: value * (1 + off * SIGMA[name]) for name, value in NOMINAL.items()}
     sensors = SensorSet(imu_window=window)
     recordings, trials = {}, []
     for number, condition in enumerate(conditions, 1):
         gravity = condition["gravity_sim"] * (1 + 0.02 * off * (-1) ** number)
-        trial = Trial(**(condition | true | {"gravity_sim": gravity}), counterweight=5.2, effects=effects)
+        rubs = friction[number - 1] if friction else 1.0
+        mine = true | {name: rubs * true[name] for name in ("mu_s", "mu_d")}
+        trial = Trial(**(condition | mine | {"gravity_sim": gravity}), counterweight=5.2, effects=effects)
         own = None if seed is None else (seed, number)
         measured, _ = record(trial, duration=duration, sensors=sensors, seed=own)
         id = f"{number:03d}"

@@ -24,6 +24,9 @@ __all__ = ["allowed", "astray", "astray_finding", "astray_held_out"]
 
 _ONE_OF = 6
 """Of so many trials one may have gone its own way; of fewer one."""
+_MOST_LEFT = 0.5
+"""Share of what a model leaves that may be left without those trials, to first order, for a refit to be worth it: on
+another branch it may take more."""
 _FAR = 3.0
 """Chi-square per sample beyond which a trial is one of those that the model does not explain; a single trial that goes
 its own way may bend the fit to one other as far."""
@@ -54,6 +57,8 @@ def astray(found: Fit, held_out: Sequence[str], *, seed: int = 0) -> tuple[Findi
         rest = tuple(trial for trial in trials if trial not in order[:count])
         if len(rest) < 3:
             break
+        if _unexplained(found, rest) > _MOST_LEFT * _unexplained(found, trials):
+            continue  # it is no affair of these
         learned = _refitted(found, rest)
         if is_strained(learned) or not open_gate(learned, seed=seed)[1].passed:
             continue
@@ -93,12 +98,24 @@ def astray_held_out(
     return tuple(failing)
 
 
+def _unexplained(found: Fit, trials: Sequence[str]) -> float:
+    """Chi-square of these trials beyond their noise that a refit to them alone would leave, to first order."""
+    parts = [rows for trial, rows in found.model.rows().items() if trial in trials]
+    modes = np.concatenate([found.modes[rows] for rows in parts])
+    slopes = np.concatenate([found.jacobian[rows] for rows in parts])
+    hessian = slopes.T @ slopes + np.diag(found.prior_precision())
+    size = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
+    gradient = slopes.T @ modes / size
+    taken = gradient @ np.linalg.pinv(hessian / np.outer(size, size), rcond=1e-10, hermitian=True) @ gradient
+    return max(float(modes @ modes - taken) - len(modes), 0.0)
+
+
 def _refitted(found: Fit, trials: tuple[str, ...]) -> Fit:
     """On these trials alone, looked for anew: on all of them the fit was bent."""
     model = found.model.on(trials)
     if not model.forms or not hasattr(model.problem, "refine"):
         return fit(model)
-    (values,) = model.problem.refine([(model.forms, found.values)], trials)
+    (values,) = model.problem.refine([(model.forms, found.values)], trials, apart=model.scatter)
     return fit(model, values)
 
 

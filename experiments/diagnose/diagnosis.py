@@ -22,8 +22,8 @@ from .gate import Verdict, held_out_gate, open_gate
 from .jitter import Jitter, find_jitter, steepness
 from .localise import Place, depends_on, latent_table, places
 from .prediction import Predicted, folds_of, predict
-from .problem import Finding, Form, Parameter, Problem
-from .replicates import exchanged, find_scatter, groups_of, odd_trials, split_trials
+from .problem import Finding, Form, Problem
+from .replicates import Scatter, exchanged, find_scatter, groups_of, odd_trials, split_trials, with_scatter
 from .search import Choice, choose
 
 __all__ = ["Diagnosis", "Gap", "diagnose"]
@@ -38,6 +38,8 @@ _REFITS = 400
 """Made-up campaigns of a thorough null."""
 _MARGIN = 1.5
 """Standard deviations beyond the gate that something without a name must reach: no effect speaks for it."""
+_OUT_OF_THE_WAY = 0.5
+"""Share of what the base model leaves from which on a name has not taken the motion out of the way."""
 _AS_LIKELY = 1.0
 """Nats within which a third name is said as well."""
 _AS_LOUD, _RIGHT_FORM = 2.0, 0.02
@@ -51,9 +53,12 @@ _ASKED = 3
 """Hypotheses that are asked whether a trial of its own way is all that speaks against them."""
 _SEEN_ELSEWHERE = 3.0
 """Nats by which a name must be better than none on the other trials, where one trial goes its own way."""
-_CERTAIN = 0.5
-"""Share of what the base model leaves, fitted, predicted and held out, that a name must take away to be certain beside
-something that has no name."""
+_CERTAIN = 0.1
+"""Share of what the base model leaves, fitted, predicted and held out, that may be left by a name that is certain
+beside something that has no name."""
+_ONE_NUMBER = 0.1
+"""And by how much of itself its amplitude may be uncertain when conditions are left out: what is there is the same in
+all of them, what stands for something else is not."""
 
 
 @dataclass(frozen=True)
@@ -190,8 +195,8 @@ def diagnose(
         gone = {finding.trial for finding in aside}
         fitted = tuple(trial for trial in fitted if trial not in gone)
         base = _whitened_fit(base.model.on(fitted))
-    scatter, model_std = _scatter(base, held_out)
-    base = fit(replace(base.model, scatter=scatter), base.values) if scatter else base
+    scatter = _scatter(base, held_out)
+    base, model_std = _rescattered(base, scatter) if scatter.parameters else base, scatter.model_std
     colours = _colours_of(base)
     base = _coloured(base, colours)
     tell("is anything left?", 0.0)
@@ -213,15 +218,16 @@ def diagnose(
 
     if first.passed:
         return nothing()
-    choice = choose(base, tell=tell, seed=seed)
+    choice = choose(base, tell=tell, seed=seed, recoloured=partial(_recoloured, colours=colours))
     base = choice.base.fit
-    if choice.best.effects:  # with the motion out of the way replicates are compared once more
-        scatter, fresh_std = _scatter(choice.best.fit, held_out)
-        if set(fresh_std) != set(model_std):
+    if choice.best.effects and excess(choice.best.fit) < _OUT_OF_THE_WAY * excess(base):
+        # With the motion out of the way replicates are compared once more.
+        scatter = _scatter(choice.best.fit, held_out)
+        if set(scatter.model_std) != set(model_std):
             tell("replicates are found to differ otherwise: choosing again", 0.0)
-            model_std = fresh_std
+            model_std = scatter.model_std
             base = _rescattered(base, scatter)
-            choice = choose(base, tell=tell, seed=seed)
+            choice = choose(base, tell=tell, seed=seed, recoloured=partial(_recoloured, colours=colours))
             base = choice.base.fit
     if choice.best.effects:  # times too: slopes are those of the motion as it is now known
         best, fresh_jitters = _jittered(choice.best.fit, held_out, jitters)
@@ -229,7 +235,7 @@ def diagnose(
             base = fit(base.model, base.values)
             if {j.channels for j in fresh_jitters} != {j.channels for j in jitters}:
                 tell("times are found to jitter: choosing again", 0.0)
-                choice = choose(base, tell=tell, seed=seed)
+                choice = choose(base, tell=tell, seed=seed, recoloured=partial(_recoloured, colours=colours))
                 base = choice.base.fit
             else:
                 left = open_gate(best, seed=seed)[1]
@@ -296,6 +302,14 @@ def _coloured(found: Fit, colours: Mapping[str, Colour]) -> Fit:
     return fit(replace(found.model, whitener=whitener_for(found, dict(colours))), found.values)
 
 
+def _recoloured(found: Fit, colours: Mapping[str, Colour]) -> Fit:
+    """The same with the noise that it leaves, where that is another than `colours`."""
+    if found.chi_square > _MOST_FOR_COLOUR * found.count:
+        return found
+    fresh = _colours_of(_plain(found))
+    return _coloured(_plain(found), fresh) if _differ(fresh, colours) else found
+
+
 def _colours_of(found: Fit) -> dict[str, Colour]:
     """Colours of the noise, where the misfit is small enough for the fast modes to hold nothing else; where it is not,
     how loud the noise is, if it is all the time."""
@@ -308,17 +322,20 @@ def _colours_of(found: Fit) -> dict[str, Colour]:
     return loud | find_colours(found)
 
 
-def _scatter(found: Fit, held_out: tuple[str, ...]) -> tuple[tuple[Parameter, ...], dict[str, float]]:
+def _scatter(found: Fit, held_out: tuple[str, ...]) -> Scatter:
     """Asked of all trials, and of the model without any scatter so far."""
     model = replace(found.model, scatter=())
     if all(len(ids) < 2 for ids in groups_of(model.problem.trials).values()):
-        return (), {}
+        return Scatter()
     return find_scatter(fit(model.on((*model.trials, *held_out)), _unscattered(found)))
 
 
-def _rescattered(found: Fit, scatter: tuple[Parameter, ...]) -> Fit:
-    """The same with this scatter and no other."""
-    return fit(replace(found.model, scatter=scatter), _unscattered(found))
+def _rescattered(found: Fit, scatter: Scatter) -> Fit:
+    """The same with this scatter and no other, from where it was asked for and, with none, from here."""
+    model = replace(found.model, scatter=scatter.parameters)
+    if not scatter.parameters:
+        return fit(model, _unscattered(found))
+    return with_scatter(model, {**_unscattered(found), **scatter.values})
 
 
 def _unscattered(found: Fit) -> dict[str, float]:
@@ -493,16 +510,31 @@ def _certain(base: Fit, choice: Choice) -> bool:
     ends = any(not met.strains and met.parameter not in amplitudes for met in bounds_met(choice.best.fit))
     if ends or is_strained(choice.best.fit) or excess(choice.best.fit) >= _CERTAIN * excess(base):
         return False
+    if choice.predicted is None or not _one_number(choice):
+        return False
     trials = [trial for trial in base.model.problem.trials if trial.id in base.model.trials]
-    predicted = predict(base, folds_of(trials)) if choice.predicted is not None else None
-    if predicted is None or choice.predicted is None:
-        return True
+    predicted = predict(base, folds_of(trials))
+    if predicted is None:
+        return False
     return choice.predicted.chi_square - choice.predicted.count < _CERTAIN * (predicted.chi_square - predicted.count)
 
 
+def _one_number(choice: Choice) -> bool:
+    """Whether each effect's amplitude stays the same whichever condition is left out (jackknife)."""
+    assert choice.predicted is not None
+    folds = choice.predicted.learned
+    for form in choice.best.forms:
+        values = np.array([learned[form.amplitude] for learned in folds])
+        error = math.sqrt((len(values) - 1) * float(values.var()))
+        if error > _ONE_NUMBER * abs(choice.best.fit.values[form.amplitude]):
+            return False
+    return True
+
+
 def _closes(before: float | None, after: float | None) -> bool:
-    """Whether most of what the base model leaves of trials held out is taken away, too; true where there are none."""
-    return before is None or after is None or after - 1 < _CERTAIN * max(before - 1, 0.0)
+    """Whether next to all that the base model leaves of trials held out is taken away, too, and what is left is no
+    louder than the sensors; true where there are none."""
+    return before is None or after is None or (after <= _AS_LOUD and after - 1 < _CERTAIN * max(before - 1, 0.0))
 
 
 def _smallest(choice: Choice) -> tuple[Hypothesis, ...]:

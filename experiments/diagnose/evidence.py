@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .fitting import Fit, Model, fit
+from .fitting import Fit, Model, fit, scanned
 from .gate import low_modes
 from .problem import Array, Form, Values
 
@@ -171,4 +171,5 @@ def held_out_fit(model: Model, trials: Sequence[str], values: Mapping[str, float
     own = [p for p in (*model.problem.base, *model.scatter) if p.trial is not None and p.trial in trials]
     if not own or not trials:
         return dict(values)
-    return {**values, **fit(model.on(trials).holding(values), values).values}
+    found = fit(model.on(trials).holding(values), values)
+    return {**values, **(scanned(found) if model.scatter and hasattr(model.problem, "guess") else found).values}

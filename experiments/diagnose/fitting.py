@@ -19,12 +19,15 @@ from scipy.fft import dct
 from .problem import Array, Form, Parameter, Problem, Values
 from .together import each
 
-__all__ = ["Fit", "Model", "Whitener", "fit", "linearised", "settled", "settled_slopes"]
+__all__ = ["Fit", "Model", "Whitener", "fit", "linearised", "scanned", "settled", "settled_slopes"]
 
 _ROUNDS = 30
 _DAMPINGS = (0.0, 1e-3, 1e-1, 10.0)
 _SETTLING = 3
 """Rounds in which the steps of a settled Jacobian are found."""
+_SCAN = np.linspace(-3.0, 3.0, 25)
+"""Standard deviations of a trial's own number that are looked at for another valley."""
+_PASSES = 3
 _MANY = 2**15
 """Residuals from which threads are worth their while."""
 _ENOUGH = 0.02
@@ -252,6 +255,67 @@ def fit(model: Model, start: Values | None = None, *, rounds: int = _ROUNDS) -> 
     return Fit(model, named(x), best, jacobian, float(best @ best), penalty(x), free)
 
 
+def scanned(found: Fit, *, passes: int = _PASSES) -> Fit:
+    """The best of fits that begin where a trial's own numbers lie elsewhere within their priors.
+
+    Where a trial sticks or slips otherwise, its likelihood has many narrow valleys. Each of its numbers is moved over
+    three standard deviations of its prior, its others with it as the fit says that they must; what is shared stays, so
+    that all trials are looked at together, and each takes its best.
+    """
+    for _ in range(passes):
+        values = dict(found.values)
+        moved = False
+        for kind in dict.fromkeys(
+            p.kind for p in found.model.parameters if p.trial is not None and math.isfinite(p.std)
+        ):
+            better = _along(found, values, kind)
+            moved, values = moved or bool(better), {**values, **better}
+        if not moved:
+            break
+        again = fit(found.model, values)
+        if again.objective > found.objective - 1.0:
+            break
+        found = again
+    return found
+
+
+def _along(found: Fit, values: Values, kind: str) -> dict[str, float]:
+    """Numbers of those trials that lie better elsewhere along the valley of one kind."""
+    model, parameters, rows = found.model, found.model.parameters, found.model.rows()
+    hessian = found.hessian()
+    mine = {p.trial: k for k, p in enumerate(parameters) if p.trial is not None and p.kind == kind}
+    ways = {}
+    for trial, here in mine.items():
+        own = [k for k, p in enumerate(parameters) if p.trial == trial]
+        covariance = np.linalg.pinv(hessian[np.ix_(own, own)], rcond=1e-12, hermitian=True)
+        place = own.index(here)
+        ways[trial] = own, covariance[:, place] / max(float(covariance[place, place]), 1e-300)
+    points = [dict(values)]
+    for z in _SCAN:
+        point = dict(values)
+        for trial, here in mine.items():
+            p = parameters[here]
+            far = (p.value + z * p.std - values[p.name]) / p.scale
+            own, way = ways[trial]
+            for k, slope in zip(own, way, strict=True):
+                q = parameters[k]
+                point[q.name] = float(np.clip(values[q.name] + far * slope * q.scale, q.lowest, q.highest))
+        points.append(point)
+    modes = model.evaluate(points)
+    told: dict[str, float] = {}
+    for trial, (own, _) in ways.items():
+        names = [parameters[k].name for k in own]
+        costs = [
+            float(one[rows[trial]] @ one[rows[trial]])
+            + sum(((point[parameters[k].name] - parameters[k].value) / parameters[k].std) ** 2 for k in own)
+            for one, point in zip(modes, points, strict=True)
+        ]
+        best = int(np.argmin(costs))
+        if costs[best] < costs[0] - 1.0:
+            told |= {name: points[best][name] for name in names}
+    return told
+
+
 def linearised(model: Model, values: Values) -> tuple[Array, Array]:
     """Modes at `values`, shape [n], and their changes per scale of each of the model's parameters, shape [n, p]."""
     parameters = model.parameters
@@ -319,9 +383,8 @@ def _begun(model: Model, start: Values | None) -> Values:
     scatter = {p.name for p in model.scatter}  # a small thing beside the rest: it begins at none
     if guess is None or all(p.name in known or p.name in scatter for p in model.parameters):
         return known
-    known = {name: value for name, value in known.items() if name not in scatter}  # what another model needed of it
     held = model.held is not None
-    found: Values = guess(model.forms, model.trials, {**(model.held or {}), **known}, held=held)
+    found: Values = guess(model.forms, model.trials, {**(model.held or {}), **known}, held=held, apart=model.scatter)
     return found
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from .evidence import held_out_fit, slow_count, tempered
 from .fitting import Fit, fit
-from .problem import TrialInfo
+from .problem import TrialInfo, Values
 from .replicates import groups_of
 
 __all__ = ["Predicted", "folds_of", "predict"]
@@ -31,6 +31,8 @@ class Predicted:
     count: int
     score: float
     """Tempered log likelihood of the prediction, comparable between models of one campaign [nats]."""
+    learned: tuple[Values, ...] = ()
+    """What was fitted without each fold."""
 
     @property
     def per_sample(self) -> float:
@@ -59,15 +61,16 @@ def predict(found: Fit, folds: Sequence[tuple[str, ...]]) -> Predicted | None:
     model = found.model
     if not folds:
         return None
-    chi_square, count = 0.0, 0
+    chi_square, count, taught = 0.0, 0, []
     for fold in folds:
         rest = tuple(id for id in model.trials if id not in fold)
         learned = fit(model.on(rest), found.values, rounds=_ROUNDS)
         values = held_out_fit(model, fold, {**found.values, **learned.values, **_untold(learned, found)})
+        taught.append(learned.values)
         (modes,) = model.on(fold).evaluate([values])
         chi_square += float(modes @ modes)
         count += len(modes)
-    return Predicted(chi_square, count, tempered(chi_square - count, slow_count(found)))
+    return Predicted(chi_square, count, tempered(chi_square - count, slow_count(found)), tuple(taught))
 
 
 def _untold(learned: Fit, found: Fit) -> dict[str, float]:

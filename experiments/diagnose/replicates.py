@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import stats
 
 from .evidence import inflation
-from .fitting import Fit, fit
+from .fitting import Fit, Model, fit, scanned
 from .gate import low_modes
-from .problem import Finding, Parameter, Problem, TrialInfo
+from .problem import Finding, Parameter, Problem, TrialInfo, Values
 
-__all__ = ["exchanged", "find_scatter", "groups_of", "odd_trials", "parted", "split_trials"]
+__all__ = ["Scatter", "exchanged", "find_scatter", "groups_of", "odd_trials", "parted", "split_trials", "with_scatter"]
 
 _SURE = 1e-4
 _LEAST = 0.005
 """Relative scatter below this is not the bed's: the smoothing of a depth column does as much."""
+_SAYS_SOMETHING = 0.5
+"""Share of what is known of a trial's number that must come from its data."""
+_LOOKS = 12
+"""Steps with all kinds of scatter at once; what is found is fitted in full."""
 _AT_ODDS = 20.0
 """How many times as far from its replicates as they are from one another, in mean square, a trial is at odds."""
 
@@ -115,49 +119,125 @@ def exchanged(
     return tuple(t for t in every if t not in out), tuple(t for t in every if t in out)
 
 
-def find_scatter(found: Fit) -> tuple[tuple[Parameter, ...], dict[str, float]]:
+def find_scatter(found: Fit) -> Scatter:
     """Nuisances that the replicates call for, their priors estimated, and what is written as model_std.
 
-    Each trial's own bed (or whatever the problem offers) is fitted; within a condition these must agree within their
-    errors. What the model lacks is the same for all replicates as long as it is small; where it is not, each trial's
-    factors are bent by it in their own way: errors are those of noise as loud as what is left (`inflation`).
+    Each trial's own numbers (bed, friction, whatever the problem offers) are fitted, all kinds at once, so that none
+    stands for another; within a condition these must agree within their errors. What the model lacks is the same for
+    all replicates as long as it is small; where it is not, each trial's factors are bent by it in their own way: errors
+    are those of noise as loud as what is left (`inflation`). The scatter is the most likely one beside these errors,
+    each condition's mean taken out (restricted likelihood): trials that say nothing of a kind count for nothing. Once
+    found, it is the prior under which all is fitted and asked again.
     """
     problem: Problem = found.model.problem
     offered: dict[str, tuple[Parameter, ...]] = getattr(problem, "scatter", {})
     inside = [t for t in problem.trials if t.id in found.model.trials]
     groups = [ids for ids in groups_of(inside).values() if len(ids) > 1]
-    active: tuple[Parameter, ...] = ()
-    model_std: dict[str, float] = {}
-    if not groups:
-        return active, model_std
+    if not groups or not offered:
+        return Scatter()
+    every = tuple(p for parameters in offered.values() for p in parameters)
+    wide = fit(replace(found.model, scatter=every), found.values, rounds=_LOOKS)
+    kinds = _scattered(wide, offered, groups)
+    while kinds:
+        active = tuple(replace(p, std=std) for kind, std in kinds.items() for p in offered[kind])
+        wide = with_scatter(replace(found.model, scatter=active), wide.values)
+        sure = _scattered(wide, {kind: offered[kind] for kind in kinds}, groups)
+        if sure.keys() == kinds.keys():
+            parameters = tuple(replace(p, std=sure[p.kind]) for p in active)
+            return Scatter(parameters, sure, wide.values)
+        kinds = sure
+    return Scatter()
+
+
+def with_scatter(model: Model, values: Values) -> Fit:
+    """The model's fit, from `values` and from where the problem's own search, which begins at what was stated, finds
+    it: a base model whose trials cannot differ bends what is shared, and stands on branches of stick and slip that
+    nobody measured."""
+    names = {p.name for p in model.parameters}
+    found = fit(model, {name: value for name, value in values.items() if name in names})
+    guess = getattr(model.problem, "guess", None)
+    if guess is None or inflation(found) == 1:
+        return found
+    stated = {p.name: p.value for p in model.problem.base}
+    begun = {name: values[name] for form in model.forms for name in (p.name for p in form.parameters)}
+    other = fit(model, guess(model.forms, model.trials, {**stated, **begun}, apart=model.scatter))
+    best = min(found, other, key=lambda one: one.objective)
+    return scanned(best)
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """What differs between replicates beyond the sensors; nothing by default."""
+
+    parameters: tuple[Parameter, ...] = ()
+    model_std: Mapping[str, float] = field(default_factory=dict)
+    values: Mapping[str, float] = field(default_factory=dict)
+    """Of the model with it, for fits to begin from."""
+
+
+def _scattered(
+    found: Fit, offered: Mapping[str, Sequence[Parameter]], groups: Sequence[Sequence[str]]
+) -> dict[str, float]:
+    """The scatter of those kinds in which replicates differ for sure."""
+    least = getattr(found.model.problem, "least_scatter", _LEAST)
+    scatter = {}
     for kind, parameters in offered.items():
-        wide = fit(replace(found.model, scatter=(*active, *parameters)), found.values)
-        value = {p.trial: wide.values[p.name] for p in parameters if p.trial in wide.model.trials}
-        louder = inflation(wide)
-        error = {p.trial: louder * _error(wide, p) for p in parameters if p.trial in wide.model.trials}
-        surprise, count, between, within = 0.0, 0, 0.0, 0.0
-        for ids in groups:
-            b, s = np.array([value[id] for id in ids]), np.array([error[id] for id in ids])
-            mean = float((b / s**2).sum() / (1 / s**2).sum())
-            surprise += float((((b - mean) / s) ** 2).sum())
-            count += len(ids) - 1
-            between += float(((b - b.mean()) ** 2).sum())
-            within += float((s**2).sum() * (len(ids) - 1) / len(ids))
-        std = math.sqrt(max(between - within, 0.0) / count)
-        if stats.chi2.sf(surprise, count) < _SURE and std > getattr(problem, "least_scatter", _LEAST):
-            model_std[kind] = std
-            active = (*active, *(replace(p, std=std) for p in parameters))
-    return active, model_std
+        told = _told(found, parameters)
+        pairs = [np.array([told[id] for id in ids if id in told]) for ids in groups]
+        pairs = [pair for pair in pairs if len(pair) > 1]
+        surprise = sum(float((((b - _mean(b, s)) / s) ** 2).sum()) for b, s in (pair.T for pair in pairs))
+        if not pairs or stats.chi2.sf(surprise, sum(len(pair) - 1 for pair in pairs)) >= _SURE:
+            continue
+        std = min(_likeliest_scatter(pairs), max(p.std for p in parameters))
+        if std > least:
+            scatter[kind] = std
+    return scatter
 
 
-def _error(found: Fit, parameter: Parameter) -> float:
-    """Standard error of a trial's nuisance, its other nuisances let free, what is shared held."""
-    own = [k for k, p in enumerate(found.model.parameters) if p.trial == parameter.trial]
-    names = [found.model.parameters[k].name for k in own]
-    block = found.hessian()[np.ix_(own, own)]
-    covariance = np.linalg.pinv(block, rcond=1e-12, hermitian=True)
-    here = names.index(parameter.name)
-    return parameter.scale * math.sqrt(max(float(covariance[here, here]), 1e-300))
+def _told(found: Fit, parameters: Sequence[Parameter]) -> dict[str, tuple[float, float]]:
+    """What a trial's data say of its own number, and the error of that: trial -> value, std. What is shared is held,
+    the trial's other numbers are free; the number's own prior says nothing here."""
+    louder, mine = inflation(found), found.model.parameters
+    precision = found.prior_precision()
+    told = {}
+    for p in parameters:
+        if p.trial not in found.model.trials:
+            continue
+        own = [k for k, q in enumerate(mine) if q.trial == p.trial and found.free[k]]
+        if p.name not in {mine[k].name for k in own}:
+            continue  # at the end of its range
+        slopes = found.jacobian[:, own]
+        hessian = slopes.T @ slopes / louder**2 + np.diag(precision[own])
+        covariance = np.linalg.pinv(hessian, rcond=1e-12, hermitian=True)
+        here = [mine[k].name for k in own].index(p.name)
+        whole = 1 / max(float(covariance[here, here]), 1e-300)
+        data = whole - precision[own[here]]
+        if data > _SAYS_SOMETHING * whole:
+            told[p.trial or ""] = found.values[p.name] * whole / data, p.scale / math.sqrt(data)
+    return told
+
+
+def _mean(values: np.ndarray, errors: np.ndarray) -> float:
+    return float((values / errors**2).sum() / (1 / errors**2).sum())
+
+
+def _likeliest_scatter(pairs: Sequence[np.ndarray]) -> float:
+    """Std between replicates that is most likely beside the errors of what is told of each, the groups' means unknown.
+
+    `pairs`: of each group values and errors, shape [trial_count, 2].
+    """
+
+    def log_likelihood(scatter: float) -> float:
+        total = 0.0
+        for values, errors in (pair.T for pair in pairs):
+            spread = np.hypot(errors, scatter)
+            off = (values - _mean(values, spread)) / spread
+            total -= float(np.log(spread).sum() + 0.5 * np.log((1 / spread**2).sum()) + 0.5 * (off @ off))
+        return total
+
+    widest = max(float(np.ptp(pair[:, 0])) for pair in pairs)
+    tried = np.concatenate([[0.0], widest * np.geomspace(1e-3, 2.0, 200)])
+    return float(tried[int(np.argmax([log_likelihood(scatter) for scatter in tried]))])
 
 
 def odd_trials(found: Fit) -> list[Finding]:

@@ -30,12 +30,14 @@ _WORTH_ALONE = 16.0
 """Nats from which a further name counts where there is but one condition, so that no prediction can be asked for."""
 _BEHIND = 30.0
 """Nats behind the best beyond which a candidate is not fitted to the end: its chi-square is seven times as large."""
+_FINISHED, _NEAR_BY = 8, 8.0
+"""So many candidates are fitted to the end, and all within so many nats of the best."""
 _WORTH_BOTH, _SHARE_BOTH = 5.0, 0.75
 """Nats, and share of what is left, from which a smaller second name counts too, if conditions left out say so."""
-_NEAR = 15.0
-"""Nats behind the best within which a name is asked to predict conditions left out."""
 _LEADS = 2.0
 """Nats of evidence and prediction together by which another close name takes the lead."""
+_UNEXPLAINED, _HOPELESS = 1.3, 0.1
+"""Chi-square per sample, and share of what the base model leaves beyond noise, from which on both no name can stand."""
 _SHOWN = 3
 """Rivals that are weighed."""
 _MOST = 3
@@ -68,10 +70,13 @@ class Choice:
 class Search:
     """One search over one set of trials."""
 
-    def __init__(self, base: Fit, *, tell: Tell, seed: int = 0) -> None:
+    def __init__(
+        self, base: Fit, *, tell: Tell, seed: int = 0, recoloured: Callable[[Fit], Fit] | None = None
+    ) -> None:  # fmt: skip
         self.base = Hypothesis(base, score(base))
         self.tell = tell
         self.seed = seed
+        self._recoloured = recoloured
         self.table: list[tuple[str, Hypothesis]] = []
         self._alone: dict[str, Hypothesis] = {}
         self._most = self.base.score
@@ -98,7 +103,13 @@ class Search:
     # Steps ------------------------------------------------------------------------------------------------------------
 
     def _gate(self, hypothesis: Hypothesis) -> Verdict:
-        return open_gate(hypothesis.fit, seed=self.seed)[1]
+        """With the noise as it shows once the hypothesis has taken the motion out of the way: a colour calls for no
+        further name."""
+        told = open_gate(hypothesis.fit, seed=self.seed)[1]
+        if told.passed or self._recoloured is None or not hypothesis.effects:
+            return told
+        other = self._recoloured(hypothesis.fit)
+        return told if other is hypothesis.fit else open_gate(other, seed=self.seed)[1]
 
     def _try(self, what: str, start: Hypothesis, forms: Sequence[Form], *, rounds: int = 6) -> Hypothesis:
         """`start` with `forms` added, all refitted."""
@@ -126,15 +137,17 @@ class Search:
         guess = getattr(model.problem, "guess", None)
         if guess is not None and forms:  # which looks for all of them together
             self.tell("looking for where the candidates' fits begin", 0.0)
-            guess(forms[:1], model.trials, self.base.fit.values)
+            guess(forms[:1], model.trials, self.base.fit.values, apart=model.scatter)
         made: list[Hypothesis] = []
         for k, form in enumerate(forms):
             self.tell(f"trying {form.effect} ({form.name})", k / max(1, len(forms)))
             made.append(self._try(form.id, self.base, [form], rounds=6 if guess is None else 1))
         if guess is not None:
             most = max((h.score for h in made), default=0.0)
+            ranked = sorted((h.score for h in made), reverse=True)
+            least = min(ranked[:_FINISHED][-1], most - _NEAR_BY)
             for k, begun in enumerate(made):
-                if begun.score > most - _BEHIND:
+                if begun.score > most - _BEHIND and begun.score >= least:
                     self.tell(f"fitting {forms[k].effect} ({forms[k].name})", k / len(forms))
                     found = fit(begun.fit.model, begun.fit.values)
                     made[k] = Hypothesis(found, score(found))
@@ -299,10 +312,15 @@ class Search:
         places = [start.values for start in starts]
         refine = getattr(model.problem, "refine", None)
         if refine is not None and starts:  # a search of its own, for models whose contacts make a likelihood jump
-            places = refine([((*model.forms, *start.forms), start.values) for start in starts], model.trials)
+            asked = [((*model.forms, *start.forms), start.values) for start in starts]
+            places = refine(asked, model.trials, apart=model.scatter)
         begun = []
-        for start, values in zip(starts, places, strict=True):
-            longer = model.with_forms((*model.forms, *start.forms))
+        models = [model.with_forms((*model.forms, *start.forms)) for start in starts]
+        if refine is not None:  # these are near their ends: the better half goes on
+            left = [float(np.square(one.evaluate([point])[0]).sum()) for one, point in zip(models, places, strict=True)]
+            kept = sorted(range(len(left)), key=lambda k: left[k])[: max(_FOLLOWED, (len(left) + 1) // 2)]
+            models, places = [models[k] for k in kept], [places[k] for k in kept]
+        for longer, values in zip(models, places, strict=True):
             for share in (0.4, 0.7) if rough else ():
                 values = fit(longer.until(share), values, rounds=6).values
             begun.append(fit(longer, values, rounds=5))
@@ -335,6 +353,11 @@ class Search:
         chosen = sorted(close.items(), key=lambda item: -item[1].score)[:_SHOWN]
         mine, rivals = self._predicted(turned, [compare(name, turned, h, without) for name, h in chosen])
         return (turned, mine, rivals) if any(rival.same for rival in rivals) else None
+
+    def _hopeless(self, best: Hypothesis) -> bool:
+        """Whether too much is left for any name to stand: then it need not be told from others."""
+        share = excess(best.fit) / max(excess(self.base.fit), 1e-9)
+        return best.fit.chi_square > _UNEXPLAINED * best.fit.count and share > _HOPELESS
 
     def _best_forms(self, effect: str) -> list[Form]:
         """Forms of an effect, in the order of how well they did alone."""
@@ -378,6 +401,8 @@ class Search:
 
     def _predicted(self, best: Hypothesis, rivals: Sequence[Rival]) -> tuple[Predicted | None, tuple[Rival, ...]]:
         """With what they say of conditions left out."""
+        if self._hopeless(best):
+            return None, tuple(rivals)
         folds = self._folds(best)
         self.tell("predicting conditions left out", 0.5)
         mine = predict(best.fit, folds)
@@ -385,7 +410,7 @@ class Search:
             return None, tuple(rivals)
         told = []
         for rival in rivals:
-            theirs = predict(rival.hypothesis.fit, folds) if rival.behind < _NEAR else None
+            theirs = predict(rival.hypothesis.fit, folds) if rival.close else None
             behind = None if theirs is None else mine.score - theirs.score
             told.append(replace(rival, predicted=theirs, behind_left_out=behind))
         return mine, tuple(told)
@@ -405,9 +430,11 @@ class Search:
         return best, mine, rivals
 
 
-def choose(base: Fit, *, tell: Tell, seed: int = 0) -> Choice:
-    """Search from the base model's fit."""
-    return Search(base, tell=tell, seed=seed).choose()
+def choose(
+    base: Fit, *, tell: Tell, seed: int = 0, recoloured: Callable[[Fit], Fit] | None = None
+) -> Choice:  # fmt: skip
+    """Search from the base model's fit. `recoloured`: a fit with the noise as that fit leaves it."""
+    return Search(base, tell=tell, seed=seed, recoloured=recoloured).choose()
 
 
 def _said(hypothesis: Hypothesis) -> str:

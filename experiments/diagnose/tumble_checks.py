@@ -17,6 +17,7 @@ from .lags import find_lag, pieces
 from .problem import Finding
 from .stuck import stuck_rows
 from .tumble_data import CHANNELS, TrialData, TumbleData
+from .tumble_spikes import spikes
 
 __all__ = ["checked"]
 
@@ -38,8 +39,11 @@ def checked(data: TumbleData) -> tuple[TumbleData, list[Finding]]:
     """The data without rows that cannot be, and what was found."""
     findings: list[Finding] = []
     trials = []
+    alone, said = spikes(data.trials)
+    findings += said
     for trial in data.trials:
         keep = np.ones(len(trial.time), dtype=bool)
+        keep[alone.get(trial.id, [])] = False
         _clocks(trial, keep, findings)
         for number, name in enumerate(CHANNELS):
             mine = np.flatnonzero((trial.channel == number) & keep)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from .together import each
 from .tumble_forms import TumbleForm
-from .tumble_forward import SHARED, Forward
+from .tumble_forward import OWN_TO_A_TRIAL, SHARED, Forward
 from .tumble_steps import (
     EASY,
     SETTLED,
@@ -86,6 +86,7 @@ class Fitter:
         told = forward.data.tables.uncertainty
         self.sigma = {name: getattr(told, name) for name in SHARED}
         self.sigma_gravity = told.gravity_sim
+        self._places = {trial.id: k for k, trial in enumerate(forward.data.trials)}
 
     def residuals(self, points: list[Point], forms: Sequence[TumbleForm]) -> Answers:
         """Whitened residuals at points of (values, gravity): one array [point_count, sample_count] a trial."""
@@ -109,7 +110,7 @@ class Fitter:
         except StopIteration as end:
             jacobian = end.value
         normal, slope = normal_equations(jacobian, residuals, u, space)
-        return Linearised(residuals, jacobian, normal, slope, space.shared, space.gravities)
+        return Linearised(residuals, jacobian, normal, slope, space)
 
     def fit(self, starts: Sequence[Start], *, steps: int = 25) -> list[Fit]:
         """Carry out all fits together."""
@@ -141,12 +142,17 @@ class Fitter:
         total = sum(len(points) for _, points in asked)
         columns = {name: np.full(total, value) for name, value in self.forward.nominal.items()}
         gravity = np.ones((total, len(self.forward.data.trials)))
+        apart = {kind: np.ones_like(gravity) for kind in OWN_TO_A_TRIAL[1:]}
         at = 0
         for forms, points in asked:
             rows = slice(at, at + len(points))
             for name in SHARED:
                 columns[name][rows] = [values.get(name, self.forward.nominal[name]) for values, _ in points]
             gravity[rows] = [relative for _, relative in points]
+            for name in (name for name in points[0][0] if name.endswith("]")):
+                kind, _, id = name[:-1].partition("[")
+                if kind in apart:
+                    apart[kind][rows, self._places[id]] = [1 + values[name] for values, _ in points]
             for form in forms:
                 given = {
                     p.name: np.array([values.get(p.name, p.value) for values, _ in points]) for p in form.parameters
@@ -155,7 +161,7 @@ class Fitter:
                     columns.setdefault(name, np.full(total, self.forward.neutral(name)))[rows] = array
             at += len(points)
         predictions = self.forward.predict(
-            columns | {"gravity": gravity}, trials=self.trials, states=False, horizon=horizon
+            columns | apart | {"gravity": gravity}, trials=self.trials, states=False, horizon=horizon
         )
 
         edges = np.cumsum([0, *(len(points) for _, points in asked)]).tolist()
@@ -188,6 +194,13 @@ class Fitter:
             name = f"gravity_sim[{self.forward.data.trials[trial].id}]"
             low = max(-6.0, -0.95 / self.sigma_gravity)
             rows.append((name, 1.0, self.sigma_gravity, 1.0, low, 6.0, 0.02))
+        kinds = list(dict.fromkeys(p.kind for p in start.apart))
+        for kind in kinds:
+            own = {p.trial: p for p in start.apart if p.kind == kind}
+            for trial in self.trials:
+                p = own[self.forward.data.trials[trial].id]
+                low, high = (p.lowest - p.value) / p.scale, (p.highest - p.value) / p.scale
+                rows.append((p.name, p.value, p.scale, p.std / p.scale, low, high, (p.step or 1e-2) / p.scale))
         table = np.array([row[1:] for row in rows], dtype=float).reshape(-1, 6)
         return Space(
             names=tuple(row[0] for row in rows),
@@ -198,6 +211,8 @@ class Fitter:
             high=table[:, 4],
             step=table[:, 5],
             gravities=gravities,
+            trials=len(self.trials),
+            kinds=len(kinds),
         )
 
     def _descend(self, start: Start, steps: int) -> Generator[tuple[list[Point], float], Answers, Fit]:
@@ -209,7 +224,7 @@ class Fitter:
         for number, horizon in enumerate(start.horizons):
             answer = yield [way.point(u)], horizon
             residuals, cost = [r[0] for r in answer], way.price(answer, 0, u)
-            if space.gravities and (number or start.scan):
+            if space.blocks() and (number or start.scan):
                 u, residuals, cost = yield from self._scan(u, residuals, cost, way, horizon)
             damping, scanned = 0.0, False
             for _ in range(steps if horizon >= 1 else max(4, steps // 3)):
@@ -230,7 +245,7 @@ class Fitter:
                     damping = max(1e3, 10 * damping)
                     continue
                 seen = sum(int(np.count_nonzero(r)) for r in residuals)
-                if space.gravities and not scanned and horizon >= 1 and cost > 1.1 * seen:
+                if space.blocks() and not scanned and horizon >= 1 and cost > 1.1 * seen:
                     scanned, before = True, cost
                     u, residuals, cost = yield from self._scan(u, residuals, cost, way, horizon)
                     if before - cost > 1.0:
@@ -246,28 +261,31 @@ class Fitter:
     def _scan(
         self, u: Array, residuals: list[Array], cost: float, way: Way, horizon: float
     ) -> Generator[tuple[list[Point], float], Answers, tuple[Array, list[Array], float]]:
-        """The best gravity of each trial on a grid over its prior."""
-        shared = way.space.shared
-        points = []
-        for z in _SCAN:
-            v = u.copy()
-            v[shared:] = z
-            points.append(way.point(v))
-        answer = yield points, horizon
+        """The best gravity of each trial on a grid over its prior, then the best of what else is its own."""
         u, residuals = u.copy(), list(residuals)
-        for k, rows in enumerate(answer):
-            now = float(residuals[k] @ residuals[k]) + u[shared + k] ** 2
-            prices = np.einsum("ij,ij->i", rows, rows) + _SCAN**2
-            best = int(np.argmin(prices))
-            if prices[best] < now:
-                cost -= now - float(prices[best])
-                u[shared + k], residuals[k] = _SCAN[best], rows[best]
+        for block in way.space.blocks():
+            std = way.space.std[block.start]
+            points = []
+            for z in _SCAN:
+                v = u.copy()
+                v[block] = np.clip(z * std, way.space.low[block], way.space.high[block])
+                points.append(way.point(v))
+            answer = yield points, horizon
+            for k, rows in enumerate(answer):
+                here = block.start + k
+                tried = np.clip(_SCAN * std, way.space.low[here], way.space.high[here])
+                now = float(residuals[k] @ residuals[k]) + (u[here] / std) ** 2
+                prices = np.einsum("ij,ij->i", rows, rows) + (tried / std) ** 2
+                best = int(np.argmin(prices))
+                if prices[best] < now:
+                    cost -= now - float(prices[best])
+                    u[here], residuals[k] = tried[best], rows[best]
         return u, residuals, cost
 
     def _jacobian(
         self, u: Array, residuals: list[Array], way: Way, horizon: float
     ) -> Generator[tuple[list[Point], float], Answers, list[Array]]:
-        """d residual / d u, one array [shared (+ 1), sample_count] a trial: the shared ones, then its own gravity."""
+        """d residual / d u, one array [shared + own, sample_count] a trial: the shared ones, then what is its own."""
         space, shared = way.space, way.space.shared
         steps, points = [], []
         for k in range(shared):
@@ -276,10 +294,10 @@ class Fitter:
             v[k] += step
             steps.append(step)
             points.append(way.point(v))
-        if space.gravities:
+        for block in space.blocks():
             v = u.copy()
-            v[shared:] += space.step[shared]
-            steps.append(float(space.step[shared]))
+            v[block] += space.step[block]
+            steps.append(float(space.step[block.start]))
             points.append(way.point(v))
         answer = yield points, horizon
         inverse = 1 / np.array(steps)

@@ -30,8 +30,9 @@ Array = NDArray[np.float64]
 
 SHARED = ("mass", "inertia", "stiffness", "damping", "mu_s", "mu_d")
 """Numbers that all trials share and that may be uncertain."""
-OWN_TO_A_TRIAL = ("gravity", "bed", "friction")
-"""Factors that every trial has of its own."""
+OWN_TO_A_TRIAL = ("gravity", "friction", "static_friction", "bed", "torque")
+"""Factors that every trial has of its own: on its gravity, on mu_s and mu_d, on mu_s beside it, on K and C, and on the
+torque."""
 _MOST_BYTES = 1.5e8
 """Of the sampled motion of the lanes that share the end of their last step."""
 _HELD_BYTES = 3.2e7
@@ -70,7 +71,7 @@ class Forward:
 
     `predict` takes arrays by name: the shared numbers ("mass" ...), effects' parameters ("pendulum.length",
     "clock-offset.offset"), each of shape [set_count]; and each trial's own, `OWN_TO_A_TRIAL`, of shape [set_count,
-    trial_count]: "gravity" (over its stated one), "bed" (a factor on K and C), "friction" (on mu_s and mu_d).
+    trial_count].
     """
 
     def __init__(
@@ -248,12 +249,14 @@ class Forward:
         gravity = columns["gravity"][sets, index] * trial.gravity_sim
         mass = columns["mass"][sets]
         bed, rubs = columns["bed"][sets, index], columns["friction"][sets, index]
+        sliding = rubs * np.minimum(columns["mu_d"][sets], columns["mu_s"][sets])
+        sticking = np.maximum(rubs * columns["static_friction"][sets, index] * columns["mu_s"][sets], sliding)
         fixed = (
             mass, columns["inertia"][sets], length, length * math.cos(math.pi / rows), trial.counterweight,
             gravity if trial.local_gravity is None else trial.local_gravity, (mass + trial.counterweight) * gravity,
-            trial.torque, trial.torque_until, self.data.tables.wheel.inertia,
+            columns["torque"][sets, index] * trial.torque, trial.torque_until, self.data.tables.wheel.inertia,
             1.0 if trial.actuator == "motor" else -1.0, trial.wheel_speed_0,
-            rubs * columns["mu_s"][sets], rubs * np.minimum(columns["mu_d"][sets], columns["mu_s"][sets]),
+            sticking, sliding,
             bed * columns["stiffness"][sets], bed * columns["damping"][sets],
         )  # fmt: skip
         for k, value in enumerate(fixed):

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .problem import Values
+from .problem import Parameter, Values
 from .tumble_data import TumbleData
 from .tumble_fit import Fit, Fitter
 from .tumble_forms import TumbleForm
@@ -36,6 +36,8 @@ _FOLLOWED = 8
 """Effects that are looked for over the whole of every trial."""
 _ROUNDS, _MORE_ROUNDS = 6, 12
 """Steps over the whole of every trial, of all that are followed and of those that are near the best."""
+_ALL_THE_WAY = 4
+"""So many sets of effects at a time are refined with as many steps as are followed to the end."""
 _HOPELESS = 30.0
 """Times the best one's chi-square, over part of a trial, beyond which a start is given up."""
 
@@ -51,6 +53,11 @@ def _thinned(data: TumbleData) -> TumbleData:
     return replace(data, trials=tuple(trials))
 
 
+def _kinds(apart: Sequence[Parameter]) -> tuple[str, ...]:
+    """What is fitted to single trials, and within which prior."""
+    return tuple(dict.fromkeys(f"{p.kind} {p.std:.4g}" for p in apart))
+
+
 class Guesser:
     """Guesses for one campaign. They are kept: the same question is answered once."""
 
@@ -63,8 +70,9 @@ class Guesser:
         self._warm: dict[tuple[str, ...], tuple[dict[str, float], float]] = {}
 
     def guess(
-        self, forms: Sequence[TumbleForm], trials: Sequence[str], values: Values, *, held: bool = False
-    ) -> dict[str, float]:
+        self, forms: Sequence[TumbleForm], trials: Sequence[str], values: Values, *, held: bool = False,
+        apart: Sequence[Parameter] = (),
+    ) -> dict[str, float]:  # fmt: skip
         """Values near the best for the base model with `forms` on `trials`, beginning from `values`.
 
         Args:
@@ -72,20 +80,20 @@ class Guesser:
             trials: their ids.
             values: what is known; parameters of a form that are missing are looked for from the form's starts.
             held: whether everything shared stays as it is.
+            apart: what else is fitted to single trials.
         """
         fitter = Fitter(self.forward, trials=[self._ids.index(trial) for trial in trials])
-        start = self._start(forms, values)
+        start = self._start(forms, values, apart)
         if held:
             names = {*SHARED, *(p.name for form in forms for p in form.parameters)}
-            fixed = Start(
-                forms=start.forms, values=start.values, gravity=start.gravity, frozen=frozenset(names), scan=True
-            )
+            fixed = replace(start, frozen=frozenset(names), scan=True)
             return self._told(fitter.fit([fixed])[0], trials, values)
         new = [form for form in forms if any(p.name not in values for p in form.parameters)]
         if not new:
             return self._told(self._base(fitter, start), trials, values)
         old = [form for form in forms if form not in new]
-        key = (tuple(form.id for form in old), tuple(trials), len(new) > 1 and tuple(form.id for form in new))
+        whose = tuple(form.id for form in new) if len(new) > 1 else ()
+        key = (tuple(form.id for form in old), tuple(trials), whose, *_kinds(apart))
         if key not in self._kept:
             self._kept[key] = {}
         kept = self._kept[key]
@@ -98,27 +106,36 @@ class Guesser:
         return self._told(kept[new[-1].id], trials, values)
 
     def refine(
-        self, asked: Sequence[tuple[Sequence[TumbleForm], Values]], trials: Sequence[str]
-    ) -> list[dict[str, float]]:
+        self, asked: Sequence[tuple[Sequence[TumbleForm], Values]], trials: Sequence[str],
+        *, apart: Sequence[Parameter] = (),
+    ) -> list[dict[str, float]]:  # fmt: skip
         """Values near the best for each (forms, values): from there, and from nominal numbers over growing horizons."""
         fitter = Fitter(self.forward, trials=[self._ids.index(trial) for trial in trials])
         starts = []
         for forms, values in asked:
             own = {p.name: values[p.name] for form in forms for p in form.parameters}
-            starts.append(Start(forms=tuple(forms), values=own, scan=True, horizons=_GROWING))
-            starts.append(self._start(forms, values))
-        fits = fitter.fit(starts, steps=12)
-        pairs = zip(fits[::2], fits[1::2], asked, strict=True)
-        return [self._told(min(a, b, key=lambda fit: fit.cost), trials, values) for a, b, (_, values) in pairs]
+            starts.append(Start(forms=tuple(forms), values=own, scan=True, horizons=_GROWING, apart=tuple(apart)))
+            starts.append(self._start(forms, values, apart))
+        few = len(asked) <= _ALL_THE_WAY
+        fits = fitter.fit(starts, steps=_MORE_ROUNDS if few else _ROUNDS)
+        best = [min(pair, key=lambda fit: fit.cost) for pair in zip(fits[::2], fits[1::2], strict=True)]
+        if not few:  # of many only the most promising go on
+            going = sorted(range(len(best)), key=lambda k: best[k].cost)[:_ALL_THE_WAY]
+            more = [Start(forms=best[k].forms, values=best[k].values, gravity=best[k].gravity, apart=tuple(apart))
+                    for k in going]  # fmt: skip
+            for k, found in zip(going, fitter.fit(more, steps=_MORE_ROUNDS - _ROUNDS), strict=True):
+                best[k] = min(best[k], found, key=lambda fit: fit.cost)
+        return [self._told(found, trials, values) for found, (_, values) in zip(best, asked, strict=True)]
 
-    def _start(self, forms: Sequence[TumbleForm], values: Values) -> Start:
+    def _start(self, forms: Sequence[TumbleForm], values: Values, apart: Sequence[Parameter]) -> Start:
         gravity = np.array(
             [values.get(f"gravity_sim[{i}]", g) / g for i, g in zip(self._ids, self._stated, strict=True)]
         )
-        known = {*SHARED, *(p.name for form in forms for p in form.parameters)}
+        known = {*SHARED, *(p.name for form in forms for p in form.parameters), *(p.name for p in apart)}
         return Start(
-            forms=tuple(forms), values={name: v for name, v in values.items() if name in known}, gravity=gravity
-        )
+            forms=tuple(forms), values={name: v for name, v in values.items() if name in known}, gravity=gravity,
+            apart=tuple(apart),
+        )  # fmt: skip
 
     def _told(self, found: Fit, trials: Sequence[str], values: Values) -> dict[str, float]:
         told = {**values, **found.values}
@@ -139,12 +156,12 @@ class Guesser:
             return values
 
         def begin(values: Mapping[str, float], horizons: tuple[float, ...]) -> Start:
-            return Start(forms=start.forms, values=values, gravity=start.gravity, scan=True, horizons=horizons)
+            return replace(start, values=values, scan=True, horizons=horizons)
 
         def poor(found: Fit, limit: float) -> bool:
             return found.cost > limit * sum(len(r) for r in found.residuals)
 
-        key = tuple(form.id for form in start.forms)
+        key = (*(form.id for form in start.forms), *_kinds(start.apart))
         if key in self._warm:  # found before, on other trials
             before, limit = self._warm[key]
             values = {name: start.values.get(name, value) for name, value in before.items()}
@@ -179,14 +196,15 @@ class Guesser:
             keep([form for form, _ in chosen], fits)
         if old:  # beside what was found already the way is short
             return best
-        self._race(fitter, begun, keep)
+        bare = Start(apart=start.apart)
+        self._race(fitter, begun, bare, keep)
         left = [form for form in forms if form.id not in best]  # given up on the way: told as they stand
         places = {form.id: point for form, point in reversed(begun)}
-        keep(left, fitter.fit([self._add(Start(), (), form, places[form.id]) for form in left], steps=2))
+        keep(left, fitter.fit([self._add(bare, (), form, places[form.id]) for form in left], steps=2))
         return best
 
     def _race(
-        self, fitter: Fitter, begun: Sequence[tuple[TumbleForm, Values]],
+        self, fitter: Fitter, begun: Sequence[tuple[TumbleForm, Values]], bare: Start,
         keep: Callable[[Sequence[TumbleForm], Sequence[Fit]], None],
     ) -> None:  # fmt: skip
         """Every form from all its starts and nominal numbers, over growing horizons; on the way most drop out.
@@ -194,7 +212,7 @@ class Guesser:
         A base model that lacks something plain stands on branches of its own, from which no effect is found: so all
         begin where every branch is the same.
         """
-        running = [(form, self._add(Start(), (), form, point, horizons=_GROWING[:1])) for form, point in begun]
+        running = [(form, self._add(bare, (), form, point, horizons=_GROWING[:1])) for form, point in begun]
         for following in (*_GROWING[1:], 1.0):
             fits = fitter.fit([start for _, start in running], steps=_ROUNDS)
             seen = max(1, sum(int(np.count_nonzero(rows)) for rows in fits[0].residuals))
@@ -212,7 +230,7 @@ class Guesser:
                 most, alike = (len(effects), 2) if following < 1 else (_FOLLOWED, 1 if last else 2)
                 if each[form.id] <= alike and form.effect in effects[:most] and found.cost <= limit:
                     start = Start(forms=(form,), values=found.values, gravity=found.gravity, scan=not last,
-                                  horizons=(following,))  # fmt: skip
+                                  horizons=(following,), apart=bare.apart)  # fmt: skip
                     longer.append((form, start))
             running = longer
         keep([form for form, _ in running], fitter.fit([start for _, start in running], steps=_MORE_ROUNDS))
@@ -226,14 +244,14 @@ class Guesser:
     ) -> Start:  # fmt: skip
         return Start(
             forms=(*old, form), values={**start.values, **values}, gravity=start.gravity,
-            scan=len(horizons) > 1, horizons=horizons,
+            scan=len(horizons) > 1, horizons=horizons, apart=start.apart,
         )  # fmt: skip
 
     def _screened(
         self, fitter: Fitter, old: Sequence[TumbleForm], begun: Sequence[tuple[TumbleForm, Values]], start: Start
     ) -> list[tuple[TumbleForm, dict[str, float]]]:
         """For each form the start from which a linear step, the base model's included, promises most."""
-        space = fitter.linearised(Start(forms=tuple(old), values=start.values, gravity=start.gravity))
+        space = fitter.linearised(replace(start, forms=tuple(old)))
         gravity = np.ones(len(self._ids)) if start.gravity is None else start.gravity
         answers = fitter.signatures([((*old, form), {**start.values, **point}, gravity) for form, point in begun])
         best: dict[str, tuple[float, TumbleForm, dict[str, float]]] = {}

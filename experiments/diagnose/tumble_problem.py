@@ -28,7 +28,7 @@ from .together import each
 from .tumble_data import CHANNELS, TumbleData, tumble_data
 from .tumble_follow import followed_until
 from .tumble_forms import TumbleForm, tumble_forms
-from .tumble_forward import SHARED, Forward, Prediction
+from .tumble_forward import OWN_TO_A_TRIAL, SHARED, Forward, Prediction
 from .tumble_guess import Guesser
 from .tumble_latent import latent_columns
 from .tumble_shapes import shaped
@@ -43,7 +43,7 @@ _STEP = 0.02  # of finite differences, in sigmas: contacts make smaller ones rou
 _SCAN = np.linspace(-3.0, 3.0, 25)
 """Standard deviations of a trial's simulated gravity that are looked at where it goes its own way."""
 _SCATTER_STD = 0.1
-"""How far friction and bed may differ between replicates while they are asked whether they do [1]."""
+"""How far replicates may differ, in each kind, while they are asked whether they do [1]."""
 
 
 class TumbleProblem:
@@ -134,7 +134,7 @@ class TumbleProblem:
                           highest=1.0, trial=trial.id, kind=kind, step=1e-3)
                 for trial in self.data.trials
             )
-            for kind in ("friction", "bed")
+            for kind in OWN_TO_A_TRIAL[1:]
         }  # fmt: skip
 
     @cached_property
@@ -329,14 +329,18 @@ class TumbleProblem:
         return advice(first.effect, second.effect)
 
     def guess(
-        self, forms: Sequence[Form], trials: Sequence[str], values: Values, *, held: bool = False
-    ) -> dict[str, float]:
+        self, forms: Sequence[Form], trials: Sequence[str], values: Values, *, held: bool = False,
+        apart: Sequence[Parameter] = (),
+    ) -> dict[str, float]:  # fmt: skip
         """Values near the best, from which a local fit may begin (`tumble_guess`)."""
-        return self._guesser.guess(_ours(forms), trials, values, held=held)
+        return self._guesser.guess(_ours(forms), trials, values, held=held, apart=_of(apart, trials))
 
-    def refine(self, asked: Sequence[tuple[Sequence[Form], Values]], trials: Sequence[str]) -> list[dict[str, float]]:
+    def refine(
+        self, asked: Sequence[tuple[Sequence[Form], Values]], trials: Sequence[str], *, apart: Sequence[Parameter] = ()
+    ) -> list[dict[str, float]]:
         """The same for several sets of forms at once, all of whose values are given (`tumble_guess`)."""
-        return self._guesser.refine([(_ours(forms), values) for forms, values in asked], trials)
+        mine = [(_ours(forms), values) for forms, values in asked]
+        return self._guesser.refine(mine, trials, apart=_of(apart, trials))
 
     def follows(self, values: Values, forms: Sequence[Form], trial: str) -> float | None:
         """The moment [s] up to which the model follows a trial, with the simulated gravity that takes it farthest; None
@@ -375,7 +379,7 @@ class TumbleProblem:
             for name, value in self.forward.nominal.items()
         }
         columns["gravity"] = self.gravity(points)
-        for kind in ("friction", "bed"):
+        for kind in OWN_TO_A_TRIAL[1:]:
             columns[kind] = np.array(
                 [[1 + values.get(f"{kind}[{t.id}]", 0.0) for t in self.data.trials] for values in points]
             )
@@ -407,6 +411,10 @@ class TumbleProblem:
         assert isinstance(form, TumbleForm)
         own = {p.name: np.array([values.get(p.name, p.value)]) for p in form.parameters}
         return {name: float(array[0]) for name, array in form.physical(own).items()}
+
+
+def _of(apart: Sequence[Parameter], trials: Sequence[str]) -> list[Parameter]:
+    return [p for p in apart if p.trial in trials]
 
 
 def _ours(forms: Sequence[Form]) -> list[TumbleForm]:

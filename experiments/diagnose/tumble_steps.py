@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .problem import Parameter
 from .tumble_data import TrialData
 from .tumble_forms import TumbleForm
 
@@ -40,7 +42,8 @@ SETTLED = 0.05
 """A step that gains less than this in chi-square ends a fit."""
 
 Point = tuple[Mapping[str, float], Array]
-"""Values of shared numbers and effects' parameters, and each trial's gravity over its stated one."""
+"""Values of shared numbers, effects' parameters and what else is a trial's own, and each trial's gravity over its
+stated one."""
 Answers = list[Array]
 """Whitened residuals, one array [point_count, sample_count] a trial."""
 
@@ -77,6 +80,8 @@ class Start:
     """Each trial's over its stated one, shape [trial_count]; None: 1."""
     frozen: frozenset[str] = frozenset()
     """Shared names that stay."""
+    apart: tuple[Parameter, ...] = ()
+    """Further numbers of single trials that are fitted: what differs between replicates."""
     scan: bool = False
     """Whether to scan each trial's gravity before the first step."""
     horizons: tuple[float, ...] = (1.0,)
@@ -86,7 +91,8 @@ class Start:
 
 @dataclass(frozen=True)
 class Space:
-    """What one fit moves, in scaled coordinates: shared first, then gravities."""
+    """What one fit moves, in scaled coordinates: shared first, then gravities, then what else is each trial's own, kind
+    by kind."""
 
     names: tuple[str, ...]
     value: Array
@@ -96,11 +102,23 @@ class Space:
     high: Array
     step: Array
     gravities: int
+    trials: int
+    kinds: int = 0
+    """Of further numbers that each trial has of its own."""
 
     @property
     def shared(self) -> int:
         """How many are shared."""
-        return len(self.names) - self.gravities
+        return len(self.names) - self.gravities - self.kinds * self.trials
+
+    def blocks(self) -> list[slice]:
+        """Where the numbers of each kind stand that every trial has of its own: gravity, then the others."""
+        edges = range(self.shared, len(self.names) + 1, max(1, self.trials))
+        return [slice(low, high) for low, high in itertools.pairwise(edges)]
+
+    def touching(self, trial: int) -> list[int]:
+        """Places of all that changes one trial: what is shared, and its own."""
+        return [*range(self.shared), *(block.start + trial for block in self.blocks())]
 
 
 @dataclass(frozen=True)
@@ -111,8 +129,7 @@ class Linearised:
     jacobian: list[Array]
     normal: Array
     slope: Array
-    shared: int
-    gravities: int
+    space: Space
 
     def promise(self, other: list[Array]) -> tuple[float, float]:
         """What chi-square would lose if the change from these residuals to `other` were free in size, and that size.
@@ -122,8 +139,7 @@ class Linearised:
         change = [b - a for a, b in zip(self.residuals, other, strict=True)]
         cross = np.zeros(len(self.slope))
         for k, (rows, c) in enumerate(zip(self.jacobian, change, strict=True)):
-            own = [*range(self.shared), self.shared + k] if self.gravities else list(range(self.shared))
-            cross[own] += rows @ c
+            cross[self.space.touching(k)] += rows @ c
         solved = np.linalg.solve(self.normal, np.column_stack([cross, self.slope]))
         size = float(sum(c @ c for c in change) - cross @ solved[:, 0])
         along = float(sum(c @ r for c, r in zip(change, self.residuals, strict=True)) - cross @ solved[:, 1])
@@ -145,7 +161,7 @@ class Way:
         named = zip(space.names, space.value, space.scale, strict=True)
         u = np.array([(self.fixed.get(name, value) - value) / scale for name, value, scale in named])
         if space.gravities:
-            u[space.shared :] = (self.gravity[self.trials] - 1) / self.sigma_gravity
+            u[space.blocks()[0]] = (self.gravity[self.trials] - 1) / self.sigma_gravity
         return np.clip(u, space.low, space.high)
 
     def point(self, u: Array) -> Point:
@@ -154,8 +170,9 @@ class Way:
         actual = space.value + space.scale * u
         gravity = self.gravity.copy()
         if space.gravities:
-            gravity[self.trials] = actual[shared:]
-        return self.fixed | dict(zip(space.names[:shared], actual[:shared].tolist(), strict=True)), gravity
+            gravity[self.trials] = actual[space.blocks()[0]]
+        told = np.r_[:shared, shared + space.gravities : len(u)]
+        return self.fixed | {space.names[k]: float(actual[k]) for k in told}, gravity
 
     def price(self, answer: Answers, row: int, u: Array) -> float:
         """Chi-square and the priors'."""
@@ -164,11 +181,10 @@ class Way:
 
 def normal_equations(jacobian: list[Array], residuals: list[Array], u: Array, space: Space) -> tuple[Array, Array]:
     """Normal matrix and half the gradient, priors included."""
-    shared = space.shared
     normal = np.diag(space.std**-2.0)
     slope = u / space.std**2
     for k, (rows, residual) in enumerate(zip(jacobian, residuals, strict=True)):
-        own = [*range(shared), shared + k] if space.gravities else list(range(shared))
+        own = space.touching(k)
         normal[np.ix_(own, own)] += rows @ rows.T
         slope[own] += rows @ residual
     return normal, slope

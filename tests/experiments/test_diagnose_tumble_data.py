@@ -1,5 +1,6 @@
 """Diagnosing tumbles: clocks that jump, what differs between replicates, effects from files in the forward model."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,11 +9,14 @@ from tumble_campaigns import CONDITIONS, NOMINAL, campaign
 
 import experiments
 from experiments.campaign import Campaign, Recording
+from experiments.diagnose.fitting import Model, Whitener, fit
 from experiments.diagnose.own import load_own
+from experiments.diagnose.replicates import find_scatter
 from experiments.diagnose.tumble_checks import checked
 from experiments.diagnose.tumble_data import CHANNELS, tumble_data
 from experiments.diagnose.tumble_forward import Forward
 from experiments.diagnose.tumble_problem import TumbleProblem
+from experiments.diagnose.tumble_spikes import spikes
 from rigid import Effect
 
 RISES = Path(experiments.__file__).parent / "terms" / "torque_rise.py"
@@ -71,13 +75,43 @@ def test_a_trials_own_friction_and_bed_are_factors_on_what_all_share():
     data = tumble_data(campaign(conditions=CONDITIONS[:2]))
     problem = TumbleProblem(data)
     ids = [trial.id for trial in problem.trials]
-    one = {"friction[001]": -0.2, "bed[001]": 0.3}
-    other = {"mu_s": 0.8 * NOMINAL["mu_s"], "mu_d": 0.8 * NOMINAL["mu_d"], "stiffness": 1.3 * NOMINAL["stiffness"],
+    one = {"friction[001]": -0.2, "static_friction[001]": 0.1, "bed[001]": 0.3}
+    other = {"mu_s": 0.88 * NOMINAL["mu_s"], "mu_d": 0.8 * NOMINAL["mu_d"], "stiffness": 1.3 * NOMINAL["stiffness"],
              "damping": 1.3 * NOMINAL["damping"]}  # fmt: skip
     own, shared, none = problem.evaluate([one, other, {}], (), ids)
     np.testing.assert_allclose(own["001"], shared["001"], atol=1e-9)
     np.testing.assert_array_equal(own["002"], none["002"])
     assert {p.trial for p in problem.scatter["friction"]} == set(ids)
+
+
+def test_replicates_whose_friction_scatters_are_told_from_replicates_that_do_not():
+    """Factors with a std of 9 % about each condition's mean; torque and bed are the same in all."""
+    factors = (1.1, 0.92, 1.0, 0.95, 1.12, 0.93)
+    conditions = [CONDITIONS[k] for k in (0, 0, 0, 1, 1, 1)]
+    for friction, kinds in ((factors, {"friction"}), ((), set())):
+        problem = TumbleProblem(tumble_data(campaign(seed=5, off=0.5, conditions=conditions, friction=friction)))
+        ids = tuple(trial.id for trial in problem.trials)
+        found = find_scatter(fit(Model(problem, Whitener.white(problem), ids)))
+        assert set(found.model_std) == kinds
+        assert not kinds or 0.05 < found.model_std["friction"] < 0.15
+
+
+@pytest.mark.parametrize("name", ["gyro", "ax", "wheel"])
+def test_a_single_reading_that_neighbours_and_replicates_do_not_share_is_set_aside(name):
+    """15 std off at 0.6 s; with the same in a replicate it is kept, and touches of the ground are no such readings."""
+    data = tumble_data(campaign(seed=3, conditions=[CONDITIONS[3]] * 2))
+    assert not spikes(data.trials)[1]
+    spoilt = []
+    for trial in data.trials:
+        rows = trial.of(name).nonzero()[0]
+        odd = rows[np.searchsorted(trial.time[rows], 0.6)]
+        value = trial.value.copy()
+        value[odd] += 15 * trial.std[odd]
+        spoilt.append(replace(trial, value=value))
+    clean, (said,) = checked(replace(data, trials=(spoilt[0], data.trials[1])))
+    assert said.set_aside and said.channel == name and said.from_s == said.to_s == pytest.approx(0.6, abs=0.02)
+    assert len(clean.trials[0].time) == len(data.trials[0].time) - 1
+    assert not spikes(spoilt)[1]
 
 
 def test_an_effect_from_a_file_moves_the_batch_as_it_moves_the_accurate_integrator():

@@ -46,6 +46,10 @@ def on_bed(**more):
         ),
         ({"surface": "steel"}, r"surface = 'steel' has no grains .* sand, jsc1a would do"),
         ({"spike_clear": 0.01}, r"spike_diameter = 0.012 m, spike_clear = 0.01 m"),
+        ({"bed_stages": ("rain:dry", "stick", "level")}, r"bed_stages: .* these grains do not stick anyway"),
+        ({"bed_stages": ("rain", "compact:0.6")}, r"bed_stages ends with 'compact:0.6': 'level' last"),
+        ({"bed_stages": ("rain", "cut:0.1", "level")}, r"bed_stages: .* would undo it"),
+        ({"bed_stages": ("rain", "tilt:5")}, r"bed_stages has 'tilt:5': a platform needs a level bed"),
     ],
 )
 def test_a_bed_that_will_not_do_is_refused_before_any_work(given, said):
@@ -196,3 +200,37 @@ def _check_report(folder, result):
     assert [block.kind for block in section.blocks] == ["figure", "table", "figure", "text"]
     assert all((folder / "figures" / name).stat().st_size > 5000 for name in ("beside.png", "feet.png"))
     assert "rig: grains at 1 g" in section.blocks[-1].text
+
+
+def test_a_bed_that_went_through_stages_is_kept_and_found_again(tmp_path, monkeypatch):
+    """`--bed-stages`: the stages reach the laboratory (a stand-in here), the second call takes the bed of the first."""
+    from dem.laboratory import Prepared
+    from dem.materials import material
+    from experiments import bed_staged
+    from experiments.progress import Progress
+
+    monkeypatch.setenv("HEDGEBED_CACHE", str(tmp_path))
+    asked, bed = [], SimpleNamespace()
+
+    def prepare_as(material, *, stages, keep, **options):
+        asked.append(stages)
+        keep.write_bytes(b"half a bed")
+        return Prepared(bed, {"stages": stages}, [])
+
+    def save_prepared(prepared, path):
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(b"a bed")
+
+    monkeypatch.setattr(bed_staged, "prepare_as", prepare_as)
+    monkeypatch.setattr(bed_staged, "save_prepared", save_prepared)
+    monkeypatch.setattr(bed_staged, "load_prepared", lambda path, **options: Prepared(path, {}, []))
+    options = {
+        "size": (0.04, 0.04, 0.03), "grain": 0.005, "spread": 0.15, "gravity": 9.81, "seed": 1, "young": 1e6,
+        "max_overlap": 0.1, "threads": 1, "cache": True, "progress": Progress(), "asked_to_stop": lambda: False,
+    }  # fmt: skip
+    first, again = (bed_staged.staged_bed(material("sand"), ("rain", "fluff", "level"), **options) for _ in range(2))
+    assert first is bed and again.read_bytes() == b"a bed" and again.name.startswith("sand-")
+    assert asked == [["rain", "fluff", "level"]]
+    assert not list((tmp_path / "unfinished").iterdir())
+    bed_staged.staged_bed(material("sand"), ("rain", "compact:0.6", "level"), **options)
+    assert len(asked) == 2

@@ -1,0 +1,160 @@
+"""The books of a run: what body, exchange and footing gained, lost and kept, and what is not accounted for.
+
+What is in them, and why, is docs/coupling.md.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .bed_footing import BedFooting
+from .footing import Footing
+from .master import Master
+from .poses import Vector
+
+__all__ = ["Books"]
+
+
+class Books:
+    """Samples of the footing's energies beside the rows of a run, and their balance.
+
+    Whoever has it gives `columns` (`time`, `kinetic_energy`, `potential_energy`, `torque_work`, `given`, `taken`, one
+    entry a macro step) and `energy_scale`, and calls `_open_books` where time begins, `_sample` now and then.
+    """
+
+    footing: Footing
+    master: Master
+    _free: tuple[int, ...] = (0, 1, 2)
+    """Along which axes the body can move."""
+
+    def _no_samples(self) -> None:
+        self._samples: list[list[float]] = []
+        self.energy_names: tuple[str, ...] = ()
+        """What the footing's energies are, in the order of `samples`."""
+        self.work_names: tuple[str, ...] = ()
+        """Likewise of a bed's book of what its contacts took (`Bed.work_taken`)."""
+        self._momentum = np.zeros(3)
+
+    @property
+    def columns(self) -> dict[str, Vector]:
+        """The rows so far, by name."""
+        raise NotImplementedError
+
+    @property
+    def energy_scale(self) -> float:
+        """What residuals are relative to [J]."""
+        raise NotImplementedError
+
+    def _open_books(self, moving: Vector) -> None:
+        """Count from here; `moving`: the body's own momentum [N s], shape (3,)."""
+        self.master.open_books()
+        self._samples.clear()
+        self._momentum = moving.copy()
+        if isinstance(self.footing, BedFooting):
+            self._momentum = self._momentum + self.footing.momentum()
+            self.footing.keep_book()
+
+    def _sample(self, time: float, moving: Vector) -> None:
+        """What the footing holds, by how much the momentum of all is off, and the grains computed.
+
+        `moving`: the body's momentum less the impulse of its weight since the books were opened [N s], shape (3,).
+        """
+        found = self.footing.energies()
+        self.energy_names = tuple(found)
+        off, computed, taken = 0.0, 0, dict[str, float]()
+        if isinstance(self.footing, BedFooting):
+            computed, taken = self.footing.grain_steps, self.footing.work_taken()
+            gained = self.footing.momentum() + moving - self._momentum
+            off = float(np.linalg.norm(gained[list(self._free)]))
+        self.work_names = tuple(f"{name}_work" for name in taken)
+        self._samples.append([time, off, computed, *found.values(), *taken.values()])
+
+    @property
+    def samples(self) -> dict[str, Vector]:
+        """Of the footing, by time: `time` [s], `momentum_error` [N s], `grain_steps` of a bed so far, energies [J],
+        work that its contacts took [J]."""
+        names = ("time", "momentum_error", "grain_steps", *self.energy_names, *self.work_names)
+        return dict(zip(names, self._sample_table.T, strict=True))
+
+    @property
+    def _sample_table(self) -> Vector:
+        """The samples as rows, also where there are none yet."""
+        count = 3 + len(self.energy_names) + len(self.work_names)
+        return np.array(self._samples, dtype=float).reshape(-1, count)
+
+    @property
+    def balance(self) -> Vector:
+        """Energy of the body gained, less the torque's work, plus what the footing took [J]: 0 but for the coupling."""
+        rows = self.columns
+        energy = rows["kinetic_energy"] + rows["potential_energy"]
+        return energy - energy[0] - rows["torque_work"] + rows["taken"] - rows["taken"][0]
+
+    @property
+    def dissipated(self) -> Vector:
+        """What the footing took less what it holds more than at the start [J], at each time of `samples`."""
+        rows, samples = self.columns, self.samples
+        held = np.sum([samples[name] for name in self.energy_names], axis=0)
+        taken = rows["taken"][np.searchsorted(rows["time"], samples["time"])]
+        return np.asarray(taken - taken[0] - (held - held[0]))
+
+    @property
+    def dissipation_reversal(self) -> float:
+        """Largest fall of `dissipated` below what it was before, over `energy_scale` [1]: energy that the footing made.
+
+        What it makes while it dissipates more elsewhere does not show.
+        """
+        lost = self.dissipated
+        return float((np.maximum.accumulate(lost) - lost).max()) / self.energy_scale
+
+    @property
+    def losses(self) -> dict[str, Vector]:
+        """What a bed lost by measurement [J], at each time of `samples`: to normal dashpots, to friction (with the
+        tangential dashpot), to rolling and twisting. Empty on a law."""
+        if not self.work_names:
+            return {}
+        samples = self.samples
+
+        def less_springs(part: str) -> Vector:
+            return np.asarray(samples[f"{part}_work"] - (samples[part] - samples[part][0]))
+
+        friction, rolling = less_springs("tangential"), less_springs("turning")
+        return {"damping": samples["damping_work"], "friction": friction, "rolling": rolling}
+
+    @property
+    def book_gap(self) -> Vector:
+        """What a bed lost by measurement less `dissipated` [J], at each time of `samples`; empty on a law.
+
+        Here nothing cancels: it is the energy that the grains' integrator made (above 0) or lost, and what `energies`
+        or the losses have wrong.
+        """
+        lost = list(self.losses.values())
+        return np.asarray(np.sum(lost, axis=0) - self.dissipated) if lost else np.zeros(0)
+
+    @property
+    def energy_residual(self) -> float:
+        """Largest energy that is not accounted for, over `energy_scale` [1].
+
+        Of the body and the exchange (`balance`) and, on a bed, with what the grains hold and lost, each measured.
+        """
+        balance, gap = self.balance, self.book_gap
+        worst = float(np.abs(balance).max())
+        if gap.size:
+            at = np.searchsorted(self.columns["time"], self.samples["time"])
+            worst = max(worst, float(np.abs(balance[at] + gap).max()))
+        return worst / self.energy_scale
+
+    def _books_state(self) -> dict[str, Any]:
+        return {
+            "books.samples": self._sample_table,
+            "books.energies": np.array(self.energy_names, dtype=str),
+            "books.works": np.array(self.work_names, dtype=str),
+            "books.momentum": np.asarray(self._momentum, dtype=float),
+        }
+
+    def _restore_books(self, state: dict[str, Any]) -> None:
+        self._samples = np.asarray(state["books.samples"]).tolist()
+        self.energy_names = tuple(str(name) for name in np.asarray(state["books.energies"]))
+        self.work_names = tuple(str(name) for name in np.asarray(state["books.works"]))
+        self._momentum = np.array(state["books.momentum"], dtype=float)

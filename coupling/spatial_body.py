@@ -1,0 +1,280 @@
+"""A platform with six degrees of freedom and up to three flywheels as a body that a footing pushes.
+
+World axes, z up from the undisturbed surface; the origin is the centre of mass. Momentum P and angular momentum L about
+it (platform and wheels) are what a step changes, so flight keeps both to round-off; I omega = L - sum h_i a_i, as in
+`rigid.spatial_motion`. A macro step of length H, s the footing's lag (0 for a law, its own step for a bed):
+
+    u, w  of  P + (H - s) / 2 (W + F_guess),  L + (H - s) / 2 T_guess,  turned half way     held during the step
+    r' = r + H u,   q' = exp(H w) q
+    P' = P + H (W + F),   L' = L + H T,   h_i' = h_i - H tau_i
+
+P and L belong to a time s / 2 later than r and q, as `coupling.planar_body` has it. Under a Coulomb bound the tips that
+stick share what holds them in proportion to their loads, f_k = N_k (c + b z x (rho_k - mean rho)), so that at the
+step's end their mean slip, and turning about the vertical, are zero; one beyond mu_s N_k slides with mu_d N_k until its
+slip turns back (`coupling.spatial_friction`). Events of friction are found to the step: of first order in H.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rigid.quaternions import to_matrix
+from rigid.spatial import SpatialTrial
+
+from .footing import FootReaction
+from .planar_body import HAND_TIME
+from .poses import Pose, Twist, Vector, Wrench, moved
+from .spatial_friction import SpatialFriction
+
+__all__ = ["SpatialBody"]
+
+_ROUNDS = 20
+"""Of the spin of a step's middle, which turns the axes that it is made from: each leaves H |w| of the error."""
+
+
+class SpatialBody:
+    """The platform of `trial` at `position` [m] with the turn `quaternion`; of the trial, the ground is not used.
+
+    Parameters
+    ----------
+    trial : rigid.SpatialTrial; torques act as it says, from t = 0, while anything touches (`torque_in_flight`: always).
+    position : of the centre of mass [m], z from the undisturbed surface.
+    quaternion : unit, scalar first, body to world.
+    velocity, angular_velocity : [m/s], [rad/s], world axes.
+
+    Raises ValueError, naming the key, for what is not finite or no unit quaternion.
+    """
+
+    def __init__(
+        self,
+        trial: SpatialTrial,
+        *,
+        position: Sequence[float],
+        quaternion: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
+        velocity: Sequence[float] = (0.0, 0.0, 0.0),
+        angular_velocity: Sequence[float] = (0.0, 0.0, 0.0),
+    ) -> None:
+        given = {"position": position, "velocity": velocity, "angular_velocity": angular_velocity}
+        for key, value in given.items():
+            if np.shape(value) != (3,) or not np.isfinite(np.asarray(value, dtype=float)).all():
+                raise ValueError(f"{key} is {value}: it must be three finite numbers")
+        turn = np.asarray(quaternion, dtype=float)
+        if turn.shape != (4,) or not abs(float(np.linalg.norm(turn)) - 1.0) < 1e-6:
+            raise ValueError(f"quaternion is {quaternion}: it must be four numbers of length 1")
+        self.trial = trial
+        platform = trial.platform
+        self.place = np.array(position, dtype=float)
+        """Of the centre of mass [m], shape (3,)."""
+        self.turn = turn / float(np.linalg.norm(turn))
+        """Unit quaternion, shape (4,)."""
+        self.axes = np.zeros((3, 3))
+        for k, wheel in enumerate(platform.wheels):
+            self.axes[k] = wheel.axis
+        self.wheels = np.array([history.spin if history is not None else 0.0 for history in trial.histories])
+        """Angular momentum of each wheel along its axis [N m s], shape (3,)."""
+        self.time = 0.0
+        self.torque_work = 0.0
+        """Work of the torques since it was let go [J]."""
+        self.touching = False
+        """Whether anything touched in the last step."""
+        self.sliding: dict[int, Vector] = {}
+        """Tip under a Coulomb bound that slides -> the unit vector of its slip, shape (2,)."""
+        self.sticking: frozenset[int] = frozenset()
+        """Those that stick."""
+        self._let_go()
+        self.momentum = self._masses * np.asarray(velocity, dtype=float)
+        """(m v_x, m v_y, (m + m_b) v_z) [N s], shape (3,)."""
+        self.angular_momentum = self._spin_to_momentum(np.asarray(angular_velocity, dtype=float))
+        """Of platform and wheels about the centre of mass [N m s], shape (3,)."""
+
+    def _let_go(self) -> None:
+        platform = self.trial.platform
+        self._masses = np.array([1.0, 1.0, 1.0]) * platform.mass + (0.0, 0.0, self.trial.counterweight)
+        self._inertia = np.array(platform.inertia)
+        self._drag = np.zeros(2)
+        self.held_by_hand = False
+
+    def take_in_hand(self, lowering_speed: float) -> None:
+        """From here on a hand lowers it at `lowering_speed` [m/s], as `PlanarBody.take_in_hand` says. Torques wait."""
+        weight, reach = float(np.linalg.norm(self.trial.weight)), self.trial.platform.reach
+        drag = weight / lowering_speed
+        velocity, spin = self.twist.velocity, self.twist.spin
+        self._masses = HAND_TIME * drag * np.ones(3)
+        self._inertia = HAND_TIME * drag * reach**2 * np.eye(3)
+        self._drag = np.array([drag, drag * reach**2])
+        self.held_by_hand = True
+        self.momentum, self.angular_momentum = self._masses * velocity, self._spin_to_momentum(spin)
+
+    def let_go(self) -> None:
+        """The hand opens: at rest from here, its time is 0 and the torques begin."""
+        self._let_go()
+        self.momentum, self.angular_momentum = np.zeros(3), self._spin_to_momentum(np.zeros(3))
+        self._force, self._moment = np.zeros(3), np.zeros(3)
+        self.time = self.torque_work = 0.0
+
+    def start(self, lag: float) -> None:
+        """Free of contact, its velocity given for the time of its pose: the momentum is brought to its own time."""
+        self._lag, self._force = lag, self.trial.weight.copy()
+        self.momentum = self.momentum + 0.5 * lag * self._force
+
+    # What a footing sees -------------------------------------------------------------------------------------------
+
+    @property
+    def pose(self) -> Pose:
+        """Where it is."""
+        return Pose(self.place, self.turn)
+
+    def predict(self, dt: float, guess: Wrench, lag: float) -> Twist:
+        """The twist to hold over the next `dt` [s], under the guess at the ground's wrench."""
+        if lag > dt * (1 + 1e-9):
+            raise ValueError(f"dt = {dt} s is shorter than the footing's own step of {lag} s")
+        self._lag, half = lag, 0.5 * max(dt - lag, 0.0)
+        self._torques = self._mean_torques(dt)
+        drag = self._drag
+        momentum = (self.momentum + half * (self.trial.weight + guess.force)) / (1 + half * drag[0] / self._masses)
+        about = self.angular_momentum + half * guess.torque
+        wheels = self.wheels - half * self._torques
+        spin = self._spin_of(about, wheels, self.turn)
+        for _ in range(_ROUNDS):
+            middle = moved(self.pose, Twist(np.zeros(3), spin), 0.5 * dt).turn
+            found = self._spin_of(about, wheels, middle) / (1 + half * drag[1] / self._inertia[0, 0])
+            done = bool(np.abs(found - spin).max() <= 4e-16 * np.abs(found).max())
+            spin = found
+            if done:
+                break
+        return Twist(momentum / self._masses, spin)
+
+    def resolve(self, dt: float, twist: Twist, reaction: FootReaction) -> Wrench:
+        """The whole wrench of the ground: `reaction` with the friction that its Coulomb bounds leave open."""
+        bounded = {tip: contact for tip, contact in reaction.contacts.items() if contact.tangential_force is None}
+        self._next_sliding, self._next_sticking = dict[int, Vector](), frozenset[int]()
+        self._next_touching = bool(reaction.contacts)
+        if not bounded:
+            return reaction.wrench
+        friction = SpatialFriction(self, dt, twist, reaction.wrench, bounded)
+        force, torque = friction.solve()
+        self._next_sliding, self._next_sticking = friction.sliding, frozenset(friction.sticking)
+        return Wrench(reaction.wrench.force + force, reaction.wrench.torque + torque)
+
+    def advance(self, dt: float, twist: Twist, wrench: Wrench) -> None:
+        """Take the step: along `twist`, with the impulse of `wrench`."""
+        middle = to_matrix(moved(self.pose, twist, 0.5 * dt).turn)
+        self.torque_work += dt * float(self._torques @ (self.axes @ (middle.T @ twist.spin)))
+        end = moved(self.pose, twist, dt)
+        self.place, self.turn = end.position, end.turn
+        self._force, self._moment = self.trial.weight + wrench.force, wrench.torque
+        slowed = 1 + dt * self._drag / np.array([self._masses[0], self._inertia[0, 0]])
+        self.momentum = (self.momentum + dt * self._force) / slowed[0]
+        if self.held_by_hand:  # the wheels' share is not slowed
+            own = self.angular_momentum - self._wheels_at(self.wheels, self.turn)
+            self.angular_momentum = self._wheels_at(self.wheels, self.turn) + (own + dt * self._moment) / slowed[1]
+        else:
+            self.angular_momentum = self.angular_momentum + dt * self._moment
+        self.wheels = self.wheels - dt * self._torques
+        self.touching, self.sliding, self.sticking = self._next_touching, self._next_sliding, self._next_sticking
+        self.time += dt
+
+    # What it has ---------------------------------------------------------------------------------------------------
+
+    @property
+    def twist(self) -> Twist:
+        """How it moves at the time of its momentum, half a lag after the pose."""
+        turn = self.turn
+        if self._lag:
+            spin = self._spin_of(self.angular_momentum, self.wheels, turn)
+            turn = moved(self.pose, Twist(np.zeros(3), spin), 0.5 * self._lag).turn
+        return Twist(self.momentum / self._masses, self._spin_of(self.angular_momentum, self.wheels, turn))
+
+    def twist_now(self, lag: float) -> Twist:
+        """How it moves at the time of the pose."""
+        momentum = self.momentum - 0.5 * lag * self._force
+        about = self.angular_momentum - 0.5 * lag * self._moment
+        return Twist(momentum / self._masses, self._spin_of(about, self.wheels + 0.5 * lag * self._torques, self.turn))
+
+    def kinetic_energy(self, lag: float) -> float:
+        """Of platform and counterweight [J], without the wheels' own spin."""
+        now = self.twist_now(lag)
+        body = to_matrix(self.turn).T @ now.spin
+        return 0.5 * float(self._masses @ now.velocity**2 + body @ self._inertia @ body)
+
+    @property
+    def potential_energy(self) -> float:
+        """- W . r [J]."""
+        return -float(self.trial.weight @ self.place)
+
+    @property
+    def wheel_speed(self) -> Vector:
+        """Absolute, of each wheel along its axis [rad/s], shape (3,); 0 where there is none."""
+        inertias = [wheel.inertia for wheel in self.trial.platform.wheels] + [math.inf] * 3
+        return self.wheels / np.array(inertias[:3])
+
+    def state(self) -> dict[str, Any]:
+        """All that its next steps depend on."""
+        slides = sorted(self.sliding)
+        return {
+            "numbers": np.concatenate(
+                [
+                    self.place, self.turn, self.momentum, self.angular_momentum, self.wheels, self._force, self._moment,
+                    self._torques, self._masses, self._drag,
+                    [self.time, self.torque_work, self._lag, self.touching, self.held_by_hand],
+                ]
+            ),
+            "inertia": self._inertia.copy(),
+            "sliding": np.array([[tip, *self.sliding[tip]] for tip in slides], dtype=float).reshape(-1, 3),
+            "sticking": np.array(sorted(self.sticking), dtype=np.int64),
+        }  # fmt: skip
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go back to what `state` gave."""
+        numbers = np.asarray(state["numbers"], dtype=float)
+        ends = np.cumsum([3, 4, 3, 3, 3, 3, 3, 3, 3, 2])
+        parts = [part.copy() for part in np.split(numbers, ends)]
+        self.place, self.turn, self.momentum, self.angular_momentum, self.wheels = parts[:5]
+        self._force, self._moment, self._torques, self._masses, self._drag = parts[5:10]
+        self.time, self.torque_work, self._lag = (float(number) for number in parts[10][:3])
+        self.touching, self.held_by_hand = bool(parts[10][3]), bool(parts[10][4])
+        self._inertia = np.array(state["inertia"], dtype=float)
+        rows = np.asarray(state["sliding"], dtype=float).reshape(-1, 3)
+        self.sliding = {int(row[0]): row[1:].copy() for row in rows}
+        self.sticking = frozenset(int(tip) for tip in np.asarray(state["sticking"]))
+
+    _lag = 0.0
+    _force: Vector = np.zeros(3)
+    _moment: Vector = np.zeros(3)
+    _torques: Vector = np.zeros(3)
+    _next_touching = False
+    _next_sliding: dict[int, Vector]
+    _next_sticking: frozenset[int]
+
+    def _wheels_at(self, wheels: Vector, turn: Vector) -> Vector:
+        """Angular momentum of the wheels in world axes with the platform turned so."""
+        return to_matrix(turn) @ (self.axes.T @ wheels)
+
+    def _spin_of(self, about: Vector, wheels: Vector, turn: Vector) -> Vector:
+        matrix = to_matrix(turn)
+        return np.asarray(matrix @ np.linalg.solve(self._inertia, matrix.T @ about - self.axes.T @ wheels))
+
+    def _spin_to_momentum(self, spin: Vector) -> Vector:
+        matrix = to_matrix(self.turn)
+        return np.asarray(matrix @ (self._inertia @ (matrix.T @ spin) + self.axes.T @ self.wheels))
+
+    def _mean_torques(self, dt: float) -> Vector:
+        """Mean torque of each wheel on the platform over the next step [N m]; cut at a wheel's end to what is left."""
+        torques = np.zeros(3)
+        if self.held_by_hand or not (self.touching or self.trial.torque_in_flight):
+            return torques
+        for k, history in enumerate(self.trial.histories):
+            if history is None:
+                continue
+            start, impulse = self.time, 0.0
+            for until in [*(t for t in history.times if self.time < t < self.time + dt), self.time + dt]:
+                impulse += history.demanded(0.5 * (start + until)) * (until - start)
+                start = until
+            low, high = (speed * history.wheel.inertia for speed in history.limits())
+            impulse = min(max(impulse, min(self.wheels[k] - high, 0.0)), max(self.wheels[k] - low, 0.0))
+            torques[k] = impulse / dt
+        return torques

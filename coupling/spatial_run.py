@@ -1,0 +1,231 @@
+"""A platform in space on any footing: set down or let fall, driven by its wheels, followed with open books.
+
+A stepper as `coupling.CoupledTumble`, whose platform is planar: `advance` makes one macro step, `state` and `restore`
+work between any two, every macro step leaves one row.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from rigid.quaternions import to_matrix
+from rigid.spatial import SpatialTrial
+
+from .bed_footing import BedFooting
+from .books import Books
+from .footing import Footing, FootReaction, LawFooting
+from .master import Master
+from .poses import Twist, Vector, Wrench
+from .spatial_body import SpatialBody
+from .tumbling import AT_REST, LONGEST_PLACING, REST_TIME
+
+__all__ = ["SpatialRun"]
+
+COLUMNS = (
+    "time", "x", "y", "z", "q0", "q1", "q2", "q3", "vx", "vy", "vz", "wx", "wy", "wz", "wheel_x", "wheel_y", "wheel_z",
+    "kinetic_energy", "potential_energy", "torque_work", "given", "taken", "fx", "fy", "fz", "touching", "sinkage",
+)  # fmt: skip
+"""Of a row: centre of mass [m], quaternion, velocity [m/s] and spin [rad/s] in world axes, absolute speeds of the
+wheels [rad/s], energies and works [J] as the planar rows have them, the footing's force [N], how many members touch,
+the deepest spike's depth [m]."""
+
+
+class SpatialRun(Books):
+    """The platform of `trial` on `footing`, followed for `duration` [s] from where its torques begin.
+
+    Parameters
+    ----------
+    position : of the centre of mass at the start [m], z from the undisturbed surface; None: level above (0, 0), its
+        lowest tips at the surface, on a bed lifted until it is clear of the grains.
+    quaternion, velocity, angular_velocity : as `SpatialBody` has them; a platform in a hand starts at rest.
+    lowering_speed : of a hand that sets it down before time begins [m/s]; None: no hand.
+    substeps, extrapolation, iterations : as `Master` has them.
+    energy_interval : between measurements of what the footing holds [s].
+
+    Raises ValueError for a start in overlap with grains, and for what `Master` and `SpatialBody` refuse.
+    """
+
+    def __init__(
+        self,
+        trial: SpatialTrial,
+        footing: Footing,
+        *,
+        duration: float,
+        position: Sequence[float] | None = None,
+        quaternion: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
+        velocity: Sequence[float] = (0.0, 0.0, 0.0),
+        angular_velocity: Sequence[float] = (0.0, 0.0, 0.0),
+        lowering_speed: float | None = None,
+        substeps: int = 10,
+        extrapolation: int = 0,
+        iterations: int = 1,
+        energy_interval: float = 0.02,
+    ) -> None:
+        for key, value in {"duration": duration, "energy_interval": energy_interval}.items():
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"{key} is {value}: it must be above 0 (in s)")
+        if lowering_speed is not None:
+            if not (math.isfinite(lowering_speed) and lowering_speed > 0):
+                raise ValueError(f"lowering_speed is {lowering_speed}: it must be above 0 (in m/s)")
+            if np.any(velocity) or np.any(angular_velocity):
+                raise ValueError("lowering_speed is given with a velocity: a platform in a hand starts at rest")
+            if not trial.weight[2] < 0:
+                raise ValueError(f"gravity = {trial.gravity} does not pull onto the ground: nothing is set down there")
+        self.trial, self.footing, self.duration = trial, footing, float(duration)
+        tips = trial.platform.tips - trial.platform.centre_of_mass
+        lowest = float((tips @ to_matrix(quaternion)[2]).min())
+        self.body = SpatialBody(
+            trial, position=(0.0, 0.0, -lowest) if position is None else position, quaternion=quaternion,
+            velocity=velocity, angular_velocity=angular_velocity,
+        )  # fmt: skip
+        if isinstance(footing, BedFooting):
+            if position is None:
+                self.body.place[2] += footing.clear_height(self.body.pose)
+            footing.check_start(self.body.pose)
+        elif isinstance(footing, LawFooting):
+            footing.place(self.body.pose)
+        self.master = Master(
+            self.body, footing, substeps=substeps, extrapolation=extrapolation, iterations=iterations,
+            first_guess=Wrench.none(),
+        )  # fmt: skip
+        self._every = max(1, round(energy_interval / self.master.macro_step))
+        self.lowering_speed = lowering_speed
+        self.placed = lowering_speed is None
+        """Whether the hand has let go."""
+        self.placing_steps = 0
+        """Macro steps that the hand took."""
+        self._settling: list[Vector] = []
+        self._rows: list[list[float]] = []
+        self._frames = 0
+        self._no_samples()
+        if lowering_speed is not None:
+            self.body.take_in_hand(lowering_speed)
+        else:
+            self.body.start(footing.lag)
+            self._begin()
+
+    # How far -------------------------------------------------------------------------------------------------------
+
+    @property
+    def done(self) -> bool:
+        """Whether it has come to its end."""
+        return self.placed and self.body.time >= self.duration - 0.5 * self.master.macro_step
+
+    @property
+    def time(self) -> float:
+        """Now [s]; before 0 while the hand holds it: how long it has been held, negative."""
+        return self.body.time if self.placed else -self.body.time
+
+    # Stepping ------------------------------------------------------------------------------------------------------
+
+    def advance(self) -> None:
+        """One macro step; nothing once it is done. Raises RuntimeError where it does not come to rest in the hand."""
+        if self.done:
+            return
+        reaction = self.master.step()
+        if not self.placed:
+            self._lower(reaction)
+            return
+        self._keep(reaction)
+        if (self.master.count - self.placing_steps) % self._every == 0 or self.done:
+            self._measure()
+
+    def run(
+        self,
+        *,
+        on_step: Callable[[SpatialRun], None] | None = None,
+        on_frame: Callable[[SpatialRun], None] | None = None,
+        frame_interval: float | None = None,
+    ) -> dict[str, Vector]:
+        """Go on to the end; `columns`. `on_frame` is called every `frame_interval` [s], and at the end."""
+        while True:
+            if on_frame and frame_interval and self.placed:
+                due = self.body.time >= self._frames * frame_interval - 0.5 * self.master.macro_step
+                self._frames += due
+                if due or self.done:
+                    on_frame(self)
+            if self.done:
+                return self.columns
+            self.advance()
+            if on_step:
+                on_step(self)
+
+    def _lower(self, reaction: FootReaction) -> None:
+        self.placing_steps = self.master.count
+        body, wrench, reach = self.body, self.master.wrench, self.trial.platform.reach
+        twist = body.twist
+        lack = [wrench.force + self.trial.weight, wrench.torque / reach, twist.velocity, twist.spin * reach]
+        count = max(2, round(REST_TIME / self.master.macro_step))
+        self._settling = [*self._settling, np.concatenate(lack)][-count:]
+        assert self.lowering_speed is not None
+        weight = float(np.linalg.norm(self.trial.weight))
+        if len(self._settling) == count and reaction.contacts:
+            mean = np.abs(np.mean(self._settling, axis=0))
+            if mean[:6].max() <= AT_REST * weight and mean[6:].max() <= AT_REST * self.lowering_speed:
+                body.let_go()
+                self.placed = True
+                self._begin()
+                return
+        if body.time > LONGEST_PLACING:
+            raise RuntimeError(
+                f"the platform did not come to rest within {LONGEST_PLACING:g} s of being set down: the ground carried "
+                f"{wrench.force[2]:.3g} of {weight:.3g} N at the end"
+            )
+
+    def _begin(self) -> None:
+        self._open_books(self.body.momentum)
+        self._keep(self.master.last)
+        self._measure()
+
+    def _keep(self, reaction: FootReaction | None) -> None:
+        """One row, of the time of the pose."""
+        body, lag = self.body, self.footing.lag
+        twist: Twist = body.twist_now(lag)
+        touching = len(reaction.contacts) if reaction is not None else 0
+        deepest = max(reaction.sinkage.values(), default=0.0) if reaction is not None else 0.0
+        self._rows.append(
+            [
+                body.time, *body.place, *body.turn, *twist.velocity, *twist.spin, *body.wheel_speed,
+                body.kinetic_energy(lag), body.potential_energy, body.torque_work, *self.master.exchanged(),
+                *self.master.wrench.force, touching, deepest,
+            ]
+        )  # fmt: skip
+
+    def _measure(self) -> None:
+        self._sample(self.body.time, self.body.momentum - self.trial.weight * self.body.time)
+
+    # What came of it -----------------------------------------------------------------------------------------------
+
+    @property
+    def columns(self) -> dict[str, Vector]:
+        """The rows so far, by COLUMNS."""
+        return dict(zip(COLUMNS, np.array(self._rows, dtype=float).reshape(-1, len(COLUMNS)).T, strict=True))
+
+    @property
+    def energy_scale(self) -> float:
+        """max(|work of the torques|, W reach, the kinetic energy at the start) [J], which residuals are relative to."""
+        rows = self.columns
+        weight = float(np.linalg.norm(self.trial.weight)) * self.trial.platform.reach
+        return max(float(np.abs(rows["torque_work"]).max()), weight, float(rows["kinetic_energy"][0]), 1e-300)
+
+    def state(self) -> dict[str, Any]:
+        """All that the rest of the run depends on: a flat dict of numpy arrays."""
+        own: dict[str, Any] = {
+            "run.counts": np.array([self.placed, self.placing_steps, self._frames], dtype=np.int64),
+            "run.settling": np.array(self._settling, dtype=float).reshape(-1, 12),
+            "run.rows": np.array(self._rows, dtype=float).reshape(-1, len(COLUMNS)),
+        }
+        return own | self._books_state() | self.master.state()
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go back to what `state` gave."""
+        placed, self.placing_steps, self._frames = (int(number) for number in state["run.counts"])
+        self.placed = bool(placed)
+        self._settling = [row.copy() for row in np.asarray(state["run.settling"], dtype=float)]
+        self._rows = np.asarray(state["run.rows"]).tolist()
+        self._restore_books(state)
+        self.master.restore(state)

@@ -1,0 +1,106 @@
+"""A bed that goes through stages before an experiment, from the cache where it is there."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from dem import Bed, Graded
+from dem.bedfile import load_prepared, save_prepared
+from dem.laboratory import prepare_as
+from dem.materials import Material
+from dem.prepare import Specification, cache_folder
+from dem.recipe import check_stages, parse_stage
+from dem.sizes import sizes_of
+
+from .progress import Progress
+
+__all__ = ["check_bed_stages", "staged_bed"]
+
+
+def check_bed_stages(
+    words: Sequence[str], material: Material, *, size: tuple[float, float, float], grain: float, spread: float
+) -> None:
+    """Raise ValueError, naming ``bed_stages``, for stages that cannot be, or leave no level bed to stand on."""
+    try:
+        plan = [parse_stage(stage) for stage in words]
+        sizes = sizes_of(grain, spread)
+        check_stages(plan, size=size, grain=grain, sizes=sizes, cohesive=material.cohesion != "none")
+    except ValueError as error:
+        raise ValueError(f"bed_stages: {error}") from error
+    spoilt = [str(stage) for stage in plan if stage.name in ("cut", "tilt")]
+    if spoilt:
+        raise ValueError(f"bed_stages has {spoilt[0]!r}: a platform needs a level bed; leave it out")
+    if plan[-1].name != "level":
+        raise ValueError(f"bed_stages ends with {str(plan[-1])!r}: 'level' last gives the bed the depth of bed_size")
+
+
+class _OneStage:
+    """Shows the stages of a preparation as one of the experiment; stops it where it can be gone on with."""
+
+    def __init__(self, progress: Progress, name: str, count: int, asked_to_stop: Callable[[], bool]) -> None:
+        self.progress, self.count, self.asked_to_stop, self.index = progress, count, asked_to_stop, -1
+        progress.stage(name, total=1.0)
+
+    def stage(self, name: str, total: float | None = None) -> None:
+        self.index += total is not None
+
+    def update(self, done: float) -> None:
+        self.progress.update(min(1.0, (max(self.index, 0) + min(max(done, 0.0), 1.0)) / self.count))
+        if self.asked_to_stop():
+            raise KeyboardInterrupt
+
+
+def staged_bed(
+    material: Material,
+    stages: Sequence[str],
+    *,
+    size: tuple[float, float, float],
+    grain: float | Graded,
+    spread: float | None,
+    gravity: float,
+    seed: int,
+    young: float,
+    max_overlap: float,
+    threads: int | None,
+    cache: bool,
+    progress: Progress,
+    asked_to_stop: Callable[[], bool],
+) -> Bed:
+    """The bed that `hedgebed bed make` with these stages would make; kept under ``HEDGEBED_CACHE``, as rained ones are.
+
+    Raises RuntimeError where it cannot be made as asked for, and what ``dem.laboratory.prepare_as`` does.
+    """
+    options: dict[str, Any] = {
+        "size": size, "grain": grain, "spread": spread, "gravity": gravity, "seed": seed, "young": young,
+        "max_overlap": max_overlap,
+    }  # fmt: skip
+    machine: dict[str, Any] = {"arch": "cpu", "threads": threads, "precision": "float64"}
+    wanted = Specification.of(material, **options, **machine, time_step=None, floor=None)
+    plan = [str(parse_stage(stage)) for stage in stages]
+    key = hashlib.sha256(json.dumps(wanted.recipe() | {"stages": plan}, sort_keys=True).encode()).hexdigest()[:24]
+    name = f"{material.name}-{key}.npz"
+    path = cache_folder() / "beds" / name
+    if cache and path.exists():
+        bed = load_prepared(path, threads=threads).bed
+        assert bed is not None
+        return bed
+    keep = cache_folder() / "unfinished" / name if cache else None
+    if keep is not None:
+        keep.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        prepared = prepare_as(
+            material, stages=plan, **options, **machine, keep=keep,
+            progress=_OneStage(progress, "bed", len(plan), asked_to_stop),
+        )  # fmt: skip
+    except ValueError as error:  # found while it was prepared, as a packing that cannot be reached
+        raise RuntimeError(str(error)) from error
+    if cache:
+        save_prepared(prepared, path)
+        assert keep is not None
+        for kept in (keep, keep.with_suffix(".json")):
+            kept.unlink(missing_ok=True)
+    assert prepared.bed is not None
+    return prepared.bed
