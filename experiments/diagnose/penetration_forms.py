@@ -180,10 +180,6 @@ def _add_shaft(add: _Add, retreats: bool) -> None:
         add(effect, "viscous", ("shaft_viscous", "viscous", 0.3, 0.0, 10.0), starts=((0.05,),))
         add(effect, "falling with speed", ("shaft_slow", "perimeter", 0.3, 0.0, 10.0),
             ("shaft_speed", "speed", -5.0, 1.0), starts=((0.05, -1.0), (0.05, -3.0)))  # fmt: skip
-        # From one direction to the other over a range of speeds, as where grains creep; the others change sign at once.
-        add(effect, "turning slowly", ("shaft_broad", "perimeter", 0.3, 0.0, 10.0),
-            ("shaft_turn", "speed", -8.0, -1.5), ("shaft_growth", "plain", 0.0, 2.0),
-            starts=((0.05, -3.0, 0.7), (0.05, -5.0, 0.7)))  # fmt: skip
 
 
 def physical(slot: Slot, value: float, scales: Scales, *, stiffness: float, size: float) -> float:

@@ -8,8 +8,7 @@ depth typical of the campaign, so that amplitudes of one effect's forms compare.
 
 A drop is integrated by the classical Runge-Kutta method, each step cut where the spike turns, leaves or comes back
 (found by halving), since friction and damper jump there. At a turning point the forces of both directions are tried:
-where neither moves the spike, it rests for good. `shaft_turn`, the speed over which friction changes its direction, is
-that of driven spikes: in a drop, which is slow for an instant only, it changes at once.
+where neither moves the spike, it rests for good.
 """
 
 # Taichi reads the annotations and the source of kernels: no `from __future__ import annotations` here.
@@ -38,7 +37,6 @@ SLOTS = (
     "crater_share", "crater_bend", "unload_stiffness",
     "drag", "drag_onset", "drag_reach", "drag_deep", "drag_both", "drag_tip",
     "shaft", "shaft_deep", "shaft_square", "shaft_viscous", "shaft_slow", "shaft_speed",
-    "shaft_broad", "shaft_growth", "shaft_turn",
     "pull", "pull_reach", "pull_deep", "pull_growth", "pull_ever", "pull_short", "pull_viscous",
     "pull_sharpness", "shift_depth", "shift_speed",
 )  # fmt: skip
@@ -48,8 +46,7 @@ PHASES = ("free", "in", "rest", "out")
 
 _SLOT = {name: place for place, name in enumerate(SLOTS)}
 _NEVER_ZERO = {"reference": 0.01, "speed_scale": 1e-4, "radius_depth": 1e-4, "layer_depth": 0.01, "layer_width": 1e-3,
-               "hardening_reach": 1e-3, "drag_reach": 1e-3, "pull_reach": 1e-3, "shaft_speed": 1e-2,
-               "shaft_turn": 1e-2}  # fmt: skip
+               "hardening_reach": 1e-3, "drag_reach": 1e-3, "pull_reach": 1e-3, "shaft_speed": 1e-2}  # fmt: skip
 _STEP = 5e-4
 """Longest step of a drop [s]: sqrt(m / K) of a spike on sand is tens of ms, so the error is below 1e-8 of the depth;
 `fall` takes shorter ones where a lane is stiffer."""
@@ -170,7 +167,6 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
     CRATER, UNLOAD = S["crater_share"], S["unload_stiffness"]
     DRAG, DRAG_DEEP, DRAG_BOTH, DRAG_TIP = S["drag"], S["drag_deep"], S["drag_both"], S["drag_tip"]
     DRAG_ONSET, DRAG_REACH = S["drag_onset"], S["drag_reach"]
-    SHAFT_BROAD, SHAFT_GROWTH, SHAFT_TURN = S["shaft_broad"], S["shaft_growth"], S["shaft_turn"]
     SHAFT, SHAFT_DEEP, SHAFT_SQUARE, SHAFT_VISCOUS, SHAFT_SLOW, SHAFT_SPEED = (
         S["shaft"], S["shaft_deep"], S["shaft_square"], S["shaft_viscous"], S["shaft_slow"], S["shaft_speed"],
     )  # fmt: skip
@@ -225,9 +221,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
         return grown if depth > 0.0 else 0.0
 
     @ti.func
-    def force(
-        z: ti.f64, v: ti.f64, way: ti.f64, top: ti.f64, deepest: ti.f64, n: ti.template(), k: ti.i32, driven: ti.i32
-    ) -> ti.f64:  # fmt: skip
+    def force(z: ti.f64, v: ti.f64, way: ti.f64, top: ti.f64, deepest: ti.f64, n: ti.template(), k: ti.i32) -> ti.f64:
         total = 0.0
         if z > 0.0:
             most, ever = ti.max(top, z), ti.max(deepest, z)
@@ -257,11 +251,6 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
             total += (n[k, SHAFT] + n[k, SHAFT_DEEP] * x + n[k, SHAFT_SQUARE] * x * x) * way + n[k, SHAFT_VISCOUS] * v
             if n[k, SHAFT_SLOW] != 0.0:
                 total += n[k, SHAFT_SLOW] * ti.exp(-ti.abs(v) / n[k, SHAFT_SPEED]) * way
-            if n[k, SHAFT_BROAD] != 0.0:
-                turning = way
-                if driven == 1:
-                    turning = v / ti.sqrt(v * v + n[k, SHAFT_TURN] * n[k, SHAFT_TURN])
-                total += n[k, SHAFT_BROAD] * ti.pow(ti.max(x, 1e-12), n[k, SHAFT_GROWTH]) * turning
             if back > 0.0:
                 held = back / n[k, PULL_REACH]
                 grown = n[k, PULL]
@@ -289,7 +278,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
                     top = 0.0
                 top, deepest = ti.max(top, z), ti.max(deepest, z)
                 way = ti.tanh(v / numbers[k, SPEED_SCALE])
-                out[k, row - starts[path]] = force(z, v, way, top, deepest, numbers, k, 1)
+                out[k, row - starts[path]] = force(z, v, way, top, deepest, numbers, k)
 
     @ti.kernel
     def fall_all(numbers: Table, lane_path: Whole, starts: Whole, times: Line, speeds: Line, steps: Line, out: Cube):
@@ -320,7 +309,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
                         for stage in range(4):
                             a = g
                             if inside == 1:
-                                a = g - force(ti.max(zs, 1e-300), vs, way, top, deepest, numbers, k, 0) / m
+                                a = g - force(ti.max(zs, 1e-300), vs, way, top, deepest, numbers, k) / m
                             weight = dt / 6.0 if stage == 0 or stage == 3 else dt / 3.0
                             z1 += weight * vs
                             v1 += weight * a
@@ -354,7 +343,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
                                 down, up = 0.0, 0.0
                                 for side in range(2):
                                     tried = 1.0 - 2.0 * side
-                                    a = g - force(z, 0.0, tried, top, deepest, numbers, k, 0) / m
+                                    a = g - force(z, 0.0, tried, top, deepest, numbers, k) / m
                                     if side == 0:
                                         down = a
                                     else:
@@ -370,7 +359,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
                     else:
                         pushed = 0.0
                         if inside == 1 and resting == 0:
-                            pushed = force(z, v, way, top, deepest, numbers, k, 0)
+                            pushed = force(z, v, way, top, deepest, numbers, k)
                         out[k, at, 0] = z
                         out[k, at, 1] = v
                         out[k, at, 2] = 0.0 if resting == 1 else g - pushed / m
