@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from experiments.campaign import Campaign, PenetrationCampaign, Recording
 from experiments.campaign.tables import PenetrationTrial
 
 from .penetration_depth import SmoothDepth, smooth_depth
+from .penetration_drive import Holds
 from .problem import Array, Finding, TrialInfo
 from .replicates import parted
 from .stuck import stuck_rows
@@ -63,7 +65,8 @@ def prepare(campaign: Campaign) -> tuple[list[Prepared], list[Finding]]:
     """
     tables = campaign.tables
     assert isinstance(tables, PenetrationCampaign)
-    trials, findings = [], []
+    trials: list[Prepared] = []
+    findings: list[Finding] = []
     for table in tables.trial:
         recording = campaign.recording(table.id, "data")
         assert recording is not None
@@ -74,8 +77,28 @@ def prepare(campaign: Campaign) -> tuple[list[Prepared], list[Finding]]:
     if not trials:
         said = "; ".join(finding.what for finding in findings)
         raise ValueError(f"no trial of {tables.name!r} can be used: {said}")
+    trials = _alike(campaign, trials)
     infos = parted([trial.info for trial in trials], {trial.info.id: _path(trial) for trial in trials})
     return [replace(trial, info=info) for trial, info in zip(trials, infos, strict=True)], findings
+
+
+def _alike(campaign: Campaign, trials: list[Prepared]) -> list[Prepared]:
+    """Smoothed once more where the holds of a push are not those of most: one machine makes all of them."""
+    holds = Counter(trial.smooth.holds for trial in trials if trial.smooth is not None and trial.smooth.holds)
+    if not holds:
+        return trials
+    usual, count = holds.most_common(1)[0]
+    if count < 2:
+        return trials
+    found = []
+    for trial in trials:
+        if trial.smooth is not None and trial.smooth.holds and trial.smooth.holds != usual:
+            recording = campaign.recording(trial.info.id, "data")
+            assert recording is not None and isinstance(campaign.tables, PenetrationCampaign)
+            again, _ = _one(campaign.tables, trial.table, recording, alike=usual)
+            trial = again or trial
+        found.append(trial)
+    return found
 
 
 def _path(trial: Prepared) -> tuple[float, ...]:
@@ -104,7 +127,7 @@ def stds(tables: PenetrationCampaign, driven: bool) -> tuple[float, float]:
 
 
 def _one(
-    tables: PenetrationCampaign, table: PenetrationTrial, recording: Recording
+    tables: PenetrationCampaign, table: PenetrationTrial, recording: Recording, *, alike: Holds = ()
 ) -> tuple[Prepared | None, list[Finding]]:
     driven = table.mode == "driven"
     channel, key = ("force", "force_N") if driven else ("accel", "accel_m_s2")
@@ -175,7 +198,7 @@ def _one(
             say(f"the force is held: {int((~held).sum())} of {len(other)} readings repeat the one before; only fresh "
                 f"ones are used", where="force")  # fmt: skip
             other[~held] = np.nan
-        return _driven(tables, table, time, depth, other, std_depth, findings)
+        return _driven(tables, table, time, depth, other, std_depth, findings, alike)
     has_depth, has_other = np.isfinite(depth), np.isfinite(other)
     has_other &= np.abs(time) > 1e-9  # the force jumps at the touch: neither side is wrong
     if has_depth.sum() + has_other.sum() < _FEWEST:
@@ -187,17 +210,18 @@ def _one(
 
 def _driven(
     tables: PenetrationCampaign, table: PenetrationTrial, time: Array, depth: Array, other: Array, std: float,
-    findings: list[Finding],
+    findings: list[Finding], alike: Holds,
 ) -> tuple[Prepared | None, list[Finding]]:  # fmt: skip
     known = np.isfinite(depth)
     if known.sum() < _FEWEST or (known & np.isfinite(other)).sum() < _FEWEST:
         what = f"trial {table.id}: fewer than {_FEWEST} rows hold both depth and force: it is set aside"
         findings.append(Finding(trial=table.id, what=what, set_aside=True))
         return None, findings
-    smooth = smooth_depth(time[known], depth[known], std)
+    smooth = smooth_depth(time[known], depth[known], std, alike=alike)
     both = known & np.isfinite(other)
     rows = both[known]
-    smooth = SmoothDepth(smooth.depth[rows], smooth.speed[rows], smooth.depth_error[rows], smooth.speed_error[rows])
+    smooth = replace(smooth, depth=smooth.depth[rows], speed=smooth.speed[rows], depth_error=smooth.depth_error[rows],
+                     speed_error=smooth.speed_error[rows])  # fmt: skip
     speed = float(table.speed) if table.speed else float(np.percentile(np.abs(smooth.speed), 80))
     everything = np.ones(int(both.sum()), dtype=bool)
     info = _info(tables, table, speed)

@@ -1,8 +1,9 @@
 """The motion of a driven spike from its noisy depth column: smooth pieces and kinks, with the error that is left.
 
-The curve is a polynomial or a cubic spline with equal intervals, plus kinks (a drive that stops or turns), fitted by
-least squares; how many of each the column calls for is chosen by the Bayesian information criterion at the stated noise
-(Schwarz, Annals of Statistics 6 (1978), 461). Since the fit is linear, its error is a known linear map of the noise.
+The curve is a machine's motion (`penetration_drive`: levels of speed joined by ramps), or a polynomial or a cubic
+spline with equal intervals, plus kinks (a drive that stops or turns), fitted by least squares; which, and how many of
+each the column calls for, is chosen by the Bayesian information criterion at the stated noise (Schwarz, Annals of
+Statistics 6 (1978), 461). The fit is linear, or all but so, and its error a known linear map of the noise.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
+
+from .penetration_drive import Drive, Holds, find_drive
 
 __all__ = ["SmoothDepth", "smooth_depth"]
 
@@ -23,6 +26,14 @@ _GENTLE = 3  # intervals of a cubic spline that is always let free
 _ROUND = (0.008, 0.02, 0.032, 0.05)  # of the record, about a kink
 _KINKED_INTERVALS = 2  # finer splines need no kinks, and the search is dear
 _KINK_GRID = 160
+_DRIVEN = 24
+"""Rows from which on levels and ramps are looked for."""
+_FINER = (1, 3)
+"""Times as many intervals of bends, tried in turn."""
+_SHOWN = 3.0
+"""Nats by which finer bends must be likelier."""
+_BENDS = 8
+"""Intervals of the spline that lets levels and ramps be not quite such."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +48,8 @@ class SmoothDepth:
     """Factor of the depth's error: the error is this times standard normal numbers [m], shape [n, p]."""
     speed_error: Array
     """Of the slope's, the same numbers [m/s], shape [n, p]."""
+    holds: Holds = ()
+    """Which of its levels of speed are 0; () where it is no motion of levels."""
 
     @property
     def depth_std(self) -> Array:
@@ -49,8 +62,10 @@ class SmoothDepth:
         return np.sqrt((self.speed_error**2).sum(axis=1))
 
 
-def smooth_depth(time: Array, depth: Array, std: float) -> SmoothDepth:
+def smooth_depth(time: Array, depth: Array, std: float, *, alike: Holds = ()) -> SmoothDepth:
     """Smooth a depth column [m] at times [s], both of shape [n], with noise of standard deviation `std` [m].
+
+    `alike`: the holds of most of the machine's other pushes.
 
     Raises ValueError for fewer than two rows.
     """
@@ -59,32 +74,69 @@ def smooth_depth(time: Array, depth: Array, std: float) -> SmoothDepth:
     span = time[-1] - time[0]
     u = (time - time[0]) / (span if span > 0 else 1.0)
     noise = max(std, 1e-9 * max(float(np.ptp(depth)), 1e-9))
+    drive = find_drive(u, depth / noise, alike=alike) if len(u) >= _DRIVEN else None
+    curve, change, ways, hidden, intervals = _curve(u, depth / noise, drive)
+    rest = depth - noise * curve
+    chosen: tuple[float, Array, Array, int] | None = None
+    for finer in _FINER:  # bends over the whole: gentle ones unless the column shows others
+        basis, slopes, fixed = _joined(u, *ways, finer * intervals)
+        log, means, root = _shrunk(basis, fixed, rest, noise)
+        if chosen is None or log > chosen[0] + _SHOWN:
+            chosen = (log, noise * curve + basis @ means, noise * change + slopes @ means, finer * intervals)
+            errors = basis @ root, slopes @ root
+    assert chosen is not None
+    _, best, speed, intervals = chosen
+    if hidden is not ways:
+        basis, slopes, fixed = _joined(u, *hidden, intervals)
+        root = _shrunk(basis, fixed, rest, noise)[2]
+        errors = basis @ root, slopes @ root
+    span = span if span > 0 else 1.0
+    holds = drive.resting if drive is not None and hidden is not ways else ()
+    return SmoothDepth(best, speed / span, errors[0], errors[1] / span, holds)
+
+
+_Columns = tuple[Array, Array]
+
+
+def _curve(u: Array, measured: Array, drive: Drive | None) -> tuple[Array, Array, _Columns, _Columns, int]:
+    """A curve, its slope, columns and their slopes by which it may be moved, those by which it may be off without the
+    noise showing it, and how many intervals of bends it may hide.
+
+    Depth is in standard deviations of the noise, time from 0 to 1.
+    """
+    n = len(u)
+    limit = n + 2 * np.sqrt(2 * n)  # down to the noise
+    good = drive is not None and drive.chi_square < limit
     best: tuple[float, Array, Array, list[float], int] | None = None
     enough = 0
     for intervals in (0, *_INTERVALS):
         basis, slopes = _basis(u, intervals)
-        if basis.shape[1] > max(2, len(u) // 3):
+        if basis.shape[1] > max(2, n // 3):
             break
-        kinks = _MOST_KINKS if intervals <= _KINKED_INTERVALS else 0
-        score, basis, slopes, places = _with_kinks(u, depth / noise, basis, slopes, kinks)
+        kinks = _MOST_KINKS if intervals <= _KINKED_INTERVALS and not good else 0
+        score, basis, slopes, places = _with_kinks(u, measured, basis, slopes, kinks)
         if best is None or score < best[0]:
             best = (score, basis, slopes, places, intervals)
-        if score - np.log(len(u)) * basis.shape[1] < len(u) + 2 * np.sqrt(2 * len(u)):  # down to the noise
+        if score - np.log(n) * basis.shape[1] < limit:
             enough += 1
             if enough == 3:
                 break
     assert best is not None
-    basis, slopes, fixed = _enlarged(u, *best[1:])
-    means, root = _shrunk(basis, fixed, depth, noise)
-    slopes = slopes / (span if span > 0 else 1.0)
-    return SmoothDepth(basis @ means, slopes @ means, basis @ root, slopes @ root)
+    if drive is None or best[0] < drive.criterion(n):
+        *columns, intervals = _enlarged(u, *best[1:])
+        ways = (columns[0], columns[1])
+        return np.zeros(n), np.zeros(n), ways, ways, intervals
+    linear = 1 + len(drive.levels) - sum(drive.resting)  # a ramp is moved by no more than its fit has found
+    depths, speeds = (columns[:, :linear] for columns in drive.changes(u))
+    return *drive.curve(u), (depths, speeds), drive.softened(u).changes(u), _BENDS
 
 
-def _shrunk(basis: Array, fixed: int, depth: Array, std: float) -> tuple[Array, Array]:
-    """Coefficients and a factor of their covariance, the columns after the first `fixed` ones held small by a prior.
+def _shrunk(basis: Array, fixed: int, depth: Array, std: float) -> tuple[float, Array, Array]:
+    """Evidence, coefficients and a factor of their covariance, all columns but the first `fixed` held small by a prior.
 
-    Each of these moves the curve by as much as a normal number of one common variance; the largest variance that the
-    column makes no less likely than 2 nats below its best is taken, so that what it cannot exclude stays in the error.
+    Each of these moves the curve by as much as a normal number of one common variance. The coefficients are means over
+    all variances, as likely as the column makes them; their error is that of the largest variance that is at most 2
+    nats less likely than the best, so that what the column cannot exclude stays in it.
     """
     size = np.maximum(np.abs(basis).max(axis=0), 1e-300)
     x = basis / size
@@ -100,8 +152,10 @@ def _shrunk(basis: Array, fixed: int, depth: Array, std: float) -> tuple[Array, 
         log = 0.5 * float(right @ means) - float(np.log(np.diag(root)).sum()) - float(extra.sum()) * np.log(scale)
         found.append((log, means, np.linalg.inv(root).T))
     best = max(log for log, _, _ in found)
-    _, means, root = next(entry for entry in reversed(found) if entry[0] >= best - 2.0)
-    return means / size, root / size[:, None]
+    weights = np.exp([log - best for log, _, _ in found])
+    means = np.average([means for _, means, _ in found], axis=0, weights=weights)
+    root = next(entry[2] for entry in reversed(found) if entry[0] >= best - 2.0)
+    return best, means / size, root / size[:, None]
 
 
 def _basis(u: Array, intervals: int) -> tuple[Array, Array]:
@@ -117,7 +171,7 @@ def _basis(u: Array, intervals: int) -> tuple[Array, Array]:
 def _enlarged(u: Array, basis: Array, slopes: Array, places: list[float], intervals: int) -> tuple[Array, Array, int]:
     """With what the noise may hide: rounder turns about each kink, and bends over the whole twice as fine.
 
-    Says also how many columns come before the bends.
+    Says also into how many intervals these bends go.
 
     The criterion leaves out what a depth sensor cannot see; a force sensor in a stiff bed can, and would take it for an
     effect. So it is let free, and its error, which `SmoothDepth` knows, is part of the likelihood.
@@ -130,8 +184,14 @@ def _enlarged(u: Array, basis: Array, slopes: Array, places: list[float], interv
                     after = np.maximum(u - at, 0.0)[:, None]
                     columns.append(after**2)
                     changes.append(2 * after)
-    turns = sum(column.shape[1] for column in columns)
-    gentle, steep = _basis(u, max(_GENTLE, 2 * intervals))
+    return np.hstack(columns), np.hstack(changes), max(_GENTLE, 2 * intervals)
+
+
+def _joined(u: Array, free: Array, slopes: Array, intervals: int) -> tuple[Array, Array, int]:
+    """`free` columns and a cubic spline's that they do not hold, their slopes, and how many are free."""
+    turns = free.shape[1]
+    columns, changes = [free], [slopes]
+    gentle, steep = _basis(u, intervals)
     if gentle.shape[1] <= len(u) // 8:
         columns.append(gentle)
         changes.append(steep)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from .problem import Form, Parameter
 
@@ -46,6 +46,8 @@ class Library:
     forms: tuple[Form, ...]
     slots: dict[str, dict[str, Slot]]
     """Form id -> parameter -> slot."""
+    shapes: dict[str, Form]
+    """Form id -> the same form with one more number, tried from where the plain one ends."""
 
 
 _Add = Callable[..., None]
@@ -98,7 +100,12 @@ def make_library(scales: Scales, *, retreats: bool, speeds_differ: bool) -> Libr
         _add_plastic(add)
         _add_adhesion(add)
     _add_shaft(add, retreats)
-    return Library(tuple(forms), slots)
+    (plain,) = [form for form in forms if form.id == "depth-hardening:quadratic"]
+    steeper = Parameter(name="depth-hardening.hardening_steeper", unit="1", value=0.0, std=0.5, scale=0.1, lowest=-0.8,
+                        highest=2.0, step=1e-3)  # fmt: skip
+    bent = replace(plain, name="with a power", parameters=(*plain.parameters, steeper), linear=False)
+    slots[bent.id] = {**slots[plain.id], steeper.name: Slot("hardening_steeper", "plain")}
+    return Library(tuple(forms), slots, {plain.id: bent})
 
 
 def _add_hardening(add: _Add) -> None:
@@ -109,6 +116,9 @@ def _add_hardening(add: _Add) -> None:
     add(effect, "exponential", ("hardening_exponential", "plain", 0.8, -8.0, 6.0), starts=((0.5,), (-0.5,)))
     add(effect, "early", ("hardening_early", "spring force", 0.5, 0.0, 20.0), ("hardening_reach", "depth", -4.0, 0.0),
         starts=((0.1, -2.5), (0.2, -1.0)))  # fmt: skip
+    # Towards a bound, a hyperbola (Kondner, J. Soil Mech. Found. Div. 89 (1963), 115) where the sharpness is 1.
+    add(effect, "levelling off", ("hardening_level", "plain", 0.8, 0.0, 20.0),
+        ("hardening_sharpness", "plain", 0.7, 5.0), starts=((0.3, 1.5), (1.0, 1.5)))  # fmt: skip
 
 
 def _add_layering(add: _Add) -> None:
@@ -170,6 +180,10 @@ def _add_shaft(add: _Add, retreats: bool) -> None:
         add(effect, "viscous", ("shaft_viscous", "viscous", 0.3, 0.0, 10.0), starts=((0.05,),))
         add(effect, "falling with speed", ("shaft_slow", "perimeter", 0.3, 0.0, 10.0),
             ("shaft_speed", "speed", -5.0, 1.0), starts=((0.05, -1.0), (0.05, -3.0)))  # fmt: skip
+        # From one direction to the other over a range of speeds, as where grains creep; the others change sign at once.
+        add(effect, "turning slowly", ("shaft_broad", "perimeter", 0.3, 0.0, 10.0),
+            ("shaft_turn", "speed", -8.0, -1.5), ("shaft_growth", "plain", 0.0, 2.0),
+            starts=((0.05, -3.0, 0.7), (0.05, -5.0, 0.7)))  # fmt: skip
 
 
 def physical(slot: Slot, value: float, scales: Scales, *, stiffness: float, size: float) -> float:

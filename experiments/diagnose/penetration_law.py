@@ -8,7 +8,8 @@ depth typical of the campaign, so that amplitudes of one effect's forms compare.
 
 A drop is integrated by the classical Runge-Kutta method, each step cut where the spike turns, leaves or comes back
 (found by halving), since friction and damper jump there. At a turning point the forces of both directions are tried:
-where neither moves the spike, it rests for good.
+where neither moves the spike, it rests for good. `shaft_turn`, the speed over which friction changes its direction, is
+that of driven spikes: in a drop, which is slow for an instant only, it changes at once.
 """
 
 # Taichi reads the annotations and the source of kernels: no `from __future__ import annotations` here.
@@ -31,11 +32,13 @@ __all__ = ["PHASES", "SLOTS", "fall", "push", "slot_table"]
 SLOTS = (
     "mass", "gravity", "stiffness", "damping", "reference", "speed_scale", "radius_depth",
     "hardening_power", "hardening_quadratic", "hardening_cubic", "hardening_exponential",
-    "hardening_early", "hardening_reach",
+    "hardening_early", "hardening_reach", "hardening_level", "hardening_sharpness",
+    "hardening_steeper",
     "layer_depth", "layer_width", "layer_slope", "layer_step", "layer_factor", "layer_bump",
     "crater_share", "crater_bend", "unload_stiffness",
     "drag", "drag_onset", "drag_reach", "drag_deep", "drag_both", "drag_tip",
     "shaft", "shaft_deep", "shaft_square", "shaft_viscous", "shaft_slow", "shaft_speed",
+    "shaft_broad", "shaft_growth", "shaft_turn",
     "pull", "pull_reach", "pull_deep", "pull_growth", "pull_ever", "pull_short", "pull_viscous",
     "pull_sharpness", "shift_depth", "shift_speed",
 )  # fmt: skip
@@ -45,7 +48,8 @@ PHASES = ("free", "in", "rest", "out")
 
 _SLOT = {name: place for place, name in enumerate(SLOTS)}
 _NEVER_ZERO = {"reference": 0.01, "speed_scale": 1e-4, "radius_depth": 1e-4, "layer_depth": 0.01, "layer_width": 1e-3,
-               "hardening_reach": 1e-3, "drag_reach": 1e-3, "pull_reach": 1e-3, "shaft_speed": 1e-2}  # fmt: skip
+               "hardening_reach": 1e-3, "drag_reach": 1e-3, "pull_reach": 1e-3, "shaft_speed": 1e-2,
+               "shaft_turn": 1e-2}  # fmt: skip
 _STEP = 5e-4
 """Longest step of a drop [s]: sqrt(m / K) of a spike on sand is tens of ms, so the error is below 1e-8 of the depth;
 `fall` takes shorter ones where a lane is stiffer."""
@@ -158,12 +162,15 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
     REFERENCE, SPEED_SCALE, RADIUS_DEPTH = S["reference"], S["speed_scale"], S["radius_depth"]
     POWER, QUADRATIC, CUBIC = S["hardening_power"], S["hardening_quadratic"], S["hardening_cubic"]
     EXPONENTIAL, EARLY, EARLY_REACH = S["hardening_exponential"], S["hardening_early"], S["hardening_reach"]
+    STEEPER = S["hardening_steeper"]
+    LEVEL, LEVEL_SHARPNESS = S["hardening_level"], S["hardening_sharpness"]
     LAYER_DEPTH, LAYER_WIDTH, LAYER_SLOPE = S["layer_depth"], S["layer_width"], S["layer_slope"]
     LAYER_STEP, LAYER_FACTOR, LAYER_BUMP = S["layer_step"], S["layer_factor"], S["layer_bump"]
     BEND = S["crater_bend"]
     CRATER, UNLOAD = S["crater_share"], S["unload_stiffness"]
     DRAG, DRAG_DEEP, DRAG_BOTH, DRAG_TIP = S["drag"], S["drag_deep"], S["drag_both"], S["drag_tip"]
     DRAG_ONSET, DRAG_REACH = S["drag_onset"], S["drag_reach"]
+    SHAFT_BROAD, SHAFT_GROWTH, SHAFT_TURN = S["shaft_broad"], S["shaft_growth"], S["shaft_turn"]
     SHAFT, SHAFT_DEEP, SHAFT_SQUARE, SHAFT_VISCOUS, SHAFT_SLOW, SHAFT_SPEED = (
         S["shaft"], S["shaft_deep"], S["shaft_square"], S["shaft_viscous"], S["shaft_slow"], S["shaft_speed"],
     )  # fmt: skip
@@ -178,6 +185,14 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
     Cube = ti.types.ndarray(dtype=ti.f64, ndim=3)
 
     @ti.func
+    def mobilised(share: ti.f64, sharpness: ti.f64) -> ti.f64:
+        """Of a bound, `share` being the way over its reach: 1 - exp(-x), or x / (1 + x^p)^(1/p) of a sharpness p."""
+        part = 1.0 - ti.exp(-share)
+        if sharpness > 0.0:
+            part = share / ti.pow(1.0 + ti.pow(ti.max(share, 1e-12), sharpness), 1.0 / sharpness)
+        return part
+
+    @ti.func
     def loading(z: ti.f64, n: ti.template(), k: ti.i32) -> ti.f64:
         depth = ti.max(z, 0.0)
         x = depth / n[k, REFERENCE]
@@ -185,10 +200,15 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
         if n[k, POWER] != 0.0:
             grown *= ti.pow(ti.max(x, 1e-9), n[k, POWER])
         if n[k, EXPONENTIAL] != 0.0:
-            y = n[k, EXPONENTIAL] * x
-            if ti.abs(y) > 1e-6:
-                grown *= (ti.exp(ti.min(y, 30.0)) - 1.0) / y
-        grown *= 1.0 + n[k, QUADRATIC] * x + n[k, CUBIC] * x * x
+            rise = n[k, EXPONENTIAL] * x
+            if ti.abs(rise) > 1e-6:
+                grown *= (ti.exp(ti.min(rise, 30.0)) - 1.0) / rise
+        if n[k, LEVEL] * x > 1e-6:
+            grown *= mobilised(n[k, LEVEL] * x, n[k, LEVEL_SHARPNESS]) / (n[k, LEVEL] * x)
+        y = x  # of the quadratic form, with a power of its own
+        if n[k, STEEPER] != 0.0:
+            y = ti.pow(ti.max(x, 1e-9), 1.0 + n[k, STEEPER])
+        grown *= 1.0 + n[k, QUADRATIC] * y + n[k, CUBIC] * x * x
         if n[k, EARLY] != 0.0:
             grown += n[k, EARLY] * (1.0 - ti.exp(-depth / n[k, EARLY_REACH]))
         away = (depth - n[k, LAYER_DEPTH]) / n[k, LAYER_WIDTH]
@@ -205,15 +225,9 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
         return grown if depth > 0.0 else 0.0
 
     @ti.func
-    def mobilised(share: ti.f64, sharpness: ti.f64) -> ti.f64:
-        """Of a pull, `share` being the retreat over its reach: 1 - exp(-x), or x / (1 + x^p)^(1/p) of a sharpness p."""
-        part = 1.0 - ti.exp(-share)
-        if sharpness > 0.0:
-            part = share / ti.pow(1.0 + ti.pow(ti.max(share, 1e-12), sharpness), 1.0 / sharpness)
-        return part
-
-    @ti.func
-    def force(z: ti.f64, v: ti.f64, way: ti.f64, top: ti.f64, deepest: ti.f64, n: ti.template(), k: ti.i32) -> ti.f64:
+    def force(
+        z: ti.f64, v: ti.f64, way: ti.f64, top: ti.f64, deepest: ti.f64, n: ti.template(), k: ti.i32, driven: ti.i32
+    ) -> ti.f64:  # fmt: skip
         total = 0.0
         if z > 0.0:
             most, ever = ti.max(top, z), ti.max(deepest, z)
@@ -243,6 +257,11 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
             total += (n[k, SHAFT] + n[k, SHAFT_DEEP] * x + n[k, SHAFT_SQUARE] * x * x) * way + n[k, SHAFT_VISCOUS] * v
             if n[k, SHAFT_SLOW] != 0.0:
                 total += n[k, SHAFT_SLOW] * ti.exp(-ti.abs(v) / n[k, SHAFT_SPEED]) * way
+            if n[k, SHAFT_BROAD] != 0.0:
+                turning = way
+                if driven == 1:
+                    turning = v / ti.sqrt(v * v + n[k, SHAFT_TURN] * n[k, SHAFT_TURN])
+                total += n[k, SHAFT_BROAD] * ti.pow(ti.max(x, 1e-12), n[k, SHAFT_GROWTH]) * turning
             if back > 0.0:
                 held = back / n[k, PULL_REACH]
                 grown = n[k, PULL]
@@ -270,7 +289,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
                     top = 0.0
                 top, deepest = ti.max(top, z), ti.max(deepest, z)
                 way = ti.tanh(v / numbers[k, SPEED_SCALE])
-                out[k, row - starts[path]] = force(z, v, way, top, deepest, numbers, k)
+                out[k, row - starts[path]] = force(z, v, way, top, deepest, numbers, k, 1)
 
     @ti.kernel
     def fall_all(numbers: Table, lane_path: Whole, starts: Whole, times: Line, speeds: Line, steps: Line, out: Cube):
@@ -301,7 +320,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
                         for stage in range(4):
                             a = g
                             if inside == 1:
-                                a = g - force(ti.max(zs, 1e-300), vs, way, top, deepest, numbers, k) / m
+                                a = g - force(ti.max(zs, 1e-300), vs, way, top, deepest, numbers, k, 0) / m
                             weight = dt / 6.0 if stage == 0 or stage == 3 else dt / 3.0
                             z1 += weight * vs
                             v1 += weight * a
@@ -335,7 +354,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
                                 down, up = 0.0, 0.0
                                 for side in range(2):
                                     tried = 1.0 - 2.0 * side
-                                    a = g - force(z, 0.0, tried, top, deepest, numbers, k) / m
+                                    a = g - force(z, 0.0, tried, top, deepest, numbers, k, 0) / m
                                     if side == 0:
                                         down = a
                                     else:
@@ -351,7 +370,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
                     else:
                         pushed = 0.0
                         if inside == 1 and resting == 0:
-                            pushed = force(z, v, way, top, deepest, numbers, k)
+                            pushed = force(z, v, way, top, deepest, numbers, k, 0)
                         out[k, at, 0] = z
                         out[k, at, 1] = v
                         out[k, at, 2] = 0.0 if resting == 1 else g - pushed / m

@@ -120,6 +120,39 @@ def test_the_smoothed_depth_is_as_wrong_as_it_says():
     assert 0.6 < np.mean(ratios) < 1.7
 
 
+def test_a_drive_that_ramps_up_holds_and_comes_back_is_found_with_its_ramps():
+    # Speed 0, 20 mm/s, 0, -20 mm/s over ramps of 50 ms; rows 2 ms and 0.04 mm apart, depth to 0.2 mm.
+    time = np.arange(0, 2.4, 0.002)
+    fine = np.linspace(0, 2.4, 48001)
+    corners, speeds = (0.075, 0.125, 1.125, 1.175, 1.375, 1.425), (0, 0.02, 0.02, 0, 0, -0.02)
+    speed = np.interp(fine, corners, speeds)
+    depth = np.interp(time, fine, np.concatenate([[0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(fine))]))
+    held = (time > 1.18) & (time < 1.37)
+    for seed in range(2):
+        smooth = smooth_depth(time, depth + 2e-4 * np.random.default_rng(seed).standard_normal(len(time)), 2e-4)
+        off = smooth.speed - np.interp(time, fine, speed)
+        assert smooth.holds == (True, False, True, False)
+        assert np.abs(off[held]).max() < 1e-3 and np.sqrt(np.mean(off**2)) < 6e-4  # 1.4e-3 and 2.4e-3 of a spline
+
+
+def test_a_smooth_motion_is_given_no_ramps():
+    time = np.linspace(0, 2, 600)
+    true = 0.02 * np.sin(0.5 * np.pi * time)
+    smooth = smooth_depth(time, true + 1e-4 * np.random.default_rng(3).standard_normal(len(time)), 1e-4)
+    assert smooth.holds == ()
+    assert np.abs(smooth.speed - 0.01 * np.pi * np.cos(0.5 * np.pi * time)).max() < 0.05 * 0.01 * np.pi
+
+
+def test_a_stiffness_that_levels_off_is_a_hyperbola_and_a_power_added_is_that_power():
+    # K z / (1 + a z / D), and K z (1 + a (z / D)^(1 + e)).
+    depth, reach = np.linspace(1e-4, 0.02, 30), 0.012
+    still = np.zeros_like(depth)
+    level = pushed(depth, still, hardening_level=1.5, hardening_sharpness=1.0, reference=reach)
+    assert level == pytest.approx(STIFFNESS * depth / (1 + 1.5 * depth / reach), rel=1e-12)
+    power = pushed(depth, still, hardening_quadratic=0.7, hardening_steeper=-0.1, reference=reach)
+    assert power == pytest.approx(STIFFNESS * depth * (1 + 0.7 * (depth / reach) ** 0.9), rel=1e-12)
+
+
 def test_where_a_slow_spike_turns_the_direction_is_in_doubt_and_friction_is_no_misfit():
     # 2 mm/s, rows 0.09 mm apart, depth to 0.1 mm: the turn is known to some rows, in which 2 x 1.5 N is 60 noises.
     def rubbed(z, v, top):
