@@ -76,6 +76,13 @@ class BedConeSettings(BedTestSettings):
     friction: float | None = Field(
         None, ge=0, le=10, description="Friction of grains on the cone [1]; the grains' own if not given."
     )
+    max_overlap: float | None = Field(
+        None,
+        ge=0.01,
+        le=0.15,
+        description="Largest overlap of grains under the cone [of a diameter]; the bed's own bound, for which its "
+        "grains were made, if not given.",
+    )
     pushes: int = Field(2, ge=1, le=20, description="Pushes into each bed, each into a fresh copy, in another place.")
 
 
