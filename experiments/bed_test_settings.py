@@ -98,6 +98,7 @@ class BedCutSettings(BedTestSettings):
         None,
         ge=0,
         lt=80,
-        description="Friction angle for the cohesion [degrees], as bed test shear gives it; no cohesion is told if not "
-        "given.",
+        description="Friction angle for the cohesion [degrees], of Mohr's circle (bed calibrate, plane = 'mohr'): that "
+        "of the plane of shear, as bed test shear gives it, is smaller and tells too large a cohesion; none is told if "
+        "not given.",
     )
