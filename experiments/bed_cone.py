@@ -48,6 +48,8 @@ def _carry_out(settings: BedConeSettings, folder: RunFolder, progress: Progress)
         from dem.penetrometer import SHAFT, cone_gradient, push_cone
 
         first = about(bed)
+        if settings.max_overlap is not None:
+            bed.overlap_limit = settings.max_overlap
         push = int(name.rpartition("-")[2]) - 1 if settings.pushes > 1 else 0
         found = push_cone(
             bed,

@@ -96,7 +96,7 @@ def _result(runs: list[dict[str, Any]], friction_angle: float | None, most: floa
         "cohesion": of(
             lambda run: None if friction_angle is None else cohesion(run, friction_angle),
             "Pa",
-            "give friction_angle, as bed test shear has it"
+            "give friction_angle, that of Mohr's circle"
             if friction_angle is None
             else f"gamma H_c / 4 tan(45 + phi / 2) with phi = {friction_angle:g} degrees",
         ),

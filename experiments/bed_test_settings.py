@@ -76,6 +76,13 @@ class BedConeSettings(BedTestSettings):
     friction: float | None = Field(
         None, ge=0, le=10, description="Friction of grains on the cone [1]; the grains' own if not given."
     )
+    max_overlap: float | None = Field(
+        None,
+        ge=0.01,
+        le=0.15,
+        description="Largest overlap of grains under the cone [of a diameter]; the bed's own bound, for which its "
+        "grains were made, if not given.",
+    )
     pushes: int = Field(2, ge=1, le=20, description="Pushes into each bed, each into a fresh copy, in another place.")
 
 
@@ -91,6 +98,7 @@ class BedCutSettings(BedTestSettings):
         None,
         ge=0,
         lt=80,
-        description="Friction angle for the cohesion [degrees], as bed test shear gives it; no cohesion is told if not "
-        "given.",
+        description="Friction angle for the cohesion [degrees], of Mohr's circle (bed calibrate, plane = 'mohr'): that "
+        "of the plane of shear, as bed test shear gives it, is smaller and tells too large a cohesion; none is told if "
+        "not given.",
     )

@@ -77,7 +77,7 @@ def calibration_result(
                 "wanted": target.value,
                 "tolerance": target.tolerance,
                 "source": target.source,
-                "plane": target.plane if "friction_angle" in target.figure and target.state else None,
+                "plane": target.plane if "friction_angle" in target.figure or target.plane == "mohr" else None,
                 "state": target.state or None,
                 "fitted": target.fit,
                 "measured": got,
@@ -208,7 +208,7 @@ def _curves(
 def _figure_table(entries: list[dict[str, Any]]) -> dict[str, Any]:
     rows = [
         [
-            entry["name"] + (f" ({entry['plane']})" if entry["plane"] == "triaxial" else ""),
+            entry["name"] + (f" ({entry['plane']})" if entry["plane"] not in (None, "shear") else ""),
             f"{entry['wanted']:g} +- {entry['tolerance']:g} {entry['unit']}",
             "-"
             if entry["measured"] is None

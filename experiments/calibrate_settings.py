@@ -55,7 +55,7 @@ FREE = {
     "bond_number": "1",
 }
 """What may be free, with its unit. bond_number: pull-off force of two grains over the weight of one."""
-_PLANES = ("shear", "triaxial")
+_PLANES = ("shear", "triaxial", "mohr")
 _SHEARED = ("loose", "dense")
 _FIXED = tuple(f.name for f in fields(Material) if f.name not in ("name", "sources", "grain"))
 
@@ -69,7 +69,8 @@ class Target:
         source: where it comes from.
         figure: which of ``FIGURES`` it is: its name, if nothing else is said.
         plane: of a friction angle: "shear", stresses on the plane of shear as a shear box or a ring shear tester reads
-            them, or "triaxial", the angle of triaxial compression.
+            them, "triaxial", the angle of triaxial compression, or "mohr", Mohr's circle of the largest and least
+            stress. Of a cohesion "shear" or "mohr", as a vertical cut has it.
         state: in which the sample is sheared: "loose" or "dense"; "drained" of an angle of repose.
         fit: whether the parameters are fitted to it, or it is only compared at the end.
         through: of a friction angle: "tests", a straight line through the tests of all pressures, or "origin", one
@@ -115,9 +116,8 @@ class CalibrateSettings(StrictSettings):
     targets: dict[str, dict[str, Any]] = Field(
         {},
         description="The figures: [targets.critical_friction_angle] value = 31.5, tolerance = 1.5, source = '...'; "
-        "also figure = '...' where it has another name, plane = 'shear' or 'triaxial', through = 'tests' or 'origin', "
-        "state = 'loose' or 'dense', "
-        "fit = false to compare only.",
+        "also figure = '...' where it has another name, plane = 'shear', 'triaxial' or 'mohr', through = 'tests' or "
+        "'origin', state = 'loose' or 'dense', fit = false to compare only.",
     )
     grain: Positive = Field(0.004, description="Mean grain diameter [m]; surface energies hold for it.")
     spread: float = Field(0.15, ge=0, le=0.5, description="Grain diameters are uniform within 1 +- this [1].")
@@ -263,8 +263,12 @@ def _target(name: str, given: dict[str, Any]) -> Target:
     state = given.get("state", figure.state)
     if state != figure.state and not (state in _SHEARED and figure.state in _SHEARED):
         raise ValueError(f"{called}.state = {state!r} must be 'loose' or 'dense', of a strength")
-    if given.get("plane", "shear") not in _PLANES or ("plane" in given and "friction_angle" not in kind):
-        raise ValueError(f"{called}.plane = {given['plane']!r} must be 'shear' or 'triaxial', of a friction angle")
+    planes = _PLANES if "friction_angle" in kind else ("shear", "mohr") if "cohesion" in kind else ()
+    if "plane" in given and given["plane"] not in planes:
+        raise ValueError(
+            f"{called}.plane = {given['plane']!r} must be 'shear', 'triaxial' or 'mohr' of a friction angle, "
+            f"'shear' or 'mohr' of a cohesion"
+        )
     if given.get("through", "tests") not in ("tests", "origin") or (
         "through" in given and "friction_angle" not in kind
     ):

@@ -7,7 +7,9 @@ Friction angle and cohesion are those of a straight line through the tests' stre
 normal (Mohr-Coulomb), on the plane of shear; of grains that do not stick one test gives the angle, as nothing but the
 pressure has the unit of a stress. The triaxial angle is that of triaxial compression at the same
 I1 I2 / I3 = (9 - sin^2) / (1 - sin^2) (Matsuoka & Nakai 1974, Proc. JSCE 232:59), from the whole stress tensor inside,
-cohesion c added to it as c / tan(angle).
+cohesion c added to it as c / tan(angle). Those of Mohr's circle are of the straight line through the circles of the
+largest and least principal stress, radius = cohesion cos(angle) + sin(angle) centre: what Coulomb's wedge, and with it
+a vertical cut, is reckoned with. Where volume stays, the plane of shear has c cos(angle) and tan = sin(angle) instead.
 """
 
 from __future__ import annotations
@@ -26,11 +28,22 @@ from .bed_repose import BEARING
 from .bed_tests import stiff_enough
 from .calibrate_settings import CalibrateSettings, Target
 
-__all__ = ["SampleTest", "figures_of", "laboratory_figure", "run_test", "summary_of", "tests_for", "triaxial_angle"]
+__all__ = [
+    "SampleTest",
+    "figures_of",
+    "laboratory_figure",
+    "mohr_circle",
+    "run_test",
+    "summary_of",
+    "tests_for",
+    "triaxial_angle",
+]
 
 _WINDOW = 0.05
 """Strain over which the largest strength is averaged."""
 _PARTS = 5
+_STEEPEST = math.sin(math.radians(85.0))
+"""Slope of a line through Mohr's circles, at most: chance brings few tests to 1 and more, which is no angle."""
 _COLUMNS = {"strain": "strain", "height": "height_m", "shear": "shear_Pa", "normal": "normal_Pa"}
 
 
@@ -184,6 +197,13 @@ def triaxial_angle(tensor: np.ndarray, *, added: float = 0.0) -> float:
     return math.degrees(math.asin(math.sqrt((ratio - 9) / (ratio - 1))))
 
 
+def mohr_circle(tensor: np.ndarray) -> tuple[float, float]:
+    """Centre and radius of the circle of the largest and least principal stress [Pa]; the tensor need not press."""
+    tensor = np.asarray(tensor, dtype=float)
+    least, _, most = np.linalg.eigvalsh(0.5 * (tensor + tensor.T))
+    return 0.5 * float(most + least), 0.5 * float(most - least)
+
+
 def figures_of(
     targets: Sequence[Target], runs: Mapping[SampleTest, Mapping[str, Any]]
 ) -> dict[str, tuple[float, float]]:
@@ -203,15 +223,22 @@ def figures_of(
         key = "peak_" if target.figure.startswith("peak") else ""
         normal = np.array([summary[f"{key}normal"] for summary in kept])
         shear = np.array([summary[f"{key}shear"] for summary in kept])
+        if target.plane == "mohr":
+            normal, shear = np.array([mohr_circle(summary[f"{key}tensor"]) for summary in kept]).T
         error = np.array([summary["error"] for summary in kept])
         start, slope, start_error, slope_error = _line(normal, shear, error, origin=target.through == "origin")
         angle = math.degrees(math.atan(slope))
         angle_error = math.degrees(slope_error / (1 + slope**2))
+        if target.plane == "mohr":
+            sine = min(slope, _STEEPEST)
+            cosine = math.sqrt(1 - sine**2)
+            angle, angle_error = math.degrees(math.asin(sine)), math.degrees(slope_error / cosine)
+            start, start_error = start / cosine, start_error / cosine
         if target.figure == "sample_density":
             found[target.name] = (float(np.mean([summary["bulk_density"] for summary in kept])), 0.0)
         elif "cohesion" in target.figure:
             found[target.name] = (start, start_error)
-        elif target.plane == "shear":
+        elif target.plane in ("shear", "mohr"):
             found[target.name] = (angle, angle_error)
         else:
             added = max(0.0, start) / slope

@@ -28,7 +28,8 @@ METHOD = (
     "bore and the one at which one of them fell the middle is tried as well.",
     "Critical height: geometric middle of the heights, at the bed's own gravity, that stood and that fell. Cohesion by "
     "Terzaghi's plane wedge without tension cracks, c = gamma H / 4 tan(45 + phi / 2); an upper bound solution, so "
-    "that the soil may have a little more cohesion than this says.",
+    "that the soil may have a little more cohesion than this says. Angle and cohesion are those of Mohr's circle; on "
+    "the plane of shear a shear box reads less of both.",
 )
 
 

@@ -85,7 +85,7 @@ def _said(entry: Mapping[str, Any]) -> str:
 
 
 def _axis_words(entry: Mapping[str, Any]) -> str:
-    kind = f", {entry['plane']}" if entry["plane"] == "triaxial" else ""
+    kind = f", {entry['plane']}" if entry["plane"] not in (None, "shear") else ""
     return f"{entry['name'].replace('_', ' ')}{kind} [{entry['unit']}]"
 
 

@@ -72,11 +72,13 @@ def astray(found: Fit, held_out: Sequence[str], *, seed: int = 0) -> tuple[Findi
 
 
 def astray_held_out(
-    found: Fit, held_out: Sequence[str], values: Mapping[str, float], most: int, *, seed: int = 0, enough: float = 0.0
-) -> tuple[str, ...] | None:
+    found: Fit, held_out: Sequence[str], values: Mapping[str, float], most: int, *, seed: int = 0, enough: float = 0.0,
+    share: float = 0.0,
+) -> tuple[str, ...] | None:  # fmt: skip
     """Those held-out trials, `most` at most, that the model follows at first only, all others passing the gate.
 
-    `enough`: chi-square per sample up to which trials pass in any case. None where there are more, or others.
+    `enough`: chi-square per sample up to which trials pass in any case. `share`: of its time up to which each must be
+    followed. None where there are more, or others.
     """
     problem = found.model.problem
 
@@ -90,8 +92,10 @@ def astray_held_out(
     failing = [t for t in held_out if not explained((t,))]
     if not failing or len(failing) > most or not hasattr(problem, "follows"):
         return None
-    if any(problem.follows(values, found.model.forms, trial) is None for trial in failing):
-        return None
+    for trial in failing:
+        until = problem.follows(values, found.model.forms, trial)
+        if until is None or until < share * float(np.max(problem.samples(trial).time)):
+            return None
     rest = tuple(trial for trial in held_out if trial not in failing)
     if rest and not explained(rest):
         return None

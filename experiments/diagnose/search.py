@@ -237,7 +237,7 @@ class Search:
             self.tell(f"beside {', '.join(best.effects) or 'the base model'}: something is left", 0.5)
             tried = []
             seen: set[str] = set()
-            for other in () if not best.effects else first[:_BEST] if len(best.effects) == 1 else first:
+            for other in first[:_BEST] if len(best.effects) == 1 else ():
                 name = other.effects[0]
                 if name in best.effects or name in seen:
                     continue
@@ -246,6 +246,10 @@ class Search:
                     tried.append(self._try(f"{_said(best)} + {form.id}", best, [form]))
             if len(best.effects) < 2:
                 tried += self._pairs()
+            else:  # a third: those that promise most beside the two
+                model, values = best.fit.model, best.fit.values
+                others = [form for form in model.problem.forms if form.effect not in best.effects]
+                tried += self._begun(model, next_starts(model, values, others, most=_BEST))
             tried.sort(key=lambda h: -h.score)
             if not tried:
                 return best

@@ -102,6 +102,20 @@ def test_friction_angle_and_cohesion_are_those_of_the_line_through_the_tests():
     assert figures_of([whole], runs)["whole"][0] == pytest.approx(math.degrees(math.atan(steeper)))
 
 
+def test_cohesion_and_angle_of_mohrs_circle_are_those_of_coulombs_wedge():
+    """s1 = 2 c cos / (1 - sin) + s3 (1 + sin) / (1 - sin): 190 Pa and 47 degrees come back, pulled sideways or not."""
+    sine, cosine = math.sin(math.radians(47)), math.cos(math.radians(47))
+    runs = {}
+    for p, least in ((300.0, -35.0), (1000.0, 160.0)):
+        most = (2 * 190 * cosine + least * (1 + sine)) / (1 - sine)
+        tensor = np.diag([least, 0.3 * (least + most), most])
+        summary = {"peak_normal": p, "peak_shear": p, "error": 5.0, "peak_tensor": tensor.tolist()}
+        runs[SampleTest("loose", p, 1)] = summary
+    targets = [Target(figure, 1, 1, "", figure, "mohr", "loose") for figure in ("peak_friction_angle", "peak_cohesion")]
+    found = figures_of(targets, runs)
+    assert found["peak_friction_angle"][0] == pytest.approx(47) and found["peak_cohesion"][0] == pytest.approx(190)
+
+
 def test_an_angle_of_repose_needs_one_bed_and_no_pressures():
     settings = sticky(targets=sticky().targets | {"angle_of_repose": ANGLE})
     tests = calibrate_tests.tests_for(settings, list(settings.wanted.values()), seed=7)
@@ -173,7 +187,11 @@ def test_a_calibration_finds_the_grains_and_resumes(tmp_path, monkeypatch, capsy
         ({"targets": {"critical_angle": ANGLE}}, "targets.critical_angle is no figure: did you mean"),
         ({"targets": {"critical_friction_angle": {"value": 31.0}}}, "tolerance must be given"),
         ({"targets": {"critical_friction_angle": ANGLE | {"tolerance": 0}}}, "tolerance = 0 must be positive"),
-        ({"targets": {"critical_friction_angle": ANGLE | {"plane": "oblique"}}}, "must be 'shear' or 'triaxial'"),
+        (
+            {"targets": {"critical_friction_angle": ANGLE | {"plane": "oblique"}}},
+            "must be 'shear', 'triaxial' or 'mohr'",
+        ),
+        ({"targets": {"sample_density": ANGLE | {"plane": "mohr"}}}, "'shear' or 'mohr' of a cohesion"),
         ({"targets": {"angle_of_repose": ANGLE | {"state": "loose"}}}, "state = 'loose' must be"),
         ({"targets": {"cohesion": COHESION | {"through": "origin"}}}, "through = 'origin' must be"),
         ({"targets": {"packing_loose": ANGLE | {"fit": True}}}, "takes minutes and is compared only"),

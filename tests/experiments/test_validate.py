@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 
 import vis
@@ -9,6 +10,7 @@ from experiments.cli import main
 from experiments.validate import experiment
 from experiments.validate.case import Case, Comparison, Curve, Outcome, Plot
 from experiments.validate.document import markdown
+from experiments.validate.friction_angle import mohr_angle
 from experiments.validate.suite import SUITE, chosen
 from experiments.validate_settings import ValidateSettings
 
@@ -140,3 +142,16 @@ def test_a_difference_that_is_not_a_number_is_said():
         command="hedgebed validate",
     )
     assert "not a number" in text and "not looked into yet" in text
+
+
+def test_mohrs_circle_asks_for_no_plane():
+    """s1 / s3 = (1 + sin) / (1 - sin) however the axes lie; with like normal stresses its sine is tau / p."""
+    tensor = np.diag([1.0, 1.3, (1 + 0.5) / (1 - 0.5)])
+    c, s = np.cos(0.7), np.sin(0.7)
+    turn = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+    assert mohr_angle(turn @ tensor @ turn.T) == pytest.approx(30)
+    assert mohr_angle(np.array([[1, 0, 0.382], [0, 1, 0], [0.382, 0, 1]])) == pytest.approx(
+        np.degrees(np.arcsin(0.382))
+    )
+    with pytest.raises(ValueError, match="least principal stress = 0 Pa: pressures in all directions"):
+        mohr_angle(np.diag([0.0, 1.0, 1.0]))

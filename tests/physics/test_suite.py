@@ -14,7 +14,8 @@ from experiments.validate.suite import SUITE, chosen
 
 FAILING = {
     "t4-spin",
-    *("katsuragi-durian", "murdoch", "rft", "size-collapse"),
+    *("friction-angle", "friction-angle-published"),
+    *("katsuragi-durian", "katsuragi-durian-fine", "murdoch", "rft", "size-collapse"),
     *("liggghts-contacts-sliding", "liggghts-cloud-sliding", "lammps-contacts-sliding", "lammps-cloud-sliding"),
 }
 """Cases that are known to fail; docs/validation.md says why. One that passes is to be taken off."""
