@@ -145,16 +145,17 @@ def _steady(colour: Colour, square: float, lag: float) -> bool:
 
 def whitener_for(found: Fit, colours: dict[str, Colour]) -> Whitener:
     """The whitener that these colours call for; never below the stated noise in the slow modes."""
-    white, model = found.model.whitener, found.model
+    model = found.model
+    white = Whitener.white(model.problem)
     weights = {}
     for trial in white.weights:
         channels = list(dict.fromkeys(model.problem.samples(trial).channel.tolist()))
-        whole = np.ones(len(white.weights[trial]))
+        whole = white.weights[trial].copy()
         for name, block in zip(channels, white.block_slices(trial), strict=True):
             if name in colours:
                 count = block.stop - block.start
                 power = colours[name].power((np.arange(count) + 0.5) / count)
-                whole[block] = 1 / np.sqrt(power)
+                whole[block] /= np.sqrt(power)
         weights[trial] = whole
     return Whitener(white.blocks, weights)
 

@@ -25,6 +25,7 @@ from .prediction import Predicted, folds_of, predict
 from .problem import Finding, Form, Problem
 from .replicates import Scatter, exchanged, find_scatter, groups_of, odd_trials, split_trials, with_scatter
 from .search import Choice, choose
+from .unrest import Unrest, find_unrest
 
 __all__ = ["Diagnosis", "Gap", "diagnose"]
 
@@ -167,12 +168,14 @@ def diagnose(
     gates: Path | None = None,
     aside: Sequence[Finding] = (),
     looked_at: Sequence[str] = (),
+    restless: bool = False,
 ) -> Diagnosis:
     """Diagnose a campaign. `tell(what, share done)` hears of progress; the same campaign gives the same answer.
 
     `thorough`: nulls by full refits, which takes as long as it takes; they are kept in the folder `gates`, if given,
     for the next campaign of the same design. `aside`: fitted trials that are to take no part (`astray`). `looked_at`:
     trials that must not be held out, others are in their place: the base model explains all but these.
+    `restless`: what replicates differ by each in its own way (`unrest`) counts as noise.
     """
     tell = tell or (lambda what, done: None)
     if hasattr(problem, "prepare"):
@@ -182,6 +185,8 @@ def diagnose(
     fitted, held_out = split_trials(problem.trials)
     if hasattr(problem, "shake"):
         problem.shake({})
+    if hasattr(problem, "calm"):
+        problem.calm({})
     base, jitters = _jittered(_whitened_fit(Model(problem, Whitener.white(problem), fitted)), held_out)
     odd = odd_trials(_whitened_fit(replace(base.model, trials=tuple(t.id for t in problem.trials))))
     if odd:
@@ -199,6 +204,8 @@ def diagnose(
         base = _whitened_fit(base.model.on(fitted))
     scatter = _scatter(base, held_out)
     base, model_std = _rescattered(base, scatter) if scatter.parameters else base, scatter.model_std
+    unrest = _unrest(base, held_out) if restless else Unrest({})
+    base = _calmed(base, unrest)
     colours = _colours_of(base)
     base = _coloured(base, colours)
     tell("is anything left?", 0.0)
@@ -208,15 +215,15 @@ def diagnose(
         tell=lambda done: tell("making the gate's null", done),
     )  # fmt: skip
     told = _Told(problem, first, findings, held_out, jitters)
-    again = partial(diagnose, problem, thorough=thorough, seed=seed, tell=tell, gates=gates)
+    again = partial(diagnose, problem, thorough=thorough, seed=seed, tell=tell, gates=gates, restless=restless)
 
     def nothing(last: Verdict | None = None) -> Diagnosis:
         """None is missing as far as the fitted trials tell; once more with others held out where these tell more."""
         if missed := () if looked_at else _missed(base, held_out, seed):
             tell("what is left shows in trials that were held out: others are held out", 0.0)
             return again(aside=aside, looked_at=missed)
-        findings.extend(_held_out_ways(base, held_out, seed))
-        return told.finish(base, None, colours, model_std, "none", last=last)
+        findings.extend((*_held_out_ways(base, held_out, seed), *unrest.findings(problem)))
+        return told.finish(base, None, colours, {**model_std, **unrest.model_std(problem)}, "none", last=last)
 
     if first.passed:
         return nothing()
@@ -225,10 +232,11 @@ def diagnose(
     if choice.best.effects and excess(choice.best.fit) < _OUT_OF_THE_WAY * excess(base):
         # With the motion out of the way replicates are compared once more.
         scatter = _scatter(choice.best.fit, held_out)
-        if set(scatter.model_std) != set(model_std):
+        wandering = _unrest(choice.best.fit, held_out) if restless else unrest
+        if set(scatter.model_std) != set(model_std) or wandering.other_than(unrest):
             tell("replicates are found to differ otherwise: choosing again", 0.0)
-            model_std = scatter.model_std
-            base = _rescattered(base, scatter)
+            model_std, unrest = scatter.model_std, wandering
+            base = _coloured(_calmed(_rescattered(base, scatter), unrest), colours)
             choice = choose(base, tell=tell, seed=seed, recoloured=partial(_recoloured, colours=colours))
             base = choice.base.fit
     if choice.best.effects:  # times too: slopes are those of the motion as it is now known
@@ -269,9 +277,17 @@ def diagnose(
         anew = again(aside=gone_astray, looked_at=looked_at)
         if anew.verdict != "unknown":
             return anew
+    if verdict == "unknown" and not restless and choice.best.effects and _unrest(choice.best.fit, held_out):
+        # Only a name may come of it: what has none and differs from replicate to replicate is not explained by that.
+        tell("replicates differ each in its own way: once more, against that", 0.0)
+        anew = again(aside=aside, looked_at=looked_at, restless=True)
+        if anew.verdict in ("named", "ambiguous"):
+            return anew
+    _calmed(base, unrest)
     if verdict in ("named", "ambiguous") and held is not None and not held.passed:
         findings += _held_out_ways(choice.best.fit, held_out, seed)
-    return told.finish(base, choice, colours, model_std, verdict, held=held)
+    findings.extend(unrest.findings(problem))
+    return told.finish(base, choice, colours, {**model_std, **unrest.model_std(problem)}, verdict, held=held)
 
 
 def _whitened_fit(model: Model) -> Fit:
@@ -330,6 +346,24 @@ def _scatter(found: Fit, held_out: tuple[str, ...]) -> Scatter:
     if all(len(ids) < 2 for ids in groups_of(model.problem.trials).values()):
         return Scatter()
     return find_scatter(fit(model.on((*model.trials, *held_out)), _unscattered(found)))
+
+
+def _unrest(found: Fit, held_out: tuple[str, ...]) -> Unrest:
+    """How replicates wander apart beyond what trials' own numbers say: asked of all trials."""
+    problem = found.model.problem
+    if not hasattr(problem, "calm"):
+        return Unrest({})
+    values = held_out_fit(found.model, held_out, found.values) if held_out else found.values
+    return find_unrest(found, values, (*found.model.trials, *held_out))
+
+
+def _calmed(found: Fit, unrest: Unrest) -> Fit:
+    """The same with what replicates differ by taken for noise, which is white otherwise."""
+    problem: Any = found.model.problem
+    if not unrest and not getattr(problem, "calmed", {}):
+        return found
+    problem.calm(unrest.weights(problem) if unrest else {})
+    return _plain(found)
 
 
 def _rescattered(found: Fit, scatter: Scatter) -> Fit:
@@ -486,7 +520,7 @@ class _Told:
         before = _gap(problem, base.model, base_values, fitted, held_out)
         after = before if verdict == "none" else _gap(problem, best.model, best_values, fitted, held_out)
         if verdict == "unknown" and choice is not None and effects:
-            effects = effects if _certain(base, choice) and _closes(before.held_out, after.held_out) else ()
+            effects = effects if _certain(base, choice) and _closes(base, best, held_out) else ()
         where = [] if verdict == "none" else places(base.model, base_values, (*fitted, *held_out))
         rivals = _smallest(choice) if choice is not None and verdict == "ambiguous" else ()
         alternatives = tuple(next(e for e in rival.effects if e not in effects) for rival in rivals)
@@ -535,10 +569,13 @@ def _one_number(choice: Choice) -> bool:
     return True
 
 
-def _closes(before: float | None, after: float | None) -> bool:
+def _closes(base: Fit, best: Fit, held_out: tuple[str, ...]) -> bool:
     """Whether next to all that the base model leaves of trials held out is taken away, too, and what is left is no
-    louder than the sensors; true where there are none."""
-    return before is None or after is None or (after <= _AS_LOUD and after - 1 < _CERTAIN * max(before - 1, 0.0))
+    louder than the sensors and what replicates differ by; true where there are none."""
+    if not held_out:
+        return True
+    before, after = (_left_of(found, held_out) for found in (base, best))
+    return after <= _AS_LOUD and after - 1 < _CERTAIN * max(before - 1, 0.0)
 
 
 def _smallest(choice: Choice) -> tuple[Hypothesis, ...]:

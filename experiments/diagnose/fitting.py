@@ -47,6 +47,12 @@ class Whitener:
 
     @staticmethod
     def white(problem: Problem) -> Whitener:
+        """For noise that is white, beside what replicates are known to differ by (`unrest`)."""
+        bare = Whitener.bare(problem)
+        return replace(bare, weights={**bare.weights, **getattr(problem, "calmed", {})})
+
+    @staticmethod
+    def bare(problem: Problem) -> Whitener:
         """For noise that is white as it is."""
         blocks, weights = {}, {}
         for trial in problem.trials:

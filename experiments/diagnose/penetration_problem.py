@@ -291,6 +291,10 @@ class PenetrationProblem:
                 row = np.concatenate([np.flatnonzero(trial.has_depth), np.flatnonzero(trial.has_other)])
                 self._shaken[id] = Shaken.of(own, row, np.zeros((len(own), 0)))
 
+    def calm(self, weights: Mapping[str, Array]) -> None:
+        """Weigh modes so from now on (`Whitener.white`): what replicates differ by counts as noise; {}: as they are."""
+        self.calmed = dict(weights)
+
     def rewhiten(self, values: Values, forms: Sequence[Form]) -> None:
         """Take the error of the smoothed depth into the whitening, at these values."""
         driven = [trial for trial in self._trials.values() if trial.driven]
