@@ -222,8 +222,8 @@ def diagnose(
         if missed := () if looked_at else _missed(base, held_out, seed):
             tell("what is left shows in trials that were held out: others are held out", 0.0)
             return again(aside=aside, looked_at=missed)
-        findings.extend((*_held_out_ways(base, held_out, seed), *unrest.findings(problem)))
-        return told.finish(base, None, colours, {**model_std, **unrest.model_std(problem)}, "none", last=last)
+        findings.extend(_held_out_ways(base, held_out, seed))
+        return told.finish(base, None, colours, {**model_std, **unrest.model_std}, "none", last=last)
 
     if first.passed:
         return nothing()
@@ -286,8 +286,7 @@ def diagnose(
     _calmed(base, unrest)
     if verdict in ("named", "ambiguous") and held is not None and not held.passed:
         findings += _held_out_ways(choice.best.fit, held_out, seed)
-    findings.extend(unrest.findings(problem))
-    return told.finish(base, choice, colours, {**model_std, **unrest.model_std(problem)}, verdict, held=held)
+    return told.finish(base, choice, colours, {**model_std, **unrest.model_std}, verdict, held=held)
 
 
 def _whitened_fit(model: Model) -> Fit:

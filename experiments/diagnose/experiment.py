@@ -115,6 +115,10 @@ def _quantity(entry: dict[str, Any], *, at_end: bool) -> dict[str, Any]:
     return {**entry, "note": "standard error of the fit, right if the model is and the noise is as it was found"}
 
 
+_UNITS = {"force": "N", "depth": "m", "accel": "m/s2"}
+"""Of channels in `model_std`, which holds relative numbers otherwise."""
+
+
 def _whose(found: Diagnosis) -> str:
     """What replicates differ by: grains lie otherwise in each bed, a hard surface has none."""
     tables = getattr(found.problem, "tables", None)
@@ -154,8 +158,9 @@ def _result(found: Diagnosis, said: dict[str, Any]) -> dict[str, Any]:
     sentences += more(found.best_values, found.forms) if more is not None else []
     sentences += [colour.sentence for colour in found.colours.values()]
     sentences += [
-        f"Replicates differ by more than the sensors: {kind}, standard deviation {std:.3g} (relative); "
-        f"it is {_whose(found)}."
+        f"Replicates differ by more than the sensors: {kind}, standard deviation {std:.3g} "
+        + (f"{_UNITS[kind]}, each in its own way" if kind in _UNITS else "(relative)")
+        + f"; it is {_whose(found)}."
         for kind, std in found.model_std.items()
     ]
     warnings = [finding.what for finding in said_once(found.findings)]

@@ -3,21 +3,21 @@
 Grains jam and give way otherwise in each bed, so curves of one condition wander apart slowly. What a law of the mean
 bed must explain is what replicates have in common; how far they wander is the pure error of a test for lack of fit
 (Draper and Smith, Applied Regression Analysis, 3rd ed. 1998, section 2.1), taken mode by mode. Mode k of a channel has
-the variance 1 + A (1 + k)^-p in units of the noise, p of the channel, A of the condition (Whittle's likelihood of the
-differences within conditions); a condition without replicates has the median A.
+the variance 1 + A / (1 + (k / b)^p) in units of the noise, b and p of the channel, A of the condition (Whittle's
+likelihood of the differences within conditions); a condition without replicates has the median A.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from .fitting import Fit, Whitener
-from .problem import Array, Finding, Problem
+from .problem import Array, Problem
 from .replicates import groups_of
 
 __all__ = ["Unrest", "find_unrest"]
@@ -28,16 +28,32 @@ _SHARE = 0.5
 """Share of the conditions with replicates that must wander."""
 _LEAST = 3.0
 """Variance of the slowest mode, in units of the noise, from which on a condition wanders."""
-_POWERS = np.linspace(0.0, 4.0, 17)
-_AMPLITUDES = np.concatenate([[0.0], np.geomspace(0.1, 1e8, 181)])
+_BENDS, _POWERS = np.geomspace(0.5, 128.0, 9), (1.0, 1.5, 2.0, 3.0, 4.0, 8.0)
+_AMPLITUDES = np.concatenate([[0.0], np.geomspace(0.1, 1e8, 61)])
+
+
+@dataclass(frozen=True)
+class Law:
+    """How replicates wander in one channel."""
+
+    bend: float
+    """b, in modes."""
+    power: float
+    """p."""
+    amplitudes: Mapping[tuple[object, ...], float]
+    """A of each condition."""
+    other: float
+    """A of a condition without replicates."""
+    std: float
+    """By how much replicates differ beyond the sensor, root mean square of all rows [the channel's unit]."""
 
 
 @dataclass(frozen=True)
 class Unrest:
     """How replicates of a campaign wander apart; nothing by default."""
 
-    laws: Mapping[str, tuple[float, Mapping[tuple[object, ...], float], float]]
-    """Channel -> p, A of each condition, A of any other."""
+    laws: Mapping[str, Law]
+    """By channel."""
 
     def __bool__(self) -> bool:
         return bool(self.laws)
@@ -51,45 +67,23 @@ class Unrest:
             channels = dict.fromkeys(problem.samples(trial.id).channel.tolist())
             for name, block in zip(channels, bare.block_slices(trial.id), strict=True):
                 if name in self.laws:
-                    power, amplitudes, other = self.laws[name]
-                    amplitude = amplitudes.get(trial.condition, other)
-                    whole[block] = 1 / np.sqrt(_variance(amplitude, power, block.stop - block.start))
+                    law = self.laws[name]
+                    amplitude = law.amplitudes.get(trial.condition, law.other)
+                    shape = _shape(law.bend, law.power, block.stop - block.start)
+                    whole[block] = 1 / np.sqrt(1.0 + amplitude * shape)
             found[trial.id] = whole
         return found
 
-    def model_std(self, problem: Problem) -> dict[str, float]:
-        """By how much replicates differ, root mean square over their samples [the channel's unit]."""
-        found = {}
-        for name, (power, amplitudes, _) in self.laws.items():
-            squares, count = 0.0, 0
-            for trial in problem.trials:
-                samples = problem.samples(trial.id)
-                mine = samples.channel == name
-                if trial.condition in amplitudes and mine.any():
-                    own = _variance(amplitudes[trial.condition], power, int(mine.sum())) - 1.0
-                    squares += float(own.sum()) * float(np.mean(samples.std[mine] ** 2))
-                    count += int(mine.sum())
-            found[name] = math.sqrt(squares / max(count, 1))
-        return found
-
-    def findings(self, problem: Problem) -> list[Finding]:
-        """In plain words."""
-        units = {"force": "N", "accel": "m/s2", "depth": "m"}
-        return [
-            Finding(
-                trial=problem.trials[0].id,
-                channel=name,
-                what=f"replicates differ from one another in {name} by {std:.3g} {units.get(name, '')} beyond the "
-                "sensors, each in its own way: that is the bed's, and what is left is weighed against it",
-            )
-            for name, std in self.model_std(problem).items()
-        ]  # fmt: skip
+    @property
+    def model_std(self) -> dict[str, float]:
+        """By how much replicates differ beyond the sensors, root mean square [the channel's unit]."""
+        return {name: law.std for name, law in self.laws.items()}
 
     def other_than(self, known: Unrest) -> bool:
         """Whether a channel wanders in one and not in the other, or by twice as much."""
         if self.laws.keys() != known.laws.keys():
             return True
-        pairs = [(law[2], known.laws[name][2]) for name, law in self.laws.items()]
+        pairs = [(law.other, known.laws[name].other) for name, law in self.laws.items()]
         return any(max(a, b) > 4 * max(min(a, b), 1e-9) for a, b in pairs)
 
 
@@ -112,41 +106,64 @@ def find_unrest(found: Fit, values: Mapping[str, float], trials: Sequence[str]) 
             squares[condition] = ((together - together.mean(axis=0)) ** 2).sum(axis=0)
             freedom[condition] = len(blocks) - 1
         if squares and (law := _law(squares, freedom)) is not None:
-            laws[name] = law
+            laws[name] = replace(law, std=_std(found, values, [groups[condition] for condition in squares], name))
     return Unrest(laws)
 
 
-def _law(
-    squares: Mapping[tuple[object, ...], Array], freedom: Mapping[tuple[object, ...], int]
-) -> tuple[float, dict[tuple[object, ...], float], float] | None:
-    """p, A of each condition and their median; None where replicates do not wander for sure."""
-    best: tuple[float, float, dict[tuple[object, ...], float]] = (math.inf, 0.0, {})
-    for power in _POWERS:
+def _law(squares: Mapping[tuple[object, ...], Array], freedom: Mapping[tuple[object, ...], int]) -> Law | None:
+    """The likeliest; None where replicates do not wander for sure."""
+    best: tuple[float, float, float, dict[tuple[object, ...], float]] = (math.inf, 0.0, 0.0, {})
+    for bend, power in itertools.product(_BENDS, _POWERS):
         total, amplitudes = 0.0, {}
         for condition, square in squares.items():
-            costs = [_cost(square, freedom[condition], a, float(power)) for a in _AMPLITUDES]
-            place = int(np.argmin(costs))
-            low, high = _AMPLITUDES[max(place - 1, 0)], _AMPLITUDES[min(place + 1, len(_AMPLITUDES) - 1)]
-            finer = minimize_scalar(
-                lambda a, s=square, n=freedom[condition], p=float(power): _cost(s, n, a, p),
-                bounds=(low, high), method="bounded",
-            )  # fmt: skip
-            amplitudes[condition] = float(finer.x) if finer.fun < costs[place] else float(_AMPLITUDES[place])
-            total += min(float(finer.fun), costs[place])
+            shape = _shape(float(bend), power, len(square))
+            amplitudes[condition], cost = _amplitude(square, freedom[condition], shape)
+            total += cost
         if total < best[0]:
-            best = total, float(power), amplitudes
-    quiet = sum(_cost(square, freedom[condition], 0.0, 0.0) for condition, square in squares.items())
-    total, power, amplitudes = best
+            best = total, float(bend), power, amplitudes
+    quiet = sum(float(square.sum()) for square in squares.values())
+    total, bend, power, amplitudes = best
     wandering = [a for a in amplitudes.values() if 1 + a > _LEAST]
     if quiet - total < _SURE or len(wandering) < _SHARE * len(amplitudes):
         return None
-    return power, amplitudes, float(np.median(list(amplitudes.values())))
+    return Law(bend, power, amplitudes, float(np.median(list(amplitudes.values()))), 0.0)
 
 
-def _cost(square: Array, freedom: int, amplitude: float, power: float) -> float:
-    variance = _variance(amplitude, power, len(square))
-    return float((freedom * np.log(variance) + square / variance).sum())
+def _std(found: Fit, values: Mapping[str, float], groups: Sequence[Sequence[str]], name: str) -> float:
+    """`Law.std`, from measured less modelled, row by row."""
+    problem, forms = found.model.problem, found.model.forms
+    squares, freedom, noise, count = 0.0, 0, 0.0, 0
+    for ids in groups:
+        left, sensor = [], []
+        for id in ids:
+            shown = problem.compare(values, forms, id).get(name)
+            if shown is not None:
+                left.append(shown["measured"] - shown["model"])
+                samples = problem.samples(id)
+                sensor.append(samples.std[samples.channel == name])
+        rows = min(len(one) for one in left)
+        together = np.stack([one[:rows] for one in left])
+        squares += float(((together - together.mean(axis=0)) ** 2).sum())
+        freedom += (len(left) - 1) * rows
+        noise += float(sum((std**2).sum() for std in sensor))
+        count += sum(len(std) for std in sensor)
+    return math.sqrt(max(squares / freedom - noise / count, 0.0))
 
 
-def _variance(amplitude: float, power: float, count: int) -> Array:
-    return np.asarray(1.0 + amplitude * (1.0 + np.arange(count)) ** -power)
+def _amplitude(square: Array, freedom: int, shape: Array) -> tuple[float, float]:
+    """The likeliest A of one condition, and minus twice its log likelihood: rough first, then in between."""
+    amplitudes = _AMPLITUDES
+    for _ in range(2):
+        variance = 1.0 + np.multiply.outer(amplitudes, shape)
+        costs = (freedom * np.log(variance) + square / variance).sum(axis=1)
+        place = int(np.argmin(costs))
+        low, high = amplitudes[max(place - 1, 0)], amplitudes[min(place + 1, len(amplitudes) - 1)]
+        if not high > 0:
+            break
+        best, cost = float(amplitudes[place]), float(costs[place])
+        amplitudes = np.linspace(low, high, 21)
+    return best, cost
+
+
+def _shape(bend: float, power: float, count: int) -> Array:
+    return np.asarray(1.0 / (1.0 + (np.arange(count) / bend) ** power))
