@@ -121,6 +121,13 @@ class CalibrateSettings(StrictSettings):
     )
     grain: Positive = Field(0.004, description="Mean grain diameter [m]; surface energies hold for it.")
     spread: float = Field(0.15, ge=0, le=0.5, description="Grain diameters are uniform within 1 +- this [1].")
+    max_overlap: float = Field(
+        0.05,
+        ge=0.005,
+        le=0.1,
+        description="Overlap [of a diameter] to which the grains of a sheared sample are softened; the worst of its "
+        "contacts go past it, to three times as much at most. Soft grains count their overlaps in the density.",
+    )
     size: tuple[Positive, Positive, Positive] = Field(
         (10.0, 8.0, 10.0), description="Sample that is sheared: both periods and the height [mean diameters]."
     )

@@ -87,6 +87,7 @@ def run_test(
         spread=settings.spread,
         strain=settings.strain,
         inertial_number=settings.inertial_number,
+        max_overlap=settings.max_overlap,
         seed=test.seed,
         threads=settings.threads,
         tell=tell,

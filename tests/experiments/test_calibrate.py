@@ -137,6 +137,20 @@ def test_the_triaxial_angle_of_triaxial_compression_is_its_own():
         triaxial_angle(np.diag([-1.0, 1.0, 1.0]))
 
 
+def test_samples_are_as_stiff_as_asked(monkeypatch):
+    asked = {}
+
+    def shear_element(stuff, **options):
+        asked.update(options)
+        return made_up_run(stuff, options["pressure"], options["seed"])
+
+    monkeypatch.setattr(calibrate_tests, "shear_element", shear_element)
+    settings = sand(max_overlap=0.02)
+    stuff = material_at(settings, {"rolling_friction": 0.25})
+    calibrate_tests.run_test(stuff, SampleTest("loose", 500.0, 1), settings, tell=lambda share: None)
+    assert asked["max_overlap"] == 0.02 and asked["pressure"] == 500.0
+
+
 def test_the_strength_of_a_sample_is_the_mean_of_its_second_half():
     run = made_up_run(material_at(sand(), {"rolling_friction": 0.25}), 1000.0, 1)
     found = summary_of(run, 2650.0)
