@@ -10,13 +10,13 @@ Beside a name that the others call for, one of the trials that were fitted and o
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from .bounds import is_strained
 from .evidence import held_out_fit
-from .fitting import Fit, fit
+from .fitting import Fit, by_beginnings, fit
 from .gate import held_out_gate, open_gate
 from .problem import Finding
 
@@ -37,10 +37,13 @@ def allowed(trials: int) -> int:
     return max(1, round(trials / _ONE_OF))
 
 
-def astray(found: Fit, held_out: Sequence[str], *, seed: int = 0) -> tuple[Finding, ...]:
+def astray(
+    found: Fit, held_out: Sequence[str], *, seed: int = 0, recoloured: Callable[[Fit], Fit] = lambda fit: fit
+) -> tuple[Finding, ...]:
     """The fitted trials without which this model passes the gate and which it follows at first; () if there are none.
 
-    `found`: the model on all fitted trials, and where fits begin. Problems that cannot say how far they follow
+    `found`: the model on all fitted trials, and where fits begin. `recoloured`: the same fit with the noise that it
+    leaves, which is not seen as long as a trial astray is loud beside it. Problems that cannot say how far they follow
     (`follows`) have none.
     """
     problem, trials = found.model.problem, found.model.trials
@@ -59,7 +62,7 @@ def astray(found: Fit, held_out: Sequence[str], *, seed: int = 0) -> tuple[Findi
             break
         if _unexplained(found, rest) > _MOST_LEFT * _unexplained(found, trials):
             continue  # it is no affair of these
-        learned = _refitted(found, rest)
+        learned = recoloured(_refitted(found, rest))
         if is_strained(learned) or not open_gate(learned, seed=seed)[1].passed:
             continue
         values = held_out_fit(learned.model, held_out, learned.values)
@@ -118,7 +121,7 @@ def _refitted(found: Fit, trials: tuple[str, ...]) -> Fit:
     """On these trials alone, looked for anew: on all of them the fit was bent."""
     model = found.model.on(trials)
     if not model.forms or not hasattr(model.problem, "refine"):
-        return fit(model)
+        return by_beginnings(fit(model))
     (values,) = model.problem.refine([(model.forms, found.values)], trials, apart=model.scatter)
     return fit(model, values)
 

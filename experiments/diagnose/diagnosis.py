@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -17,7 +18,7 @@ from .colour import Colour, find_colours, find_loud, whitener_for
 from .effect_words import confirmation
 from .equivalence import Rival
 from .evidence import SMALL, Hypothesis, excess, held_out_fit, inflation, score, signature_matrix
-from .fitting import Fit, Model, Whitener, fit, settled
+from .fitting import Fit, Model, Whitener, by_beginnings, fit, settled
 from .gate import Verdict, held_out_gate, open_gate
 from .jitter import Jitter, find_jitter, steepness
 from .localise import Place, depends_on, latent_table, places
@@ -35,6 +36,8 @@ _MOST_FOR_COLOUR = 2.5
 """Chi-square per sample above which motion, not noise, fills the fast modes too."""
 _OTHER = 0.1
 """Change of a noise's persistence, and relative change of its size, from which on it is another one."""
+_MUCH = 3.0
+"""Standard deviations of chi-square that a fit must leave for another one to be looked for."""
 _REFITS = 400
 """Made-up campaigns of a thorough null."""
 _MARGIN = 1.5
@@ -175,7 +178,8 @@ def diagnose(
     `thorough`: nulls by full refits, which takes as long as it takes; they are kept in the folder `gates`, if given,
     for the next campaign of the same design. `aside`: fitted trials that are to take no part (`astray`). `looked_at`:
     trials that must not be held out, others are in their place: the base model explains all but these.
-    `restless`: what replicates differ by each in its own way (`unrest`) counts as noise.
+    `restless`: what replicates differ by each in its own way (`unrest`) counts as noise; asked only whether a name that
+    stands beside something unknown is there for certain.
     """
     tell = tell or (lambda what, done: None)
     if hasattr(problem, "prepare"):
@@ -215,13 +219,13 @@ def diagnose(
         tell=lambda done: tell("making the gate's null", done),
     )  # fmt: skip
     told = _Told(problem, first, findings, held_out, jitters)
-    again = partial(diagnose, problem, thorough=thorough, seed=seed, tell=tell, gates=gates, restless=restless)
+    again = partial(diagnose, thorough=thorough, seed=seed, tell=tell, gates=gates, restless=restless)
 
     def nothing(last: Verdict | None = None) -> Diagnosis:
         """None is missing as far as the fitted trials tell; once more with others held out where these tell more."""
         if missed := () if looked_at else _missed(base, held_out, seed):
             tell("what is left shows in trials that were held out: others are held out", 0.0)
-            return again(aside=aside, looked_at=missed)
+            return again(problem, aside=aside, looked_at=missed)
         findings.extend(_held_out_ways(base, held_out, seed))
         return told.finish(base, None, colours, {**model_std, **unrest.model_std}, "none", last=last)
 
@@ -272,28 +276,36 @@ def diagnose(
     choice = replace(choice, best=replace(choice.best, fit=settled(choice.best.fit)))
     held = _held_out_verdict(choice.best.fit, held_out, seed) if held_out else None
     verdict = _verdict(choice, held, held_out, seed)
-    if not aside and (gone_astray := _own_ways(base, choice, verdict, held_out, seed)):
+    if not aside and (gone_astray := _own_ways(base, choice, verdict, held_out, seed, colours)):
         tell("a trial goes its own way: once more without it", 0.0)
-        anew = again(aside=gone_astray, looked_at=looked_at)
+        anew = again(problem, aside=gone_astray, looked_at=looked_at)
         if anew.verdict != "unknown":
             return anew
-    if verdict == "unknown" and not restless and choice.best.effects and _unrest(choice.best.fit, held_out):
-        # Only a name may come of it: what has none and differs from replicate to replicate is not explained by that.
+    certain: tuple[str, ...] = ()
+    if verdict == "unknown" and not restless and choice.best.effects and (wander := _unrest(choice.best.fit, held_out)):
         tell("replicates differ each in its own way: once more, against that", 0.0)
-        anew = again(aside=aside, looked_at=looked_at, restless=True)
-        if anew.verdict in ("named", "ambiguous"):
-            return anew
-    _calmed(base, unrest)
+        anew = again(deepcopy(problem), aside=aside, looked_at=looked_at, restless=True)
+        if anew.verdict == "named" and anew.choice is not None:
+            # Fitted, and the gap taken, with the sensors' noise alone.
+            certain = anew.effects
+            best = settled(fit(base.model.with_forms(anew.forms), _unscattered(anew.best)))
+            choice = replace(anew.choice, base=choice.base, best=Hypothesis(best, score(best)), left=choice.left)
+            held = _held_out_verdict(best, held_out, seed) if held_out else None
+        model_std = {**model_std, **wander.model_std}
     if verdict in ("named", "ambiguous") and held is not None and not held.passed:
         findings += _held_out_ways(choice.best.fit, held_out, seed)
-    return told.finish(base, choice, colours, {**model_std, **unrest.model_std}, verdict, held=held)
+    model_std = {**model_std, **unrest.model_std}
+    return told.finish(base, choice, colours, model_std, verdict, held=held, certain=certain)
 
 
 def _whitened_fit(model: Model) -> Fit:
-    """Fitted, with the whitening taken at the fit."""
+    """Fitted, with the whitening taken at the fit; where it leaves something, looked for from the beginnings, too."""
     found = fit(model)
     model.problem.rewhiten(found.values, ())
-    return fit(model, found.values)
+    found = fit(model, found.values)
+    if hasattr(model.problem, "follows") and found.chi_square > found.count + _MUCH * math.sqrt(2 * found.count):
+        return by_beginnings(found)
+    return found
 
 
 def _jittered(found: Fit, held_out: tuple[str, ...], known: tuple[Jitter, ...] = ()) -> tuple[Fit, tuple[Jitter, ...]]:
@@ -434,13 +446,16 @@ def _held_out_ways(found: Fit, held_out: tuple[str, ...], seed: int) -> list[Fin
     return [own for trial in gone if (own := astray_finding(found, trial, values, set_aside=False)) is not None]
 
 
-def _own_ways(base: Fit, choice: Choice, verdict: str, held_out: tuple[str, ...], seed: int) -> tuple[Finding, ...]:
+def _own_ways(
+    base: Fit, choice: Choice, verdict: str, held_out: tuple[str, ...], seed: int, colours: Mapping[str, Colour]
+) -> tuple[Finding, ...]:
     """Trials that go ways of their own, where the base model explains all others and a name nothing but them, or where
     a name explains all others and nothing has a name as it is."""
-    gone = astray(base, held_out, seed=seed)
+    ask = partial(astray, held_out=held_out, seed=seed, recoloured=partial(_recoloured, colours=colours))
+    gone = ask(base)
     if verdict == "unknown":
         for other in () if gone else _likeliest(choice):
-            gone = gone or astray(other.fit, held_out, seed=seed)
+            gone = gone or ask(other.fit)
     elif gone:
         rest = tuple(t for t in base.model.trials if t not in {finding.trial for finding in gone})
         plain = score(fit(base.model.on(rest)))
@@ -473,8 +488,8 @@ def _verdict(choice: Choice, held: Verdict | None, held_out: tuple[str, ...], se
         values = held_out_fit(found.model, held_out, found.values)
         ask = partial(astray_held_out, found, held_out, values, seed=seed, enough=SMALL)
         passed = ask(allowed(len(held_out))) is not None
-        # Where nothing at all is left of the trials that were fitted, all held out may part, but late.
-        passed = passed or (fits and ask(len(held_out), share=_LATE) is not None)
+        # Where nothing at all is left of the trials that were fitted, all held out but one may part, and late.
+        passed = passed or (fits and ask(len(held_out) - 1, share=_LATE) is not None)
     return ("ambiguous" if choice.alternatives else "named") if passed else "unknown"
 
 
@@ -509,6 +524,7 @@ class _Told:
     def finish(
         self, base: Fit, choice: Choice | None, colours: Mapping[str, Colour], model_std: Mapping[str, float],
         verdict: str, *, last: Verdict | None = None, held: Verdict | None = None,
+        certain: tuple[str, ...] = (),
     ) -> Diagnosis:  # fmt: skip
         """The diagnosis, its gaps and places."""
         base = settled(base)
@@ -519,7 +535,8 @@ class _Told:
         before = _gap(problem, base.model, base_values, fitted, held_out)
         after = before if verdict == "none" else _gap(problem, best.model, best_values, fitted, held_out)
         if verdict == "unknown" and choice is not None and effects:
-            effects = effects if _certain(base, choice) and _closes(base, best, held_out) else ()
+            sure = effects if _certain(base, choice) and _closes(base, best, held_out) else certain
+            effects = tuple(effect for effect in effects if effect in sure)
         where = [] if verdict == "none" else places(base.model, base_values, (*fitted, *held_out))
         rivals = _smallest(choice) if choice is not None and verdict == "ambiguous" else ()
         alternatives = tuple(next(e for e in rival.effects if e not in effects) for rival in rivals)

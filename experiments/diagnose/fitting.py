@@ -19,7 +19,7 @@ from scipy.fft import dct
 from .problem import Array, Form, Parameter, Problem, Values
 from .together import each
 
-__all__ = ["Fit", "Model", "Whitener", "fit", "linearised", "scanned", "settled", "settled_slopes"]
+__all__ = ["Fit", "Model", "Whitener", "by_beginnings", "fit", "linearised", "scanned", "settled", "settled_slopes"]
 
 _ROUNDS = 30
 _DAMPINGS = (0.0, 1e-3, 1e-1, 10.0)
@@ -28,6 +28,8 @@ _SETTLING = 3
 _SCAN = np.linspace(-3.0, 3.0, 25)
 """Standard deviations of a trial's own number that are looked at for another valley."""
 _PASSES = 3
+_BEGINNINGS = (0.3, 0.5, 0.7, 0.85)
+"""Shares of their time that are looked at one after the other (`by_beginnings`)."""
 _MANY = 2**15
 """Residuals from which threads are worth their while."""
 _ENOUGH = 0.02
@@ -108,14 +110,15 @@ class Model:
         """The same with all shared parameters held at these values."""
         return replace(self, held=dict(values))
 
-    def until(self, share: float) -> Model:
-        """The same, of the trials that the problem calls `rough` only the first share of their time looked at.
+    def until(self, share: float, trials: Sequence[str] | None = None) -> Model:
+        """The same, of these trials (None: those that the problem calls `rough`) only the first share of their time
+        looked at.
 
         A motion with bounces depends on its parameters the more roughly the longer it goes on: fits that begin with its
         beginning find their way.
         """
         kept = {}
-        for trial in getattr(self.problem, "rough", ()):
+        for trial in getattr(self.problem, "rough", ()) if trials is None else trials:
             time = self.problem.samples(trial).time
             kept[trial] = (time <= time.min() + share * np.ptp(time)).astype(float)
         return replace(self, whitener=replace(self.whitener, kept=kept))
@@ -283,6 +286,19 @@ def scanned(found: Fit, *, passes: int = _PASSES) -> Fit:
             break
         found = again
     return found
+
+
+def by_beginnings(found: Fit) -> Fit:
+    """The better of `found` and a fit that begins with the beginning of all trials and looks at more of them in steps.
+
+    A motion that slips, hops and falls is the rougher in its parameters the longer it goes on; a fit to all of it at
+    once may end on a branch that nobody measured.
+    """
+    model, values = found.model, {p.name: p.value for p in found.model.parameters}
+    for share in _BEGINNINGS:
+        values = scanned(fit(model.until(share, model.trials), values), passes=1).values
+    other = scanned(fit(model, values))
+    return other if other.objective < found.objective - 1.0 else found
 
 
 def _along(found: Fit, values: Values, kind: str) -> dict[str, float]:

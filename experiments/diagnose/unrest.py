@@ -28,6 +28,7 @@ _SHARE = 0.5
 """Share of the conditions with replicates that must wander."""
 _LEAST = 3.0
 """Variance of the slowest mode, in units of the noise, from which on a condition wanders."""
+_SHARES = np.linspace(0.0, 1.0, 201)
 _BENDS, _POWERS = np.geomspace(0.5, 128.0, 9), (1.0, 1.5, 2.0, 3.0, 4.0, 8.0)
 _AMPLITUDES = np.concatenate([[0.0], np.geomspace(0.1, 1e8, 61)])
 
@@ -41,7 +42,7 @@ class Law:
     power: float
     """p."""
     amplitudes: Mapping[tuple[object, ...], float]
-    """A of each condition."""
+    """A of each condition, for one row: modes of a given wander grow with the root of the number of rows."""
     other: float
     """A of a condition without replicates."""
     std: float
@@ -69,8 +70,8 @@ class Unrest:
                 if name in self.laws:
                     law = self.laws[name]
                     amplitude = law.amplitudes.get(trial.condition, law.other)
-                    shape = _shape(law.bend, law.power, block.stop - block.start)
-                    whole[block] = 1 / np.sqrt(1.0 + amplitude * shape)
+                    count = block.stop - block.start
+                    whole[block] = 1 / np.sqrt(1.0 + amplitude * count * _shape(law.bend, law.power, count))
             found[trial.id] = whole
         return found
 
@@ -97,16 +98,21 @@ def find_unrest(found: Fit, values: Mapping[str, float], trials: Sequence[str]) 
     rows = {(trial, name): block for trial, name, block in model.channel_rows()}
     laws = {}
     for name in dict.fromkeys(name for _, name in rows):
-        squares, freedom = {}, {}
+        squares, freedom, sizes = {}, {}, {}
         for condition, ids in groups.items():
             blocks = [modes[rows[(id, name)]] for id in ids if (id, name) in rows]
             if len(blocks) < 2 or (count := min(len(block) for block in blocks)) < 2:
                 continue
-            together = np.stack([block[:count] for block in blocks])
+            sizes[condition] = float(np.mean([len(block) for block in blocks]))
+            together = np.stack([block[:count] * math.sqrt(sizes[condition] / len(block)) for block in blocks])
             squares[condition] = ((together - together.mean(axis=0)) ** 2).sum(axis=0)
             freedom[condition] = len(blocks) - 1
         if squares and (law := _law(squares, freedom)) is not None:
-            laws[name] = replace(law, std=_std(found, values, [groups[condition] for condition in squares], name))
+            amplitudes = {condition: a / sizes[condition] for condition, a in law.amplitudes.items()}
+            laws[name] = replace(
+                law, amplitudes=amplitudes, other=float(np.median(list(amplitudes.values()))),
+                std=_std(found, values, [groups[condition] for condition in squares], name),
+            )  # fmt: skip
     return Unrest(laws)
 
 
@@ -130,7 +136,7 @@ def _law(squares: Mapping[tuple[object, ...], Array], freedom: Mapping[tuple[obj
 
 
 def _std(found: Fit, values: Mapping[str, float], groups: Sequence[Sequence[str]], name: str) -> float:
-    """`Law.std`, from measured less modelled, row by row."""
+    """`Law.std`, from measured less modelled at equal shares of the time."""
     problem, forms = found.model.problem, found.model.forms
     squares, freedom, noise, count = 0.0, 0, 0.0, 0
     for ids in groups:
@@ -138,13 +144,14 @@ def _std(found: Fit, values: Mapping[str, float], groups: Sequence[Sequence[str]
         for id in ids:
             shown = problem.compare(values, forms, id).get(name)
             if shown is not None:
-                left.append(shown["measured"] - shown["model"])
+                time = shown["t_s"] - shown["t_s"][0]
+                own = shown["measured"] - shown["model"]
+                left.append(np.interp(_SHARES, time / max(float(time[-1]), 1e-300), own))
                 samples = problem.samples(id)
                 sensor.append(samples.std[samples.channel == name])
-        rows = min(len(one) for one in left)
-        together = np.stack([one[:rows] for one in left])
+        together = np.stack(left)
         squares += float(((together - together.mean(axis=0)) ** 2).sum())
-        freedom += (len(left) - 1) * rows
+        freedom += (len(left) - 1) * len(_SHARES)
         noise += float(sum((std**2).sum() for std in sensor))
         count += sum(len(std) for std in sensor)
     return math.sqrt(max(squares / freedom - noise / count, 0.0))
