@@ -205,7 +205,7 @@ def diagnose(
         findings += aside
         gone = {finding.trial for finding in aside}
         fitted = tuple(trial for trial in fitted if trial not in gone)
-        base = _whitened_fit(base.model.on(fitted))
+        base = by_beginnings(_whitened_fit(base.model.on(fitted)))
     scatter = _scatter(base, held_out)
     base, model_std = _rescattered(base, scatter) if scatter.parameters else base, scatter.model_std
     unrest = _unrest(base, held_out) if restless else Unrest({})
