@@ -160,7 +160,8 @@ class PenetrateSettings(StrictSettings):
 
     @model_validator(mode="after")
     def _fits_together(self) -> PenetrateSettings:
-        for finding in (self._spike(), self._bed(), self._runs(), self._beside()):
+        bed = None if self.ground == "spring-damper" else self._bed()  # there is none then
+        for finding in (self._spike(), bed, self._runs(), self._beside()):
             if finding:
                 raise ValueError(finding + self._perhaps_millimetres())
         return self

@@ -21,6 +21,10 @@ Array = NDArray[np.float64]
 _DEEP = 30.0
 """Diameters beyond which a depth over `_DEEP_METRES` is doubted."""
 _DEEP_METRES = 0.3
+_WIDE_METRES, _SHALLOW = 1.0, 0.02
+"""A diameter above this is doubted where the spike goes in by less than this share of it."""
+_OFF_SCALE = 30.0
+"""Ratio of a measured force and that of the spring with the stated stiffness which no doubt of it explains."""
 
 
 def penetration_oddities(tables: PenetrationCampaign, trial: PenetrationTrial, data: Recording) -> Iterator[Odd]:
@@ -45,10 +49,39 @@ def penetration_oddities(tables: PenetrationCampaign, trial: PenetrationTrial, d
             "say so",
         )
         return
+    if diameter > _WIDE_METRES and deepest < _SHALLOW * diameter:
+        yield said(
+            "depth",
+            f"diameter = {diameter:g} m, {diameter / deepest:.0f} times the greatest depth, {1e3 * deepest:.3g} mm: ",
+            f"is it in mm? {1e-3 * diameter:g} m would fit",
+        )
+    yield from _off_scale(tables, trial, depth, data)
     if trial.mode == "driven":
         yield from _driven(tables, trial, time, depth, data["force_N"], std)
     else:
         yield from _drop(tables, trial, time, depth, data["accel_m_s2"], std)
+
+
+def _off_scale(tables: PenetrationCampaign, trial: PenetrationTrial, depth: Array, data: Recording) -> Iterator[Odd]:
+    """A force, or a mass times what it is slowed down by, that is out of all proportion to K z."""
+    known = tables.uncertainty.stiffness if tables.uncertainty is not None else 0.0
+    if known is not None and known >= 1:
+        return  # a stiffness that nobody knows
+    last = int(np.nanargmax(depth))
+    near = np.abs(np.arange(len(depth)) - last) <= max(2, len(depth) // 100)
+    spring = tables.surface.stiffness * float(depth[last])
+    if trial.mode == "driven":
+        push, what, key = data["force_N"], "force_N", "[surface] stiffness"
+    else:
+        mass = tables.spike.mass or 0.0
+        push, what, key = mass * (trial.gravity - data["accel_m_s2"]), "mass (g - accel)", "[spike] mass or stiffness"
+    met = float(np.nanmedian(np.where(near, push, np.nan))) if np.isfinite(push[near]).any() else 0.0
+    if met > 0 and not 1 / _OFF_SCALE < met / spring < _OFF_SCALE:
+        yield said(
+            "force" if trial.mode == "driven" else "accel",
+            f"{what} is {met:.3g} N at {1e3 * depth[last]:.3g} mm where stiffness = {tables.surface.stiffness:g} N/m ",
+            f"makes {spring:.3g} N: is {key} in other units (N/mm, g)?",
+        )
 
 
 def _driven(

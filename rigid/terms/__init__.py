@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from types import FunctionType
 
 from .base import BASE
 from .body import BODY_EFFECTS
@@ -33,7 +35,8 @@ def find_effect(id: str) -> Term:
 def load_effect(file: str | Path) -> Term:
     """The term that the Python file `file` calls TERM.
 
-    Raises ValueError, naming the file, where there is none, or where its id is one of ours.
+    Raises ValueError, naming the file, where there is none, where its id is one of ours, and where a hook calls another
+    function of the file.
     """
     path = Path(file).resolve()
     if not path.is_file():
@@ -54,5 +57,21 @@ def load_effect(file: str | Path) -> Term:
         raise ValueError(f"file = {str(file)!r} has no TERM = rigid.terms.Term(...)")
     if term.id in EFFECTS or term.id in {base.id for base in BASE}:
         raise ValueError(f"file = {str(file)!r}: the id {term.id!r} is taken; choose another")
+    for key, hook in term.hooks.items():
+        _check_alone(hook, f"file = {str(file)!r}: hook {key!r}")
     sys.modules[name] = module
     return term
+
+
+def _check_alone(hook: Callable[..., object], said: str) -> None:
+    """Raise ValueError for a hook that calls a function of its own file: each is compiled by itself, and the call would
+    come out as nothing, without an error."""
+    own = getattr(hook, "__globals__", {})
+    code = getattr(hook, "__code__", None)
+    for called in code.co_names if code is not None else ():
+        found = own.get(called)
+        if isinstance(found, FunctionType) and found.__globals__ is own:
+            raise ValueError(
+                f"{said} calls {called}() of the same file: hooks are compiled one by one, so write what it does into "
+                f"the hook itself"
+            )

@@ -99,3 +99,11 @@ def test_a_file_that_cannot_be_fitted_is_refused_by_name(mud, tmp_path, change, 
     with pytest.raises(ValueError, match=words) as raised:
         make_problem(campaign, own=[load_own(file)])
     assert "effect.py" in str(raised.value)
+
+
+def test_a_hook_that_calls_a_function_of_its_file_is_refused_instead_of_coming_out_as_nothing(mud, tmp_path):
+    file = tmp_path / "helped.py"
+    text = mud.read_text().replace("TERM = Term(", "def grow(rate):\n    return rate\n\n\nTERM = Term(")
+    file.write_text(text.replace("max(rate, 0.0)", "grow(rate)"))
+    with pytest.raises(ValueError, match=r"helped.py.*hook 'rate_force' calls grow\(\) of the same file"):
+        load_own(file)

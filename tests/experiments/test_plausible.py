@@ -113,6 +113,22 @@ def test_a_mistake_in_a_tumble_is_said_once_by_its_cause(changes, tables, said):
     assert len(told) == 1 and all(words in told[0] for words in said), told
 
 
+@pytest.mark.parametrize(
+    ("table", "change", "said"),
+    [
+        ("spike", {"diameter": 12.0}, "is it in mm? 0.012 m would fit"),
+        ("surface", {"stiffness": 0.9}, "is [surface] stiffness in other units"),
+        ("spike", {"mass": 500.0}, "is [spike] mass or stiffness in other units"),
+    ],
+)
+def test_a_number_of_a_push_in_other_units_is_said(table, change, said):
+    """Millimetres, N/mm and grams: a newcomer's campaign passed with all three."""
+    campaign = read_campaign(TEMPLATES / "template-penetration")
+    tables = campaign.tables.model_copy(update={table: getattr(campaign.tables, table).model_copy(update=change)})
+    told = [finding.what for finding in find_faults(replace(campaign, tables=tables))]
+    assert any(said in what for what in told), told
+
+
 def test_nothing_is_wrong_with_the_templates():
     assert find_faults(read_campaign(TEMPLATES / "template-penetration")) == []
     told = [finding.what for finding in find_faults(read_campaign(TEMPLATES / "template-tumble"))]
