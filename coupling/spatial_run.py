@@ -16,12 +16,11 @@ from rigid.quaternions import to_matrix
 from rigid.spatial import SpatialTrial
 
 from .bed_footing import BedFooting
-from .books import Books
+from .followed import Followed
 from .footing import Footing, FootReaction, LawFooting
 from .master import Master
 from .poses import Twist, Vector, Wrench
 from .spatial_body import SpatialBody
-from .tumbling import AT_REST, LONGEST_PLACING, REST_TIME
 
 __all__ = ["SpatialRun"]
 
@@ -34,7 +33,7 @@ wheels [rad/s], energies and works [J] as the planar rows have them, the footing
 the deepest spike's depth [m]."""
 
 
-class SpatialRun(Books):
+class SpatialRun(Followed):
     """The platform of `trial` on `footing`, followed for `duration` [s] from where its torques begin.
 
     Parameters
@@ -96,29 +95,17 @@ class SpatialRun(Books):
         self.lowering_speed = lowering_speed
         self.placed = lowering_speed is None
         """Whether the hand has let go."""
-        self.placing_steps = 0
-        """Macro steps that the hand took."""
-        self._settling: list[Vector] = []
         self._rows: list[list[float]] = []
-        self._frames = 0
-        self._no_samples()
+        self._not_begun()
         if lowering_speed is not None:
             self.body.take_in_hand(lowering_speed)
         else:
             self.body.start(footing.lag)
             self._begin()
 
-    # How far -------------------------------------------------------------------------------------------------------
-
     @property
-    def done(self) -> bool:
-        """Whether it has come to its end."""
-        return self.placed and self.body.time >= self.duration - 0.5 * self.master.macro_step
-
-    @property
-    def time(self) -> float:
-        """Now [s]; before 0 while the hand holds it: how long it has been held, negative."""
-        return self.body.time if self.placed else -self.body.time
+    def _weight(self) -> float:
+        return float(np.linalg.norm(self.trial.weight))
 
     # Stepping ------------------------------------------------------------------------------------------------------
 
@@ -142,39 +129,13 @@ class SpatialRun(Books):
         frame_interval: float | None = None,
     ) -> dict[str, Vector]:
         """Go on to the end; `columns`. `on_frame` is called every `frame_interval` [s], and at the end."""
-        while True:
-            if on_frame and frame_interval and self.placed:
-                due = self.body.time >= self._frames * frame_interval - 0.5 * self.master.macro_step
-                self._frames += due
-                if due or self.done:
-                    on_frame(self)
-            if self.done:
-                return self.columns
-            self.advance()
-            if on_step:
-                on_step(self)
+        self._follow(on_step, on_frame, frame_interval)
+        return self.columns
 
     def _lower(self, reaction: FootReaction) -> None:
-        self.placing_steps = self.master.count
-        body, wrench, reach = self.body, self.master.wrench, self.trial.platform.reach
-        twist = body.twist
-        lack = [wrench.force + self.trial.weight, wrench.torque / reach, twist.velocity, twist.spin * reach]
-        count = max(2, round(REST_TIME / self.master.macro_step))
-        self._settling = [*self._settling, np.concatenate(lack)][-count:]
-        assert self.lowering_speed is not None
-        weight = float(np.linalg.norm(self.trial.weight))
-        if len(self._settling) == count and reaction.contacts:
-            mean = np.abs(np.mean(self._settling, axis=0))
-            if mean[:6].max() <= AT_REST * weight and mean[6:].max() <= AT_REST * self.lowering_speed:
-                body.let_go()
-                self.placed = True
-                self._begin()
-                return
-        if body.time > LONGEST_PLACING:
-            raise RuntimeError(
-                f"the platform did not come to rest within {LONGEST_PLACING:g} s of being set down: the ground carried "
-                f"{wrench.force[2]:.3g} of {weight:.3g} N at the end"
-            )
+        wrench, twist, reach = self.master.wrench, self.body.twist, self.trial.platform.reach
+        lacking = np.concatenate([wrench.force + self.trial.weight, wrench.torque / reach])
+        self._settle(reaction, lacking, np.concatenate([twist.velocity, twist.spin * reach]))
 
     def _begin(self) -> None:
         self._open_books(self.body.momentum)

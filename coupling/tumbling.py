@@ -17,23 +17,17 @@ from rigid.trajectory import STATES, Tally, Trajectory, Transition
 from rigid.trial import Trial
 
 from .bed_footing import BedFooting
-from .books import Books
 from .contact_state import ContactReader, state_of
+from .followed import REST_TIME, Followed
 from .footing import Footing, FootReaction, LawFooting
 from .master import Master
 from .planar_body import PlanarBody
 from .poses import Wrench
 
-__all__ = ["AT_REST", "MOST_REVERSAL", "CoupledTumble"]
+__all__ = ["MOST_REVERSAL", "CoupledTumble"]
 
-AT_REST = 0.005
-"""What a platform at rest may still lack of its weight, and its mean speed over the lowering speed [1]."""
-REST_TIME = 0.04
-"""For how long the signs of rest must hold [s]."""
 PLACING_WAY = 0.02
 """Lowering speed times the time that setting down took in the first runs, without REST_TIME [m]; for progress only."""
-LONGEST_PLACING = 3.0
-"""A platform that has not come to rest after this [s] is an error."""
 MOST_REVERSAL = 1e-3
 """A larger `CoupledTumble.dissipation_reversal` is worth a warning [1].
 
@@ -48,7 +42,7 @@ COLUMNS = (
 """Of a row: the planar model's names; work on the footing as the body and as the footing sees it [J]."""
 
 
-class CoupledTumble(Books):
+class CoupledTumble(Followed):
     """The platform of `trial` on `footing`, followed for `duration` [s] from where the torque begins.
 
     Parameters
@@ -114,14 +108,10 @@ class CoupledTumble(Books):
         """Between measurements of what the footing holds [s]."""
         self.placed = lowering_speed is None
         """Whether the hand has let go."""
-        self.placing_steps = 0
-        """Macro steps that the hand took."""
-        self._settling: list[tuple[float, float, float, float]] = []
         self._rows: list[list[float]] = []
         self._states: list[int] = []
         self._feet: list[np.ndarray] = []
-        self._frames = 0
-        self._no_samples()
+        self._not_begun()
         if self.placed:
             self.body.touching = rests
             self._begin()
@@ -134,14 +124,8 @@ class CoupledTumble(Books):
     # How far -------------------------------------------------------------------------------------------------------
 
     @property
-    def done(self) -> bool:
-        """Whether the time is over."""
-        return self.placed and self.body.time >= self.duration - 0.5 * self.master.macro_step
-
-    @property
-    def time(self) -> float:
-        """Now [s]; before 0 while the hand holds it: how long it has been held, negative."""
-        return self.body.time if self.placed else -self.body.time
+    def _weight(self) -> float:
+        return self.trial.weight
 
     @property
     def fraction(self) -> float:
@@ -172,42 +156,14 @@ class CoupledTumble(Books):
         frame_interval: float | None = None,
     ) -> Trajectory:
         """Go on to the end. `on_frame` is called every `frame_interval` [s] of the tumble, and at its end."""
-        while True:
-            if on_frame and frame_interval and self.placed:
-                due = self.body.time >= self._frames * frame_interval - 0.5 * self.master.macro_step
-                self._frames += due
-                if due or self.done:
-                    on_frame(self)
-            if self.done:
-                return self.trajectory()
-            self.advance()
-            if on_step:
-                on_step(self)
+        self._follow(on_step, on_frame, frame_interval)
+        return self.trajectory()
 
     def _lower(self) -> None:
         reaction = self.master.step()
-        self.placing_steps = self.master.count
-        body, wrench = self.body, self.master.wrench
-        length = self.trial.spike_length
-        self._settling.append(
-            (wrench.force[2], wrench.torque[1] / length, float(body.rates[1]), float(body.rates[2]) * length)
-        )
-        count = max(2, round(REST_TIME / self.master.macro_step))
-        self._settling = self._settling[-count:]
-        assert self.lowering_speed is not None
-        if len(self._settling) == count and reaction.contacts:
-            lift, turn, sinking, turning = np.array(self._settling).mean(axis=0)
-            near = max(abs(lift - self.trial.weight), abs(turn)) <= AT_REST * self.trial.weight
-            if near and max(abs(sinking), abs(turning)) <= AT_REST * self.lowering_speed:
-                body.let_go()
-                self.placed = True
-                self._begin()
-                return
-        if body.time > LONGEST_PLACING:
-            raise RuntimeError(
-                f"the platform did not come to rest within {LONGEST_PLACING:g} s of being set down: the ground carried "
-                f"{wrench.force[2]:.3g} of {self.trial.weight:.3g} N at the end"
-            )
+        wrench, rates, length = self.master.wrench, self.body.rates, self.trial.spike_length
+        lacking = np.array([wrench.force[2] - self.trial.weight, wrench.torque[1] / length])
+        self._settle(reaction, lacking, np.array([rates[1], rates[2] * length]))
 
     def _begin(self) -> None:
         self._open_books(self.body.momentum)
@@ -330,7 +286,7 @@ class CoupledTumble(Books):
         """Go back to what `state` gave."""
         placed, self.placing_steps, self._frames = (int(number) for number in state["tumble.counts"])
         self.placed = bool(placed)
-        self._settling = [tuple(row) for row in np.asarray(state["tumble.settling"]).tolist()]
+        self._settling = list(np.asarray(state["tumble.settling"], dtype=float))
         self._rows = np.asarray(state["tumble.rows"]).tolist()
         self._states = [int(code) for code in state["tumble.states"]]
         self._feet = list(np.asarray(state["tumble.feet"]))

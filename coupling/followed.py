@@ -1,0 +1,101 @@
+"""What all runs of a body on a footing share: how far they are, the loop to the end, the hand that sets a body down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from .books import Books
+from .footing import FootReaction
+from .poses import Vector
+
+__all__ = ["AT_REST", "REST_TIME", "Followed"]
+
+AT_REST = 0.005
+"""What a platform at rest may still lack of its weight, and its mean speed over the lowering speed [1]."""
+REST_TIME = 0.04
+"""For how long the signs of rest must hold [s]."""
+LONGEST_PLACING = 3.0
+"""A platform that has not come to rest after this [s] is an error."""
+
+
+class Followed(Books):
+    """A run that can be saved between any two macro steps. Whoever has it gives `advance`, `_begin` and `_weight`."""
+
+    body: Any
+    duration: float
+    lowering_speed: float | None
+    placed: bool
+    """Whether the hand has let go."""
+
+    def _not_begun(self) -> None:
+        self.placing_steps = 0
+        """Macro steps that the hand took."""
+        self._settling: list[Vector] = []
+        self._frames = 0
+        self._no_samples()
+
+    @property
+    def done(self) -> bool:
+        """Whether it has come to its end."""
+        return self.placed and self.body.time >= self.duration - 0.5 * self.master.macro_step
+
+    @property
+    def time(self) -> float:
+        """Now [s]; before 0 while the hand holds it: how long it has been held, negative."""
+        return self.body.time if self.placed else -self.body.time
+
+    def advance(self) -> None:
+        """One macro step; nothing once it is done."""
+        raise NotImplementedError
+
+    def _begin(self) -> None:
+        """Time is 0."""
+        raise NotImplementedError
+
+    @property
+    def _weight(self) -> float:
+        """[N]"""
+        raise NotImplementedError
+
+    def _follow(
+        self,
+        on_step: Callable[[Any], None] | None,
+        on_frame: Callable[[Any], None] | None,
+        frame_interval: float | None,
+    ) -> None:
+        """Go on to the end, with a frame every `frame_interval` [s] and at the end."""
+        while True:
+            if on_frame and frame_interval and self.placed:
+                due = self.body.time >= self._frames * frame_interval - 0.5 * self.master.macro_step
+                self._frames += due
+                if due or self.done:
+                    on_frame(self)
+            if self.done:
+                return
+            self.advance()
+            if on_step:
+                on_step(self)
+
+    def _settle(self, reaction: FootReaction, lacking: Vector, moving: Vector) -> None:
+        """A step in the hand: what of the weight the ground does not carry yet [N], and the speeds [m/s]. At rest the
+        hand lets go. Raises RuntimeError where that takes too long."""
+        self.placing_steps = self.master.count
+        count = max(2, round(REST_TIME / self.master.macro_step))
+        self._settling = [*self._settling, np.concatenate([lacking, moving])][-count:]
+        assert self.lowering_speed is not None
+        if len(self._settling) == count and reaction.contacts:
+            mean = np.abs(np.mean(self._settling, axis=0))
+            near = mean[: len(lacking)].max() <= AT_REST * self._weight
+            if near and mean[len(lacking) :].max() <= AT_REST * self.lowering_speed:
+                self.body.let_go()
+                self.placed = True
+                self._begin()
+                return
+        if self.body.time > LONGEST_PLACING:
+            raise RuntimeError(
+                f"the platform did not come to rest within {LONGEST_PLACING:g} s of being set down: the ground carried "
+                f"{self.master.wrench.force[2]:.3g} of {self._weight:.3g} N at the end"
+            )
