@@ -149,9 +149,8 @@ def whitener_for(found: Fit, colours: dict[str, Colour]) -> Whitener:
     white = Whitener.white(model.problem)
     weights = {}
     for trial in white.weights:
-        channels = list(dict.fromkeys(model.problem.samples(trial).channel.tolist()))
         whole = white.weights[trial].copy()
-        for name, block in zip(channels, white.block_slices(trial), strict=True):
+        for name, block in white.channel_blocks(model.problem, trial):
             if name in colours:
                 count = block.stop - block.start
                 power = colours[name].power((np.arange(count) + 0.5) / count)

@@ -76,6 +76,11 @@ class Whitener:
         edges = np.cumsum([0, *(len(rows) for rows in self.blocks[trial])]).tolist()
         return [slice(low, high) for low, high in itertools.pairwise(edges)]
 
+    def channel_blocks(self, problem: Problem, trial: str) -> list[tuple[str, slice]]:
+        """Each channel of a trial, and where its modes stand."""
+        channels = dict.fromkeys(problem.samples(trial).channel.tolist())
+        return list(zip(channels, self.block_slices(trial), strict=True))
+
 
 @dataclass(frozen=True)
 class Model:
@@ -144,8 +149,7 @@ class Model:
     def channel_rows(self) -> Iterator[tuple[str, str, slice]]:
         """Trial, channel and where its modes stand, of all trials that are fitted."""
         for trial, rows in self.rows().items():
-            channels = dict.fromkeys(self.problem.samples(trial).channel.tolist())
-            for channel, block in zip(channels, self.whitener.block_slices(trial), strict=True):
+            for channel, block in self.whitener.channel_blocks(self.problem, trial):
                 yield trial, channel, slice(rows.start + block.start, rows.start + block.stop)
 
 

@@ -10,7 +10,8 @@ Names of values: a base parameter by its own name (``stiffness``), a nuisance of
 effect's as ``pendulum.curvature``. Units are SI. A parameter that is not among the values given has its `value`.
 
 Where times may jitter (`jitter`), a kind of trial has `clocks` (channels whose times come from one clock), `readings`
-(what the model reads so many seconds later) and `shake` (takes jitter into the whitening) as well.
+(what the model reads so many seconds later) and `shake` (takes jitter into the whitening) as well. Where replicates may
+wander apart (`unrest`), it has `calm`, and `calmed` once that was called.
 
 A kind of trial is a class with these members (no base class to inherit), made by a function
 ``make_problem(campaign: Campaign) -> Problem`` in ``experiments/diagnose/<kind>_problem.py``.

@@ -65,8 +65,7 @@ class Unrest:
         found = {}
         for trial in problem.trials:
             whole = np.ones(len(bare.weights[trial.id]))
-            channels = dict.fromkeys(problem.samples(trial.id).channel.tolist())
-            for name, block in zip(channels, bare.block_slices(trial.id), strict=True):
+            for name, block in bare.channel_blocks(problem, trial.id):
                 if name in self.laws:
                     law = self.laws[name]
                     amplitude = law.amplitudes.get(trial.condition, law.other)
