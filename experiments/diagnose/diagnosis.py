@@ -209,7 +209,7 @@ def diagnose(
     scatter = _scatter(base, held_out)
     base, model_std = _rescattered(base, scatter) if scatter.parameters else base, scatter.model_std
     unrest = _unrest(base, held_out) if restless else Unrest({})
-    base = _calmed(base, unrest)
+    base = _doubted(_calmed(base, unrest), held_out)
     colours = _colours_of(base)
     base = _coloured(base, colours)
     tell("is anything left?", 0.0)
@@ -264,6 +264,11 @@ def diagnose(
         base, colours = _coloured(_plain(base), fresh), fresh
         left = open_gate(best, seed=seed)[1]
         choice = replace(choice, best=Hypothesis(best, score(best)), left=left)
+    if choice.best.effects:
+        best = _doubted(choice.best.fit, held_out)
+        if best is not choice.best.fit:
+            left = open_gate(best, seed=seed)[1]
+            choice = replace(choice, best=Hypothesis(best, choice.best.score), left=left)
     if thorough and choice.best.effects:
         left = open_gate(
             choice.best.fit, seed=seed, refit=True, draws=_REFITS, folder=gates,
@@ -317,6 +322,15 @@ def _jittered(found: Fit, held_out: tuple[str, ...], known: tuple[Jitter, ...] =
     problem.shake(steepness(problem, jitters, _values_of_all(found, held_out), found.model.forms))
     problem.rewhiten(found.values, found.model.forms)
     return fit(found.model, found.values), jitters
+
+
+def _doubted(found: Fit, held_out: tuple[str, ...]) -> Fit:
+    """With readings that this model makes doubtful counted for little (`TumbleProblem.doubt`), where there are any."""
+    problem: Any = found.model.problem
+    if not hasattr(problem, "doubt"):
+        return found
+    values = held_out_fit(found.model, held_out, found.values) if held_out else found.values
+    return fit(found.model, found.values) if problem.doubt(values, found.model.forms) else found
 
 
 def _plain(found: Fit) -> Fit:

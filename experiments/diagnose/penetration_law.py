@@ -9,6 +9,10 @@ depth typical of the campaign, so that amplitudes of one effect's forms compare.
 A drop is integrated by the classical Runge-Kutta method, each step cut where the spike turns, leaves or comes back
 (found by halving), since friction and damper jump there. At a turning point the forces of both directions are tried:
 where neither moves the spike, it rests for good.
+
+Friction that is mobilised over a way (`shaft_held`) is a share w of its bound, dw = (sign(dz) - w) |dz| / reach (Dahl,
+A solid friction model, TOR-0158(3107-18)-1, Aerospace Corp., 1968, with exponent 1): it stays while the spike is held.
+From where the way last turned on, w is an exponential of the depth.
 """
 
 # Taichi reads the annotations and the source of kernels: no `from __future__ import annotations` here.
@@ -37,6 +41,7 @@ SLOTS = (
     "crater_share", "crater_bend", "unload_stiffness",
     "drag", "drag_onset", "drag_reach", "drag_deep", "drag_both", "drag_tip",
     "shaft", "shaft_deep", "shaft_square", "shaft_viscous", "shaft_slow", "shaft_speed",
+    "shaft_held", "shaft_reach", "shaft_growth",
     "pull", "pull_reach", "pull_deep", "pull_growth", "pull_ever", "pull_short", "pull_viscous",
     "pull_sharpness", "shift_depth", "shift_speed",
 )  # fmt: skip
@@ -46,7 +51,7 @@ PHASES = ("free", "in", "rest", "out")
 
 _SLOT = {name: place for place, name in enumerate(SLOTS)}
 _NEVER_ZERO = {"reference": 0.01, "speed_scale": 1e-4, "radius_depth": 1e-4, "layer_depth": 0.01, "layer_width": 1e-3,
-               "hardening_reach": 1e-3, "drag_reach": 1e-3, "pull_reach": 1e-3, "shaft_speed": 1e-2}  # fmt: skip
+               "hardening_reach": 1e-3, "drag_reach": 1e-3, "pull_reach": 1e-3, "shaft_speed": 1e-2, "shaft_reach": 1e-3}  # fmt: skip
 _STEP = 5e-4
 """Longest step of a drop [s]: sqrt(m / K) of a spike on sand is tens of ms, so the error is below 1e-8 of the depth;
 `fall` takes shorter ones where a lane is stiffer."""
@@ -108,7 +113,8 @@ def fall(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDA
     ensure()
     longest = int(np.diff(starts).max())
     out = np.zeros((len(numbers), longest, 4))
-    rate = np.sqrt(np.maximum(numbers[:, _SLOT["stiffness"]], 1e-9) / numbers[:, _SLOT["mass"]])
+    held = np.abs(numbers[:, _SLOT["shaft_held"]]) / numbers[:, _SLOT["shaft_reach"]]
+    rate = np.sqrt((np.maximum(numbers[:, _SLOT["stiffness"]], 1e-9) + held) / numbers[:, _SLOT["mass"]])
     rate += np.abs(numbers[:, _SLOT["damping"]]) / numbers[:, _SLOT["mass"]]
     steps = np.minimum(_STEP, 0.05 / rate)
     _kernels(tuple(effect.term for effect in own))[1](
@@ -170,6 +176,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
     SHAFT, SHAFT_DEEP, SHAFT_SQUARE, SHAFT_VISCOUS, SHAFT_SLOW, SHAFT_SPEED = (
         S["shaft"], S["shaft_deep"], S["shaft_square"], S["shaft_viscous"], S["shaft_slow"], S["shaft_speed"],
     )  # fmt: skip
+    SHAFT_HELD, SHAFT_REACH, SHAFT_GROWTH = S["shaft_held"], S["shaft_reach"], S["shaft_growth"]
     PULL, PULL_REACH, PULL_DEEP, PULL_SHORT, PULL_VISCOUS = (
         S["pull"], S["pull_reach"], S["pull_deep"], S["pull_short"], S["pull_viscous"],
     )  # fmt: skip
@@ -221,7 +228,15 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
         return grown if depth > 0.0 else 0.0
 
     @ti.func
-    def force(z: ti.f64, v: ti.f64, way: ti.f64, top: ti.f64, deepest: ti.f64, n: ti.template(), k: ti.i32) -> ti.f64:
+    def taken(z: ti.f64, way: ti.f64, turn_z: ti.f64, turn_w: ti.f64, n: ti.template(), k: ti.i32) -> ti.f64:
+        """Share of the friction's bound at z, from `turn_w` at `turn_z` on, where the way last turned."""
+        return way + (turn_w - way) * ti.exp(-ti.abs(z - turn_z) / n[k, SHAFT_REACH])
+
+    @ti.func
+    def force(
+        z: ti.f64, v: ti.f64, way: ti.f64, top: ti.f64, deepest: ti.f64, turn_z: ti.f64, turn_w: ti.f64,
+        n: ti.template(), k: ti.i32,
+    ) -> ti.f64:  # fmt: skip
         total = 0.0
         if z > 0.0:
             most, ever = ti.max(top, z), ti.max(deepest, z)
@@ -251,6 +266,9 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
             total += (n[k, SHAFT] + n[k, SHAFT_DEEP] * x + n[k, SHAFT_SQUARE] * x * x) * way + n[k, SHAFT_VISCOUS] * v
             if n[k, SHAFT_SLOW] != 0.0:
                 total += n[k, SHAFT_SLOW] * ti.exp(-ti.abs(v) / n[k, SHAFT_SPEED]) * way
+            if n[k, SHAFT_HELD] != 0.0:
+                bound = n[k, SHAFT_HELD] * ti.pow(x, n[k, SHAFT_GROWTH])
+                total += bound * taken(z, way, turn_z, turn_w, n, k)
             if back > 0.0:
                 held = back / n[k, PULL_REACH]
                 grown = n[k, PULL]
@@ -272,13 +290,17 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
         for k in range(numbers.shape[0]):  # type: ignore[attr-defined]
             path = lane_path[k]
             top, deepest = 0.0, 0.0
+            before, share = 0.0, 0.0
             for row in range(starts[path], starts[path + 1]):
                 z, v = depth[row] + numbers[k, SHIFT_DEPTH], speed[row] + numbers[k, SHIFT_SPEED]
                 if z <= 0.0:
-                    top = 0.0
+                    top, before, share = 0.0, 0.0, 0.0
+                else:
+                    share = taken(z, 1.0 if z > before else -1.0, before, share, numbers, k)
+                    before = z
                 top, deepest = ti.max(top, z), ti.max(deepest, z)
                 way = ti.tanh(v / numbers[k, SPEED_SCALE])
-                out[k, row - starts[path]] = force(z, v, way, top, deepest, numbers, k)
+                out[k, row - starts[path]] = force(z, v, way, top, deepest, z, share, numbers, k)
 
     @ti.kernel
     def fall_all(numbers: Table, lane_path: Whole, starts: Whole, times: Line, speeds: Line, steps: Line, out: Cube):
@@ -287,6 +309,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
             m, g = numbers[k, MASS], numbers[k, GRAVITY]
             z, v, t, way = 0.0, speeds[path], 0.0, 1.0
             top, deepest = 0.0, 0.0
+            turn_z, turn_w = 0.0, 0.0
             inside, resting = 1, 0
             for row in range(starts[path], starts[path + 1]):
                 until, at = times[row], row - starts[path]
@@ -309,7 +332,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
                         for stage in range(4):
                             a = g
                             if inside == 1:
-                                a = g - force(ti.max(zs, 1e-300), vs, way, top, deepest, numbers, k) / m
+                                a = g - force(ti.max(zs, 1e-300), vs, way, top, deepest, turn_z, turn_w, numbers, k) / m
                             weight = dt / 6.0 if stage == 0 or stage == 3 else dt / 3.0
                             z1 += weight * vs
                             v1 += weight * a
@@ -338,12 +361,14 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
                                     inside, top = 0, 0.0
                                 else:
                                     inside, way = 1, 1.0
+                                turn_z, turn_w = 0.0, 0.0
                             elif found and turned:
                                 v = 0.0
+                                turn_z, turn_w = z, taken(z, way, turn_z, turn_w, numbers, k)
                                 down, up = 0.0, 0.0
                                 for side in range(2):
                                     tried = 1.0 - 2.0 * side
-                                    a = g - force(z, 0.0, tried, top, deepest, numbers, k) / m
+                                    a = g - force(z, 0.0, tried, top, deepest, turn_z, turn_w, numbers, k) / m
                                     if side == 0:
                                         down = a
                                     else:
@@ -359,7 +384,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
                     else:
                         pushed = 0.0
                         if inside == 1 and resting == 0:
-                            pushed = force(z, v, way, top, deepest, numbers, k)
+                            pushed = force(z, v, way, top, deepest, turn_z, turn_w, numbers, k)
                         out[k, at, 0] = z
                         out[k, at, 1] = v
                         out[k, at, 2] = 0.0 if resting == 1 else g - pushed / m

@@ -92,7 +92,9 @@ class Search:
         best = first[0] if first and first[0].score > self.base.score + _WORTH else self.base
         if not self._gate(best).passed:
             best = self._further(best, first)
-        best = self._backward(best)
+        whole, best = best, self._backward(best)
+        if len(best.effects) == len(whole.effects) and len(best.forms) < len(whole.forms):
+            best = self._backward(self._enriched(best))  # without the form that was in the way of others
         best, predicted, rivals = self._settle(best, first)
         if len(best.effects) == 2 and not any(rival.same for rival in rivals):
             best, predicted, rivals = self._second(best) or (best, predicted, rivals)

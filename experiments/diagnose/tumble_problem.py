@@ -42,6 +42,11 @@ _UNITS = {"mass": "kg", "inertia": "kg m2", "stiffness": "N/m", "damping": "N s/
 _STEP = 0.02  # of finite differences, in sigmas: contacts make smaller ones rough
 _SCAN = np.linspace(-3.0, 3.0, 25)
 """Standard deviations of a trial's simulated gravity that are looked at where it goes its own way."""
+_SWITCH = 5e-4
+"""From the moment of a reading [s] within which a model that jumps leaves it in doubt: one step of the integration."""
+_SEEN = 3.0
+"""Standard deviations of the noise from which on a change of what the model reads is a jump."""
+_IMU = tuple(CHANNELS.index(name) for name in ("gyro", "ax", "ay"))
 _SCATTER_STD = 0.1
 """How far replicates may differ, in each kind, while they are asked whether they do [1]."""
 
@@ -70,6 +75,12 @@ class TumbleProblem:
         self.findings = tuple(findings)
         self._index = {trial.id: k for k, trial in enumerate(data.trials)}
         self._shaken: dict[str, Shaken] = {}
+        self._along: Mapping[str, Array] = {}
+        self._switches: dict[str, Array] = {}
+
+    @property
+    def _ids(self) -> list[str]:
+        return [trial.id for trial in self.data.trials]
 
     @cached_property
     def trials(self) -> tuple[TrialInfo, ...]:
@@ -200,7 +211,28 @@ class TumbleProblem:
         return [{trial: rows[k] for trial, rows in zip(trials, residuals, strict=True)} for k in range(len(points))]
 
     def rewhiten(self, values: Values, forms: Sequence[Form]) -> None:
-        """The whitening does not depend on the values."""
+        """Take readings at a switch of the contact for doubtful, where this model switches."""
+        self.doubt(values, forms)
+
+    def doubt(self, values: Values, forms: Sequence[Form]) -> bool:
+        """Count readings of the IMU next to which the model jumps, as it does where a spike touches or a slip ends, with
+        an error as large as the jump: on which side of it they were taken no fit can tell. Whether any has changed."""
+        before = self._switches
+        self._switches = self._jumps(values, forms, self._ids)
+        self._take_in()
+        return any((self._switches[id] != before[id]).any() if id in before else self._switches[id].any()
+                   for id in self._switches)  # fmt: skip
+
+    def _jumps(self, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> dict[str, Array]:
+        """By how much the model jumps within `_SWITCH` of each reading of the IMU, over its noise; 0 where it does not."""
+        late, now, early = (self.readings(values, forms, trials, shift) for shift in (_SWITCH, 0.0, -_SWITCH))
+        found = {}
+        for trial in trials:
+            after, before = late[trial] - now[trial], now[trial] - early[trial]
+            jumps = np.abs(after - before) > np.maximum(_SEEN, 0.5 * np.abs(after + before))
+            imu = np.isin(self.data.trials[self._index[trial]].channel, _IMU)
+            found[trial] = np.where(jumps & imu & np.isfinite(after + before), after + before, 0.0)
+        return found
 
     def readings(self, values: Values, forms: Sequence[Form], trials: Sequence[str], late: float) -> dict[str, Array]:
         """What the model reads `late` seconds after each sample's time, over the stated noise, shape [sample_count]."""
@@ -218,9 +250,17 @@ class TumbleProblem:
         `along`: what one standard deviation of jitter changes in each sample, over its stated noise, by trial; {} for
         times as they stand. Readings of one clock with one time share an error.
         """
+        self._along = dict(along)
+        self._take_in()
+
+    def _take_in(self) -> None:
+        """Times that jitter and readings at a switch into the whitening."""
         self._shaken = {}
-        for id, own in along.items():
+        for id in self._ids:
             data = self.data.trials[self._index[id]]
+            own = self._along.get(id, np.zeros(len(data.time)))
+            jump = self._switches.get(id, np.zeros(len(data.time)))
+            own = np.where(np.abs(jump) > np.abs(own), jump, own)
             if own.any():
                 clock = np.array([next(k for k, names in enumerate(self.clocks) if name in names) for name in CHANNELS])
                 at = np.column_stack([clock[data.channel], data.time])
@@ -229,10 +269,11 @@ class TumbleProblem:
                 self._shaken[id] = Shaken.of(own, row, np.column_stack(zeros))
 
     def chi_square(self, values: Values, forms: Sequence[Form], trial: str) -> tuple[float, int]:
-        """With the camera's zero at its most probable value."""
+        """With the camera's zero at its most probable value; readings at a switch of the contact say nothing."""
         data = self.data.trials[self._index[trial]]
         residual = self._residual(values, forms, trial)
-        residual = residual - self._zero(data.channel, residual)
+        valid = self._jumps(values, forms, [trial])[trial] == 0
+        residual = (residual - self._zero(data.channel, residual))[valid]
         return float(residual @ residual), len(residual)
 
     def noise(self, random: np.random.Generator, trial: str) -> Array:
