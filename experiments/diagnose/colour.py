@@ -8,17 +8,18 @@ do not call for it, the noise stays as stated.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import stats
-from scipy.fft import idct
+from scipy.fft import dct, idct
 from scipy.optimize import minimize
 
 from .fitting import Fit, Whitener
 from .problem import Array
 
-__all__ = ["Colour", "find_colours", "find_loud", "whitener_for"]
+__all__ = ["Colour", "colour_of", "find_colours", "find_loud", "whitener_for"]
 
 _FAST = 0.15
 """Share of the band that counts as slow and is left out."""
@@ -30,6 +31,8 @@ _SURE = 16.0
 """Twice the log likelihood that two more numbers must gain: chance 3e-4 under white noise."""
 _PIECES, _PIECE = 8, 24
 """Pieces of a recording, and samples of one at least, over which noise has to be alike."""
+_FEWEST = 100
+"""Fast modes from which on a law is fitted."""
 _ALIKE = 0.5
 """Share of the excess, and of the correlation, that half of all pieces must show."""
 
@@ -73,26 +76,45 @@ def find_colours(found: Fit) -> dict[str, Colour]:
         places.setdefault(name, []).append(frequency[fast])
     colours = {}
     for name, parts in powers.items():
-        power, frequency = np.concatenate(parts), np.concatenate(places[name])
-        if len(power) < 100:
-            continue
-
-        def twice(numbers: Array, power: Array = power, frequency: Array = frequency) -> float:
-            std = float(np.exp(numbers[1])) if len(numbers) > 1 else 1.0
-            law = _power(frequency, std, float(np.tanh(numbers[0])))
-            return float((np.log(law) + power / law).sum())
-
-        white = float(power.sum())
-        pieces = _pieces(found, name)
-        stated = min((minimize(twice, [a], method="Nelder-Mead") for a in (0.0, 0.8)), key=lambda r: r.fun)
-        louder = minimize(twice, [stated.x[0], 0.0], method="Nelder-Mead")
-        for best in (louder, stated) if stated.fun - louder.fun > _SURE else (stated,):
-            std = float(np.exp(best.x[1])) if len(best.x) > 1 else 1.0
-            colour = Colour(name, std, float(np.clip(np.tanh(best.x[0]), -0.5, 0.97)))
-            if white - best.fun > _SURE and _steady(colour, *pieces):
-                colours[name] = colour
-                break
+        rows = [own for _, other, own in found.model.channel_rows() if other == name]
+        residuals = [idct(found.modes[own], norm="ortho") for own in rows]
+        colour = _fitted(name, np.concatenate(parts), np.concatenate(places[name]), residuals)
+        if colour is not None:
+            colours[name] = colour
     return colours
+
+
+def colour_of(channel: str, residuals: Sequence[Array]) -> Colour | None:
+    """The colour of one channel's noise from what smooth curves leave of it, an array a recording, over the stated
+    noise; None where the noise is as stated."""
+    powers, places = [], []
+    for rest in residuals:
+        frequency = np.arange(len(rest)) / len(rest)
+        powers.append(dct(rest, norm="ortho")[frequency > _FAST] ** 2)
+        places.append(frequency[frequency > _FAST])
+    return _fitted(channel, np.concatenate(powers), np.concatenate(places), residuals) if powers else None
+
+
+def _fitted(channel: str, power: Array, frequency: Array, residuals: Sequence[Array]) -> Colour | None:
+    """The law of the fast modes, where they call for one and all the time shows it."""
+    if len(power) < _FEWEST:
+        return None
+
+    def twice(numbers: Array) -> float:
+        std = float(np.exp(numbers[1])) if len(numbers) > 1 else 1.0
+        law = _power(frequency, std, float(np.tanh(numbers[0])))
+        return float((np.log(law) + power / law).sum())
+
+    white = float(power.sum())
+    pieces = _pieces(residuals)
+    stated = min((minimize(twice, [a], method="Nelder-Mead") for a in (0.0, 0.8)), key=lambda r: r.fun)
+    louder = minimize(twice, [stated.x[0], 0.0], method="Nelder-Mead")
+    for best in (louder, stated) if stated.fun - louder.fun > _SURE else (stated,):
+        std = float(np.exp(best.x[1])) if len(best.x) > 1 else 1.0
+        colour = Colour(channel, std, float(np.clip(np.tanh(best.x[0]), -0.5, 0.97)))
+        if white - best.fun > _SURE and _steady(colour, *pieces):
+            return colour
+    return None
 
 
 def find_loud(found: Fit) -> dict[str, Colour]:
@@ -117,13 +139,11 @@ def find_loud(found: Fit) -> dict[str, Colour]:
     return loud
 
 
-def _pieces(found: Fit, channel: str) -> tuple[float, float]:
+def _pieces(residuals: Sequence[Array]) -> tuple[float, float]:
     """Medians, over the pieces of all recordings of a channel, of the mean square and the lag-one correlation."""
     squares, lags = [], []
-    for _, name, rows in found.model.channel_rows():
-        if name != channel or rows.stop - rows.start < 2:
-            continue
-        for piece in _cut(idct(found.modes[rows], norm="ortho")):
+    for residual in residuals:
+        for piece in _cut(residual) if len(residual) > 1 else ():
             square = float(np.mean(piece**2))
             squares.append(square)
             lags.append(float(np.mean(piece[1:] * piece[:-1])) / max(square, 1e-300))

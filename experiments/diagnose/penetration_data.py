@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from scipy.ndimage import median_filter
 from experiments.campaign import Campaign, PenetrationCampaign, Recording
 from experiments.campaign.tables import PenetrationTrial
 
+from .colour import Colour, colour_of
 from .penetration_depth import SmoothDepth, smooth_depth
 from .penetration_drive import Holds
 from .problem import Array, Finding, TrialInfo
@@ -77,12 +79,41 @@ def prepare(campaign: Campaign) -> tuple[list[Prepared], list[Finding]]:
     if not trials:
         said = "; ".join(finding.what for finding in findings)
         raise ValueError(f"no trial of {tables.name!r} can be used: {said}")
-    trials = _alike(campaign, trials)
+    trials, colours = _recoloured(campaign, trials)
+    findings += [Finding(trial="", channel="depth", what=colour.sentence) for colour in dict.fromkeys(colours.values())]
+    trials = _alike(campaign, trials, colours)
     infos = parted([trial.info for trial in trials], {trial.info.id: _path(trial) for trial in trials})
     return [replace(trial, info=info) for trial, info in zip(trials, infos, strict=True)], findings
 
 
-def _alike(campaign: Campaign, trials: list[Prepared]) -> list[Prepared]:
+def _recoloured(campaign: Campaign, trials: list[Prepared]) -> tuple[list[Prepared], dict[str, Colour]]:
+    """Smoothed once more where the noise of the depths is not as stated, and its colour by trial.
+
+    One sensor reads all pushes; rows at another rate are as long apart as they are, so that each rate has its own.
+    """
+    assert isinstance(campaign.tables, PenetrationCampaign)
+    std = stds(campaign.tables, True)[0] if any(trial.smooth is not None for trial in trials) else 0.0
+    rates: dict[int, list[Prepared]] = {}
+    for trial in trials if std > 0 else ():
+        if trial.smooth is not None:
+            rates.setdefault(round(5 * float(np.log(np.median(np.diff(trial.time))))), []).append(trial)
+    colours: dict[str, Colour] = {}
+    for alike in rates.values():
+        left = [(trial.depth - trial.smooth.depth) / std for trial in alike if trial.smooth is not None]
+        if (colour := colour_of("depth", left)) is not None:
+            colours |= {trial.info.id: colour for trial in alike}
+    return [_again(campaign, trial, colours) if trial.info.id in colours else trial for trial in trials], colours
+
+
+def _again(campaign: Campaign, trial: Prepared, colours: Mapping[str, Colour], alike: Holds = ()) -> Prepared:
+    """The same, smoothed with what is known now."""
+    recording = campaign.recording(trial.info.id, "data")
+    assert recording is not None and isinstance(campaign.tables, PenetrationCampaign)
+    found, _ = _one(campaign.tables, trial.table, recording, alike=alike, colour=colours.get(trial.info.id))
+    return found or trial
+
+
+def _alike(campaign: Campaign, trials: list[Prepared], colours: Mapping[str, Colour]) -> list[Prepared]:
     """Smoothed once more where the holds of a push are not those of most: one machine makes all of them."""
     holds = Counter(trial.smooth.holds for trial in trials if trial.smooth is not None and trial.smooth.holds)
     if not holds:
@@ -93,10 +124,7 @@ def _alike(campaign: Campaign, trials: list[Prepared]) -> list[Prepared]:
     found = []
     for trial in trials:
         if trial.smooth is not None and trial.smooth.holds and trial.smooth.holds != usual:
-            recording = campaign.recording(trial.info.id, "data")
-            assert recording is not None and isinstance(campaign.tables, PenetrationCampaign)
-            again, _ = _one(campaign.tables, trial.table, recording, alike=usual)
-            trial = again or trial
+            trial = _again(campaign, trial, colours, usual)
         found.append(trial)
     return found
 
@@ -127,7 +155,8 @@ def stds(tables: PenetrationCampaign, driven: bool) -> tuple[float, float]:
 
 
 def _one(
-    tables: PenetrationCampaign, table: PenetrationTrial, recording: Recording, *, alike: Holds = ()
+    tables: PenetrationCampaign, table: PenetrationTrial, recording: Recording, *, alike: Holds = (),
+    colour: Colour | None = None,
 ) -> tuple[Prepared | None, list[Finding]]:
     driven = table.mode == "driven"
     channel, key = ("force", "force_N") if driven else ("accel", "accel_m_s2")
@@ -198,7 +227,7 @@ def _one(
             say(f"the force is held: {int((~held).sum())} of {len(other)} readings repeat the one before; only fresh "
                 f"ones are used", where="force")  # fmt: skip
             other[~held] = np.nan
-        return _driven(tables, table, time, depth, other, std_depth, findings, alike)
+        return _driven(tables, table, time, depth, other, std_depth, findings, alike, colour)
     has_depth, has_other = np.isfinite(depth), np.isfinite(other)
     has_other &= np.abs(time) > 1e-9  # the force jumps at the touch: neither side is wrong
     if has_depth.sum() + has_other.sum() < _FEWEST:
@@ -210,14 +239,15 @@ def _one(
 
 def _driven(
     tables: PenetrationCampaign, table: PenetrationTrial, time: Array, depth: Array, other: Array, std: float,
-    findings: list[Finding], alike: Holds,
+    findings: list[Finding], alike: Holds, colour: Colour | None,
 ) -> tuple[Prepared | None, list[Finding]]:  # fmt: skip
     known = np.isfinite(depth)
     if known.sum() < _FEWEST or (known & np.isfinite(other)).sum() < _FEWEST:
         what = f"trial {table.id}: fewer than {_FEWEST} rows hold both depth and force: it is set aside"
         findings.append(Finding(trial=table.id, what=what, set_aside=True))
         return None, findings
-    smooth = smooth_depth(time[known], depth[known], std, alike=alike)
+    louder, persistence = (max(colour.std, 1.0), colour.persistence) if colour is not None else (1.0, 0.0)
+    smooth = smooth_depth(time[known], depth[known], louder * std, alike=alike, persistence=persistence)
     both = known & np.isfinite(other)
     rows = both[known]
     smooth = replace(smooth, depth=smooth.depth[rows], speed=smooth.speed[rows], depth_error=smooth.depth_error[rows],

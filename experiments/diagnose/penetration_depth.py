@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
-from .penetration_drive import Drive, Holds, find_drive
+from .penetration_drive import Drive, Holds, Weights, find_drive
 
 __all__ = ["SmoothDepth", "smooth_depth"]
 
@@ -62,10 +62,13 @@ class SmoothDepth:
         return np.sqrt((self.speed_error**2).sum(axis=1))
 
 
-def smooth_depth(time: Array, depth: Array, std: float, *, alike: Holds = ()) -> SmoothDepth:
+def smooth_depth(
+    time: Array, depth: Array, std: float, *, alike: Holds = (), persistence: float = 0.0
+) -> SmoothDepth:
     """Smooth a depth column [m] at times [s], both of shape [n], with noise of standard deviation `std` [m].
 
-    `alike`: the holds of most of the machine's other pushes.
+    `alike`: the holds of most of the machine's other pushes. `persistence`: correlation of the noise of a row with
+    that of the next.
 
     Raises ValueError for fewer than two rows.
     """
@@ -74,13 +77,15 @@ def smooth_depth(time: Array, depth: Array, std: float, *, alike: Holds = ()) ->
     span = time[-1] - time[0]
     u = (time - time[0]) / (span if span > 0 else 1.0)
     noise = max(std, 1e-9 * max(float(np.ptp(depth)), 1e-9))
-    drive = find_drive(u, depth / noise, alike=alike) if len(u) >= _DRIVEN else None
-    curve, change, ways, hidden, intervals = _curve(u, depth / noise, drive)
+    weigh = Weights(np.ones(len(u)), persistence)
+    driven = len(u) >= _DRIVEN
+    drive = find_drive(u, depth / noise, alike=alike, persistence=persistence) if driven else None
+    curve, change, ways, hidden, intervals = _curve(u, depth / noise, drive, weigh)
     rest = depth - noise * curve
     chosen: tuple[float, Array, Array, int] | None = None
     for finer in _FINER:  # bends over the whole: gentle ones unless the column shows others
         basis, slopes, fixed = _joined(u, *ways, finer * intervals)
-        log, means, root = _shrunk(basis, fixed, rest, noise)
+        log, means, root = _shrunk(basis, fixed, rest / noise, noise, weigh)
         if chosen is None or log > chosen[0] + _SHOWN:
             chosen = (log, noise * curve + basis @ means, noise * change + slopes @ means, finer * intervals)
             errors = basis @ root, slopes @ root
@@ -88,7 +93,7 @@ def smooth_depth(time: Array, depth: Array, std: float, *, alike: Holds = ()) ->
     _, best, speed, intervals = chosen
     if hidden is not ways:
         basis, slopes, fixed = _joined(u, *hidden, intervals)
-        root = _shrunk(basis, fixed, rest, noise)[2]
+        root = _shrunk(basis, fixed, rest / noise, noise, weigh)[2]
         errors = basis @ root, slopes @ root
     span = span if span > 0 else 1.0
     holds = drive.resting if drive is not None and hidden is not ways else ()
@@ -98,7 +103,9 @@ def smooth_depth(time: Array, depth: Array, std: float, *, alike: Holds = ()) ->
 _Columns = tuple[Array, Array]
 
 
-def _curve(u: Array, measured: Array, drive: Drive | None) -> tuple[Array, Array, _Columns, _Columns, int]:
+def _curve(
+    u: Array, measured: Array, drive: Drive | None, weigh: Weights
+) -> tuple[Array, Array, _Columns, _Columns, int]:
     """A curve, its slope, columns and their slopes by which it may be moved, those by which it may be off without the
     noise showing it, and how many intervals of bends it may hide.
 
@@ -114,7 +121,7 @@ def _curve(u: Array, measured: Array, drive: Drive | None) -> tuple[Array, Array
         if basis.shape[1] > max(2, n // 3):
             break
         kinks = _MOST_KINKS if intervals <= _KINKED_INTERVALS and not good else 0
-        score, basis, slopes, places = _with_kinks(u, measured, basis, slopes, kinks)
+        score, basis, slopes, places = _with_kinks(u, measured, basis, slopes, kinks, weigh)
         if best is None or score < best[0]:
             best = (score, basis, slopes, places, intervals)
         if score - np.log(n) * basis.shape[1] < limit:
@@ -128,19 +135,22 @@ def _curve(u: Array, measured: Array, drive: Drive | None) -> tuple[Array, Array
         return np.zeros(n), np.zeros(n), ways, ways, intervals
     linear = 1 + len(drive.levels) - sum(drive.resting)  # a ramp is moved by no more than its fit has found
     depths, speeds = (columns[:, :linear] for columns in drive.changes(u))
-    return *drive.curve(u), (depths, speeds), drive.softened(u).changes(u), _BENDS
+    return *drive.curve(u), (depths, speeds), drive.softened(u, weigh).changes(u), _BENDS
 
 
-def _shrunk(basis: Array, fixed: int, depth: Array, std: float) -> tuple[float, Array, Array]:
+def _shrunk(
+    basis: Array, fixed: int, depth: Array, std: float, weigh: Weights
+) -> tuple[float, Array, Array]:
     """Evidence, coefficients and a factor of their covariance, all columns but the first `fixed` held small by a prior.
+    `depth` is over the noise, `basis` in metres.
 
     Each of these moves the curve by as much as a normal number of one common variance. The coefficients are means over
     all variances, as likely as the column makes them; their error is that of the largest variance that is at most 2
     nats less likely than the best, so that what the column cannot exclude stays in it.
     """
     size = np.maximum(np.abs(basis).max(axis=0), 1e-300)
-    x = basis / size
-    gram, right = x.T @ x / std**2, x.T @ depth / std**2
+    x = weigh(basis / size) / std
+    gram, right = x.T @ x, x.T @ weigh(depth)
     p = x.shape[1]
     extra = np.arange(p) >= fixed
     found: list[tuple[float, Array, Array]] = []
@@ -209,25 +219,27 @@ def _joined(u: Array, free: Array, slopes: Array, intervals: int) -> tuple[Array
 
 
 def _with_kinks(
-    u: Array, measured: Array, basis: Array, slopes: Array, most: int
+    u: Array, measured: Array, basis: Array, slopes: Array, most: int, weigh: Weights
 ) -> tuple[float, Array, Array, list[float]]:
     """The criterion, the columns with as many kinks as it allows, each where it helps most, and where they are."""
     n = len(u)
     places: list[float] = []
 
-    q = np.linalg.qr(basis)[0]
-    rest = measured - q @ (q.T @ measured)
+    q = np.linalg.qr(weigh(basis))[0]
+    rest = weigh(measured)
+    rest = rest - q @ (q.T @ rest)
     score = float(rest @ rest) + np.log(n) * basis.shape[1]
     grid = np.linspace(0.0, 1.0, _KINK_GRID + 2)[1:-1]
     for _ in range(min(most, n // 6)):
         if rest @ rest < n + 3 * np.sqrt(2 * n):  # nothing left that a kink could explain
             break
-        place, power = _best_kink(u, q, rest, grid)
+        place, power = _best_kink(u, q, rest, grid, weigh)
         fine = place + np.linspace(-1.2, 1.2, 41) / _KINK_GRID
-        place, power = _best_kink(u, q, rest, fine[(fine > 0) & (fine < 1)], (power,))
+        place, power = _best_kink(u, q, rest, fine[(fine > 0) & (fine < 1)], weigh, (power,))
         after = np.maximum(u - place, 0.0)
         trial = np.column_stack([basis, after**power])
-        column = trial[:, -1] - q @ (q.T @ trial[:, -1])
+        column = weigh(trial[:, -1])
+        column = column - q @ (q.T @ column)
         column /= np.linalg.norm(column)
         q_new, rest_new = np.column_stack([q, column]), rest - column * (column @ rest)
         new = float(rest_new @ rest_new) + np.log(n) * (trial.shape[1] + 1)
@@ -239,11 +251,13 @@ def _with_kinks(
     return score, basis, slopes, places
 
 
-def _best_kink(u: Array, q: Array, rest: Array, places: Array, powers: tuple[int, ...] = (1, 2)) -> tuple[float, int]:
+def _best_kink(
+    u: Array, q: Array, rest: Array, places: Array, weigh: Weights, powers: tuple[int, ...] = (1, 2)
+) -> tuple[float, int]:
     """Where a kink (power 1: the speed jumps) or a bend (2: it begins to change) takes most away, and which."""
     best = (-1.0, 0.5, 1)
     for power in powers:
-        columns = np.maximum(u[:, None] - places[None, :], 0.0) ** power
+        columns = weigh(np.maximum(u[:, None] - places[None, :], 0.0) ** power)
         whole = np.sqrt((columns**2).sum(axis=0))
         columns = columns - q @ (q.T @ columns)
         size = np.sqrt((columns**2).sum(axis=0))

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Drive", "Holds", "find_drive"]
+__all__ = ["Drive", "Holds", "Weights", "find_drive"]
 
 Array = NDArray[np.float64]
 Holds = tuple[bool, ...]
@@ -35,6 +35,31 @@ _WAYS = 2
 """Ways of adding a ramp that are fitted."""
 _AHEAD = 2
 """Ramps that may be added without a gain before the search ends: a stop and a start are worth something together."""
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Turns rows into independent ones of unit variance."""
+
+    root: Array
+    """One over the standard deviation of each row, shape [n]."""
+    persistence: float = 0.0
+    """Correlation of neighbouring rows, an autoregressive law of order one."""
+
+    def __call__(self, rows: Array) -> Array:
+        """Of shape [n] or [n, p], the same."""
+        a, x = self.persistence, (rows.T * self.root).T
+        if a:
+            x = np.concatenate([x[:1], (x[1:] - a * x[:-1]) / np.sqrt(1 - a * a)])
+        return x
+
+    def of_means(self, sizes: NDArray[np.int64]) -> Weights:
+        """For means of so many neighbouring rows, whose correlation is taken for one of order one again."""
+        a = self.persistence
+        powers = [(1 + 2 * sum((1 - k / b) * a**k for k in range(1, b))) / b for b in sizes.tolist()]
+        usual = int(sizes[0])
+        together = a * ((1 - a**usual) / (1 - a) / usual) ** 2
+        return Weights(1 / np.sqrt(np.array(powers)), float(together / powers[0]))
 
 
 @dataclass(frozen=True)
@@ -76,7 +101,7 @@ class Drive:
         shares, spent = _between(on), _between(gone)
         return self.start + spent @ self.levels, shares @ self.levels
 
-    def softened(self, u: Array) -> Drive:
+    def softened(self, u: Array, weigh: Weights) -> Drive:
         """With as wide ramps as the noise may hide, and no level at rest for certain."""
         widths = self.widths.copy()
         for k, jump in enumerate(np.diff(self.levels)):
@@ -84,7 +109,7 @@ class Drive:
                 if width > widths[k]:
                     widths[k] = width
                 by_width = _ramp_changes(u, self.middles[k], widths[k], self.round)[1]
-                if abs(jump) * widths[k] * float(np.linalg.norm(by_width)) > _HIDDEN:
+                if abs(jump) * widths[k] * float(np.linalg.norm(weigh(by_width))) > _HIDDEN:
                     break
         count = len(self.levels)
         return replace(self, widths=widths, resting=(False,) * count, even=False)
@@ -139,21 +164,24 @@ class Drive:
         return np.column_stack(on), np.column_stack(gone)
 
 
-def find_drive(u: Array, measured: Array, *, alike: Holds = ()) -> Drive:
+def find_drive(u: Array, measured: Array, *, alike: Holds = (), persistence: float = 0.0) -> Drive:
     """The motion behind depths `measured` (over their noise) at times `u` from 0 to 1, shapes [n].
 
-    `alike`: which levels are at rest in most of the machine's other pushes.
+    `alike`: which levels are at rest in most of the machine's other pushes. `persistence`: of the noise (`Weights`).
     """
     n = len(u)
     block = max(1, -(-n // _BLOCKS))
     edges = np.arange(0, n, block)
     sizes = np.diff(np.append(edges, n))
     t = np.add.reduceat(u, edges) / sizes
-    root = np.sqrt(sizes.astype(float))
+    every = Weights(np.ones(n), persistence)
+    weigh = every.of_means(sizes) if block > 1 else every
     y = np.add.reduceat(measured, edges) / sizes
-    drive = _level_fit(Drive(0.0, np.zeros(1), np.zeros(0), np.zeros(0), False, (False,)), t, y, root)
+    drive = _level_fit(Drive(0.0, np.zeros(1), np.zeros(0), np.zeros(0), False, (False,)), t, y, weigh)
     tried, idle = [drive], 0  # the best, and what came after it
     within = float(((np.repeat(y, sizes) - measured) ** 2).sum())  # what the means have taken out
+    if persistence:
+        within = float(n - len(t))
 
     def score(one: Drive) -> float:
         return one.criterion(n) + within
@@ -161,33 +189,33 @@ def find_drive(u: Array, measured: Array, *, alike: Holds = ()) -> Drive:
     for _ in range(min(_MOST_RAMPS, len(t) // 8)):
         if drive.chi_square + within < n - 2 * np.sqrt(2 * n) or idle == _AHEAD:
             break
-        ways = [_added(drive, t, y, root), *(_parted(drive, k, t, y, root) for k in range(len(drive.middles)))]
+        ways = [_added(drive, t, y, weigh), *(_parted(drive, k, t, y, weigh) for k in range(len(drive.middles)))]
         ways = sorted(ways, key=lambda way: way.chi_square)[:_WAYS]
-        drive = min((_fitted(way, t, y, root, most=12) for way in ways), key=lambda way: way.chi_square)
-        drive = _fitted(drive, t, y, root)
+        drive = min((_fitted(way, t, y, weigh, most=12) for way in ways), key=lambda way: way.chi_square)
+        drive = _fitted(drive, t, y, weigh)
         if score(drive) < score(tried[0]) - 2.0:
             tried, idle = [drive], 0
         else:
             tried.append(drive)
             idle += 1
-    plain = min((_pared(one, t, y, root, n, alike) for one in tried), key=lambda one: one.criterion(n, alike))
+    plain = min((_pared(one, t, y, weigh, n, alike) for one in tried), key=lambda one: one.criterion(n, alike))
     found = [plain]
     if len(plain.middles):  # a raised cosine is as steep as a straight ramp of two thirds of its width
-        rounder = _fitted(replace(plain, widths=1.5 * plain.widths, round=True), t, y, root)
-        found.append(_pared(rounder, t, y, root, n, alike))
+        rounder = _fitted(replace(plain, widths=1.5 * plain.widths, round=True), t, y, weigh)
+        found.append(_pared(rounder, t, y, weigh, n, alike))
     if len(plain.middles) > 1:
-        found += [_fitted(_evened(one), t, y, root) for one in found]
+        found += [_fitted(_evened(one), t, y, weigh) for one in found]
     if block > 1:
-        found = [_fitted(one, u, measured, np.ones(n), most=8) for one in found]
-    found = [_level_fit(replace(one, widths=np.maximum(one.widths, 1.0 / n)), u, measured, np.ones(n)) for one in found]
+        found = [_fitted(one, u, measured, every, most=8) for one in found]
+    found = [_level_fit(replace(one, widths=np.maximum(one.widths, 1.0 / n)), u, measured, every) for one in found]
     return min(found, key=lambda one: one.criterion(n, alike))
 
 
-def _pared(drive: Drive, t: Array, y: Array, root: Array, n: int, alike: Holds) -> Drive:
+def _pared(drive: Drive, t: Array, y: Array, weigh: Weights, n: int, alike: Holds) -> Drive:
     """With levels at rest, without needless ramps, and with holds in others, as the criterion asks for it."""
     tried: set[tuple[object, ...]] = set()
     while True:
-        columns = drive.changes(t)[0] * root[:, None]
+        columns = weigh(drive.changes(t)[0])
         size = np.linalg.norm(columns, axis=0) + 1e-300
         covariance = np.linalg.pinv((columns / size).T @ (columns / size), rcond=1e-12, hermitian=True)
         std = np.sqrt(np.maximum(np.diag(covariance), 0.0)) / size
@@ -204,13 +232,13 @@ def _pared(drive: Drive, t: Array, y: Array, root: Array, n: int, alike: Holds) 
             jump = abs(drive.levels[k + 1] - drive.levels[k])
             simpler.append((jump / max(float(std[1 : 1 + len(free)].max()), 1e-300), _without(drive, k)))
         better = None
-        holds = [_parted(drive, k, t, y, root, hold=True) for k in range(len(drive.middles))]
+        holds = [_parted(drive, k, t, y, weigh, hold=True) for k in range(len(drive.middles))]
         for one in (*(one for _, one in sorted(simpler, key=lambda pair: pair[0])[:6]), *holds):
             mark = (one.resting, tuple(np.round(one.middles, 3)))
             if mark in tried:
                 continue
             tried.add(mark)
-            one = _fitted(one, t, y, root, most=10)
+            one = _fitted(one, t, y, weigh, most=10)
             if one.criterion(n, alike) < drive.criterion(n, alike):
                 better = one
                 break
@@ -233,14 +261,15 @@ def _without(drive: Drive, k: int) -> Drive:
     return replace(drive, levels=levels, middles=drive.middles[keep], widths=drive.widths[keep], resting=resting)
 
 
-def _added(drive: Drive, t: Array, y: Array, root: Array) -> Drive:
+def _added(drive: Drive, t: Array, y: Array, weigh: Weights) -> Drive:
     """With one more ramp where it takes most away."""
-    rest = (y - drive.curve(t)[0]) * root
-    columns = drive.changes(t)[0] * root[:, None]
+    rest = weigh(y - drive.curve(t)[0])
+    columns = weigh(drive.changes(t)[0])
     q = np.linalg.qr(columns)[0]
     rest = rest - q @ (q.T @ rest)
     places = np.linspace(0.0, 1.0, _GRID + 2)[1:-1]
-    bends = np.column_stack([_ramp(t, place, _FIRST_WIDTH, drive.round)[1] for place in places]) * root[:, None]
+    bends = np.column_stack([_ramp(t, place, _FIRST_WIDTH, drive.round)[1] for place in places])
+    bends = weigh(bends)
     whole = np.linalg.norm(bends, axis=0)
     bends = bends - q @ (q.T @ bends)
     size = np.linalg.norm(bends, axis=0)
@@ -252,10 +281,10 @@ def _added(drive: Drive, t: Array, y: Array, root: Array) -> Drive:
         drive, levels=levels, middles=np.insert(drive.middles, at, place), chi_square=np.inf,
         widths=np.insert(drive.widths, at, _FIRST_WIDTH), resting=(False,) * len(levels),
     )  # fmt: skip
-    return _level_fit(new, t, y, root)
+    return _level_fit(new, t, y, weigh)
 
 
-def _parted(drive: Drive, k: int, t: Array, y: Array, root: Array, *, hold: bool = False) -> Drive:
+def _parted(drive: Drive, k: int, t: Array, y: Array, weigh: Weights, *, hold: bool = False) -> Drive:
     """With ramp k in two, a level between them, which is a `hold` or begins as the best one."""
     middle, width = drive.middles[k], max(float(drive.widths[k]), 0.02)
     middles = np.insert(drive.middles, k, middle)
@@ -265,28 +294,28 @@ def _parted(drive: Drive, k: int, t: Array, y: Array, root: Array, *, hold: bool
     levels = np.insert(drive.levels, k + 1, 0.0)
     new = replace(drive, levels=levels, middles=middles, widths=widths)
     if not hold:
-        return _level_fit(replace(new, resting=(False,) * len(levels)), t, y, root)
+        return _level_fit(replace(new, resting=(False,) * len(levels)), t, y, weigh)
     return replace(new, resting=(*drive.resting[: k + 1], True, *drive.resting[k + 1 :]))
 
 
-def _level_fit(drive: Drive, t: Array, y: Array, root: Array) -> Drive:
+def _level_fit(drive: Drive, t: Array, y: Array, weigh: Weights) -> Drive:
     """The best levels for ramps as they are."""
     free = ~np.array(drive.resting)
-    columns = np.column_stack([np.ones(len(t)), _between(drive._columns(t)[1])[:, free]]) * root[:, None]
-    found = np.linalg.lstsq(columns, y * root, rcond=1e-12)[0]
+    columns = weigh(np.column_stack([np.ones(len(t)), _between(drive._columns(t)[1])[:, free]]))
+    found = np.linalg.lstsq(columns, weigh(y), rcond=1e-12)[0]
     levels = np.zeros(len(free))
     levels[free] = found[1:]
-    rest = y * root - columns @ found
+    rest = weigh(y) - columns @ found
     return replace(drive, start=float(found[0]), levels=levels, chi_square=float(rest @ rest))
 
 
-def _fitted(drive: Drive, t: Array, y: Array, root: Array, *, most: int = 25) -> Drive:
+def _fitted(drive: Drive, t: Array, y: Array, weigh: Weights, *, most: int = 25) -> Drive:
     """All numbers by damped least squares, from where they are; the levels are the best for every set of ramps."""
-    drive = _level_fit(drive, t, y, root)
+    drive = _level_fit(drive, t, y, weigh)
     damping = 1e-3
     for _ in range(most):
-        columns = drive.changes(t)[0] * root[:, None]
-        rest = (y - drive.curve(t)[0]) * root
+        columns = weigh(drive.changes(t)[0])
+        rest = weigh(y - drive.curve(t)[0])
         size = np.linalg.norm(columns, axis=0)
         size = np.where(size > 0, size, 1.0)
         gram = (columns / size).T @ (columns / size)
@@ -294,7 +323,7 @@ def _fitted(drive: Drive, t: Array, y: Array, root: Array, *, most: int = 25) ->
         moved, before = False, drive.chi_square
         for _ in range(5):
             step = np.linalg.solve(gram + damping * np.eye(len(gram)) + 1e-12 * np.eye(len(gram)), right) / size
-            new = _level_fit(drive.moved(step), t, y, root)
+            new = _level_fit(drive.moved(step), t, y, weigh)
             if new.chi_square < drive.chi_square:
                 drive, damping, moved = new, max(0.2 * damping, 1e-9), True
                 break

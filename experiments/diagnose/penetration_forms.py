@@ -176,13 +176,15 @@ def _add_shaft(add: _Add, retreats: bool) -> None:
     add(effect, "constant", ("shaft", "perimeter", 0.3, 0.0, 10.0), starts=((0.05,),))
     if retreats:
         add(effect, "growing with depth", ("shaft_deep", "perimeter", 0.3, 0.0, 10.0), starts=((0.05,),))
-        add(effect, "of the square of depth", ("shaft_square", "perimeter", 0.3, 0.0, 10.0), starts=((0.05,),))
+        grown = ("shaft_growth", "plain", 0.0, 2.0)
+        add(effect, "by a power of depth", ("shaft_power", "perimeter", 0.3, 0.0, 10.0), grown,
+            starts=((0.05, 0.5), (0.05, 1.5)))  # fmt: skip
         add(effect, "viscous", ("shaft_viscous", "viscous", 0.3, 0.0, 10.0), starts=((0.05,),))
         add(effect, "falling with speed", ("shaft_slow", "perimeter", 0.3, 0.0, 10.0),
             ("shaft_speed", "speed", -5.0, 1.0), starts=((0.05, -1.0), (0.05, -3.0)))  # fmt: skip
         # It takes a way to turn round, and stays while the spike is held.
         add(effect, "mobilised over a way", ("shaft_held", "perimeter", 0.3, 0.0, 10.0),
-            ("shaft_reach", "depth", math.log(0.003), 0.0), ("shaft_growth", "plain", 0.0, 2.0),
+            ("shaft_reach", "depth", math.log(0.003), 0.0), grown,
             starts=((0.05, -4.0, 0.3), (0.05, -2.0, 0.3)))  # fmt: skip
 
 

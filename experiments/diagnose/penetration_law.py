@@ -40,7 +40,7 @@ SLOTS = (
     "layer_depth", "layer_width", "layer_slope", "layer_step", "layer_factor", "layer_bump",
     "crater_share", "crater_bend", "unload_stiffness",
     "drag", "drag_onset", "drag_reach", "drag_deep", "drag_both", "drag_tip",
-    "shaft", "shaft_deep", "shaft_square", "shaft_viscous", "shaft_slow", "shaft_speed",
+    "shaft", "shaft_deep", "shaft_power", "shaft_viscous", "shaft_slow", "shaft_speed",
     "shaft_held", "shaft_reach", "shaft_growth",
     "pull", "pull_reach", "pull_deep", "pull_growth", "pull_ever", "pull_short", "pull_viscous",
     "pull_sharpness", "shift_depth", "shift_speed",
@@ -51,7 +51,8 @@ PHASES = ("free", "in", "rest", "out")
 
 _SLOT = {name: place for place, name in enumerate(SLOTS)}
 _NEVER_ZERO = {"reference": 0.01, "speed_scale": 1e-4, "radius_depth": 1e-4, "layer_depth": 0.01, "layer_width": 1e-3,
-               "hardening_reach": 1e-3, "drag_reach": 1e-3, "pull_reach": 1e-3, "shaft_speed": 1e-2, "shaft_reach": 1e-3}  # fmt: skip
+               "hardening_reach": 1e-3, "drag_reach": 1e-3, "pull_reach": 1e-3, "shaft_speed": 1e-2,
+               "shaft_reach": 1e-3}  # fmt: skip
 _STEP = 5e-4
 """Longest step of a drop [s]: sqrt(m / K) of a spike on sand is tens of ms, so the error is below 1e-8 of the depth;
 `fall` takes shorter ones where a lane is stiffer."""
@@ -173,8 +174,8 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
     CRATER, UNLOAD = S["crater_share"], S["unload_stiffness"]
     DRAG, DRAG_DEEP, DRAG_BOTH, DRAG_TIP = S["drag"], S["drag_deep"], S["drag_both"], S["drag_tip"]
     DRAG_ONSET, DRAG_REACH = S["drag_onset"], S["drag_reach"]
-    SHAFT, SHAFT_DEEP, SHAFT_SQUARE, SHAFT_VISCOUS, SHAFT_SLOW, SHAFT_SPEED = (
-        S["shaft"], S["shaft_deep"], S["shaft_square"], S["shaft_viscous"], S["shaft_slow"], S["shaft_speed"],
+    SHAFT, SHAFT_DEEP, SHAFT_POWER, SHAFT_VISCOUS, SHAFT_SLOW, SHAFT_SPEED = (
+        S["shaft"], S["shaft_deep"], S["shaft_power"], S["shaft_viscous"], S["shaft_slow"], S["shaft_speed"],
     )  # fmt: skip
     SHAFT_HELD, SHAFT_REACH, SHAFT_GROWTH = S["shaft_held"], S["shaft_reach"], S["shaft_growth"]
     PULL, PULL_REACH, PULL_DEEP, PULL_SHORT, PULL_VISCOUS = (
@@ -263,7 +264,9 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
             if n[k, DRAG_ONSET] != 0.0:
                 share += n[k, DRAG_ONSET] * (1.0 - ti.exp(-z / n[k, DRAG_REACH]))
             total += share * sinking * sinking + n[k, DRAG_BOTH] * v * ti.abs(v)
-            total += (n[k, SHAFT] + n[k, SHAFT_DEEP] * x + n[k, SHAFT_SQUARE] * x * x) * way + n[k, SHAFT_VISCOUS] * v
+            total += (n[k, SHAFT] + n[k, SHAFT_DEEP] * x) * way + n[k, SHAFT_VISCOUS] * v
+            if n[k, SHAFT_POWER] != 0.0:
+                total += n[k, SHAFT_POWER] * ti.pow(x, n[k, SHAFT_GROWTH]) * way
             if n[k, SHAFT_SLOW] != 0.0:
                 total += n[k, SHAFT_SLOW] * ti.exp(-ti.abs(v) / n[k, SHAFT_SPEED]) * way
             if n[k, SHAFT_HELD] != 0.0:

@@ -215,8 +215,8 @@ class TumbleProblem:
         self.doubt(values, forms)
 
     def doubt(self, values: Values, forms: Sequence[Form]) -> bool:
-        """Count readings of the IMU next to which the model jumps, as it does where a spike touches or a slip ends, with
-        an error as large as the jump: on which side of it they were taken no fit can tell. Whether any has changed."""
+        """Count readings of the IMU next to which the model jumps, where a spike touches or a slip ends, with an error
+        as large as the jump: on which side of it they were taken no fit can tell. Says whether any has changed."""
         before = self._switches
         self._switches = self._jumps(values, forms, self._ids)
         self._take_in()
@@ -224,7 +224,8 @@ class TumbleProblem:
                    for id in self._switches)  # fmt: skip
 
     def _jumps(self, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> dict[str, Array]:
-        """By how much the model jumps within `_SWITCH` of each reading of the IMU, over its noise; 0 where it does not."""
+        """By how much the model jumps within `_SWITCH` of each reading of the IMU, over its noise; 0 where it does
+        not."""
         late, now, early = (self.readings(values, forms, trials, shift) for shift in (_SWITCH, 0.0, -_SWITCH))
         found = {}
         for trial in trials:
