@@ -76,8 +76,8 @@ def find_colours(found: Fit) -> dict[str, Colour]:
         places.setdefault(name, []).append(frequency[fast])
     colours = {}
     for name, parts in powers.items():
-        rows = [own for _, other, own in found.model.channel_rows() if other == name]
-        residuals = [idct(found.modes[own], norm="ortho") for own in rows]
+        mine = [own for _, other, own in found.model.channel_rows() if other == name]
+        residuals = [idct(found.modes[own], norm="ortho") for own in mine]
         colour = _fitted(name, np.concatenate(parts), np.concatenate(places[name]), residuals)
         if colour is not None:
             colours[name] = colour

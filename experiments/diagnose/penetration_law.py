@@ -57,6 +57,9 @@ _STEP = 5e-4
 """Longest step of a drop [s]: sqrt(m / K) of a spike on sand is tens of ms, so the error is below 1e-8 of the depth;
 `fall` takes shorter ones where a lane is stiffer."""
 
+_SETTLED = 1e-3
+"""Speed [m/s] at which a spike that comes back to a surface that bears it stays there: it would hop by 5e-8 m."""
+
 
 def slot_table(count: int, own: Sequence[OwnEffect] = ()) -> NDArray[np.float64]:
     """Numbers of `count` lanes, shape [count, slot_count]: nothing acts, and no length is zero.
@@ -160,7 +163,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
 
     State = ti.types.struct(**dict.fromkeys(STATE_FIELDS, ti.f64))
     own_spring, own_force = _own_functions(own)
-    OWN = len(own) > 0
+    OWN, SETTLED = len(own) > 0, _SETTLED
     S = _SLOT  # compile-time constants
     MASS, GRAVITY, STIFFNESS, DAMPING = S["mass"], S["gravity"], S["stiffness"], S["damping"]
     REFERENCE, SPEED_SCALE, RADIUS_DEPTH = S["reference"], S["speed_scale"], S["radius_depth"]
@@ -364,6 +367,10 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
                                     inside, top = 0, 0.0
                                 else:
                                     inside, way = 1, 1.0
+                                    # On what bears it at the surface it would hop for ever, ever less.
+                                    bears = force(1e-300, 0.0, 1.0, 0.0, deepest, 0.0, 0.0, numbers, k)
+                                    if v < SETTLED and bears > m * g:
+                                        v, resting = 0.0, 1
                                 turn_z, turn_w = 0.0, 0.0
                             elif found and turned:
                                 v = 0.0

@@ -7,7 +7,8 @@ import pytest
 from tumble_campaigns import CONDITIONS, campaign
 
 from experiments.campaign import Recording
-from experiments.diagnose.astray import allowed, astray
+from experiments.diagnose.astray import allowed, astray, astray_held_out
+from experiments.diagnose.evidence import held_out_fit
 from experiments.diagnose.fitting import Model, Whitener, fit
 from experiments.diagnose.tumble_problem import make_problem
 
@@ -57,3 +58,15 @@ def test_what_two_trials_of_six_show_is_no_affair_of_single_trials(made, moment)
 
 def test_a_trial_that_never_follows_the_model_has_not_gone_astray(made):
     assert astray_in(gone(made, "001", 0.0)) == ()
+
+
+def test_a_held_out_trial_may_part_late_and_not_early(made, moment):
+    def parted(from_s):
+        problem = make_problem(gone(made, "005", from_s))
+        found = fit(Model(problem, Whitener.white(problem), FITTED))
+        values = held_out_fit(found.model, HELD_OUT, found.values)
+        end = float(problem.samples("005").time.max())
+        return astray_held_out(found, HELD_OUT, values, 1, share=moment / end)
+
+    assert parted(0.6 * moment) is None
+    assert parted(1.3 * moment) == ("005",)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from penetration_campaigns import DAMPING, GRAVITY, MASS, STIFFNESS, campaign_of, driven_trial, drop_trial
+from penetration_campaigns import DAMPING, DEPTH_STD, GRAVITY, MASS, STIFFNESS, campaign_of, driven_trial, drop_trial
 
 from experiments.campaign import Recording, read_model
 from experiments.diagnose.bounds import is_strained
@@ -59,6 +59,38 @@ def test_dry_friction_holds_a_spike_at_rest_where_neither_side_can_move_it():
     motion = drop(np.arange(0.0, 1.0, 0.001), 0.5, damping=DAMPING, shaft=3.0)
     assert motion[-1, 3] == 2 and motion[-1, 1] == 0.0 and motion[-1, 2] == 0.0
     assert abs(MASS * GRAVITY - STIFFNESS * motion[-1, 0]) <= 3.0 + 1e-9
+
+
+def test_friction_that_is_mobilised_over_a_way_stays_in_a_hold_and_turns_round_over_that_way():
+    # dw = (sign(dz) - w) |dz| / r: w = 1 - e^(-z/r) going in, the same while held, then -1 + (w1 + 1) e^(-(Z - z)/r).
+    depth = np.concatenate([np.linspace(1e-4, 0.02, 80), np.full(20, 0.02), np.linspace(0.02, 1e-4, 80)])
+    bound, reach = 2.0, 0.003
+    force = pushed(depth, np.gradient(depth), shaft_held=bound, shaft_reach=reach)
+    there = 1 - math.exp(-0.02 / reach)
+    share = np.concatenate([1 - np.exp(-depth[:80] / reach), np.full(20, there),
+                            -1 + (there + 1) * np.exp(-(0.02 - depth[100:]) / reach)])  # fmt: skip
+    assert force == pytest.approx(STIFFNESS * depth + bound * share, abs=1e-12)
+
+
+def test_a_drop_loses_to_mobilised_friction_what_its_integral_over_the_way_says():
+    # m v^2/2 + K z^2/2 - m g z falls by f (z - r (1 - e^(-z/r))) going in, without a jump at the turn.
+    bound, reach, speed = 3.0, 0.002, 0.6
+    time = np.arange(0.0, 0.06, 0.0005)
+    depth, rate, pull, phase = drop(time, speed, shaft_held=bound, shaft_reach=reach).T
+    going = phase == 1
+    energy = 0.5 * MASS * rate**2 + 0.5 * STIFFNESS * depth**2 - MASS * GRAVITY * depth
+    lost = bound * (depth - reach * (1 - np.exp(-depth / reach)))
+    assert going.sum() > 20
+    assert energy[going] == pytest.approx(0.5 * MASS * speed**2 - lost[going], rel=1e-8)
+    turn = int(np.flatnonzero(rate < 0)[0])
+    assert MASS * abs(pull[turn] - pull[turn - 1]) < 0.5 * bound  # where Coulomb's friction jumps by twice its bound
+
+
+def test_a_spike_that_hops_on_a_crust_comes_to_rest_on_it():
+    # The crust bears 8 N at the surface and the spike weighs 4.9 N: it hops ever less, and for ever if nobody ends it.
+    time, crust = np.arange(0.0, 0.8, 0.001), {"layer_bump": 8.0, "layer_depth": 1e-4, "layer_width": 3e-3}
+    motion = drop(time, 0.3, damping=20 * DAMPING, **crust)
+    assert motion[-1, 3] == 2 and motion[-1, 0] == 0.0 and motion[-1, 1] == 0.0
 
 
 def test_a_crater_pushes_back_along_the_loading_curve_pressed_into_what_is_left():
@@ -133,6 +165,44 @@ def test_a_drive_that_ramps_up_holds_and_comes_back_is_found_with_its_ramps():
         off = smooth.speed - np.interp(time, fine, speed)
         assert smooth.holds == (True, False, True, False)
         assert np.abs(off[held]).max() < 1e-3 and np.sqrt(np.mean(off**2)) < 6e-4  # 1.4e-3 and 2.4e-3 of a spline
+
+
+def coloured(random, count, persistence):
+    noise = random.standard_normal(count)
+    for k in range(1, count):
+        noise[k] = persistence * noise[k - 1] + math.sqrt(1 - persistence**2) * noise[k]
+    return noise
+
+
+def test_the_error_of_a_depth_whose_noise_is_coloured_is_as_large_as_it_says():
+    """A correlation a from row to row leaves a mean with (1 + a) / (1 - a) times the variance that white noise does."""
+    time, std = np.linspace(0.0, 1.0, 600), 1e-4
+    depth = 0.02 * np.minimum(time / 0.5, 1.0) - 0.02 * np.maximum(time - 0.6, 0.0)
+    told = {0.0: [], 0.6: []}
+    for seed in range(6):
+        noise = std * coloured(np.random.default_rng(seed), len(time), 0.6)
+        for persistence, over in told.items():
+            smooth = smooth_depth(time, depth + noise, std, persistence=persistence)
+            over.append(np.mean(((smooth.depth - depth) / smooth.depth_std) ** 2))
+    assert np.mean(told[0.6]) < 1.5 < np.mean(told[0.0])
+
+
+@pytest.mark.parametrize("persistence", [0.0, 0.6])
+def test_the_colour_of_a_depth_sensor_is_found_in_all_pushes_together_and_said(persistence):
+    trials = []
+    for seed in range(4):
+        columns = dict(driven_trial(base, speed=0.01, seed=seed).columns)
+        noise = coloured(np.random.default_rng(10 + seed), len(columns["t_s"]), persistence)
+        columns["depth_m"] = 0.01 * columns["t_s"] + DEPTH_STD * noise
+        trials.append((f"{seed}", "driven", 0.01, Recording(columns)))
+    made = campaign_of(trials)
+    said = [finding.what for finding in make_problem(made).findings if finding.channel == "depth"]
+    if persistence:
+        (sentence,) = said
+        found = float(sentence.split("with the next by ")[1].split(":")[0])
+        assert found == pytest.approx(persistence, abs=0.1)
+    else:
+        assert said == []
 
 
 def test_a_smooth_motion_is_given_no_ramps():

@@ -8,6 +8,7 @@ import pytest
 from tumble_campaigns import CONDITIONS, campaign
 
 from experiments.campaign import Campaign, Recording, read_model
+from experiments.diagnose.fitting import Model, Whitener, fit
 from experiments.diagnose.tumble_checks import checked
 from experiments.diagnose.tumble_data import CHANNELS, tumble_data
 from experiments.diagnose.tumble_fit import Fitter
@@ -59,6 +60,45 @@ def test_without_a_window_the_specific_force_is_that_of_the_instant():
     # A sample at the very moment of a contact may fall on either side of the jump.
     assert np.median(np.abs(gap[trial.of("ax")])) < 0.01
     assert np.mean(np.abs(gap[trial.of("ay")]) > 0.5) < 0.03
+
+
+def test_a_force_that_was_read_while_the_contact_switched_is_no_misfit():
+    """The mean of what is read just before and just after a catch: no motion over stiff contacts has that."""
+    made = campaign(seed=2, off=0.5, window=0.0, conditions=CONDITIONS[:2], duration=1.8)
+    problem = make_problem(made)
+    right = fit(Model(problem, Whitener.white(problem), ("001", "002")))
+    values, samples = right.values, problem.samples("001")
+    imu = {name: np.flatnonzero(samples.channel == name) for name in ("ax", "ay")}
+
+    def read(late):
+        return problem.readings(values, (), ("001",), late)["001"]
+
+    steps = np.linspace(0.0, 0.0099, 34)
+    jumps = np.abs(np.diff([read(late)[imu["ax"]] for late in steps], axis=0))
+    step, row = np.unravel_index(np.argmax(jumps), jumps.shape)
+    low, high = steps[step], steps[step + 1]
+    first, last = (read(late)[imu["ax"][row]] for late in (low, high))
+    for _ in range(20):
+        middle = 0.5 * (low + high)
+        there = read(middle)[imu["ax"][row]]
+        low, high = (low, middle) if abs(there - first) > abs(there - last) else (middle, high)
+    columns = {name: column.copy() for name, column in made.recordings["001", "imu"].columns.items()}
+    at = int(np.argmin(np.abs(columns["t_s"] - samples.time[imu["ax"][row]])))
+    columns["t_s"][at] += high
+    size = 0.0
+    for name, places in imu.items():
+        before, after = (read(shift)[places[row]] for shift in (low, high))
+        columns[f"{name}_m_s2"][at] = 0.5 * (before + after) * samples.std[places[row]]
+        size = max(size, abs(after - before))
+    assert size > 20  # of the sensor's standard deviations
+    again = make_problem(replace(made, recordings={**made.recordings, ("001", "imu"): Recording(columns)}))
+    plain = fit(Model(again, Whitener.white(again), ("001", "002")), values)
+    again.rewhiten(values, ())
+    doubted = fit(plain.model, values)
+    assert plain.chi_square - doubted.chi_square > 0.1 * size**2
+    assert doubted.chi_square < right.chi_square + 20
+    gap, count = again.chi_square(doubted.values, (), "001")
+    assert gap / count < 1.15 and 0 < len(again.samples("001").time) - count < 12
 
 
 def test_the_whitened_sum_of_squares_is_that_of_the_noise_with_the_cameras_zero_in_it():
