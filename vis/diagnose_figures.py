@@ -280,8 +280,8 @@ def _draw_left(
                           va="center", fontsize=7.5, color=INK, annotation_clip=False)  # fmt: skip
     axis.set_xscale("log")
     axis.set_xlim(min(0.9, 0.9 * min(left)), 1.15 * most)
-    with_scatter = "sensors and replicates" if base.get("with_scatter") else "sensors"
-    axis.set_xlabel(f"chi-square per sample it leaves\n(1: the noise of the {with_scatter}; %: gap closed)")
+    noise = "noise and replicates" if base.get("with_scatter") else "noise"
+    axis.set_xlabel(f"chi-square per sample left\n(1: {noise}; %: gap closed)")
     axis.grid(False, axis="y")
     axis.xaxis.set_major_formatter(_plain_numbers)
     if most < 20:

@@ -26,6 +26,7 @@ from .next_steps import after_unknown
 from .prediction import Predicted, folds_of, predict
 from .problem import Finding, Form, Problem
 from .replicates import Scatter, exchanged, find_scatter, groups_of, odd_trials, split_trials, with_scatter
+from .scatter_gap import gap_with_scatter
 from .search import Choice, choose
 from .unrest import Unrest, find_unrest
 
@@ -552,15 +553,15 @@ class _Told:
         if verdict == "unknown":
             told, shares = depends_on(latent_table(problem, best_values, best.model.forms))
             left = places(best.model, best_values, (*fitted, *held_out))
-        return Diagnosis(
+        found = Diagnosis(
             verdict=verdict, problem=problem, base=base, best=best, base_values=base_values, best_values=best_values,
             effects=effects, alternatives=alternatives, rivals=rival_forms, where=tuple(where), before=before,
             after=after, fitted=fitted, held_out=held_out, gate_before=self.first,
             gate_after=last or (choice.left if choice is not None else self.first), gate_held_out=held, choice=choice,
             colours=colours, jitters=self.jitters, model_std=model_std, findings=findings, depends_on=told,
-            shares=shares, left=tuple(left),
-            next_experiment=_next(problem, best, best_values, choice, rival_forms, verdict, left, shares),
+            shares=shares, left=tuple(left), next_experiment="",
         )  # fmt: skip
+        return replace(found, next_experiment=_next(found))
 
 
 def _certain(base: Fit, choice: Choice) -> bool:
@@ -607,15 +608,17 @@ def _smallest(choice: Choice) -> tuple[Hypothesis, ...]:
     return (first, *(h for h in others[:1] if h.score > choice.best.score - _AS_LIKELY))
 
 
-def _next(
-    problem: Problem, best: Fit, values: Mapping[str, float], choice: Choice | None, rivals: tuple[Form, ...],
-    verdict: str, left: Sequence[Place], shares: Mapping[str, float],
-) -> str:  # fmt: skip
+def _next(found: Diagnosis) -> str:
     """The next experiment: what tells two names apart, confirms one, or follows up what has no name."""
-    if verdict == "none" or choice is None:
+    problem, choice, best = found.problem, found.choice, found.best
+    if found.verdict == "none" or choice is None:
         return "None is needed: the base model explains what these sensors can see."
-    if verdict == "named":
+    if found.verdict == "named":
         return confirmation(choice.best.effects[0])
-    if verdict == "ambiguous":
-        return problem.next_experiment(best.model.forms[0], rivals[0], best.values)
-    return after_unknown(problem, values, best.model.forms, left, shares)
+    if found.verdict == "ambiguous":
+        return problem.next_experiment(best.model.forms[0], found.rivals[0], best.values)
+    weighed = gap_with_scatter(found)
+    return after_unknown(
+        problem, found.best_values, found.forms, found.left, found.shares,
+        is_scatter=bool(found.effects) and weighed is not None and max(v or 0.0 for v in weighed.after) <= SMALL,
+    )  # fmt: skip

@@ -85,7 +85,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
     said["model_std"] = dict(found.model_std)
     said["findings"] = [
         {"trial": f.trial, "what": f.what, "channel": f.channel, "from_s": f.from_s, "to_s": f.to_s,
-         "set_aside": f.set_aside}
+         "set_aside": f.set_aside, "doubt": f.doubt}
         for f in found.findings
     ]  # fmt: skip
     said["next_experiment"] = found.next_experiment

@@ -50,10 +50,11 @@ _FOLLOW = {
 
 
 def after_unknown(
-    problem: Problem, values: Values, forms: Sequence[Form], worst: Sequence[Place], shares: Mapping[str, float]
-) -> str:
+    problem: Problem, values: Values, forms: Sequence[Form], worst: Sequence[Place], shares: Mapping[str, float],
+    *, is_scatter: bool = False,
+) -> str:  # fmt: skip
     """The next experiment, a sentence or two. `worst`: where the model that was found fails; `shares`: what the latent
-    force goes with (`localise.depends_on`)."""
+    force goes with (`localise.depends_on`); `is_scatter`: what replicates differ by is all that the model leaves."""
     sums: dict[str, float] = {}
     for place in worst:
         sums[place.trial] = sums.get(place.trial, 0.0) + place.excess
@@ -70,6 +71,12 @@ def after_unknown(
     others = f"{alike[0]} to {alike[-1]}" if len(alike) > 3 else " and ".join(alike)
     part = "nothing" if share < 0.005 else f"{100 * share:.0f} %"
     measured = f"of what is left of trial {trial}, {part} comes back in its replicates ({others})"
+    if is_scatter:
+        return (
+            f"More replicates, each prepared anew in the same way, its zeros taken each time: {measured}, and the "
+            f"model comes as near to a trial as another trial of the same condition does. Only trials that repeat "
+            f"better can show more."
+        )
     follow = _follow(shares)
     if share >= _COMMON:
         return f"It repeats: {measured}, so that it is in {problem.whole}. To find what it is, {follow}."

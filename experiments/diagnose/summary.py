@@ -43,7 +43,16 @@ def summary_sentences(said: Mapping[str, Any]) -> list[str]:
         first = [*_candidates(said), *_left(said)]
     else:
         first = sure_sentences(said)
-    return [*first, *scatter_sentence(said), f"Next experiment: {said['next_experiment']}"]
+    return [*_doubts(said), *first, *scatter_sentence(said), f"Next experiment: {said['next_experiment']}"]
+
+
+def _doubts(said: Mapping[str, Any]) -> list[str]:
+    """What in the recordings may be all that stands behind a name."""
+    found = [finding["what"] for finding in said.get("findings", []) if finding.get("doubt")]
+    if not found or said["verdict"] == "none":
+        return []
+    more = f" (and {len(found) - 1} more, see the warnings)" if len(found) > 1 else ""
+    return [f"To be put right first, for it may be all that is behind this: {found[0]}{more}."]
 
 
 def scatter_sentence(said: Mapping[str, Any]) -> list[str]:
@@ -113,11 +122,11 @@ def _why_unknown(said: Mapping[str, Any]) -> list[str]:
     gate = said["gate"]
     strained = [bound for bound in said["at_bounds"]["after"] if bound["sigmas"] is not None]
     reasons = [
-        f"{score['score']:.3g} where the gate of {which} lets {score['threshold']:.3g} pass"
+        f"{score['score']:.3g} on {which} (a right model: {score['threshold']:.3g} at most)"
         for which, score in (("the fitted trials", gate["after"]), ("those held out", gate.get("held_out")))
         if score is not None and not score["passed"]
     ]
-    said_so = [f"it leaves {' and '.join(reasons)}"] if reasons else []
+    said_so = [f"the gate stands at {' and at '.join(reasons)}"] if reasons else []
     said_so += [f"it needs {bound['parameter']} {bound['sigmas']:+.1f} sigma off what was stated" for bound in strained]
     return [f"It is not the whole answer: {'; '.join(said_so)}."] if said_so else []
 

@@ -113,7 +113,8 @@ def test_the_first_lines_of_an_unknown_name_what_leads_how_far_it_goes_and_what_
     for said in (
         "Certain: plastic-sinkage (102 nats over the base model, weighed against what replicates differ by)",
         "from 52 to 23 on the trials that were fitted, 57 % of what is beyond the noise",  # (51 - 22) / 51
-        "from 65 to 62 on those held out, 5 %", "adhesion, is 41 nats behind", "22 where the gate of the fitted trials",
+        "from 65 to 62 on those held out, 5 %", "adhesion, is 41 nats behind",
+        "the gate stands at 22 on the fitted trials",
         "phase rest (100 %) and channel force", "trial b from 0.4 to 0.9 s", "goes with depth", "Push once more.",
     ):  # fmt: skip
         assert said in words, said
