@@ -66,6 +66,8 @@ _COLUMNS: dict[str, tuple[str, float]] = {
     "latent_force_y_N": ("missing force along y [N]", 1.0),
     "latent_torque_N_m": ("missing torque [N m]", 1.0),
 }
+_NARROW = 3.0
+"""Range of chi-square up to which its axis is linear."""
 _BINS = 20
 _APART = 0.005
 """Share of the range within which bins lie at one place."""
@@ -276,17 +278,21 @@ def _draw_left(
         axis.plot(value, place, "o", color=colour, ms=5.5, zorder=3)
         closes = row.get("closes")
         if closes is not None:
-            axis.annotate(f"{100 * max(closes, 0.0):.0f} %", (1.01, place), xycoords=("axes fraction", "data"),
-                          va="center", fontsize=7.5, color=INK, annotation_clip=False)  # fmt: skip
-    axis.set_xscale("log")
-    axis.set_xlim(min(0.9, 0.9 * min(left)), 1.15 * most)
+            share = f"{100 * min(max(closes, 0.0), 1.0):.0f} %"
+            axis.annotate(share, (1.01, place), xycoords=("axes fraction", "data"), va="center", fontsize=7.5,
+                          color=INK, annotation_clip=False)  # fmt: skip
+    if most < _NARROW * min(left):
+        axis.set_xlim(min(left) - 0.1 * (most - min(left)), most + 0.1 * (most - min(left)))
+    else:
+        axis.set_xscale("log")
+        axis.set_xlim(min(0.9, 0.9 * min(left)), 1.15 * most)
+        axis.xaxis.set_major_formatter(_plain_numbers)
+        if most < 20:
+            axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axis.xaxis.set_minor_locator(NullLocator())
     noise = "noise and replicates" if base.get("with_scatter") else "noise"
     axis.set_xlabel(f"chi-square per sample left\n(1: {noise}; %: gap closed)")
     axis.grid(False, axis="y")
-    axis.xaxis.set_major_formatter(_plain_numbers)
-    if most < 20:
-        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.xaxis.set_minor_locator(NullLocator())
 
 
 def _plain_numbers(value: float, place: float) -> str:

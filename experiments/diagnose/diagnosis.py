@@ -21,12 +21,12 @@ from .evidence import SMALL, Hypothesis, excess, held_out_fit, inflation, score,
 from .fitting import Fit, Model, Whitener, by_beginnings, fit, settled
 from .gate import Verdict, held_out_gate, open_gate
 from .jitter import Jitter, find_jitter, steepness
-from .localise import Place, depends_on, latent_table, places
+from .localise import Place, depends_on, latent_table, places, places_in
 from .next_steps import after_unknown
 from .prediction import Predicted, folds_of, predict
 from .problem import Finding, Form, Problem
 from .replicates import Scatter, exchanged, find_scatter, groups_of, odd_trials, split_trials, with_scatter
-from .scatter_gap import gap_with_scatter
+from .scatter_gap import gap_with_scatter, weighed_residuals
 from .search import Choice, choose
 from .unrest import Unrest, find_unrest
 
@@ -112,7 +112,7 @@ class Diagnosis:
     depends_on: str = ""
     shares: Mapping[str, float] = field(default_factory=dict)
     left: tuple[Place, ...] = ()
-    """Where the best model fails, if the verdict is unknown."""
+    """Where the best model fails beyond what replicates differ by, if the verdict is unknown."""
 
     @property
     def forms(self) -> tuple[Form, ...]:
@@ -552,7 +552,8 @@ class _Told:
         findings = (*self.findings, *(jitter.finding for jitter in self.jitters))
         if verdict == "unknown":
             told, shares = depends_on(latent_table(problem, best_values, best.model.forms))
-            left = places(best.model, best_values, (*fitted, *held_out))
+            rest = weighed_residuals(problem, model_std, best_values, best.model.forms, (*fitted, *held_out))
+            left = places_in(problem, best_values, best.model.forms, rest)
         found = Diagnosis(
             verdict=verdict, problem=problem, base=base, best=best, base_values=base_values, best_values=best_values,
             effects=effects, alternatives=alternatives, rivals=rival_forms, where=tuple(where), before=before,

@@ -22,6 +22,10 @@ _SHARES = np.linspace(0.0, 1.0, 401)
 """Places along a trial at which replicates are compared."""
 _COMMON, _IN_PART = 0.5, 0.25
 """Shares of what is left from which on it comes back, or does in part."""
+_AS_BAD = 0.3
+"""Share of the worst trial's misfit from which on one that has replicates is asked in its place."""
+_MAINLY = 0.5
+"""Share of it from which on a phase holds it."""
 _GOES_WITH = 0.1
 """Share of the latent force that a column must explain to be followed up."""
 
@@ -47,6 +51,16 @@ _FOLLOW = {
     "state": "make one trial at another torque: see whether it stays with the phase of the motion",
 }  # fmt: skip
 """Column of latent.csv -> the trial that follows it up."""
+_FOLLOW_PHASE = {
+    "rest": "hold the spike there ten times as long, and come to the hold at a third of the speed: see whether the "
+            "force comes back, and whether it goes with the speed before",
+    "free": "run once without touching anything: what is there in the air is neither the bed's nor the tip's",
+    "out": _FOLLOW["retreat_m"],
+    "stand": "record it standing, the wheel at rest and then at speed: what is there without a motion is the sensors' "
+             "or the room's",
+    "hop": "let the platform turn in the air, held by the rig: what is there without a touch is not the surface's",
+}  # fmt: skip
+"""Phase of the motion in which most of it lies -> the same."""
 
 
 def after_unknown(
@@ -60,7 +74,10 @@ def after_unknown(
         sums[place.trial] = sums.get(place.trial, 0.0) + place.excess
     known = {trial.id: trial for trial in problem.trials}
     trial = max(sums, key=lambda name: sums[name]) if sums else problem.trials[0].id
-    alike = [id for id in groups_of(problem.trials)[known[trial].condition] if id != trial]
+    groups = groups_of(problem.trials)
+    repeated = [id for id in sums if len(groups[known[id].condition]) > 1 and sums[id] > _AS_BAD * sums[trial]]
+    trial = max(repeated, key=lambda name: sums[name]) if repeated else trial
+    alike = [id for id in groups[known[trial].condition] if id != trial]
     if not alike:
         which = f"trial {trial}, the one with the largest gap," if sums else f"trial {trial}"
         return (
@@ -77,7 +94,7 @@ def after_unknown(
             f"model comes as near to a trial as another trial of the same condition does. Only trials that repeat "
             f"better can show more."
         )
-    follow = _follow(shares)
+    follow = _follow(worst, shares)
     if share >= _COMMON:
         return f"It repeats: {measured}, so that it is in {problem.whole}. To find what it is, {follow}."
     if share >= _IN_PART:
@@ -89,7 +106,13 @@ def after_unknown(
     )
 
 
-def _follow(shares: Mapping[str, float]) -> str:
+def _follow(worst: Sequence[Place], shares: Mapping[str, float]) -> str:
+    phases: dict[str, float] = {}
+    for place in worst:
+        phases[place.phase] = phases.get(place.phase, 0.0) + place.excess
+    for phase, excess in phases.items():
+        if phase in _FOLLOW_PHASE and excess > _MAINLY * sum(phases.values()):
+            return f"since most of it is in phase {phase}, {_FOLLOW_PHASE[phase]}"
     ranked = sorted(((share, name) for name, share in shares.items() if name in _FOLLOW), reverse=True)
     if not ranked or ranked[0][0] < _GOES_WITH:
         return (

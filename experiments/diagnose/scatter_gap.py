@@ -19,7 +19,7 @@ from .problem import Array, Form, Problem, Values
 if TYPE_CHECKING:
     from .diagnosis import Diagnosis
 
-__all__ = ["ScatterGap", "gap_with_scatter", "scatter_std", "sensor_std"]
+__all__ = ["ScatterGap", "gap_with_scatter", "scatter_std", "sensor_std", "weighed_residuals"]
 
 _LOST = 1e3
 """Residual over the noise where the model cannot be integrated."""
@@ -40,26 +40,41 @@ def gap_with_scatter(found: Diagnosis) -> ScatterGap | None:
     if not found.model_std:
         return None
 
+    model_std = found.model_std
+
     def stage(values: Values, forms: Sequence[Form]) -> tuple[float, float | None]:
-        fitted = _per_sample(found, values, forms, found.fitted)
-        return fitted, _per_sample(found, values, forms, found.held_out) if found.held_out else None
+        fitted = _per_sample(found.problem, model_std, values, forms, found.fitted)
+        held_out = found.held_out
+        return fitted, _per_sample(found.problem, model_std, values, forms, held_out) if held_out else None
 
     before = stage(found.base_values, ())
     return ScatterGap(before, before if found.verdict == "none" else stage(found.best_values, found.forms))
 
 
-def _per_sample(found: Diagnosis, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> float:
-    total, count = 0.0, 0
+def _per_sample(
+    problem: Problem, model_std: Mapping[str, float], values: Values, forms: Sequence[Form], trials: Sequence[str]
+) -> float:
+    found = weighed_residuals(problem, model_std, values, forms, trials)
+    count = sum(len(rest) for rest in found.values())
+    return sum(float(rest @ rest) for rest in found.values()) / max(count, 1)
+
+
+def weighed_residuals(
+    problem: Problem, model_std: Mapping[str, float], values: Values, forms: Sequence[Form], trials: Sequence[str]
+) -> dict[str, Array]:
+    """(measured - model) over the root of the sensors' variance and that of what replicates differ by: trial ->
+    shape [sample_count]."""
+    found = {}
     for trial in trials:
-        shown = found.problem.compare(values, forms, trial)
-        stds = sensor_std(found.problem, values, forms, trial)
-        wide = scatter_std(found.problem, found.model_std, values, forms, trial)
-        for name, columns in shown.items():
-            std = np.hypot(stds[name], wide[name])
-            rest = (columns["measured"] - columns["model"]) / std
-            rest = np.where(np.isfinite(rest), rest, _LOST)
-            total, count = total + float(rest @ rest), count + len(rest)
-    return total / max(count, 1)
+        channel = problem.samples(trial).channel
+        stds = sensor_std(problem, values, forms, trial)
+        wide = scatter_std(problem, model_std, values, forms, trial)
+        whole = np.zeros(len(channel))
+        for name, columns in problem.compare(values, forms, trial).items():
+            rest = (columns["measured"] - columns["model"]) / np.hypot(stds[name], wide[name])
+            whole[channel == name] = np.where(np.isfinite(rest), rest, _LOST)
+        found[trial] = whole
+    return found
 
 
 def sensor_std(problem: Problem, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:

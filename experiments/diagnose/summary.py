@@ -177,9 +177,10 @@ def _left(said: Mapping[str, Any]) -> list[str]:
         total = sum(place["excess"] for place in places)
         phase, channel = (shares_words(places, key, total) for key in ("phase", "channel"))
         first = places[0]
+        beyond = ", beyond what replicates differ by," if "gap_with_scatter" in said else ""
         sentences.append(
-            f"What is left then is in phase {phase} and channel {channel}; its worst stretch is {first['channel']} of "
-            f"trial {first['trial']} from {first['from_s']:.4g} to {first['to_s']:.4g} s."
+            f"What is left then{beyond} is in phase {phase} and channel {channel}; its worst stretch is "
+            f"{first['channel']} of trial {first['trial']} from {first['from_s']:.4g} to {first['to_s']:.4g} s."
         )
     if "latent" in said:
         sentences.append(f"The force that is missing goes with {said['latent']['depends_on']}.")

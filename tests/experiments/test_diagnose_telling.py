@@ -7,6 +7,8 @@ import pytest
 
 from experiments.diagnose.effect_words import confirmation
 from experiments.diagnose.gaps import Gaps
+from experiments.diagnose.localise import Place
+from experiments.diagnose.next_steps import _follow
 from experiments.diagnose.summary import scatter_sentence, summary_sentences, title_words
 from experiments.diagnose.telling import PhaseTable, sure_sentences, told_tables, where_sentences
 
@@ -136,3 +138,10 @@ def test_the_gap_with_the_beds_own_share_is_said_beside_the_gap():
     (sentence,) = scatter_sentence(unknown(gap_with_scatter=weighed))
     assert "4 fitted (5 held out) with the base model and 1.1 fitted with the best one" in sentence
     assert scatter_sentence(unknown()) == []
+
+
+def test_what_to_do_next_follows_the_phase_or_the_column_that_holds_what_is_left():
+    places = [Place("1", "force", "rest", 0.0, 1.0, 60.0), Place("1", "force", "in", 0.0, 1.0, 30.0)]
+    assert "hold the spike there ten times as long" in _follow(places, {"depth_m": 0.9})
+    assert "twice as deep" in _follow(places[1:], {"depth_m": 0.9, "t_s": 0.2})
+    assert "nothing that was recorded" in _follow(places[1:], {"depth_m": 0.05})
