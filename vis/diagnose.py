@@ -72,7 +72,8 @@ def _labels(said: Mapping[str, Any]) -> tuple[str, str]:
     before, names = "base model, fitted", " + ".join(effect["id"] for effect in said["effects"])
     if said["verdict"] == "none" or said["gap"]["after"] == said["gap"]["before"]:
         return before, ""
-    return before, f"with {names}" if names else "best model found"
+    likeliest = " + ".join(said.get("leading", {}).get("effects", []))
+    return before, f"with {names}" if names else f"with {likeliest}, not certain" if likeliest else "best model found"
 
 
 # The page -------------------------------------------------------------------------------------------------------------

@@ -152,11 +152,13 @@ def draw_trajectories(channels: Sequence[Channel], held: set[str], labels: tuple
             right.plot(time, c.residual(stage), color=colour, lw=0.8, ls="-")
         left.plot(time[::step], factor * c.measured[::step], ".", color=INK, ms=2.4, zorder=2)
         for axis in (left, right):
+            low, high = axis.get_ylim()
+            axis.set_ylim(low, high + 0.07 * (high - low))  # the band along the top hides nothing
             _strip(axis, time, c.phase)
             axis.set_xlabel("time [ms]" if quick else "time [s]", labelpad=1)
         left.set_title(f"trial {c.trial}, {what}" + (" (held out)" if c.trial in held else ""))
-        left.set_ylabel(f"{what.split(',')[0]} [{unit}]")
-        right.set_ylabel("left over [std]")
+        left.set_ylabel(f"{what.split(',')[0]} [{unit}]", fontsize=8.5)
+        right.set_ylabel("left over [std]", fontsize=8.5)
     handles: list[Any] = [Line2D([], [], color=INK, ls="", marker=".", label="measured")]
     handles += [Line2D([], [], color=colour, ls=dash, label=label) for _, colour, dash, label in models]
     handles.append(Patch(color="#e3e8ec", label="± 2 std of the sensor"))
@@ -207,8 +209,12 @@ def draw_phases(rows: Sequence[Mapping[str, Any]], labels: tuple[str, str]) -> F
                 axis.plot([before, after], [place, place], color=GREY, lw=1.2, zorder=2)
                 axis.plot(after, place, "o", color=BED, ms=5.5, zorder=4)
             axis.plot(before, place, "D", color=MODEL, ms=4.8, zorder=3)
-        axis.set_xscale("log")
-        axis.xaxis.set_major_formatter(_plain_numbers)
+        shown = [float(row[stage]) for row in rows for stage in ("before", "after")]
+        if max(shown) < _NARROW:
+            axis.set_xlim(0.0, 1.1 * max(*shown, 1.5))
+        else:
+            axis.set_xscale("log")
+            axis.xaxis.set_major_formatter(_plain_numbers)
         axis.set_title(title)
         axis.set_xlabel("chi-square per sample (1: the sensors' noise)")
     axes[0].set_yticks(range(len(keys)), [f"{channel}, {phase}" for channel, phase in keys])
@@ -281,8 +287,9 @@ def _draw_left(
             share = f"{100 * min(max(closes, 0.0), 1.0):.0f} %"
             axis.annotate(share, (1.01, place), xycoords=("axes fraction", "data"), va="center", fontsize=7.5,
                           color=INK, annotation_clip=False)  # fmt: skip
-    if most < _NARROW * min(left):
-        axis.set_xlim(min(left) - 0.1 * (most - min(left)), most + 0.1 * (most - min(left)))
+    if most < _NARROW:
+        low = min(1.0, *left)
+        axis.set_xlim(low - 0.1 * max(most - low, 0.1), most + 0.1 * max(most - low, 0.1))
     else:
         axis.set_xscale("log")
         axis.set_xlim(min(0.9, 0.9 * min(left)), 1.15 * most)
@@ -349,15 +356,31 @@ def draw_latent(folder: Path, said: Mapping[str, Any], channels: Sequence[Channe
             across = factor * values[column]
             for name in dict.fromkeys(phase.tolist()):
                 own = phase == name
-                axis.plot(across[own], values[latent][own], ".", ms=1.6, color=_PHASES.get(name, GREY), alpha=0.8)
+                axis.plot(across[own], values[latent][own], ".", ms=2.2, color=_PHASES.get(name, GREY), alpha=0.8)
             axis.axhline(0.0, color=GREY, lw=0.8)
             axis.plot(*_means(across, values[latent]), "-", color=INK, lw=1.3, marker="o", ms=3)
             share = said["latent"].get("explained", {}).get(column)
             axis.set_xlabel(label + (f"; explains {100 * share:.0f} %" if share is not None else ""))
         pair[0].set_ylabel(_COLUMNS.get(latent, (latent, 1.0))[0])
+        _frame(pair[1], values[latent])
     handles = [*_phase_handles(phase), Line2D([], [], color=INK, marker="o", ms=3, label="means of equal counts")]
     drawing.legend(handles=handles, loc="outside upper left", ncols=5, fontsize=8)
     return drawing
+
+
+def _frame(axis: Axes, values: Array) -> None:
+    """A range of y that a few touches do not stretch, and how many rows lie beyond it."""
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return
+    low, high = np.percentile(known, (0.5, 99.5))
+    room = 0.5 * (high - low)
+    if room <= 0 or (known.min() > low - room and known.max() < high + room):
+        return
+    axis.set_ylim(low - room, high + room)
+    beyond = int(((known < low - room) | (known > high + room)).sum())
+    axis.text(0.99, 0.97, f"{beyond} rows beyond", transform=axis.transAxes, ha="right", va="top", fontsize=7.5,
+              color="#555555")  # fmt: skip
 
 
 def _phase_at(trials: NDArray[np.str_], time: Array, channels: Sequence[Channel]) -> NDArray[np.str_]:

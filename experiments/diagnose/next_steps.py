@@ -82,7 +82,7 @@ def after_unknown(
         which = f"trial {trial}, the one with the largest gap," if sums else f"trial {trial}"
         return (
             f"Repeat {which} twice without changing anything: what comes back is in {problem.whole}, what does not is "
-            "in the room."
+            f"in the room. And {_follow(worst, shares)}."
         )
     share = common_share(problem, values, forms, (trial, *alike))
     others = f"{alike[0]} to {alike[-1]}" if len(alike) > 3 else " and ".join(alike)
