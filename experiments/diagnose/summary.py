@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .effect_words import meaning
+from .gaps import unit_of
 from .telling import shares_words, sure_sentences
 
 __all__ = ["scatter_sentence", "summary_sentences", "title_words"]
@@ -61,11 +62,25 @@ def scatter_sentence(said: Mapping[str, Any]) -> list[str]:
     if weighed is None:
         return []
     if said["verdict"] == "none":
-        return [f"Weighed against what replicates differ by as well it is {_both(weighed['after'])}."]
+        return [
+            f"What is beyond the noise is what replicates differ by{_scatter(said)}: weighed against that as well it "
+            f"is {_both(weighed['after'])}."
+        ]
     return [
-        f"Weighed against what replicates differ by as well (1: as near as another run of the same comes), the gap is "
-        f"{_both(weighed['before'])} with the base model and {_both(weighed['after'])} with the best one."
+        f"Weighed against what replicates differ by as well{_scatter(said)}, 1 being as near as another run of the "
+        f"same comes, the gap is {_both(weighed['before'])} with the base model and {_both(weighed['after'])} with the best one."
     ]
+
+
+def _scatter(said: Mapping[str, Any]) -> str:
+    """By how much replicates differ, in parentheses: a channel in its unit, a trial's own factor in per cent."""
+    parts = []
+    for kind, std in said.get("model_std", {}).items():
+        unit, factor = unit_of(kind)
+        parts.append(
+            f"{kind.replace('_', ' ')} " + (f"{100 * std:.2g} %" if unit == "SI" else f"{factor * std:.2g} {unit}")
+        )
+    return f" ({', '.join(parts)})" if parts else ""
 
 
 def _both(gap: Mapping[str, float | None]) -> str:

@@ -135,7 +135,9 @@ def test_where_nothing_is_certain_the_candidates_are_said_with_what_each_would_c
 
 def test_the_gap_with_the_beds_own_share_is_said_beside_the_gap():
     weighed = {"before": {"fit": 4.0, "held_out": 5.0}, "after": {"fit": 1.1, "held_out": None}}
-    (sentence,) = scatter_sentence(unknown(gap_with_scatter=weighed))
+    said = unknown(gap_with_scatter=weighed, model_std={"force": 3.7, "depth": 0.0005, "static_friction": 0.08})
+    (sentence,) = scatter_sentence(said)
+    assert "(force 3.7 N, depth 0.5 mm, static friction 8 %)" in sentence
     assert "4 fitted (5 held out) with the base model and 1.1 fitted with the best one" in sentence
     assert scatter_sentence(unknown()) == []
 
