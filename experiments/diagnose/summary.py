@@ -68,7 +68,8 @@ def scatter_sentence(said: Mapping[str, Any]) -> list[str]:
         ]
     return [
         f"Weighed against what replicates differ by as well{_scatter(said)}, 1 being as near as another run of the "
-        f"same comes, the gap is {_both(weighed['before'])} with the base model and {_both(weighed['after'])} with the best one."
+        f"same comes, the gap is {_both(weighed['before'])} with the base model and "
+        f"{_both(weighed['after'])} with the best one."
     ]
 
 
