@@ -39,7 +39,8 @@ def write_diagnosis_report(folder: str | Path, *, progress: Callable[[float], No
     plans: list[tuple[str, str, str, Callable[[], Figure | None]]] = [
         ("trajectories", "Measured and modelled",
          "The channels in which the base model fails most, held-out trials last: left measured (dots) and modelled, "
-         "right what is left over the sensor's noise. The band along the top is the phase of the base model's motion.",
+         "right what is left over the sensor's noise, and, where replicates differ by more, how far that is. The band "
+         "along the top is the phase of the base model's motion.",
          lambda: draw_trajectories(shown, held, labels)),
         ("residuals", "What is left, by phase and channel",
          "Chi-square per sample with the noise that campaign.toml states. Trials held out took no part in fitting or "
@@ -85,8 +86,8 @@ def _page(said: Mapping[str, Any], result: Mapping[str, Any], drawn: Mapping[str
     which = "chi-square a sample, " + ("fitted" if gap["before"]["held_out"] is None else "held-out") + " trials"
     tiles = [
         Tile("Verdict", said["verdict"], " or ".join([named, *said["alternatives"]])),
-        Tile("Gap before", _gap(gap["before"]), which),
-        Tile("Gap after", _gap(gap["after"]), which, second=True),
+        Tile("Gap before", _gap(gap["before"]), which + _weighed(said, "before")),
+        Tile("Gap after", _gap(gap["after"]), which + _weighed(said, "after"), second=True),
     ]
     sections = [
         Section("", [listing(result.get("summary", [])), *_there(drawn, "trajectories")]),
@@ -109,6 +110,12 @@ def _page(said: Mapping[str, Any], result: Mapping[str, Any], drawn: Mapping[str
         warnings=[str(warning)[:1].upper() + str(warning)[1:] for warning in result["warnings"]],
         sections=[section for section in sections if section.blocks],
     )
+
+
+def _weighed(said: Mapping[str, Any], stage: str) -> str:
+    """The same weighed against what replicates differ by, where that is more than the sensors."""
+    weighed = said.get("gap_with_scatter")
+    return "" if weighed is None else f"; {_gap(weighed[stage])} beside what replicates differ by"
 
 
 def _gap(gap: Mapping[str, Any]) -> str:

@@ -87,6 +87,8 @@ class Channel:
     """Of the noise as the gap takes it, beside the base model and beside the best one."""
     std_after: Array
     phase: NDArray[np.str_]
+    scatter: Array | None = None
+    """What replicates differ by beyond the sensors, beside the best model; None where they differ by no more."""
 
     def residual(self, stage: str) -> Array:
         """(measured - model) / std."""
@@ -105,7 +107,8 @@ def read_channel(path: Path) -> Channel:
 
     phase = np.array(columns.get("phase", [""] * len(rows)), dtype=str)
     return Channel(trial, name, numbers("t_s"), numbers("measured"), numbers("before"), numbers("after"),
-                   numbers("std"), numbers("std_after" if "std_after" in columns else "std"), phase)  # fmt: skip
+                   numbers("std"), numbers("std_after" if "std_after" in columns else "std"), phase,
+                   numbers("scatter") if "scatter" in columns else None)  # fmt: skip
 
 
 def worst(channels: Sequence[Channel], held: set[str]) -> list[Channel]:
@@ -146,6 +149,9 @@ def draw_trajectories(channels: Sequence[Channel], held: set[str], labels: tuple
         quick = np.ptp(c.time) < 0.5
         time = c.time * (1e3 if quick else 1.0)
         step = max(1, len(time) // 160)
+        if c.scatter is not None:
+            wide = 2 * np.hypot(1.0, c.scatter / c.std_after)
+            right.fill_between(time, -wide, wide, color="#f1ead8", lw=0, zorder=0)
         right.axhspan(-2, 2, color="#e3e8ec", lw=0)
         for stage, colour, dash, _ in models:
             left.plot(time, factor * getattr(c, stage), color=colour, ls=dash, lw=1.4, zorder=3)
@@ -162,6 +168,8 @@ def draw_trajectories(channels: Sequence[Channel], held: set[str], labels: tuple
     handles: list[Any] = [Line2D([], [], color=INK, ls="", marker=".", label="measured")]
     handles += [Line2D([], [], color=colour, ls=dash, label=label) for _, colour, dash, label in models]
     handles.append(Patch(color="#e3e8ec", label="± 2 std of the sensor"))
+    if any(c.scatter is not None for c in channels):
+        handles.append(Patch(color="#f1ead8", label="and of replicates"))
     handles += _phase_handles(phase for c in channels for phase in c.phase)
     drawing.legend(handles=handles, loc="outside upper left", ncols=4, fontsize=8)
     return drawing

@@ -5,7 +5,7 @@ diagnosis.json       the contract (diagnosis.schema.json beside this file), and 
 model.toml           the model with what was added: `hedgebed tumble --model` and `penetrate --model` run it
 latent.csv           where the verdict is unknown: what the model lacks, row by row
 evidence.csv         every candidate: its score, and the chi-square a sample that it leaves beyond what noise makes
-series/<trial>.<channel>.csv    t_s,measured,before,after,std,std_after,phase (std: as the gap takes it)
+series/<trial>.<channel>.csv    t_s,measured,before,after,std,std_after,phase (as the gap takes it) and scatter
 ```
 """
 
@@ -23,7 +23,7 @@ from .evidence import excess, inflation
 from .fitting import Fit
 from .gaps import Gaps
 from .localise import phases_of
-from .scatter_gap import gap_with_scatter, sensor_std
+from .scatter_gap import gap_with_scatter, scatter_std, sensor_std
 from .telling import PhaseTable
 
 __all__ = ["document", "write_diagnosis"]
@@ -132,6 +132,7 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
         after = problem.compare(found.best_values, found.forms, trial.id)
         samples = problem.samples(trial.id)
         phases = phases_of(problem, found.base_values, (), trial.id)
+        wide = scatter_std(problem, found.model_std, found.best_values, found.forms, trial.id)
         noises = [sensor_std(problem, found.base_values, (), trial.id),
                   sensor_std(problem, found.best_values, found.forms, trial.id)]  # fmt: skip
         for channel, columns in before.items():
@@ -143,6 +144,8 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
             if len(columns["t_s"]) == int(rows_here.sum()):
                 first, last = (noise[channel] for noise in noises)
                 columns |= {"std": first, "std_after": last, "phase": phases[rows_here]}
+                if found.model_std:
+                    columns["scatter"] = wide[channel]
                 rest = [columns["measured"] - columns[stage] for stage in ("before", "after")]
                 held = trial.id in found.held_out
                 phase_table.add(channel, phases[rows_here], rest[0] / first, rest[1] / last, held_out=held)
