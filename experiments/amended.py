@@ -129,10 +129,15 @@ class AmendedLaw:
             of_k = "K and C are those fitted to this diameter" if several else "K and C are that one's"
             said.append(
                 f"the model is of a tip of {1e3 * spike.diameter:g} mm, this one has {1e3 * own.tip_diameter:g} mm: "
-                f"its effects are scaled, {of_k}"
+                f"its effects are scaled, {of_k}; --tip-diameter {spike.diameter:g} is the model's own"
             )
         if spike.tip != own.tip:
-            said.append(f"the model is of a {spike.tip} tip, this one is a {own.tip}")
+            said.append(f"the model is of a {spike.tip} tip, this one is a {own.tip}; --tip {spike.tip} is its own")
+        if spike.mass is not None and not math.isclose(spike.mass, own.mass, rel_tol=1e-3):
+            said.append(
+                f"what fell in the model's trials was {spike.mass:g} kg, a drop here moves {own.mass:g} kg under "
+                f"{own.weight:.3g} N; --mass {spike.mass:g}, and --load for what it weighs, are the model's own"
+            )
         return said
 
     def plain(self, time_step: float) -> SpringDamper:

@@ -140,12 +140,20 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
             "runs": [_entry(unit, plain[unit.id], runs[unit.id]) for unit in units],
             "spike": asdict(make_spike(settings)) | {"load": settings.weight},
             "model": {"file": settings.model, "effects": list(law.effects)},
+            "departures": {"sentences": [_spike_words(settings)]},
             "warnings": law.warnings(),
         }
         folder.write_result(result)
         progress.stage("report", total=1.0)
         write_report(folder.path, progress)
     return result
+
+
+def _spike_words(settings: PenetrateSettings) -> str:
+    return (
+        f"The spike, the model's own where no option says otherwise: a {settings.tip} of "
+        f"{1e3 * settings.tip_diameter:g} mm; a drop moves {settings.mass:g} kg under {settings.weight:.4g} N."
+    )
 
 
 def _entry(unit: Unit, plain: Penetration, amended: Penetration) -> dict[str, Any]:

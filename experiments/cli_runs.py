@@ -171,7 +171,9 @@ def _show_headline(headline: Headline, console: Console) -> None:
 
 
 def _show_all(result: dict[str, Any], console: Console) -> None:
-    """Every quantity, the tables, findings and warnings."""
+    """What it comes to, every quantity, the tables, findings and warnings."""
+    for sentence in result.get("summary", []):
+        console.print(f"- {sentence}", markup=False)
     table = Table(box=None, pad_edge=False)
     table.add_column("quantity")
     table.add_column("value", justify="right")

@@ -105,7 +105,7 @@ class PenetrateSettings(StrictSettings):
         None,
         min_length=1,
         description="A model.toml of penetration, as diagnose writes it: its law, effects and all, is run beside bed "
-        "and spring-damper.",
+        "and spring-damper. Without a bed its spike, mass and load are taken where they are not given.",
     )
     campaign: str | None = Field(
         None,
@@ -152,6 +152,16 @@ class PenetrateSettings(StrictSettings):
 
     @model_validator(mode="before")
     @classmethod
+    def _model_decides(cls, given: Any) -> Any:
+        """Without a bed nothing but the model says what the spike is."""
+        if isinstance(given, dict) and given.get("ground") == "spring-damper" and given.get("model"):
+            from .model_given import settings_of_model
+
+            return settings_of_model(given)
+        return given
+
+    @model_validator(mode="before")
+    @classmethod
     def _no_drops_are_none(cls, given: Any) -> Any:
         """Who leaves the drops out leaves them out on every seed."""
         if isinstance(given, dict) and given.get("drop_speeds", True) in ((), []):
@@ -179,6 +189,8 @@ class PenetrateSettings(StrictSettings):
         return ""
 
     def _spike(self) -> str | None:
+        if self.ground == "spring-damper":  # which has no grains, and no floor
+            return self._shaft()
         across = self.tip_diameter / self.grain
         if across < 1:
             return (
@@ -192,9 +204,8 @@ class PenetrateSettings(StrictSettings):
                 f" m, or allow_coarse for a quick look"
             )
         shaft = self.shaft_diameter
-        if shaft is not None and (shaft > self.tip_diameter or (self.tip == "flat" and shaft != self.tip_diameter)):
-            bound = "equal" if self.tip == "flat" else "be at most"
-            return f"shaft_diameter = {shaft:g} m must {bound} tip_diameter, {self.tip_diameter:g} m"
+        if finding := self._shaft():
+            return finding
         if shaft is not None and shaft < self.grain:
             return (
                 f"shaft_diameter = {shaft:g} m is thinner than the grains (grain = {self.grain:g} m): at least "
@@ -217,6 +228,13 @@ class PenetrateSettings(StrictSettings):
                 f"deep (bed_size less tip_diameter): at least {reach - self.tip_height:.3g} m would do, or a shallower "
                 f"bed"
             )
+        return None
+
+    def _shaft(self) -> str | None:
+        shaft = self.shaft_diameter
+        if shaft is not None and (shaft > self.tip_diameter or (self.tip == "flat" and shaft != self.tip_diameter)):
+            bound = "equal" if self.tip == "flat" else "be at most"
+            return f"shaft_diameter = {shaft:g} m must {bound} tip_diameter, {self.tip_diameter:g} m"
         return None
 
     def _bed(self) -> str | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -39,15 +39,17 @@ def write_diagnosis_report(folder: str | Path, *, progress: Callable[[float], No
     plans: list[tuple[str, str, str, Callable[[], Figure | None]]] = [
         ("trajectories", "Measured and modelled",
          "The channels in which the base model fails most, held-out trials last: left measured (dots) and modelled, "
-         "right what is left over the sensor's noise. The band along the top is the phase of the base model's motion.",
+         "right what is left over the sensor's noise, and, where replicates differ by more, how far that is. The band "
+         "along the top is the phase of the base model's motion.",
          lambda: draw_trajectories(shown, held, labels)),
         ("residuals", "What is left, by phase and channel",
          "Chi-square per sample with the noise that campaign.toml states. Trials held out took no part in fitting or "
          "choosing.",
          lambda: draw_phases(said.get("by_phase", []), labels)),
         ("evidence", "What every candidate explains",
-         "Log evidence over the base model, tempered for misfit of form: the best form of each name, and of sets of "
-         "names those that beat all of their parts.",
+         "The best form of each name, and of sets of names those that beat all of their parts. Left: log evidence over "
+         "the base model, tempered for misfit of form. Right: what each leaves of the trials that were fitted, and how "
+         "much of what the base model leaves beyond the noise it takes away.",
          lambda: draw_evidence(said)),
         ("latent", "What no effect explains",
          "What the best model lacks, over time and over what it goes with most. Shares are those of the variance that "
@@ -71,7 +73,8 @@ def _labels(said: Mapping[str, Any]) -> tuple[str, str]:
     before, names = "base model, fitted", " + ".join(effect["id"] for effect in said["effects"])
     if said["verdict"] == "none" or said["gap"]["after"] == said["gap"]["before"]:
         return before, ""
-    return before, f"with {names}" if names else "best model found"
+    likeliest = " + ".join(said.get("leading", {}).get("effects", []))
+    return before, f"with {names}" if names else f"with {likeliest}, not certain" if likeliest else "best model found"
 
 
 # The page -------------------------------------------------------------------------------------------------------------
@@ -83,14 +86,14 @@ def _page(said: Mapping[str, Any], result: Mapping[str, Any], drawn: Mapping[str
     which = "chi-square a sample, " + ("fitted" if gap["before"]["held_out"] is None else "held-out") + " trials"
     tiles = [
         Tile("Verdict", said["verdict"], " or ".join([named, *said["alternatives"]])),
-        Tile("Gap before", _gap(gap["before"]), which),
-        Tile("Gap after", _gap(gap["after"]), which, second=True),
+        Tile("Gap before", _gap(gap["before"]), which + _weighed(said, "before")),
+        Tile("Gap after", _gap(gap["after"]), which + _weighed(said, "after"), second=True),
     ]
     sections = [
-        Section("", [listing(result["departures"]["sentences"]), *_there(drawn, "trajectories")]),
-        Section("What is left", [_gap_table(gap), *_in_units(said), *_there(drawn, "residuals"), *_phase_table(said),
+        Section("", [listing(result.get("summary", [])), *_there(drawn, "trajectories")]),
+        Section("What is left", [_gap_table(said), *_in_units(said), *_there(drawn, "residuals"), *_phase_table(said),
                                  *_there(drawn, "latent")]),
-        Section("Where the base model fails", _where(said)),
+        Section("Where the base model fails", [*_sentences(result["departures"]["sentences"]), *_where(said)]),
         Section("Candidates", [*_there(drawn, "evidence"), *_evidence(said)]),
         Section("What these trials can tell apart", _told_apart(said)),
         Section("The next experiment", [text(said["next_experiment"])] if said.get("next_experiment") else []),
@@ -109,17 +112,36 @@ def _page(said: Mapping[str, Any], result: Mapping[str, Any], drawn: Mapping[str
     )
 
 
+def _weighed(said: Mapping[str, Any], stage: str) -> str:
+    """The same weighed against what replicates differ by, where that is more than the sensors."""
+    weighed = said.get("gap_with_scatter")
+    return "" if weighed is None else f"; {_gap(weighed[stage])} beside what replicates differ by"
+
+
 def _gap(gap: Mapping[str, Any]) -> str:
     return short(gap["fit"] if gap["held_out"] is None else gap["held_out"], 3)
 
 
-def _gap_table(gap: Mapping[str, Any]) -> Block:
+def _sentences(sentences: Sequence[str]) -> list[Block]:
+    return [listing(sentences)] if sentences else []
+
+
+def _gap_table(said: Mapping[str, Any]) -> Block:
+    gap, weighed = said["gap"], said.get("gap_with_scatter")
+
     def cell(value: float | None) -> str:
         return _DASH if value is None else short(value, 3)
 
-    rows = [(name, cell(gap["before"][part]), cell(gap["after"][part]))
-            for part, name in (("fit", "fitted trials"), ("held_out", "held-out trials"))]  # fmt: skip
-    return table(("", "base model", "best model"), rows, title="The gap, chi-square per sample (1: the sensors' noise)")
+    rows = [
+        (name, *(cell(one[stage][part]) for one in (gap, weighed) if one is not None for stage in ("before", "after")))
+        for part, name in (("fit", "fitted trials"), ("held_out", "held-out trials"))
+    ]  # fmt: skip
+    head: tuple[str, ...] = ("", "base model", "best model")
+    title = "The gap, chi-square per sample (1: the sensors' noise)"
+    if weighed is not None:
+        head += ("base model, replicates' scatter added", "best model, replicates' scatter added")
+        title += "; beside it with what replicates differ by added to the variance (1: as near as another run comes)"
+    return table(head, rows, title=title)
 
 
 def _in_units(said: Mapping[str, Any]) -> list[Block]:

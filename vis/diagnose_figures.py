@@ -15,6 +15,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from vis.style import BED, GREY, INK, MODEL
@@ -41,7 +42,7 @@ _QUANTITIES: dict[str, tuple[str, str, float]] = {
     "accel": ("acceleration", "m/s²", 1.0),
 }
 _PHASES = {"stand": "#b9b9b9", "pivot": "#009E73", "slip": "#CC79A7", "hop": "#9fd0f0",
-           "free": "#9fd0f0", "in": "#b9b9b9", "rest": "#E69F00", "out": "#CC79A7"}  # fmt: skip
+           "free": "#9fd0f0", "in": "#6f8aa3", "rest": "#E69F00", "out": "#CC79A7"}  # fmt: skip
 #: column of latent.csv -> axis label and factor; what is not here is shown under its own name
 _COLUMNS: dict[str, tuple[str, float]] = {
     "t_s": ("time [s]", 1.0),
@@ -65,7 +66,11 @@ _COLUMNS: dict[str, tuple[str, float]] = {
     "latent_force_y_N": ("missing force along y [N]", 1.0),
     "latent_torque_N_m": ("missing torque [N m]", 1.0),
 }
+_NARROW = 3.0
+"""Range of chi-square up to which its axis is linear."""
 _BINS = 20
+_APART = 0.005
+"""Share of the range within which bins lie at one place."""
 
 
 @dataclass(frozen=True)
@@ -79,11 +84,15 @@ class Channel:
     before: Array
     after: Array
     std: Array
+    """Of the noise as the gap takes it, beside the base model and beside the best one."""
+    std_after: Array
     phase: NDArray[np.str_]
+    scatter: Array | None = None
+    """What replicates differ by beyond the sensors, beside the best model; None where they differ by no more."""
 
     def residual(self, stage: str) -> Array:
         """(measured - model) / std."""
-        return (self.measured - getattr(self, stage)) / self.std
+        return (self.measured - getattr(self, stage)) / (self.std if stage == "before" else self.std_after)
 
 
 def read_channel(path: Path) -> Channel:
@@ -98,7 +107,8 @@ def read_channel(path: Path) -> Channel:
 
     phase = np.array(columns.get("phase", [""] * len(rows)), dtype=str)
     return Channel(trial, name, numbers("t_s"), numbers("measured"), numbers("before"), numbers("after"),
-                   numbers("std"), phase)  # fmt: skip
+                   numbers("std"), numbers("std_after" if "std_after" in columns else "std"), phase,
+                   numbers("scatter") if "scatter" in columns else None)  # fmt: skip
 
 
 def worst(channels: Sequence[Channel], held: set[str]) -> list[Channel]:
@@ -139,20 +149,27 @@ def draw_trajectories(channels: Sequence[Channel], held: set[str], labels: tuple
         quick = np.ptp(c.time) < 0.5
         time = c.time * (1e3 if quick else 1.0)
         step = max(1, len(time) // 160)
+        if c.scatter is not None:
+            wide = 2 * np.hypot(1.0, c.scatter / c.std_after)
+            right.fill_between(time, -wide, wide, color="#f1ead8", lw=0, zorder=0)
         right.axhspan(-2, 2, color="#e3e8ec", lw=0)
         for stage, colour, dash, _ in models:
             left.plot(time, factor * getattr(c, stage), color=colour, ls=dash, lw=1.4, zorder=3)
             right.plot(time, c.residual(stage), color=colour, lw=0.8, ls="-")
         left.plot(time[::step], factor * c.measured[::step], ".", color=INK, ms=2.4, zorder=2)
         for axis in (left, right):
+            low, high = axis.get_ylim()
+            axis.set_ylim(low, high + 0.07 * (high - low))  # the band along the top hides nothing
             _strip(axis, time, c.phase)
             axis.set_xlabel("time [ms]" if quick else "time [s]", labelpad=1)
-        left.set_title(f"{c.trial}, {what}" + (" (held out)" if c.trial in held else ""))
-        left.set_ylabel(f"{what.split(',')[0]} [{unit}]")
-        right.set_ylabel("residual / noise")
+        left.set_title(f"trial {c.trial}, {what}" + (" (held out)" if c.trial in held else ""))
+        left.set_ylabel(f"{what.split(',')[0]} [{unit}]", fontsize=8.5)
+        right.set_ylabel("left over [std]", fontsize=8.5)
     handles: list[Any] = [Line2D([], [], color=INK, ls="", marker=".", label="measured")]
     handles += [Line2D([], [], color=colour, ls=dash, label=label) for _, colour, dash, label in models]
     handles.append(Patch(color="#e3e8ec", label="± 2 std of the sensor"))
+    if any(c.scatter is not None for c in channels):
+        handles.append(Patch(color="#f1ead8", label="and of replicates"))
     handles += _phase_handles(phase for c in channels for phase in c.phase)
     drawing.legend(handles=handles, loc="outside upper left", ncols=4, fontsize=8)
     return drawing
@@ -200,11 +217,16 @@ def draw_phases(rows: Sequence[Mapping[str, Any]], labels: tuple[str, str]) -> F
                 axis.plot([before, after], [place, place], color=GREY, lw=1.2, zorder=2)
                 axis.plot(after, place, "o", color=BED, ms=5.5, zorder=4)
             axis.plot(before, place, "D", color=MODEL, ms=4.8, zorder=3)
-        axis.set_xscale("log")
+        shown = [float(row[stage]) for row in rows for stage in ("before", "after")]
+        if max(shown) < _NARROW:
+            axis.set_xlim(0.0, 1.1 * max(*shown, 1.5))
+        else:
+            axis.set_xscale("log")
+            axis.xaxis.set_major_formatter(_plain_numbers)
         axis.set_title(title)
         axis.set_xlabel("chi-square per sample (1: the sensors' noise)")
     axes[0].set_yticks(range(len(keys)), [f"{channel}, {phase}" for channel, phase in keys])
-    axes[0].invert_yaxis()
+    axes[0].set_ylim(len(keys) - 0.4, -0.6)
     handles = [Line2D([], [], color=MODEL, ls="", marker="D", ms=4.8, label=labels[0])]
     if labels[1]:
         handles.append(Line2D([], [], color=BED, ls="", marker="o", ms=5.5, label=labels[1]))
@@ -216,39 +238,101 @@ def draw_phases(rows: Sequence[Mapping[str, Any]], labels: tuple[str, str]) -> F
 
 
 def draw_evidence(said: Mapping[str, Any]) -> Figure | None:
-    """Bars: the best form of each single name, and the best sets of names that beat all of their parts."""
-    best: dict[tuple[str, ...], float] = {}
+    """Bars of evidence, and what each candidate leaves: the best form of each single name, and the best sets of names
+    that beat all of their parts."""
+    best: dict[tuple[str, ...], Mapping[str, Any]] = {}
     for row in said.get("evidence", []):
-        best.setdefault(tuple(row["effects"]), float(row["score"]))
+        best.setdefault(tuple(row["effects"]), row)
     if not best:
         return None
-    chosen = tuple(effect["id"] for effect in said["effects"])
+    score = {names: float(row["score"]) for names, row in best.items()}
+    leading = _leading_names(said, score)
     singles = [names for names in best if len(names) == 1]
     sets = [names for names in best if len(names) > 1
-            and all(best[names] > best.get((name,), -math.inf) + 0.05 for name in names)]  # fmt: skip
-    names = sorted({*singles, *sets[:5], *([chosen] if chosen in best else [])}, key=lambda n: (best[n], -len(n)))
+            and all(score[names] > score.get((name,), -math.inf) + 0.05 for name in names)]  # fmt: skip
+    names = sorted({*singles, *sets[:5], *([leading] if leading in best else [])}, key=lambda n: (score[n], -len(n)))
     names = names[-_MOST_BARS:] if len(names) > _MOST_BARS else names
-    drawing = Figure(figsize=(_WIDTH, 1.2 + 0.27 * len(names)))
+    drawing = Figure(figsize=(_WIDTH, 1.3 + 0.27 * len(names)))
     FigureCanvasAgg(drawing)
-    axis = drawing.subplots()
-    kinds = {name: _kind(name, chosen, said) for name in names}
-    sure = "named for certain" if said["verdict"] == "unknown" else "named"
-    colours = {sure: BED, "cannot be told from it": MODEL, "other": "#b5b5b5"}
-    axis.barh(range(len(names)), [best[name] for name in names], color=[colours[kinds[n]] for n in names], height=0.66)
+    axis, beside = drawing.subplots(1, 2, sharey=True, width_ratios=(3, 2))
+    kinds = {name: _kind(name, leading, said) for name in names}
+    colours = {name: _KINDS[kinds[name]] for name in names}
+    places = range(len(names))
+    axis.barh(places, [score[name] for name in names], color=[colours[n] for n in names], height=0.66)
     axis.axvline(0.0, color=INK, lw=0.9)
-    axis.set_yticks(range(len(names)), [" + ".join(name) for name in names])
+    axis.set_yticks(places, [" + ".join(name) for name in names])
     axis.grid(False, axis="y")
-    axis.set_xlabel("log evidence over the base model [nats]; left of 0: not worth its parameters")
-    shown = [kind for kind in colours if kind in kinds.values()]
-    drawing.legend(handles=[Patch(color=colours[kind], label=kind) for kind in shown], loc="outside upper left",
-                   ncols=3, fontsize=8)  # fmt: skip
+    axis.set_xlabel("log evidence over the base model [nats]\n(left of 0: not worth its parameters)")
+    _draw_left(beside, [best[name] for name in names], [colours[name] for name in names], said)
+    shown = [kind for kind in _KINDS if kind in kinds.values()]
+    handles: list[Any] = [Patch(color=_KINDS[kind], label=kind) for kind in shown]
+    handles.append(Line2D([], [], color=INK, ls=(0, (1, 1.5)), label="the noise alone"))
+    handles.append(Line2D([], [], color=MODEL, ls=(0, (4, 2)), label="the base model"))
+    drawing.legend(handles=handles, loc="outside upper left", ncols=5, fontsize=8)
     return drawing
 
 
-def _kind(name: tuple[str, ...], chosen: tuple[str, ...], said: Mapping[str, Any]) -> str:
-    if name == chosen:
-        return "named for certain" if said["verdict"] == "unknown" else "named"
-    swapped = [(other, *chosen[1:]) for other in said["alternatives"]]
+_KINDS = {"named": BED, "certain": BED, "likeliest, not certain": "#7fb8d9", "cannot be told from it": MODEL,
+          "other": "#b5b5b5"}  # fmt: skip
+"""What a candidate is -> its colour."""
+
+
+def _draw_left(
+    axis: Axes, rows: Sequence[Mapping[str, Any]], colours: Sequence[str], said: Mapping[str, Any]
+) -> None:  # fmt: skip
+    """Chi-square a sample that each candidate leaves, between that of the base model and that of the noise."""
+    base = said.get("evidence_base", {})
+    left = [max(1 + float(row["left"]), 1e-2) for row in rows]
+    axis.axvline(1.0, color=INK, lw=1.0, ls=(0, (1, 1.5)))
+    whole = 1 + float(base["left"]) if base else max(left)
+    axis.axvline(whole, color=MODEL, lw=1.0, ls=(0, (4, 2)))
+    most = max(whole, *left)
+    for place, (row, value, colour) in enumerate(zip(rows, left, colours, strict=True)):
+        axis.plot([whole, value], [place, place], color=GREY, lw=1.0, zorder=2)
+        axis.plot(value, place, "o", color=colour, ms=5.5, zorder=3)
+        closes = row.get("closes")
+        if closes is not None:
+            share = f"{100 * min(max(closes, 0.0), 1.0):.0f} %"
+            axis.annotate(share, (1.01, place), xycoords=("axes fraction", "data"), va="center", fontsize=7.5,
+                          color=INK, annotation_clip=False)  # fmt: skip
+    if most < _NARROW:
+        low = min(1.0, *left)
+        axis.set_xlim(low - 0.1 * max(most - low, 0.1), most + 0.1 * max(most - low, 0.1))
+    else:
+        axis.set_xscale("log")
+        axis.set_xlim(min(0.9, 0.9 * min(left)), 1.15 * most)
+        axis.xaxis.set_major_formatter(_plain_numbers)
+        if most < 20:
+            axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axis.xaxis.set_minor_locator(NullLocator())
+    noise = "noise and replicates" if base.get("with_scatter") else "noise"
+    axis.set_xlabel(f"chi-square per sample left\n(1: {noise}; %: gap closed)")
+    axis.grid(False, axis="y")
+
+
+def _plain_numbers(value: float, place: float) -> str:
+    return f"{value:g}" if 1e-3 <= value < 1e5 else f"{value:.0e}"
+
+
+def _leading_names(said: Mapping[str, Any], score: Mapping[tuple[str, ...], float]) -> tuple[str, ...]:
+    """The set of names that is told: named, or of an unknown the best model's, or the likeliest single one."""
+    if said["verdict"] != "unknown":
+        return tuple(effect["id"] for effect in said["effects"])
+    names = tuple(said.get("leading", {}).get("effects", ()))
+    same = next((known for known in score if sorted(known) == sorted(names)), names)
+    singles = [known for known in score if len(known) == 1 and score[known] > 0]
+    return same or max(singles, key=lambda known: score[known], default=())
+
+
+def _kind(name: tuple[str, ...], leading: tuple[str, ...], said: Mapping[str, Any]) -> str:
+    if said["verdict"] == "unknown":
+        certain = {effect["id"] for effect in said["effects"]}
+        if certain and set(name) == certain:
+            return "certain"
+        return "likeliest, not certain" if name == leading else "other"
+    if name == leading:
+        return "named"
+    swapped = [(other, *leading[1:]) for other in said["alternatives"]]
     return "cannot be told from it" if set(name) in [set(s) for s in swapped] else "other"
 
 
@@ -280,15 +364,31 @@ def draw_latent(folder: Path, said: Mapping[str, Any], channels: Sequence[Channe
             across = factor * values[column]
             for name in dict.fromkeys(phase.tolist()):
                 own = phase == name
-                axis.plot(across[own], values[latent][own], ".", ms=1.6, color=_PHASES.get(name, GREY), alpha=0.8)
+                axis.plot(across[own], values[latent][own], ".", ms=2.2, color=_PHASES.get(name, GREY), alpha=0.8)
             axis.axhline(0.0, color=GREY, lw=0.8)
             axis.plot(*_means(across, values[latent]), "-", color=INK, lw=1.3, marker="o", ms=3)
             share = said["latent"].get("explained", {}).get(column)
             axis.set_xlabel(label + (f"; explains {100 * share:.0f} %" if share is not None else ""))
         pair[0].set_ylabel(_COLUMNS.get(latent, (latent, 1.0))[0])
+        _frame(pair[1], values[latent])
     handles = [*_phase_handles(phase), Line2D([], [], color=INK, marker="o", ms=3, label="means of equal counts")]
     drawing.legend(handles=handles, loc="outside upper left", ncols=5, fontsize=8)
     return drawing
+
+
+def _frame(axis: Axes, values: Array) -> None:
+    """A range of y that a few touches do not stretch, and how many rows lie beyond it."""
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return
+    low, high = np.percentile(known, (0.5, 99.5))
+    room = 0.5 * (high - low)
+    if room <= 0 or (known.min() > low - room and known.max() < high + room):
+        return
+    axis.set_ylim(low - room, high + room)
+    beyond = int(((known < low - room) | (known > high + room)).sum())
+    axis.text(0.99, 0.97, f"{beyond} rows beyond", transform=axis.transAxes, ha="right", va="top", fontsize=7.5,
+              color="#555555")  # fmt: skip
 
 
 def _phase_at(trials: NDArray[np.str_], time: Array, channels: Sequence[Channel]) -> NDArray[np.str_]:
@@ -312,4 +412,8 @@ def _means(x: Array, y: Array) -> tuple[Array, Array]:
         return places, np.array([y[x == place].mean() for place in places])
     order = np.argsort(x, kind="stable")
     pieces = [piece for piece in np.array_split(order, _BINS) if len(piece)]
-    return np.array([x[p].mean() for p in pieces]), np.array([y[p].mean() for p in pieces])
+    counts = np.array([len(piece) for piece in pieces], dtype=float)
+    places, means = (np.array([column[piece].mean() for piece in pieces]) for column in (x, y))
+    group = np.cumsum(np.concatenate([[0], np.diff(places) > _APART * np.ptp(x)]).astype(int))  # one place is one mean
+    whole = np.bincount(group, counts)
+    return np.bincount(group, places * counts) / whole, np.bincount(group, means * counts) / whole

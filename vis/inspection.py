@@ -188,6 +188,9 @@ def _lines(result: Mapping[str, Any], trials: Sequence[Mapping[str, Any]]) -> tu
     handles += [
         Line2D([], [], lw=1.6, color=RED, label=f"{trial['id']}: at odds") for trial in trials if trial["id"] in odd
     ]
+    names = {trial["id"] for trial in trials}
+    if any(finding["from_s"] is not None and finding["trial"] in names for finding in result["findings"]):
+        handles.append(Line2D([], [], color=RED, ls="", marker="o", ms=4, label="found: see the list"))
     return styles, handles
 
 

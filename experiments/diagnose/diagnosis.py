@@ -21,10 +21,12 @@ from .evidence import SMALL, Hypothesis, excess, held_out_fit, inflation, score,
 from .fitting import Fit, Model, Whitener, by_beginnings, fit, settled
 from .gate import Verdict, held_out_gate, open_gate
 from .jitter import Jitter, find_jitter, steepness
-from .localise import Place, depends_on, latent_table, places
+from .localise import Place, depends_on, latent_table, places, places_in
+from .next_steps import after_unknown
 from .prediction import Predicted, folds_of, predict
 from .problem import Finding, Form, Problem
 from .replicates import Scatter, exchanged, find_scatter, groups_of, odd_trials, split_trials, with_scatter
+from .scatter_gap import gap_with_scatter, weighed_residuals
 from .search import Choice, choose
 from .unrest import Unrest, find_unrest
 
@@ -92,6 +94,7 @@ class Diagnosis:
     rivals: tuple[Form, ...]
     """First form of each alternative."""
     where: tuple[Place, ...]
+    """Where the base model fails."""
     before: Gap
     after: Gap
     fitted: tuple[str, ...]
@@ -108,6 +111,8 @@ class Diagnosis:
     next_experiment: str
     depends_on: str = ""
     shares: Mapping[str, float] = field(default_factory=dict)
+    left: tuple[Place, ...] = ()
+    """Where the best model fails beyond what replicates differ by, if the verdict is unknown."""
 
     @property
     def forms(self) -> tuple[Form, ...]:
@@ -294,7 +299,8 @@ def diagnose(
             # Fitted, and the gap taken, with the sensors' noise alone.
             certain = anew.effects
             best = settled(fit(base.model.with_forms(anew.forms), _unscattered(anew.best)))
-            choice = replace(anew.choice, base=choice.base, best=Hypothesis(best, score(best)), left=choice.left)
+            # The table of candidates is of the likelihood in which they were weighed, its base model's with it.
+            choice = replace(anew.choice, best=Hypothesis(best, score(best)), left=choice.left)
             held = _held_out_verdict(best, held_out, seed) if held_out else None
         model_std = {**model_std, **wander.model_std}
     if verdict in ("named", "ambiguous") and held is not None and not held.passed:
@@ -556,18 +562,21 @@ class _Told:
         alternatives = tuple(next(e for e in rival.effects if e not in effects) for rival in rivals)
         rival_forms = tuple(next(f for f in rival.forms if f.effect == e)
                             for rival, e in zip(rivals, alternatives, strict=True))  # fmt: skip
-        told, shares = "", dict[str, float]()
+        told, shares, left = "", dict[str, float](), list[Place]()
         findings = (*self.findings, *(jitter.finding for jitter in self.jitters))
         if verdict == "unknown":
             told, shares = depends_on(latent_table(problem, best_values, best.model.forms))
-        return Diagnosis(
+            rest = weighed_residuals(problem, model_std, best_values, best.model.forms, (*fitted, *held_out))
+            left = places_in(problem, best_values, best.model.forms, rest)
+        found = Diagnosis(
             verdict=verdict, problem=problem, base=base, best=best, base_values=base_values, best_values=best_values,
             effects=effects, alternatives=alternatives, rivals=rival_forms, where=tuple(where), before=before,
             after=after, fitted=fitted, held_out=held_out, gate_before=self.first,
             gate_after=last or (choice.left if choice is not None else self.first), gate_held_out=held, choice=choice,
             colours=colours, jitters=self.jitters, model_std=model_std, findings=findings, depends_on=told,
-            shares=shares, next_experiment=_next(problem, best, choice, rival_forms, verdict, where),
+            shares=shares, left=tuple(left), next_experiment="",
         )  # fmt: skip
+        return replace(found, next_experiment=_next(found))
 
 
 def _certain(base: Fit, choice: Choice) -> bool:
@@ -614,21 +623,17 @@ def _smallest(choice: Choice) -> tuple[Hypothesis, ...]:
     return (first, *(h for h in others[:1] if h.score > choice.best.score - _AS_LIKELY))
 
 
-def _next(
-    problem: Problem, best: Fit, choice: Choice | None, rivals: tuple[Form, ...], verdict: str, where: Sequence[Place]
-) -> str:
-    """The next experiment: what tells two names apart, confirms one, or comes back where nothing has a name."""
-    if verdict == "none" or choice is None:
+def _next(found: Diagnosis) -> str:
+    """The next experiment: what tells two names apart, confirms one, or follows up what has no name."""
+    problem, choice, best = found.problem, found.choice, found.best
+    if found.verdict == "none" or choice is None:
         return "None is needed: the base model explains what these sensors can see."
-    if verdict == "named":
+    if found.verdict == "named":
         return confirmation(choice.best.effects[0])
-    if verdict == "ambiguous":
-        return problem.next_experiment(best.model.forms[0], rivals[0], best.values)
-    sums: dict[str, float] = {}
-    for place in where:
-        sums[place.trial] = sums.get(place.trial, 0.0) + place.excess
-    worst = f"trial {max(sums, key=lambda trial: sums[trial])}, the one with the largest gap," if sums else "a trial"
-    return (
-        f"Repeat {worst} twice without changing anything: what comes back is in {problem.whole}, what does not is in "
-        "the room."
-    )
+    if found.verdict == "ambiguous":
+        return problem.next_experiment(best.model.forms[0], found.rivals[0], best.values)
+    weighed = gap_with_scatter(found)
+    return after_unknown(
+        problem, found.best_values, found.forms, found.left, found.shares,
+        is_scatter=bool(found.effects) and weighed is not None and max(v or 0.0 for v in weighed.after) <= SMALL,
+    )  # fmt: skip

@@ -5,7 +5,7 @@ diagnosis.json       the contract (diagnosis.schema.json beside this file), and 
 model.toml           the model with what was added: `hedgebed tumble --model` and `penetrate --model` run it
 latent.csv           where the verdict is unknown: what the model lacks, row by row
 evidence.csv         every candidate: its score, and the chi-square a sample that it leaves beyond what noise makes
-series/<trial>.<channel>.csv    t_s,measured,before,after,phase
+series/<trial>.<channel>.csv    t_s,measured,before,after,std,std_after,phase (as the gap takes it) and scatter
 ```
 """
 
@@ -20,8 +20,10 @@ from experiments.runfolder import write_json, write_series
 
 from .diagnosis import Diagnosis
 from .evidence import excess, inflation
+from .fitting import Fit
 from .gaps import Gaps
 from .localise import phases_of
+from .scatter_gap import gap_with_scatter, scatter_std, sensor_std
 from .telling import PhaseTable
 
 __all__ = ["document", "write_diagnosis"]
@@ -47,7 +49,19 @@ def document(found: Diagnosis) -> dict[str, Any]:
             "held_out_trials": list(found.held_out),
         },
     }  # fmt: skip
+    weighed = gap_with_scatter(found)
+    if weighed is not None:
+        said["gap_with_scatter"] = {
+            stage: {"fit": pair[0], "held_out": pair[1]}
+            for stage, pair in (("before", weighed.before), ("after", weighed.after))
+        }
     if found.verdict == "unknown":
+        said["leading"] = _leading(found)
+        said["left"] = [
+            {"trial": p.trial, "channel": p.channel, "phase": p.phase, "from_s": p.from_s, "to_s": p.to_s,
+             "excess": p.excess}
+            for p in found.left
+        ]  # fmt: skip
         said["latent"] = {"file": "latent.csv", "depends_on": found.depends_on, "explained": dict(found.shares)}
     said["base"] = _base_values(found)
     said["gate"] = {
@@ -65,12 +79,13 @@ def document(found: Diagnosis) -> dict[str, Any]:
         for stage, bounds in (("before", found.bounds_before), ("after", found.bounds_after))
     }  # fmt: skip
     said["evidence"] = _evidence(found)
+    said["evidence_base"] = _evidence_base(found)
     said["equivalence"] = _equivalence(found)
     said["noise"] = _noise(found)
     said["model_std"] = dict(found.model_std)
     said["findings"] = [
         {"trial": f.trial, "what": f.what, "channel": f.channel, "from_s": f.from_s, "to_s": f.to_s,
-         "set_aside": f.set_aside}
+         "set_aside": f.set_aside, "doubt": f.doubt}
         for f in found.findings
     ]  # fmt: skip
     said["next_experiment"] = found.next_experiment
@@ -117,6 +132,9 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
         after = problem.compare(found.best_values, found.forms, trial.id)
         samples = problem.samples(trial.id)
         phases = phases_of(problem, found.base_values, (), trial.id)
+        wide = scatter_std(problem, found.model_std, found.best_values, found.forms, trial.id)
+        noises = [sensor_std(problem, found.base_values, (), trial.id),
+                  sensor_std(problem, found.best_values, found.forms, trial.id)]  # fmt: skip
         for channel, columns in before.items():
             if not len(columns["t_s"]):  # a sensor that recorded nothing
                 continue
@@ -124,14 +142,15 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
             columns = {"t_s": columns["t_s"], "measured": columns["measured"], "before": columns["model"],
                        "after": after[channel]["model"]}  # fmt: skip
             if len(columns["t_s"]) == int(rows_here.sum()):
-                std = samples.std[rows_here]
-                columns |= {"std": std, "phase": phases[rows_here]}
+                first, last = (noise[channel] for noise in noises)
+                columns |= {"std": first, "std_after": last, "phase": phases[rows_here]}
+                if found.model_std:
+                    columns["scatter"] = wide[channel]
                 rest = [columns["measured"] - columns[stage] for stage in ("before", "after")]
                 held = trial.id in found.held_out
-                phase_table.add(channel, phases[rows_here], *(part / std for part in rest), held_out=held)
-                gaps.add(
-                    trial.id, channel, columns["t_s"], rest[0], rest[1], std, settings=trial.settings, held_out=held
-                )
+                phase_table.add(channel, phases[rows_here], rest[0] / first, rest[1] / last, held_out=held)
+                gaps.add(trial.id, channel, columns["t_s"], rest[0], rest[1], first, last, settings=trial.settings,
+                         held_out=held)  # fmt: skip
             write_series(folder / "series" / f"{trial.id}.{channel}.csv", columns)
     said["by_phase"] = phase_table.rows
     said["by_channel"], said["by_condition"], said["parted"] = gaps.by_channel, gaps.by_condition, gaps.parted
@@ -166,13 +185,41 @@ def _evidence(found: Diagnosis) -> list[dict[str, Any]]:
     """Every candidate that was tried, the likeliest first; scores relative to the base model [nats]."""
     if found.choice is None:
         return []
-    zero = found.choice.base.score
+    zero, whole = found.choice.base.score, _beyond_noise(found.choice.base.fit)
     seen: dict[tuple[str, ...], dict[str, Any]] = {}
     for _, hypothesis in found.choice.table:
         ids = [form.id for form in hypothesis.forms]
         key = tuple(sorted(ids))  # in whatever order they were added
         row = {"candidate": " + ".join(ids), "effects": list(hypothesis.effects), "score": hypothesis.score - zero,
-               "left": float(excess(hypothesis.fit) / hypothesis.fit.count)}  # fmt: skip
+               "left": _beyond_noise(hypothesis.fit),
+               "closes": 1 - _beyond_noise(hypothesis.fit) / whole if whole > 0 else None}  # fmt: skip
         if key not in seen or row["score"] > seen[key]["score"]:
             seen[key] = row
     return sorted(seen.values(), key=lambda row: -row["score"])
+
+
+def _beyond_noise(fit: Fit) -> float:
+    """Chi-square a sample beyond the noise that a fit leaves of the fitted trials."""
+    return float(excess(fit) / fit.count)
+
+
+def _evidence_base(found: Diagnosis) -> dict[str, Any]:
+    """What the base model leaves in the same units; were candidates weighed against what replicates differ by?"""
+    if found.choice is None:
+        return {}
+    base = found.choice.base.fit
+    return {"left": _beyond_noise(base), "with_scatter": bool(getattr(base.model.problem, "calmed", {}))}
+
+
+def _leading(found: Diagnosis) -> dict[str, Any]:
+    """The candidate that explains most where something has no name: what it closes, and how sure it is."""
+    if found.choice is None or not found.choice.best.effects:
+        return {"effects": [], "certain": [], "nearest": None}
+    rivals = found.choice.rivals
+    near = min(rivals, key=lambda rival: rival.behind) if rivals else None
+    return {
+        "effects": list(found.choice.best.effects), "certain": list(found.effects),
+        "nearest": None if near is None else {
+            "effect": near.effect, "evidence_behind": near.behind, "angle_deg": near.angle,
+            "told_apart": not near.same},
+    }  # fmt: skip

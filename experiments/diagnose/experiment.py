@@ -25,7 +25,8 @@ from .diagnosis import Diagnosis, diagnose
 from .document import write_diagnosis
 from .own import load_own
 from .problem import Problem
-from .telling import findings_in_words, sure_sentences, told_tables, where_sentences
+from .summary import summary_sentences, title_words
+from .telling import findings_in_words, told_tables, where_sentences
 
 __all__ = ["check", "diagnose_campaign", "resume", "run"]
 
@@ -127,20 +128,19 @@ def _whose(found: Diagnosis) -> str:
 
 
 def _result(found: Diagnosis, said: dict[str, Any]) -> dict[str, Any]:
-    names = " and ".join(found.effects) or "nothing"
-    title = {
-        "none": "nothing is missing: the model with its fitted parameters explains the trials",
-        "named": f"missing: {names}",
-        "ambiguous": f"missing: {names}, or {' or '.join(found.alternatives)}: these trials cannot tell",
-        "unknown": "something is missing that no effect of the library explains"
-        + (f"; {names} for certain" if found.effects else ""),
-    }[found.verdict]
     quantities: dict[str, Any] = {
         f"gap_{stage}_{part}": {"value": value, "std": None, "unit": "1",
                                 "note": "chi-square per sample"}
         for stage, gap in (("before", found.before), ("after", found.after))
         for part, value in (("fit", gap.fit), ("held_out", gap.held_out))
     }  # fmt: skip
+    if "gap_with_scatter" in said:
+        quantities |= {
+            f"gap_with_scatter_{stage}_{part}": {
+                "value": said["gap_with_scatter"][stage][part], "std": None, "unit": "1",
+                "note": "chi-square per sample, what replicates differ by added to the sensors' variance"}
+            for stage in ("before", "after") for part in ("fit", "held_out")
+        }  # fmt: skip
     at_end = {
         stage: {bound["parameter"] for bound in bounds if bound["at_bound"]}
         for stage, bounds in said["at_bounds"].items()
@@ -151,9 +151,7 @@ def _result(found: Diagnosis, said: dict[str, Any]) -> dict[str, Any]:
     for effect in said["effects"]:
         for name, entry in effect["parameters"].items():
             quantities[f"{effect['id']}.{name}"] = _quantity(entry, at_end=f"{effect['id']}.{name}" in at_end["after"])
-    sentences = [*sure_sentences(said), *where_sentences(said), f"Next experiment: {said['next_experiment']}"]
-    if "latent" in said:
-        sentences.insert(0, f"What is missing depends on {said['latent']['depends_on']}.")
+    sentences = where_sentences(said)
     more = getattr(found.problem, "remarks", None)
     sentences += more(found.best_values, found.forms) if more is not None else []
     sentences += [colour.sentence for colour in found.colours.values()]
@@ -185,9 +183,10 @@ def _result(found: Diagnosis, said: dict[str, Any]) -> dict[str, Any]:
         "format": "hedgebed-result/1",
         "experiment": "diagnose",
         "version": __version__,
-        "title": title[:1].upper() + title[1:],
+        "title": title_words(said),
         "status": "done",
         "verdict": found.verdict,
+        "summary": summary_sentences(said),
         "quantities": quantities,
         "tables": told_tables(said),
         "departures": {"sentences": sentences},

@@ -40,19 +40,21 @@ class Gaps:
         self._parted: list[dict[str, Any]] = []
 
     def add(
-        self, trial: str, channel: str, time: Array, before: Array, after: Array, std: Array,
+        self, trial: str, channel: str, time: Array, before: Array, after: Array, std: Array, std_after: Array,
         *, settings: Mapping[str, float], held_out: bool,
     ) -> None:  # fmt: skip
-        """One channel of one trial: measured less modelled of both models, in the channel's SI unit; shapes [n]."""
+        """One channel of one trial: measured less modelled of both models and the noise of each, in the channel's SI
+        unit; shapes [n]."""
         if not len(time):
             return
         sums = self._channels.setdefault((channel, held_out), [0.0, 0.0, 0.0])
         trials, over = self._conditions.setdefault(tuple(sorted(settings.items())), (set(), [0.0, 0.0, 0.0]))
         trials.add(trial)
-        for target, scale in ((sums, np.ones(len(std))), (over, std)):
+        plain = np.ones(len(std))
+        for target, scale, scale_after in ((sums, plain, plain), (over, std, std_after)):
             target[0] += len(time)
             target[1] += float(np.sum((before / scale) ** 2))
-            target[2] += float(np.sum((after / scale) ** 2))
+            target[2] += float(np.sum((after / scale_after) ** 2))
         if len(time) >= _WINDOW:
             standing = time < 0  # a camera's zero, fitted to the whole trial, is no parting
             zero = float(before[standing].mean()) if channel in _ZEROED and standing.sum() > 1 else 0.0

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .fitting import Model
 from .problem import Array, Form, Problem, Values
 
-__all__ = ["Place", "depends_on", "latent_table", "phases_of", "places"]
+__all__ = ["Place", "depends_on", "latent_table", "phases_of", "places", "places_in"]
 
 _SURE = 4.0
 """Standard deviations by which the energy of a stretch must exceed that of noise."""
@@ -35,15 +35,19 @@ class Place:
 
 def places(model: Model, values: Values, trials: Sequence[str]) -> list[Place]:
     """Stretches of one phase in which residuals are beyond noise, the worst first."""
-    problem = model.problem
-    (found,) = problem.evaluate([values], model.forms, trials)
+    (found,) = model.problem.evaluate([values], model.forms, trials)
+    return places_in(model.problem, values, model.forms, found)
+
+
+def places_in(problem: Problem, values: Values, forms: Sequence[Form], residuals: Mapping[str, Array]) -> list[Place]:
+    """The same of given residuals over the noise: trial -> shape [sample_count]."""
     out = []
-    for trial in trials:
+    for trial, found in residuals.items():
         samples = problem.samples(trial)
-        phases = phases_of(problem, values, model.forms, trial)
+        phases = phases_of(problem, values, forms, trial)
         for channel in dict.fromkeys(samples.channel.tolist()):
             rows = np.flatnonzero(samples.channel == channel)
-            time, rest, phase = samples.time[rows], found[trial][rows], phases[rows]
+            time, rest, phase = samples.time[rows], found[rows], phases[rows]
             for low, high in _runs(phase):
                 count = high - low
                 if count < 3:

@@ -18,7 +18,7 @@ from .penetration_depth import SmoothDepth, smooth_depth
 from .penetration_drive import Holds
 from .problem import Array, Finding, TrialInfo
 from .replicates import parted
-from .stuck import stuck_rows
+from .stuck import clipped, stuck_rows
 
 __all__ = ["Prepared", "prepare"]
 
@@ -203,6 +203,9 @@ def _one(
             one = f"one reading of {name} lies far from its neighbours and is set aside"
             say(several if len(lone) > 1 else one, where=name, rows=lone)
             values[lone] = np.nan
+        for end in clipped(values) if not driven or name != "depth" else ():  # a machine may stop at its end
+            say(f"{len(end.rows)} readings of {name} {end.words}", where=name, rows=end.rows)
+            values[end.rows] = np.nan
         stuck = stuck_rows(values) if not driven or name != "depth" else lone[:0]  # a machine may stand still
         if len(stuck):
             say(f"{len(stuck)} readings of {name} repeat the one before where it never does otherwise: the sensor is "

@@ -126,6 +126,8 @@ class Finding:
     from_s: float | None = None
     to_s: float | None = None
     set_aside: bool = False
+    doubt: bool = False
+    """Whether a person has to put it right before a name can be trusted: a unit, a sign, a zero, a clock."""
 
 
 class Problem(Protocol):

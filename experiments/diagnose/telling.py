@@ -12,7 +12,10 @@ import numpy as np
 from .effect_words import meaning
 from .problem import Array, Finding
 
-__all__ = ["PhaseTable", "findings_in_words", "setting_words", "sure_sentences", "told_tables", "where_sentences"]
+__all__ = [
+    "PhaseTable", "findings_in_words", "setting_words", "shares_words", "sure_sentences", "told_tables",
+    "where_sentences",
+]  # fmt: skip
 
 _UNITS = {"N_m": "N m", "m_s2": "m/s2", "m_s": "m/s", "m": "m"}
 _OTHER = 0.01
@@ -56,7 +59,7 @@ def where_sentences(said: Mapping[str, Any]) -> list[str]:
     if not places:
         return []
     total = sum(place["excess"] for place in places)
-    phase, channel = (_shares(places, key, total) for key in ("phase", "channel"))
+    phase, channel = (shares_words(places, key, total) for key in ("phase", "channel"))
     first = places[0]
     said_first = (
         f"The base model fails most in phase {phase} and channel {channel}, shares of the chi-square beyond the "
@@ -118,7 +121,7 @@ def _parted(said: Mapping[str, Any]) -> list[str]:
     return sentences
 
 
-def _shares(places: Sequence[Mapping[str, Any]], key: str, total: float) -> str:
+def shares_words(places: Sequence[Mapping[str, Any]], key: str, total: float) -> str:
     """The largest shares up to `_MAINLY` of it all, at most two."""
     sums: dict[str, float] = {}
     for place in places:

@@ -15,7 +15,7 @@ from scipy.ndimage import median_filter
 
 from .lags import find_lag, pieces
 from .problem import Finding
-from .stuck import stuck_rows
+from .stuck import clipped, stuck_rows
 from .tumble_data import CHANNELS, TrialData, TumbleData
 from .tumble_spikes import spikes
 
@@ -51,6 +51,16 @@ def checked(data: TumbleData) -> tuple[TumbleData, list[Finding]]:
                 continue
             _gaps(trial, name, mine, findings)
             _ends(trial, name, keep, findings)
+            for end in clipped(trial.value[mine]) if name != "wheel" else ():  # which a motor turns as fast as it can
+                keep[mine[end.rows]] = False
+                findings.append(Finding(
+                    trial=trial.id, channel=name, from_s=float(trial.time[mine[end.rows[0]]]),
+                    to_s=float(trial.time[mine[end.rows[-1]]]), set_aside=True,
+                    what=f"{len(end.rows)} readings of {name} {end.words}",
+                ))  # fmt: skip
+            mine = mine[keep[mine]]
+            if len(mine) < 8:
+                continue
             stuck = stuck_rows(trial.value[mine]) if name != "wheel" else mine[:0]  # in a hop it turns evenly
             if len(stuck):
                 keep[mine[stuck]] = False

@@ -17,6 +17,7 @@ from experiments.diagnose.problem import Finding
 from .penetration import penetration_oddities
 from .tumble import tumble_oddities
 from .words import times, unit_words
+from .zeros import depth_zeros
 
 __all__ = ["find_implausible", "loud_sensors", "missing_sensors", "said_once", "without_companions"]
 
@@ -75,7 +76,15 @@ def _each_implausible(campaign: Campaign) -> list[Finding]:
         else:
             assert isinstance(trial, TumbleTrial)
             odd = list(tumble_oddities(campaign, tables, trial))
-        found += [Finding(trial=trial.id, channel=channel, what=f"trial {trial.id}: {what}") for channel, what in odd]
+        found += [
+            Finding(trial=trial.id, channel=channel, what=f"trial {trial.id}: {what}", doubt=True)
+            for channel, what in odd
+        ]
+    if not any(finding.channel == "depth" for finding in found):  # in mm, or counted upwards, it begins anywhere
+        found += [
+            Finding(trial=trial, channel="depth", what=f"trial {trial}: {what}" if trial else what, doubt=True)
+            for trial, what in depth_zeros(campaign)
+        ]
     return found
 
 

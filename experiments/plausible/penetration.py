@@ -23,6 +23,8 @@ _DEEP = 30.0
 _DEEP_METRES = 0.3
 _WIDE_METRES, _SHALLOW = 1.0, 0.02
 """A diameter above this is doubted where the spike goes in by less than this share of it."""
+_FEW_ROWS = 5
+"""Rows by which a drop may begin late."""
 _OFF_SCALE = 30.0
 """Ratio of a measured force and that of the spring with the stated stiffness which no doubt of it explains."""
 
@@ -100,7 +102,7 @@ def _driven(
     if above.sum() >= 3:
         zero = float(np.median(force[above]))
         error = 1.25 * std_of(tables.sensors.force) / math.sqrt(above.sum())
-        if abs(zero) > max(OFF * error, std_of(tables.sensors.force)):
+        if abs(zero) > max(OFF * error, std_of(tables.sensors.force)) and not _rises(force[above]):
             yield said(
                 "force",
                 f"the force reads {zero:.3g} N above the surface, {times(abs(zero) / std_of(tables.sensors.force))} ",
@@ -114,6 +116,13 @@ def _driven(
                 yield said("depth", f"speed = {trial.speed:g} m/s, but the depth goes in at {speed:.3g} m/s")
 
 
+def _rises(force: Array) -> bool:
+    """Whether a force above the surface grows on the way down, from next to nothing: the depth's zero is off then."""
+    third = max(len(force) // 3, 1)
+    first, last = abs(float(force[:third].mean())), abs(float(force[-third:].mean()))
+    return len(force) >= 6 and last > 2 * first
+
+
 def _drop(
     tables: PenetrationCampaign, trial: PenetrationTrial, time: Array, depth: Array, accel: Array, std: float
 ) -> Iterator[Odd]:
@@ -121,6 +130,15 @@ def _drop(
     both = np.isfinite(depth) & np.isfinite(accel) & (time >= 0)
     if both.sum() >= 12:
         yield from _second_derivative(trial, time[both], depth[both], accel[both], std)
+    first = float(time[np.isfinite(depth)][0])
+    if first > max(_FEW_ROWS * float(np.median(np.diff(time))), 0.2 * float(np.nanmax(depth)) / trial.speed):
+        there = float(depth[np.isfinite(depth)][0])
+        yield said(
+            "depth",
+            f"no row before {1e3 * first:.3g} ms, where the depth is {1e3 * there:.3g} mm; t = 0 is the first touch: ",
+            "either that is not recorded, or the clock was started late and all times are off",
+        )
+        return
     known = np.isfinite(depth) & (np.abs(time) < 0.2 * max(float(np.nanmax(depth)), 1e-9) / trial.speed)
     if known.sum() >= 6 and np.ptp(time[known]) > 0:
         (_, speed, start), covariance = np.polyfit(time[known], depth[known], 2, cov="unscaled")

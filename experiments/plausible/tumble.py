@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ def tumble_oddities(campaign: Campaign, tables: TumbleCampaign, trial: TumbleTri
                 "starts",
             )
             return
+    yield from _begins_late(tables, trial, {"pose": pose, "imu": imu, "wheel": wheel})
     yield from gravity_oddities(tables, trial)
     turning: list[Odd] = []
     if pose is not None and imu is not None:
@@ -48,6 +49,40 @@ def tumble_oddities(campaign: Campaign, tables: TumbleCampaign, trial: TumbleTri
         yield from _at_rest(tables, trial, imu)
     if wheel is not None:
         yield from _wheel(tables, trial, wheel)
+
+
+def _begins_late(
+    tables: TumbleCampaign, trial: TumbleTrial, recordings: Mapping[str, Recording | None]
+) -> Iterator[Odd]:
+    """No sensor has a row near t = 0, when the torque starts: was it not recorded, or does the clock begin late?"""
+    there = {name: own for name, own in recordings.items() if own is not None and len(own)}
+    if not there:
+        return
+    first = {name: float(own.time[0]) for name, own in there.items()}
+    steps = {name: float(np.median(np.diff(own.time))) if len(own) > 1 else 0.0 for name, own in there.items()}
+    name = min(first, key=lambda sensor: first[sensor])
+    if first[name] <= max(_LATE, 5 * steps[name]):
+        return
+    words = ""
+    wheel, sensor = there.get("wheel"), tables.sensors.wheel
+    if wheel is not None and sensor is not None:
+        slope = trial.torque / tables.wheel.inertia * (1 if trial.actuator == "motor" else -1)
+        turns = wheel["omega_rad_s"] > 0.05 * trial.wheel_speed_0  # a brake has not stopped it yet
+        rows = np.isfinite(wheel["omega_rad_s"]) & turns & (wheel.time < first["wheel"] + 0.2)
+        if rows.sum() >= 6 and slope != 0 and wheel.time[rows][-1] < trial.torque_until:
+            gained = wheel["omega_rad_s"][rows] - trial.wheel_speed_0
+            began = float(np.median(wheel.time[rows] - gained / slope))
+            doubt = 3 * sensor.std[0] / abs(slope) + 0.1 * first["wheel"]
+            words = (
+                f"; by the wheel's speed the torque set in at {began:.2g} s of this clock"
+                if abs(began) > max(doubt, _LATE)
+                else "; the wheel's speed fits the clock: the beginning was not recorded"
+            )
+    yield said(
+        "clock",
+        f"no sensor has a row before {first[name]:.3g} s, and t = 0 is when the torque starts: either the beginning, ",
+        f"which tells most, is not recorded, or the clock was started late and all times are off{words}",
+    )
 
 
 def _start(tables: TumbleCampaign, pose: Recording, *, angle: bool) -> Iterator[Odd]:

@@ -114,6 +114,25 @@ def test_what_is_no_model_of_penetration_is_refused_by_name(law):
         PenetrateSettings(**QUICK, ground="spring-damper")
 
 
+def test_without_a_bed_the_spike_the_mass_and_the_load_are_the_models_own(tmp_path):
+    path = tmp_path / "model.toml"
+    drop = '[[trial]]\nid = "1"\nmode = "drop"\nspeed = 0.2\ngravity = 2.0\ndata = "1.csv"\n'
+    cone = MODEL.replace("diameter = 0.012", 'diameter = 0.003\ntip = "cone"\ncone_angle = 40.0')
+    path.write_text(cone + CRATER + drop)
+    own = PenetrateSettings(ground="spring-damper", model=str(path))
+    assert (own.tip, own.tip_diameter, own.cone_angle, own.mass) == ("cone", 0.003, 40.0, MASS)
+    assert own.weight == pytest.approx(2.0 * MASS)  # thinner than five grains: there are none
+    typed = PenetrateSettings(ground="spring-damper", model=str(path), mass=0.2, tip_diameter=0.02)
+    assert (typed.mass, typed.tip_diameter, typed.load) == (0.2, 0.02, None)
+    beside = PenetrateSettings(model=str(path))  # beside a bed its spike is that of the bed's runs, and it is said
+    assert (beside.tip, beside.mass) == ("sphere", 0.1)
+    size, tip, mass = read_law(path, beside).warnings()
+    assert "--tip-diameter 0.003" in size and "--tip cone" in tip and "--mass 0.3" in mass
+    path.write_text("nonsense")
+    with pytest.raises(ValueError, match=r"model\.toml"):
+        penetrate.check(PenetrateSettings(ground="spring-damper", model=str(path)))
+
+
 def test_without_a_bed_the_command_shows_both_laws(tmp_path, capsys):
     (tmp_path / "model.toml").write_text(MODEL + CRATER)
     tokens = ["penetrate", "--ground", "spring-damper", "--model", str(tmp_path / "model.toml"), "--speeds", "0.2"]

@@ -7,6 +7,9 @@ import pytest
 
 from experiments.diagnose.effect_words import confirmation
 from experiments.diagnose.gaps import Gaps
+from experiments.diagnose.localise import Place
+from experiments.diagnose.next_steps import _follow
+from experiments.diagnose.summary import scatter_sentence, summary_sentences, title_words
 from experiments.diagnose.telling import PhaseTable, sure_sentences, told_tables, where_sentences
 
 
@@ -60,16 +63,16 @@ def test_the_gap_is_told_in_millimetres_by_condition_and_from_when_on():
     rest = np.where(time > 0.495, 3e-3, 0.0)
     for trial, torque in (("a", 0.1), ("b", 0.2)):
         before = rest if trial == "a" else 0 * rest
-        gaps.add(
-            trial, "x", time, before, 0 * rest, np.full(101, 5e-4), settings={"torque_N_m": torque}, held_out=False
-        )
+        noise = np.full(101, 5e-4)
+        gaps.add(trial, "x", time, before, 0 * rest, noise, noise, settings={"torque_N_m": torque}, held_out=False)
     (row,) = gaps.by_channel
     assert (row["unit"], row["rms_after"]) == ("mm", 0.0)
     assert row["rms_before"] == pytest.approx(3 * np.sqrt(51 / 202))
     assert [(row["trials"], row["before"]) for row in gaps.by_condition] == [
         (["a"], pytest.approx(36 * 51 / 101)), (["b"], 0.0)]  # fmt: skip
     offset = np.where(np.linspace(-0.2, 1.0, 121) < 0.295, 2e-3, 5e-3)  # the zero alone is no parting
-    gaps.add("c", "y", np.linspace(-0.2, 1.0, 121), offset, 0 * offset, np.full(121, 5e-4), settings={}, held_out=False)
+    time, noise = np.linspace(-0.2, 1.0, 121), np.full(121, 5e-4)
+    gaps.add("c", "y", time, offset, 0 * offset, noise, noise, settings={}, held_out=False)
     parted, later = gaps.parted
     assert later["trial"] == "c" and later["at_s"] == pytest.approx(0.3, abs=0.03)
     assert parted["trial"] == "a" and parted["at_s"] == pytest.approx(0.5, abs=0.03)
@@ -87,3 +90,60 @@ def test_how_sure_a_name_is_stands_in_words_with_its_nearest_rival():
     for words in ("268 nats", "from 153 to 0.97", "com-offset, is 209 nats behind", "9 degrees", "tell the two apart"):
         assert words in sure
     assert "remove the cable" in confirmation("umbilical")
+
+
+def unknown(**changes):
+    """diagnosis.json of an unknown, as far as words need it."""
+    gap = {"before": {"fit": 52.0, "held_out": 65.0}, "after": {"fit": 23.0, "held_out": 62.0}}
+    said = {
+        "verdict": "unknown", "effects": [{"id": "plastic-sinkage"}], "alternatives": [], "gap": gap,
+        "leading": {"effects": ["plastic-sinkage"], "certain": ["plastic-sinkage"],
+                    "nearest": {"effect": "adhesion", "evidence_behind": 41.0, "angle_deg": 34.0, "told_apart": True}},
+        "evidence": [{"effects": ["plastic-sinkage"], "score": 102.0, "left": 0.1, "closes": 0.9},
+                     {"effects": ["adhesion"], "score": 61.0, "left": 0.5, "closes": 0.5}],
+        "evidence_base": {"left": 1.0, "with_scatter": True}, "at_bounds": {"before": [], "after": []},
+        "gate": {"before": {"passed": False, "score": 90.0, "threshold": 4.0},
+                 "after": {"passed": False, "score": 22.0, "threshold": 4.0}},
+        "left": [place("b", "force", "rest", 30.0, 0.1)],
+        "latent": {"depends_on": "depth (explains 23 % of it)"}, "next_experiment": "Push once more.",
+    }  # fmt: skip
+    return said | changes
+
+
+def test_the_first_lines_of_an_unknown_name_what_leads_how_far_it_goes_and_what_is_left():
+    words = " ".join(summary_sentences(unknown()))
+    for said in (
+        "Certain: plastic-sinkage (102 nats over the base model, weighed against what replicates differ by)",
+        "from 52 to 23 on the trials that were fitted, 57 % of what is beyond the noise",  # (51 - 22) / 51
+        "from 65 to 62 on those held out, 5 %", "adhesion, is 41 nats behind",
+        "the gate stands at 22 on the fitted trials",
+        "phase rest (100 %) and channel force", "trial b from 0.4 to 0.9 s", "goes with depth", "Push once more.",
+    ):  # fmt: skip
+        assert said in words, said
+    assert "plastic-sinkage for certain" in title_words(unknown())
+
+
+def test_where_nothing_is_certain_the_candidates_are_said_with_what_each_would_close():
+    leading = {"effects": ["adhesion"], "certain": [], "nearest": None}
+    words = " ".join(summary_sentences(unknown(effects=[], leading=leading)))
+    assert "Likeliest, but not certain: adhesion (61 nats" in words and "plastic-sinkage would take away 90 %" in words
+    nothing = unknown(effects=[], leading={"effects": [], "certain": [], "nearest": None})
+    words = " ".join(summary_sentences(nothing))
+    assert "plastic-sinkage would take away 90 %, adhesion 50 %" in words
+    assert "the likeliest is adhesion, not for certain" in title_words(unknown(effects=[], leading=leading))
+
+
+def test_the_gap_with_the_beds_own_share_is_said_beside_the_gap():
+    weighed = {"before": {"fit": 4.0, "held_out": 5.0}, "after": {"fit": 1.1, "held_out": None}}
+    said = unknown(gap_with_scatter=weighed, model_std={"force": 3.7, "depth": 0.0005, "static_friction": 0.08})
+    (sentence,) = scatter_sentence(said)
+    assert "(force 3.7 N, depth 0.5 mm, static friction 8 %)" in sentence
+    assert "4 fitted (5 held out) with the base model and 1.1 fitted with the best one" in sentence
+    assert scatter_sentence(unknown()) == []
+
+
+def test_what_to_do_next_follows_the_phase_or_the_column_that_holds_what_is_left():
+    places = [Place("1", "force", "rest", 0.0, 1.0, 60.0), Place("1", "force", "in", 0.0, 1.0, 30.0)]
+    assert "hold the spike there ten times as long" in _follow(places, {"depth_m": 0.9})
+    assert "twice as deep" in _follow(places[1:], {"depth_m": 0.9, "t_s": 0.2})
+    assert "nothing that was recorded" in _follow(places[1:], {"depth_m": 0.05})

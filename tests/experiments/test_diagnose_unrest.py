@@ -6,8 +6,11 @@ from scipy.fft import idct
 
 from experiments.campaign import Recording
 from experiments.diagnose.diagnosis import diagnose
+from experiments.diagnose.document import document
 from experiments.diagnose.fitting import Model, Whitener, fit
+from experiments.diagnose.next_steps import common_share
 from experiments.diagnose.penetration_problem import make_problem
+from experiments.diagnose.scatter_gap import gap_with_scatter, scatter_std
 from experiments.diagnose.unrest import find_unrest
 from tests.penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial
 
@@ -63,8 +66,36 @@ def test_a_name_is_certain_where_all_that_is_left_is_what_replicates_differ_by()
     assert found.verdict == "unknown" and found.effects == ("depth-hardening",)
     assert found.model_std["force"] == pytest.approx(0.8, rel=0.3)
     assert found.after.held_out < 0.2 * found.before.held_out
+    # 1 + 0.8^2 / 0.05^2 with the sensors alone, as near as another push comes with what pushes differ by added
+    weighed = gap_with_scatter(found)
+    assert found.after.held_out > 50
+    assert weighed.after == pytest.approx((1.0, 1.0), abs=0.45) and weighed.before[1] > 3 * weighed.after[1]
+    said = document(found)
+    assert said["gap_with_scatter"]["after"]["fit"] == weighed.after[0]
+    assert said["evidence_base"]["with_scatter"]  # candidates and base model in one likelihood
+    best = next(row for row in said["evidence"] if row["effects"] == ["depth-hardening"])
+    assert 0.8 < best["closes"] <= 1.2 and best["score"] > 10
+    assert found.next_experiment.startswith(("More replicates", "It does not repeat"))  # not: repeat a trial
 
 
 def test_what_differs_between_replicates_alone_gets_no_name_and_is_not_called_nothing():
     found = diagnose(wandering(0.8))
     assert found.verdict == "unknown" and found.effects == ()
+    assert found.next_experiment.startswith("It does not repeat")
+
+
+def test_a_trials_own_factor_on_the_bed_widens_a_push_by_its_share_of_the_force():
+    problem = wandering(0.0)
+    values = {"stiffness": STIFFNESS, "damping": DAMPING}
+    here = problem.compare(values, (), "00")["force"]
+    (std,) = scatter_std(problem, {"bed": 0.1}, values, (), "00").values()
+    assert std == pytest.approx(0.1 * here["model"], abs=1e-9)  # (1 + s) (K z + C v)
+    both = scatter_std(problem, {"bed": 0.1, "force": 0.3}, values, (), "00")["force"]
+    assert both == pytest.approx(np.hypot(0.1 * here["model"], 0.3), abs=1e-9)
+
+
+@pytest.mark.parametrize(("hardening", "size", "least", "most"), [(60.0, 0.0, 0.9, 1.0), (0.0, 0.8, 0.0, 0.3)])
+def test_what_replicates_have_in_common_is_told_from_what_each_does(hardening, size, least, most):
+    problem = wandering(size, hardening=hardening)
+    share = common_share(problem, {"stiffness": STIFFNESS, "damping": DAMPING}, (), ("00", "01", "02"))
+    assert least <= share <= most

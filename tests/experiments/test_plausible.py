@@ -7,10 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial, drop_trial
 
 from experiments.campaign import Campaign, Recording, TumbleCampaign, read_campaign
 from experiments.campaign.templates import TEMPLATES, new_campaign
+from experiments.diagnose.stuck import clipped
 from experiments.inspection import find_faults, unnamed_files
+from experiments.plausible.zeros import depth_zeros
 
 GRAVITY = 9.80665
 
@@ -166,3 +169,88 @@ def test_a_sensor_louder_than_stated_is_said():
     one = campaign.tables.model_copy(update={"trial": campaign.tables.trial[:1]})
     told = [finding.what for finding in find_faults(replace(campaign, tables=one))]
     assert any("times what [sensors.force] states" in what for what in told), told
+
+
+def pushes(shift: float, *, law: Callable[[float], float] = lambda z: STIFFNESS * z, above: float = 0.0) -> Campaign:
+    """Three pushes whose depth reads `shift` [m] too much, recorded from `above` the surface on."""
+    trials = []
+    for k in range(3):
+        made = driven_trial(
+            lambda z, v, top: law(z - above) + DAMPING * v if z > above else 0.0, speed=0.01, depth=0.02 + above, seed=k
+        )
+        made.columns["depth_m"] += shift - above
+        trials.append((f"{k}", "driven", 0.01, made))
+    return campaign_of(trials)
+
+
+@pytest.mark.parametrize("above", [0.0, 0.004])
+@pytest.mark.parametrize("shift", [0.002, -0.002])
+def test_a_depth_whose_zero_is_off_in_all_pushes_of_a_machine_is_said_once(shift, above):
+    ((trial, what),) = depth_zeros(pushes(shift, above=above))
+    assert trial == "" and "in all 3 pushes the force sets in at a depth of" in what
+    low, high = (float(word) for word in what.split("depth of ")[1].split(" mm")[0].split(" to "))
+    assert low - 0.5 < 1e3 * shift < high + 0.5
+    said = [finding.what for finding in find_faults(pushes(shift, above=above))]
+    assert not any("spike's weight" in what for what in said)  # the force's zero is right
+
+
+@pytest.mark.parametrize(
+    "law", [lambda z: STIFFNESS * z, lambda z: 6e4 * z**2, lambda z: STIFFNESS * (z if z < 0.01 else 3 * z - 0.02)]
+)
+@pytest.mark.parametrize("above", [0.0, 0.004])
+def test_a_depth_whose_zero_is_right_is_left_in_peace_whatever_the_law(law, above):
+    assert list(depth_zeros(pushes(0.0, law=law, above=above))) == []
+
+
+def test_readings_that_clip_are_told_from_a_sensor_that_is_stuck_and_from_a_coarse_one():
+    time = np.linspace(0.0, 1.0, 400)
+    noisy = np.sin(np.pi * time) + 0.01 * np.random.default_rng(0).standard_normal(400)
+    (end,) = clipped(np.minimum(noisy, 0.9))
+    assert end.highest and end.value == 0.9 and set(end.rows) == set(np.flatnonzero(noisy >= 0.9))
+    (end,) = clipped(np.maximum(-noisy, -0.9))
+    assert not end.highest and "the lowest" in end.words
+    assert clipped(noisy) == [] and clipped(np.round(np.sin(np.pi * time), 3)) == []
+    stuck = noisy.copy()
+    stuck[60:90] = stuck[60]
+    assert clipped(stuck) == []
+
+
+def test_a_sensor_that_clips_is_said_and_its_readings_are_set_aside():
+    def at_most(columns: dict[str, np.ndarray]) -> None:
+        columns["force_N"] = np.minimum(columns["force_N"], 0.8 * columns["force_N"].max())
+
+    said = [f for f in find_faults(changed("penetration", "001", "data", at_most)) if "clips there" in f.what]
+    assert len(said) == 1 and said[0].channel == "force" and said[0].set_aside
+    turning = changed("tumble", "001", "imu", lambda c: c.update(gyro_rad_s=np.minimum(c["gyro_rad_s"], 0.5)))
+    assert any(f.channel == "gyro" and "the highest that it ever reads" in f.what for f in find_faults(turning))
+
+
+def late(columns: dict[str, np.ndarray], *, by: float, told: float = 0.0) -> None:
+    """Rows before `by` [s] are missing, and the others' times are less by `told`."""
+    kept = columns["t_s"] >= by
+    for name in list(columns):
+        columns[name] = columns[name][kept]
+    columns["t_s"] = columns["t_s"] - told
+
+
+@pytest.mark.parametrize(
+    ("by", "told", "words"), [(0.3, 0.0, "was not recorded"), (0.6, 0.3, "the torque set in at -0.3 s of this clock")]
+)
+def test_a_clock_that_starts_late_is_said(by, told, words):
+    campaign = read_campaign(TEMPLATES / "template-tumble")
+    recordings = dict(campaign.recordings)
+    for (trial, sensor), recording in campaign.recordings.items():
+        columns = dict(recording.columns)
+        late(columns, by=by, told=told)
+        recordings[trial, sensor] = Recording(columns)
+    said = [f for f in find_faults(replace(campaign, recordings=recordings)) if "no sensor has a row before" in f.what]
+    assert said and all("0.3" in f.what and f.doubt for f in said)
+    assert any(words in f.what for f in said)
+
+
+def test_a_drop_whose_recording_begins_late_is_said():
+    made = drop_trial(lambda z, v: STIFFNESS * z + DAMPING * max(v, 0.0), speed=0.3)
+    columns = dict(made.columns)
+    late(columns, by=0.03)
+    said = [f.what for f in find_faults(campaign_of([("1", "drop", 0.3, Recording(columns))]))]
+    assert any("no row before 30 ms" in what for what in said)

@@ -11,15 +11,16 @@ from vis.diagnose_figures import read_channel, worst
 from vis.palette import line_handles, line_styles
 
 
-def write_folder(folder, *, trials: dict[str, float]) -> None:
+def write_folder(folder, *, trials: dict[str, float], scatter: float | None = None) -> None:
     """An unknown diagnosis of pushes; `trials`: id -> size of what is missing, in standard deviations."""
     (folder / "series").mkdir()
     time = np.linspace(0.0, 1.0, 60)
     latent = ["trial,t_s,latent_force_N,depth_m,velocity_m_s"]
     for trial, size in trials.items():
-        rows = ["t_s,measured,before,after,std,phase"]
+        rows = ["t_s,measured,before,after,std,phase" + ("" if scatter is None else ",scatter")]
         for t in time:
             rows.append(f"{t},{t + 0.1 * size * t},{t},{t + 0.05 * size * t},0.1,{'in' if t < 0.5 else 'out'}")
+            rows[-1] += "" if scatter is None else f",{scatter}"
             latent.append(f"{trial},{t},{0.05 * size * t},{0.01 * t},0.01")
         (folder / "series" / f"{trial}.force.csv").write_text("\n".join(rows) + "\n")
     (folder / "latent.csv").write_text("\n".join(latent) + "\n")
@@ -38,7 +39,9 @@ def write_folder(folder, *, trials: dict[str, float]) -> None:
                       "set_aside": True}],
         "next_experiment": "Repeat the trial.",
     }  # fmt: skip
-    result = {"title": "Something is missing", "version": "0", "warnings": ["a gap"],
+    if scatter is not None:
+        said["gap_with_scatter"] = {stage: {"fit": 2.0, "held_out": 1.5} for stage in ("before", "after")}
+    result = {"title": "Something is missing", "summary": ["Certain: nothing."], "version": "0", "warnings": ["a gap"],
               "departures": {"sentences": ["The base model fails most in in."]}}  # fmt: skip
     (folder / "diagnosis.json").write_text(json.dumps(said))
     (folder / "result.json").write_text(json.dumps(result))
@@ -52,6 +55,15 @@ def test_the_report_of_an_unknown_has_every_part_and_names_columns_in_words(tmp_
         assert part in page
     figures = {path.stem for path in (tmp_path / "figures").iterdir()}
     assert figures == {"trajectories", "residuals", "evidence", "latent"}
+
+
+def test_what_replicates_differ_by_stands_beside_the_gap_and_behind_what_is_left(tmp_path):
+    write_folder(tmp_path, trials={"a": 3.0, "d": 2.0}, scatter=0.2)
+    page = write_diagnosis_report(tmp_path).read_text(encoding="utf-8")
+    for part in ("1.5 beside what replicates differ by", "replicates&#39; scatter added", "Certain: nothing."):
+        assert part in page or part.replace("&#39;", "'") in page
+    channel = read_channel(tmp_path / "series" / "a.force.csv")
+    assert channel.scatter is not None and set(channel.scatter) == {0.2}
 
 
 def test_the_worst_channels_are_drawn_and_held_out_ones_among_them(tmp_path):

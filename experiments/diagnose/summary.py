@@ -1,0 +1,203 @@
+"""The first lines of a diagnosis: what is missing, how far that closes the gap, how sure it is, what is left, and what
+to do next; a few sentences made of diagnosis.json alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from .effect_words import meaning
+from .gaps import unit_of
+from .telling import shares_words, sure_sentences
+
+__all__ = ["scatter_sentence", "summary_sentences", "title_words"]
+
+_WORTH_SAYING = 0.1
+"""Share of what is beyond the noise that a candidate must close to be called the likeliest."""
+_NAMES = 3
+"""Candidates that are said where none is certain."""
+
+
+def title_words(said: Mapping[str, Any]) -> str:
+    """The verdict in one line."""
+    names = " and ".join(effect["id"] for effect in said["effects"])
+    if said["verdict"] == "none":
+        return "Nothing is missing: the model with its fitted parameters explains the trials"
+    if said["verdict"] == "named":
+        return f"Missing: {names}"
+    if said["verdict"] == "ambiguous":
+        return f"Missing: {names}, or {' or '.join(said['alternatives'])}: these trials cannot tell"
+    if names:
+        return f"Unknown: {names} for certain, and something beside it that no effect of the library explains"
+    likeliest = _likeliest(said)
+    also = f"; the likeliest is {likeliest}, not for certain" if likeliest else ""
+    return f"Unknown: something is missing that no effect of the library explains{also}"
+
+
+def summary_sentences(said: Mapping[str, Any]) -> list[str]:
+    """What stands first in the report and on the terminal."""
+    if said["verdict"] == "none":
+        gap = said["gap"]["after"]
+        out = "" if gap["held_out"] is None else f" and {gap['held_out']:.3g} of those held out"
+        first = [f"The base model leaves {gap['fit']:.3g} a sample of the trials that were fitted{out} (1 is noise)."]
+    elif said["verdict"] == "unknown":
+        first = [*_candidates(said), *_left(said)]
+    else:
+        first = sure_sentences(said)
+    return [*_doubts(said), *first, *scatter_sentence(said), f"Next experiment: {said['next_experiment']}"]
+
+
+def _doubts(said: Mapping[str, Any]) -> list[str]:
+    """What in the recordings may be all that stands behind a name."""
+    found = [finding["what"] for finding in said.get("findings", []) if finding.get("doubt")]
+    if not found or said["verdict"] == "none":
+        return []
+    more = f" (and {len(found) - 1} more, see the warnings)" if len(found) > 1 else ""
+    return [f"To be put right first, for it may be all that is behind this: {found[0]}{more}."]
+
+
+def scatter_sentence(said: Mapping[str, Any]) -> list[str]:
+    """The gap weighed against what replicates differ by as well, where they differ by more than the sensors."""
+    weighed = said.get("gap_with_scatter")
+    if weighed is None:
+        return []
+    if said["verdict"] == "none":
+        return [
+            f"What is beyond the noise is what replicates differ by{_scatter(said)}: weighed against that as well it "
+            f"is {_both(weighed['after'])}."
+        ]
+    return [
+        f"Weighed against what replicates differ by as well{_scatter(said)}, 1 being as near as another run of the "
+        f"same comes, the gap is {_both(weighed['before'])} with the base model and "
+        f"{_both(weighed['after'])} with the best one."
+    ]
+
+
+def _scatter(said: Mapping[str, Any]) -> str:
+    """By how much replicates differ, in parentheses: a channel in its unit, a trial's own factor in per cent."""
+    parts = []
+    for kind, std in said.get("model_std", {}).items():
+        unit, factor = unit_of(kind)
+        parts.append(
+            f"{kind.replace('_', ' ')} " + (f"{100 * std:.2g} %" if unit == "SI" else f"{factor * std:.2g} {unit}")
+        )
+    return f" ({', '.join(parts)})" if parts else ""
+
+
+def _both(gap: Mapping[str, float | None]) -> str:
+    out = "" if gap["held_out"] is None else f" ({gap['held_out']:.3g} held out)"
+    return f"{gap['fit']:.3g} fitted{out}"
+
+
+# Where something has no name ------------------------------------------------------------------------------------------
+
+
+def _likeliest(said: Mapping[str, Any]) -> str:
+    """The names of the best model, or of the candidate that closes most; empty where it is little."""
+    names = said.get("leading", {}).get("effects", [])
+    if names:
+        return " + ".join(names)
+    rows = _singles(said)
+    return str(rows[0]["effects"][0]) if rows and (rows[0].get("closes") or 0.0) >= _WORTH_SAYING else ""
+
+
+def _candidates(said: Mapping[str, Any]) -> list[str]:
+    """Which names lead, how far each closes the gap, and how sure it is."""
+    leading = said.get("leading", {"effects": [], "certain": [], "nearest": None})
+    if not leading["effects"]:
+        rows = _singles(said)
+        if not rows:
+            return ["No effect of the library could be tried."]
+        listed = _closing(sorted(rows, key=lambda row: -(row.get("closes") or 0.0))[:_NAMES])
+        return [f"No effect of the library explains it: of what the base model leaves beyond the noise, {listed}."]
+    certain = leading["certain"]
+    others = [name for name in leading["effects"] if name not in certain]
+    sentences = [words for name in leading["effects"] if (words := meaning(name))]
+    sure = f"Certain: {' and '.join(certain)}" if certain else ""
+    maybe = f"{'likeliest' if certain else 'Likeliest'}, but not certain: {' and '.join(others)}" if others else ""
+    row = next((r for r in said["evidence"] if sorted(r["effects"]) == sorted(leading["effects"])), None)
+    nats = "" if row is None else f" ({row['score']:.0f} nats over the base model{_weighed(said)})"
+    parts = "; ".join(part for part in (sure, maybe) if part)
+    first = f"{parts}{nats}: it takes the gap {_closes(said['gap'])}"
+    near = leading["nearest"]
+    if near is not None:
+        apart = "these trials tell the two apart" if near["told_apart"] else "these trials do not tell the two apart"
+        first += (
+            f"; the nearest other name, {near['effect']}, is {near['evidence_behind']:.0f} nats behind and "
+            f"{near['angle_deg']:.0f} degrees away in what it changes (0: the same): {apart}"
+        )
+    sentences.append(f"{first}.")
+    rest = [row for row in _singles(said) if row["effects"][0] not in leading["effects"]][: _NAMES - 1]
+    if rest and not certain:
+        sentences.append(f"Of what the base model leaves beyond the noise{_weighed(said)}, {_closing(rest)}.")
+    return [*sentences, *_why_unknown(said)]
+
+
+def _why_unknown(said: Mapping[str, Any]) -> list[str]:
+    """What keeps the leading candidate from being the verdict."""
+    gate = said["gate"]
+    strained = [bound for bound in said["at_bounds"]["after"] if bound["sigmas"] is not None]
+    reasons = [
+        f"{score['score']:.3g} on {which} (a right model: {score['threshold']:.3g} at most)"
+        for which, score in (("the fitted trials", gate["after"]), ("those held out", gate.get("held_out")))
+        if score is not None and not score["passed"]
+    ]
+    said_so = [f"the gate stands at {' and at '.join(reasons)}"] if reasons else []
+    said_so += [f"it needs {bound['parameter']} {bound['sigmas']:+.1f} sigma off what was stated" for bound in strained]
+    return [f"It is not the whole answer: {'; '.join(said_so)}."] if said_so else []
+
+
+def _weighed(said: Mapping[str, Any]) -> str:
+    """Against what candidates were weighed, where it is not the sensors alone."""
+    return ", weighed against what replicates differ by" if said.get("evidence_base", {}).get("with_scatter") else ""
+
+
+def _singles(said: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """The best form of every single name, the likeliest first."""
+    best: dict[str, Mapping[str, Any]] = {}
+    for row in said["evidence"]:
+        if len(row["effects"]) == 1:
+            best.setdefault(row["effects"][0], row)
+    return list(best.values())
+
+
+def _closing(rows: Sequence[Mapping[str, Any]]) -> str:
+    """layering would take away 40 %, adhesion 3 %"""
+    first, *others = [(row["effects"][0], _share(row.get("closes"))) for row in rows]
+    return f"{first[0]} would take away {first[1]}" + "".join(f", {name} {share}" for name, share in others)
+
+
+def _share(share: float | None) -> str:
+    if share is None:
+        return "nothing"
+    return "nothing" if share < 0.005 else "all" if share > 0.995 else f"{100 * share:.0f} %"
+
+
+def _closes(gap: Mapping[str, Any]) -> str:
+    """From what to what, and which share of what is beyond the noise that is, fitted and held out."""
+    parts = []
+    for key, words in (("fit", "on the trials that were fitted"), ("held_out", "on those held out")):
+        before, after = gap["before"][key], gap["after"][key]
+        if before is None or after is None:
+            continue
+        share = f", {_share(1 - max(after - 1, 0.0) / (before - 1))} of what is beyond the noise" if before > 1 else ""
+        parts.append(f"from {before:.3g} to {after:.3g} {words}{share}")
+    return " and ".join(parts)
+
+
+def _left(said: Mapping[str, Any]) -> list[str]:
+    """Where the best model still fails, and what the missing force goes with."""
+    sentences = []
+    places = said.get("left", [])
+    if places:
+        total = sum(place["excess"] for place in places)
+        phase, channel = (shares_words(places, key, total) for key in ("phase", "channel"))
+        first = places[0]
+        beyond = ", beyond what replicates differ by," if "gap_with_scatter" in said else ""
+        sentences.append(
+            f"What is left then{beyond} is in phase {phase} and channel {channel}; its worst stretch is "
+            f"{first['channel']} of trial {first['trial']} from {first['from_s']:.4g} to {first['to_s']:.4g} s."
+        )
+    if "latent" in said:
+        sentences.append(f"The force that is missing goes with {said['latent']['depends_on']}.")
+    return sentences
