@@ -68,7 +68,7 @@ def test_a_force_that_was_read_while_the_contact_switched_is_no_misfit():
     problem = make_problem(made)
     right = fit(Model(problem, Whitener.white(problem), ("001", "002")))
     values, samples = right.values, problem.samples("001")
-    imu = {name: np.flatnonzero(samples.channel == name) for name in ("ax", "ay")}
+    imu = {name: np.flatnonzero(samples.channel == name) for name in ("gyro", "ax", "ay")}
 
     def read(late):
         return problem.readings(values, (), ("001",), late)["001"]
@@ -88,7 +88,8 @@ def test_a_force_that_was_read_while_the_contact_switched_is_no_misfit():
     size = 0.0
     for name, places in imu.items():
         before, after = (read(shift)[places[row]] for shift in (low, high))
-        columns[f"{name}_m_s2"][at] = 0.5 * (before + after) * samples.std[places[row]]
+        column = "gyro_rad_s" if name == "gyro" else f"{name}_m_s2"
+        columns[column][at] = 0.5 * (before + after) * samples.std[places[row]]
         size = max(size, abs(after - before))
     assert size > 20  # of the sensor's standard deviations
     again = make_problem(replace(made, recordings={**made.recordings, ("001", "imu"): Recording(columns)}))
