@@ -68,28 +68,28 @@ def test_a_force_that_was_read_while_the_contact_switched_is_no_misfit():
     problem = make_problem(made)
     right = fit(Model(problem, Whitener.white(problem), ("001", "002")))
     values, samples = right.values, problem.samples("001")
-    imu = {name: np.flatnonzero(samples.channel == name) for name in ("gyro", "ax", "ay")}
+    force = np.flatnonzero(samples.channel == "ax")
 
     def read(late):
         return problem.readings(values, (), ("001",), late)["001"]
 
     steps = np.linspace(0.0, 0.0099, 34)
-    jumps = np.abs(np.diff([read(late)[imu["ax"]] for late in steps], axis=0))
+    jumps = np.abs(np.diff([read(late)[force] for late in steps], axis=0))
     step, row = np.unravel_index(np.argmax(jumps), jumps.shape)
     low, high = steps[step], steps[step + 1]
-    first, last = (read(late)[imu["ax"][row]] for late in (low, high))
+    first, last = (read(late)[force[row]] for late in (low, high))
     for _ in range(20):
         middle = 0.5 * (low + high)
-        there = read(middle)[imu["ax"][row]]
+        there = read(middle)[force[row]]
         low, high = (low, middle) if abs(there - first) > abs(there - last) else (middle, high)
     columns = {name: column.copy() for name, column in made.recordings["001", "imu"].columns.items()}
-    at = int(np.argmin(np.abs(columns["t_s"] - samples.time[imu["ax"][row]])))
+    at = int(np.argmin(np.abs(columns["t_s"] - samples.time[force[row]])))
     columns["t_s"][at] += high
     size = 0.0
-    for name, places in imu.items():
-        before, after = (read(shift)[places[row]] for shift in (low, high))
-        column = "gyro_rad_s" if name == "gyro" else f"{name}_m_s2"
-        columns[column][at] = 0.5 * (before + after) * samples.std[places[row]]
+    for name, column in (("gyro", "gyro_rad_s"), ("ax", "ax_m_s2"), ("ay", "ay_m_s2")):
+        (place,) = np.flatnonzero((samples.channel == name) & (samples.time == samples.time[force[row]]))
+        before, after = (read(shift)[place] for shift in (low, high))
+        columns[column][at] = 0.5 * (before + after) * samples.std[place]
         size = max(size, abs(after - before))
     assert size > 20  # of the sensor's standard deviations
     again = make_problem(replace(made, recordings={**made.recordings, ("001", "imu"): Recording(columns)}))
