@@ -78,12 +78,17 @@ def weighed_residuals(
 
 
 def sensor_std(problem: Problem, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
-    """Noise of each reading as `gap` takes it (of a driven force with the error of its depth), by channel."""
+    """Noise of each reading as `gap` takes it, by channel: of a driven force with the error of its depth; endless where
+    a tumble was read while a contact switched."""
     samples = problem.samples(trial)
     found = {str(name): samples.std[samples.channel == name] for name in dict.fromkeys(samples.channel.tolist())}
     own: Any = getattr(problem, "gap_std", None)
     if own is not None and "force" in found:
         found["force"] = own(values, forms, trial)
+    switches: Any = getattr(problem, "switches", None)
+    if switches is not None:
+        doubtful = switches(values, forms, [trial])[trial] != 0
+        found = {name: np.where(doubtful[samples.channel == name], np.inf, std) for name, std in found.items()}
     return found
 
 

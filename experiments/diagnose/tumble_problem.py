@@ -218,14 +218,14 @@ class TumbleProblem:
         """Count readings of the IMU next to which the model jumps, where a spike touches or a slip ends, with an error
         as large as the jump: on which side of it they were taken no fit can tell. Says whether any has changed."""
         before = self._switches
-        self._switches = self._jumps(values, forms, self._ids)
+        self._switches = self.switches(values, forms, self._ids)
         self._take_in()
         return any((self._switches[id] != before[id]).any() if id in before else self._switches[id].any()
                    for id in self._switches)  # fmt: skip
 
-    def _jumps(self, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> dict[str, Array]:
-        """By how much the model jumps within `_SWITCH` of each reading of the IMU, over its noise; 0 where it does
-        not."""
+    def switches(self, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> dict[str, Array]:
+        """By how much the model jumps within `_SWITCH` of each reading of the IMU, over its noise, by trial, shape
+        [sample_count]; 0 where it does not, and of the other channels."""
         late, now, early = (self.readings(values, forms, trials, shift) for shift in (_SWITCH, 0.0, -_SWITCH))
         found = {}
         for trial in trials:
@@ -273,7 +273,7 @@ class TumbleProblem:
         """With the camera's zero at its most probable value; readings at a switch of the contact say nothing."""
         data = self.data.trials[self._index[trial]]
         residual = self._residual(values, forms, trial)
-        valid = self._jumps(values, forms, [trial])[trial] == 0
+        valid = self.switches(values, forms, [trial])[trial] == 0
         residual = (residual - self._zero(data.channel, residual))[valid]
         return float(residual @ residual), len(residual)
 
