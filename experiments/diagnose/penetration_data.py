@@ -30,6 +30,8 @@ _LONG = 0.02
 """Share of a recording from which on a stretch without rows is said."""
 _SMOOTH, _ROUGH = 1.7, 3.0
 """Chi-square a row up to which a polynomial goes through both sides of a gap, and beyond which it does not."""
+_LOUDER = 1.2
+"""Power of the slowest noise of a depth sensor, over what is stated, from which on its pushes are smoothed once more."""
 _OUTLIER = 8.0
 """Noise standard deviations beyond which a lone reading is a fault (once in 1e15 by chance)."""
 
@@ -100,7 +102,8 @@ def _recoloured(campaign: Campaign, trials: list[Prepared]) -> tuple[list[Prepar
     colours: dict[str, Colour] = {}
     for alike in rates.values():
         left = [(trial.depth - trial.smooth.depth) / std for trial in alike if trial.smooth is not None]
-        if (colour := colour_of("depth", left)) is not None:
+        colour = colour_of("depth", left)
+        if colour is not None and float(colour.power(np.zeros(1))[0]) > _LOUDER:
             colours |= {trial.info.id: colour for trial in alike}
     return [_again(campaign, trial, colours) if trial.info.id in colours else trial for trial in trials], colours
 
