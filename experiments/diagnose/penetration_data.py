@@ -31,7 +31,7 @@ _LONG = 0.02
 _SMOOTH, _ROUGH = 1.7, 3.0
 """Chi-square a row up to which a polynomial goes through both sides of a gap, and beyond which it does not."""
 _LOUDER = 1.2
-"""Power of the slowest noise of a depth sensor, over what is stated, from which on its pushes are smoothed once more."""
+"""Power of a depth sensor's slow noise, over what is stated, from which on its pushes are smoothed once more."""
 _OUTLIER = 8.0
 """Noise standard deviations beyond which a lone reading is a fault (once in 1e15 by chance)."""
 
