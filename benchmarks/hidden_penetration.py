@@ -203,7 +203,9 @@ def _shape(
             elif effect == "shaft-friction":
                 s |= {"shaft": amplitude * full, "shaft_speed": 0.02}
             else:
-                s |= {"layer": max(sign * amplitude, -0.9), "layer_depth": layer_at, "layer_width": 0.03 * depth,
+                # no less than a tenth of the force is left: no bed pulls a spike in
+                least = -0.9 if layer_kind < 0.5 else -0.9 * layer_at / depth
+                s |= {"layer": max(sign * amplitude, least), "layer_depth": layer_at, "layer_width": 0.03 * depth,
                       "layer_kind": layer_kind}  # fmt: skip
         if outside == "floor-vibration":
             s |= {"vibration": amplitude * depth * 0.1, "vibration_rate": rate, "vibration_phase": phase}
