@@ -25,7 +25,7 @@ from .localise import Place, depends_on, latent_table, places, places_in
 from .next_steps import after_unknown
 from .prediction import Predicted, folds_of, predict
 from .problem import Finding, Form, Problem
-from .replicates import Scatter, exchanged, find_scatter, groups_of, odd_trials, split_trials, with_scatter
+from .replicates import Scatter, exchanged, find_scatter, groups_of, odd_trials, split_trials, trends, with_scatter
 from .scatter_gap import gap_with_scatter, weighed_residuals
 from .search import Choice, choose
 from .unrest import Unrest, find_unrest
@@ -212,6 +212,7 @@ def diagnose(
         fitted = tuple(trial for trial in fitted if trial not in gone)
         base = by_beginnings(_whitened_fit(base.model.on(fitted)))
     scatter = _scatter(base, held_out)
+    findings += trends(scatter, problem.trials)
     base, model_std = _rescattered(base, scatter) if scatter.parameters else base, scatter.model_std
     unrest = _unrest(base, held_out) if restless else Unrest({})
     base = _doubted(_calmed(base, unrest), held_out)

@@ -14,7 +14,8 @@ from .fitting import Fit, Model, fit, scanned
 from .gate import low_modes
 from .problem import Finding, Parameter, Problem, TrialInfo, Values
 
-__all__ = ["Scatter", "exchanged", "find_scatter", "groups_of", "odd_trials", "parted", "split_trials", "with_scatter"]
+__all__ = ["Scatter", "exchanged", "find_scatter", "groups_of", "odd_trials", "parted", "split_trials", "trends",
+           "with_scatter"]  # fmt: skip
 
 _SURE = 1e-4
 _LEAST = 0.005
@@ -26,6 +27,9 @@ _LOOKS = 12
 _AT_ODDS = 20.0
 """How many times as far from its replicates as they are from one another, in mean square, a trial is at odds."""
 
+_TREND = 1e-3
+"""Chance of a rank correlation with the trials' order (Spearman, American Journal of Psychology 15 (1904), 72) below
+which what replicates differ by is said to grow or fall from trial to trial."""
 _ANOTHER = 1.1
 """Ratio of two depths or durations from which on trials do not go through the same."""
 _SIZEABLE = 0.2
@@ -173,6 +177,30 @@ class Scatter:
     model_std: Mapping[str, float] = field(default_factory=dict)
     values: Mapping[str, float] = field(default_factory=dict)
     """Of the model with it, for fits to begin from."""
+
+
+def trends(scatter: Scatter, trials: Sequence[TrialInfo]) -> list[Finding]:
+    """What replicates differ by, where it grows or falls from trial to trial: beds that settle, sensors that drift and
+    tips that wear do so, what scatters does not."""
+    found = []
+    for kind in scatter.model_std:
+        told = [(k, scatter.values[f"{kind}[{trial.id}]"]) for k, trial in enumerate(trials)
+                if f"{kind}[{trial.id}]" in scatter.values]  # fmt: skip
+        if len(told) < 3:
+            continue
+        order, values = np.array(told).T
+        rank = stats.spearmanr(order, values)
+        chance = max(float(rank.pvalue), 2 / math.factorial(len(told)))  # of two orders among all of them
+        if chance < _TREND:
+            way = "grows" if rank.statistic > 0 else "falls"
+            what = (
+                f"what replicates differ by is no scatter: {kind} {way} from trial to trial, in the campaign's order, "
+                f"by {100 * abs(values[-1] - values[0]):.2g} % in all (rank correlation {rank.statistic:.2f}, by "
+                f"chance once in {1 / chance:.0f} times): what has changed with time, the bed, the surface, a tip or a "
+                f"sensor's gain, no effect has"
+            )
+            found.append(Finding(trial="", what=what, doubt=True))
+    return found
 
 
 def _scattered(

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .effect_words import meaning
+from .evidence import SMALL
 from .gaps import unit_of
 from .telling import shares_words, sure_sentences
 
@@ -50,7 +51,7 @@ def summary_sentences(said: Mapping[str, Any]) -> list[str]:
 def _doubts(said: Mapping[str, Any]) -> list[str]:
     """What in the recordings may be all that stands behind a name."""
     found = [finding["what"] for finding in said.get("findings", []) if finding.get("doubt")]
-    if not found or said["verdict"] == "none":
+    if not found or (said["verdict"] == "none" and said["gap"]["after"]["fit"] <= SMALL):
         return []
     more = f" (and {len(found) - 1} more, see the warnings)" if len(found) > 1 else ""
     return [f"To be put right first, for it may be all that is behind this: {found[0]}{more}."]

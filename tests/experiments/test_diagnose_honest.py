@@ -11,7 +11,7 @@ from experiments.diagnose.fitting import Model, Whitener, fit, settled
 from experiments.diagnose.gate import held_out_gate, open_gate
 from experiments.diagnose.penetration_problem import make_problem
 from experiments.diagnose.problem import Parameter, Samples, TrialInfo
-from experiments.diagnose.replicates import exchanged, groups_of, parted, split_trials
+from experiments.diagnose.replicates import Scatter, exchanged, groups_of, parted, split_trials, trends
 
 COUNT = 400
 
@@ -152,3 +152,14 @@ def test_a_stiffness_that_was_stated_wrong_is_not_passed_over():
     found = diagnose(make_problem(campaign_of(trials, stiffness=0.7 * STIFFNESS, doubt=(0.05, 0.1))))
     assert found.verdict != "none"
     assert any(bound.parameter.startswith("stiffness") for bound in found.bounds_before)
+
+
+@pytest.mark.parametrize(("factors", "words"), [
+    (np.linspace(-0.1, 0.1, 8), "bed grows from trial to trial"),
+    (np.array([0.1, -0.07, 0.02, 0.06, -0.1, 0.04, -0.03, 0.08]), None),
+])  # fmt: skip
+def test_what_grows_from_trial_to_trial_is_said_to_be_no_scatter(factors, words):
+    trials = [TrialInfo(id=f"{k}", condition=(k // 2,), settings={}) for k in range(len(factors))]
+    values = {f"bed[{trial.id}]": float(factor) for trial, factor in zip(trials, factors, strict=True)}
+    told = trends(Scatter(model_std={"bed": 0.06}, values=values), trials)
+    assert (words is None and told == []) or (words in told[0].what and "once in 20160 times" in told[0].what)
