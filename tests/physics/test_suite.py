@@ -16,7 +16,6 @@ FAILING = {
     "t4-spin",
     *("friction-angle", "friction-angle-published"),
     *("katsuragi-durian", "katsuragi-durian-fine", "murdoch", "rft", "size-collapse"),
-    *("liggghts-contacts-sliding", "liggghts-cloud-sliding", "lammps-contacts-sliding", "lammps-cloud-sliding"),
 }
 """Cases that are known to fail; docs/validation.md says why. One that passes is to be taken off."""
 QUICK = [case for case in chosen(quick=True) if case.compute is not None]
