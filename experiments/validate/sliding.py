@@ -21,8 +21,8 @@ __all__ = ["CASES"]
 STATED = {
     "liggghts": "LIGGGHTS-PUBLIC manual, gran_tangential_history: the spring is held at cof Fn, and the dashpot added "
     "while it is below",
-    "lammps": "LAMMPS manual, pair_style granular, tangential mindlin: min(mu F_n0, |-k_t a xi + F_t,damp|), and xi = "
-    "-(mu F_n0 t + F_t,damp) / k_t where it slides",
+    "lammps": "LAMMPS manual, pair_style granular, tangential mindlin: spring and dashpot together are held at "
+    "mu F_n0, and where they slide xi = -(mu F_n0 t + F_t,damp) / k_t",
 }
 WHAT = (
     ("force", slice(9, 12), "force on a grain over the largest"),
@@ -70,13 +70,14 @@ def _case(
                 about.name: _differences(other, _law(peer, assembly, *peers.LAWS[label]), assembly),
             }
             for who, band in (("bed", _AS_UNSLID), (about.name, _ROUNDING)):
+                most = {name: float(values.max()) for name, values in found[who].items()}
                 rows += [
-                    Comparison(f"{label}, {who} beside its law: {what}", "1", 0.0, found[who][name].max(), band, False)
+                    Comparison(f"{label}, {who} beside its law: {what}", "1", 0.0, most[name], band, False)
                     for name, _, what in WHAT
                 ]
                 curves.append(Curve(f"{label}: {who}, its law", time, np.maximum(found[who]["force"], 1e-17)))
             if label == _SLIDING:
-                rows.append(_order(label, assembly, found["bed"]["velocity"].max()))
+                rows.append(_order(label, assembly, float(found["bed"]["velocity"].max())))
             apart = _differences(bed, other, assembly)
             curves.append(Curve(f"{label}: bed, {about.name}", time, np.maximum(apart["force"], 1e-17), False))
             told = ", ".join(f"{apart[name].max():.2g} ({what})" for name, _, what in WHAT)
@@ -94,7 +95,7 @@ def _order(label: str, assembly: peers.Assembly, coarse: float) -> Comparison:
     """At what power of the step the bed's velocities come to those of its law."""
     fine = peers.refined(assembly, _FINER)
     there = _law("bed", fine, *peers.LAWS[label])
-    finer = _differences(peers.ours(fine, *peers.LAWS[label]), there, fine)["velocity"].max()
+    finer = float(_differences(peers.ours(fine, *peers.LAWS[label]), there, fine)["velocity"].max())
     order = math.log(coarse / finer) / math.log(_FINER)
     return Comparison(
         f"{label}, bed beside its law: order at which velocities come together", "1", 1.0, order, 0.1, False
