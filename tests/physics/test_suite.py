@@ -14,7 +14,6 @@ from experiments.validate.suite import SUITE, chosen
 
 FAILING = {
     "t4-spin",
-    *("friction-angle", "friction-angle-published"),
     *("katsuragi-durian", "katsuragi-durian-fine", "murdoch", "rft", "size-collapse"),
 }
 """Cases that are known to fail; docs/validation.md says why. One that passes is to be taken off."""
