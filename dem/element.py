@@ -62,8 +62,8 @@ _LOOK = 0.02
 # The grains are made for this many times the pressure: chains of force under shear are stronger than at rest.
 _SPARE = 1.5
 # The worst of thousands of contacts over a long shear goes past what a bed is softened for; the bound is this many
-# times that.
-_BOUND = 3.0
+# times that, or this overlap over diameter where that is more: single contacts of it do no harm.
+_BOUND, _HARMLESS = 3.0, 0.1
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,7 @@ def press_element(
         seed=seed,
         threads=threads,
     )
-    bed.overlap_limit = _BOUND * max_overlap
+    bed.overlap_limit = max(_BOUND * max_overlap, _HARMLESS)
     body = bed.add_body([Plane(normal=(0.0, 0.0, -1.0))], position=(0.0, 0.0, top + 0.01 * grain))
     _touch(bed, body, friction=pressed_friction, adhesive=False)
     wall = _Wall(bed, body, pressure=pressure, grain=grain)
