@@ -21,6 +21,7 @@ from .measure import bulk_packing, surface_height
 from .shapes import Plane
 from .sleep import Sleep, Sleeper
 from .solids import AnyShape
+from .stress import find_contacts
 from .timestep import time_step_for
 
 __all__ = ["Bed", "BedFailure"]
@@ -97,7 +98,7 @@ class Bed:
             height: top of the box [m]; a grain above it is lost. Twice the highest grain when None.
             gravity: downwards [m/s2], or a vector.
             young: Young's modulus of the (softened) grains [Pa]; the material's own when None.
-            max_overlap: bound on overlap over diameter; the time step is chosen for it.
+            max_overlap: bound on overlap over diameter, from the start on; the time step is chosen for it.
             time_step: [s]; at most ``dem.timestep.longest_step``. When None an eighth of the contact time, or for
                 strongly damped grains the longest that is stable where that is shorter.
             floor: whether there is a floor at z = 0; a Facing where grains touch it otherwise than one another.
@@ -106,7 +107,8 @@ class Bed:
 
         Raises:
             ValueError: arrays of wrong shape, numbers that are not finite, a negative size, a step too long, a bed
-                narrower than three grains.
+                narrower than three grains, grains that overlap one another or the floor by more than ``max_overlap``,
+                grains outside the box.
         """
         stuff = find_material(material)
         if young is not None:
@@ -127,7 +129,12 @@ class Bed:
         if not 0 < max_overlap <= 0.2:
             raise ValueError(f"max_overlap = {max_overlap} must be above 0 and at most 0.2 of a diameter")
         dt = time_step_for(stuff, diameter=2 * float(radii.min()), max_overlap=max_overlap, wanted=time_step)
-        top = float((positions[:, 2] + radii).max())
+        top, lowest = float((positions[:, 2] + radii).max()), int(positions[:, 2].argmin())
+        if positions[lowest, 2] < (bottom := -4 * float(radii.max())):
+            raise ValueError(
+                f"positions: grain {lowest} begins at z = {positions[lowest, 2]:.4g} m, below the box, which reaches "
+                f"down to {bottom:.4g} m (the floor is at 0); put it higher"
+            )
         settings = {
             "material": stuff,
             "size": tuple(float(s) for s in size),
@@ -147,6 +154,7 @@ class Bed:
             bed._add([Plane()], (0.0, 0.0, 0.0), floor if isinstance(floor, Facing) else Facing())
         bed._make_lists()
         bed._push()
+        bed._refuse_overlaps()
         bed._shift_velocities(-0.5)  # half a step behind the positions, where the leapfrog wants them
         bed.measure_surface()
         return bed
@@ -765,6 +773,24 @@ class Bed:
         e.write("origin", positions.astype(dtype))
         e.write("id", np.arange(n, dtype=np.int32))
         e.write("near_end", (np.arange(e.chunk_count) * e.near_room).astype(np.int32))
+
+    def _refuse_overlaps(self) -> None:
+        """Raise ValueError, naming the worst pair, where grains begin beyond the bound that ``advance`` holds."""
+        # Two centres in one place have no direction: their force is no number, and their overlap is not taken.
+        if self.max_overlap <= self.overlap_limit and np.isfinite(self._engine.read("force")).all():
+            return
+        with np.errstate(invalid="ignore"):
+            contacts = find_contacts(self)
+        radius = self.grains()["radius"]
+        other = np.where(contacts.second < 0, contacts.first, contacts.second)
+        share = contacts.overlap / (radius[contacts.first] + radius[other])
+        worst = int(share.argmax())
+        j, i = sorted((int(contacts.first[worst]), int(contacts.second[worst])))
+        raise ValueError(
+            f"positions: grain {i} begins in overlap with {'the floor' if j < 0 else f'grain {j}'} by "
+            f"{100 * share[worst]:.3g} % of a diameter, max_overlap = {self.overlap_limit:g} allows "
+            f"{100 * self.overlap_limit:g} %; move it away, or take a larger max_overlap (0.2 at most)"
+        )
 
     def _check_valid(self) -> None:
         if self._generation != runtime.generation():

@@ -45,6 +45,10 @@ _PACKING = 0.58
 # lacks; steps between two looks of the servo, and in how many units of time what still lacks is taken into its speed
 # while the sample is sheared: one that dilates steadily needs a lid that rises steadily.
 _APPROACH, _SERVO, _STEPS, _REMEMBERS = 0.3, 0.06, 20, 4.0
+# The servo's bound for stiff samples. Their modulus M goes as young^2/3 pressure^1/3: the lid gains on its pressure at
+# the rate servo M / pressure / height, which sound brings back to it after height / sqrt(M / density). The product of
+# the two, servo (young / pressure)^1/3, must stay near 1 or below: at 1.25 samples came to rest, at 1.4 none of three.
+_STABLE = 0.8
 # Time constants of the drag while the grains are brought together (a shorter one would bear the lid in their stead: at
 # a tenth of sqrt(pressure / density) a layer of ten diameters takes 6 % of the pressure) and while they come to rest;
 # how long pressure and rest must hold, when it gives up [units of time].
@@ -58,8 +62,8 @@ _LOOK = 0.02
 # The grains are made for this many times the pressure: chains of force under shear are stronger than at rest.
 _SPARE = 1.5
 # The worst of thousands of contacts over a long shear goes past what a bed is softened for; the bound is this many
-# times that.
-_BOUND = 3.0
+# times that, or this overlap over diameter where that is more: single contacts of it do no harm.
+_BOUND, _HARMLESS = 3.0, 0.1
 
 
 @dataclass(frozen=True)
@@ -97,6 +101,7 @@ class _Wall:
         self.area = bed.size[0] * bed.size[1]
         self.speed = math.sqrt(pressure / bed.material.density)
         self.unit = grain / self.speed
+        self._servo = min(_SERVO, _STABLE / (bed.material.young / pressure) ** (1 / 3))
         self._steady = 0.0
 
     @property
@@ -107,7 +112,7 @@ class _Wall:
         """A few steps towards the pressure; the share of it that lacks [1]."""
         self.bed.advance(_STEPS, drag_time=drag_time)
         lacking = 1 - float(self.bed.reaction(self.body)[0][2]) / (self.pressure * self.area)
-        down = _APPROACH if lacking > 0.6 else _SERVO * max(-1.0, lacking)
+        down = _APPROACH if lacking > 0.6 else self._servo * max(-1.0, lacking)
         self.bed.move_body(self.body, velocity=(0.0, 0.0, -down * self.speed))
         return lacking
 
@@ -115,7 +120,7 @@ class _Wall:
         """A few steps on its way sideways [m/s]; what the grains pushed it with meanwhile [N], shape [3]."""
         self.bed.advance(_STEPS)
         force = self.bed.reaction(self.body)[0]
-        down = _SERVO * self.speed * max(-1.0, min(1.0, 1 - float(force[2]) / (self.pressure * self.area)))
+        down = self._servo * self.speed * max(-1.0, min(1.0, 1 - float(force[2]) / (self.pressure * self.area)))
         self._steady += down * _STEPS * self.bed.time_step / (_REMEMBERS * self.unit)
         self.bed.move_body(self.body, velocity=(sideways, 0.0, -down - self._steady))
         return force
@@ -177,7 +182,7 @@ def press_element(
         seed=seed,
         threads=threads,
     )
-    bed.overlap_limit = _BOUND * max_overlap
+    bed.overlap_limit = max(_BOUND * max_overlap, _HARMLESS)
     body = bed.add_body([Plane(normal=(0.0, 0.0, -1.0))], position=(0.0, 0.0, top + 0.01 * grain))
     _touch(bed, body, friction=pressed_friction, adhesive=False)
     wall = _Wall(bed, body, pressure=pressure, grain=grain)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -19,7 +20,7 @@ from .lid import Lid
 from .materials import Facing, Material
 from .measure import packing_profile
 from .pouring import poured, poured_on, touching_as
-from .prepare import BEARING, Specification
+from .prepare import BEARING, Specification, kept_in_cache
 from .recipe import DENSEST_UNIFORM, FLUFF, Stage, check_stages, parse_stage
 from .sizes import Sizes, Uniform
 from .stages import _DRAG, _PAST, _SHORT, ENERGY_RATIO, FLOOR_RATIO, Preparation
@@ -94,19 +95,22 @@ def prepare_as(
     threads: int | None = None,
     progress: Any = None,
     keep: str | Path | None = None,
+    cache: bool = False,
 ) -> Prepared:
-    """A bed that went through these stages, at rest after each of them.
+    """A bed that went through these stages, at rest after each of them, or the same one from the cache.
 
     Args:
         stages: as ``dem.recipe.parse_stage`` reads them: ``["rain", "fluff", "level", "compact:0.6"]``.
         keep: a file (.npz; a .json comes beside it) where what is under way is kept every minute and after every stage;
             the next call with it goes on from there, to the same bits.
+        cache: whether to look in the cache that ``prepare_bed`` has, and to leave the bed there, whole or under way.
 
     The other options are those of ``dem.prepare.prepare_bed``. The rain is more than is wanted, so that a bed that is
     levelled last has its depth up to a packing fraction of 0.64.
 
     Raises:
-        ValueError: what ``prepare_bed`` refuses; stages that cannot be; a packing, or a slope, that is out of reach.
+        ValueError: what ``prepare_bed`` refuses; stages that cannot be; a packing, or a slope, that is out of reach;
+            both ``keep`` and ``cache``.
         BedFailure: the bed did not come to rest.
     """
     wanted = Specification.of(
@@ -117,10 +121,17 @@ def prepare_as(
     plan = [parse_stage(stage) if isinstance(stage, str) else stage for stage in stages]
     check_stages(plan, size=wanted.size, grain=sizes.mean, sizes=wanted.local, cohesive=stuff.cohesion != "none")
     recipe = wanted.recipe() | {"stages": [str(stage) for stage in plan]}
+    if cache and keep is not None:
+        raise ValueError(f"keep = {str(keep)!r} beside cache: the cache has a place of its own for what is under way")
     runtime.start(arch=arch, threads=threads, precision=precision)
+    own, first = stuff.softened(wanted.young), wanted
+    shelf, unfinished = kept_in_cache(recipe)
+    if cache:
+        keep = unfinished
+        if (found := _cached(shelf, own, arch=arch, threads=threads)) is not None:
+            return found
     dense = DENSEST_UNIFORM if isinstance(wanted.local, Uniform) else 0.70
     depth = (z + _SURPLUS_DIAMETERS * wanted.coarsest) * dense
-    own, first = stuff.softened(wanted.young), wanted
     if plan[0].dry:
         first = replace(wanted, material=poured(stuff, friction=plan[0].value), floor=poured_on(wanted.floor))
     work = Laboratory(
@@ -134,7 +145,36 @@ def prepare_as(
         sticking=lambda bed: touching_as(bed, own, floor=wanted.floor),
     )
     work.find(arch=arch, threads=threads)
-    return Prepared(wanted.finish(work.run(), recipe), recipe, work.reports)
+    prepared = Prepared(wanted.finish(work.run(), recipe), recipe, work.reports)
+    if cache:
+        _leave(prepared, shelf, work)
+    return prepared
+
+
+def _cached(path: Path, material: Material, *, arch: str, threads: int | None) -> Prepared | None:
+    from .bedfile import load_prepared
+
+    if not path.exists():
+        return None
+    try:
+        found = load_prepared(path, arch=arch, threads=threads)
+    except ValueError as problem:
+        warnings.warn(f"the cached bed {path.name} cannot be read and is made anew: {problem}", stacklevel=3)
+        return None
+    assert found.bed is not None
+    found.bed.material = material
+    return found
+
+
+def _leave(prepared: Prepared, path: Path, work: Laboratory) -> None:
+    from .bedfile import save_prepared
+
+    try:
+        save_prepared(prepared, path)
+    except OSError as problem:
+        warnings.warn(f"the bed could not be kept in the cache: {problem}", stacklevel=3)
+    else:
+        work.forget()
 
 
 class Laboratory(Preparation):

@@ -197,6 +197,13 @@ def fingerprint() -> str:
     return digest.hexdigest()[:16]
 
 
+def kept_in_cache(recipe: dict[str, Any]) -> tuple[Path, Path]:
+    """Where the cache keeps the bed of a recipe (which names its material), and where it while it is under way."""
+    key = hashlib.sha256(json.dumps(recipe, sort_keys=True).encode()).hexdigest()[:24]
+    name = f"{recipe['material']['name']}-{key}.npz"
+    return cache_folder() / "beds" / name, cache_folder() / "unfinished" / name
+
+
 def prepare_bed(
     material: str | Material,
     *,
@@ -264,8 +271,7 @@ def prepare_bed(
         "packing": packing,
     }
     runtime.start(arch=arch, threads=threads, precision=precision)
-    key = hashlib.sha256(json.dumps(recipe, sort_keys=True).encode()).hexdigest()[:24]
-    path = cache_folder() / "beds" / f"{stuff.name}-{key}.npz"
+    path, unfinished = kept_in_cache(recipe)
     if cache and path.exists():
         try:
             bed = Bed.load(path, arch=arch, threads=threads)
@@ -281,7 +287,7 @@ def prepare_bed(
         depth=wanted.size[2],
         packing=packing,
         progress=progress,
-        path=cache_folder() / "unfinished" / path.name if cache else None,
+        path=unfinished if cache else None,
     )
     work.find(arch=arch, threads=threads)
     try:
@@ -325,7 +331,7 @@ def check_options(size, grain, gravity, seed, max_overlap) -> None:
     if not (math.isfinite(gravity) and gravity > 0):
         raise ValueError(f"gravity = {gravity} must be positive [m/s2]; nothing settles without it")
     for name, length, least in (("x", size[0], 6), ("y", size[1], 6), ("z", size[2], 4)):
-        if length < least * grain:
+        if length < least * grain * (1 - 1e-9):  # 6 * 0.006 is more than 0.036 to a computer
             raise ValueError(
                 f"size: {name} = {length} m is less than {least} grains of {grain} m; {least * grain:.4g} m would do"
             )

@@ -136,20 +136,25 @@ def check_stages(stages: Sequence[Stage], *, size: Sequence[float], grain: float
         value, key = stage.value, f"stages: {str(stage)!r}: packing"
         if stage.name in ("compact", "packing") and value is not None:
             check_packing(value, sizes, cohesive=cohesive, key=key)
-        elif stage.name == "level" and value is not None and not 4 * grain <= value <= size[2]:
+        elif stage.name == "level" and value is not None and not _within(value, 4 * grain, size[2]):
             raise ValueError(
                 f"stages: {str(stage)!r} [m]: a height from {4 * grain:.4g} m, four grains, to the bed's depth "
                 f"{size[2]:g} m would do"
             )
         elif stage.name == "fluff" and value is not None and not 1.02 <= value <= 2.0:
             raise ValueError(f"stages: {str(stage)!r}: 1.02 to 2 times the height of the bed would do")
-        elif stage.name == "cut" and value is not None and not 2 * grain <= value <= size[0] - 6 * grain:
+        elif stage.name == "cut" and value is not None and not _within(value, 2 * grain, size[0] - 6 * grain):
             raise ValueError(
                 f"stages: {str(stage)!r} [m]: at least two grains, {2 * grain:.4g} m, would do, and at most the bed's "
                 f"width less six grains, {size[0] - 6 * grain:.4g} m"
             )
         elif stage.name == "tilt" and value is not None and not value < 90:
             raise ValueError(f"stages: {str(stage)!r} [degrees]: below 90 would do")
+
+
+def _within(value: float, low: float, high: float) -> bool:
+    """Whether a length lies there, rounding forgiven: 6 * 0.006 is more than 0.036 to a computer."""
+    return low * (1 - 1e-9) <= value <= high * (1 + 1e-9)
 
 
 def _check_sticking(stages: Sequence[Stage], *, cohesive: bool) -> None:

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Callable, Sequence
-from typing import Any
 
 from dem import Bed, Graded
-from dem.bedfile import load_prepared, save_prepared
 from dem.laboratory import prepare_as
 from dem.materials import Material
-from dem.prepare import Specification, cache_folder
 from dem.recipe import check_stages, parse_stage
 from dem.sizes import sizes_of
 
@@ -73,34 +68,13 @@ def staged_bed(
 
     Raises RuntimeError where it cannot be made as asked for, and what ``dem.laboratory.prepare_as`` does.
     """
-    options: dict[str, Any] = {
-        "size": size, "grain": grain, "spread": spread, "gravity": gravity, "seed": seed, "young": young,
-        "max_overlap": max_overlap,
-    }  # fmt: skip
-    machine: dict[str, Any] = {"arch": "cpu", "threads": threads, "precision": "float64"}
-    wanted = Specification.of(material, **options, **machine, time_step=None, floor=None)
-    plan = [str(parse_stage(stage)) for stage in stages]
-    key = hashlib.sha256(json.dumps(wanted.recipe() | {"stages": plan}, sort_keys=True).encode()).hexdigest()[:24]
-    name = f"{material.name}-{key}.npz"
-    path = cache_folder() / "beds" / name
-    if cache and path.exists():
-        bed = load_prepared(path, threads=threads).bed
-        assert bed is not None
-        return bed
-    keep = cache_folder() / "unfinished" / name if cache else None
-    if keep is not None:
-        keep.parent.mkdir(parents=True, exist_ok=True)
     try:
         prepared = prepare_as(
-            material, stages=plan, **options, **machine, keep=keep,
-            progress=_OneStage(progress, "bed", len(plan), asked_to_stop),
+            material, stages=stages, size=size, grain=grain, spread=spread, gravity=gravity, seed=seed, young=young,
+            max_overlap=max_overlap, threads=threads, cache=cache,
+            progress=_OneStage(progress, "bed", len(stages), asked_to_stop),
         )  # fmt: skip
     except ValueError as error:  # found while it was prepared, as a packing that cannot be reached
         raise RuntimeError(str(error)) from error
-    if cache:
-        save_prepared(prepared, path)
-        assert keep is not None
-        for kept in (keep, keep.with_suffix(".json")):
-            kept.unlink(missing_ok=True)
     assert prepared.bed is not None
     return prepared.bed

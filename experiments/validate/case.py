@@ -46,7 +46,7 @@ class Comparison:
         """How much of the band the difference takes [1]; infinite for what is not a number."""
         scale = self.band * (abs(self.reference) if self.relative else 1.0)
         share = abs(self.difference) / scale
-        return share if math.isfinite(share) else math.inf
+        return float(share) if math.isfinite(share) else math.inf  # numpy's would make a bool that JSON refuses
 
     @property
     def passes(self) -> bool:

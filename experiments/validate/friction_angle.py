@@ -14,7 +14,10 @@ principal stress of the whole tensor, sin(angle) = (s1 - s3) / (s1 + s3), which 
 
 Published simulations of simple shear give shear over the mean of the three normal stresses, tau / p, and the packing
 fraction where slow flow settles: Chialvo, Sun & Sundaresan 2012, spheres of one size, linear springs, periodic (case
-``friction-angle-published``). Where the normal stresses are alike the Mohr circle's angle is arcsin(tau / p).
+``friction-angle-published``). Where the normal stresses are alike the Mohr circle's angle is arcsin(tau / p). Those
+samples are as nearly theirs as can be; softer ones, whose overlaps are counted whole, lie denser (at friction 0.1 0.642
+where the spheres are ten times as soft), and sizes within 15 % and an inertial number of 0.01 make tau / p 0.421 for
+0.381 at friction 0.5.
 """
 
 from __future__ import annotations
@@ -39,17 +42,20 @@ from .peers import PEERS, lammps_restitution, run_peer
 __all__ = ["CASES", "Sheared", "in_lammps", "lammps_law", "mohr_angle"]
 
 GRAIN, PRESSURE, SIZE = 0.004, 1000.0, (10.0, 8.0, 10.0)  # [m], [Pa], [mean diameters]
-SPREAD, INERTIAL, STRAIN, SEEDS = 0.15, 0.01, 2.0, (1, 2, 3)
+SPREAD, INERTIAL, STRAIN = 0.15, 0.01, 2.0
+# One sample of LAMMPS scatters by 1.5 degrees on the plane of shear (0.8 of ours): three say too little.
+SEEDS, SEEDS_AS_PUBLISHED = range(1, 13), (1, 2, 3)
 ROLLING = (0.0, 0.356)  # friction is 0.5; the second is that of sand-calibrated
-BAND = 1.5  # [degrees]; the standard error of one sample is 0.3 to 0.8
+BAND = 1.5  # [degrees]
 PUBLISHED = {0.1: (0.268, 0.613), 0.5: (0.382, 0.587)}
 """Friction: tau / p and packing fraction of slow simple shear, without rolling friction [1]. The paper's table was not
 read: the figures stand in the settings of its group's two-fluid solver (test case jetBedPU of
 gudaxia/twoPhaseEulerPimpleFoamPU on GitHub: muFriction, yieldStressRatio, alphaCritical)."""
 RATIO_BAND, PACKING_BAND = 0.025, 0.01  # [1]; the first is what 1.5 degrees are worth
+AS_PUBLISHED = {"spread": 0.01, "inertial_number": 0.003, "max_overlap": 0.01}
+"""How samples come near the published grains: hard, of one size, sheared slowly."""
 LIMIT = 600.0  # for LAMMPS [s]
 _EVERY, _PARTS = 20, 5
-_SAMPLES: dict[tuple[Material, int], ElementShear] = {}
 
 
 @dataclass(frozen=True)
@@ -107,18 +113,14 @@ def _degrees(ratio: float) -> float:
     return math.degrees(math.atan(ratio))
 
 
-def _sample(stuff: Material, seed: int, tell: Callable[[float], None]) -> ElementShear:
-    """One sample, sheared, or the one kept: both cases have those without rolling friction."""
-    if (stuff, seed) not in _SAMPLES:
-        _SAMPLES[stuff, seed] = shear_element(
-            stuff, pressure=PRESSURE, grain=GRAIN, size=SIZE, spread=SPREAD, strain=STRAIN, inertial_number=INERTIAL,
-            seed=seed, threads=1, tell=tell,
-        )  # fmt: skip
-    return _SAMPLES[stuff, seed]
-
-
-def _here(stuff: Material, seed: int, tell: Callable[[float], None]) -> tuple[Sheared, ElementShear]:
-    run = _sample(stuff, seed, tell)
+def _here(
+    stuff: Material, seed: int, tell: Callable[[float], None], **otherwise: float
+) -> tuple[Sheared, ElementShear]:
+    """One sample, sheared; ``otherwise``: options of ``shear_element`` that are not those of the module."""
+    options = {"spread": SPREAD, "inertial_number": INERTIAL} | otherwise
+    run = shear_element(
+        stuff, pressure=PRESSURE, grain=GRAIN, size=SIZE, strain=STRAIN, seed=seed, threads=1, tell=tell, **options
+    )
     said = summary_of(run, stuff.density)
     ratio, tensor = said["shear"] / said["normal"], np.array(said["tensor"])
     error = _degrees(ratio + said["error"] / said["normal"]) - _degrees(ratio)
@@ -245,14 +247,17 @@ def _compute(tell: Callable[[float], None]) -> Outcome:
 
 def _published(tell: Callable[[float], None]) -> Outcome:
     rows, words = [], []
-    parts = len(PUBLISHED) * len(SEEDS)
+    everything: list[ElementShear] = []
+    parts = len(PUBLISHED) * len(SEEDS_AS_PUBLISHED)
     for k, (friction, (wanted, dense)) in enumerate(PUBLISHED.items()):
         found, runs = [], []
-        for m, seed in enumerate(SEEDS):
-            begin = (k * len(SEEDS) + m) / parts
-            one, run = _here(_stuff(0.0, friction), seed, lambda share, b=begin: tell(b + share / parts))  # type: ignore[misc]
+        for m, seed in enumerate(SEEDS_AS_PUBLISHED):
+            begin = (k * len(SEEDS_AS_PUBLISHED) + m) / parts
+            stuff = _stuff(0.0, friction)
+            one, run = _here(stuff, seed, lambda share, b=begin: tell(b + share / parts), **AS_PUBLISHED)  # type: ignore[misc]
             found.append(one)
             runs.append(run)
+        everything += runs
         ratio, circle = (float(np.mean([getattr(one, key) for one in found])) for key in ("over_mean", "mohr"))
         packing = float(np.mean([_packing(run) for run in runs]))
         about = f"friction {friction:g}"
@@ -270,32 +275,15 @@ def _published(tell: Callable[[float], None]) -> Outcome:
             f"{tensor[1, 1] / tensor[2, 2]:.2f} of that on it"
         )
     remark = (
-        f"{'; '.join(words)}. No rolling friction, spheres within {100 * SPREAD:g} % where the paper's are alike, "
-        "Hertz's springs where it has linear ones, rough planes 10 diameters apart where it has none, inertial number "
-        f"{INERTIAL:g} where its figures are of the slowest flow. Its angle is arcsin(tau / p), of a circle about the "
-        "mean stress; ours is of the largest and least stress. The paper's table was not read: the figures are those "
-        "in its group's own flow solver."
+        f"{'; '.join(words)}. No rolling friction, spheres within {100 * AS_PUBLISHED['spread']:g} % where the paper's "
+        "are alike, Hertz's springs where it has linear ones, overlaps of at most "
+        f"{100 * max(run.max_overlap for run in everything):.1f} % of a diameter, rough planes 10 diameters apart "
+        f"where it has none, inertial number {AS_PUBLISHED['inertial_number']:g} where its figures are of the slowest "
+        "flow. Its angle is arcsin(tau / p), of a circle about the mean stress; ours is of the largest and least "
+        "stress. The paper's table was not read: the figures are those in its group's own flow solver."
     )
     return Outcome(rows, (), [remark])
 
-
-WHY = (
-    "the strength is the same, its direction is not: Mohr's circles and the triaxial angles agree (in the plane of "
-    "shear the circle has 33.3 +- 0.3 degrees over ten samples of LAMMPS, 33.8 +- 0.2 over our three); but the normal "
-    "stress along the shear is 0.99 of that across it in ours and 0.84 +- 0.01 in LAMMPS, which turns the axes and "
-    "takes two degrees off the plane of shear. Not why (2026-11-22): how ours is read (lid, inside and both sides of "
-    "the stress tensor agree within 0.1 degrees), its height (28.6 at 20 diameters); in LAMMPS the rolling dashpot "
-    "(26.4 without), the packing (26.7 at 0.557), a rolling spring of our stiffness at the mean force (26.5 with 0.063 "
-    "E d; 28.2 with 0.02). Left are the walls, and a rolling spring that stiffens with the load"
-)
-WHY_PUBLISHED = (
-    "Mohr's circles agree. Packing: these grains are soft, overlap by 1.7 % of a diameter in the mean (Hertz's law at "
-    "the mean force) and are counted whole; LAMMPS bears 876 Pa at the same packing with grains as soft, where ours "
-    "bear 1000. Shear over mean stress at friction 0.5: LAMMPS has 0.407 in its periodic box (one sample), so that "
-    "most of it is neither our code nor our walls; the stress across the plane of shear is 0.83 of that on it, 0.85 in "
-    "LAMMPS, which makes the mean small. Over the stress on the plane of shear it is 0.392. Not tried: grains of one "
-    "size, linear springs, slower shear (2026-11-22)"
-)
 
 CASES = [
     Case(
@@ -306,8 +294,7 @@ CASES = [
         "LAMMPS of Debian, run here; the band is ours",
         _compute,
         slow=True,
-        seconds=200,
-        reason=WHY,
+        seconds=500,
     ),
     Case(
         "friction-angle-published",
@@ -319,6 +306,5 @@ CASES = [
         _published,
         slow=True,
         seconds=200,
-        reason=WHY_PUBLISHED,
     ),
 ]

@@ -24,6 +24,7 @@ from . import (
     peers,
     restitution,
     silo,
+    sliding,
     slump,
     spinning,
 )
@@ -36,6 +37,7 @@ SHARED = ("case.py", "spheres.py")
 NEEDS = {
     "books": ("cloud.py", "energy.py"),
     "peers": ("cloud.py",),
+    "sliding": ("laws.py", "peers.py", "cloud.py"),
     "spinning": ("oblique.py",),
     "friction_angle": ("peers.py",),
     "slump": ("peers.py", "friction_angle.py"),
@@ -58,6 +60,7 @@ _MODULES = (
     silo,
     large_body,
     peers,
+    sliding,
     friction_angle,
     slump,
     dosta,

@@ -1,5 +1,6 @@
 """Preparation as in the laboratory: what each stage does, its report, and that it can be stopped anywhere."""
 
+import json
 import math
 
 import numpy as np
@@ -141,6 +142,31 @@ class Interrupted:
             if not self.left:
                 self.came = True
                 raise KeyboardInterrupt
+
+
+def test_a_bed_that_went_through_stages_is_kept_in_the_cache_and_found_again(tmp_path, monkeypatch):
+    """The same bits and reports, from a file; one of other stages is another; a file that is spoilt is made anew."""
+    monkeypatch.setenv("HEDGEBED_CACHE", str(tmp_path))
+    options = BED | {"stages": ["rain"]}
+    with pytest.raises(KeyboardInterrupt):
+        prepare_as(SAND, **options, cache=True, progress=Interrupted("rain", 4))
+    assert len(list((tmp_path / "unfinished").iterdir())) == 2
+    first = prepare_as(SAND, **options, cache=True)
+    assert not list((tmp_path / "unfinished").iterdir())
+    (path,) = (tmp_path / "beds").iterdir()
+    assert path.name.startswith("sand-") and path.suffix == ".npz"
+    again = prepare_as(SAND, **options, cache=True, progress=Interrupted("rain", 1))  # computes nothing
+    state, found = first.bed.state(), again.bed.state()
+    assert all(found[key].tobytes() == values.tobytes() for key, values in state.items())
+    assert again.recipe == json.loads(json.dumps(first.recipe)) and again.reports == first.reports
+    assert again.bed.material == first.bed.material and again.bed.recipe == again.recipe
+    with pytest.raises(KeyboardInterrupt):
+        prepare_as(SAND, **options | {"stages": ["rain", "level"]}, cache=True, progress=Interrupted("rain", 1))
+    path.write_bytes(b"no bed")
+    with pytest.warns(UserWarning, match="cannot be read and is made anew"), pytest.raises(KeyboardInterrupt):
+        prepare_as(SAND, **options, cache=True, progress=Interrupted("rain", 1))
+    with pytest.raises(ValueError, match=r"keep = .* beside cache"):
+        prepare_as(SAND, **options, cache=True, keep=tmp_path / "kept.npz")
 
 
 def test_a_preparation_that_was_stopped_goes_on_to_the_same_bits(made, tmp_path):

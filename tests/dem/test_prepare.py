@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import dem.prepare
-from dem import SAND, Bed, Facing, LogNormal, Normal
-from dem.prepare import prepare_bed
+from dem import SAND, Bed, Facing, LogNormal, Normal, Uniform
+from dem.prepare import check_options, prepare_bed
+from dem.recipe import check_stages, parse_stage
 from dem.stages import ENERGY_RATIO, Preparation
 
 GRAIN = 0.004
@@ -348,3 +349,16 @@ def test_what_cannot_be_made_is_refused_by_name(options, words):
 def test_a_misspelt_option_raises():
     with pytest.raises(TypeError):
         Bed.prepare(SAND, **BED, graine=0.004)
+
+
+@pytest.mark.parametrize("grain", [0.006, 0.0019, 0.0007])
+def test_a_width_of_six_grains_is_enough_whatever_rounding_does(grain):
+    """6 * 0.006 is more than 0.036 to a computer; as decimals the two are one."""
+    wide, deep = round(6 * grain, 6), round(4 * grain, 6)
+    check_options((wide, wide, deep), grain, 9.81, 1, 0.05)
+    check_stages(
+        [parse_stage("rain"), parse_stage(f"level:{deep}"), parse_stage(f"cut:{wide}")],
+        size=(2 * wide, wide, deep), grain=grain, sizes=Uniform(grain), cohesive=False,
+    )  # fmt: skip
+    with pytest.raises(ValueError, match="is less than 6 grains"):
+        check_options((wide, 0.9999 * wide, deep), grain, 9.81, 1, 0.05)

@@ -50,6 +50,17 @@ def with_nan(row):
         ({"gravity": math.nan}, "gravity = nan"),
         ({"young": -1e7}, "young = -10000000.0 must be positive"),
         ({"time_step": 1e-2}, "time_step = 0.01 s is outside"),
+        (
+            {"positions": POSITIONS + [[0, 0, 0], [-0.0171, -0.02, 0], [0, 0, 0]]},
+            r"positions: grain 1 begins in overlap with grain 0 by 27.5 % of a diameter, max_overlap = 0.05 allows "
+            r"5 %; move it away, or take a larger max_overlap \(0.2 at most\)",
+        ),
+        ({"positions": POSITIONS[[1, 1, 2]]}, "grain 1 begins in overlap with grain 0 by 100 %"),
+        ({"positions": POSITIONS + [0, 0, -0.003]}, "grain 0 begins in overlap with the floor by 75 %"),
+        (
+            {"positions": POSITIONS + [0, 0, -0.03]},
+            r"grain 0 begins at z = -0\.028 m, below the box.* put it higher",
+        ),
         ({"precision": "double"}, "precision = 'double' is unknown; use one of float64, float32"),
         ({"material": "sandy"}, r"material = 'sandy' is not known.*did you mean 'sand'"),
     ],
@@ -57,6 +68,17 @@ def with_nan(row):
 def test_a_bed_that_cannot_be_is_refused(options, words):
     with pytest.raises(ValueError, match=words):
         make(**options)
+
+
+def test_grains_may_begin_in_overlap_up_to_the_bound():
+    """10 % of a diameter, where the bound is 5 % and 20 %; across the sides as anywhere."""
+    close = POSITIONS.copy()
+    close[0], close[1] = (0.0002, 0.01, RADIUS), (0.0366 + 0.04, 0.01, RADIUS)
+    with pytest.raises(ValueError, match="grain 1 begins in overlap with grain 0 by 10 % of a diameter"):
+        make(positions=close)
+    bed = make(positions=close, max_overlap=0.2, gravity=0.0)
+    assert bed.max_overlap == pytest.approx(0.1)
+    bed.advance(10)
 
 
 @pytest.mark.parametrize(

@@ -202,35 +202,29 @@ def _check_report(folder, result):
     assert "rig: grains at 1 g" in section.blocks[-1].text
 
 
-def test_a_bed_that_went_through_stages_is_kept_and_found_again(tmp_path, monkeypatch):
-    """`--bed-stages`: the stages reach the laboratory (a stand-in here), the second call takes the bed of the first."""
+def test_stages_of_a_bed_reach_the_laboratory_and_its_cache(monkeypatch):
+    """`--bed-stages`, with a stand-in for the laboratory; what it refuses on the way fails the run, with its words."""
     from dem.laboratory import Prepared
     from dem.materials import material
     from experiments import bed_staged
     from experiments.progress import Progress
 
-    monkeypatch.setenv("HEDGEBED_CACHE", str(tmp_path))
     asked, bed = [], SimpleNamespace()
 
-    def prepare_as(material, *, stages, keep, **options):
-        asked.append(stages)
-        keep.write_bytes(b"half a bed")
-        return Prepared(bed, {"stages": stages}, [])
-
-    def save_prepared(prepared, path):
-        path.parent.mkdir(exist_ok=True)
-        path.write_bytes(b"a bed")
+    def prepare_as(material, *, stages, cache, progress, **options):
+        asked.append((stages, cache))
+        progress.stage("rain", 1.0)
+        progress.update(0.5)
+        if "fluff" not in stages:
+            raise ValueError("packing = 0.6 cannot be reached")
+        return Prepared(bed, {}, [])
 
     monkeypatch.setattr(bed_staged, "prepare_as", prepare_as)
-    monkeypatch.setattr(bed_staged, "save_prepared", save_prepared)
-    monkeypatch.setattr(bed_staged, "load_prepared", lambda path, **options: Prepared(path, {}, []))
     options = {
         "size": (0.04, 0.04, 0.03), "grain": 0.005, "spread": 0.15, "gravity": 9.81, "seed": 1, "young": 1e6,
         "max_overlap": 0.1, "threads": 1, "cache": True, "progress": Progress(), "asked_to_stop": lambda: False,
     }  # fmt: skip
-    first, again = (bed_staged.staged_bed(material("sand"), ("rain", "fluff", "level"), **options) for _ in range(2))
-    assert first is bed and again.read_bytes() == b"a bed" and again.name.startswith("sand-")
-    assert asked == [["rain", "fluff", "level"]]
-    assert not list((tmp_path / "unfinished").iterdir())
-    bed_staged.staged_bed(material("sand"), ("rain", "compact:0.6", "level"), **options)
-    assert len(asked) == 2
+    assert bed_staged.staged_bed(material("sand"), ("rain", "fluff", "level"), **options) is bed
+    assert asked == [(("rain", "fluff", "level"), True)]
+    with pytest.raises(RuntimeError, match=r"packing = 0\.6 cannot be reached"):
+        bed_staged.staged_bed(material("sand"), ("rain", "compact:0.6", "level"), **options)
