@@ -18,7 +18,7 @@ from rigid.trial import Trial
 
 from .bed_footing import BedFooting
 from .contact_state import ContactReader, state_of
-from .followed import REST_TIME, Followed
+from .followed import Followed
 from .footing import Footing, FootReaction, LawFooting
 from .master import Master
 from .planar_body import PlanarBody
@@ -26,8 +26,6 @@ from .poses import Wrench
 
 __all__ = ["MOST_REVERSAL", "CoupledTumble"]
 
-PLACING_WAY = 0.02
-"""Lowering speed times the time that setting down took in the first runs, without REST_TIME [m]; for progress only."""
 MOST_REVERSAL = 1e-3
 """A larger `CoupledTumble.dissipation_reversal` is worth a warning [1].
 
@@ -126,13 +124,6 @@ class CoupledTumble(Followed):
     @property
     def _weight(self) -> float:
         return self.trial.weight
-
-    @property
-    def fraction(self) -> float:
-        """How far it is along, 0 to 1, the setting down, as long as it was guessed to take, included."""
-        hand = REST_TIME + PLACING_WAY / self.lowering_speed if self.lowering_speed is not None else 0.0
-        done = hand + self.body.time if self.placed else min(hand, self.body.time)
-        return min(1.0, done / (hand + self.duration))
 
     # Stepping ------------------------------------------------------------------------------------------------------
 

@@ -60,9 +60,17 @@ class Stage(Eye):
     """
 
     def __init__(
-        self, size: tuple[int, int], *, width: float, cut: float, low: Array, high: Array, radius: float | None
+        self,
+        size: tuple[int, int],
+        *,
+        width: float,
+        cut: float,
+        low: Array,
+        high: Array,
+        radius: float | None,
+        pitch: float = 0.24,
     ) -> None:
-        super().__init__(size, width=width, cut=cut, pitch=0.24)
+        super().__init__(size, width=width, cut=cut, pitch=pitch)
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
         import pyvista
 
