@@ -93,6 +93,7 @@ def conclude(
         "surface": float(bed.surface), "young": softening.young, "softer_than_real": softening.factor,
         "time_step": float(bed.time_step), "macro_step": run.master.macro_step,
         "max_overlap": float(bed.max_overlap), "seed": settings.seed, "steps": run.master.count,
+        "spike_diameter": settings.spike_diameter,
         **_grain_steps(settings, run), "worst_guess": books.worst_guess, "largest_force": books.largest_force,
         "beside": quantities_of(beside),
         "beside_transitions": [
