@@ -404,6 +404,19 @@ class BedFooting:
         ahead = grains["mass"][:, None] * grains["velocity"] + 0.5 * self.time_step * grains["force"]
         return self.copies * (ahead.sum(axis=0) - self.impulse)
 
+    def angular_momentum(self) -> Vector:
+        """Of the grains about the body's (0, 0, 0), less what they got from elsewhere than the body, `copies` times.
+
+        [N m s], shape (3,), as `momentum` has the velocities; since `keep_book`. What changes it is the body, to
+        round-off: weight, floor, what goes across the periodic sides and sleepers are told apart (`dem.ledger`).
+        """
+        found = self.bed.angular_momentum()
+        others = found["outside"]
+        if self.bodies[0] > 0:  # the floor is the first
+            others = others - found["first_body"]
+        about_bed = found["grains"] - others
+        return np.asarray(self.copies * about_bed - np.cross(self.origin, self.momentum()))
+
     def state(self) -> dict[str, Any]:
         """The bed's, which contains the bodies and their contacts."""
         return {f"bed.{key}": value for key, value in self.bed.state().items()} | {

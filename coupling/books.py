@@ -28,6 +28,8 @@ class Books:
     master: Master
     _free: tuple[int, ...] = (0, 1, 2)
     """Along which axes the body can move."""
+    _turns: tuple[int, ...] = (0, 1, 2)
+    """About which axes it can turn."""
 
     def _no_samples(self) -> None:
         self._samples: list[list[float]] = []
@@ -35,7 +37,9 @@ class Books:
         """What the footing's energies are, in the order of `samples`."""
         self.work_names: tuple[str, ...] = ()
         """Likewise of a bed's book of what its contacts took (`Bed.work_taken`)."""
-        self._momentum = np.zeros(3)
+        self._momentum, self._angular_momentum = np.zeros(3), np.zeros(3)
+        self._moment = np.zeros(3)
+        """Angular impulse on the body from elsewhere than the footing since the books were opened [N m s]."""
 
     @property
     def columns(self) -> dict[str, Vector]:
@@ -47,41 +51,58 @@ class Books:
         """What residuals are relative to [J]."""
         raise NotImplementedError
 
-    def _open_books(self, moving: Vector) -> None:
-        """Count from here; `moving`: the body's own momentum [N s], shape (3,)."""
+    def _open_books(self, moving: Vector, turning: Vector) -> None:
+        """Count from here; `moving`, `turning`: the body's own momentum [N s] and its angular momentum about its
+        (0, 0, 0), wheels included or not [N m s], shape (3,) both."""
         self.master.open_books()
         self._samples.clear()
-        self._momentum = moving.copy()
+        self._momentum, self._angular_momentum = moving.copy(), turning.copy()
+        self._moment = np.zeros(3)
         if isinstance(self.footing, BedFooting):
-            self._momentum = self._momentum + self.footing.momentum()
             self.footing.keep_book()
+            self._momentum = self._momentum + self.footing.momentum()
+            self._angular_momentum = self._angular_momentum + self.footing.angular_momentum()
 
-    def _sample(self, time: float, moving: Vector) -> None:
-        """What the footing holds, by how much the momentum of all is off, and the grains computed.
+    def _pull(self, before: Vector, after: Vector, weight: Vector, masses: Vector) -> None:
+        """A macro step on which the body went from `before` to `after` [m]: weight about (0, 0, 0), and the rig.
 
-        `moving`: the body's momentum less the impulse of its weight since the books were opened [N s], shape (3,).
+        In a rig the momentum is not along the velocity v, since it is heavier upwards, and v x P is the moment of the
+        wires. By the middle of the step, half the footing's lag later as momentum is: of second order in it.
+        """
+        dt = self.master.macro_step
+        velocity = (after - before) / dt
+        middle = 0.5 * (before + after + self.footing.lag * velocity)
+        self._moment = self._moment + dt * (np.cross(middle, weight) + np.cross(velocity, masses * velocity))
+
+    def _sample(self, time: float, moving: Vector, turning: Vector) -> None:
+        """What the footing holds, by how much the momenta of all are off, and the grains computed.
+
+        `moving`: the body's momentum less the impulse of its weight since the books were opened [N s], `turning` its
+        angular momentum less what a torque gave that is not of its wheels [N m s], shape (3,) both.
         """
         found = self.footing.energies()
         self.energy_names = tuple(found)
-        off, computed, taken = 0.0, 0, dict[str, float]()
+        off, turned, computed, taken = 0.0, 0.0, 0, dict[str, float]()
         if isinstance(self.footing, BedFooting):
             computed, taken = self.footing.grain_steps, self.footing.work_taken()
             gained = self.footing.momentum() + moving - self._momentum
             off = float(np.linalg.norm(gained[list(self._free)]))
+            about = self.footing.angular_momentum() + turning - self._moment - self._angular_momentum
+            turned = float(np.linalg.norm(about[list(self._turns)]))
         self.work_names = tuple(f"{name}_work" for name in taken)
-        self._samples.append([time, off, computed, *found.values(), *taken.values()])
+        self._samples.append([time, off, turned, computed, *found.values(), *taken.values()])
 
     @property
     def samples(self) -> dict[str, Vector]:
-        """Of the footing, by time: `time` [s], `momentum_error` [N s], `grain_steps` of a bed so far, energies [J],
-        work that its contacts took [J]."""
-        names = ("time", "momentum_error", "grain_steps", *self.energy_names, *self.work_names)
-        return dict(zip(names, self._sample_table.T, strict=True))
+        """Of the footing, by time: `time` [s], `momentum_error` [N s], `angular_momentum_error` [N m s], `grain_steps`
+        of a bed so far, energies [J], work that its contacts took [J]."""
+        own = ("time", "momentum_error", "angular_momentum_error", "grain_steps")
+        return dict(zip((*own, *self.energy_names, *self.work_names), self._sample_table.T, strict=True))
 
     @property
     def _sample_table(self) -> Vector:
         """The samples as rows, also where there are none yet."""
-        count = 3 + len(self.energy_names) + len(self.work_names)
+        count = 4 + len(self.energy_names) + len(self.work_names)
         return np.array(self._samples, dtype=float).reshape(-1, count)
 
     @property
@@ -150,11 +171,12 @@ class Books:
             "books.samples": self._sample_table,
             "books.energies": np.array(self.energy_names, dtype=str),
             "books.works": np.array(self.work_names, dtype=str),
-            "books.momentum": np.asarray(self._momentum, dtype=float),
+            "books.momentum": np.concatenate([self._momentum, self._angular_momentum, self._moment]),
         }
 
     def _restore_books(self, state: dict[str, Any]) -> None:
         self._samples = np.asarray(state["books.samples"]).tolist()
         self.energy_names = tuple(str(name) for name in np.asarray(state["books.energies"]))
         self.work_names = tuple(str(name) for name in np.asarray(state["books.works"]))
-        self._momentum = np.array(state["books.momentum"], dtype=float)
+        numbers = np.array(state["books.momentum"], dtype=float)
+        self._momentum, self._angular_momentum, self._moment = (part.copy() for part in np.split(numbers, 3))

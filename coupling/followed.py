@@ -17,6 +17,8 @@ AT_REST = 0.005
 """What a platform at rest may still lack of its weight, and its mean speed over the lowering speed [1]."""
 REST_TIME = 0.04
 """For how long the signs of rest must hold [s]."""
+PLACING_WAY = 0.02
+"""Lowering speed times the time that setting down took in the first runs, without REST_TIME [m]; for progress only."""
 LONGEST_PLACING = 3.0
 """A platform that has not come to rest after this [s] is an error."""
 
@@ -46,6 +48,13 @@ class Followed(Books):
     def time(self) -> float:
         """Now [s]; before 0 while the hand holds it: how long it has been held, negative."""
         return self.body.time if self.placed else -self.body.time
+
+    @property
+    def fraction(self) -> float:
+        """How far it is along, 0 to 1, the setting down, as long as it was guessed to take, included."""
+        hand = REST_TIME + PLACING_WAY / self.lowering_speed if self.lowering_speed is not None else 0.0
+        done = hand + self.body.time if self.placed else min(hand, self.body.time)
+        return min(1.0, done / (hand + self.duration))
 
     def advance(self) -> None:
         """One macro step; nothing once it is done."""

@@ -121,6 +121,11 @@ class SpatialBody:
         self._lag, self._force = lag, self.trial.weight.copy()
         self.momentum = self.momentum + 0.5 * lag * self._force
 
+    @property
+    def masses(self) -> Vector:
+        """(m, m, m + m_b) [kg], shape (3,); a hand's while it holds it."""
+        return self._masses
+
     # What a footing sees -------------------------------------------------------------------------------------------
 
     @property

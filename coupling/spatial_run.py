@@ -113,10 +113,12 @@ class SpatialRun(Followed):
         """One macro step; nothing once it is done. Raises RuntimeError where it does not come to rest in the hand."""
         if self.done:
             return
+        before = self.body.place
         reaction = self.master.step()
         if not self.placed:
             self._lower(reaction)
             return
+        self._pull(before, self.body.place, self.trial.weight, self.body.masses)
         self._keep(reaction)
         if (self.master.count - self.placing_steps) % self._every == 0 or self.done:
             self._measure()
@@ -138,7 +140,7 @@ class SpatialRun(Followed):
         self._settle(reaction, lacking, np.concatenate([twist.velocity, twist.spin * reach]))
 
     def _begin(self) -> None:
-        self._open_books(self.body.momentum)
+        self._open_books(self.body.momentum, self._turning)
         self._keep(self.master.last)
         self._measure()
 
@@ -156,8 +158,14 @@ class SpatialRun(Followed):
             ]
         )  # fmt: skip
 
+    @property
+    def _turning(self) -> Vector:
+        """Angular momentum of platform and wheels about (0, 0, 0) [N m s]."""
+        return np.asarray(np.cross(self.body.place, self.body.momentum) + self.body.angular_momentum)
+
     def _measure(self) -> None:
-        self._sample(self.body.time, self.body.momentum - self.trial.weight * self.body.time)
+        body = self.body
+        self._sample(body.time, body.momentum - self.trial.weight * body.time, self._turning)
 
     # What came of it -----------------------------------------------------------------------------------------------
 

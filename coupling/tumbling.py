@@ -18,7 +18,7 @@ from rigid.trial import Trial
 
 from .bed_footing import BedFooting
 from .contact_state import ContactReader, state_of
-from .followed import REST_TIME, Followed
+from .followed import Followed
 from .footing import Footing, FootReaction, LawFooting
 from .master import Master
 from .planar_body import PlanarBody
@@ -26,8 +26,6 @@ from .poses import Wrench
 
 __all__ = ["MOST_REVERSAL", "CoupledTumble"]
 
-PLACING_WAY = 0.02
-"""Lowering speed times the time that setting down took in the first runs, without REST_TIME [m]; for progress only."""
 MOST_REVERSAL = 1e-3
 """A larger `CoupledTumble.dissipation_reversal` is worth a warning [1].
 
@@ -119,20 +117,13 @@ class CoupledTumble(Followed):
             assert lowering_speed is not None
             self.body.take_in_hand(lowering_speed)
 
-    _free = (0, 2)
+    _free, _turns = (0, 2), (1,)
 
     # How far -------------------------------------------------------------------------------------------------------
 
     @property
     def _weight(self) -> float:
         return self.trial.weight
-
-    @property
-    def fraction(self) -> float:
-        """How far it is along, 0 to 1, the setting down, as long as it was guessed to take, included."""
-        hand = REST_TIME + PLACING_WAY / self.lowering_speed if self.lowering_speed is not None else 0.0
-        done = hand + self.body.time if self.placed else min(hand, self.body.time)
-        return min(1.0, done / (hand + self.duration))
 
     # Stepping ------------------------------------------------------------------------------------------------------
 
@@ -143,7 +134,11 @@ class CoupledTumble(Followed):
         if not self.placed:
             self._lower()
             return
+        before = self.body.pose.position
         reaction = self.master.step()
+        inertia = self.body.inertia
+        masses = np.array([inertia[0], inertia[0], inertia[1]])
+        self._pull(before, self.body.pose.position, np.array([0.0, 0.0, -self.trial.weight]), masses)
         self._keep(reaction)
         if (self.master.count - self.placing_steps) % self._every == 0 or self.done:
             self._measure()
@@ -166,7 +161,7 @@ class CoupledTumble(Followed):
         self._settle(reaction, lacking, np.array([rates[1], rates[2] * length]))
 
     def _begin(self) -> None:
-        self._open_books(self.body.momentum)
+        self._open_books(self.body.momentum, self._turning)
         self._keep(self.master.last)
         self._measure()
 
@@ -202,10 +197,18 @@ class CoupledTumble(Followed):
             state = state_of(touching, touching & (body.modes != 0)) if len(self._rows) > 1 else "stand"
         self._states.append(STATES.index(state))
 
+    @property
+    def _turning(self) -> np.ndarray:
+        """Angular momentum of the platform about (0, 0, 0), less what the wheel gave it [N m s]."""
+        body, trial = self.body, self.trial
+        given = trial.wheel_inertia * (body.wheel_speed - trial.wheel_speed_0)
+        own = body.inertia[2] * body.rates[2] - (given if trial.actuator == "motor" else -given)
+        return np.asarray(np.cross(body.pose.position, body.momentum) + [0.0, own, 0.0])
+
     def _measure(self) -> None:
         body = self.body
         fallen = np.array([0.0, 0.0, -self.trial.weight * body.time])
-        self._sample(body.time, body.momentum - fallen)
+        self._sample(body.time, body.momentum - fallen, self._turning)
 
     # What came of it -----------------------------------------------------------------------------------------------
 

@@ -13,7 +13,7 @@ from . import runtime, state
 from .cohesion import COHESIONS, jkr_range
 from .contact import effective_moduli, pair_parameters
 from .engine import MOST_PRIMITIVES, take_engine
-from .ledger import PARTS
+from .ledger import PARTS, TURNED
 from .lists import MOST_BODIES
 from .materials import Facing, Material
 from .materials import material as find_material
@@ -474,7 +474,7 @@ class Bed:
         A drag (``advance``) is not in it.
         """
         self._check_valid()
-        self._engine.open_ledger()
+        self._engine.open_ledger(self.gravity)
 
     @property
     def work_taken(self) -> dict[str, float]:
@@ -490,6 +490,31 @@ class Bed:
         if not self._engine.ledger.on:
             raise ValueError("this bed keeps no book of what contacts take: keep_book() opens it")
         return dict(zip(PARTS, self._engine.ledger.sums().tolist(), strict=True))
+
+    def angular_momentum(self) -> dict[str, np.ndarray]:
+        """Of the grains about the bed's origin, and what has changed it since ``keep_book`` [N m s], shape [3] each.
+
+        Returns:
+            grains: sum of x x m v and of their spins' with the velocities half a step ahead, to which the forces so far
+            have brought them. outside: what came of gravity, across the periodic sides, of grains put back into the
+            box, and to and from sleepers. first_body, bodies: what body 0, which is the floor where there is one, and
+            the others took. grains = grains then + outside - first_body - bodies, to round-off; not with a drag, and
+            not through ``set_gravity``, which shifts the velocities.
+
+        Raises:
+            ValueError: no book is kept.
+        """
+        if not self._engine.ledger.on:
+            raise ValueError("this bed keeps no book of what contacts take: keep_book() opens it")
+        e = self._engine
+        awake = slice(0, self.awake_count)  # those awake come first
+        names = ("position", "velocity", "spin", "force", "torque")
+        x, v, w, f, t = (e.read(name)[awake].astype(float) for name in names)
+        radius, mass = x[:, 3], v[:, 3]
+        momentum = mass[:, None] * v[:, :3] + self.time_step * f
+        own = (0.4 * mass * radius**2)[:, None] * w[:, :3] + self.time_step * t
+        total = np.cross(x[:, :3], momentum).sum(axis=0) + own.sum(axis=0)
+        return {"grains": total, **dict(zip(TURNED, e.ledger.turns(), strict=True))}
 
     # ------------------------------------------------------------------ time
 
@@ -567,7 +592,7 @@ class Bed:
         e.keep_lists(e.rest, e.ledger)
         if self._sleeper is not None:
             self._sleeper.rearrange(all_awake=all_awake)
-        e.sort(*self.gravity, e.rest)
+        e.sort(*self.gravity, e.rest, e.ledger)
         e.make_lists(self._skin, e.shapes, e.rest, e.ledger)
         self.list_count += 1
         self._since_lists = 0
@@ -696,6 +721,8 @@ class Bed:
         self.wake()
         self._shift_velocities(0.5)
         self.gravity = _vector(gravity)
+        if self._engine.ledger.on:
+            self._engine.ledger.pull[None] = self.gravity
         self._make_lists()
         self._push()
         self._shift_velocities(-0.5)

@@ -325,7 +325,7 @@ class Engine(Lists, Shapes, Sleepers, Bookkeeping):
         self.rest = EVERYONE
         self.count[AWAKE], self.count[CHUNKS] = self.grain_count, self.chunk_count
 
-    def open_ledger(self) -> None:
+    def open_ledger(self, gravity: tuple[float, float, float]) -> None:
         """From here on kernels keep the book of what contacts take."""
         if self._kept_ledger is None:
             self._kept_ledger = Ledger(
@@ -333,6 +333,7 @@ class Engine(Lists, Shapes, Sleepers, Bookkeeping):
             )
         self.ledger = self._kept_ledger
         self.ledger.clear()
+        self.ledger.pull[None] = gravity
 
     def close_ledger(self) -> None:
         """The kernels are those that keep no book."""
@@ -461,6 +462,8 @@ class Engine(Lists, Shapes, Sleepers, Bookkeeping):
                     self.slide[s] = ti.Vector.zero(self.real, 4)
                     if ti.static(self.rolling):
                         self.roll[s] = ti.Vector.zero(self.real, 3)
+        if ti.static(ledger.on):
+            self.book_weight(c, dt, ledger)
         p = self.grain_pair[None]
         largest = ti.cast(0.0, self.real)
         held = ti.Vector.zero(self.real, 3)
@@ -520,6 +523,7 @@ class Engine(Lists, Shapes, Sleepers, Bookkeeping):
                     held -= f
             if ti.static(ledger.on):
                 self.book_pair(c, s, i, j, d, ledger.parts(damped, f_t, turn), dt, rest, ledger)
+                self.book_turning(c, bits, f, f_t, turn, n, arm_j, dt, rest, ledger)
             largest = ti.max(largest, overlap * by_sum)
         for s in range(c * self.count[NEAR_ROOM], self.near_end[c]):
             largest = ti.max(largest, self.push_near(c, s, dt, shapes, ledger))
@@ -579,6 +583,7 @@ class Engine(Lists, Shapes, Sleepers, Bookkeeping):
                 now = ledger.parts(damped, f_t, turn)
                 ledger.add(c, ledger.took(ledger.near_last[s], now, parting, v_t, spin, dt))
                 ledger.near_last[s] = now
+                self.book_body(c, i, b, f, t_body, n, arm, arm_i, dt, ledger)
         else:
             if ti.static(ledger.on):
                 before = ledger.near_last[s]

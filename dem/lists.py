@@ -138,13 +138,21 @@ class Lists:
         return (k * self.count[NY] + j) * self.count[NX] + i
 
     @ti.kernel
-    def sort(self, gx: float, gy: float, gz: float, rest: ti.template()):
+    def sort(self, gx: float, gy: float, gz: float, rest: ti.template(), ledger: ti.template()):
         """Wrap the grains into the box and bring them into the order of the curve; ids break ties.
 
         Those that sleep come behind those awake: each set has the cells for itself.
         """
         for k in range(rest.sets * self.count[CELLS]):
             self.cell_fill[k] = 0
+        if ti.static(ledger.on):
+            for _ in range(1):  # one thread: the sum has one order
+                for i in range(self.count[GRAINS]):
+                    x, v = self.position[i], self.velocity[i]
+                    a = -ti.floor(x.x / self.box[PERIOD_X]) * self.box[PERIOD_X]
+                    b = -ti.floor(x.y / self.box[PERIOD_Y]) * self.box[PERIOD_Y]
+                    if a != 0.0 or b != 0.0:
+                        ledger.turn(0, ledger.outside, v.w * ti.Vector([a, b, 0.0]).cross(v.xyz))
         for i in range(self.count[GRAINS]):
             x = self.position[i]
             inside = x.z >= self.box[BOTTOM] and x.z <= self.box[TOP]

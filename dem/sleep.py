@@ -118,7 +118,7 @@ class Sleeper:
             rest.woken.fill(1)
         elif self.awake < self.bed.grain_count:
             e.look(self.limit, self.rules.share, self.fast, rest)
-        e.stir(self.bed.time_step, self.reach, int(self.leaving), rest, e.shapes)
+        e.stir(self.bed.time_step, self.reach, int(self.leaving), rest, e.shapes, e.ledger)
         rest.news.fill(0)
         if self.leaving:
             e.store_contacts(rest)

@@ -169,7 +169,9 @@ class Sleepers:
                     ti.atomic_add(rest.news[LEAVING], 1)
 
     @ti.kernel
-    def stir(self, dt: float, reach: float, leaving: int, rest: ti.template(), shapes: ti.template()):
+    def stir(
+        self, dt: float, reach: float, leaving: int, rest: ti.template(), shapes: ti.template(), ledger: ti.template()
+    ):
         """Wake those flagged, with all around them, and those that a body comes near; let those fall asleep that may.
 
         Between ``keep_lists`` and ``sort``: the lists are still those of before.
@@ -194,6 +196,8 @@ class Sleepers:
                     k = self.id[i]
                     if rest.leaves[k] == 1:
                         v = self.velocity[i]
+                        if ti.static(ledger.on):
+                            self.book_leaving(c, i, ledger)
                         rest.asleep[k] = 1
                         rest.held[c] = rest.held[c] + v.xyz * (v.w / ti.cast(dt, self.real))
                         v.xyz = ti.Vector.zero(self.real, 3)

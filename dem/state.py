@@ -117,7 +117,8 @@ def put_back(bed: Bed, state: dict[str, np.ndarray]) -> None:
         e.write(name, state[name], near)
     e.close_ledger()
     if "ledger_taken" in state:
-        e.open_ledger()
+        x, y, z = (float(v) for v in state["reals"][2:5])
+        e.open_ledger((x, y, z))
         e.ledger.restore(state, rows, near)
     numbers = [int(v) for v in state["numbers"]]
     bed.steps, bodies, bed.list_count, bed._since_lists, bed._reaction_steps, floor = numbers

@@ -109,6 +109,12 @@ EXPERIMENTS: dict[str, Experiment] = {
             module="experiments.tumble",
         ),
         Experiment(
+            "tumble spatial",
+            "A platform in six degrees of freedom, driven or thrown, on a bed of grains or on the spring-damper.",
+            settings="experiments.spatial_settings:SpatialSettings",
+            module="experiments.spatial",
+        ),
+        Experiment(
             "paper",
             "Redoes Figures 5 to 8 of the paper beside what its text states in numbers.",
             settings="experiments.paper_settings:PaperSettings",

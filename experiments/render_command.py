@@ -42,6 +42,10 @@ def render(
             from vis.tumble import write_tumble_report
 
             report = write_tumble_report(run, pictures=True, colour=colour, film=film, progress=progress.update)
+        elif folder.command == "tumble spatial":
+            from vis.spatial import write_spatial_report
+
+            report = write_spatial_report(run, colour=colour, film=film, progress=progress.update)
         else:
             if colour != "displacement" or not film:
                 say(f"colour and film are for runs of tumble; this one is of {folder.command}")

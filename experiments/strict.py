@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import UnionType
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 from annotated_types import MinLen
@@ -26,7 +27,8 @@ class StrictSettings(BaseModel):
             if not isinstance(value, bool):
                 raise ValueError("it must be true or false")
         elif kinds & {int, float} and value is not None:
-            several = get_origin(hint) is tuple
+            may_be_unset = get_args(hint) if get_origin(hint) is UnionType else ()
+            several = tuple in (get_origin(hint), *map(get_origin, may_be_unset))
             if several and not isinstance(value, list | tuple):
                 raise ValueError(f"it must be a list such as [{value if _is_number(value) else 0.1}]")
             if not several and isinstance(value, list | tuple):

@@ -1,4 +1,5 @@
-"""Settings of a tumble on grains: the bed, the spikes in it, the coupling. They belong to ``ground = "bed"``."""
+"""Settings of runs on grains: the bed, how it is coupled; and of a tumble the spikes in it. They belong to
+``ground = "bed"``."""
 
 from __future__ import annotations
 
@@ -8,7 +9,7 @@ from pydantic import Field
 
 from .strict import StrictSettings
 
-__all__ = ["OF_THE_MASTER", "TumbleBedSettings"]
+__all__ = ["OF_THE_MASTER", "GrainsSettings", "TumbleBedSettings"]
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -20,38 +21,19 @@ OF_THE_MASTER = (
 """Those that ``method = "coupled"`` takes on the spring-damper too."""
 
 
-class TumbleBedSettings(StrictSettings):
-    """What a bed of grains under a platform is made of, and how it is coupled; SI units."""
+class GrainsSettings(StrictSettings):
+    """What a bed of grains under any platform is made of, and how it is coupled; SI units."""
 
     bed_size: tuple[Positive, Positive, Positive] = Field(
-        (0.5, 0.06, 0.046),
-        description="On a bed: its length along the motion, its width for one spike (both periodic) and its depth [m].",
+        (0.7, 0.7, 0.05), description="On a bed: its size along x and y (both periodic) and its depth [m]."
     )
     grain: Positive = Field(0.003, description="On a bed: mean grain diameter [m].")
-    coarse: Positive | None = Field(
-        None,
-        description="On a bed: graded: `grain` is the mean diameter under the expected footprints, this the largest "
-        "away from them [m]; one size throughout if not given.",
-    )
     spread: float = Field(0.15, ge=0, le=0.5, description="On a bed: grain diameters are uniform within 1 +- this [1].")
-    bed_stages: tuple[str, ...] | None = Field(
-        None,
-        description="On a bed: how it is prepared, as `hedgebed bed make --stages` has it (rain:dry compact:0.57 stick "
-        "level, for grains that stick); rained and levelled if not given.",
-    )
     seed: int = Field(1, ge=0, lt=2**31, description="On a bed: seed of its grains.")
-    place: float = Field(
-        0.0,
-        allow_inf_nan=False,
-        description="On a bed: how far along it from its middle the platform is set down [m]; the bed goes on "
-        "periodically, so other grains lie there.",
-    )
     young: Positive | None = Field(
         None, description="On a bed: Young's modulus of the softened grains [Pa]; from max_overlap if not given."
     )
     max_overlap: float = Field(0.05, gt=0, le=0.2, description="On a bed: largest overlap of grains over diameter [1].")
-    spike_diameter: Positive = Field(0.012, description="On a bed: diameter of shaft and ball tip of a spike [m].")
-    spike_clear: Positive = Field(0.04, description="On a bed: how far a spike stands out of the hull [m].")
     spike_friction: NotNegative = Field(0.5, description="On a bed: friction of spike and grains [1].")
     spike_restitution: float = Field(0.5, ge=0.01, le=1, description="On a bed: restitution of spike and grains [1].")
     lowering_speed: Positive | None = Field(
@@ -66,6 +48,44 @@ class TumbleBedSettings(StrictSettings):
     iterations: int = Field(
         1, ge=1, le=50, description="On a bed, or coupled: how often a step is computed at most; 1: explicit."
     )
+    sleep: bool = Field(
+        False, description="On a bed: whether grains at rest are left out until something reaches them (docs/bed.md)."
+    )
+    sleep_force: Positive = Field(
+        1.0, description="Of sleep: change of a contact's force that wakes a grain, over its weight [1], and"
+    )
+    sleep_share: Positive = Field(0.5, description="Of sleep: the least of it over the force itself [1].")
+    frame_count: int = Field(30, ge=0, le=1000, description="On a bed: frames for ParaView; 0: none.")
+    checkpoint_interval: Positive = Field(60.0, description="On a bed: time between checkpoints [s].")
+    threads: int | None = Field(None, ge=1, description="On a bed: threads; all cores if not given.")
+    cache: bool = Field(True, description="On a bed: whether prepared beds are kept and used again.")
+
+
+class TumbleBedSettings(GrainsSettings):
+    """The same of a tumble in the plane, whose bed is a slice as wide as one spike has for itself."""
+
+    bed_size: tuple[Positive, Positive, Positive] = Field(
+        (0.5, 0.06, 0.046),
+        description="On a bed: its length along the motion, its width for one spike (both periodic) and its depth [m].",
+    )
+    coarse: Positive | None = Field(
+        None,
+        description="On a bed: graded: `grain` is the mean diameter under the expected footprints, this the largest "
+        "away from them [m]; one size throughout if not given.",
+    )
+    bed_stages: tuple[str, ...] | None = Field(
+        None,
+        description="On a bed: how it is prepared, as `hedgebed bed make --stages` has it (rain:dry compact:0.57 stick "
+        "level, for grains that stick); rained and levelled if not given.",
+    )
+    place: float = Field(
+        0.0,
+        allow_inf_nan=False,
+        description="On a bed: how far along it from its middle the platform is set down [m]; the bed goes on "
+        "periodically, so other grains lie there.",
+    )
+    spike_diameter: Positive = Field(0.012, description="On a bed: diameter of shaft and ball tip of a spike [m].")
+    spike_clear: Positive = Field(0.04, description="On a bed: how far a spike stands out of the hull [m].")
     tumbles: int = Field(
         1,
         ge=1,
@@ -81,17 +101,6 @@ class TumbleBedSettings(StrictSettings):
     drop_along: float = Field(0.0, allow_inf_nan=False, description="Of a landing: speed along the surface [m/s].")
     drop_spin: float = Field(0.0, allow_inf_nan=False, description="Of a landing: spin, clockwise [rad/s].")
     drop_theta: float = Field(0.0, allow_inf_nan=False, description="Of a landing: theta at the first touch [rad].")
-    sleep: bool = Field(
-        False, description="On a bed: whether grains at rest are left out until something reaches them (docs/bed.md)."
-    )
-    sleep_force: Positive = Field(
-        1.0, description="Of sleep: change of a contact's force that wakes a grain, over its weight [1], and"
-    )
-    sleep_share: Positive = Field(0.5, description="Of sleep: the least of it over the force itself [1].")
-    frame_count: int = Field(30, ge=0, le=1000, description="On a bed: frames for ParaView; 0: none.")
-    checkpoint_interval: Positive = Field(60.0, description="On a bed: time between checkpoints [s].")
-    threads: int | None = Field(None, ge=1, description="On a bed: threads; all cores if not given.")
-    cache: bool = Field(True, description="On a bed: whether prepared beds are kept and used again.")
 
     def bed_settings_given(self) -> list[str]:
         """Names of those of these settings that are not at their defaults."""

@@ -7,7 +7,6 @@ spring-damper's trial is integrated first: it says how far and deep the bed must
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +24,7 @@ from rigid.trial import Trial
 from .bed_graded import graded_under
 from .bed_progress import BedProgress
 from .bed_staged import check_bed_stages, staged_bed
+from .following import CHECKPOINT, follow
 from .progress import Progress
 from .reporting import write_report
 from .runfolder import RunFolder
@@ -54,7 +54,6 @@ MOST_GRAINS = 3e6
 """More are refused: the run would take days."""
 HULL_SHARE = 0.95
 """The hull's cylinder over the distance of its sides from the axis, so that it never stands out of the hull [1]."""
-CHECKPOINT = "tumble"
 
 
 @dataclass(frozen=True)
@@ -315,41 +314,12 @@ def _stepper(settings: TumbleSettings, plan: TumblePlan, bed: Bed, forecast: For
 
 def _follow(settings: TumbleSettings, run: CoupledTumble, folder: RunFolder, progress: Progress) -> Trajectory:
     """To its end, kept every `checkpoint_interval`; a failure leaves its state and what there is of the series."""
-    kept = folder.load_checkpoint(CHECKPOINT)
-    if kept is not None:
-        run.restore(kept)
-        progress.message(f"goes on at {run.time:.4g} s")
-    frames = TumbleFrames(settings, run, folder.path, resumed=kept is not None) if settings.frame_count else None
-    progress.stage("tumble", total=1.0)
-    saved, in_hand = time.monotonic(), not run.placed
 
-    def on_step(run: CoupledTumble) -> None:
-        nonlocal saved, in_hand
-        progress.update(run.fraction)
-        if in_hand and run.placed:
-            in_hand = False
-            held = run.placing_steps * run.master.macro_step
-            progress.message(f"set down after {held:.3g} s: {1e3 * sinkage_start(run):.3g} mm deep")
-        stop = asked_to_stop()
-        if not run.done and (stop or time.monotonic() - saved >= settings.checkpoint_interval):
-            folder.save_checkpoint(CHECKPOINT, run.state())
-            saved = time.monotonic()
-        if stop and not run.done:
-            raise KeyboardInterrupt
+    def frames(resumed: bool) -> TumbleFrames | None:
+        return TumbleFrames(settings, run, folder.path, resumed=resumed) if settings.frame_count else None
 
-    try:
-        with held_back() as asked_to_stop:
-            series = run.run(
-                on_step=on_step, on_frame=frames.write if frames else None,
-                frame_interval=frames.interval if frames else None,
-            )  # fmt: skip
-    except RuntimeError as error:  # a grain lost, an overlap past its bound, a spike beyond the bed
-        folder.save_checkpoint(f"{CHECKPOINT}.failed", run.state())
-        if run.placed:
-            write_trajectory(folder.path, run)
-        raise RuntimeError(
-            f"at {run.time:.4g} s: {error}; a longer or deeper bed_size, a shorter duration or another young would do; "
-            f"the state is in checkpoint/{CHECKPOINT}.failed.npz"
-        ) from error
-    folder.save_checkpoint(CHECKPOINT, run.state())
-    return series
+    found: Trajectory = follow(
+        run, folder, progress, frames=frames, checkpoint_interval=settings.checkpoint_interval,
+        sinkage=lambda: sinkage_start(run), write_series=lambda: write_trajectory(folder.path, run),
+    )  # fmt: skip
+    return found

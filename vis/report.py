@@ -26,6 +26,7 @@ _NEEDS |= {"Drops": "drop", "Peaks of the drops": "drop"}
 #: Experiment -> module and function of its own report.
 _OTHERS = {
     "tumble": ("vis.tumble", "write_tumble_report"),
+    "tumble spatial": ("vis.spatial", "write_spatial_report"),
     "hop": ("vis.hop", "write_hop_report"),
     "paper": ("vis.paper", "write_paper_report"),
     "campaign": ("vis.campaign", "write_campaign_report"),

@@ -60,9 +60,17 @@ class Stage(Eye):
     """
 
     def __init__(
-        self, size: tuple[int, int], *, width: float, cut: float, low: Array, high: Array, radius: float | None
+        self,
+        size: tuple[int, int],
+        *,
+        width: float,
+        cut: float,
+        low: Array,
+        high: Array,
+        radius: float | None,
+        pitch: float = 0.24,
     ) -> None:
-        super().__init__(size, width=width, cut=cut, pitch=0.24)
+        super().__init__(size, width=width, cut=cut, pitch=pitch)
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
         import pyvista
 
@@ -104,13 +112,14 @@ class Stage(Eye):
         for name, (points, triangles) in frame.bodies.items():
             self._actors += self._body(name, points, triangles)
         camera = self._plotter.camera
-        far = 10.0 * self.width
+        far = 1.05 * self.reach
         middle = np.array([focus[0], self.cut, focus[1]])
         camera.focal_point = tuple(middle)
         camera.position = tuple(middle + far * np.array([0.0, -np.cos(self.pitch), np.sin(self.pitch)]))
         camera.up = (0.0, 0.0, 1.0)
         camera.parallel_scale = 0.5 * self.height
-        # As near as it can be: the shading of gaps is read off depths, and coarse ones stripe what is flat.
+        # As near as it can be: the shading of gaps reads distances from the camera off half-precision numbers (a part
+        # in 2048), and coarse ones stripe what is flat.
         camera.clipping_range = (far - self.reach, far + self.reach)
         self._plotter.render()
         image = np.asarray(self._plotter.screenshot(None, return_img=True))[..., :3]

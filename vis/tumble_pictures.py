@@ -135,7 +135,7 @@ def draw_tracks(reel: Reel, file: Path) -> Picture:
         above.grid(False)
         bar = drawing.colorbar(picture, ax=[above, along], shrink=0.6, extend="both")
         bar.set_label("change of the surface's height [mm]")
-        strip = np.abs(y) <= 0.5 * 12.0
+        strip = np.abs(y) <= 0.5e3 * float((reel.result.get("grains") or {}).get("spike_diameter", 0.012))
         for index in np.unique(np.linspace(1, len(reel) - 1, 4).round().astype(int)):
             now = reel.frame(int(index))
             mean = 1e3 * np.asarray(now.maps["surface"].fields["change"], dtype=float)[strip].mean(axis=0)

@@ -194,6 +194,8 @@ def test_a_tumble_on_grains_closes_its_books_and_goes_on_from_a_checkpoint_to_th
     assert (np.diff(found.dissipated).min()) > -0.01 * found.torque_work[-1]
     assert run.dissipation_reversal < 0.01 * MOST_REVERSAL
     assert run.samples["momentum_error"].max() < 1e-12
+    wheel = run.trial.wheel_inertia * run.body.wheel_speed
+    assert run.samples["angular_momentum_error"].max() < 1e-5 * wheel
     bed.restore(kept)
     other = small(bed, torque=torque, duration=0.1)
     with np.load(tmp_path / "state.npz") as state:

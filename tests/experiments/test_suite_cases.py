@@ -23,6 +23,12 @@ def test_every_case_of_every_experiment_is_valid_and_found_by_its_name():
     assert counts == {1: 23, 2: 6, 3: 6, 4: 4, 5: 5, 6: 8}
 
 
+def test_no_case_that_ships_is_refused():
+    """The spring-damper's tips stay on the bed for as long as the case lasts, and whatever else is checked before."""
+    refused = {case.name: cost for case in suite.cases() if isinstance(cost := suite.estimate(case), str)}
+    assert not refused
+
+
 def test_cases_that_can_share_a_bed_do():
     """What shapes a bed is the same, its modulus given: then `Bed.prepare` finds it in the cache."""
     shaping = ("bed_size", "grain", "spread", "young", "max_overlap", "seed")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from coupling import CoupledTumble, LawFooting, LeftTheBedError
-from experiments import tumble, tumble_grains, tumble_grains_result, tumble_steppers
+from experiments import following, tumble, tumble_grains, tumble_grains_result, tumble_steppers
 from experiments.cli import main
 from experiments.runfolder import RunFolder
 from experiments.softening import Softening
@@ -169,7 +169,7 @@ def test_a_run_stopped_by_ctrl_c_is_taken_up_again_to_the_same_numbers(tmp_path,
 
         yield asked
 
-    monkeypatch.setattr(tumble_grains, "held_back", stopping)
+    monkeypatch.setattr(following, "held_back", stopping)
     with pytest.raises(KeyboardInterrupt):
         tumble.run(settings, tmp_path / "broken")
     assert RunFolder.open(tmp_path / "broken").load_checkpoint("tumble") is not None

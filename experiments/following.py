@@ -1,0 +1,80 @@
+"""A run on a footing followed to its end in a run folder: checkpoints, Ctrl-C, frames, what is kept of a failure."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from .progress import Progress
+from .runfolder import RunFolder
+from .stopping import held_back
+
+__all__ = ["CHECKPOINT", "Frames", "follow"]
+
+CHECKPOINT = "tumble"
+
+
+class Frames(Protocol):
+    """What writes the frames of a run."""
+
+    interval: float
+    """Between two of them [s]."""
+
+    def write(self, run: Any) -> None:
+        """One frame of what there is now."""
+
+
+def follow(
+    run: Any,
+    folder: RunFolder,
+    progress: Progress,
+    *,
+    frames: Callable[[bool], Frames | None],
+    checkpoint_interval: float,
+    sinkage: Callable[[], float],
+    write_series: Callable[[], Any],
+) -> Any:
+    """What `run.run` gives, `run` a `CoupledTumble` or a `SpatialRun`; taken up from its checkpoint where there is one.
+
+    `frames` is told whether it is taken up; `sinkage` says how deep it stands [m] once it is set down; `write_series`
+    keeps what there is where it fails. Raises KeyboardInterrupt and RuntimeError with the state saved.
+    """
+    kept = folder.load_checkpoint(CHECKPOINT)
+    if kept is not None:
+        run.restore(kept)
+        progress.message(f"goes on at {run.time:.4g} s")
+    drawn = frames(kept is not None)
+    progress.stage("tumble", total=1.0)
+    saved, in_hand = time.monotonic(), not run.placed
+
+    def on_step(run: Any) -> None:
+        nonlocal saved, in_hand
+        progress.update(run.fraction)
+        if in_hand and run.placed:
+            in_hand = False
+            held = run.placing_steps * run.master.macro_step
+            progress.message(f"set down after {held:.3g} s: {1e3 * sinkage():.3g} mm deep")
+        stop = asked_to_stop()
+        if not run.done and (stop or time.monotonic() - saved >= checkpoint_interval):
+            folder.save_checkpoint(CHECKPOINT, run.state())
+            saved = time.monotonic()
+        if stop and not run.done:
+            raise KeyboardInterrupt
+
+    try:
+        with held_back() as asked_to_stop:
+            found = run.run(
+                on_step=on_step, on_frame=drawn.write if drawn else None,
+                frame_interval=drawn.interval if drawn else None,
+            )  # fmt: skip
+    except RuntimeError as error:  # a grain lost, an overlap past its bound, a spike beyond the bed
+        folder.save_checkpoint(f"{CHECKPOINT}.failed", run.state())
+        if run.placed:
+            write_series()
+        raise RuntimeError(
+            f"at {run.time:.4g} s: {error}; a longer or deeper bed_size, a shorter duration or another young would do; "
+            f"the state is in checkpoint/{CHECKPOINT}.failed.npz"
+        ) from error
+    folder.save_checkpoint(CHECKPOINT, run.state())
+    return found

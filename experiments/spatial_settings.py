@@ -1,0 +1,135 @@
+"""Settings of `hedgebed tumble spatial`: a platform in six degrees of freedom on a surface, options with units."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from .platform_settings import NotNegative, Positive
+from .tumble_bed_settings import GrainsSettings
+
+__all__ = ["SpatialSettings"]
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Vector = tuple[Finite, Finite, Finite]
+ZERO = (0.0, 0.0, 0.0)
+
+
+class SpatialSettings(GrainsSettings):
+    """A platform in space, driven by its wheels or thrown, on a bed of grains or on the spring-damper."""
+
+    # The surface
+    surface: str | None = Field(None, description="Material: steel, brick, sand or jsc1a; brick if not given.")
+    ground: Literal["spring-damper", "bed"] = Field(
+        "spring-damper", description="What computes the surface's force: the spring-damper, or a bed of grains."
+    )
+    stiffness: Positive | None = Field(
+        None, description="K of one spike [N/m]; half of the surface's, which are of a row of two, if not given."
+    )
+    damping: NotNegative | None = Field(
+        None, description="C of one spike, while going in [N s/m]; half of the surface's if not given."
+    )
+    mu_s: NotNegative | None = Field(None, description="Static friction [1]; the surface's if not given (brick: 0.5).")
+    mu_d: NotNegative | None = Field(
+        None, description="Sliding friction [1]; the surface's if not given (brick: 0.25), half of mu_s where that is."
+    )
+
+    # The platform, and what carries part of it
+    platform: str = Field("hedgehog", description="The platform: one that ships, or its TOML file.")
+    rig: Positive | None = Field(
+        None, description="g_sim of the offloading rig [9.80665 m/s2]; 0.0085 if neither it nor gravity is given."
+    )
+    rig_reading: Literal["pair", "weight"] = Field(
+        "pair",
+        description="What rig means: free-fall acceleration of platform and counterweight (pair), or the weight left "
+        "per mass of the platform (weight).",
+    )
+    gravity: Positive | None = Field(None, description="Gravity of a free platform, without a rig [m/s2].")
+
+    # What drives it
+    torque: Vector | None = Field(
+        None,
+        description="Torque on the platform about its own x, y and z, while a spike touches [N m]; 0.22 about y, or "
+        "the motor's most, if neither it nor a motion at the start is given.",
+    )
+    torque_until: Positive | None = Field(None, description="End of the torques [s]; they do not end if not given.")
+    torque_in_flight: bool = Field(False, description="Whether the wheels are driven while nothing touches, too.")
+    actuator: Literal["motor", "brake"] = Field(
+        "motor", description="What makes the torques: motors that speed wheels up, or brakes that slow them to rest."
+    )
+    wheel_speed_0: tuple[NotNegative, NotNegative, NotNegative] = Field(
+        ZERO, description="Speeds of the wheels about x, y and z at the start [rad/s]; a brake must be given its own."
+    )
+
+    # How it starts
+    turn: Vector = Field(
+        ZERO, description="How it is turned at the start: about this vector, by its length, from level [rad]."
+    )
+    velocity: Vector = Field(ZERO, description="Velocity of the centre of mass at the start [m/s].")
+    angular_velocity: Vector = Field(ZERO, description="Angular velocity at the start, axes of the ground [rad/s].")
+    height: NotNegative | None = Field(
+        None,
+        description="Height of the lowest tip over the surface at the start [m]: it is let fall. If not given it is "
+        "put just clear of the ground, and set down by a hand where it has no motion.",
+    )
+    duration: Positive = Field(1.0, le=3600, description="How long it is followed [s].")
+
+    @property
+    def in_a_hand(self) -> bool:
+        """Whether a hand sets it down before time begins."""
+        return self.height is None and not any(self.velocity) and not any(self.angular_velocity)
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        for finding in (self._friction(), self._gravity(), self._actuation(), self._hand(), self._of_a_bed()):
+            if finding:
+                raise ValueError(finding)
+        return self
+
+    def _friction(self) -> str | None:
+        if self.mu_s is not None and self.mu_d is not None and self.mu_d > self.mu_s:
+            return f"mu_d = {self.mu_d:g} is above mu_s = {self.mu_s:g}: at most that would do"
+        return None
+
+    def _gravity(self) -> str | None:
+        if self.gravity is None:
+            return None
+        if self.rig is not None:
+            return (
+                f"gravity = {self.gravity:g} m/s2 and rig = {self.rig:g} are both given: gravity is that of a free "
+                f"platform, one of them would do"
+            )
+        if self.rig_reading != "pair":
+            return f"rig_reading = {self.rig_reading} belongs to a rig, and gravity = {self.gravity:g} m/s2 has none"
+        return None
+
+    def _actuation(self) -> str | None:
+        if self.actuator != "brake":
+            return None
+        for axis, torque, speed in zip("xyz", self.torque or ZERO, self.wheel_speed_0, strict=True):
+            if torque and not speed:
+                return (
+                    f"wheel_speed_0 about {axis} = 0 rad/s: a brake slows a wheel that turns, so its speed at the "
+                    f"start must be given in rad/s, such as 300"
+                )
+        if not any(self.torque or ZERO):
+            return "torque is not given: a brake's must be, about each axis in N m"
+        return None
+
+    def _hand(self) -> str | None:
+        if self.lowering_speed is not None and not self.in_a_hand:
+            return (
+                f"lowering_speed = {self.lowering_speed:g} m/s with a motion or a height at the start: a hand sets "
+                f"down what is at rest, so without it"
+            )
+        return None
+
+    def _of_a_bed(self) -> str | None:
+        if self.ground == "bed":
+            return None
+        both = ("lowering_speed", "substeps", "extrapolation", "iterations", "frame_count", "checkpoint_interval")
+        for name, field in GrainsSettings.model_fields.items():
+            if name not in both and getattr(self, name) != field.default:
+                return f"{name} = {getattr(self, name)} belongs to ground = 'bed'"
+        return None

@@ -1,0 +1,200 @@
+"""`hedgebed tumble spatial`: refusals by name, the spring-damper, a small bed (stopped and taken up), the report."""
+
+import json
+import math
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from experiments import following, spatial
+from experiments.cli import main
+from experiments.runfolder import RunFolder
+from experiments.spatial_settings import SpatialSettings
+from experiments.spatial_trial import plan_spatial
+from vis.tumble_series import read_columns
+
+CUBE = """
+format = "hedgebed-platform/1"
+name = "cube"
+[body]
+mass = 0.1
+inertia = [1.2e-5, 1.2e-5, 1.2e-5]
+[hull]
+shape = "box"
+size = [0.03, 0.03, 0.03]
+[spikes]
+clear = 0.01
+diameter = 0.008
+[wheels]
+inertia = 1e-6
+max_speed = 1000.0
+motor_torque = 0.02
+axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
+"""
+
+
+@pytest.fixture
+def cube(tmp_path):
+    """A cube of 30 mm on eight spikes, with wheels about x and y, as a file."""
+    path = tmp_path / "cube.toml"
+    path.write_text(CUBE)
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"gravity": 1.0, "rig": 0.01}, "gravity = 1 m/s2 and rig = 0.01"),
+        ({"velocity": (0.1, 0.0, 0.0), "lowering_speed": 0.1}, "lowering_speed = 0.1 m/s with a motion"),
+        ({"actuator": "brake", "torque": (1.0, 0.0, 0.0)}, "wheel_speed_0 about x = 0 rad/s"),
+        ({"actuator": "brake"}, "torque is not given"),
+        ({"grain": 0.004}, "grain = 0.004 belongs to ground = 'bed'"),
+        ({"mu_s": 0.1, "mu_d": 0.2}, "mu_d = 0.2 is above mu_s = 0.1"),
+        ({"torque": 0.1}, "it must be a list"),
+    ],
+)
+def test_what_does_not_go_together_is_refused_by_name(given, said):
+    with pytest.raises(ValueError, match=said):
+        SpatialSettings(**given)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"torque": (0.0, 0.0, 0.01)}, "has no wheel about z"),
+        ({"torque": (0.03, 0.0, 0.0)}, "about x: torque is 0.03 N m: the motor gives at most 0.02"),
+        ({"rig": 1.0}, "rig = 1 .* is not below the local gravity"),
+        ({"surface": "steel", "ground": "bed"}, "surface = 'steel' has no grains .* sand, jsc1a would do"),
+        (
+            {"bed_size": (0.07, 0.2, 0.05)},
+            r"bed_size = 0.07 m along x is too short: .* 0.\d+ m or a shorter one would do",
+        ),
+        ({"bed_size": (0.2, 0.2, 0.02)}, r"bed_size = 0.02 m deep is too shallow: .* would do"),
+        ({"bed_size": (0.2, 0.2, 0.05), "grain": 0.009}, "grain = 0.009 m is larger than the spike"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_any_work(cube, given, said):
+    own = {"surface": "sand", "ground": "bed", "gravity": 1.0, "platform": cube, "duration": 0.05}
+    own |= {"torque": (0.0, 0.01, 0.0), "velocity": (0.0, 0.0, -0.1)}
+    if "rig" in given:
+        del own["gravity"]
+    with pytest.raises(ValueError, match=said):
+        spatial.check(SpatialSettings(**own | given))
+
+
+def test_a_platform_without_spikes_has_no_grains_to_touch():
+    settings = SpatialSettings(surface="sand", ground="bed", platform="mascot", gravity=1.0)
+    with pytest.raises(ValueError, match="tip_radius of MASCOT"):
+        spatial.check(settings)
+
+
+def test_set_down_by_the_hand_on_the_spring_damper_it_stands_as_deep_as_its_load_says(tmp_path, monkeypatch, capsys):
+    """Four tips with K of a row halved: W / (4 K); then two wheels turn it over two sides."""
+    monkeypatch.setattr(spatial, "write_report", lambda *_: None)
+    out = tmp_path / "run"
+    given = ("--surface", "sand", "--torque", "0.05", "0.06", "0", "--duration", "0.1", "--frame-count", "3")
+    assert main(["tumble", "spatial", *given, "--quiet", "--out", str(out)]) == 0
+    assert "A hand set it down" in capsys.readouterr().out
+    result = json.loads((out / "result.json").read_text())
+    weight, quantities = result["trial"]["weight"]["value"], result["quantities"]
+    assert quantities["sinkage_start"]["value"] == pytest.approx(weight / (4 * 41.1), rel=0.01)
+    assert quantities["energy_residual"]["value"] < 1e-5
+    path = read_columns(out / "trajectory.csv")[0]
+    assert path["wx_rad_s"][-1] > 0.01 and path["wy_rad_s"][-1] > 0.01
+    assert path["touching"][0] == 4
+    motion = read_columns(out / "series" / "motion.csv")[0]
+    inertia = 1.2e-3
+    assert motion["wheel_x_rad_s"][-1] == pytest.approx(-0.05 * 0.1 / inertia, rel=1e-6)
+    assert len(list((out / "frames").glob("tumble_hull_*.vtu"))) == 4
+
+
+def test_a_drop_tells_its_impact_and_a_hop(tmp_path, monkeypatch, cube):
+    """From 1 mm at 1 m/s2 with no damping: sqrt(2 g h) + what v0 adds, and back up with all of it on a level cube."""
+    monkeypatch.setattr(spatial, "write_report", lambda *_: None)
+    settings = SpatialSettings(
+        surface="brick", platform=cube, gravity=1.0, height=1e-3, damping=0.0, duration=0.15, frame_count=0,
+    )  # fmt: skip
+    assert plan_spatial(settings).trial.torques == ()
+    quantities = spatial.run(settings, tmp_path / "drop")["quantities"]
+    speed = math.sqrt(2 * 1.0 * 1e-3)
+    assert quantities["first_touch"]["value"] == pytest.approx(speed, abs=1e-3)
+    assert quantities["impact_speed"]["value"] == pytest.approx(speed, rel=0.02)
+    assert quantities["restitution"]["value"] == pytest.approx(1.0, abs=0.02)
+
+
+def small_bed(*_):
+    """Two layers of large grains, almost at rest."""
+    from dem import Bed
+    from dem.materials import SAND
+
+    d, rows = 6e-3, 20
+    low = [((i + 0.5) * d, (j + 0.5) * d, 0.5 * d) for i in range(rows) for j in range(rows)]
+    high = [((i + 1.0) * d, (j + 1.0) * d, 0.5 * d + d * math.sqrt(0.5)) for i in range(rows) for j in range(rows)]
+    positions = np.array(low + high) % [rows * d, rows * d, 1.0]
+    bed = Bed.from_grains(
+        SAND, positions=positions, radii=np.full(len(positions), 0.5 * d), young=1e6, max_overlap=0.2,
+        size=(rows * d, rows * d, 0.05), height=0.3, threads=1, gravity=1.0,
+    )  # fmt: skip
+    bed.advance(200)
+    bed.surface = float((bed.grains()["position"][:, 2] + 0.5 * d).max())
+    return bed
+
+
+def test_on_grains_a_stopped_run_is_taken_up_to_the_same_bits_and_its_books_close(tmp_path, monkeypatch, cube):
+    monkeypatch.setattr(spatial, "_prepare", small_bed)
+    monkeypatch.setattr(spatial, "write_report", lambda *_: None)
+    settings = SpatialSettings(
+        surface="sand", ground="bed", platform=cube, gravity=1.0, turn=(0.3, 0.2, 0.0), velocity=(0.05, 0.02, -0.15),
+        angular_velocity=(0.0, 1.0, 2.0), torque=(0.001, 0.0, 0.0), duration=0.03, bed_size=(0.14, 0.14, 0.05),
+        grain=0.006, young=1e6, max_overlap=0.2, threads=1, frame_count=2, substeps=4,
+    )  # fmt: skip
+    whole = spatial.run(settings, tmp_path / "whole")
+    calls = 0
+
+    @contextmanager
+    def stopping():
+        def asked():
+            nonlocal calls
+            calls += 1
+            return calls == 20
+
+        yield asked
+
+    monkeypatch.setattr(following, "held_back", stopping)
+    with pytest.raises(KeyboardInterrupt):
+        spatial.run(settings, tmp_path / "broken")
+    assert RunFolder.open(tmp_path / "broken").load_checkpoint("tumble") is not None
+    again = spatial.resume(tmp_path / "broken")
+    assert again["quantities"] == whole["quantities"]
+    for name in ("trajectory.csv", "series/bed.csv", "series/motion.csv", "frames/tumble.pvd"):
+        assert (tmp_path / "broken" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
+    quantities = whole["quantities"]
+    assert quantities["sinkage_largest"]["value"] > 1e-3 and quantities["dissipated_friction"]["value"] > 0
+    assert quantities["energy_residual"]["value"] < 5e-3 and quantities["momentum_residual"]["value"] < 1e-13
+    assert whole["grains"]["beside"]["impact_speed"]["value"] > 0.1
+    frames = sorted(path.name for path in (tmp_path / "whole" / "frames").glob("*_0001.*"))
+    parts = ("contact_forces", "grains", "hull", "row_forces", "spikes")
+    assert frames == [*(f"tumble_{part}_0001.vtu" for part in parts), "tumble_surface_0001.vti"]
+    _check_report(tmp_path / "whole")
+
+
+def _check_report(folder):
+    """Every plot is there and the page says both grounds' numbers, without pictures."""
+    from vis.spatial import write_spatial_report
+
+    page = write_spatial_report(folder, pictures=False).read_text()
+    assert "spring-damper" in page and "cube in space on bed of sand" in page
+    assert all((folder / "figures" / f"{name}.png").stat().st_size > 5000 for name in ("path", "turning", "energy"))
+
+
+def test_the_flat_pictures_are_drawn_where_there_is_no_opengl(tmp_path, monkeypatch, cube):
+    from vis import spatial as report
+
+    monkeypatch.setattr(spatial, "write_report", lambda *_: None)
+    monkeypatch.setattr(report, "opengl_available", lambda: False)
+    settings = SpatialSettings(platform=cube, gravity=1.0, height=1e-3, duration=0.02, frame_count=2)
+    spatial.run(settings, tmp_path / "law")
+    page = report.write_spatial_report(tmp_path / "law").read_text()
+    assert "no OpenGL" in page
+    assert (tmp_path / "law" / "film.gif").exists() and (tmp_path / "law" / "figures" / "space-end.png").exists()
