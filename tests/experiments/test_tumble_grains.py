@@ -179,6 +179,7 @@ def test_a_run_stopped_by_ctrl_c_is_taken_up_again_to_the_same_numbers(tmp_path,
         assert (tmp_path / "broken" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
     assert whole["quantities"]["energy_residual"]["value"] < 0.01
     assert whole["quantities"]["momentum_residual"]["value"] < 1e-12
+    assert whole["quantities"]["angular_momentum_residual"]["value"] < 1e-4 * settings.torque * settings.duration
     grains = whole["grains"]
     assert grains["grain_steps"] == pytest.approx(grains["awake_share"] * grains["grain_steps_all_awake"])
     assert 0 < grains["awake_share"] < 0.9 and grains["lowering_time"] > 0
@@ -190,16 +191,18 @@ def test_a_run_stopped_by_ctrl_c_is_taken_up_again_to_the_same_numbers(tmp_path,
 
 
 def _check_report(folder, result):
-    """The section of the report has both figures and both columns."""
+    """The section of the report has its figures and both columns, and where the energy went."""
     from vis.tumble import read_columns
     from vis.tumble_grains import grains_section
 
     (folder / "figures").mkdir(exist_ok=True)
     tables = {name: read_columns(folder / file) for name, file in result["grains"]["series"].items()}
+    tables["motion"] = read_columns(folder / "series" / "motion.csv")
     section = grains_section(result, folder / "figures", tables)
-    assert [block.kind for block in section.blocks] == ["figure", "table", "figure", "text"]
-    assert all((folder / "figures" / name).stat().st_size > 5000 for name in ("beside.png", "feet.png"))
-    assert "rig: grains at 1 g" in section.blocks[-1].text
+    assert [block.kind for block in section.blocks] == ["figure", "table", "figure", "text", "figure"]
+    drawn = ("beside.png", "feet.png", "books.png")
+    assert all((folder / "figures" / name).stat().st_size > 5000 for name in drawn)
+    assert "rig: grains at 1 g" in section.blocks[3].text
 
 
 def test_stages_of_a_bed_reach_the_laboratory_and_its_cache(monkeypatch):
