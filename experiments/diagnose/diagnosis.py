@@ -30,7 +30,7 @@ from .scatter_gap import gap_with_scatter, weighed_residuals
 from .search import Choice, choose
 from .unrest import Unrest, find_unrest
 
-__all__ = ["Diagnosis", "Gap", "diagnose"]
+__all__ = ["Diagnosis", "Gap", "diagnose", "one_number"]
 
 Tell = Callable[[str, float], None]
 
@@ -64,6 +64,8 @@ _SEEN_ELSEWHERE = 3.0
 _CERTAIN = 0.1
 """Share of what the base model leaves, fitted, predicted and held out, that may be left by a name that is certain
 beside something that has no name."""
+_MANY = 3
+"""Names that together bend to nearly anything: each of so many must have one amplitude wherever it is looked at."""
 _ONE_NUMBER = 0.1
 """And by how much of itself its amplitude may be uncertain when conditions are left out: what is there is the same in
 all of them, what stands for something else is not."""
@@ -501,6 +503,8 @@ def _verdict(choice: Choice, held: Verdict | None, held_out: tuple[str, ...], se
     found = choice.best.fit
     if not choice.best.effects or is_strained(found):
         return "unknown"
+    if len(choice.best.effects) >= _MANY and (choice.predicted is None or not one_number(choice)):
+        return "unknown"
     after = _gap(found.model.problem, found.model, _values_of_all(found, held_out), found.model.trials, held_out)
     fits, predicts = choice.left.passed, held is None or held.passed
     little = after.fit <= SMALL and (after.held_out or 0.0) <= SMALL
@@ -588,7 +592,7 @@ def _certain(base: Fit, choice: Choice) -> bool:
     ends = any(not met.strains and met.parameter not in amplitudes for met in bounds_met(choice.best.fit))
     if ends or is_strained(choice.best.fit) or excess(choice.best.fit) >= _CERTAIN * excess(base):
         return False
-    if choice.predicted is None or not _one_number(choice):
+    if choice.predicted is None or not one_number(choice):
         return False
     trials = [trial for trial in base.model.problem.trials if trial.id in base.model.trials]
     predicted = predict(base, folds_of(trials))
@@ -597,7 +601,7 @@ def _certain(base: Fit, choice: Choice) -> bool:
     return choice.predicted.chi_square - choice.predicted.count < _CERTAIN * (predicted.chi_square - predicted.count)
 
 
-def _one_number(choice: Choice) -> bool:
+def one_number(choice: Choice) -> bool:
     """Whether each effect's amplitude stays the same whichever condition is left out (jackknife)."""
     assert choice.predicted is not None
     folds = choice.predicted.learned

@@ -127,11 +127,11 @@ def _law(squares: Mapping[tuple[object, ...], Array], freedom: Mapping[tuple[obj
         if total < best[0]:
             best = total, float(bend), power, amplitudes
     quiet = sum(float(square.sum()) for square in squares.values())
-    total, bend, power, amplitudes = best
+    least, chosen, steep, amplitudes = best
     wandering = [a for a in amplitudes.values() if 1 + a > _LEAST]
-    if quiet - total < _SURE or len(wandering) < _SHARE * len(amplitudes):
+    if quiet - least < _SURE or len(wandering) < _SHARE * len(amplitudes):
         return None
-    return Law(bend, power, amplitudes, float(np.median(list(amplitudes.values()))), 0.0)
+    return Law(chosen, steep, amplitudes, float(np.median(list(amplitudes.values()))), 0.0)
 
 
 def _std(found: Fit, values: Mapping[str, float], groups: Sequence[Sequence[str]], name: str) -> float:

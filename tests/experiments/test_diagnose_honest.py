@@ -1,12 +1,14 @@
 """What keeps a diagnosis honest: errors near jumps, numbers too far from what was stated, noise that is none."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial
 
 from experiments.diagnose.bounds import bounds_met
 from experiments.diagnose.colour import find_colours, find_loud
-from experiments.diagnose.diagnosis import diagnose
+from experiments.diagnose.diagnosis import diagnose, one_number
 from experiments.diagnose.fitting import Model, Whitener, fit, settled
 from experiments.diagnose.gate import held_out_gate, open_gate
 from experiments.diagnose.penetration_problem import make_problem
@@ -163,3 +165,12 @@ def test_what_grows_from_trial_to_trial_is_said_to_be_no_scatter(factors, words)
     values = {f"bed[{trial.id}]": float(factor) for trial, factor in zip(trials, factors, strict=True)}
     told = trends(Scatter(model_std={"bed": 0.06}, values=values), trials)
     assert (words is None and told == []) or (words in told[0].what and "once in 20160 times" in told[0].what)
+
+
+@pytest.mark.parametrize(("learned", "same"), [([1.0, 1.02, 0.98, 1.01], True), ([1.0, 1.2, 0.7, 1.0], False)])
+def test_an_effect_that_is_there_has_one_amplitude_whichever_condition_is_left_out(learned, same):
+    # Jackknife: the error is the root of (n - 1) times the mean square over the n folds; at most a tenth.
+    form = SimpleNamespace(amplitude="pull.force")
+    best = SimpleNamespace(forms=(form,), fit=SimpleNamespace(values={"pull.force": 1.0}))
+    folds = SimpleNamespace(learned=[{"pull.force": value} for value in learned])
+    assert one_number(SimpleNamespace(best=best, predicted=folds)) is same
