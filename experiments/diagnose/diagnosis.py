@@ -65,7 +65,8 @@ _CERTAIN = 0.1
 """Share of what the base model leaves, fitted, predicted and held out, that may be left by a name that is certain
 beside something that has no name."""
 _MANY = 3
-"""Names that together bend to nearly anything: each of so many must have one amplitude wherever it is looked at."""
+"""Names that together bend to nearly anything, a trial set aside for one of them: each of so many must have one amplitude
+wherever it is looked at."""
 _ONE_NUMBER = 0.1
 """And by how much of itself its amplitude may be uncertain when conditions are left out: what is there is the same in
 all of them, what stands for something else is not."""
@@ -288,7 +289,7 @@ def diagnose(
     tell("verdict", 0.0)
     choice = replace(choice, best=replace(choice.best, fit=settled(choice.best.fit)))
     held = _held_out_verdict(choice.best.fit, held_out, seed) if held_out else None
-    verdict = _verdict(choice, held, held_out, seed)
+    verdict = _verdict(choice, held, held_out, seed, set_aside=bool(aside))
     if not aside and (gone_astray := _own_ways(base, choice, verdict, held_out, seed, colours)):
         tell("a trial goes its own way: once more without it", 0.0)
         anew = again(problem, aside=gone_astray, looked_at=looked_at)
@@ -496,14 +497,16 @@ def _likeliest(choice: Choice) -> list[Hypothesis]:
     return list(found.values())
 
 
-def _verdict(choice: Choice, held: Verdict | None, held_out: tuple[str, ...], seed: int) -> str:
+def _verdict(
+    choice: Choice, held: Verdict | None, held_out: tuple[str, ...], seed: int, *, set_aside: bool = False
+) -> str:
     """A name stands where its model leaves nothing, on the trials that were fitted and on those that were not, or too
     little to speak of, or what a form that is not nature's leaves; and where it needs no number that the campaign all
     but excludes. Else something is unknown."""
     found = choice.best.fit
     if not choice.best.effects or is_strained(found):
         return "unknown"
-    if len(choice.best.effects) >= _MANY and (choice.predicted is None or not one_number(choice)):
+    if len(choice.best.effects) + set_aside >= _MANY and (choice.predicted is None or not one_number(choice)):
         return "unknown"
     after = _gap(found.model.problem, found.model, _values_of_all(found, held_out), found.model.trials, held_out)
     fits, predicts = choice.left.passed, held is None or held.passed
