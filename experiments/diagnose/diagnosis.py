@@ -65,8 +65,8 @@ _CERTAIN = 0.1
 """Share of what the base model leaves, fitted, predicted and held out, that may be left by a name that is certain
 beside something that has no name."""
 _MANY = 3
-"""Names that together bend to nearly anything, a trial set aside for one of them: each of so many must have one amplitude
-wherever it is looked at."""
+"""Names that together bend to nearly anything, a trial that was set aside counted as one: each of so many must have one
+amplitude wherever it is looked at."""
 _ONE_NUMBER = 0.1
 """And by how much of itself its amplitude may be uncertain when conditions are left out: what is there is the same in
 all of them, what stands for something else is not."""
