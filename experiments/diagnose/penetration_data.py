@@ -207,6 +207,8 @@ def _one(
             say(several if len(lone) > 1 else one, where=name, rows=lone)
             values[lone] = np.nan
         for end in clipped(values) if not driven or name != "depth" else ():  # a machine may stop at its end
+            if name == "accel" and abs(end.value - table.gravity) < 1e-3 * table.gravity:
+                continue  # free flight
             say(f"{len(end.rows)} readings of {name} {end.words}", where=name, rows=end.rows)
             values[end.rows] = np.nan
         stuck = stuck_rows(values) if not driven or name != "depth" else lone[:0]  # a machine may stand still
@@ -254,6 +256,7 @@ def _driven(
         return None, findings
     louder, persistence = (max(colour.std, 1.0), colour.persistence) if colour is not None else (1.0, 0.0)
     smooth = smooth_depth(time[known], depth[known], louder * std, alike=alike, persistence=persistence)
+    smooth = replace(smooth, inflation=louder * float(np.sqrt((1 + persistence) / (1 - persistence))))
     both = known & np.isfinite(other)
     rows = both[known]
     smooth = replace(smooth, depth=smooth.depth[rows], speed=smooth.speed[rows], depth_error=smooth.depth_error[rows],

@@ -50,6 +50,8 @@ class SmoothDepth:
     """Of the slope's, the same numbers [m/s], shape [n, p]."""
     holds: Holds = ()
     """Which of its levels of speed are 0; () where it is no motion of levels."""
+    inflation: float = 1.0
+    """By how much its standard error is larger than with white noise as loud as stated, which the gap is taken with."""
 
     @property
     def depth_std(self) -> Array:

@@ -182,9 +182,10 @@ def _add_shaft(add: _Add, retreats: bool) -> None:
         add(effect, "viscous", ("shaft_viscous", "viscous", 0.3, 0.0, 10.0), starts=((0.05,),))
         add(effect, "falling with speed", ("shaft_slow", "perimeter", 0.3, 0.0, 10.0),
             ("shaft_speed", "speed", -5.0, 1.0), starts=((0.05, -1.0), (0.05, -3.0)))  # fmt: skip
-        # It takes a way to turn round, and stays while the spike is held.
-        add(effect, "mobilised over a way", ("shaft_held", "perimeter", 0.3, 0.0, 10.0),
-            ("shaft_reach", "depth", math.log(0.003), 0.0), grown,
+        # It takes a way to turn round, and stays while the spike is held. Were its bound as large as the spring, it
+        # would be a crater: loading doubled, nothing given back.
+        add(effect, "mobilised over a way", ("shaft_held", "perimeter", 0.1, 0.0, 0.4),
+            ("shaft_reach", "depth", math.log(0.003), 0.0), ("shaft_growth", "plain", 0.0, 1.5),
             starts=((0.05, -4.0, 0.3), (0.05, -2.0, 0.3)))  # fmt: skip
 
 

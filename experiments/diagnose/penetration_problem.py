@@ -350,7 +350,7 @@ class PenetrationProblem:
         this = self._trials[trial]
         assert this.smooth is not None
         ((_, by_depth, _),) = self._slopes(values, forms, [this])
-        doubt = np.abs(by_depth) * this.smooth.depth_std
+        doubt = np.abs(by_depth) * this.smooth.depth_std / this.smooth.inflation
         touch = _touching(this)
         if touch.any():  # the force begins with a jump: half of what it may be over what the depth leaves open
             most = float(_off_surface(this)[touch].max())

@@ -27,9 +27,9 @@ _LOOKS = 12
 _AT_ODDS = 20.0
 """How many times as far from its replicates as they are from one another, in mean square, a trial is at odds."""
 
-_TREND = 1e-3
-"""Chance of a rank correlation with the trials' order (Spearman, American Journal of Psychology 15 (1904), 72) below
-which what replicates differ by is said to grow or fall from trial to trial."""
+_TREND, _DRAWS = 1e-3, 4999
+"""Chance below which what replicates differ by is said to grow or fall from trial to trial, and orders that are drawn
+for it."""
 _ANOTHER = 1.1
 """Ratio of two depths or durations from which on trials do not go through the same."""
 _SIZEABLE = 0.2
@@ -181,23 +181,35 @@ class Scatter:
 
 def trends(scatter: Scatter, trials: Sequence[TrialInfo]) -> list[Finding]:
     """What replicates differ by, where it grows or falls from trial to trial: beds that settle, sensors that drift and
-    tips that wear do so, what scatters does not."""
+    tips that wear do so, what scatters does not.
+
+    Replicates are compared with one another only, for conditions differ by more than time; the chance is that of their
+    orders drawn anew within each condition.
+    """
     found = []
     for kind in scatter.model_std:
-        told = [(k, scatter.values[f"{kind}[{trial.id}]"]) for k, trial in enumerate(trials)
-                if f"{kind}[{trial.id}]" in scatter.values]  # fmt: skip
-        if len(told) < 3:
+        groups = [
+            np.array([(place[id], scatter.values[f"{kind}[{id}]"]) for id in ids if f"{kind}[{id}]" in scatter.values])
+            for place in [{trial.id: k for k, trial in enumerate(trials)}]
+            for ids in groups_of(trials).values()
+        ]
+        apart = [group - group.mean(axis=0) for group in groups if len(group) > 1]
+        if not apart:
             continue
-        order, values = np.array(told).T
-        rank = stats.spearmanr(order, values)
-        chance = max(float(rank.pvalue), 2 / math.factorial(len(told)))  # of two orders among all of them
+        random = np.random.default_rng(0)
+        seen = sum(float(order @ values) for order, values in (group.T for group in apart))
+        drawn = sum(
+            np.array([random.permutation(values) @ order for _ in range(_DRAWS)])
+            for order, values in (group.T for group in apart)
+        )
+        chance = (1 + int(np.sum(np.abs(drawn) >= abs(seen) * (1 - 1e-12)))) / (1 + _DRAWS)
         if chance < _TREND:
-            way = "grows" if rank.statistic > 0 else "falls"
+            slope = seen / sum(float(order @ order) for order, _ in (group.T for group in apart))
+            way = "grows" if seen > 0 else "falls"
             what = (
                 f"what replicates differ by is no scatter: {kind} {way} from trial to trial, in the campaign's order, "
-                f"by {100 * abs(values[-1] - values[0]):.2g} % in all (rank correlation {rank.statistic:.2f}, by "
-                f"chance once in {1 / chance:.0f} times): what has changed with time, the bed, the surface, a tip or a "
-                f"sensor's gain, no effect has"
+                f"by {100 * abs(slope):.2g} % each on the mean (by chance once in {1 / chance:.0f} times or less): "
+                f"what has changed with time, the bed, the surface, a tip or a sensor's gain, no effect has"
             )
             found.append(Finding(trial="", what=what, doubt=True))
     return found

@@ -19,8 +19,17 @@ _NAMES = 3
 """Candidates that are said where none is certain."""
 
 
+def _only_stated_wrong(said: Mapping[str, Any]) -> str:
+    """The numbers that were stated otherwise, where the base model leaves no more than noise with them; else empty."""
+    gaps = [gap for gap in said["gap"]["before"].values() if gap is not None]
+    far = [bound["parameter"] for bound in said["at_bounds"]["before"] if bound["sigmas"] is not None]
+    return " and ".join(far) if said["verdict"] == "unknown" and far and max(gaps) <= SMALL else ""
+
+
 def title_words(said: Mapping[str, Any]) -> str:
     """The verdict in one line."""
+    if wrong := _only_stated_wrong(said):
+        return f"Unknown: {wrong} is not what campaign.toml says; with another number the model explains the trials"
     names = " and ".join(effect["id"] for effect in said["effects"])
     if said["verdict"] == "none":
         return "Nothing is missing: the model with its fitted parameters explains the trials"
@@ -37,15 +46,32 @@ def title_words(said: Mapping[str, Any]) -> str:
 
 def summary_sentences(said: Mapping[str, Any]) -> list[str]:
     """What stands first in the report and on the terminal."""
+    wrong = _only_stated_wrong(said)
     if said["verdict"] == "none":
         gap = said["gap"]["after"]
         out = "" if gap["held_out"] is None else f" and {gap['held_out']:.3g} of those held out"
         first = [f"The base model leaves {gap['fit']:.3g} a sample of the trials that were fitted{out} (1 is noise)."]
+    elif wrong:
+        said_so = "; ".join(
+            f"{bound['parameter']} {bound['sigmas']:+.1f} sigma off" for bound in said["at_bounds"]["before"]
+            if bound["sigmas"] is not None
+        )  # fmt: skip
+        first = [
+            f"The base model leaves no more than noise, but with {said_so} what was stated: either what was stated of "
+            f"{wrong} is wrong, or a column is in another unit than its heading says, or both. No effect is missing "
+            "that these trials could show."
+        ]
     elif said["verdict"] == "unknown":
         first = [*_candidates(said), *_left(said)]
     else:
         first = sure_sentences(said)
-    return [*_doubts(said), *first, *scatter_sentence(said), f"Next experiment: {said['next_experiment']}"]
+    ask = said["next_experiment"]
+    if wrong:
+        ask = (
+            f"Check the units of the columns (a known weight on the load cell, a ruler beside the drive) and measure "
+            f"{wrong} by itself; then state what comes out."
+        )
+    return [*_doubts(said), *first, *scatter_sentence(said), f"Next experiment: {ask}"]
 
 
 def _doubts(said: Mapping[str, Any]) -> list[str]:
