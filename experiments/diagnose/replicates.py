@@ -27,6 +27,8 @@ _LOOKS = 12
 _AT_ODDS = 20.0
 """How many times as far from its replicates as they are from one another, in mean square, a trial is at odds."""
 
+_FAR_PAIRS = 0.75
+"""Share of all pairs of replicates that lie nearer than what one at odds is measured by."""
 _TREND, _DRAWS = 1e-3, 4999
 """Chance below which what replicates differ by is said to grow or fall from trial to trial, and orders that are drawn
 for it."""
@@ -288,14 +290,16 @@ def odd_trials(found: Fit) -> list[Finding]:
         modes[trial] = np.concatenate([modes.get(trial, np.zeros(0)), found.modes[rows]])
     findings = []
     inside = [t for t in found.model.problem.trials if t.id in found.model.trials]
-    for ids in groups_of(inside).values():
-        if len(ids) < 3 or len({len(modes[id]) for id in ids}) > 1:
-            continue
-        far = {(a, b): float(np.mean((modes[a] - modes[b]) ** 2)) / 2 for a in ids for b in ids if a != b}
-        for id in ids:
+    groups = [ids for ids in groups_of(inside).values() if len(ids) > 1 and len({len(modes[id]) for id in ids}) == 1]
+    far = {(a, b): float(np.mean((modes[a] - modes[b]) ** 2)) / 2 for ids in groups for a in ids for b in ids if a != b}
+    for ids in groups:
+        for id in ids if len(ids) > 2 else ():
             others = [other for other in ids if other != id]
             mine = min(far[(id, other)] for other in others)
-            theirs = float(np.median([far[(a, b)] for a in others for b in others if a != b]))
+            # One pair that agrees by chance is no measure: of three numbers one lies 20 times as far in a third of all
+            # draws. So all conditions are asked how far replicates lie apart.
+            all_pairs = float(np.quantile([value for pair, value in far.items() if id not in pair], _FAR_PAIRS))
+            theirs = max(float(np.median([far[(a, b)] for a in others for b in others if a != b])), all_pairs)
             size = float(np.median([np.mean(modes[other] ** 2) for other in others]))
             if mine > _AT_ODDS * max(theirs, 1.0) and mine > _SIZEABLE * size:
                 what = (

@@ -13,7 +13,7 @@ from experiments.diagnose.fitting import Model, Whitener, fit, settled
 from experiments.diagnose.gate import held_out_gate, open_gate
 from experiments.diagnose.penetration_problem import make_problem
 from experiments.diagnose.problem import Parameter, Samples, TrialInfo
-from experiments.diagnose.replicates import Scatter, exchanged, groups_of, parted, split_trials, trends
+from experiments.diagnose.replicates import Scatter, exchanged, groups_of, odd_trials, parted, split_trials, trends
 
 COUNT = 400
 
@@ -176,3 +176,22 @@ def test_an_effect_that_is_there_has_one_amplitude_whichever_condition_is_left_o
     best = SimpleNamespace(forms=(form,), fit=SimpleNamespace(values={"pull.force": 1.0}))
     folds = SimpleNamespace(learned=[{"pull.force": value} for value in learned])
     assert one_number(SimpleNamespace(best=best, predicted=folds)) is same
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_three_replicates_of_beds_that_differ_are_none_of_them_at_odds(seed):
+    """Of three normal numbers one lies 20 times as far from the other two as these from one another in a third of all
+    draws: how far replicates lie apart is asked of all conditions."""
+    random, trials = np.random.default_rng(seed), []
+    for place, speed in enumerate((0.005, 0.01, 0.02, 0.04)):
+        for again in range(3):
+            own = STIFFNESS * (1 + 0.05 * float(random.standard_normal()))
+
+            def force(z, v, top, own=own):
+                return own * z + DAMPING * max(v, 0.0)
+
+            recording = driven_trial(force, speed=speed, seed=100 * seed + 10 * place + again)
+            trials.append((f"{place}{again}", "driven", speed, recording))
+    problem = make_problem(campaign_of(trials))
+    found = fit(Model(problem, Whitener.white(problem), tuple(trial.id for trial in problem.trials)))
+    assert odd_trials(found) == []
