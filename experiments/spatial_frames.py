@@ -11,18 +11,15 @@ from coupling import BedFooting, SpatialRun
 from coupling.bed_footing import HULL, Member, spatial_members
 from rigid.quaternions import to_matrix
 from rigid.solids import Mesh, merge
-from vis.frames import GRAIN_FIELDS, FrameWriter, HeightMap, read_frames
+from vis.frames import GRAIN_FIELDS
 from vis.meshes import spike_mesh
-from vis.tracks import height_map
 
 from .spatial_settings import SpatialSettings
+from .tracked_frames import TrackedFrames
 
 __all__ = ["SpatialFrames"]
 
-NAME = "tumble"
-
-
-class SpatialFrames:
+class SpatialFrames(TrackedFrames):
     """Writes frames/tumble.pvd.
 
     A frame has `spikes` and `hull` as meshes, the hull as the platform has it (grains meet the ball inside);
@@ -32,16 +29,10 @@ class SpatialFrames:
     """
 
     def __init__(self, settings: SpatialSettings, run: SpatialRun, folder: Path, *, resumed: bool) -> None:
-        self.interval = max(settings.duration / max(1, settings.frame_count), run.master.macro_step)
-        self._untouched: HeightMap | None = None
-        self._spacing = 0.5 * settings.grain
-        if resumed:
-            half = 0.5 * run.master.macro_step
-            self.writer = FrameWriter(folder, name=NAME, resume=True, keep_until=max(run.time, 0.0) - half)
-            if self.writer.times:
-                self._untouched = read_frames(folder, NAME)[0].maps.get("surface")
-        else:
-            self.writer = FrameWriter(folder, name=NAME)
+        super().__init__(
+            run, folder, duration=settings.duration, frame_count=settings.frame_count, grain=settings.grain,
+            resumed=resumed,
+        )  # fmt: skip
         platform = run.trial.platform
         hull = platform.hull()
         self.meshes = {"hull": Mesh(hull.vertices - platform.centre_of_mass, hull.faces)}
@@ -63,7 +54,7 @@ class SpatialFrames:
             grains = {name: seen[name] for name in ("position", *GRAIN_FIELDS)}
             points, pushes = footing.pushes()
             clouds["contact_forces"] = (points + origin, {"force": pushes})
-            maps["surface"] = self._surface(footing, seen)
+            maps["surface"] = self.surface(footing, seen)
         of_all = run.master.wrench.force
         self.writer.write(
             run.time, grains,
@@ -83,17 +74,6 @@ class SpatialFrames:
         ]
         numbers = np.array([float(row) for row, _ in contacts])
         return np.array(at).reshape(-1, 3), {"force": np.array(force).reshape(-1, 3), "row": numbers}
-
-    def _surface(self, footing: BedFooting, grains: dict[str, np.ndarray]) -> HeightMap:
-        size = footing.bed.size
-        found = height_map(
-            grains["position"], grains["radius"], (float(size[0]), float(size[1])), spacing=self._spacing,
-            coordination=grains["coordination"],
-        )  # fmt: skip
-        if self._untouched is None:
-            self._untouched = found
-        found.fields["change"] = found.fields["height"] - self._untouched.fields["height"]
-        return found
 
 
 def _mesh(member: Member) -> Mesh:

@@ -11,18 +11,15 @@ from coupling import BedFooting, CoupledTumble
 from coupling.bed_footing import HULL, Member
 from rigid.quaternions import to_matrix
 from rigid.solids import Mesh, merge
-from vis.frames import GRAIN_FIELDS, FrameWriter, HeightMap, read_frames
+from vis.frames import GRAIN_FIELDS
 from vis.meshes import revolve, spike_mesh
-from vis.tracks import height_map
 
+from .tracked_frames import TrackedFrames
 from .tumble_settings import TumbleSettings
 
 __all__ = ["TumbleFrames"]
 
-NAME = "tumble"
-
-
-class TumbleFrames:
+class TumbleFrames(TrackedFrames):
     """Writes frames/tumble.pvd; the platform is its simulated slice, one spike a row and the hull's cylinder.
 
     Beside the grains a frame has `spikes` and `hull` as meshes; as points with a vector `force` [N] `row_forces` (on
@@ -32,16 +29,10 @@ class TumbleFrames:
     """
 
     def __init__(self, settings: TumbleSettings, run: CoupledTumble, folder: Path, *, resumed: bool) -> None:
-        self.interval = max(settings.duration / max(1, settings.frame_count), run.master.macro_step)
-        self._untouched: HeightMap | None = None
-        self._spacing = 0.5 * settings.grain
-        if resumed:
-            half = 0.5 * run.master.macro_step
-            self.writer = FrameWriter(folder, name=NAME, resume=True, keep_until=max(run.time, 0.0) - half)
-            if self.writer.times:
-                self._untouched = read_frames(folder, NAME)[0].maps.get("surface")
-        else:
-            self.writer = FrameWriter(folder, name=NAME)
+        super().__init__(
+            run, folder, duration=settings.duration, frame_count=settings.frame_count, grain=settings.grain,
+            resumed=resumed,
+        )  # fmt: skip
         footing = run.footing
         assert isinstance(footing, BedFooting)
         self.meshes = {
@@ -70,7 +61,7 @@ class TumbleFrames:
                 "row_forces": (at, {"force": force, "row": rows}),
                 "contact_forces": (points + footing.origin, {"force": pushes}),
             },
-            maps={"surface": self._surface(footing, grains)},
+            maps={"surface": self.surface(footing, grains)},
         )
 
     def _rows(
@@ -83,17 +74,6 @@ class TumbleFrames:
         at = [place + members[row].at @ turn - [0.0, 0.0, members[row].radius] for row in rows]
         force = np.column_stack([along[rows], np.zeros(len(rows)), normal[rows]])
         return rows.astype(float), np.array(at).reshape(-1, 3), force
-
-    def _surface(self, footing: BedFooting, grains: dict[str, np.ndarray]) -> HeightMap:
-        size = footing.bed.size
-        found = height_map(
-            grains["position"], grains["radius"], (float(size[0]), float(size[1])), spacing=self._spacing,
-            coordination=grains["coordination"],
-        )  # fmt: skip
-        if self._untouched is None:
-            self._untouched = found
-        found.fields["change"] = found.fields["height"] - self._untouched.fields["height"]
-        return found
 
 
 def _mesh(member: Member) -> Mesh:

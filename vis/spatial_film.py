@@ -7,7 +7,6 @@
 
 from __future__ import annotations
 
-import functools
 import json
 import sys
 from collections.abc import Callable
@@ -24,8 +23,8 @@ from scipy.ndimage import gaussian_filter1d
 
 from vis.canvas import COLOURS, colour_values, colourmap, nice_above
 from vis.frames import Frame, Frames, read_frames
+from vis.jobs import draw_job, job_of
 from vis.numbers import quote
-from vis.render import replace_file, write_gif, write_png
 from vis.stage import FlatStage, Stage
 from vis.style import INK, styled
 
@@ -166,35 +165,15 @@ def _top(frames: Frames, by: str) -> float:
 
 def run_spatial_job(job: dict[str, Any], *, opengl: bool, step: Callable[[], None] = lambda: None) -> None:
     """Draw every picture of a job (see the module); `step` is called after each."""
-    views: dict[tuple[int, int], View] = {}
-
-    def view(size: list[int]) -> View:
-        key = (int(size[0]), int(size[1]))
-        if key not in views:
-            views[key] = View(job["folder"], key, by=job["by"], opengl=opengl)
-        return views[key]
-
-    try:
-        for still in job["stills"]:
-            image = view(still["size"]).draw(still["index"])
-            replace_file(Path(still["file"]), functools.partial(write_png, image))
-            step()
-        if film := job.get("film"):
-            images = []
-            for index in film["indices"]:
-                images.append(view(film["size"]).draw(index))
-                step()
-            replace_file(Path(film["file"]), functools.partial(write_gif, images=images, frame_ms=100))
-    finally:
-        for each in views.values():
-            each.close()
+    draw_job(
+        job, lambda size: View(job["folder"], size, by=job["by"], opengl=opengl), moment="index", moments="indices",
+        step=step,
+    )  # fmt: skip
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Carry out the job in the file that is named; exit status 0."""
-    (name,) = sys.argv[1:] if arguments is None else arguments
-    job = json.loads(Path(name).read_text(encoding="utf-8"))
-    run_spatial_job(job, opengl=True, step=lambda: print("done", flush=True))
+    run_spatial_job(job_of(arguments), opengl=True, step=lambda: print("done", flush=True))
     return 0
 
 

@@ -10,12 +10,9 @@ its own, as `vis.render` does for spikes.
 
 from __future__ import annotations
 
-import functools
-import json
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,9 +25,9 @@ from scipy.ndimage import gaussian_filter1d
 
 from vis.canvas import COLOURS, colour_values, colourmap
 from vis.frames import Frame
+from vis.jobs import draw_job, job_of
 from vis.numbers import quote
 from vis.reel import Reel
-from vis.render import replace_file, write_gif, write_png
 from vis.stage import Eye, FlatStage, Stage
 from vis.style import INK, styled
 from vis.tumble_series import STATES, state_runs
@@ -260,35 +257,15 @@ def _round_length(length: float) -> float:
 def run_film_job(job: dict[str, Any], *, opengl: bool, step: Callable[[], None] = lambda: None) -> None:
     """Draw every picture of a job (see the module); `step` is called after each."""
     reels = [Reel.open(folder) for folder in job["runs"]]
-    sheets: dict[tuple[int, int], Sheet] = {}
-
-    def sheet(size: Sequence[int]) -> Sheet:
-        key = (int(size[0]), int(size[1]))
-        if key not in sheets:
-            sheets[key] = Sheet(reels, key, by=job["by"], opengl=opengl, labels=job.get("labels"))
-        return sheets[key]
-
-    try:
-        for still in job["stills"]:
-            image = sheet(still["size"]).draw(still["time"])
-            replace_file(Path(still["file"]), functools.partial(write_png, image))
-            step()
-        if film := job.get("film"):
-            images = []
-            for time in film["times"]:
-                images.append(sheet(film["size"]).draw(time))
-                step()
-            replace_file(Path(film["file"]), functools.partial(write_gif, images=images, frame_ms=100))
-    finally:
-        for each in sheets.values():
-            each.close()
+    draw_job(
+        job, lambda size: Sheet(reels, size, by=job["by"], opengl=opengl, labels=job.get("labels")), moment="time",
+        moments="times", step=step,
+    )  # fmt: skip
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Carry out the job in the file that is named; exit status 0."""
-    (name,) = sys.argv[1:] if arguments is None else arguments
-    job = json.loads(Path(name).read_text(encoding="utf-8"))
-    run_film_job(job, opengl=True, step=lambda: print("done", flush=True))
+    run_film_job(job_of(arguments), opengl=True, step=lambda: print("done", flush=True))
     return 0
 
 

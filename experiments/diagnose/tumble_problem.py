@@ -78,10 +78,6 @@ class TumbleProblem:
         self._along: Mapping[str, Array] = {}
         self._switches: dict[str, Array] = {}
 
-    @property
-    def _ids(self) -> list[str]:
-        return [trial.id for trial in self.data.trials]
-
     @cached_property
     def trials(self) -> tuple[TrialInfo, ...]:
         """In the campaign's order."""
@@ -218,7 +214,7 @@ class TumbleProblem:
         """Count readings of the IMU next to which the model jumps, where a spike touches or a slip ends, with an error
         as large as the jump: on which side of it they were taken no fit can tell. Says whether any has changed."""
         before = self._switches
-        self._switches = self.switches(values, forms, self._ids)
+        self._switches = self.switches(values, forms, tuple(self._index))
         self._take_in()
         return any((self._switches[id] != before[id]).any() if id in before else self._switches[id].any()
                    for id in self._switches)  # fmt: skip
@@ -257,7 +253,7 @@ class TumbleProblem:
     def _take_in(self) -> None:
         """Times that jitter and readings at a switch into the whitening."""
         self._shaken = {}
-        for id in self._ids:
+        for id in self._index:
             data = self.data.trials[self._index[id]]
             own = self._along.get(id, np.zeros(len(data.time)))
             jump = self._switches.get(id, np.zeros(len(data.time)))
