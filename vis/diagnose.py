@@ -129,18 +129,25 @@ def _sentences(sentences: Sequence[str]) -> list[Block]:
 def _gap_table(said: Mapping[str, Any]) -> Block:
     gap, weighed = said["gap"], said.get("gap_with_scatter")
 
-    def cell(value: float | None) -> str:
-        return _DASH if value is None else short(value, 3)
+    def cell(value: float | None, error: float | None = None) -> str:
+        told = _DASH if value is None else short(value, 3)
+        return told if error is None else f"{told} ± {short(error, 1)}"
+
+    def error(one: Mapping[str, Any], stage: str, part: str) -> float | None:
+        return one.get("after_std", {}).get(part) if stage == "after" else None
 
     rows = [
-        (name, *(cell(one[stage][part]) for one in (gap, weighed) if one is not None for stage in ("before", "after")))
+        (name, *(cell(one[stage][part], error(one, stage, part)) for one in (gap, weighed) if one is not None
+                 for stage in ("before", "after")))
         for part, name in (("fit", "fitted trials"), ("held_out", "held-out trials"))
     ]  # fmt: skip
     head: tuple[str, ...] = ("", "base model", "best model")
     title = "The gap, chi-square per sample (1: the sensors' noise)"
     if weighed is not None:
         head += ("base model, replicates' scatter added", "best model, replicates' scatter added")
-        title += "; beside it with what replicates differ by added to the variance (1: as near as another run comes)"
+        title += "; beside it with what replicates differ by added to the variance (1: as near as another run comes"
+        freedom = weighed.get("freedom")
+        title += f"; their scatter rests on {freedom} degrees of freedom)" if freedom else ")"
     return table(head, rows, title=title)
 
 

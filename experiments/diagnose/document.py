@@ -24,7 +24,7 @@ from .fitting import Fit
 from .gaps import Gaps
 from .localise import phases_of
 from .scatter_gap import gap_with_scatter, scatter_std, sensor_std
-from .telling import PhaseTable
+from .telling import PhaseTable, valid_residuals
 
 __all__ = ["document", "write_diagnosis"]
 
@@ -54,7 +54,10 @@ def document(found: Diagnosis) -> dict[str, Any]:
         said["gap_with_scatter"] = {
             stage: {"fit": pair[0], "held_out": pair[1]}
             for stage, pair in (("before", weighed.before), ("after", weighed.after))
-        }
+        } | {
+            "after_std": {"fit": weighed.after_std[0], "held_out": weighed.after_std[1]},
+            "freedom": weighed.freedom,
+        }  # fmt: skip
     if found.verdict == "unknown":
         said["leading"] = _leading(found)
         said["left"] = [
@@ -148,7 +151,8 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
                     columns["scatter"] = wide[channel]
                 rest = [columns["measured"] - columns[stage] for stage in ("before", "after")]
                 held = trial.id in found.held_out
-                phase_table.add(channel, phases[rows_here], rest[0] / first, rest[1] / last, held_out=held)
+                phase_table.add(channel, phases[rows_here], valid_residuals(rest[0], first),
+                                valid_residuals(rest[1], last), held_out=held)  # fmt: skip
                 gaps.add(trial.id, channel, columns["t_s"], rest[0], rest[1], first, last, settings=trial.settings,
                          held_out=held)  # fmt: skip
             write_series(folder / "series" / f"{trial.id}.{channel}.csv", columns)

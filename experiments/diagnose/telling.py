@@ -14,7 +14,7 @@ from .problem import Array, Finding
 
 __all__ = [
     "PhaseTable", "findings_in_words", "setting_words", "shares_words", "sure_sentences", "told_tables",
-    "where_sentences",
+    "valid_residuals", "where_sentences",
 ]  # fmt: skip
 
 _UNITS = {"N_m": "N m", "m_s2": "m/s2", "m_s": "m/s", "m": "m"}
@@ -35,22 +35,30 @@ class PhaseTable:
         self._sums: dict[tuple[str, str, bool], list[float]] = {}
 
     def add(self, channel: str, phases: np.ndarray, before: Array, after: Array, *, held_out: bool) -> None:
-        """One channel of one trial: the phase, and the residuals over the noise of both models, shapes [n]."""
+        """One channel of one trial: the phase, and the residuals over the noise of both models, shapes [n]; NaN where a
+        reading counts for nothing beside that model (`valid_residuals`), as it does in the gap."""
         for phase in dict.fromkeys(phases.tolist()):
             own = phases == phase
-            sums = self._sums.setdefault((str(phase), channel, held_out), [0.0, 0.0, 0.0])
-            sums[0] += int(own.sum())
-            sums[1] += float(before[own] @ before[own])
-            sums[2] += float(after[own] @ after[own])
+            sums = self._sums.setdefault((str(phase), channel, held_out), [0.0, 0.0, 0.0, 0.0])
+            for at, rest in ((0, before[own]), (2, after[own])):
+                counted = rest[~np.isnan(rest)]
+                sums[at] += len(counted)
+                sums[at + 1] += float(counted @ counted)
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """``by_phase`` of diagnosis.json."""
+        """``by_phase`` of diagnosis.json; without cells in which no reading counts."""
         return [
             {"phase": phase, "channel": channel, "held_out": held_out, "samples": int(count), "before": before / count,
-             "after": after / count}
-            for (phase, channel, held_out), (count, before, after) in sorted(self._sums.items())
+             "after": after / count_after}
+            for (phase, channel, held_out), (count, before, count_after, after) in sorted(self._sums.items())
+            if count and count_after
         ]  # fmt: skip
+
+
+def valid_residuals(rest: Array, std: Array) -> Array:
+    """Residuals over the noise, NaN where the noise is endless: a reading taken while a contact switched."""
+    return np.where(np.isinf(std), np.nan, rest / std)
 
 
 def where_sentences(said: Mapping[str, Any]) -> list[str]:
