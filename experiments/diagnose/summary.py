@@ -6,10 +6,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from .candidates import unnamed_sentence
 from .effect_words import meaning
 from .evidence import SMALL
 from .gaps import unit_of
-from .telling import shares_words, sure_sentences
+from .telling import shares_words, size_sentences, sure_sentences
 
 __all__ = ["scatter_sentence", "summary_sentences", "title_words"]
 
@@ -169,6 +170,7 @@ def _candidates(said: Mapping[str, Any]) -> list[str]:
             f"{near['angle_deg']:.0f} degrees away in what it changes (0: the same): {apart}"
         )
     sentences.append(f"{first}.")
+    sentences += [*size_sentences(said), *unnamed_sentence(said)]
     rest = [row for row in _singles(said) if row["effects"][0] not in leading["effects"]][: _NAMES - 1]
     if rest and not certain:
         sentences.append(f"Of what the base model leaves beyond the noise{_weighed(said)}, {_closing(rest)}.")
