@@ -10,13 +10,15 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from vis.diagnose_figures import draw_evidence, draw_latent, draw_phases, draw_trajectories, read_channel, worst
-from vis.numbers import short
+from vis.numbers import plain, short
 from vis.page import Block, Page, Section, Tile, code, figure, listing, table, text, write_page
 from vis.style import styled
 
 __all__ = ["write_diagnosis_report"]
 
 _DPI = 130
+_MOST_PLACES = 8
+"""Stretches that are listed."""
 _DASH = "\N{EN DASH}"
 
 
@@ -119,7 +121,12 @@ def _weighed(said: Mapping[str, Any], stage: str) -> str:
 
 
 def _gap(gap: Mapping[str, Any]) -> str:
-    return short(gap["fit"] if gap["held_out"] is None else gap["held_out"], 3)
+    return _number(gap["fit"] if gap["held_out"] is None else gap["held_out"])
+
+
+def _number(value: float) -> str:
+    """0.97, 153, 19 400."""
+    return plain(value) if value >= 1e3 else short(value, 3)
 
 
 def _sentences(sentences: Sequence[str]) -> list[Block]:
@@ -130,7 +137,7 @@ def _gap_table(said: Mapping[str, Any]) -> Block:
     gap, weighed = said["gap"], said.get("gap_with_scatter")
 
     def cell(value: float | None, error: float | None = None) -> str:
-        told = _DASH if value is None else short(value, 3)
+        told = _DASH if value is None else _number(value)
         return told if error is None else f"{told} ± {short(error, 1)}"
 
     def error(one: Mapping[str, Any], stage: str, part: str) -> float | None:
@@ -168,10 +175,11 @@ def _in_units(said: Mapping[str, Any]) -> list[Block]:
         blocks.append(table(head, rows, title="Measured less modelled, root mean square, the sensors' noise included"))
     conditions = said.get("by_condition", [])
     if len(conditions) > 1:
-        lines = [(_settings(row["settings"]), ", ".join(row["trials"]), short(row["before"], 3), short(row["after"], 3))
-                 for row in conditions]  # fmt: skip
-        blocks.append(table(("condition", "trials", "before", "after"), lines,
-                            title="Chi-square per sample by condition"))  # fmt: skip
+        common = _common([row["settings"] for row in conditions])
+        lines = [(_settings(row["settings"], but=common), ", ".join(row["trials"]), _number(row["before"]),
+                  _number(row["after"])) for row in conditions]  # fmt: skip
+        title = "Chi-square per sample by condition" + (f" ({_settings(common)} in all)" if common else "")
+        blocks.append(table(("condition", "trials", "before", "after"), lines, title=title))
     return blocks
 
 
@@ -186,7 +194,7 @@ def _phase_table(said: Mapping[str, Any]) -> list[Block]:
     def cells(part: Mapping[str, Any] | None) -> tuple[str, str, str]:
         if part is None:
             return _DASH, _DASH, _DASH
-        return str(part["samples"]), short(part["before"], 3), short(part["after"], 3)
+        return str(part["samples"]), _number(part["before"]), _number(part["after"])
 
     head = ("phase", "channel", "samples fitted", "before", "after", "samples held out", "before", "after")
     body = [(*key, *cells(parts.get(False)), *cells(parts.get(True))) for key, parts in rows.items()]
@@ -196,13 +204,23 @@ def _phase_table(said: Mapping[str, Any]) -> list[Block]:
 def _where(said: Mapping[str, Any]) -> list[Block]:
     if not said["where"]:
         return []
+    places = said["where"][:_MOST_PLACES]
+    common = _common([p.get("settings", {}) for p in said["where"]])
     rows = [
-        (p["trial"], _settings(p.get("settings", {})), p["channel"], p["phase"], f"{p['from_s']:.4g}",
-         f"{p['to_s']:.4g}", short(p.get("excess", 0.0), 3))
-        for p in said["where"]
+        (p["trial"], _settings(p.get("settings", {}), but=common), p["channel"], p["phase"], f"{p['from_s']:.4g}",
+         f"{p['to_s']:.4g}", _number(p.get("excess", 0.0)))
+        for p in places
     ]  # fmt: skip
+    more = len(said["where"]) - len(places)
+    title = "The worst stretches" + (f" (of {len(places) + more}, which diagnosis.json has)" if more else "")
     head = ("trial", "settings", "channel", "phase", "from [s]", "to [s]", "chi-square beyond noise")
-    return [table(head, rows, title="The worst stretches"), *_parted(said)]
+    return [table(head, rows, title=title), *_parted(said)]
+
+
+def _common(settings: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """What is the same in several conditions."""
+    first = settings[0] if len(settings) > 1 else {}
+    return {name: value for name, value in first.items() if all(other.get(name) == value for other in settings)}
 
 
 def _parted(said: Mapping[str, Any]) -> list[Block]:
@@ -217,8 +235,10 @@ def _parted(said: Mapping[str, Any]) -> list[Block]:
                   title=title, words=True)]  # fmt: skip
 
 
-def _settings(settings: Mapping[str, float]) -> str:
-    """torque_N_m = 0.22 as "torque 0.22 N m"."""
+def _settings(settings: Mapping[str, float], *, but: Mapping[str, float] | None = None) -> str:
+    """torque_N_m = 0.22 as "torque 0.22 N m"; `but`: what need not be said, for all have it."""
+    left = {name: value for name, value in settings.items() if name not in (but or {})}
+    settings = left or settings
     units = {"N_m": "N m", "m_s2": "m/s²", "m_s": "m/s", "m": "m", "kg": "kg", "rad_s": "rad/s"}
     shown = []
     for name, value in settings.items():
@@ -244,7 +264,7 @@ def _evidence(said: Mapping[str, Any]) -> list[Block]:
     blocks: list[Block] = []
     if better:
         head = ("candidate (effect:form)", "evidence over the base model [nats]", "chi-square a sample beyond noise",
-                "of the gap closed", "forms tried", "")  # fmt: skip
+                "of the gap closed", "forms tried", "what became of it")  # fmt: skip
         title = "A line a set of names, in its best form; the likeliest first"
         blocks.append(table(head, better, title=title, words=True))
     if worse:

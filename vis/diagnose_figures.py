@@ -261,6 +261,12 @@ def draw_evidence(said: Mapping[str, Any]) -> Figure | None:
     colours = {name: _KINDS[kinds[name]] for name in names}
     places = range(len(names))
     axis.barh(places, [score[name] for name in names], color=[colours[n] for n in names], height=0.66)
+    most = max(*score.values(), 1.0)
+    for place, name in enumerate(names):
+        axis.annotate(f"{score[name]:.1f}" if abs(score[name]) < 10 else f"{score[name]:.0f}",
+                      (max(score[name], 0.0), place), xytext=(3, 0), textcoords="offset points", va="center",
+                      fontsize=7.5, color=INK)  # fmt: skip
+    axis.set_xlim(right=1.1 * most)
     axis.axvline(0.0, color=INK, lw=0.9)
     axis.set_yticks(places, [" + ".join(name) for name in names])
     axis.grid(False, axis="y")

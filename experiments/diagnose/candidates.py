@@ -34,9 +34,15 @@ def candidate_rows(said: Mapping[str, Any]) -> list[dict[str, Any]]:
     sets.sort(key=lambda names: -best[names]["score"])
     shown = [names for names in best if len(names) == 1 or names == told or names in sets[:_SETS]]
     shown.sort(key=lambda names: -best[names]["score"])
+    base = said.get("evidence_base", {}).get("left")
+
+    def left(row: Row) -> float | None:
+        """At amplitude 0 every form is the base model, which was fitted once more after the candidates."""
+        return min(row["left"], base) if "left" in row and base is not None else row.get("left")
+
     return [
         {"candidate": _written(best[names], alone, _told(said)), "effects": _ordered(names, alone, _told(said)),
-         "score": best[names]["score"], "left": best[names].get("left"), "closes": best[names].get("closes"),
+         "score": best[names]["score"], "left": left(best[names]), "closes": best[names].get("closes"),
          "tried": tried[names], "better": best[names]["score"] > 0, "note": _note(said, names, best, told)}
         for names in shown
     ]  # fmt: skip

@@ -51,14 +51,6 @@ class Colour:
         """S at frequencies 0..1 of half the sampling rate."""
         return _power(frequency, self.std, self.persistence)
 
-    @property
-    def sentence(self) -> str:
-        """In plain words."""
-        return (
-            f"the noise of {self.channel} is {self.std:.2f} of what is stated and a sample correlates with the next by "
-            f"{self.persistence:.2f}: taken into account"
-        )
-
 
 def find_colours(found: Fit) -> dict[str, Colour]:
     """Channels whose noise is not as stated. `found` must have been fitted with `Whitener.white`.

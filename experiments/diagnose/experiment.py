@@ -23,6 +23,7 @@ from hedgebed import __version__
 from .bounds import is_strained
 from .diagnosis import Diagnosis, diagnose
 from .document import write_diagnosis
+from .noise_words import together
 from .own import load_own
 from .problem import Problem
 from .summary import summary_sentences, title_words
@@ -155,7 +156,8 @@ def _result(found: Diagnosis, said: dict[str, Any]) -> dict[str, Any]:
     sentences = where_sentences(said)
     more = getattr(found.problem, "remarks", None)
     sentences += more(found.best_values, found.forms) if more is not None else []
-    sentences += [colour.sentence for colour in found.colours.values()]
+    noises = [together([colour]) for colour in found.colours.values()]
+    sentences += [f"{words[0].upper()}{words[1:]}." for words in noises]
     sentences += [
         f"Replicates differ by more than the sensors: {kind}, standard deviation {std:.3g} "
         + (f"{_UNITS[kind]}, each in its own way" if kind in _UNITS else "(relative)")

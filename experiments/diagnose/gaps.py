@@ -10,7 +10,7 @@ import numpy as np
 
 from .problem import Array
 
-__all__ = ["Gaps", "unit_of"]
+__all__ = ["Gaps", "numeral", "unit_of"]
 
 #: channel -> (unit, factor on SI)
 _UNITS: dict[str, tuple[str, float]] = {
@@ -29,6 +29,13 @@ _SIGMAS = 5.0
 def unit_of(channel: str) -> tuple[str, float]:
     """The unit in which a channel is told, and its size in SI units."""
     return _UNITS.get(channel, ("SI", 1.0))
+
+
+def numeral(value: float, digits: int = 3) -> str:
+    """A number in a sentence: 0.97, 153, 19,400, and powers of ten only from ten millions on."""
+    if not 10**digits <= abs(value) < 1e7:
+        return f"{value:.{digits}g}"
+    return f"{float(f'{value:.{digits - 1}e}'):,.0f}"
 
 
 class Gaps:

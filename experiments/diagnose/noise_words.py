@@ -14,13 +14,13 @@ _ALIKE = 0.05
 
 def together(colours: Sequence[Colour]) -> str:
     """One sentence on the noise of a channel, of which `colours` are what was found at its rates."""
-    if len(colours) == 1:
-        return colours[0].sentence
-    return (
-        f"the noise of {colours[0].channel} is {_range([colour.std for colour in colours])} of what is stated and a "
-        f"sample correlates with the next by {_range([colour.persistence for colour in colours])}, at "
-        f"{len(colours)} sampling rates: taken into account"
-    )
+    stds, persistences = [colour.std for colour in colours], [colour.persistence for colour in colours]
+    as_stated = max(abs(std - 1.0) for std in stds) < _ALIKE
+    size = "as large as is stated" if as_stated else f"{_range(stds)} of what is stated"
+    white = max(abs(persistence) for persistence in persistences) < _ALIKE
+    colour = "" if white else f" and a sample correlates with the next by {_range(persistences)}"
+    rates = f", at {len(colours)} sampling rates" if len(colours) > 1 else ""
+    return f"the noise of {colours[0].channel} is {size}{colour}{rates}: taken into account"
 
 
 def _range(numbers: Sequence[float]) -> str:

@@ -217,8 +217,10 @@ def _one(
         time, depth, other, blind = time[:jump], depth[:jump], other[:jump], blind[:jump]
     if blind.any():
         say(f"{int(blind.sum())} readings of force are cut off at 0 or next to it: it reads exactly 0 and never less, "
-            f"which its noise would, so that it shows nothing that pulls (adhesion would be hidden); they are left out",
-            where="force", rows=np.flatnonzero(blind))  # fmt: skip
+            f"which its noise would, so that it shows nothing that pulls (adhesion would be hidden): an amplifier for "
+            f"both signs is needed, or another zero; they are left out", where="force",
+            rows=np.flatnonzero(blind))  # fmt: skip
+        findings[-1] = replace(findings[-1], doubt=True)
         other[blind] = np.nan
     steps = np.diff(time)
     usual = float(np.median(steps)) if len(steps) else 0.0

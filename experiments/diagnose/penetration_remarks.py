@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .gaps import numeral
 from .problem import Array
 
 __all__ = ["Push", "remarks"]
@@ -50,8 +51,8 @@ def _stiffness(pushes: Sequence[Push]) -> list[str]:
         by_size.setdefault(push.diameter, []).append(float(z @ push.force / max(float(z @ z), 1e-300)))
     parts = []
     for size, found in sorted(by_size.items()):
-        spread = f" +- {np.std(found, ddof=1):.2g}" if len(found) > 1 else ""
-        parts.append(f"{np.mean(found):.4g}{spread} N/m at {1e3 * size:g} mm ({len(found)})")
+        spread = f" +- {numeral(float(np.std(found, ddof=1)), 2)}" if len(found) > 1 else ""
+        parts.append(f"{numeral(float(np.mean(found)), 4)}{spread} N/m at {1e3 * size:g} mm ({len(found)})")
     said = [f"K of a straight spring, push by push (number of pushes): {', '.join(parts)}."]
     if len(by_size) > 2:
         sizes = np.log(sorted(by_size))
@@ -72,4 +73,4 @@ def _two(push: Push, spring: Callable[[Push], Array]) -> tuple[float, float, flo
 def _range(values: Sequence[float]) -> str:
     low, high = min(values), max(values)
     signs = "negative in every one" if high < 0 else "positive in every one" if low > 0 else "of either sign"
-    return f"{low:.3g} to {high:.3g} N s/m, {signs}"
+    return f"{numeral(low)} to {numeral(high)} N s/m, {signs}"

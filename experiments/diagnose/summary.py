@@ -9,7 +9,7 @@ from typing import Any
 from .candidates import unnamed_sentence
 from .effect_words import meaning
 from .evidence import SMALL
-from .gaps import unit_of
+from .gaps import numeral, unit_of
 from .telling import shares_words, size_sentences, sure_sentences
 
 __all__ = ["scatter_sentence", "summary_sentences", "title_words"]
@@ -50,8 +50,10 @@ def summary_sentences(said: Mapping[str, Any]) -> list[str]:
     wrong = _only_stated_wrong(said)
     if said["verdict"] == "none":
         gap = said["gap"]["after"]
-        out = "" if gap["held_out"] is None else f" and {gap['held_out']:.3g} of those held out"
-        first = [f"The base model leaves {gap['fit']:.3g} a sample of the trials that were fitted{out} (1 is noise)."]
+        out = "" if gap["held_out"] is None else f" and {numeral(gap['held_out'])} of those held out"
+        first = [
+            f"The base model leaves {numeral(gap['fit'])} a sample of the trials that were fitted{out} (1 is noise)."
+        ]
     elif wrong:
         said_so = "; ".join(
             f"{bound['parameter']} {bound['sigmas']:+.1f} sigma off" for bound in said["at_bounds"]["before"]
@@ -118,7 +120,7 @@ def _both(gap: Mapping[str, float | None], weighed: Mapping[str, Any] | None = N
 
     def told(key: str) -> str:
         error = errors.get(key)
-        return f"{gap[key]:.3g}" if error is None else f"{gap[key]:.2f} +- {error:.1g}"
+        return numeral(gap[key] or 0.0) if error is None else f"{gap[key]:.2f} +- {error:.1g}"
 
     out = "" if gap["held_out"] is None else f" ({told('held_out')} held out)"
     return f"{told('fit')} fitted{out}"
@@ -182,7 +184,7 @@ def _why_unknown(said: Mapping[str, Any]) -> list[str]:
     gate = said["gate"]
     strained = [bound for bound in said["at_bounds"]["after"] if bound["sigmas"] is not None]
     reasons = [
-        f"{score['score']:.3g} on {which} (a right model: {score['threshold']:.3g} at most)"
+        f"{numeral(score['score'])} on {which} (a right model: {score['threshold']:.3g} at most)"
         for which, score in (("the fitted trials", gate["after"]), ("those held out", gate.get("held_out")))
         if score is not None and not score["passed"]
     ]
@@ -225,7 +227,7 @@ def _closes(gap: Mapping[str, Any]) -> str:
         if before is None or after is None:
             continue
         share = f", {_share(1 - max(after - 1, 0.0) / (before - 1))} of what is beyond the noise" if before > 1 else ""
-        parts.append(f"from {before:.3g} to {after:.3g} {words}{share}")
+        parts.append(f"from {numeral(before)} to {numeral(after)} {words}{share}")
     return " and ".join(parts)
 
 

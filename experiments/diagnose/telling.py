@@ -11,6 +11,7 @@ import numpy as np
 
 from .candidates import candidate_rows, no_better, unnamed_sentence
 from .effect_words import meaning
+from .gaps import numeral
 from .problem import Array, Finding
 
 __all__ = [
@@ -90,8 +91,8 @@ def sure_sentences(said: Mapping[str, Any]) -> list[str]:
     sure = f"How sure: {name} is {best['score']:.0f} nats likelier than the base model" if best is not None else ""
     gap = said["gap"]
     if gap["before"]["held_out"] is not None:
-        out = f"on the trials that took no part it takes the gap from {gap['before']['held_out']:.3g} to "
-        out += f"{gap['after']['held_out']:.3g} (1 is noise)"
+        out = f"on the trials that took no part it takes the gap from {numeral(gap['before']['held_out'])} to "
+        out += f"{numeral(gap['after']['held_out'])} (1 is noise)"
         sure += f"; {out}" if sure else f"How sure: {out}"
     rivals = said["equivalence"][1:]
     if rivals:
@@ -123,7 +124,7 @@ def _is_small(size: Mapping[str, Any], most: float) -> bool:
 
 def _size_words(size: Mapping[str, Any], *, is_small: bool) -> str:
     """shaft-friction changes the force by 0.4 N (root mean square, 1.2 N at most), 21 % of it, 9 times the noise"""
-    times = f"{size['signature']:.2g} times the noise of all readings"
+    times = f"{numeral(size['signature'], 2)} times the noise of all readings"
     if size["channel"] is None:
         return f"{size['effect']} changes nothing that can be seen"
     share = f", {100 * size['share']:.2g} % of it" if size["share"] is not None else ""
@@ -206,7 +207,7 @@ def told_tables(said: Mapping[str, Any]) -> list[dict[str, Any]]:
 
         def shown(key: tuple[str, str], held_out: bool, stage: str) -> str:
             row = cells.get((*key, held_out))
-            return "-" if row is None else f"{row[stage]:.3g}"
+            return "-" if row is None else numeral(row[stage])
 
         tables += _in_units(said)
         tables.append({
@@ -246,11 +247,15 @@ def _in_units(said: Mapping[str, Any]) -> list[dict[str, Any]]:
         })  # fmt: skip
     conditions = said.get("by_condition", [])
     if len(conditions) > 1:
+        first = conditions[0]["settings"]
+        common = {name for name in first if all(row["settings"].get(name) == first[name] for row in conditions)}
+        shared = ", ".join(setting_words(name, first[name]) for name in first if name in common)
         tables.append({
-            "title": "chi-square per sample by condition",
+            "title": "chi-square per sample by condition" + (f" ({shared} in all)" if shared else ""),
             "head": ["condition", "trials", "before", "after"],
-            "rows": [[", ".join(setting_words(*pair) for pair in row["settings"].items()), ", ".join(row["trials"]),
-                      f"{row['before']:.3g}", f"{row['after']:.3g}"] for row in conditions],
+            "rows": [[", ".join(setting_words(*pair) for pair in row["settings"].items() if pair[0] not in common)
+                      or "the same", ", ".join(row["trials"]),
+                      numeral(row["before"]), numeral(row["after"])] for row in conditions],
         })  # fmt: skip
     return tables
 

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from experiments.diagnose.candidates import candidate_rows, unnamed_sentence
+from experiments.diagnose.colour import Colour
 from experiments.diagnose.effect_words import confirmation
-from experiments.diagnose.gaps import Gaps
+from experiments.diagnose.gaps import Gaps, numeral
 from experiments.diagnose.localise import Place
 from experiments.diagnose.next_steps import _follow
+from experiments.diagnose.noise_words import together
 from experiments.diagnose.summary import scatter_sentence, summary_sentences, title_words
 from experiments.diagnose.telling import (
     PhaseTable,
@@ -197,3 +199,23 @@ def test_what_to_do_next_follows_the_phase_or_the_column_that_holds_what_is_left
     assert "hold the spike there ten times as long" in _follow(places, {"depth_m": 0.9})
     assert "twice as deep" in _follow(places[1:], {"depth_m": 0.9, "t_s": 0.2})
     assert "nothing that was recorded" in _follow(places[1:], {"depth_m": 0.05})
+
+
+def test_the_noise_of_one_sensor_is_one_sentence_whatever_the_number_of_its_rates():
+    slow, fast = Colour("depth", 1.003, 0.61), Colour("depth", 0.998, 0.62)
+    assert together([slow]) == (
+        "the noise of depth is as large as is stated and a sample correlates with the next by 0.61: taken into account"
+    )
+    words = together([slow, fast])
+    assert "by 0.61, at 2 sampling rates" in words or "by 0.62, at 2 sampling rates" in words
+    assert "1.40 to 2.10 of what is stated and" in together([Colour("x", 1.4, 0.3), Colour("x", 2.1, 0.3)])
+    assert (
+        together([Colour("force", 0.87, 0.001)]) == "the noise of force is 0.87 of what is stated: taken into account"
+    )
+
+
+def test_large_numbers_are_written_out():
+    assert [numeral(value) for value in (0.9692, 152.6, 19441.0, 9995.0, 3.2e7)] == [
+        "0.969", "153", "19,400", "10,000", "3.2e+07",
+    ]  # fmt: skip
+    assert (numeral(103.2, 2), numeral(6.54, 2), numeral(12480.0, 4)) == ("100", "6.5", "12,480")
