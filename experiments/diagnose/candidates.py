@@ -63,9 +63,10 @@ def unnamed_sentence(said: Mapping[str, Any]) -> list[str]:
     if own is None or not ahead:
         return []
     row = ahead[0]
+    what = "is not told" if said["effects"] else "does not lead"
     return [
         f"Of all that was tried {' + '.join(row['effects'])} has the most evidence, {row['score'] - own['score']:.0f} "
-        f"nats more than {' + '.join(own['effects'])}, and is not told: {row['note']}."
+        f"nats more than {' + '.join(own['effects'])}, and {what}: {row['note']}."
     ]
 
 
@@ -110,13 +111,15 @@ def _note(
     if names > told or len(names) > len(told):
         if said.get("gate", {}).get("after", {}).get("passed"):
             return f"{together} leaves no more than noise, and a further name is not looked for then"
-        left = own.get("left") or 0.0
-        share = f"{100 * (left - row['left']) / left:.0f} %" if left > 0 else ""
-        takes = f" and takes away {share} of what {together} leaves" if share else ""
-        what = "a further name" if names > told else f"in the place of {together} {len(names)} names"
+        left, whole = own.get("left") or 0.0, said.get("evidence_base", {}).get("left") or 0.0
+        if left <= 0:
+            return f"what {together} leaves is no more than the noise, of which a further name takes up some, too"
+        parts = [f"{more:.0f} nats", f"{100 * (left - row['left']) / left:.0f} % of what {together} leaves"]
+        parts += [f"{100 * (left - row['left']) / whole:.1g} % of what the base model leaves"] if whole > 0 else []
+        what = "a further name" if names > told else f"{len(names)} names in the place of {together}"
         return (
-            f"it gains {more:.0f} nats{takes}, too little for {what}: the misfit of a form is always there for a "
-            f"further one to take up"
+            f"it gains {', '.join(parts)}, less than {what} must (docs/diagnose-method.md): the misfit of a form is "
+            f"always there to be taken up"
         )
     other = next((r for r in said.get("equivalence", [])[1:] if r["effect"] in names - told), None)
     if other is not None and (other.get("left_out_behind") or 0.0) > 0:

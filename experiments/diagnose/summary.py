@@ -10,28 +10,34 @@ from .candidates import unnamed_sentence
 from .effect_words import meaning
 from .evidence import SMALL
 from .gaps import numeral, unit_of
-from .telling import shares_words, size_sentences, sure_sentences
+from .telling import shares_words, size_sentences, small_names, sure_sentences
 
 __all__ = ["scatter_sentence", "summary_sentences", "title_words"]
 
 _WORTH_SAYING = 0.1
 """Share of what is beyond the noise that a candidate must close to be called the likeliest."""
+_AS_LIKELY = 1.0
+"""Nats within which another name is said beside the likeliest."""
 _NAMES = 3
 """Candidates that are said where none is certain."""
 
 
 def _only_stated_wrong(said: Mapping[str, Any]) -> str:
     """The numbers that were stated otherwise, where the base model leaves no more than noise with them; else empty."""
+    if said["verdict"] != "unknown":
+        return ""
     gaps = [gap for gap in said["gap"]["before"].values() if gap is not None]
     far = [bound["parameter"] for bound in said["at_bounds"]["before"] if bound["sigmas"] is not None]
-    return " and ".join(far) if said["verdict"] == "unknown" and far and max(gaps) <= SMALL else ""
+    return " and ".join(far) if far and max(gaps) <= SMALL else ""
 
 
 def title_words(said: Mapping[str, Any]) -> str:
     """The verdict in one line."""
     if wrong := _only_stated_wrong(said):
         return f"Unknown: {wrong} is not what campaign.toml says; with another number the model explains the trials"
-    names = " and ".join(effect["id"] for effect in said["effects"])
+    small = small_names(said)
+    names = " and ".join([effect["id"] for effect in said["effects"] if effect["id"] not in small]
+                         + [f"{name} (small: {size})" for name, size in small.items()])  # fmt: skip
     if said["verdict"] == "none":
         return "Nothing is missing: the model with its fitted parameters explains the trials"
     if said["verdict"] == "named":
@@ -139,9 +145,11 @@ def _rests_on(weighed: Mapping[str, Any]) -> str:
 
 def _likeliest(said: Mapping[str, Any]) -> str:
     """The names of the best model, or of the candidate that closes most; empty where it is little."""
-    names = said.get("leading", {}).get("effects", [])
+    leading = said.get("leading", {})
+    names, near = leading.get("effects", []), leading.get("nearest")
     if names:
-        return " + ".join(names)
+        also = near is not None and not near["told_apart"] and near["evidence_behind"] < _AS_LIKELY
+        return " + ".join(names) + (f" or {near['effect']}" if also else "")
     rows = _singles(said)
     return str(rows[0]["effects"][0]) if rows and (rows[0].get("closes") or 0.0) >= _WORTH_SAYING else ""
 

@@ -15,7 +15,7 @@ from .gaps import numeral
 from .problem import Array, Finding
 
 __all__ = [
-    "PhaseTable", "findings_in_words", "setting_words", "shares_words", "sure_sentences", "told_tables",
+    "PhaseTable", "findings_in_words", "setting_words", "shares_words", "small_names", "sure_sentences", "told_tables",
     "valid_residuals", "where_sentences",
 ]  # fmt: skip
 
@@ -115,6 +115,19 @@ def size_sentences(said: Mapping[str, Any]) -> list[str]:
     most = max(size["signature"] for size in sizes)
     told = [_size_words(size, is_small=_is_small(size, most)) for size in sizes]
     return [f"How large: {'; '.join(told)}."]
+
+
+def small_names(said: Mapping[str, Any]) -> dict[str, str]:
+    """Names that are small beside another one that is told, and how small: name -> 0.1 % of the force."""
+    sizes = said.get("sizes", [])
+    if len(sizes) < 2:
+        return {}
+    most = max(size["signature"] for size in sizes)
+    return {
+        size["effect"]: f"{100 * size['share']:.1g} % of the {size['channel']}" if size["share"] is not None
+        else f"{size['signature']:.2g} times the noise"
+        for size in sizes if size["signature"] < most and _is_small(size, most)
+    }  # fmt: skip
 
 
 def _is_small(size: Mapping[str, Any], most: float) -> bool:

@@ -87,11 +87,14 @@ def test_a_pair_with_more_evidence_than_what_is_told_is_not_passed_over_in_silen
     said = {"verdict": "named", "effects": [{"id": "friction"}], "evidence": evidence,
             "gate": {"after": {"passed": False}}}  # fmt: skip
     (sentence,) = unnamed_sentence(said)
-    for words in ("friction + adhesion has the most evidence, 4 nats more than friction", "takes away 20 %",
-                  "too little for a further name"):  # fmt: skip
+    for words in ("friction + adhesion has the most evidence, 4 nats more than friction", "gains 4 nats, 20 % of",
+                  "less than a further name must"):  # fmt: skip
         assert words in sentence
     (sentence,) = unnamed_sentence(said | {"gate": {"after": {"passed": True}}})
     assert "friction leaves no more than noise" in sentence
+    quiet = [row | {"left": row["left"] - 0.6} for row in evidence]
+    (sentence,) = unnamed_sentence(said | {"evidence": quiet})
+    assert "what friction leaves is no more than the noise" in sentence
     assert unnamed_sentence(said | {"evidence": evidence[1:]}) == []
     other = {"candidate": "layering:1", "effects": ["layering"], "score": 31.0, "left": 0.5}
     nearest = [{"effect": "friction"}, {"effect": "layering", "left_out_behind": 12.0}]
@@ -219,3 +222,15 @@ def test_large_numbers_are_written_out():
         "0.969", "153", "19,400", "10,000", "3.2e+07",
     ]  # fmt: skip
     assert (numeral(103.2, 2), numeral(6.54, 2), numeral(12480.0, 4)) == ("100", "6.5", "12,480")
+
+
+def test_the_title_says_that_a_second_name_is_small_and_that_another_is_as_likely():
+    size = {"channel": "force", "unit": "N", "rms": 0.1, "most": 0.2}
+    sizes = [size | {"effect": "shaft-friction", "signature": 26.0, "share": 0.055},
+             size | {"effect": "layering", "signature": 0.4, "share": 0.0009}]  # fmt: skip
+    said = {"verdict": "named", "effects": [{"id": "layering"}, {"id": "shaft-friction"}], "sizes": sizes}
+    assert title_words(said) == "Missing: shaft-friction and layering (small: 0.09 % of the force)"
+    assert title_words(said | {"sizes": sizes[:1]}) == "Missing: layering and shaft-friction"
+    near = {"effect": "plastic-sinkage", "evidence_behind": 0.3, "angle_deg": 9.0, "told_apart": False}
+    leading = {"effects": ["adhesion"], "certain": [], "nearest": near}
+    assert "the likeliest is adhesion or plastic-sinkage, not" in title_words(unknown(effects=[], leading=leading))
