@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from penetration_campaigns import DAMPING, FORCE_STD, STIFFNESS, campaign_of, driven_trial, drop_trial
 
-from experiments.campaign import Campaign, Recording
+from experiments.campaign import Campaign, Recording, read_campaign
+from experiments.campaign.templates import TEMPLATES
 from experiments.diagnose.penetration_data import prepare
 from experiments.diagnose.stuck import clipped_wheel, cut_rows
+from experiments.inspection import find_faults
 from experiments.plausible import find_implausible
 from experiments.plausible.force_units import force_units
 
@@ -113,3 +115,13 @@ def test_a_wheel_that_clips_is_told_from_one_that_turns_evenly():
     assert clipped_wheel(true, 0.5) == [] and clipped_wheel(noisy, 0.5) == []
     (end,) = clipped_wheel(np.minimum(noisy, 200.0), 0.5)
     assert end.value == 200.0 and set(end.rows) == set(np.flatnonzero(noisy >= 200.0))
+
+
+def test_a_campaign_whose_wheel_clips_is_told():
+    campaign = read_campaign(TEMPLATES / "template-tumble")
+    columns = dict(campaign.recordings["001", "wheel"].columns)
+    columns["omega_rad_s"] = np.minimum(columns["omega_rad_s"], 0.8 * columns["omega_rad_s"].max())
+    clipped = replace(campaign, recordings={**campaign.recordings, ("001", "wheel"): Recording(columns)})
+    said = [f for f in find_faults(clipped) if f.channel == "wheel" and "clips there" in f.what]
+    assert len(said) == 1 and said[0].trial == "001" and said[0].set_aside
+    assert not any("clips" in f.what for f in find_faults(campaign))
