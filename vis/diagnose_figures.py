@@ -261,12 +261,15 @@ def draw_evidence(said: Mapping[str, Any]) -> Figure | None:
     colours = {name: _KINDS[kinds[name]] for name in names}
     places = range(len(names))
     axis.barh(places, [score[name] for name in names], color=[colours[n] for n in names], height=0.66)
-    most = max(*score.values(), 1.0)
+    most = max(*(score[name] for name in names), 1.0)
     for place, name in enumerate(names):
         axis.annotate(f"{score[name]:.1f}" if abs(score[name]) < 10 else f"{score[name]:.0f}",
                       (max(score[name], 0.0), place), xytext=(3, 0), textcoords="offset points", va="center",
                       fontsize=7.5, color=INK)  # fmt: skip
-    axis.set_xlim(right=1.1 * most)
+    axis.set_xlim(
+        max(1.1 * min(score[name] for name in names), -0.3 * most) if min(score[name] for name in names) < 0 else 0.0,
+        1.12 * most,
+    )  # one that is far off does not press the others together
     axis.axvline(0.0, color=INK, lw=0.9)
     axis.set_yticks(places, [" + ".join(name) for name in names])
     axis.grid(False, axis="y")
@@ -376,7 +379,8 @@ def draw_latent(folder: Path, said: Mapping[str, Any], channels: Sequence[Channe
             axis.axhline(0.0, color=GREY, lw=0.8)
             axis.plot(*_means(across, values[latent]), "-", color=INK, lw=1.3, marker="o", ms=3)
             share = said["latent"].get("explained", {}).get(column)
-            axis.set_xlabel(label + (f"; explains {100 * share:.0f} %" if share is not None else ""))
+            several = "up to " if len(latents) > 1 else ""  # it is the largest of all that is missing
+            axis.set_xlabel(label + (f"; explains {several}{100 * share:.0f} %" if share is not None else ""))
         pair[0].set_ylabel(_COLUMNS.get(latent, (latent, 1.0))[0])
         _frame(pair[1], values[latent])
     handles = [*_phase_handles(phase), Line2D([], [], color=INK, marker="o", ms=3, label="means of equal counts")]

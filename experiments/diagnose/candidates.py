@@ -66,7 +66,7 @@ def unnamed_sentence(said: Mapping[str, Any]) -> list[str]:
     what = "is not told" if said["effects"] else "does not lead"
     return [
         f"Of all that was tried {' + '.join(row['effects'])} has the most evidence, {row['score'] - own['score']:.0f} "
-        f"nats more than {' + '.join(own['effects'])}, and {what}: {row['note']}."
+        f"nats more than {' + '.join(own['effects'])}, and {what}: it {row['note']}."
     ]
 
 
@@ -110,21 +110,18 @@ def _note(
     together = " + ".join(_told(said))
     if names > told or len(names) > len(told):
         if said.get("gate", {}).get("after", {}).get("passed"):
-            return f"{together} leaves no more than noise, and a further name is not looked for then"
+            return f"is not needed: {together} leaves no more than noise"
         left, whole = own.get("left") or 0.0, said.get("evidence_base", {}).get("left") or 0.0
         if left <= 0:
-            return f"what {together} leaves is no more than the noise, of which a further name takes up some, too"
-        parts = [f"{more:.0f} nats", f"{100 * (left - row['left']) / left:.0f} % of what {together} leaves"]
-        parts += [f"{100 * (left - row['left']) / whole:.1g} % of what the base model leaves"] if whole > 0 else []
+            return f"takes up noise: what {together} leaves is no more"
         what = "a further name" if names > told else f"{len(names)} names in the place of {together}"
-        return (
-            f"it gains {', '.join(parts)}, less than {what} must (docs/diagnose-method.md): the misfit of a form is "
-            f"always there to be taken up"
-        )
+        share = f"{100 * (left - row['left']) / left:.0f} % of what {together} leaves"
+        of_base = f", {100 * (left - row['left']) / whole:.1g} % of what the base model leaves" if whole > 0 else ""
+        return f"gains {more:.1f} nats, {share}{of_base}: less than {what} must"
     other = next((r for r in said.get("equivalence", [])[1:] if r["effect"] in names - told), None)
     if other is not None and (other.get("left_out_behind") or 0.0) > 0:
-        return f"it predicts conditions that were left out worse, by {other['left_out_behind']:.0f} nats"
-    return "it does not stand when noise and names are looked at together"
+        return f"predicts conditions that were left out worse, by {other['left_out_behind']:.0f} nats"
+    return "does not stand when noise and names are looked at together"
 
 
 def _is_alternative(said: Mapping[str, Any], names: frozenset[str], told: frozenset[str]) -> bool:
