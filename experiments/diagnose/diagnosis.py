@@ -503,6 +503,6 @@ def _next(found: Diagnosis) -> str:
         return problem.next_experiment(best.model.forms[0], found.rivals[0], best.values)
     weighed = gap_with_scatter(found)
     return after_unknown(
-        problem, found.best_values, found.forms, found.left, found.shares,
+        problem, found.best_values, found.forms, found.left, found.shares, beside=choice.best.effects,
         is_scatter=bool(found.effects) and weighed is not None and max(v or 0.0 for v in weighed.after) <= SMALL,
     )  # fmt: skip

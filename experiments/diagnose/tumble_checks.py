@@ -15,7 +15,7 @@ from scipy.ndimage import median_filter
 
 from .lags import find_lag, pieces
 from .problem import Finding
-from .stuck import clipped, stuck_rows
+from .stuck import clipped, clipped_wheel, stuck_rows
 from .tumble_data import CHANNELS, TrialData, TumbleData
 from .tumble_spikes import spikes
 
@@ -51,7 +51,8 @@ def checked(data: TumbleData) -> tuple[TumbleData, list[Finding]]:
                 continue
             _gaps(trial, name, mine, findings)
             _ends(trial, name, keep, findings)
-            for end in clipped(trial.value[mine]) if name != "wheel" else ():  # which a motor turns as fast as it can
+            values = trial.value[mine]
+            for end in clipped(values) if name != "wheel" else clipped_wheel(values, float(trial.std[mine[0]])):
                 keep[mine[end.rows]] = False
                 findings.append(Finding(
                     trial=trial.id, channel=name, from_s=float(trial.time[mine[end.rows[0]]]),
