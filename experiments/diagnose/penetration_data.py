@@ -39,7 +39,8 @@ _OUTLIER = 8.0
 
 @dataclass(frozen=True)
 class Prepared:
-    """One trial. Driven: rows with both depth and force. Drop: the times of all rows, and which have what."""
+    """One trial. Driven: rows with a depth, on which the force of a law with a memory depends whether or not the sensor
+    read it. Drop: all rows. And which rows have what."""
 
     table: PenetrationTrial
     info: TrialInfo
@@ -50,7 +51,7 @@ class Prepared:
     depth: Array
     """As measured [m], shape [n]."""
     other: Array
-    """Force [N] or acceleration [m/s2], shape [n]."""
+    """Force [N] or acceleration [m/s2], NaN where there is none, shape [n]."""
     has_depth: NDArray[np.bool_]
     has_other: NDArray[np.bool_]
     smooth: SmoothDepth | None = None
@@ -291,16 +292,12 @@ def _driven(
     louder, persistence = (max(colour.std, 1.0), colour.persistence) if colour is not None else (1.0, 0.0)
     smooth = smooth_depth(time[known], depth[known], louder * std, alike=alike, persistence=persistence)
     smooth = replace(smooth, inflation=louder * float(np.sqrt((1 + persistence) / (1 - persistence))))
-    both = known & np.isfinite(other)
-    rows = both[known]
-    smooth = replace(smooth, depth=smooth.depth[rows], speed=smooth.speed[rows], depth_error=smooth.depth_error[rows],
-                     speed_error=smooth.speed_error[rows])  # fmt: skip
     speed = float(table.speed) if table.speed else float(np.percentile(np.abs(smooth.speed), 80))
-    everything = np.ones(int(both.sum()), dtype=bool)
-    info = _info(tables, table, speed)
+    time, depth, other = time[known], depth[known], other[known]
     return Prepared(
-        table, info, tables.diameter_of(table), time[both], depth[both], other[both], everything, everything, smooth
-    ), findings
+        table, _info(tables, table, speed), tables.diameter_of(table), time, depth, other, np.isfinite(depth),
+        np.isfinite(other), smooth,
+    ), findings  # fmt: skip
 
 
 def _info(tables: PenetrationCampaign, table: PenetrationTrial, speed: float) -> TrialInfo:
