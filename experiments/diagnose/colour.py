@@ -33,6 +33,8 @@ _PIECES, _PIECE = 8, 24
 """Pieces of a recording, and samples of one at least, over which noise has to be alike."""
 _FEWEST = 100
 """Fast modes from which on a law is fitted."""
+_WHITE = 0.1
+"""Correlation of neighbouring samples up to which noise is called white."""
 _ALIKE = 0.5
 """Share of the excess, and of the correlation, that half of all pieces must show."""
 
@@ -54,6 +56,8 @@ class Colour:
     @property
     def sentence(self) -> str:
         """In plain words."""
+        if self.std > 1 and abs(self.persistence) < _WHITE:
+            return f"{self.channel} is {self.std:.2f} times as loud as stated (white): taken into account"
         return (
             f"the noise of {self.channel} is {self.std:.2f} of what is stated and a sample correlates with the next by "
             f"{self.persistence:.2f}: taken into account"
