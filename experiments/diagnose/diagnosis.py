@@ -225,6 +225,15 @@ def diagnose(
             base = _coloured(_calmed(_rescattered(base, scatter), unrest), colours)
             choice = choose(base, tell=tell, seed=seed, recoloured=partial(_recoloured, colours=colours))
             base = choice.base.fit
+    for beside in () if restless else (choice.best.fit, choice.base.fit):
+        scatter = _apart(beside, held_out) if not choice.left.passed else Scatter()
+        if scatter.parameters and set(scatter.model_std) != set(model_std):
+            tell("replicates are found to differ beside what is left: choosing again", 0.0)
+            other = _coloured(_rescattered(_plain(base), scatter), colours)
+            another = choose(other, tell=tell, seed=seed, recoloured=partial(_recoloured, colours=colours))
+            if another.left.score < choice.left.score:
+                choice, model_std = another, scatter.model_std
+                base = choice.base.fit
     if choice.best.effects:  # times too: slopes are those of the motion as it is now known
         best, fresh_jitters = _jittered(choice.best.fit, held_out, jitters)
         if fresh_jitters:
@@ -348,12 +357,17 @@ def _colours_of(found: Fit) -> dict[str, Colour]:
     return loud | find_colours(found)
 
 
-def _scatter(found: Fit, held_out: tuple[str, ...]) -> Scatter:
+def _scatter(found: Fit, held_out: tuple[str, ...], *, apart: bool = False) -> Scatter:
     """Asked of all trials, and of the model without any scatter so far."""
     model = replace(found.model, scatter=())
     if all(len(ids) < 2 for ids in groups_of(model.problem.trials).values()):
         return Scatter()
-    return find_scatter(fit(model.on((*model.trials, *held_out)), unscattered(found)))
+    return find_scatter(fit(model.on((*model.trials, *held_out)), unscattered(found)), apart=apart)
+
+
+def _apart(found: Fit, held_out: tuple[str, ...]) -> Scatter:
+    """What replicates differ by where what is left hides it; none where they cannot be compared row by row."""
+    return _scatter(found, held_out, apart=True) if hasattr(found.model.problem, "calm") else Scatter()
 
 
 def _unrest(found: Fit, held_out: tuple[str, ...]) -> Unrest:
@@ -463,7 +477,13 @@ class _Told:
         base = settled(base)
         problem, held_out, fitted = self.problem, self.held_out, base.model.trials
         best = choice.best.fit if choice is not None else base
-        base_values, best_values = values_of_all(base, held_out), values_of_all(best, held_out)
+        # With a factor a trial the base model leaves to the factors what it lacks: that of one mean bed is another.
+        plain = (
+            fit(replace(base.model, scatter=()), unscattered(base))
+            if verdict != "none" and base.model.scatter
+            else base
+        )
+        base_values, best_values = values_of_all(plain, held_out), values_of_all(best, held_out)
         effects = choice.best.effects if choice is not None else ()
         before = gap_of(problem, base.model, base_values, fitted, held_out)
         after = before if verdict == "none" else gap_of(problem, best.model, best_values, fitted, held_out)

@@ -101,14 +101,15 @@ _FIRST = 0.2
 def best_start(model: Model, form: Form, values: Values, *, rounds: int = 6) -> Fit:
     """The best fit of `model` (which holds `form`) over the form's starts, in several sizes of the amplitude.
 
-    The other values are those given, and those of the priors: a base model that lacks an effect bends its parameters.
+    The other values are those given, and those of the priors: a base model that lacks an effect bends its parameters,
+    and what replicates differ by first of all.
     `rounds`: steps, where the problem looks for the best start itself.
     """
     if hasattr(model.problem, "guess"):
         return fit(model, values, rounds=rounds)
     starts = form.starts or ({form.amplitude: 1.0},)
     amplitude = next(p for p in form.parameters if p.name == form.amplitude)
-    known = {p.name: p.value for p in model.problem.base if math.isfinite(p.std)}
+    known = {p.name: p.value for p in (*model.problem.base, *model.scatter) if math.isfinite(p.std)}
     points = []
     for start in starts:
         for size in _SIZES:

@@ -16,7 +16,7 @@ def together(colours: Sequence[Colour]) -> str:
     """One sentence on the noise of a channel, of which `colours` are what was found at its rates."""
     stds, persistences = [colour.std for colour in colours], [colour.persistence for colour in colours]
     as_stated = max(abs(std - 1.0) for std in stds) < _ALIKE
-    size = "as large as is stated" if as_stated else f"{_range(stds)} of what is stated"
+    size = "as large as is stated" if as_stated else f"{_range(stds)} times what is stated"
     white = max(abs(persistence) for persistence in persistences) < _ALIKE
     colour = "" if white else f" and a sample correlates with the next by {_range(persistences)}"
     rates = f", at {len(colours)} sampling rates" if len(colours) > 1 else ""

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
+from scipy.stats import norm
 
 from experiments.campaign import Campaign, PenetrationCampaign, Recording
 from experiments.campaign.tables import PenetrationTrial
@@ -73,11 +74,12 @@ def prepare(campaign: Campaign) -> tuple[list[Prepared], list[Finding]]:
     assert isinstance(tables, PenetrationCampaign)
     trials: list[Prepared] = []
     findings: list[Finding] = []
+    louder = _louder(campaign)
     cuts = _cuts(campaign, tables)
     for table in tables.trial:
         recording = campaign.recording(table.id, "data")
         assert recording is not None
-        trial, found = _one(tables, table, recording, cut=cuts.get(table.id))
+        trial, found = _one(tables, table, recording, colour=louder if table.mode == "driven" else None, cut=cuts.get(table.id))
         findings += found
         if trial is not None:
             trials.append(trial)
@@ -85,7 +87,7 @@ def prepare(campaign: Campaign) -> tuple[list[Prepared], list[Finding]]:
         said = "; ".join(finding.what for finding in findings)
         raise ValueError(f"no trial of {tables.name!r} can be used: {said}")
     campaign = _without(campaign, cuts)
-    trials, colours = _recoloured(campaign, trials)
+    trials, colours = _recoloured(campaign, trials, louder)
     if colours:
         findings.append(Finding(trial="", channel="depth", what=together(list(dict.fromkeys(colours.values())))))
     trials = _alike(campaign, trials, colours)
@@ -115,10 +117,33 @@ def _without(campaign: Campaign, cuts: Mapping[str, NDArray[np.int64]]) -> Campa
     return replace(campaign, recordings=recordings) if cuts else campaign
 
 
-def _recoloured(campaign: Campaign, trials: list[Prepared]) -> tuple[list[Prepared], dict[str, Colour]]:
-    """Smoothed once more where the noise of the depths is not as stated, and its colour by trial.
+def _louder(campaign: Campaign) -> Colour | None:
+    """How loud the depth sensor of the pushes is, where it is louder than stated; else None.
+
+    Third differences know nothing of a smooth motion: those of white noise s have the variance 20 s^2. A curve smoothed
+    at a noise that is too small would follow the noise, and what it leaves would tell too little of it. Of noise that
+    is correlated they tell less than there is: that is looked for in what is left (`_recoloured`).
+    """
+    assert isinstance(campaign.tables, PenetrationCampaign)
+    sizes = []
+    for table in campaign.tables.trial:
+        recording = campaign.recording(table.id, "data") if table.mode == "driven" else None
+        depth = recording["depth_m"] if recording is not None else np.zeros(0)
+        third = np.diff(depth[np.isfinite(depth)], 3)
+        if len(third) >= _FEWEST:
+            sizes.append(float(np.median(np.abs(third))) / (np.sqrt(20.0) * float(norm.ppf(0.75))))
+    std = stds(campaign.tables, True)[0] if sizes else 0.0
+    louder = float(np.median(sizes)) / std if std > 0 else 1.0
+    return Colour("depth", louder, 0.0) if louder**2 > _LOUDER else None
+
+
+def _recoloured(
+    campaign: Campaign, trials: list[Prepared], louder: Colour | None
+) -> tuple[list[Prepared], dict[str, Colour]]:
+    """Smoothed once more where the noise of the depths is not as it was taken, and its colour by trial.
 
     One sensor reads all pushes; rows at another rate are as long apart as they are, so that each rate has its own.
+    `louder`: what the noise was taken for; None: as stated.
     """
     assert isinstance(campaign.tables, PenetrationCampaign)
     std = stds(campaign.tables, True)[0] if any(trial.smooth is not None for trial in trials) else 0.0
@@ -127,12 +152,20 @@ def _recoloured(campaign: Campaign, trials: list[Prepared]) -> tuple[list[Prepar
         if trial.smooth is not None:
             rates.setdefault(round(5 * float(np.log(np.median(np.diff(trial.time))))), []).append(trial)
     colours: dict[str, Colour] = {}
+    anew: set[str] = set()
     for alike in rates.values():
         left = [(trial.depth - trial.smooth.depth) / std for trial in alike if trial.smooth is not None]
         colour = colour_of("depth", left)
-        if colour is not None and float(colour.power(np.zeros(1))[0]) > _LOUDER:
+        slow = float(colour.power(np.zeros(1))[0]) if colour is not None else 1.0
+        if colour is not None and louder is not None and 1 / _LOUDER < slow / louder.std**2 < _LOUDER:
+            colour = louder  # as it was taken
+        elif colour is not None and slow > _LOUDER:
+            anew |= {trial.info.id for trial in alike}
+        else:
+            colour = louder
+        if colour is not None:
             colours |= {trial.info.id: colour for trial in alike}
-    return [_again(campaign, trial, colours) if trial.info.id in colours else trial for trial in trials], colours
+    return [_again(campaign, trial, colours) if trial.info.id in anew else trial for trial in trials], colours
 
 
 def _again(campaign: Campaign, trial: Prepared, colours: Mapping[str, Colour], alike: Holds = ()) -> Prepared:
@@ -191,6 +224,7 @@ def _one(
     driven = table.mode == "driven"
     channel, key = ("force", "force_N") if driven else ("accel", "accel_m_s2")
     std_depth, std_other = stds(tables, driven)
+    loud = max(colour.std, 1.0) if colour is not None else 1.0
     findings: list[Finding] = []
     time, depth, other = recording.time.copy(), recording["depth_m"].copy(), recording[key].copy()
 
@@ -210,7 +244,7 @@ def _one(
             say(f"not one of {missing} readings of {name} is a number")
         elif missing > 0.02 * len(values):
             say(f"{missing} of {len(values)} readings of {name} are gaps; the rest is used")
-    jump = _clock_jump(time, depth, std_depth) or (None if driven else _clock_jump(time, other, std_other))
+    jump = _clock_jump(time, depth, loud * std_depth) or (None if driven else _clock_jump(time, other, std_other))
     if jump is not None:
         rows = np.arange(jump, len(time))
         say(f"the clock jumps by {time[jump] - time[jump - 1]:.3g} s where the motion goes on as if it had not; all "
@@ -231,7 +265,7 @@ def _one(
             what=f"trial {table.id}: there is no row from {time[k]:.4g} to {time[k + 1]:.4g} s, where one every "
             f"{usual:.3g} s is usual: kept as a gap",
         ))  # fmt: skip
-    for name, values, std in (("depth", depth, std_depth), (channel, other, std_other)):
+    for name, values, std in (("depth", depth, loud * std_depth), (channel, other, std_other)):
         # A depth cannot jump; a force can, where a tip touches for a moment, but not beyond all that it is elsewhere.
         known = values[np.isfinite(values)]
         range_ = float(np.ptp(np.percentile(known, [0.5, 99.5]))) if name != "depth" and len(known) else 0.0
@@ -251,19 +285,19 @@ def _one(
             say(f"{len(stuck)} readings of {name} repeat the one before where it never does otherwise: the sensor is "
                 f"stuck, they are set aside", where=name, rows=stuck)  # fmt: skip
             values[stuck] = np.nan
-    step = _step(time, depth, std_depth)
+    step = _step(time, depth, loud * std_depth)
     while step is not None:
         size = depth[step] - depth[step - 1]
-        back = _step(time, depth, std_depth, after=step)
+        back = _step(time, depth, loud * std_depth, after=step)
         while back is not None and abs(depth[back] - depth[back - 1] + size) > 0.5 * abs(size):
-            back = _step(time, depth, std_depth, after=back)  # until one takes it back
+            back = _step(time, depth, loud * std_depth, after=back)  # until one takes it back
         rows = np.arange(step, len(depth) if back is None else back)
         stays = "stays there, as where a marker is lost; it is set aside from there on"
         comes = f"comes back {len(rows)} rows later, as where a marker is lost for a while; these are set aside"
         say(f"the depth jumps by {1e3 * size:.3g} mm between two readings and {stays if back is None else comes}",
             where="depth", rows=rows)  # fmt: skip
         depth[rows] = np.nan
-        step = None if back is None else _step(time, depth, std_depth, after=back)
+        step = None if back is None else _step(time, depth, loud * std_depth, after=back)
     if driven:
         held = _held(other)
         if held is not None:

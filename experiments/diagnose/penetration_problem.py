@@ -56,6 +56,8 @@ class PenetrationProblem:
     whole = "the bed or the spike"
     clocks = (("force",), ("depth", "accel"))
     """Channels whose times come from one clock."""
+    hidden_scatter = ("bed damping",)
+    """Kinds of scatter that are asked for only where something is left: they come near to what a speed does."""
 
     def __init__(self, campaign: Campaign, *, own: Sequence[OwnEffect] = ()) -> None:
         tables = campaign.tables
@@ -124,12 +126,15 @@ class PenetrationProblem:
 
     @property
     def scatter(self) -> dict[str, tuple[Parameter, ...]]:
-        """What may differ between replicates beyond the sensors: kind -> one nuisance a trial, mostly not fitted."""
-        return {"bed": tuple(
-            Parameter(name=f"bed[{id}]", unit="1", value=0.0, std=_BED_STD, scale=0.02, lowest=-0.95, highest=5.0,
-                      trial=id, kind="bed", step=1e-4)
+        """What may differ between replicates beyond the sensors: kind -> one nuisance a trial, mostly not fitted.
+
+        A factor on K and C, and one on C alone.
+        """
+        return {kind: tuple(
+            Parameter(name=f"{kind}[{id}]", unit="1", value=0.0, std=_BED_STD, scale=0.02, lowest=-0.95, highest=5.0,
+                      trial=id, kind=kind, step=1e-4)
             for id in self._trials
-        )}  # fmt: skip
+        ) for kind in ("bed", "bed damping")}  # fmt: skip
 
     @property
     def rough(self) -> tuple[str, ...]:
@@ -191,7 +196,8 @@ class PenetrationProblem:
         into[_SLOT["mass"]] = self.tables.spike.mass or 1.0
         into[_SLOT["gravity"]] = trial.table.gravity
         into[_SLOT["stiffness"]] = stiffness
-        into[_SLOT["damping"]] = values.get(name_c, self._default(name_c, surface.damping)) * bed
+        damper = 1.0 + values.get(f"bed damping[{trial.info.id}]", 0.0)
+        into[_SLOT["damping"]] = values.get(name_c, self._default(name_c, surface.damping)) * bed * damper
         into[_SLOT["reference"]] = self._scales.depth
         into[_SLOT["radius_depth"]] = _tip_depth(self.tables.spike, trial.diameter)
         if trial.smooth is not None:

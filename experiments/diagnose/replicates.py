@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -9,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy import stats
 
-from .evidence import inflation
+from .evidence import inflation, slow_count
 from .fitting import Fit, Model, fit, scanned
 from .gate import low_modes
 from .problem import Finding, Parameter, Problem, TrialInfo, Values
@@ -125,29 +126,32 @@ def exchanged(
     return tuple(t for t in every if t not in out), tuple(t for t in every if t in out)
 
 
-def find_scatter(found: Fit) -> Scatter:
+def find_scatter(found: Fit, *, apart: bool = False) -> Scatter:
     """Nuisances that the replicates call for, their priors estimated, and what is written as model_std.
 
     Each trial's own numbers (bed, friction, whatever the problem offers) are fitted, all kinds at once, so that none
     stands for another; within a condition these must agree within their errors. What the model lacks is the same for
     all replicates as long as it is small; where it is not, each trial's factors are bent by it in their own way: errors
-    are those of noise as loud as what is left (`inflation`). The scatter is the most likely one beside these errors,
-    each condition's mean taken out (restricted likelihood): trials that say nothing of a kind count for nothing. Once
-    found, it is the prior under which all is fitted and asked again.
+    are those of noise as loud as what is left (`inflation`), or, `apart`, as what each has left of its own
+    (`_louder`), and all kinds are asked for. The scatter is the most likely one beside these errors, each condition's
+    mean taken out (restricted likelihood): trials that say nothing of a kind count for nothing. Once found, it is the
+    prior under which all is fitted and asked again.
     """
     problem: Problem = found.model.problem
     offered: dict[str, tuple[Parameter, ...]] = getattr(problem, "scatter", {})
+    late = () if apart else getattr(problem, "hidden_scatter", ())
+    offered = {kind: parameters for kind, parameters in offered.items() if kind not in late}
     inside = [t for t in problem.trials if t.id in found.model.trials]
     groups = [ids for ids in groups_of(inside).values() if len(ids) > 1]
     if not groups or not offered:
         return Scatter()
     every = tuple(p for parameters in offered.values() for p in parameters)
     wide = fit(replace(found.model, scatter=every), found.values, rounds=_LOOKS)
-    kinds = _scattered(wide, offered, groups)
+    kinds = _scattered(wide, offered, groups, apart)
     while kinds:
         active = tuple(replace(p, std=std) for kind, std in kinds.items() for p in offered[kind])
         wide = with_scatter(replace(found.model, scatter=active), wide.values)
-        sure = _scattered(wide, {kind: offered[kind] for kind in kinds}, groups)
+        sure = _scattered(wide, {kind: offered[kind] for kind in kinds}, groups, apart)
         if sure.keys() == kinds.keys():
             parameters = tuple(replace(p, std=sure[p.kind]) for p in active)
             return Scatter(parameters, sure, wide.values)
@@ -218,13 +222,14 @@ def trends(scatter: Scatter, trials: Sequence[TrialInfo]) -> list[Finding]:
 
 
 def _scattered(
-    found: Fit, offered: Mapping[str, Sequence[Parameter]], groups: Sequence[Sequence[str]]
+    found: Fit, offered: Mapping[str, Sequence[Parameter]], groups: Sequence[Sequence[str]], apart: bool
 ) -> dict[str, float]:
     """The scatter of those kinds in which replicates differ for sure."""
     least = getattr(found.model.problem, "least_scatter", _LEAST)
+    louder = _louder(found, groups) if apart else inflation(found)
     scatter = {}
     for kind, parameters in offered.items():
-        told = _told(found, parameters)
+        told = _told(found, parameters, louder)
         pairs = [np.array([told[id] for id in ids if id in told]) for ids in groups]
         pairs = [pair for pair in pairs if len(pair) > 1]
         surprise = sum(float((((b - _mean(b, s)) / s) ** 2).sum()) for b, s in (pair.T for pair in pairs))
@@ -236,10 +241,33 @@ def _scattered(
     return scatter
 
 
-def _told(found: Fit, parameters: Sequence[Parameter]) -> dict[str, tuple[float, float]]:
+def _louder(found: Fit, groups: Sequence[Sequence[str]]) -> float:
+    """How much louder than the sensors what tells replicates apart is, where they go through the same at the same time.
+
+    What a model lacks is the same in all of them and bends their numbers alike: only what each has of its own counts
+    (pure error, as in `unrest`).
+    """
+    whole = inflation(found)
+    rows = {(trial, channel): block for trial, channel, block in found.model.channel_rows()}
+    left, freedom = 0.0, 0
+    for ids, channel in itertools.product(groups, dict.fromkeys(channel for _, channel in rows)):
+        blocks = [found.modes[rows[(id, channel)]] for id in ids if (id, channel) in rows]
+        if len(blocks) < 2:
+            continue
+        count = min(len(block) for block in blocks)
+        usual = float(np.mean([len(block) for block in blocks]))
+        together = np.stack([block[:count] * math.sqrt(usual / len(block)) for block in blocks])
+        left += float(((together - together.mean(axis=0)) ** 2).sum())
+        freedom += (len(blocks) - 1) * count
+    beyond = max(left - freedom - 2 * math.sqrt(2.0 * freedom), 0.0)
+    return min(whole, math.sqrt(1 + beyond / slow_count(found)))
+
+
+def _told(found: Fit, parameters: Sequence[Parameter], louder: float) -> dict[str, tuple[float, float]]:
     """What a trial's data say of its own number, and the error of that: trial -> value, std. What is shared is held,
-    the trial's other numbers are free; the number's own prior says nothing here."""
-    louder, mine = inflation(found), found.model.parameters
+    the trial's other numbers are free; the number's own prior says nothing here. `louder`: the data than their noise.
+    """
+    mine = found.model.parameters
     precision = found.prior_precision()
     told = {}
     for p in parameters:

@@ -14,7 +14,16 @@ from experiments.diagnose.fitting import Model, Whitener, fit, settled
 from experiments.diagnose.gate import held_out_gate, open_gate
 from experiments.diagnose.penetration_problem import make_problem
 from experiments.diagnose.problem import Parameter, Samples, TrialInfo
-from experiments.diagnose.replicates import Scatter, exchanged, groups_of, odd_trials, parted, split_trials, trends
+from experiments.diagnose.replicates import (
+    Scatter,
+    exchanged,
+    find_scatter,
+    groups_of,
+    odd_trials,
+    parted,
+    split_trials,
+    trends,
+)
 
 COUNT = 400
 
@@ -196,3 +205,41 @@ def test_three_replicates_of_beds_that_differ_are_none_of_them_at_odds(seed):
     problem = make_problem(campaign_of(trials))
     found = fit(Model(problem, Whitener.white(problem), tuple(trial.id for trial in problem.trials)))
     assert odd_trials(found) == []
+
+
+@pytest.mark.parametrize("differ", [0.0, 0.03])
+def test_beds_that_differ_are_told_beside_an_effect_that_has_no_name_yet(differ):
+    """Pushes on K z (1 + z / D) in beds whose K differs by 3 %: what a straight spring leaves is the same in all."""
+    beds = 1 + differ * np.array([-1.2, 0.2, 1.0, 0.9, -0.1, -0.8])
+
+    def bent(bed):
+        return lambda z, v, top: bed * (STIFFNESS * z * (1 + z / 0.02) + DAMPING * max(v, 0.0))
+
+    trials = [
+        (f"{k}", "driven", speed, driven_trial(bent(bed), speed=speed, seed=30 + k))
+        for k, (bed, speed) in enumerate(zip(beds, (0.01, 0.01, 0.01, 0.1, 0.1, 0.1), strict=True))
+    ]
+    problem = make_problem(campaign_of(trials))
+    found = fit(Model(problem, Whitener.white(problem), tuple(trial.id for trial in problem.trials)))
+    problem.rewhiten(found.values, ())
+    found = fit(found.model, found.values)
+    assert found.chi_square > 10 * found.count
+    assert find_scatter(found).model_std == {}
+    told = find_scatter(found, apart=True).model_std
+    assert told == ({"bed": pytest.approx(0.03, rel=0.5)} if differ else {})
+
+
+def test_dampers_that_differ_are_told_from_springs_that_do():
+    """Pushes on K z + C v at 0.2 and 0.4 m/s in beds whose C alone differs by 10 %: by 0.08 to 0.16 N."""
+    dampers = DAMPING * (1 + 0.1 * np.array([-1.2, 0.2, 1.0, 0.9, -0.1, -0.8]))
+
+    def bed(damping):
+        return lambda z, v, top: STIFFNESS * z + damping * max(v, 0.0)
+
+    trials = [
+        (f"{k}", "driven", speed, driven_trial(bed(damping), speed=speed, seed=50 + k))
+        for k, (damping, speed) in enumerate(zip(dampers, (0.2, 0.2, 0.2, 0.4, 0.4, 0.4), strict=True))
+    ]
+    problem = make_problem(campaign_of(trials))
+    found = fit(Model(problem, Whitener.white(problem), tuple(trial.id for trial in problem.trials)))
+    assert find_scatter(found, apart=True).model_std == {"bed damping": pytest.approx(0.1, rel=0.5)}

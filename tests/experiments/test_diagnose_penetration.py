@@ -205,6 +205,22 @@ def test_the_colour_of_a_depth_sensor_is_found_in_all_pushes_together_and_said(p
         assert said == []
 
 
+def test_a_depth_sensor_three_times_as_loud_as_stated_is_found_and_its_error_counted():
+    """Noise of three times the stated variance's root, in rows and in what a curve smoothed at it is off by."""
+    trials = []
+    for seed in range(4):
+        columns = dict(driven_trial(base, speed=0.01, retreat=True, seed=seed).columns)
+        more = math.sqrt(8.0) * DEPTH_STD * np.random.default_rng(20 + seed).standard_normal(len(columns["t_s"]))
+        trials.append((f"{seed}", "driven", 0.01, Recording({**columns, "depth_m": columns["depth_m"] + more})))
+    problem = make_problem(campaign_of(trials))
+    (sentence,) = [finding.what for finding in problem.findings]
+    assert float(sentence.split("depth is ")[1].split(" times")[0]) == pytest.approx(3.0, rel=0.05)
+    model = Model(problem, Whitener.white(problem), tuple("0123"))
+    problem.rewhiten({"stiffness": STIFFNESS, "damping": DAMPING}, ())
+    (modes,) = model.evaluate([{"stiffness": STIFFNESS, "damping": DAMPING}])
+    assert modes @ modes / len(modes) < 1.1
+
+
 def test_a_smooth_motion_is_given_no_ramps():
     time = np.linspace(0, 2, 600)
     true = 0.02 * np.sin(0.5 * np.pi * time)
