@@ -58,6 +58,8 @@ outside the library names left 0.08 and more, but for one shock, which a crust e
 _NO_NAME = 0.5
 """Share of what the base model leaves, of trials fitted or held out, from which on a name explains too little to be
 one, where the gate sees that something is left. In five counts of tumbles right names left 0.47 at most of these."""
+_LOUD = 3.0
+"""Standard deviations of chi-square beyond which what a name leaves is no matter of chance."""
 _ASKED = 3
 """Hypotheses that are asked whether a trial of its own way is all that speaks against them."""
 _LATE = 0.5
@@ -553,7 +555,7 @@ def _verdict(
         return "unknown"
     after = _gap(found.model.problem, found.model, _values_of_all(found, held_out), found.model.trials, held_out)
     fits, predicts = choice.left.passed, held is None or held.passed
-    if not fits and excess(found) > _NO_NAME * excess(choice.base.fit):
+    if not fits and _too_little(choice, after.fit, held_out):
         return "unknown"
     little = after.fit <= SMALL and (after.held_out or 0.0) <= SMALL
     little = little and (predicts or _share_left(choice, held_out) < _NO_NAME)
@@ -576,6 +578,18 @@ def _of_form(choice: Choice, held_out: tuple[str, ...]) -> bool:
         left.append(_left_of(found, held_out))
         share.append(_share_left(choice, held_out))
     return (max(left) <= _AS_LOUD and share[0] < _RIGHT_FORM) or max(share) < _NEXT_TO_NOTHING
+
+
+def _too_little(choice: Choice, after: float, held_out: tuple[str, ...]) -> bool:
+    """Whether a name explains too little of what was fitted to be one. `after`: what it leaves a sample, in the gap's
+    units: a colour of the noise found beside a name that is none is what the name has missed."""
+    found, base = choice.best.fit, choice.base.fit
+    if excess(found) > _NO_NAME * excess(base):
+        return True
+    problem, trials = base.model.problem, base.model.trials
+    before = _gap(problem, base.model, _values_of_all(base, held_out), trials, ()).fit
+    of_form = getattr(problem, "left_by_forms", 1.0)
+    return after - 1 > max(_LOUD * math.sqrt(2 / found.count), of_form * (before - 1))
 
 
 def _share_left(choice: Choice, held_out: tuple[str, ...]) -> float:
