@@ -20,6 +20,8 @@ __all__ = ["EFFECTS", "OUTSIDE", "Hidden", "make_hidden"]
 EFFECTS = ("inertial-drag", "depth-hardening", "plastic-sinkage", "adhesion", "shaft-friction", "layering")
 OUTSIDE = ("floor-vibration", "loose-mass", "shock", "load-cell-drift", "sloshing")
 _STEP = 5e-6
+_COLOURED_DEPTH = 0.25
+"""Share of the campaigns whose depth sensor's noise is correlated from row to row."""
 
 _Columns = dict[str, np.ndarray]
 
@@ -34,7 +36,10 @@ class Hidden:
     signature: float
     """Root mean square of what the effect changes, after K and C are fitted to it, over the noise."""
     coloured: bool
+    """Whether the noise of force and acceleration is correlated from row to row."""
     trials: int = 0
+    depth_persistence: float = 0.0
+    """Correlation of the depth's noise from row to row: 0 for white noise."""
     extra: dict[str, Any] = field(default_factory=dict)
 
 
@@ -123,8 +128,11 @@ def make_hidden(
             low, high = (math.log(amplitude), high) if measure < strength else (low, math.log(amplitude))
         made = [_trial(plan, k, settings) for k in range(len(clean))]
         measure = _signature(plan, clean, made, list(range(len(clean))))
-    campaign = _record(random, plan, made, coloured)
-    return campaign, Hidden(effects, outside, settings, measure, coloured, len(clean))
+    # Drawn apart, so that a seed goes on making the same campaign but for this.
+    apart = np.random.default_rng((seed, 1))
+    persistence = float(apart.uniform(0.3, 0.8)) if apart.random() < _COLOURED_DEPTH else 0.0
+    campaign = _record(random, plan, made, coloured, persistence)
+    return campaign, Hidden(effects, outside, settings, measure, coloured, len(clean), persistence)
 
 
 def _draw_kind(random: np.random.Generator) -> str:
@@ -314,16 +322,18 @@ def _signature(plan: dict[str, Any], clean: list[_Columns], made: list[_Columns]
     return float(np.sqrt(np.mean(d**2)))
 
 
-def _record(random: np.random.Generator, plan: dict[str, Any], made: list[_Columns], coloured: bool) -> Campaign:
+def _correlated(white: np.ndarray, persistence: float) -> np.ndarray:
+    """An autoregressive law of order one with unit variance."""
+    if persistence:
+        for k in range(1, len(white)):
+            white[k] = persistence * white[k - 1] + math.sqrt(1 - persistence**2) * white[k]
+    return white
+
+
+def _record(
+    random: np.random.Generator, plan: dict[str, Any], made: list[_Columns], coloured: bool, depth_persistence: float
+) -> Campaign:
     persistence = float(random.uniform(0.3, 0.8)) if coloured else 0.0
-
-    def noise(count: int, std: float) -> np.ndarray:
-        white = random.standard_normal(count)
-        if persistence:
-            for k in range(1, count):
-                white[k] = persistence * white[k - 1] + math.sqrt(1 - persistence**2) * white[k]
-        return std * white
-
     trials, recordings = [], {}
     for index, (this, data) in enumerate(zip(plan["trials"], made, strict=True)):
         name = f"{index + 1:03d}"
@@ -333,8 +343,9 @@ def _record(random: np.random.Generator, plan: dict[str, Any], made: list[_Colum
         n = len(data["time"])
         column, std = ("force_N", plan["noise_force"]) if this["driven"] else ("accel_m_s2", plan["noise_accel"])
         recordings[(name, "data")] = Recording({
-            "t_s": data["time"], "depth_m": data["depth"] + plan["noise_depth"] * random.standard_normal(n),
-            column: data["other"] + noise(n, std),
+            "t_s": data["time"],
+            "depth_m": data["depth"] + plan["noise_depth"] * _correlated(random.standard_normal(n), depth_persistence),
+            column: data["other"] + std * _correlated(random.standard_normal(n), persistence),
         })  # fmt: skip
     tables = PenetrationCampaign.model_validate({
         "format": "hedgehog-campaign/1", "kind": "penetration", "name": "made up",

@@ -9,7 +9,7 @@ what belongs to the spring with the K that the model gives.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -91,6 +91,15 @@ def _own(path: Path, number: int, effect: EffectTable) -> OwnEffect:
     return own
 
 
+_SPEED = 1.1
+"""Factor beyond the speeds that a model was fitted to from which on it is extrapolated."""
+
+
+def _range(speeds: Sequence[float]) -> str:
+    low, high = min(speeds), max(speeds)
+    return f"{low:g}" if math.isclose(low, high) else f"{low:g} to {high:g}"
+
+
 @dataclass(frozen=True)
 class AmendedLaw:
     """K, C and the effects of a model, for the spike of `settings`. Made by `read_law`."""
@@ -121,7 +130,7 @@ class AmendedLaw:
         return self.model.surface.stiffness, self.model.surface.damping
 
     def warnings(self) -> list[str]:
-        """What a reader must know: a spike that is not the model's."""
+        """What a reader must know: a spike that is not the model's, and speeds that it was not fitted to."""
         own, spike = self.settings, self.model.spike
         said = []
         if spike.diameter is not None and not math.isclose(spike.diameter, own.tip_diameter, rel_tol=0.01):
@@ -133,11 +142,47 @@ class AmendedLaw:
             )
         if spike.tip != own.tip:
             said.append(f"the model is of a {spike.tip} tip, this one is a {own.tip}; --tip {spike.tip} is its own")
-        if spike.mass is not None and not math.isclose(spike.mass, own.mass, rel_tol=1e-3):
+        drops = (*own.drop_speeds, *own.other_drop_speeds)
+        if drops and spike.mass is not None and not math.isclose(spike.mass, own.mass, rel_tol=1e-3):
             said.append(
                 f"what fell in the model's trials was {spike.mass:g} kg, a drop here moves {own.mass:g} kg under "
                 f"{own.weight:.3g} N; --mass {spike.mass:g}, and --load for what it weighs, are the model's own"
             )
+        return [*said, *self._extrapolated()]
+
+    @property
+    def fitted_to(self) -> str:
+        """The speeds of the trials that the model was fitted to, in words; empty where the file has none."""
+        driven, dropped, by_hand = self._speeds
+        parts = [f"pushes at {_range(driven)} m/s"] if driven else []
+        parts += ["pushes by hand"] if by_hand else []
+        parts += [f"drops at {_range(dropped)} m/s"] if dropped else []
+        return " and ".join(parts)
+
+    @property
+    def _speeds(self) -> tuple[list[float], list[float], bool]:
+        """Of pushes and drops that the model was fitted to [m/s], and whether some pushes have no nominal one."""
+        driven = [trial.speed for trial in self.model.trial if trial.mode == "driven"]
+        dropped = [trial.speed for trial in self.model.trial if trial.mode == "drop" and trial.speed is not None]
+        return [speed for speed in driven if speed], dropped, None in driven or 0.0 in driven
+
+    def _extrapolated(self) -> list[str]:
+        """Speeds of these runs beyond those of the model's trials; a drop has every speed below its own."""
+        own, (driven, dropped, by_hand) = self.settings, self._speeds
+        drops = {*own.drop_speeds, *own.other_drop_speeds}
+        if by_hand or not (driven or dropped):
+            return []
+        least, most = 0.0 if dropped else min(driven), max(driven + dropped)
+        pushes = {*own.speeds, *own.other_speeds, *([own.retreat_speed] if own.speeds or own.other_speeds else [])}
+        far = sorted(v for v in pushes | drops if not least / _SPEED <= v <= most * _SPEED)
+        said = []
+        if far:
+            said.append(
+                f"the model was fitted to {self.fitted_to}: what it says at {', '.join(f'{v:g}' for v in far)} m/s is "
+                f"extrapolated"
+            )
+        if drops and not dropped:
+            said.append("the model was fitted to pushes alone: what it says of drops is extrapolated")
         return said
 
     def plain(self, time_step: float) -> SpringDamper:

@@ -140,7 +140,7 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
             "runs": [_entry(unit, plain[unit.id], runs[unit.id]) for unit in units],
             "spike": asdict(make_spike(settings)) | {"load": settings.weight},
             "model": {"file": settings.model, "effects": list(law.effects)},
-            "departures": {"sentences": [_spike_words(settings)]},
+            "departures": {"sentences": _spike_words(settings, law)},
             "warnings": law.warnings(),
         }
         folder.write_result(result)
@@ -149,11 +149,13 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
     return result
 
 
-def _spike_words(settings: PenetrateSettings) -> str:
-    return (
+def _spike_words(settings: PenetrateSettings, law: AmendedLaw) -> list[str]:
+    falls = f"; a drop moves {settings.mass:g} kg under {settings.weight:.4g} N" if settings.drop_speeds else ""
+    spike = (
         f"The spike, the model's own where no option says otherwise: a {settings.tip} of "
-        f"{1e3 * settings.tip_diameter:g} mm; a drop moves {settings.mass:g} kg under {settings.weight:.4g} N."
+        f"{1e3 * settings.tip_diameter:g} mm{falls}."
     )
+    return [spike, *([f"The model was fitted to {law.fitted_to}."] if law.fitted_to else [])]
 
 
 def _entry(unit: Unit, plain: Penetration, amended: Penetration) -> dict[str, Any]:

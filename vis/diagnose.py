@@ -129,18 +129,25 @@ def _sentences(sentences: Sequence[str]) -> list[Block]:
 def _gap_table(said: Mapping[str, Any]) -> Block:
     gap, weighed = said["gap"], said.get("gap_with_scatter")
 
-    def cell(value: float | None) -> str:
-        return _DASH if value is None else short(value, 3)
+    def cell(value: float | None, error: float | None = None) -> str:
+        told = _DASH if value is None else short(value, 3)
+        return told if error is None else f"{told} ± {short(error, 1)}"
+
+    def error(one: Mapping[str, Any], stage: str, part: str) -> float | None:
+        return one.get("after_std", {}).get(part) if stage == "after" else None
 
     rows = [
-        (name, *(cell(one[stage][part]) for one in (gap, weighed) if one is not None for stage in ("before", "after")))
+        (name, *(cell(one[stage][part], error(one, stage, part)) for one in (gap, weighed) if one is not None
+                 for stage in ("before", "after")))
         for part, name in (("fit", "fitted trials"), ("held_out", "held-out trials"))
     ]  # fmt: skip
     head: tuple[str, ...] = ("", "base model", "best model")
     title = "The gap, chi-square per sample (1: the sensors' noise)"
     if weighed is not None:
         head += ("base model, replicates' scatter added", "best model, replicates' scatter added")
-        title += "; beside it with what replicates differ by added to the variance (1: as near as another run comes)"
+        title += "; beside it with what replicates differ by added to the variance (1: as near as another run comes"
+        freedom = weighed.get("freedom")
+        title += f"; their scatter rests on {freedom} degrees of freedom)" if freedom else ")"
     return table(head, rows, title=title)
 
 
@@ -222,11 +229,42 @@ def _settings(settings: Mapping[str, float]) -> str:
 
 
 def _evidence(said: Mapping[str, Any]) -> list[Block]:
-    rows = [(row["candidate"], f"{row['score']:.1f}", f"{row['left']:.3g}") for row in said.get("evidence", [])]
+    """A line a set of names; those no better than the base model in one sentence."""
+    plain = {"closes": None, "tried": 1, "better": True, "note": ""}  # of a folder from before there were candidates
+    rows = said.get("candidates") or [plain | dict(row) for row in said.get("evidence", [])]
     if not rows:
         return [text("Nothing was left that a candidate could explain: none was tried.")]
-    head = ("candidate (effect:form)", "evidence over the base model [nats]", "chi-square a sample beyond noise")
-    return [table(head, rows, title="Every candidate that was tried, the likeliest first")]
+    better = [
+        (row["candidate"], f"{row['score']:.1f}", _DASH if row["left"] is None else f"{row['left']:.3g}",
+         _DASH if row["closes"] is None else f"{100 * min(max(row['closes'], 0.0), 1.0):.0f} %", str(row["tried"]),
+         row["note"])
+        for row in rows if row["better"]
+    ]  # fmt: skip
+    worse = [" + ".join(row["effects"]) for row in rows if not row["better"]]
+    blocks: list[Block] = []
+    if better:
+        head = ("candidate (effect:form)", "evidence over the base model [nats]", "chi-square a sample beyond noise",
+                "of the gap closed", "forms tried", "")  # fmt: skip
+        title = "A line a set of names, in its best form; the likeliest first"
+        blocks.append(table(head, better, title=title, words=True))
+    if worse:
+        blocks.append(text(f"No better than the base model with its parameters fitted: {', '.join(worse)}."))
+    blocks.append(text("Every candidate in every form is in evidence.csv.", small=True))
+    return blocks
+
+
+def _sizes(said: Mapping[str, Any]) -> list[Block]:
+    rows = [
+        (size["effect"], short(size["signature"], 2), size["channel"], f"{short(size['rms'], 2)} {size['unit']}",
+         f"{short(size['most'], 2)} {size['unit']}",
+         _DASH if size["share"] is None else f"{100 * size['share']:.2g} %")
+        for size in said.get("sizes", []) if size["channel"] is not None
+    ]  # fmt: skip
+    if not rows:
+        return []
+    head = ("effect", "signature [noise]", "plainest in", "change, root mean square", "at most", "of what it reads")
+    return [table(head, rows, title="How large each effect is: what the readings would lack without it, all else "
+                                    "refitted, over the sensors' noise")]  # fmt: skip
 
 
 def _numbers(said: Mapping[str, Any]) -> list[Block]:
@@ -255,10 +293,21 @@ def _numbers(said: Mapping[str, Any]) -> list[Block]:
     if base:
         head = ("parameter", "before", "standard error", "after", "standard error", "unit")
         blocks.append(table(head, base, title="The base model's parameters"))
+    blocks = [*_sizes(said), *blocks[:1], *_equations(said), *blocks[1:]] if effects else blocks
     if blocks:
         blocks.append(text("Standard errors hold if the model is right and the noise is as it was found; what the form "
                            "of an effect leaves open is not in them.", small=True))  # fmt: skip
     return blocks
+
+
+def _equations(said: Mapping[str, Any]) -> list[Block]:
+    """The law that each number is of."""
+    rows = [row for row in said.get("equations", []) if row["equation"]]
+    if not rows:
+        return []
+    laws = [f"{row['effect']} ({row['form']}): {row['equation']}." for row in rows]
+    symbols = said.get("symbols", "")
+    return [listing(laws), *([text(f"{symbols}.", small=True)] if symbols else [])]
 
 
 def _unit(unit: str) -> str:

@@ -241,12 +241,14 @@ def draw_evidence(said: Mapping[str, Any]) -> Figure | None:
     """Bars of evidence, and what each candidate leaves: the best form of each single name, and the best sets of names
     that beat all of their parts."""
     best: dict[tuple[str, ...], Mapping[str, Any]] = {}
-    for row in said.get("evidence", []):
-        best.setdefault(tuple(row["effects"]), row)
+    orders: dict[frozenset[str], tuple[str, ...]] = {}  # one set of names, in whatever order they were added
+    for row in (*said.get("candidates", []), *said.get("evidence", [])):
+        best.setdefault(orders.setdefault(frozenset(row["effects"]), tuple(row["effects"])), row)
     if not best:
         return None
     score = {names: float(row["score"]) for names, row in best.items()}
     leading = _leading_names(said, score)
+    leading = orders.get(frozenset(leading), leading)
     singles = [names for names in best if len(names) == 1]
     sets = [names for names in best if len(names) > 1
             and all(score[names] > score.get((name,), -math.inf) + 0.05 for name in names)]  # fmt: skip

@@ -15,6 +15,7 @@ import numpy as np
 from .astray import allowed, astray, astray_finding, astray_held_out
 from .bounds import Bound, bounds_met, is_strained
 from .colour import Colour, find_colours, find_loud, whitener_for
+from .deciding import Gap, certain, closes, gap_of, smallest, unscattered, values_of_all, verdict_of
 from .effect_words import confirmation
 from .equivalence import Rival
 from .evidence import SMALL, Hypothesis, excess, held_out_fit, inflation, score, signature_matrix
@@ -23,14 +24,14 @@ from .gate import Verdict, held_out_gate, open_gate
 from .jitter import Jitter, find_jitter, steepness
 from .localise import Place, depends_on, latent_table, places, places_in
 from .next_steps import after_unknown
-from .prediction import Predicted, folds_of, predict
+from .prediction import Predicted
 from .problem import Finding, Form, Problem
 from .replicates import Scatter, exchanged, find_scatter, groups_of, odd_trials, split_trials, trends, with_scatter
 from .scatter_gap import gap_with_scatter, weighed_residuals
 from .search import Choice, choose
 from .unrest import Unrest, find_unrest
 
-__all__ = ["Diagnosis", "Gap", "diagnose", "one_number"]
+__all__ = ["Diagnosis", "Gap", "diagnose"]
 
 Tell = Callable[[str, float], None]
 
@@ -46,43 +47,10 @@ _MARGIN = 1.5
 """Standard deviations beyond the gate that something without a name must reach: no effect speaks for it."""
 _OUT_OF_THE_WAY = 0.5
 """Share of what the base model leaves from which on a name has not taken the motion out of the way."""
-_AS_LIKELY = 1.0
-"""Nats within which a third name is said as well."""
-_AS_LOUD, _RIGHT_FORM = 2.0, 0.02
-"""Chi-square per sample up to which a misfit of form is no louder than the sensors; and the share of what the base
-model leaves that it may be."""
-_NEXT_TO_NOTHING = 0.01
-"""The same share, of trials fitted and of trials held out, where it is louder: a form that is off by a tenth of its
-effect. In made-up campaigns of penetration two dozen right names left 0.011 at most of the fitted trials; of things
-outside the library names left 0.08 and more, but for one shock, which a crust explained on those it was fitted to."""
-_NO_NAME = 0.5
-"""Share of what the base model leaves, of trials fitted or held out, from which on a name explains too little to be
-one, where the gate sees that something is left. In five counts of tumbles right names left 0.47 at most of these."""
-_LOUD = 3.0
-"""Standard deviations of chi-square beyond which what a name leaves is no matter of chance."""
 _ASKED = 3
 """Hypotheses that are asked whether a trial of its own way is all that speaks against them."""
-_LATE = 0.5
-"""Share of a held-out trial's time up to which a model that explains all fitted ones must follow it."""
 _SEEN_ELSEWHERE = 3.0
 """Nats by which a name must be better than none on the other trials, where one trial goes its own way."""
-_CERTAIN = 0.1
-"""Share of what the base model leaves, fitted, predicted and held out, that may be left by a name that is certain
-beside something that has no name."""
-_MANY = 3
-"""Names that together bend to nearly anything, a trial that was set aside counted as one: each of so many must have one
-amplitude wherever it is looked at."""
-_ONE_NUMBER = 0.1
-"""And by how much of itself its amplitude may be uncertain when conditions are left out: what is there is the same in
-all of them, what stands for something else is not."""
-
-
-@dataclass(frozen=True)
-class Gap:
-    """Chi-square per valid sample, as docs/diagnose.md has it."""
-
-    fit: float
-    held_out: float | None
 
 
 @dataclass(frozen=True)
@@ -309,21 +277,21 @@ def diagnose(
     tell("verdict", 0.0)
     choice = replace(choice, best=replace(choice.best, fit=settled(choice.best.fit)))
     held = _held_out_verdict(choice.best.fit, held_out, seed) if held_out else None
-    verdict = _verdict(choice, held, held_out, seed, set_aside=bool(aside))
+    verdict = verdict_of(choice, held, held_out, seed, set_aside=bool(aside))
     asked = verdict == "unknown" and choice.left.passed and len(choice.best.effects) > 1  # before the second name
     if not (aside or asked) and (gone_astray := _own_ways(base, choice, verdict, held_out, seed, colours)):
         tell("a trial goes its own way: once more without it", 0.0)
         anew = again(problem, aside=gone_astray, looked_at=looked_at)
         if anew.verdict != "unknown":
             return anew
-    certain: tuple[str, ...] = ()
+    sure: tuple[str, ...] = ()
     if verdict == "unknown" and not restless and choice.best.effects and (wander := _unrest(choice.best.fit, held_out)):
         tell("replicates differ each in its own way: once more, against that", 0.0)
         anew = again(deepcopy(problem), aside=aside, looked_at=looked_at, restless=True, begun=None)
         if anew.verdict == "named" and anew.choice is not None:
             # Fitted, and the gap taken, with the sensors' noise alone.
-            certain = anew.effects
-            best = settled(fit(base.model.with_forms(anew.forms), _unscattered(anew.best)))
+            sure = anew.effects
+            best = settled(fit(base.model.with_forms(anew.forms), unscattered(anew.best)))
             # The table of candidates is of the likelihood in which they were weighed, its base model's with it.
             choice = replace(anew.choice, best=Hypothesis(best, score(best)), left=choice.left)
             held = _held_out_verdict(best, held_out, seed) if held_out else None
@@ -331,7 +299,7 @@ def diagnose(
     if verdict in ("named", "ambiguous") and held is not None and not held.passed:
         findings += _held_out_ways(choice.best.fit, held_out, seed)
     model_std = {**model_std, **unrest.model_std}
-    return told.finish(base, choice, colours, model_std, verdict, held=held, certain=certain)
+    return told.finish(base, choice, colours, model_std, verdict, held=held, sure=sure)
 
 
 @dataclass(frozen=True)
@@ -361,7 +329,7 @@ def _jittered(found: Fit, held_out: tuple[str, ...], known: tuple[Jitter, ...] =
     if not jitters:
         return found, ()
     problem: Any = found.model.problem
-    problem.shake(steepness(problem, jitters, _values_of_all(found, held_out), found.model.forms))
+    problem.shake(steepness(problem, jitters, values_of_all(found, held_out), found.model.forms))
     problem.rewhiten(found.values, found.model.forms)
     return fit(found.model, found.values), jitters
 
@@ -417,7 +385,7 @@ def _scatter(found: Fit, held_out: tuple[str, ...]) -> Scatter:
     model = replace(found.model, scatter=())
     if all(len(ids) < 2 for ids in groups_of(model.problem.trials).values()):
         return Scatter()
-    return find_scatter(fit(model.on((*model.trials, *held_out)), _unscattered(found)))
+    return find_scatter(fit(model.on((*model.trials, *held_out)), unscattered(found)))
 
 
 def _unrest(found: Fit, held_out: tuple[str, ...]) -> Unrest:
@@ -442,40 +410,14 @@ def _rescattered(found: Fit, scatter: Scatter) -> Fit:
     """The same with this scatter and no other, from where it was asked for and, with none, from here."""
     model = replace(found.model, scatter=scatter.parameters)
     if not scatter.parameters:
-        return fit(model, _unscattered(found))
-    return with_scatter(model, {**_unscattered(found), **scatter.values})
-
-
-def _unscattered(found: Fit) -> dict[str, float]:
-    scatter = {parameter.name for parameter in found.model.scatter}
-    return {name: value for name, value in found.values.items() if name not in scatter}
+        return fit(model, unscattered(found))
+    return with_scatter(model, {**unscattered(found), **scatter.values})
 
 
 def _differ(one: Mapping[str, Colour], other: Mapping[str, Colour]) -> bool:
     white = Colour("", 1.0, 0.0)
     pairs = [(one.get(name, white), other.get(name, white)) for name in set(one) | set(other)]
     return any(abs(a.persistence - b.persistence) > _OTHER or abs(a.std - b.std) > _OTHER * b.std for a, b in pairs)
-
-
-def _gap(problem: Problem, model: Model, values: Mapping[str, float], fitted: tuple[str, ...],
-         held_out: tuple[str, ...]) -> Gap:  # fmt: skip
-    def per_sample(trials: tuple[str, ...]) -> float:
-        pairs = [problem.chi_square(values, model.forms, trial) for trial in trials]
-        return sum(total for total, _ in pairs) / max(1, sum(count for _, count in pairs))
-
-    return Gap(per_sample(fitted), per_sample(held_out) if held_out else None)
-
-
-def _values_of_all(found: Fit, held_out: tuple[str, ...]) -> dict[str, float]:
-    """One set of numbers for all trials: what is shared as it was fitted, the held-out trials' own nuisances refitted.
-
-    The gap is that of one mean bed, how replicates differ is the gate's affair: where that was fitted, the fitted
-    trials' own nuisances are refitted without it.
-    """
-    model, values = replace(found.model, scatter=()), _unscattered(found)
-    if found.model.scatter:
-        values = held_out_fit(model, model.trials, values)
-    return held_out_fit(model, held_out, values)
 
 
 def _held_out_verdict(found: Fit, held_out: tuple[str, ...], seed: int) -> Verdict:
@@ -491,7 +433,7 @@ def _missed(base: Fit, held_out: tuple[str, ...], seed: int) -> tuple[str, ...]:
     values = held_out_fit(found.model, held_out, found.values)
     if astray_held_out(found, held_out, values, allowed(len(held_out)), seed=seed) is not None:
         return ()
-    after = _gap(found.model.problem, found.model, _values_of_all(found, held_out), found.model.trials, held_out)
+    after = gap_of(found.model.problem, found.model, values_of_all(found, held_out), found.model.trials, held_out)
     if (after.held_out or 0.0) <= SMALL:
         return ()
     return tuple(t for t in held_out if not held_out_gate(found, (t,), values, seed=seed).passed) or held_out
@@ -542,68 +484,6 @@ def _likeliest(choice: Choice) -> list[Hypothesis]:
     return list(found.values())
 
 
-def _verdict(
-    choice: Choice, held: Verdict | None, held_out: tuple[str, ...], seed: int, *, set_aside: bool = False
-) -> str:
-    """A name stands where its model leaves nothing, on the trials that were fitted and on those that were not, or too
-    little to speak of, or what a form that is not nature's leaves; and where it needs no number that the campaign all
-    but excludes. Else something is unknown."""
-    found = choice.best.fit
-    if not choice.best.effects or is_strained(found):
-        return "unknown"
-    if len(choice.best.effects) + set_aside >= _MANY and (choice.predicted is None or not one_number(choice)):
-        return "unknown"
-    after = _gap(found.model.problem, found.model, _values_of_all(found, held_out), found.model.trials, held_out)
-    fits, predicts = choice.left.passed, held is None or held.passed
-    if not fits and _too_little(choice, after.fit, held_out):
-        return "unknown"
-    little = after.fit <= SMALL and (after.held_out or 0.0) <= SMALL
-    little = little and (predicts or _share_left(choice, held_out) < _NO_NAME)
-    passed = (fits and predicts) or little or _of_form(choice, held_out)
-    if not passed and (fits or after.fit <= SMALL):  # or what is held out follows for a while only
-        values = held_out_fit(found.model, held_out, found.values)
-        ask = partial(astray_held_out, found, held_out, values, seed=seed, enough=SMALL)
-        passed = ask(allowed(len(held_out))) is not None
-        # Where nothing at all is left of the trials that were fitted, all held out but one may part, and late.
-        passed = passed or (fits and ask(len(held_out) - 1, share=_LATE) is not None)
-    return ("ambiguous" if choice.alternatives else "named") if passed else "unknown"
-
-
-def _of_form(choice: Choice, held_out: tuple[str, ...]) -> bool:
-    """Whether what is left is little beside what the base model leaves, and less where it is louder than the sensors:
-    nature's form is never quite the library's."""
-    found, base = choice.best.fit, choice.base.fit
-    left, share = [found.chi_square / found.count], [excess(found) / max(excess(base), 1e-9)]
-    if held_out:
-        left.append(_left_of(found, held_out))
-        share.append(_share_left(choice, held_out))
-    return (max(left) <= _AS_LOUD and share[0] < _RIGHT_FORM) or max(share) < _NEXT_TO_NOTHING
-
-
-def _too_little(choice: Choice, after: float, held_out: tuple[str, ...]) -> bool:
-    """Whether a name explains too little of what was fitted to be one. `after`: what it leaves a sample, in the gap's
-    units: a colour of the noise found beside a name that is none is what the name has missed."""
-    found, base = choice.best.fit, choice.base.fit
-    if excess(found) > _NO_NAME * excess(base):
-        return True
-    problem, trials = base.model.problem, base.model.trials
-    before = _gap(problem, base.model, _values_of_all(base, held_out), trials, ()).fit
-    of_form = getattr(problem, "left_by_forms", 1.0)
-    return after - 1 > max(_LOUD * math.sqrt(2 / found.count), of_form * (before - 1))
-
-
-def _share_left(choice: Choice, held_out: tuple[str, ...]) -> float:
-    """What the best leaves beyond noise of trials held out, over what the base model leaves."""
-    after, before = (_left_of(one, held_out) for one in (choice.best.fit, choice.base.fit))
-    return (after - 1) / max(before - 1, 1e-9)
-
-
-def _left_of(found: Fit, trials: tuple[str, ...]) -> float:
-    """Chi-square per sample of trials that took no part, their own nuisances refitted."""
-    (modes,) = found.model.on(trials).evaluate([held_out_fit(found.model, trials, found.values)])
-    return float(modes @ modes) / len(modes)
-
-
 @dataclass(frozen=True)
 class _Told:
     """What is known before anything is chosen."""
@@ -617,21 +497,21 @@ class _Told:
     def finish(
         self, base: Fit, choice: Choice | None, colours: Mapping[str, Colour], model_std: Mapping[str, float],
         verdict: str, *, last: Verdict | None = None, held: Verdict | None = None,
-        certain: tuple[str, ...] = (),
+        sure: tuple[str, ...] = (),
     ) -> Diagnosis:  # fmt: skip
         """The diagnosis, its gaps and places."""
         base = settled(base)
         problem, held_out, fitted = self.problem, self.held_out, base.model.trials
         best = choice.best.fit if choice is not None else base
-        base_values, best_values = _values_of_all(base, held_out), _values_of_all(best, held_out)
+        base_values, best_values = values_of_all(base, held_out), values_of_all(best, held_out)
         effects = choice.best.effects if choice is not None else ()
-        before = _gap(problem, base.model, base_values, fitted, held_out)
-        after = before if verdict == "none" else _gap(problem, best.model, best_values, fitted, held_out)
+        before = gap_of(problem, base.model, base_values, fitted, held_out)
+        after = before if verdict == "none" else gap_of(problem, best.model, best_values, fitted, held_out)
         if verdict == "unknown" and choice is not None and effects:
-            sure = effects if _certain(base, choice) and _closes(base, best, held_out) else certain
-            effects = tuple(effect for effect in effects if effect in sure)
+            stays = effects if certain(base, choice) and closes(base, best, held_out) else sure
+            effects = tuple(effect for effect in effects if effect in stays)
         where = [] if verdict == "none" else places(base.model, base_values, (*fitted, *held_out))
-        rivals = _smallest(choice) if choice is not None and verdict == "ambiguous" else ()
+        rivals = smallest(choice) if choice is not None and verdict == "ambiguous" else ()
         alternatives = tuple(next(e for e in rival.effects if e not in effects) for rival in rivals)
         rival_forms = tuple(next(f for f in rival.forms if f.effect == e)
                             for rival, e in zip(rivals, alternatives, strict=True))  # fmt: skip
@@ -652,50 +532,6 @@ class _Told:
         return replace(found, next_experiment=_next(found))
 
 
-def _certain(base: Fit, choice: Choice) -> bool:
-    """Whether what was found is there for certain although something else is too: it takes most of what the base model
-    leaves away, of what was fitted and of conditions left out in turn, without a number that the campaign excludes or
-    a scale that ends where the library does: with one, it may be no more than what bends nearest to something else."""
-    amplitudes = {form.amplitude for form in choice.best.forms}
-    ends = any(not met.strains and met.parameter not in amplitudes for met in bounds_met(choice.best.fit))
-    if ends or is_strained(choice.best.fit) or excess(choice.best.fit) >= _CERTAIN * excess(base):
-        return False
-    if choice.predicted is None or not one_number(choice):
-        return False
-    trials = [trial for trial in base.model.problem.trials if trial.id in base.model.trials]
-    predicted = predict(base, folds_of(trials))
-    if predicted is None:
-        return False
-    return choice.predicted.chi_square - choice.predicted.count < _CERTAIN * (predicted.chi_square - predicted.count)
-
-
-def one_number(choice: Choice) -> bool:
-    """Whether each effect's amplitude stays the same whichever condition is left out (jackknife)."""
-    assert choice.predicted is not None
-    folds = choice.predicted.learned
-    for form in choice.best.forms:
-        values = np.array([learned[form.amplitude] for learned in folds])
-        error = math.sqrt((len(values) - 1) * float(values.var()))
-        if error > _ONE_NUMBER * abs(choice.best.fit.values[form.amplitude]):
-            return False
-    return True
-
-
-def _closes(base: Fit, best: Fit, held_out: tuple[str, ...]) -> bool:
-    """Whether next to all that the base model leaves of trials held out is taken away, too, and what is left is no
-    louder than the sensors and what replicates differ by; true where there are none."""
-    if not held_out:
-        return True
-    before, after = (_left_of(found, held_out) for found in (base, best))
-    return after <= _AS_LOUD and after - 1 < _CERTAIN * max(before - 1, 0.0)
-
-
-def _smallest(choice: Choice) -> tuple[Hypothesis, ...]:
-    """The alternatives that are said: the likeliest, and a second one where it is about as likely as the first name."""
-    first, *others = choice.alternatives
-    return (first, *(h for h in others[:1] if h.score > choice.best.score - _AS_LIKELY))
-
-
 def _next(found: Diagnosis) -> str:
     """The next experiment: what tells two names apart, confirms one, or follows up what has no name."""
     problem, choice, best = found.problem, found.choice, found.best
@@ -707,6 +543,6 @@ def _next(found: Diagnosis) -> str:
         return problem.next_experiment(best.model.forms[0], found.rivals[0], best.values)
     weighed = gap_with_scatter(found)
     return after_unknown(
-        problem, found.best_values, found.forms, found.left, found.shares,
+        problem, found.best_values, found.forms, found.left, found.shares, beside=choice.best.effects,
         is_scatter=bool(found.effects) and weighed is not None and max(v or 0.0 for v in weighed.after) <= SMALL,
     )  # fmt: skip

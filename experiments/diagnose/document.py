@@ -16,15 +16,19 @@ from typing import Any
 
 import numpy as np
 
-from experiments.runfolder import write_json, write_series
+from experiments.runfolder import write_json, write_series, write_text
 
+from .candidates import candidate_rows
 from .diagnosis import Diagnosis
+from .effect_equations import SYMBOLS, equations_of, with_comments
 from .evidence import excess, inflation
 from .fitting import Fit
 from .gaps import Gaps
 from .localise import phases_of
+from .problem import Form
 from .scatter_gap import gap_with_scatter, scatter_std, sensor_std
-from .telling import PhaseTable
+from .sizes import effect_sizes
+from .telling import PhaseTable, valid_residuals
 
 __all__ = ["document", "write_diagnosis"]
 
@@ -54,7 +58,10 @@ def document(found: Diagnosis) -> dict[str, Any]:
         said["gap_with_scatter"] = {
             stage: {"fit": pair[0], "held_out": pair[1]}
             for stage, pair in (("before", weighed.before), ("after", weighed.after))
-        }
+        } | {
+            "after_std": {"fit": weighed.after_std[0], "held_out": weighed.after_std[1]},
+            "freedom": weighed.freedom,
+        }  # fmt: skip
     if found.verdict == "unknown":
         said["leading"] = _leading(found)
         said["left"] = [
@@ -80,7 +87,11 @@ def document(found: Diagnosis) -> dict[str, Any]:
     }  # fmt: skip
     said["evidence"] = _evidence(found)
     said["evidence_base"] = _evidence_base(found)
+    said["sizes"] = effect_sizes(found)
+    said["equations"] = _equations(found)
+    said["symbols"] = SYMBOLS if found.problem.kind == "penetration" and found.forms else ""
     said["equivalence"] = _equivalence(found)
+    said["candidates"] = candidate_rows(said)
     said["noise"] = _noise(found)
     said["model_std"] = dict(found.model_std)
     said["findings"] = [
@@ -90,6 +101,16 @@ def document(found: Diagnosis) -> dict[str, Any]:
     ]  # fmt: skip
     said["next_experiment"] = found.next_experiment
     return said
+
+
+def _equations(found: Diagnosis) -> list[dict[str, Any]]:
+    """The laws of the best model's effects, and the units of their parameters."""
+    problem, values = found.problem, found.best_values
+
+    def units(form: Form) -> dict[str, str]:
+        return {name: unit for name, (_, unit) in problem.reported(values, form).items()}
+
+    return equations_of(problem.kind, found.forms, units)
 
 
 def _equivalence(found: Diagnosis) -> list[dict[str, Any]]:
@@ -117,7 +138,10 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
     said = document(found)
     if found.verdict == "unknown":
         write_series(folder / "latent.csv", found.latent())
-    problem.write_model(str(folder / "model.toml"), found.best_values, found.forms)
+    path = folder / "model.toml"
+    problem.write_model(str(path), found.best_values, found.forms)
+    commented = with_comments(path.read_text(encoding="utf-8"), said["equations"], problem.kind)
+    write_text(path, commented)
     rows = _evidence(found)
     if rows:
         write_series(folder / "evidence.csv", {
@@ -148,7 +172,8 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
                     columns["scatter"] = wide[channel]
                 rest = [columns["measured"] - columns[stage] for stage in ("before", "after")]
                 held = trial.id in found.held_out
-                phase_table.add(channel, phases[rows_here], rest[0] / first, rest[1] / last, held_out=held)
+                phase_table.add(channel, phases[rows_here], valid_residuals(rest[0], first),
+                                valid_residuals(rest[1], last), held_out=held)  # fmt: skip
                 gaps.add(trial.id, channel, columns["t_s"], rest[0], rest[1], first, last, settings=trial.settings,
                          held_out=held)  # fmt: skip
             write_series(folder / "series" / f"{trial.id}.{channel}.csv", columns)

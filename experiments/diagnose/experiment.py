@@ -137,7 +137,8 @@ def _result(found: Diagnosis, said: dict[str, Any]) -> dict[str, Any]:
     if "gap_with_scatter" in said:
         quantities |= {
             f"gap_with_scatter_{stage}_{part}": {
-                "value": said["gap_with_scatter"][stage][part], "std": None, "unit": "1",
+                "value": said["gap_with_scatter"][stage][part], "unit": "1",
+                "std": said["gap_with_scatter"]["after_std"][part] if stage == "after" else None,
                 "note": "chi-square per sample, what replicates differ by added to the sensors' variance"}
             for stage in ("before", "after") for part in ("fit", "held_out")
         }  # fmt: skip

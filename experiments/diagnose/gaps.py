@@ -44,17 +44,17 @@ class Gaps:
         *, settings: Mapping[str, float], held_out: bool,
     ) -> None:  # fmt: skip
         """One channel of one trial: measured less modelled of both models and the noise of each, in the channel's SI
-        unit; shapes [n]."""
+        unit; shapes [n]. A reading whose noise is endless beside a model does not count there."""
         if not len(time):
             return
-        sums = self._channels.setdefault((channel, held_out), [0.0, 0.0, 0.0])
-        trials, over = self._conditions.setdefault(tuple(sorted(settings.items())), (set(), [0.0, 0.0, 0.0]))
+        sums = self._channels.setdefault((channel, held_out), [0.0] * 4)
+        trials, over = self._conditions.setdefault(tuple(sorted(settings.items())), (set(), [0.0] * 4))
         trials.add(trial)
-        plain = np.ones(len(std))
-        for target, scale, scale_after in ((sums, plain, plain), (over, std, std_after)):
-            target[0] += len(time)
-            target[1] += float(np.sum((before / scale) ** 2))
-            target[2] += float(np.sum((after / scale_after) ** 2))
+        for at, rest, noise in ((0, before, std), (2, after, std_after)):
+            counts = np.isfinite(noise)  # as in the gap: a reading at a switch of the contact says nothing
+            for target, scale in ((sums, np.ones(len(noise))), (over, noise)):
+                target[at] += int(counts.sum())
+                target[at + 1] += float(np.sum((rest[counts] / scale[counts]) ** 2))
         if len(time) >= _WINDOW:
             standing = time < 0  # a camera's zero, fitted to the whole trial, is no parting
             zero = float(before[standing].mean()) if channel in _ZEROED and standing.sum() > 1 else 0.0
@@ -70,8 +70,9 @@ class Gaps:
         return [
             {"channel": channel, "unit": unit_of(channel)[0], "held_out": held_out, "samples": int(count),
              "rms_before": unit_of(channel)[1] * math.sqrt(before / count),
-             "rms_after": unit_of(channel)[1] * math.sqrt(after / count)}
-            for (channel, held_out), (count, before, after) in sorted(self._channels.items())
+             "rms_after": unit_of(channel)[1] * math.sqrt(after / count_after)}
+            for (channel, held_out), (count, before, count_after, after) in sorted(self._channels.items())
+            if count and count_after
         ]  # fmt: skip
 
     @property
@@ -79,8 +80,9 @@ class Gaps:
         """Chi-square per sample by the trials' settings."""
         return [
             {"settings": dict(settings), "trials": sorted(trials), "samples": int(count), "before": before / count,
-             "after": after / count}
-            for settings, (trials, (count, before, after)) in sorted(self._conditions.items())
+             "after": after / count_after}
+            for settings, (trials, (count, before, count_after, after)) in sorted(self._conditions.items())
+            if count and count_after
         ]  # fmt: skip
 
     @property

@@ -65,10 +65,11 @@ _FOLLOW_PHASE = {
 
 def after_unknown(
     problem: Problem, values: Values, forms: Sequence[Form], worst: Sequence[Place], shares: Mapping[str, float],
-    *, is_scatter: bool = False,
+    *, beside: Sequence[str] = (), is_scatter: bool = False,
 ) -> str:  # fmt: skip
     """The next experiment, a sentence or two. `worst`: where the model that was found fails; `shares`: what the latent
-    force goes with (`localise.depends_on`); `is_scatter`: what replicates differ by is all that the model leaves."""
+    force goes with (`localise.depends_on`); `beside`: names that the model has already; `is_scatter`: what replicates
+    differ by is all that the model leaves."""
     sums: dict[str, float] = {}
     for place in worst:
         sums[place.trial] = sums.get(place.trial, 0.0) + place.excess
@@ -99,10 +100,16 @@ def after_unknown(
         return f"It repeats: {measured}, so that it is in {problem.whole}. To find what it is, {follow}."
     if share >= _IN_PART:
         return f"It repeats in part: {measured}. Of that part, {follow}; for the rest, see what differs between them."
+    alone = (
+        "Write down what changes between them (the preparation, the time since then, who moves what, what else runs in "
+        f"the room) and hold that still once; and {_FOLLOW['t_s']}."
+    )
+    if not beside:
+        return f"It does not repeat: {measured}, so that it differs from trial to trial. {alone}"
+    names = " and ".join(beside)
     return (
-        f"It does not repeat: {measured}, so that it differs from trial to trial. Write down what changes between them "
-        f"(the preparation, the time since then, who moves what, what else runs in the room) and hold that still once; "
-        f"and {_FOLLOW['t_s']}."
+        f"What is left beside {names} does not repeat: {measured}, so that it is each trial's own and no second effect "
+        f"of {problem.whole}; {names} is what these trials have in common. To see more, make them more alike. {alone}"
     )
 
 

@@ -14,11 +14,12 @@ from experiments.campaign import Campaign, PenetrationCampaign, Recording
 from experiments.campaign.tables import PenetrationTrial
 
 from .colour import Colour, colour_of
+from .noise_words import together
 from .penetration_depth import SmoothDepth, smooth_depth
 from .penetration_drive import Holds
 from .problem import Array, Finding, TrialInfo
 from .replicates import parted
-from .stuck import clipped, stuck_rows
+from .stuck import clipped, cut_rows, stuck_rows
 
 __all__ = ["Prepared", "prepare"]
 
@@ -38,7 +39,8 @@ _OUTLIER = 8.0
 
 @dataclass(frozen=True)
 class Prepared:
-    """One trial. Driven: rows with both depth and force. Drop: the times of all rows, and which have what."""
+    """One trial. Driven: rows with a depth, on which the force of a law with a memory depends whether or not the sensor
+    read it. Drop: all rows. And which rows have what."""
 
     table: PenetrationTrial
     info: TrialInfo
@@ -49,7 +51,7 @@ class Prepared:
     depth: Array
     """As measured [m], shape [n]."""
     other: Array
-    """Force [N] or acceleration [m/s2], shape [n]."""
+    """Force [N] or acceleration [m/s2], NaN where there is none, shape [n]."""
     has_depth: NDArray[np.bool_]
     has_other: NDArray[np.bool_]
     smooth: SmoothDepth | None = None
@@ -71,21 +73,46 @@ def prepare(campaign: Campaign) -> tuple[list[Prepared], list[Finding]]:
     assert isinstance(tables, PenetrationCampaign)
     trials: list[Prepared] = []
     findings: list[Finding] = []
+    cuts = _cuts(campaign, tables)
     for table in tables.trial:
         recording = campaign.recording(table.id, "data")
         assert recording is not None
-        trial, found = _one(tables, table, recording)
+        trial, found = _one(tables, table, recording, cut=cuts.get(table.id))
         findings += found
         if trial is not None:
             trials.append(trial)
     if not trials:
         said = "; ".join(finding.what for finding in findings)
         raise ValueError(f"no trial of {tables.name!r} can be used: {said}")
+    campaign = _without(campaign, cuts)
     trials, colours = _recoloured(campaign, trials)
-    findings += [Finding(trial="", channel="depth", what=colour.sentence) for colour in dict.fromkeys(colours.values())]
+    if colours:
+        findings.append(Finding(trial="", channel="depth", what=together(list(dict.fromkeys(colours.values())))))
     trials = _alike(campaign, trials, colours)
     infos = parted([trial.info for trial in trials], {trial.info.id: _path(trial) for trial in trials})
     return [replace(trial, info=info) for trial, info in zip(trials, infos, strict=True)], findings
+
+
+def _cuts(campaign: Campaign, tables: PenetrationCampaign) -> dict[str, NDArray[np.int64]]:
+    """Rows of each push at which the amplifier shows 0 for all that is less."""
+    forces = {
+        table.id: recording["force_N"] for table in tables.trial
+        if table.mode == "driven" and (recording := campaign.recording(table.id, "data")) is not None
+    }  # fmt: skip
+    if not forces:
+        return {}
+    rows = cut_rows(list(forces.values()), stds(tables, True)[1])
+    return {id: own for id, own in zip(forces, rows, strict=True) if len(own)}
+
+
+def _without(campaign: Campaign, cuts: Mapping[str, NDArray[np.int64]]) -> Campaign:
+    """The same with gaps in the place of forces that are cut off."""
+    recordings = dict(campaign.recordings)
+    for id, rows in cuts.items():
+        columns = {name: column.copy() for name, column in recordings[id, "data"].columns.items()}
+        columns["force_N"][rows] = np.nan
+        recordings[id, "data"] = replace(recordings[id, "data"], columns=columns)
+    return replace(campaign, recordings=recordings) if cuts else campaign
 
 
 def _recoloured(campaign: Campaign, trials: list[Prepared]) -> tuple[list[Prepared], dict[str, Colour]]:
@@ -159,8 +186,8 @@ def stds(tables: PenetrationCampaign, driven: bool) -> tuple[float, float]:
 
 def _one(
     tables: PenetrationCampaign, table: PenetrationTrial, recording: Recording, *, alike: Holds = (),
-    colour: Colour | None = None,
-) -> tuple[Prepared | None, list[Finding]]:
+    colour: Colour | None = None, cut: NDArray[np.int64] | None = None,
+) -> tuple[Prepared | None, list[Finding]]:  # fmt: skip
     driven = table.mode == "driven"
     channel, key = ("force", "force_N") if driven else ("accel", "accel_m_s2")
     std_depth, std_other = stds(tables, driven)
@@ -172,10 +199,11 @@ def _one(
         findings.append(Finding(trial=table.id, what=f"trial {table.id}: {what}", channel=where, from_s=span[0],
                                 to_s=span[1], set_aside=rows is not None))  # fmt: skip
 
+    blind = np.isin(np.arange(len(time)), cut) if cut is not None else np.zeros(len(time), dtype=bool)
     keep = np.concatenate([[True], np.diff(time) > 0])  # a coarse clock repeats itself: the first reading rules
     if not keep.all():
         say(f"{int((~keep).sum())} rows repeat the time before them and are left out")
-        time, depth, other = time[keep], depth[keep], other[keep]
+        time, depth, other, blind = time[keep], depth[keep], other[keep], blind[keep]
     for name, values in (("depth", depth), (channel, other)):
         missing = int(np.isnan(values).sum())
         if missing == len(values):
@@ -187,7 +215,12 @@ def _one(
         rows = np.arange(jump, len(time))
         say(f"the clock jumps by {time[jump] - time[jump - 1]:.3g} s where the motion goes on as if it had not; all "
             f"that follows is set aside", rows=rows)  # fmt: skip
-        time, depth, other = time[:jump], depth[:jump], other[:jump]
+        time, depth, other, blind = time[:jump], depth[:jump], other[:jump], blind[:jump]
+    if blind.any():
+        say(f"{int(blind.sum())} readings of force are cut off at 0 or next to it: it reads exactly 0 and never less, "
+            f"which its noise would, so that it shows nothing that pulls (adhesion would be hidden); they are left out",
+            where="force", rows=np.flatnonzero(blind))  # fmt: skip
+        other[blind] = np.nan
     steps = np.diff(time)
     usual = float(np.median(steps)) if len(steps) else 0.0
     for k in np.flatnonzero(steps > np.maximum(10 * usual, _LONG * float(np.ptp(time)) if len(time) else 0.0)):
@@ -257,16 +290,12 @@ def _driven(
     louder, persistence = (max(colour.std, 1.0), colour.persistence) if colour is not None else (1.0, 0.0)
     smooth = smooth_depth(time[known], depth[known], louder * std, alike=alike, persistence=persistence)
     smooth = replace(smooth, inflation=louder * float(np.sqrt((1 + persistence) / (1 - persistence))))
-    both = known & np.isfinite(other)
-    rows = both[known]
-    smooth = replace(smooth, depth=smooth.depth[rows], speed=smooth.speed[rows], depth_error=smooth.depth_error[rows],
-                     speed_error=smooth.speed_error[rows])  # fmt: skip
     speed = float(table.speed) if table.speed else float(np.percentile(np.abs(smooth.speed), 80))
-    everything = np.ones(int(both.sum()), dtype=bool)
-    info = _info(tables, table, speed)
+    time, depth, other = time[known], depth[known], other[known]
     return Prepared(
-        table, info, tables.diameter_of(table), time[both], depth[both], other[both], everything, everything, smooth
-    ), findings
+        table, _info(tables, table, speed), tables.diameter_of(table), time, depth, other, np.isfinite(depth),
+        np.isfinite(other), smooth,
+    ), findings  # fmt: skip
 
 
 def _info(tables: PenetrationCampaign, table: PenetrationTrial, speed: float) -> TrialInfo:

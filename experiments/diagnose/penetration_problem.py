@@ -142,8 +142,9 @@ class PenetrationProblem:
         A drop from speed v to depth z without loss: K z^2 / 2 = m v^2 / 2 + m g z.
         """
         driven = [trial for trial in self._trials.values() if trial.driven and trial.diameter == diameter]
-        top = sum(float((t.smooth.depth * t.other)[t.smooth.depth > 0].sum()) for t in driven if t.smooth is not None)
-        down = sum(float((t.smooth.depth**2)[t.smooth.depth > 0].sum()) for t in driven if t.smooth is not None)
+        below = [(t, t.has_other & (t.smooth.depth > 0)) for t in driven if t.smooth is not None]
+        top = sum(float((t.smooth.depth * t.other)[rows].sum()) for t, rows in below if t.smooth is not None)
+        down = sum(float((t.smooth.depth**2)[rows].sum()) for t, rows in below if t.smooth is not None)
         if down > 0 and top > 0:
             return top / down
         found = []
@@ -255,7 +256,7 @@ class PenetrationProblem:
             rest, shaken = self._missed(trial, model), self._shaken.get(trial.info.id)
             return rest if shaken is None else shaken.whitened(rest)
         directions, shrink, doubtful = self._whitening[trial.info.id]
-        rest = (trial.other - model) / stds(self.tables, True)[1] / doubtful
+        rest = (trial.other - model)[trial.has_other] / stds(self.tables, True)[1] / doubtful
         rest = rest - directions @ (shrink * (directions.T @ rest)) if len(shrink) else rest
         return _bounded(rest)
 
@@ -273,7 +274,7 @@ class PenetrationProblem:
                 if drops:
                     found[trial.info.id] = _of_drop(trial, out[0][:, 0], out[0][:, 2], self.tables)
                 else:  # along the path as it was smoothed
-                    force = np.interp(trial.time + late, trial.time, out[0])
+                    force = np.interp(trial.time[trial.has_other] + late, trial.time, out[0])
                     found[trial.info.id] = force / stds(self.tables, True)[1]
         return found
 
@@ -311,13 +312,15 @@ class PenetrationProblem:
             # An effect may begin with a jump at the surface: as large as the force is measured to be just below it.
             depth_here = np.maximum(8 * smooth.depth_std, _SHALLOW * self._scales.depth)
             shallow = (smooth.depth > 0) & (smooth.depth < depth_here)
+            shallow &= trial.has_other
             below = float(np.median(np.abs(trial.other[shallow]))) if shallow.any() else 0.0
             start = max(jump, below) + np.abs(by_depth).max() * smooth.depth_std
             touch = start * _touching(trial)
-            turn = _turning(smooth.speed, smooth.speed_std, trial.other, std_force)
+            rows = trial.has_other
+            turn = _turning(smooth.speed[rows], smooth.speed_std[rows], trial.other[rows], std_force)
             shaken = self._along.get(trial.info.id, 0.0)
-            doubtful = np.sqrt(1 + (bend**2 + touch**2 + turn**2) / std_force**2 + shaken**2)
-            left, sizes, _ = np.linalg.svd(factor / std_force / doubtful[:, None], full_matrices=False)
+            doubtful = np.sqrt(1 + ((bend**2 + touch**2)[rows] + turn**2) / std_force**2 + shaken**2)
+            left, sizes, _ = np.linalg.svd(factor[rows] / std_force / doubtful[:, None], full_matrices=False)
             kept = sizes > 1e-3
             self._whitening[trial.info.id] = (left[:, kept], 1 - 1 / np.sqrt(1 + sizes[kept] ** 2), doubtful)
 
@@ -342,11 +345,11 @@ class PenetrationProblem:
             missed = self._missed(this, self._run([values], forms, [this])[0][0])
             return float(missed @ missed), len(missed)
         force = self._run([values], forms, [this])[0][0]
-        rest = (this.other - force) / self.gap_std(values, forms, trial)
+        rest = (this.other - force)[this.has_other] / self.gap_std(values, forms, trial)
         return float(rest @ rest), len(rest)
 
     def gap_std(self, values: Values, forms: Sequence[Form], trial: str) -> Array:
-        """Of each row of a driven trial's force, as docs/diagnose.md has it for the gap [N], shape [n]."""
+        """Of each reading of a driven trial's force, as docs/diagnose.md has it for the gap [N], shape [n]."""
         this = self._trials[trial]
         assert this.smooth is not None
         ((_, by_depth, _),) = self._slopes(values, forms, [this])
@@ -356,7 +359,7 @@ class PenetrationProblem:
             most = float(_off_surface(this)[touch].max())
             deep, shallow = (self._run([values], forms, [this], (shift, 0.0))[0][0] for shift in (most, -most))
             doubt = np.where(touch, np.maximum(doubt, 0.5 * np.abs(deep - shallow)), doubt)
-        return np.hypot(stds(self.tables, True)[1], doubt)
+        return np.hypot(stds(self.tables, True)[1], doubt[this.has_other])
 
     # What is seen -----------------------------------------------------------------------------------------------------
 
@@ -365,8 +368,8 @@ class PenetrationProblem:
         this = self._trials[trial]
         std_depth, std_other = stds(self.tables, this.driven)
         if this.driven:
-            n = len(this.time)
-            return Samples(time=this.time, channel=np.full(n, "force"), std=np.full(n, std_other))
+            time = this.time[this.has_other]
+            return Samples(time=time, channel=np.full(len(time), "force"), std=np.full(len(time), std_other))
         first, second = this.time[this.has_depth], this.time[this.has_other]
         return Samples(
             time=np.concatenate([first, second]),
@@ -377,9 +380,7 @@ class PenetrationProblem:
     def noise(self, random: np.random.Generator, trial: str) -> Array:
         """Standard normal: the whitening has taken the depth's error in."""
         this = self._trials[trial]
-        return random.standard_normal(
-            len(this.time) if this.driven else int(this.has_depth.sum() + this.has_other.sum())
-        )
+        return random.standard_normal(int(this.has_other.sum()) + (0 if this.driven else int(this.has_depth.sum())))
 
     def _state(self, values: Values, forms: Sequence[Form], trial: str) -> tuple[Array, Array, NDArray[np.str_], Array]:
         """Depth, speed, phase, and model's force or motion at every row."""
@@ -397,7 +398,8 @@ class PenetrationProblem:
         """See `Problem`."""
         this = self._trials[trial]
         names = self._state(values, forms, trial)[2]
-        return names if this.driven else np.concatenate([names[this.has_depth], names[this.has_other]])
+        force = names[this.has_other]
+        return force if this.driven else np.concatenate([names[this.has_depth], force])
 
     def reported(self, values: Values, form: Form) -> dict[str, tuple[float, str]]:
         """Forces and lengths of the campaign's middle diameter in SI units; exponents and shares as they are."""
@@ -441,7 +443,8 @@ class PenetrationProblem:
         this = self._trials[trial]
         _, _, _, model = self._state(values, forms, trial)
         if this.smooth is not None:
-            return {"force": {"t_s": this.time, "measured": this.other, "model": model, "depth_m": this.smooth.depth}}
+            columns = {"t_s": this.time, "measured": this.other, "model": model, "depth_m": this.smooth.depth}
+            return {"force": {name: column[this.has_other] for name, column in columns.items()}}
         return {
             name: {"t_s": this.time[rows], "measured": measured[rows], "model": model[rows, column]}
             for name, measured, rows, column in (
@@ -487,8 +490,8 @@ class PenetrationProblem:
             return []
         still = {**values, **{self._named("damping", diameter): 0.0 for diameter in self._diameters}}
         pushes = [
-            Push(trial.diameter, trial.smooth.depth, trial.smooth.speed, trial.other,
-                 self._run([still], forms, [trial])[0][0])
+            Push(trial.diameter, *(column[trial.has_other] for column in (
+                trial.smooth.depth, trial.smooth.speed, trial.other, self._run([still], forms, [trial])[0][0])))
             for trial in self._trials.values() if trial.smooth is not None
         ]  # fmt: skip
         return remarks(pushes, tuple(dict.fromkeys(form.effect for form in forms)))

@@ -251,7 +251,7 @@ class Search:
             seen: set[str] = set()
             beside = self._beside(best)
             if beside:  # what stands out beside the first name, whatever it is alone
-                found = self._enriched(max(beside, key=lambda h: h.score))
+                found = self._enriched(self._likeliest(best, beside))
                 if self._worth(best, found) and (self._next_to_all(found) or self._gate(found).passed):
                     return found
                 tried += [found, *beside]
@@ -268,10 +268,9 @@ class Search:
                 model, values = best.fit.model, best.fit.values
                 others = [form for form in model.problem.forms if form.effect not in best.effects]
                 tried += self._begun(model, next_starts(model, values, others, most=_BEST))
-            tried.sort(key=lambda h: -h.score)
             if not tried:
                 return best
-            new = self._enriched(tried[0])
+            new = self._enriched(self._likeliest(best, tried))
             if not self._worth(best, new):
                 return best
             best = new
@@ -297,7 +296,30 @@ class Search:
         left = excess(best.fit)
         return left < _SHARE_OF_FORM * excess(self.base.fit) and best.fit.chi_square < SMALL * best.fit.count
 
+    def _likeliest(self, best: Hypothesis, tried: Sequence[Hypothesis]) -> Hypothesis:
+        """The likeliest of `tried`, with the noise as it shows where the least is left: until the motion is out of the
+        way a colour is part of every misfit, and the tempered evidence hardly tells one misfit from another."""
+        first = max(tried, key=lambda h: h.score)
+        least = min(tried, key=lambda h: h.fit.objective)
+        pair = self._in_its_noise(first, least) if least is not first else None
+        return least if pair is not None and pair[1].score > pair[0].score else first
+
+    def _in_its_noise(self, one: Hypothesis, other: Hypothesis) -> tuple[Hypothesis, Hypothesis] | None:
+        """Both weighed with the noise that `other` leaves; None where that is the noise they were weighed with."""
+        found = self._recoloured(other.fit) if self._recoloured is not None else other.fit
+        if found is other.fit:
+            return None
+        same = fit(replace(one.fit.model, whitener=found.model.whitener), one.fit.values)
+        return Hypothesis(same, score(same)), Hypothesis(found, score(found))
+
     def _worth(self, best: Hypothesis, new: Hypothesis) -> bool:
+        """Whether a further name is worth saying, with the noise as it was taken or as it shows beside the name."""
+        if self._worth_in_noise(best, new):
+            return True
+        pair = self._in_its_noise(best, new)
+        return pair is not None and self._worth_in_noise(*pair)
+
+    def _worth_in_noise(self, best: Hypothesis, new: Hypothesis) -> bool:
         """Whether a further name is more than the misfit of the first one's form: it takes most of what is left
         away, or needs no more the number that the campaign excludes."""
         left = max(excess(best.fit), 0.0)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Clipped", "clipped", "stuck_rows"]
+__all__ = ["Clipped", "clipped", "clipped_wheel", "cut_rows", "stuck_rows"]
 
 _LONG = 12
 """Equal readings in a row that noise does not make."""
@@ -17,6 +19,10 @@ _AT_THE_END, _IN_A_ROW = 8, 4
 """Readings at the very end of a channel's range, and those of them in a row, from which on it clips there."""
 _NEXT = 2
 """Readings at the value next to that: more, and it is a coarse channel that turns there."""
+_BESIDE, _SLIGHT = 7, 6.0
+"""Rows on either side of a zero that are looked at, and standard deviations up to which a reading may belong to it."""
+_NOISY = 0.2
+"""Share of the stated noise that a wheel's speed must have below where it clips."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +47,7 @@ class Clipped:
 def clipped(values: NDArray[np.float64]) -> list[Clipped]:
     """The ends of a channel's range at which it clips; `values`: NaN in gaps, shape [n].
 
-    Zeros are let be: they are what a sensor says that is cut off there, or at rest.
+    Zeros are let be: they are what a sensor says that is at rest, or cut off there (`cut_rows`).
     """
     known = np.flatnonzero(np.isfinite(values))
     own = values[known]
@@ -61,6 +67,47 @@ def clipped(values: NDArray[np.float64]) -> list[Clipped]:
         if longest >= _IN_A_ROW and int((own == near).sum()) <= _NEXT and repeats <= _USUAL:
             found.append(Clipped(known[at], float(end), highest))
     return found
+
+
+def clipped_wheel(values: NDArray[np.float64], std: float) -> list[Clipped]:
+    """The same of a wheel's speed, noise `std` as stated [rad/s]: only its highest readings, and only where it is noisy
+    below them, for a wheel without a torque turns evenly in a simulation."""
+    found = [end for end in clipped(values) if end.highest]
+    if not found:
+        return []
+    below = np.delete(values, found[0].rows)
+    below = below[np.isfinite(below)]
+    if len(below) < 3 * _AT_THE_END:
+        return []
+    noise = float(np.median(np.abs(np.diff(below, 4)))) / 0.6745 / math.sqrt(70)
+    return found if noise > _NOISY * std else []
+
+
+def cut_rows(recordings: Sequence[NDArray[np.float64]], std: float) -> list[NDArray[np.int64]]:
+    """Rows, recording by recording, at which one sensor is cut off at exactly 0: it never reads less in any of them,
+    although its noise `std` would. [n], NaN in gaps -> [m].
+
+    Rows beside a zero that read no more than the noise are counted among them: those that noise takes below 0 are
+    missing there, so that the others are too high on the mean.
+    """
+    none = [np.zeros(0, dtype=np.int64) for _ in recordings]
+    known = [values[np.isfinite(values)] for values in recordings]
+    everything = np.concatenate(known) if known else np.zeros(0)
+    zeros = int((everything == 0).sum())
+    if zeros < _AT_THE_END or len(everything) < 3 * _AT_THE_END or everything.min() < 0:
+        return none
+    if np.mean([_repeats(own) for own in known if len(own)]) > _USUAL:  # held, or so coarse that 0 is a step of it
+        return none
+    found = []
+    for values in recordings:
+        cut = np.convolve((values == 0).astype(float), np.ones(2 * _BESIDE + 1), mode="same") > 0.5
+        found.append(np.flatnonzero(cut & (values < _SLIGHT * std)))
+    return found
+
+
+def _repeats(known: NDArray[np.float64]) -> float:
+    """Share of readings that repeat the one before, zeros left out."""
+    return float(np.mean((np.diff(known) == 0) & (known[1:] != 0))) if len(known) > 1 else 0.0
 
 
 def stuck_rows(values: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -6,10 +6,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from .candidates import unnamed_sentence
 from .effect_words import meaning
 from .evidence import SMALL
 from .gaps import unit_of
-from .telling import shares_words, sure_sentences
+from .telling import shares_words, size_sentences, sure_sentences
 
 __all__ = ["scatter_sentence", "summary_sentences", "title_words"]
 
@@ -91,12 +92,12 @@ def scatter_sentence(said: Mapping[str, Any]) -> list[str]:
     if said["verdict"] == "none":
         return [
             f"What is beyond the noise is what replicates differ by{_scatter(said)}: weighed against that as well it "
-            f"is {_both(weighed['after'])}."
+            f"is {_both(weighed['after'], weighed)}{_rests_on(weighed)}."
         ]
     return [
         f"Weighed against what replicates differ by as well{_scatter(said)}, 1 being as near as another run of the "
         f"same comes, the gap is {_both(weighed['before'])} with the base model and "
-        f"{_both(weighed['after'])} with the best one."
+        f"{_both(weighed['after'], weighed)} with the best one{_rests_on(weighed)}."
     ]
 
 
@@ -111,9 +112,24 @@ def _scatter(said: Mapping[str, Any]) -> str:
     return f" ({', '.join(parts)})" if parts else ""
 
 
-def _both(gap: Mapping[str, float | None]) -> str:
-    out = "" if gap["held_out"] is None else f" ({gap['held_out']:.3g} held out)"
-    return f"{gap['fit']:.3g} fitted{out}"
+def _both(gap: Mapping[str, float | None], weighed: Mapping[str, Any] | None = None) -> str:
+    """`weighed`: `gap_with_scatter`, for the standard errors of its `after`."""
+    errors = {} if weighed is None else weighed.get("after_std", {})
+
+    def told(key: str) -> str:
+        error = errors.get(key)
+        return f"{gap[key]:.3g}" if error is None else f"{gap[key]:.2f} +- {error:.1g}"
+
+    out = "" if gap["held_out"] is None else f" ({told('held_out')} held out)"
+    return f"{told('fit')} fitted{out}"
+
+
+def _rests_on(weighed: Mapping[str, Any]) -> str:
+    """How well it is known what replicates differ by."""
+    freedom = weighed.get("freedom")
+    if not freedom:
+        return ""
+    return f"; what replicates differ by rests on {freedom} degree{'s' if freedom > 1 else ''} of freedom"
 
 
 # Where something has no name ------------------------------------------------------------------------------------------
@@ -154,6 +170,7 @@ def _candidates(said: Mapping[str, Any]) -> list[str]:
             f"{near['angle_deg']:.0f} degrees away in what it changes (0: the same): {apart}"
         )
     sentences.append(f"{first}.")
+    sentences += [*size_sentences(said), *unnamed_sentence(said)]
     rest = [row for row in _singles(said) if row["effects"][0] not in leading["effects"]][: _NAMES - 1]
     if rest and not certain:
         sentences.append(f"Of what the base model leaves beyond the noise{_weighed(said)}, {_closing(rest)}.")

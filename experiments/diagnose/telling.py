@@ -9,19 +9,20 @@ from typing import Any
 
 import numpy as np
 
+from .candidates import candidate_rows, no_better, unnamed_sentence
 from .effect_words import meaning
 from .problem import Array, Finding
 
 __all__ = [
     "PhaseTable", "findings_in_words", "setting_words", "shares_words", "sure_sentences", "told_tables",
-    "where_sentences",
+    "valid_residuals", "where_sentences",
 ]  # fmt: skip
 
 _UNITS = {"N_m": "N m", "m_s2": "m/s2", "m_s": "m/s", "m": "m"}
 _OTHER = 0.01
 """Relative difference from which on two settings are two."""
-_MORE = 0.05
-"""Nats by which a set of names must beat each of its parts to be listed."""
+_SMALL_SHARE, _SMALL_BESIDE = 0.05, 0.2
+"""Share of the force up to which an effect is called small, and of the largest one's signature."""
 _STANDING = 2.0
 """Chi-square per sample of a platform that stands from which on it is explained."""
 _MAINLY = 0.5
@@ -35,22 +36,30 @@ class PhaseTable:
         self._sums: dict[tuple[str, str, bool], list[float]] = {}
 
     def add(self, channel: str, phases: np.ndarray, before: Array, after: Array, *, held_out: bool) -> None:
-        """One channel of one trial: the phase, and the residuals over the noise of both models, shapes [n]."""
+        """One channel of one trial: the phase, and the residuals over the noise of both models, shapes [n]; NaN where a
+        reading counts for nothing beside that model (`valid_residuals`), as it does in the gap."""
         for phase in dict.fromkeys(phases.tolist()):
             own = phases == phase
-            sums = self._sums.setdefault((str(phase), channel, held_out), [0.0, 0.0, 0.0])
-            sums[0] += int(own.sum())
-            sums[1] += float(before[own] @ before[own])
-            sums[2] += float(after[own] @ after[own])
+            sums = self._sums.setdefault((str(phase), channel, held_out), [0.0, 0.0, 0.0, 0.0])
+            for at, rest in ((0, before[own]), (2, after[own])):
+                counted = rest[~np.isnan(rest)]
+                sums[at] += len(counted)
+                sums[at + 1] += float(counted @ counted)
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """``by_phase`` of diagnosis.json."""
+        """``by_phase`` of diagnosis.json; without cells in which no reading counts."""
         return [
             {"phase": phase, "channel": channel, "held_out": held_out, "samples": int(count), "before": before / count,
-             "after": after / count}
-            for (phase, channel, held_out), (count, before, after) in sorted(self._sums.items())
+             "after": after / count_after}
+            for (phase, channel, held_out), (count, before, count_after, after) in sorted(self._sums.items())
+            if count and count_after
         ]  # fmt: skip
+
+
+def valid_residuals(rest: Array, std: Array) -> Array:
+    """Residuals over the noise, NaN where the noise is endless: a reading taken while a contact switched."""
+    return np.where(np.isinf(std), np.nan, rest / std)
 
 
 def where_sentences(said: Mapping[str, Any]) -> list[str]:
@@ -94,7 +103,39 @@ def sure_sentences(said: Mapping[str, Any]) -> list[str]:
             else ""
         )
         sure += f"{near['angle_deg']:.0f} degrees away in what it changes (0: the same): {apart}"
-    return [*sentences, *([f"{sure}."] if sure else [])]
+    return [*sentences, *size_sentences(said), *([f"{sure}."] if sure else []), *unnamed_sentence(said)]
+
+
+def size_sentences(said: Mapping[str, Any]) -> list[str]:
+    """How large each effect is, the largest first, in a sentence; what is small is called so."""
+    sizes = said.get("sizes", [])
+    if not sizes:
+        return []
+    most = max(size["signature"] for size in sizes)
+    told = [_size_words(size, is_small=_is_small(size, most)) for size in sizes]
+    return [f"How large: {'; '.join(told)}."]
+
+
+def _is_small(size: Mapping[str, Any], most: float) -> bool:
+    share = size["share"]
+    return (share is not None and share <= _SMALL_SHARE) or size["signature"] <= _SMALL_BESIDE * most
+
+
+def _size_words(size: Mapping[str, Any], *, is_small: bool) -> str:
+    """shaft-friction changes the force by 0.4 N (root mean square, 1.2 N at most), 21 % of it, 9 times the noise"""
+    times = f"{size['signature']:.2g} times the noise of all readings"
+    if size["channel"] is None:
+        return f"{size['effect']} changes nothing that can be seen"
+    share = f", {100 * size['share']:.2g} % of it" if size["share"] is not None else ""
+    if is_small:
+        return (
+            f"{size['effect']} is small: it changes {size['channel']} by {size['most']:.2g} {size['unit']} at most"
+            f"{share}, {times}"
+        )
+    return (
+        f"{size['effect']} changes {size['channel']} by {size['rms']:.2g} {size['unit']} (root mean square; "
+        f"{size['most']:.2g} {size['unit']} at most){share}, {times}"
+    )
 
 
 def _parted(said: Mapping[str, Any]) -> list[str]:
@@ -174,19 +215,13 @@ def told_tables(said: Mapping[str, Any]) -> list[dict[str, Any]]:
             "rows": [[*key, *(shown(key, held, stage) for held in (False, True) for stage in ("before", "after"))]
                      for key in keys],
         })  # fmt: skip
-    best: dict[tuple[str, ...], Mapping[str, Any]] = {}
-    for row in said["evidence"]:
-        best.setdefault(tuple(sorted(row["effects"])), row)
-    singles = [row for names, row in best.items() if len(names) == 1]
-    alone = {names[0]: row["score"] for names, row in best.items() if len(names) == 1}
-    sets = [row for names, row in best.items()
-            if len(names) > 1 and all(row["score"] > alone.get(name, 0.0) + _MORE for name in names)][:2]  # fmt: skip
-    chosen = [row for row in best.values() if row in singles or row in sets]
-    if chosen:
+    rows = candidate_rows(said)
+    if rows:
+        worse = no_better(rows)
         tables.append({
-            "title": "candidates, the best form of each",
+            "title": "candidates, the best form of each" + (f" ({worse})" if worse else ""),
             "head": ["candidate", "evidence over the base model [nats]", "chi-square a sample beyond noise"],
-            "rows": [[row["candidate"], f"{row['score']:.1f}", f"{row['left']:.3g}"] for row in chosen],
+            "rows": [[row["candidate"], f"{row['score']:.1f}", f"{row['left']:.3g}"] for row in rows if row["better"]],
         })  # fmt: skip
     return tables
 

@@ -15,7 +15,7 @@ from scipy.ndimage import median_filter
 
 from .lags import find_lag, pieces
 from .problem import Finding
-from .stuck import clipped, stuck_rows
+from .stuck import clipped, clipped_wheel, stuck_rows
 from .tumble_data import CHANNELS, TrialData, TumbleData
 from .tumble_spikes import spikes
 
@@ -31,7 +31,6 @@ _SURE = 25.0  # squared standard deviations by which a clock that is right must 
 _SENSORS = {"the camera": ("theta", "x", "y"), "the IMU": ("gyro",), "the wheel": ("wheel",)}  # what is smooth
 _ALL = {"the camera": ("theta", "x", "y"), "the IMU": ("gyro", "ax", "ay"), "the wheel": ("wheel",)}
 _END = 0.1  # s by which a channel must be shorter than the others to be said
-_QUIET = 0.3  # std of its noise, up to which a channel's second differences are those of one that has none
 _MOVED = 0.02  # s by which a clock must have jumped to be told from the motion on either side
 _OFTEN = 4  # times that a marker may be lost before nothing is set aside where half of the rows would be
 
@@ -52,8 +51,8 @@ def checked(data: TumbleData) -> tuple[TumbleData, list[Finding]]:
                 continue
             _gaps(trial, name, mine, findings)
             _ends(trial, name, keep, findings)
-            # A wheel without noise reads the same as long as it turns evenly, in a hop or as fast as its motor can.
-            for end in clipped(trial.value[mine]) if name != "wheel" or _noisy(trial, mine) else ():
+            values = trial.value[mine]
+            for end in clipped(values) if name != "wheel" else clipped_wheel(values, float(trial.std[mine[0]])):
                 keep[mine[end.rows]] = False
                 findings.append(Finding(
                     trial=trial.id, channel=name, from_s=float(trial.time[mine[end.rows[0]]]),
@@ -83,13 +82,6 @@ def checked(data: TumbleData) -> tuple[TumbleData, list[Finding]]:
         kept = {field: getattr(trial, field)[keep] for field in ("time", "value", "std", "channel")}
         trials.append(trial if keep.all() else replace(trial, **kept))
     return replace(data, trials=tuple(trials)), findings
-
-
-def _noisy(trial: TrialData, mine: NDArray[np.intp]) -> bool:
-    """Whether readings of a channel scatter as its noise has them do, so that none would be like the next by itself."""
-    second = np.abs(np.diff(trial.value[mine], 2))
-    second = second[second > 0]  # where it clips there is none
-    return len(second) > 0 and float(np.median(second)) > _QUIET * float(trial.std[mine[0]])
 
 
 def _jumps(

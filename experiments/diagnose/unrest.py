@@ -108,9 +108,11 @@ def find_unrest(found: Fit, values: Mapping[str, float], trials: Sequence[str]) 
             freedom[condition] = len(blocks) - 1
         if squares and (law := _law(squares, freedom)) is not None:
             amplitudes = {condition: a / sizes[condition] for condition, a in law.amplitudes.items()}
+            std = _std(found, values, [groups[condition] for condition in squares], name)
             laws[name] = replace(
                 law, amplitudes=amplitudes, other=float(np.median(list(amplitudes.values()))),
-                std=_std(found, values, [groups[condition] for condition in squares], name),
+                # Where louder noise is all that rows show, what the law itself makes of slow modes.
+                std=std or _std_of(law, sizes) * _noise(problem, [id for ids in groups.values() for id in ids], name),
             )  # fmt: skip
     return Unrest(laws)
 
@@ -154,6 +156,21 @@ def _std(found: Fit, values: Mapping[str, float], groups: Sequence[Sequence[str]
         noise += float(sum((std**2).sum() for std in sensor))
         count += sum(len(std) for std in sensor)
     return math.sqrt(max(squares / freedom - noise / count, 0.0))
+
+
+def _std_of(law: Law, sizes: Mapping[tuple[object, ...], float]) -> float:
+    """Root mean square over the rows of what the law's modes make, in units of the noise; `sizes`: rows of a trial."""
+    each = [
+        law.amplitudes[condition] * float(_shape(law.bend, law.power, round(size)).mean())
+        for condition, size in sizes.items()
+    ]
+    return math.sqrt(float(np.mean(each)))
+
+
+def _noise(problem: Problem, trials: Sequence[str], name: str) -> float:
+    """Root mean square noise of a channel."""
+    stds = [samples.std[samples.channel == name] for samples in (problem.samples(trial) for trial in trials)]
+    return math.sqrt(float(np.mean(np.concatenate(stds) ** 2)))
 
 
 def _amplitude(square: Array, freedom: int, shape: Array) -> tuple[float, float]:

@@ -14,6 +14,7 @@ from experiments.campaign import Campaign, PenetrationCampaign, TumbleCampaign
 from experiments.campaign.tables import PenetrationTrial, TumbleTrial
 from experiments.diagnose.problem import Finding
 
+from .force_units import force_units
 from .penetration import penetration_oddities
 from .tumble import tumble_oddities
 from .words import times, unit_words
@@ -33,6 +34,8 @@ _NAMED = ("looks like", "would say so")
 """Words of a finding that names a unit."""
 _FOLLOWS = ("by a jump that no motion makes", "jumps so often", "what [sensors.", "its zero is to be taken off")
 """Words of findings that a named cause makes of itself."""
+_OFF_SCALE = "in other units (N/mm, g)"
+"""Words of a force that is out of all proportion."""
 _TOGETHER = (frozenset(("x", "y", "theta")), frozenset(("gyro", "ax", "ay")), frozenset(("wheel",)),
              frozenset(("depth",)), frozenset(("force",)), frozenset(("accel",)))  # fmt: skip
 """Channels of one sensor."""
@@ -85,6 +88,9 @@ def _each_implausible(campaign: Campaign) -> list[Finding]:
             Finding(trial=trial, channel="depth", what=f"trial {trial}: {what}" if trial else what, doubt=True)
             for trial, what in depth_zeros(campaign)
         ]
+        units = [Finding(trial="", channel="force", what=what, doubt=True) for what in force_units(campaign)]
+        if units:  # which says more than that it is off
+            found = [f for f in found if f.channel != "force" or _OFF_SCALE not in f.what] + units
     return found
 
 

@@ -77,12 +77,13 @@ def _off_scale(tables: PenetrationCampaign, trial: PenetrationTrial, depth: Arra
     else:
         mass = tables.spike.mass or 0.0
         push, what, key = mass * (trial.gravity - data["accel_m_s2"]), "mass (g - accel)", "[spike] mass or stiffness"
+    also = ", or the force in mN" if trial.mode == "driven" else ""
     met = float(np.nanmedian(np.where(near, push, np.nan))) if np.isfinite(push[near]).any() else 0.0
     if met > 0 and not 1 / _OFF_SCALE < met / spring < _OFF_SCALE:
         yield said(
             "force" if trial.mode == "driven" else "accel",
             f"{what} is {met:.3g} N at {1e3 * depth[last]:.3g} mm where stiffness = {tables.surface.stiffness:g} N/m ",
-            f"makes {spring:.3g} N: is {key} in other units (N/mm, g)?",
+            f"makes {spring:.3g} N: is {key} in other units (N/mm, g){also}?",
         )
 
 

@@ -105,6 +105,21 @@ def test_on_another_tip_a_section_goes_with_the_square_of_the_diameter_and_a_sha
     assert law(effects).warnings() == []
 
 
+def test_speeds_that_the_model_was_not_fitted_to_are_said_and_a_drops_mass_only_where_something_drops(law):
+    pushes = "".join(
+        f'[[trial]]\nid = "{k}"\nmode = "driven"\nspeed = {speed}\ngravity = 9.81\ndata = "{k}.csv"\n'
+        for k, speed in enumerate((0.01, 0.05))
+    )
+    drop = '[[trial]]\nid = "d"\nmode = "drop"\nspeed = 0.5\ngravity = 9.81\ndata = "d.csv"\n'
+    still = {"drop_speeds": (), "other_drop_speeds": (), "other_speeds": (0.02,), "retreat_speed": 0.05}
+    assert law(CRATER + pushes, speeds=(0.05,), mass=0.2, **still).warnings() == []  # nothing drops
+    (said,) = law(CRATER + pushes, speeds=(0.2, 0.002), **still).warnings()
+    assert "pushes at 0.01 to 0.05 m/s: what it says at 0.002, 0.2 m/s is extrapolated" in said
+    assert law(CRATER + pushes + drop, speeds=(0.2, 0.002), **still).warnings() == []  # a drop has all speeds below
+    far, alone = law(CRATER + pushes, speeds=(0.05,), **(still | {"drop_speeds": (0.3,)})).warnings()
+    assert "at 0.3 m/s is extrapolated" in far and "what it says of drops" in alone
+
+
 def test_what_is_no_model_of_penetration_is_refused_by_name(law):
     with pytest.raises(ValueError, match="crater_shape = 0"):
         law(CRATER.replace("crater_share", "crater_shape"))
@@ -126,7 +141,8 @@ def test_without_a_bed_the_spike_the_mass_and_the_load_are_the_models_own(tmp_pa
     assert (typed.mass, typed.tip_diameter, typed.load) == (0.2, 0.02, None)
     beside = PenetrateSettings(model=str(path))  # beside a bed its spike is that of the bed's runs, and it is said
     assert (beside.tip, beside.mass) == ("sphere", 0.1)
-    size, tip, mass = read_law(path, beside).warnings()
+    size, tip, mass, speeds = read_law(path, beside).warnings()
+    assert "was fitted to drops at 0.2 m/s" in speeds
     assert "--tip-diameter 0.003" in size and "--tip cone" in tip and "--mass 0.3" in mass
     path.write_text("nonsense")
     with pytest.raises(ValueError, match=r"model\.toml"):

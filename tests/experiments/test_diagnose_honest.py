@@ -8,7 +8,8 @@ from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial
 
 from experiments.diagnose.bounds import bounds_met
 from experiments.diagnose.colour import find_colours, find_loud
-from experiments.diagnose.diagnosis import diagnose, one_number
+from experiments.diagnose.deciding import one_number
+from experiments.diagnose.diagnosis import diagnose
 from experiments.diagnose.fitting import Model, Whitener, fit, settled
 from experiments.diagnose.gate import held_out_gate, open_gate
 from experiments.diagnose.penetration_problem import make_problem

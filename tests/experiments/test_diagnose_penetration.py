@@ -263,6 +263,28 @@ def test_a_force_that_is_held_is_thinned_and_said():
     assert any("held" in finding.what for finding in problem.findings)
 
 
+def test_where_a_force_clips_the_depth_goes_on_and_a_crater_is_as_deep_as_the_spike_went():
+    """A crater that keeps half of the deepest depth pushes back with K (2 z - top) on the way out."""
+
+    def crater(z, v, top):
+        return base(z, v) if v > 0 else STIFFNESS * max(2 * z - top, 0.0)
+
+    recording = driven_trial(crater, speed=0.01, retreat=True)
+    at_most = 0.6 * STIFFNESS * 0.02
+    cut = Recording({**recording.columns, "force_N": np.minimum(recording["force_N"], at_most)})
+    left = []
+    for one in (recording, cut):
+        problem = make_problem(campaign_of([("d", "driven", 0.01, one)]))
+        (form,) = [form for form in problem.forms if form.id == "plastic-sinkage:crater"]
+        true = {"stiffness": STIFFNESS, "damping": DAMPING, form.amplitude: 0.5}
+        total, count = problem.chi_square(true, (form,), "d")
+        left.append(total / count)
+    assert any("clips" in finding.what for finding in problem.findings)
+    assert count == (recording["force_N"] < at_most).sum()
+    # 1.28 and 1.33; 1400 if the spike had gone no deeper than the force was read.
+    assert left[1] < 1.1 * left[0]
+
+
 def test_a_depth_that_jumps_and_stays_is_set_aside_from_there_on():
     recording = drop_trial(base, speed=0.8)
     depth = recording["depth_m"].copy()

@@ -5,12 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from experiments.diagnose.candidates import candidate_rows, unnamed_sentence
 from experiments.diagnose.effect_words import confirmation
 from experiments.diagnose.gaps import Gaps
 from experiments.diagnose.localise import Place
 from experiments.diagnose.next_steps import _follow
 from experiments.diagnose.summary import scatter_sentence, summary_sentences, title_words
-from experiments.diagnose.telling import PhaseTable, sure_sentences, told_tables, where_sentences
+from experiments.diagnose.telling import (
+    PhaseTable,
+    size_sentences,
+    sure_sentences,
+    told_tables,
+    valid_residuals,
+    where_sentences,
+)
 
 
 def test_chi_square_by_phase_is_that_of_the_residuals_of_all_trials_of_a_kind():
@@ -25,6 +33,16 @@ def test_chi_square_by_phase_is_that_of_the_residuals_of_all_trials_of_a_kind():
     }  # fmt: skip
     assert rows["in", False]["before"] == pytest.approx((1 + 9 + 4) / 3)
     assert (rows["out", True]["before"], rows["out", True]["after"]) == (16.0, 0.25)
+
+
+def test_a_reading_at_a_switch_of_the_contact_counts_in_no_table_as_in_the_gap():
+    table, gaps, rest = PhaseTable(), Gaps(), np.array([2.0, 50.0, 2.0])
+    noise, quiet = np.array([1.0, np.inf, 1.0]), np.ones(3)
+    table.add("ax", np.array(["hop"] * 3), valid_residuals(rest, noise), valid_residuals(rest, quiet), held_out=False)
+    (row,) = table.rows
+    assert (row["samples"], row["before"], row["after"]) == (2, 4.0, pytest.approx((4 + 2500 + 4) / 3))
+    gaps.add("a", "ax", np.arange(3.0), rest, rest, noise, noise, settings={}, held_out=False)
+    assert gaps.by_condition[0]["before"] == 4.0 and gaps.by_channel[0]["rms_before"] == 2.0
 
 
 def place(trial: str, channel: str, phase: str, excess: float, torque: float) -> dict:
@@ -48,13 +66,45 @@ def test_the_table_of_candidates_has_every_name_once_and_sets_that_beat_their_pa
         return {"candidate": candidate, "effects": effects, "score": score, "left": 1.0}
 
     said = {
-        "verdict": "named", "by_phase": [],
-        "evidence": [row("a:1 + b:1", 30.0), row("a:1", 20.0), row("a:2", 19.0), row("b:1", 3.0), row("c:1 + b:1", 2.0),
-                     row("c:1 + a:1", 1.0), row("c:1", -1.0)],
+        "verdict": "named", "effects": [{"id": "a"}, {"id": "b"}], "by_phase": [],
+        "evidence": [row("b:1 + a:1", 30.0), row("a:2 + b:1", 28.0), row("a:1 + a:2", 25.0), row("a:1", 20.0),
+                     row("b:1", 3.0), row("c:1 + b:1", 2.0), row("c:1 + a:1", 1.0), row("c:1", -1.0)],
     }  # fmt: skip
     (table,) = told_tables(said)
-    assert [cells[0] for cells in table["rows"]] == ["a:1 + b:1", "a:1", "b:1", "c:1"]
-    assert table["rows"][1][1] == "20.0"
+    assert [cells[0] for cells in table["rows"]] == ["a:1 + b:1", "a:1 + 2", "b:1"]
+    assert (
+        table["rows"][1][1] == "25.0" and "no better than the base model" in table["title"] and "c)" in table["title"]
+    )
+    rows = candidate_rows(said)
+    assert (rows[0]["effects"], rows[0]["tried"], rows[0]["note"]) == (["a", "b"], 2, "told")
+
+
+def test_a_pair_with_more_evidence_than_what_is_told_is_not_passed_over_in_silence():
+    pair = {"candidate": "friction:1 + adhesion:1", "effects": ["friction", "adhesion"], "score": 33.0, "left": 0.4}
+    evidence = [pair, {"candidate": "friction:1", "effects": ["friction"], "score": 28.5, "left": 0.5}]
+    said = {"verdict": "named", "effects": [{"id": "friction"}], "evidence": evidence,
+            "gate": {"after": {"passed": False}}}  # fmt: skip
+    (sentence,) = unnamed_sentence(said)
+    for words in ("friction + adhesion has the most evidence, 4 nats more than friction", "takes away 20 %",
+                  "too little for a further name"):  # fmt: skip
+        assert words in sentence
+    (sentence,) = unnamed_sentence(said | {"gate": {"after": {"passed": True}}})
+    assert "friction leaves no more than noise" in sentence
+    assert unnamed_sentence(said | {"evidence": evidence[1:]}) == []
+    other = {"candidate": "layering:1", "effects": ["layering"], "score": 31.0, "left": 0.5}
+    nearest = [{"effect": "friction"}, {"effect": "layering", "left_out_behind": 12.0}]
+    (sentence,) = unnamed_sentence(said | {"evidence": [other, evidence[1]], "equivalence": nearest})
+    assert "layering has the most evidence" in sentence and "left out worse, by 12 nats" in sentence
+
+
+def test_how_large_an_effect_is_is_said_the_largest_first_and_a_small_one_is_called_so():
+    size = {"channel": "force", "unit": "N"}
+    large = size | {"effect": "drag", "signature": 9.0, "rms": 0.4, "most": 1.25, "share": 0.21}
+    small = size | {"effect": "crust", "signature": 1.1, "rms": 0.01, "most": 0.04, "share": 0.02}
+    (words,) = size_sentences({"sizes": [large, small]})
+    assert "drag changes force by 0.4 N (root mean square; 1.2 N at most), 21 % of it, 9 times the noise" in words
+    assert words.index("drag") < words.index("crust is small: it changes force by 0.04 N at most, 2 % of it, 1.1 times")
+    assert size_sentences({}) == []
 
 
 def test_the_gap_is_told_in_millimetres_by_condition_and_from_when_on():

@@ -5,6 +5,7 @@ import pytest
 from scipy.fft import idct
 
 from experiments.campaign import Recording
+from experiments.diagnose import unrest
 from experiments.diagnose.diagnosis import diagnose
 from experiments.diagnose.document import document
 from experiments.diagnose.fitting import Model, Whitener, fit
@@ -42,12 +43,12 @@ def test_how_far_replicates_wander_is_told_in_newtons_and_nothing_where_they_do_
     problem = wandering(size)
     ids = tuple(trial.id for trial in problem.trials)
     found = fit(Model(problem, Whitener.white(problem), ids))
-    unrest = find_unrest(found, found.values, ids)
+    wander = find_unrest(found, found.values, ids)
     if size == 0:
-        assert not unrest
+        assert not wander
         return
-    assert unrest.model_std == {"force": pytest.approx(size, rel=0.25)}
-    weights = unrest.weights(problem)["00"]
+    assert wander.model_std == {"force": pytest.approx(size, rel=0.25)}
+    weights = wander.weights(problem)["00"]
     assert weights[0] < 0.3 and weights[-1] == pytest.approx(1.0, abs=0.05)
 
 
@@ -56,8 +57,7 @@ def test_a_replicate_with_half_as_many_rows_does_not_seem_to_wander():
     problem = wandering(0.0, hardening=60.0, thinned="01")
     ids = tuple(trial.id for trial in problem.trials)
     found = fit(Model(problem, Whitener.white(problem), ids))
-    unrest = find_unrest(found, found.values, ids)
-    assert unrest.model_std.get("force", 0.0) < 0.1
+    assert find_unrest(found, found.values, ids).model_std.get("force", 0.0) < 0.1
 
 
 def test_a_name_is_certain_where_all_that_is_left_is_what_replicates_differ_by():
@@ -72,10 +72,14 @@ def test_a_name_is_certain_where_all_that_is_left_is_what_replicates_differ_by()
     assert weighed.after == pytest.approx((1.0, 1.0), abs=0.45) and weighed.before[1] > 3 * weighed.after[1]
     said = document(found)
     assert said["gap_with_scatter"]["after"]["fit"] == weighed.after[0]
+    assert weighed.freedom == said["gap_with_scatter"]["freedom"] == 6  # nine pushes, three conditions
+    for value, error in zip(weighed.after, weighed.after_std, strict=True):
+        assert 0.05 < error < 1.0 and abs(value - 1.0) < 3 * error
     assert said["evidence_base"]["with_scatter"]  # candidates and base model in one likelihood
     best = next(row for row in said["evidence"] if row["effects"] == ["depth-hardening"])
     assert 0.8 < best["closes"] <= 1.2 and best["score"] > 10
-    assert found.next_experiment.startswith(("More replicates", "It does not repeat"))  # not: repeat a trial
+    words = ("More replicates", "What is left beside depth-hardening does not repeat")  # not: repeat a trial
+    assert found.next_experiment.startswith(words)
 
 
 def test_what_differs_between_replicates_alone_gets_no_name_and_is_not_called_nothing():
@@ -99,3 +103,12 @@ def test_what_replicates_have_in_common_is_told_from_what_each_does(hardening, s
     problem = wandering(size, hardening=hardening)
     share = common_share(problem, {"stiffness": STIFFNESS, "damping": DAMPING}, (), ("00", "01", "02"))
     assert least <= share <= most
+
+
+def test_a_wander_that_rows_do_not_show_is_told_by_its_law(monkeypatch):
+    """Where the rows' noise hides it, never 0 N."""
+    problem = wandering(0.8)
+    ids = tuple(trial.id for trial in problem.trials)
+    found = fit(Model(problem, Whitener.white(problem), ids))
+    monkeypatch.setattr(unrest, "_std", lambda *asked: 0.0)
+    assert unrest.find_unrest(found, found.values, ids).model_std == {"force": pytest.approx(0.8, rel=0.3)}

@@ -1,0 +1,123 @@
+"""The candidates as a person wants to see them: a line a set of names, and why one that looks better has no name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+__all__ = ["candidate_rows", "no_better", "unnamed_sentence"]
+
+_MORE = 0.05
+"""Nats by which a set of names must beat each of its parts to be listed."""
+_SETS = 4
+"""Sets of names that are listed beside the one that is told."""
+_WORTH_SAYING = 1.0
+"""Nats by which a candidate must beat what is told to be spoken of."""
+
+Row = Mapping[str, Any]
+
+
+def candidate_rows(said: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """``candidates`` of diagnosis.json: the best form of each name, of what is told, and of the sets of names that beat
+    all of their parts; the likeliest first, those no better than the base model last."""
+    best: dict[frozenset[str], Row] = {}
+    tried: dict[frozenset[str], int] = {}
+    for row in said.get("evidence", []):
+        names = frozenset(row["effects"])
+        tried[names] = tried.get(names, 0) + 1
+        if names not in best or row["score"] > best[names]["score"]:
+            best[names] = row
+    alone = {name: row["score"] for names, row in best.items() for name in names if len(names) == 1}
+    told = frozenset(_told(said))
+    sets = [names for names, row in best.items()
+            if len(names) > 1 and all(row["score"] > alone.get(name, 0.0) + _MORE for name in names)]  # fmt: skip
+    sets.sort(key=lambda names: -best[names]["score"])
+    shown = [names for names in best if len(names) == 1 or names == told or names in sets[:_SETS]]
+    shown.sort(key=lambda names: -best[names]["score"])
+    return [
+        {"candidate": _written(best[names], alone, _told(said)), "effects": _ordered(names, alone, _told(said)),
+         "score": best[names]["score"], "left": best[names].get("left"), "closes": best[names].get("closes"),
+         "tried": tried[names], "better": best[names]["score"] > 0, "note": _note(said, names, best, told)}
+        for names in shown
+    ]  # fmt: skip
+
+
+def no_better(rows: Sequence[Row]) -> str:
+    """The names that are no better than the base model, as a clause; empty where all are."""
+    names = [" + ".join(row["effects"]) for row in rows if not row["better"]]
+    return f"no better than the base model with its parameters fitted: {', '.join(names)}" if names else ""
+
+
+def unnamed_sentence(said: Mapping[str, Any]) -> list[str]:
+    """Of a candidate that is likelier than what is told: which, and why it is not told."""
+    rows = candidate_rows(said)
+    told = frozenset(_told(said))
+    own = next((row for row in rows if frozenset(row["effects"]) == told), None)
+    ahead = [row for row in rows if own is not None and row["score"] > own["score"] + _WORTH_SAYING and row["note"]]
+    if own is None or not ahead:
+        return []
+    row = ahead[0]
+    return [
+        f"Of all that was tried {' + '.join(row['effects'])} has the most evidence, {row['score'] - own['score']:.0f} "
+        f"nats more than {' + '.join(own['effects'])}, and is not told: {row['note']}."
+    ]
+
+
+def _told(said: Mapping[str, Any]) -> tuple[str, ...]:
+    """The names that are told, or of an unknown the best model's, in order."""
+    names = tuple(effect["id"] for effect in said.get("effects", ()))
+    leading = tuple(said.get("leading", {}).get("effects", ()))
+    return leading if said["verdict"] == "unknown" and leading else names
+
+
+def _ordered(names: frozenset[str], alone: Mapping[str, float], told: Sequence[str]) -> list[str]:
+    """What is told first, then those that explain most alone."""
+    place = {name: k for k, name in enumerate(told)}
+    return sorted(names, key=lambda name: (place.get(name, len(place)), -alone.get(name, -1e300), name))
+
+
+def _written(row: Row, alone: Mapping[str, float], told: Sequence[str]) -> str:
+    """``a:one + two + b:three``: names in order, each once, with its forms."""
+    forms: dict[str, list[str]] = {}
+    for part in row.get("candidate", " + ".join(row["effects"])).split(" + "):
+        effect, _, form = part.partition(":")
+        forms.setdefault(effect, []).append(form)
+    order = _ordered(frozenset(forms), alone, told)
+    return " + ".join(f"{effect}:{' + '.join(forms[effect])}".removesuffix(":") for effect in order)
+
+
+def _note(
+    said: Mapping[str, Any], names: frozenset[str], best: Mapping[frozenset[str], Row], told: frozenset[str]
+) -> str:
+    """What a candidate is to the one that is told; of one that is likelier, why it is not."""
+    if names == told:
+        return {"named": "told", "ambiguous": "told, or another"}.get(said["verdict"], "leads")
+    if not told or told not in best:
+        return ""
+    if said["verdict"] == "ambiguous" and _is_alternative(said, names, told):
+        return "cannot be told from it"
+    own, row = best[told], best[names]
+    more = row["score"] - own["score"]
+    if more <= 0:
+        return ""
+    together = " + ".join(_told(said))
+    if names > told or len(names) > len(told):
+        if said.get("gate", {}).get("after", {}).get("passed"):
+            return f"{together} leaves no more than noise, and a further name is not looked for then"
+        left = own.get("left") or 0.0
+        share = f"{100 * (left - row['left']) / left:.0f} %" if left > 0 else ""
+        takes = f" and takes away {share} of what {together} leaves" if share else ""
+        what = "a further name" if names > told else f"in the place of {together} {len(names)} names"
+        return (
+            f"it gains {more:.0f} nats{takes}, too little for {what}: the misfit of a form is always there for a "
+            f"further one to take up"
+        )
+    other = next((r for r in said.get("equivalence", [])[1:] if r["effect"] in names - told), None)
+    if other is not None and (other.get("left_out_behind") or 0.0) > 0:
+        return f"it predicts conditions that were left out worse, by {other['left_out_behind']:.0f} nats"
+    return "it does not stand when noise and names are looked at together"
+
+
+def _is_alternative(said: Mapping[str, Any], names: frozenset[str], told: frozenset[str]) -> bool:
+    first = next(iter(_told(said)))
+    return any(names == (told - {first}) | {other} for other in said["alternatives"])
