@@ -49,6 +49,8 @@ _OUT_OF_THE_WAY = 0.5
 """Share of what the base model leaves from which on a name has not taken the motion out of the way."""
 _ASKED = 3
 """Hypotheses that are asked whether a trial of its own way is all that speaks against them."""
+_NAMES = 2
+"""Names beside which a trial may go its own way: more and a trial set aside would explain nearly anything."""
 _SEEN_ELSEWHERE = 3.0
 """Nats by which a name must be better than none on the other trials, where one trial goes its own way."""
 
@@ -476,8 +478,8 @@ def _all_astray(
 
 
 def _likeliest(choice: Choice) -> list[Hypothesis]:
-    """The best, and the likeliest single names."""
-    found = {choice.best.effects: choice.best} if choice.best.effects else {}
+    """The best, where that is no more than two names, and the likeliest single ones."""
+    found = {choice.best.effects: choice.best} if 0 < len(choice.best.effects) <= _NAMES else {}
     for _, tried in sorted(choice.table, key=lambda row: -row[1].score):
         if len(tried.effects) == 1 and len(found) < _ASKED:
             found.setdefault(tried.effects, tried)
