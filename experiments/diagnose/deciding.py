@@ -29,6 +29,11 @@ _NEXT_TO_NOTHING = 0.01
 """The same share, of trials fitted and of trials held out, where it is louder: a form that is off by a tenth of its
 effect. In made-up campaigns of penetration two dozen right names left 0.011 at most of the fitted trials; of things
 outside the library names left 0.08 and more, but for one shock, which a crust explained on those it was fitted to."""
+_NO_NAME = 0.5
+"""Share of what the base model leaves, of trials fitted or held out, from which on a name explains too little to be
+one, where the gate sees that something is left. In five counts of tumbles right names left 0.47 at most of these."""
+_LOUD = 3.0
+"""Standard deviations of chi-square beyond which what a name leaves is no matter of chance."""
 _LATE = 0.5
 """Share of a held-out trial's time up to which a model that explains all fitted ones must follow it."""
 _CERTAIN = 0.1
@@ -93,7 +98,10 @@ def verdict_of(
         return "unknown"
     after = gap_of(found.model.problem, found.model, values_of_all(found, held_out), found.model.trials, held_out)
     fits, predicts = choice.left.passed, held is None or held.passed
+    if not fits and _too_little(choice, after.fit, held_out):
+        return "unknown"
     little = after.fit <= SMALL and (after.held_out or 0.0) <= SMALL
+    little = little and (predicts or _share_left(choice, held_out) < _NO_NAME)
     passed = (fits and predicts) or little or _of_form(choice, held_out)
     if not passed and (fits or after.fit <= SMALL):  # or what is held out follows for a while only
         values = held_out_fit(found.model, held_out, found.values)
@@ -110,10 +118,27 @@ def _of_form(choice: Choice, held_out: tuple[str, ...]) -> bool:
     found, base = choice.best.fit, choice.base.fit
     left, share = [found.chi_square / found.count], [excess(found) / max(excess(base), 1e-9)]
     if held_out:
-        after, before = (_left_of(one, held_out) for one in (found, base))
-        left.append(after)
-        share.append((after - 1) / max(before - 1, 1e-9))
+        left.append(_left_of(found, held_out))
+        share.append(_share_left(choice, held_out))
     return (max(left) <= _AS_LOUD and share[0] < _RIGHT_FORM) or max(share) < _NEXT_TO_NOTHING
+
+
+def _too_little(choice: Choice, after: float, held_out: tuple[str, ...]) -> bool:
+    """Whether a name explains too little of what was fitted to be one. `after`: what it leaves a sample, in the gap's
+    units: a colour of the noise found beside a name that is none is what the name has missed."""
+    found, base = choice.best.fit, choice.base.fit
+    if excess(found) > _NO_NAME * excess(base):
+        return True
+    problem, trials = base.model.problem, base.model.trials
+    before = gap_of(problem, base.model, values_of_all(base, held_out), trials, ()).fit
+    of_form = getattr(problem, "left_by_forms", 1.0)
+    return after - 1 > max(_LOUD * math.sqrt(2 / found.count), of_form * (before - 1))
+
+
+def _share_left(choice: Choice, held_out: tuple[str, ...]) -> float:
+    """What the best leaves beyond noise of trials held out, over what the base model leaves."""
+    after, before = (_left_of(one, held_out) for one in (choice.best.fit, choice.base.fit))
+    return (after - 1) / max(before - 1, 1e-9)
 
 
 def _left_of(found: Fit, trials: tuple[str, ...]) -> float:

@@ -49,6 +49,8 @@ _OUT_OF_THE_WAY = 0.5
 """Share of what the base model leaves from which on a name has not taken the motion out of the way."""
 _ASKED = 3
 """Hypotheses that are asked whether a trial of its own way is all that speaks against them."""
+_NAMES = 2
+"""Names beside which a trial may go its own way: more and a trial set aside would explain nearly anything."""
 _SEEN_ELSEWHERE = 3.0
 """Nats by which a name must be better than none on the other trials, where one trial goes its own way."""
 
@@ -153,6 +155,8 @@ def diagnose(
     aside: Sequence[Finding] = (),
     looked_at: Sequence[str] = (),
     restless: bool = False,
+    begun: _Begun | None = None,
+    patient: bool = False,
 ) -> Diagnosis:
     """Diagnose a campaign. `tell(what, share done)` hears of progress; the same campaign gives the same answer.
 
@@ -160,7 +164,8 @@ def diagnose(
     for the next campaign of the same design. `aside`: fitted trials that are to take no part (`astray`). `looked_at`:
     trials that must not be held out, others are in their place: the base model explains all but these.
     `restless`: what replicates differ by each in its own way (`unrest`) counts as noise; asked only whether a name that
-    stands beside something unknown is there for certain.
+    stands beside something unknown is there for certain. `begun`: what the same campaign's first fits have told.
+    `patient`: look for further names before a trial is asked whether it goes its own way.
     """
     tell = tell or (lambda what, done: None)
     if hasattr(problem, "prepare"):
@@ -172,8 +177,13 @@ def diagnose(
         problem.shake({})
     if hasattr(problem, "calm"):
         problem.calm({})
-    base, jitters = _jittered(_whitened_fit(Model(problem, Whitener.white(problem), fitted)), held_out)
-    odd = odd_trials(_whitened_fit(replace(base.model, trials=tuple(t.id for t in problem.trials))))
+    if begun is None or begun.jitters or not (aside or looked_at):  # or else all is fitted anew below
+        base, jitters = _jittered(_whitened_fit(Model(problem, Whitener.white(problem), fitted)), held_out)
+        odd = []
+        if any(len(ids) > 2 for ids in groups_of(problem.trials).values()) or not hasattr(problem, "follows"):
+            odd = odd_trials(_whitened_fit(base.model.on([t.id for t in problem.trials])))
+        begun = _Begun(base, jitters, odd)
+    base, jitters, odd = begun.base, begun.jitters, begun.odd
     if odd:
         findings += odd
         at_odds = {finding.trial for finding in odd}
@@ -186,7 +196,7 @@ def diagnose(
         findings += aside
         gone = {finding.trial for finding in aside}
         fitted = tuple(trial for trial in fitted if trial not in gone)
-        base = by_beginnings(_whitened_fit(base.model.on(fitted)))
+        base = _whitened_fit(base.model.on(fitted), beginnings=True)
     scatter = _scatter(base, held_out)
     findings += trends(scatter, problem.trials)
     base, model_std = _rescattered(base, scatter) if scatter.parameters else base, scatter.model_std
@@ -201,7 +211,7 @@ def diagnose(
         tell=lambda done: tell("making the gate's null", done),
     )  # fmt: skip
     told = _Told(problem, first, findings, held_out, jitters)
-    again = partial(diagnose, thorough=thorough, seed=seed, tell=tell, gates=gates, restless=restless)
+    again = partial(diagnose, thorough=thorough, seed=seed, tell=tell, gates=gates, restless=restless, begun=begun)
 
     def nothing(last: Verdict | None = None) -> Diagnosis:
         """None is missing as far as the fitted trials tell; once more with others held out where these tell more."""
@@ -213,7 +223,13 @@ def diagnose(
 
     if first.passed:
         return nothing()
-    choice = choose(base, tell=tell, seed=seed, recoloured=partial(_recoloured, colours=colours))
+    recoloured = partial(_recoloured, colours=colours)
+    own = None if aside or patient else partial(_all_astray, held_out=held_out, seed=seed, recoloured=recoloured)
+    choice = choose(base, tell=tell, seed=seed, recoloured=recoloured, own_ways=own)
+    if choice.astray:
+        tell("a trial goes its own way: once more without it", 0.0)
+        anew = again(problem, aside=choice.astray, looked_at=looked_at)
+        return anew if anew.verdict != "unknown" else again(problem, looked_at=looked_at, patient=True)
     base = choice.base.fit
     if choice.best.effects and excess(choice.best.fit) < _OUT_OF_THE_WAY * excess(base):
         # With the motion out of the way replicates are compared once more.
@@ -254,12 +270,13 @@ def diagnose(
         best = _coloured(_plain(choice.best.fit), fresh)
         base, colours = _coloured(_plain(base), fresh), fresh
         left = open_gate(best, seed=seed)[1]
-        choice = replace(choice, best=Hypothesis(best, score(best)), left=left)
+        choice = _moved(choice, base, best, left)
     if choice.best.effects:
         best = _doubted(choice.best.fit, held_out)
         if best is not choice.best.fit:
             left = open_gate(best, seed=seed)[1]
-            choice = replace(choice, best=Hypothesis(best, choice.best.score), left=left)
+            base = fit(base.model, base.values)
+            choice = _moved(choice, base, best, left)
     if thorough and choice.best.effects:
         left = open_gate(
             choice.best.fit, seed=seed, refit=True, draws=_REFITS, folder=gates,
@@ -272,7 +289,8 @@ def diagnose(
     choice = replace(choice, best=replace(choice.best, fit=settled(choice.best.fit)))
     held = _held_out_verdict(choice.best.fit, held_out, seed) if held_out else None
     verdict = verdict_of(choice, held, held_out, seed, set_aside=bool(aside))
-    if not aside and (gone_astray := _own_ways(base, choice, verdict, held_out, seed, colours)):
+    asked = verdict == "unknown" and choice.left.passed and len(choice.best.effects) > 1  # before the second name
+    if not (aside or asked) and (gone_astray := _own_ways(base, choice, verdict, held_out, seed, colours)):
         tell("a trial goes its own way: once more without it", 0.0)
         anew = again(problem, aside=gone_astray, looked_at=looked_at)
         if anew.verdict != "unknown":
@@ -280,7 +298,7 @@ def diagnose(
     sure: tuple[str, ...] = ()
     if verdict == "unknown" and not restless and choice.best.effects and (wander := _unrest(choice.best.fit, held_out)):
         tell("replicates differ each in its own way: once more, against that", 0.0)
-        anew = again(deepcopy(problem), aside=aside, looked_at=looked_at, restless=True)
+        anew = again(deepcopy(problem), aside=aside, looked_at=looked_at, restless=True, begun=None)
         if anew.verdict == "named" and anew.choice is not None:
             # Fitted, and the gap taken, with the sensors' noise alone.
             sure = anew.effects
@@ -295,12 +313,23 @@ def diagnose(
     return told.finish(base, choice, colours, model_std, verdict, held=held, sure=sure)
 
 
-def _whitened_fit(model: Model) -> Fit:
-    """Fitted, with the whitening taken at the fit; where it leaves something, looked for from the beginnings, too."""
+@dataclass(frozen=True)
+class _Begun:
+    """What is known of a campaign before any trial is set aside or held out in another's place."""
+
+    base: Fit
+    jitters: tuple[Jitter, ...]
+    odd: list[Finding]
+
+
+def _whitened_fit(model: Model, *, beginnings: bool = False) -> Fit:
+    """Fitted, with the whitening taken at the fit; where it leaves something, or in any case (`beginnings`), looked for
+    from the beginnings, too."""
     found = fit(model)
     model.problem.rewhiten(found.values, ())
     found = fit(model, found.values)
-    if hasattr(model.problem, "follows") and found.chi_square > found.count + _MUCH * math.sqrt(2 * found.count):
+    left = found.chi_square > found.count + _MUCH * math.sqrt(2 * found.count)
+    if beginnings or (left and hasattr(model.problem, "follows")):
         return by_beginnings(found)
     return found
 
@@ -323,6 +352,11 @@ def _doubted(found: Fit, held_out: tuple[str, ...]) -> Fit:
         return found
     values = held_out_fit(found.model, held_out, found.values) if held_out else found.values
     return fit(found.model, found.values) if problem.doubt(values, found.model.forms) else found
+
+
+def _moved(choice: Choice, base: Fit, best: Fit, left: Verdict) -> Choice:
+    """The choice with both fitted in another likelihood; scores stay those of the one in which all were weighed."""
+    return replace(choice, base=replace(choice.base, fit=base), best=replace(choice.best, fit=best), left=left)
 
 
 def _plain(found: Fit) -> Fit:
@@ -449,9 +483,17 @@ def _own_ways(
     return gone
 
 
+def _all_astray(
+    base: Fit, best: Fit, *, held_out: tuple[str, ...], seed: int, recoloured: Callable[[Fit], Fit]
+) -> tuple[Finding, ...]:
+    """Trials whose ways of their own are all that speaks against the base model, or else against the best name."""
+    ask = partial(astray, held_out=held_out, seed=seed, recoloured=recoloured)
+    return ask(base) or (ask(best) if best.model.forms else ())
+
+
 def _likeliest(choice: Choice) -> list[Hypothesis]:
-    """The best, and the likeliest single names."""
-    found = {choice.best.effects: choice.best} if choice.best.effects else {}
+    """The best, where that is no more than two names, and the likeliest single ones."""
+    found = {choice.best.effects: choice.best} if 0 < len(choice.best.effects) <= _NAMES else {}
     for _, tried in sorted(choice.table, key=lambda row: -row[1].score):
         if len(tried.effects) == 1 and len(found) < _ASKED:
             found.setdefault(tried.effects, tried)

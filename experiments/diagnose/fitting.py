@@ -94,6 +94,8 @@ class Model:
     """Nuisances of trials that describe what differs between replicates."""
     held: Mapping[str, float] | None = None
     """Values at which all shared parameters are held; None: they are fitted."""
+    share: float = 1.0
+    """Of their time, up to which trials are looked at (`until`)."""
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -126,13 +128,17 @@ class Model:
         for trial in getattr(self.problem, "rough", ()) if trials is None else trials:
             time = self.problem.samples(trial).time
             kept[trial] = (time <= time.min() + share * np.ptp(time)).astype(float)
-        return replace(self, whitener=replace(self.whitener, kept=kept))
+        return replace(self, whitener=replace(self.whitener, kept=kept), share=share)
 
     def evaluate(self, points: Sequence[Values]) -> list[Array]:
         """Modes of all trials, one after another, at each point."""
         held = self.held
         whole = points if held is None else [{**held, **point} for point in points]
-        found = self.problem.evaluate(whole, self.forms, self.trials)
+        part = getattr(self.problem, "evaluate_until", None)
+        if part is not None and self.share < 1 and all(trial in self.whitener.kept for trial in self.trials):
+            found = part(whole, self.forms, self.trials, self.share)  # what is not looked at need not be simulated
+        else:
+            found = self.problem.evaluate(whole, self.forms, self.trials)
 
         def modes(trial: str) -> Array:
             return self.whitener.modes(trial, np.stack([one[trial] for one in found]))
@@ -238,7 +244,7 @@ def fit(model: Model, start: Values | None = None, *, rounds: int = _ROUNDS) -> 
     damping = 1.0
     free = np.ones(len(x), dtype=bool)
     for _ in range(rounds):
-        best, jacobian = _linearise(model, parameters, x)
+        best, jacobian = _linearise(model, parameters, x, best)
         objective = float(best @ best) + penalty(x)
         gradient = jacobian.T @ best + precision * scales * (x - middle)
         at_low, at_high = (x <= low) & (gradient > 0), (x >= high) & (gradient < 0)
@@ -258,10 +264,8 @@ def fit(model: Model, start: Values | None = None, *, rounds: int = _ROUNDS) -> 
         gain = objective - objectives[place]
         damping = max(damping * (0.3 if place <= 1 else 1.0 if place == 2 else 5.0), 1e-4)
         if gain > 0:
-            x = trials[place]
+            x, best = trials[place], modes[place]
         if gain < _ENOUGH + 1e-7 * objective:
-            if gain > 0:
-                best = modes[place]
             break
     if best is None:
         best = model.evaluate([named(x)])[0]
@@ -420,12 +424,15 @@ def _solve(matrix: Array, right: Array) -> Array:
     return np.linalg.lstsq(scaled, right / size, rcond=1e-13)[0] / size
 
 
-def _linearise(model: Model, parameters: Sequence[Parameter], x: Array) -> tuple[Array, Array]:
-    """Modes at `x`, and their changes per scale of each parameter; nuisances of one kind are changed together."""
+def _linearise(
+    model: Model, parameters: Sequence[Parameter], x: Array, known: Array | None = None
+) -> tuple[Array, Array]:
+    """Modes at `x` (`known`, if they are), and their changes per scale of each parameter; nuisances of one kind are
+    changed together."""
     names = [p.name for p in parameters]
     base = {name: float(value) for name, value in zip(names, x, strict=True)}
     groups = _groups(parameters)
-    points = [base]
+    points = [base] if known is None else []
     steps = np.zeros(len(parameters))
     for members in groups:
         point = dict(base)
@@ -436,6 +443,7 @@ def _linearise(model: Model, parameters: Sequence[Parameter], x: Array) -> tuple
             point[p.name] = x[k] + steps[k]
         points.append(point)
     modes = model.evaluate(points)
+    modes = modes if known is None else [known, *modes]
     jacobian = np.zeros((len(modes[0]), len(parameters)))
     rows = model.rows()
     for place, members in enumerate(groups, 1):

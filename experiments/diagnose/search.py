@@ -14,7 +14,7 @@ from .fitting import Fit, Model, fit
 from .gate import Verdict, open_gate
 from .pairs import FormsStart, next_starts, pair_starts
 from .prediction import Predicted, folds_of, predict
-from .problem import Form
+from .problem import Finding, Form
 
 __all__ = ["Choice", "Search", "choose"]
 
@@ -26,6 +26,9 @@ _SHARE = 0.5
 """Of the excess that is left, how much a further name must take away."""
 _SHARE_OF_BASE = 0.04
 """And of what the base model left: a misfit of the first effect's form is often some hundredths of it."""
+_SHARE_PLAIN, _SHARE_OF_FORM = 0.2, 0.01
+"""Of what the base model leaves, how much a first name may leave for the second one to be looked for beside it, and
+how much both may for no third one to be looked for."""
 _WORTH_ALONE = 16.0
 """Nats from which a further name counts where there is but one condition, so that no prediction can be asked for."""
 _BEHIND = 30.0
@@ -65,15 +68,19 @@ class Choice:
     """The nearest other names, the likeliest first, and why they are alternatives or not."""
     predicted: Predicted | None = None
     """What the best leaves of conditions left out."""
+    astray: tuple[Finding, ...] = ()
+    """Trials that go ways of their own, which is all that speaks against the best: then no further name was tried."""
 
 
 class Search:
     """One search over one set of trials."""
 
     def __init__(
-        self, base: Fit, *, tell: Tell, seed: int = 0, recoloured: Callable[[Fit], Fit] | None = None
+        self, base: Fit, *, tell: Tell, seed: int = 0, recoloured: Callable[[Fit], Fit] | None = None,
+        own_ways: Callable[[Fit, Fit], tuple[Finding, ...]] | None = None,
     ) -> None:  # fmt: skip
         self.base = Hypothesis(base, score(base))
+        self._own_ways = own_ways
         self.tell = tell
         self.seed = seed
         self._recoloured = recoloured
@@ -90,7 +97,10 @@ class Search:
         first = [self._enriched(h) for h in first[:3]] + first[3:]
         first.sort(key=lambda h: -h.score)
         best = first[0] if first and first[0].score > self.base.score + _WORTH else self.base
-        if not self._gate(best).passed:
+        told = self._gate(best)
+        if not told.passed:
+            if self._own_ways is not None and (gone := self._own_ways(self.base.fit, best.fit)):
+                return Choice(self.base, best, (), tuple(self.table), told, astray=gone)
             best = self._further(best, first)
         whole, best = best, self._backward(best)
         if len(best.effects) == len(whole.effects) and len(best.forms) < len(whole.forms):
@@ -239,7 +249,13 @@ class Search:
             self.tell(f"beside {', '.join(best.effects) or 'the base model'}: something is left", 0.5)
             tried = []
             seen: set[str] = set()
-            for other in first[:_BEST] if len(best.effects) == 1 else ():
+            beside = self._beside(best)
+            if beside:  # what stands out beside the first name, whatever it is alone
+                found = self._enriched(self._likeliest(best, beside))
+                if self._worth(best, found) and (self._next_to_all(found) or self._gate(found).passed):
+                    return found
+                tried += [found, *beside]
+            for other in first[:_BEST] if len(best.effects) == 1 and not beside else ():
                 name = other.effects[0]
                 if name in best.effects or name in seen:
                     continue
@@ -263,6 +279,22 @@ class Search:
             if self._gate(best).passed:
                 return best
         return best
+
+    def _beside(self, best: Hypothesis) -> list[Hypothesis]:
+        """Second names that promise most beside the first, where that explains most of what the base model leaves and
+        the problem has a search of its own: alone, on the branches where a plain effect leaves the base model, they
+        were seen for nothing."""
+        plain = excess(best.fit) < _SHARE_PLAIN * excess(self.base.fit)
+        if len(best.effects) != 1 or not plain or not hasattr(best.fit.model.problem, "refine"):
+            return []
+        model, values = best.fit.model, best.fit.values
+        others = [form for form in model.problem.forms if form.effect not in best.effects]
+        return self._begun(model, next_starts(model, values, others, most=_BEST))
+
+    def _next_to_all(self, best: Hypothesis) -> bool:
+        """Whether next to nothing of what the base model leaves is left, and no more than a misfit of form."""
+        left = excess(best.fit)
+        return left < _SHARE_OF_FORM * excess(self.base.fit) and best.fit.chi_square < SMALL * best.fit.count
 
     def _likeliest(self, best: Hypothesis, tried: Sequence[Hypothesis]) -> Hypothesis:
         """The likeliest of `tried`, with the noise as it shows where the least is left: until the motion is out of the
@@ -459,10 +491,13 @@ class Search:
 
 
 def choose(
-    base: Fit, *, tell: Tell, seed: int = 0, recoloured: Callable[[Fit], Fit] | None = None
+    base: Fit, *, tell: Tell, seed: int = 0, recoloured: Callable[[Fit], Fit] | None = None,
+    own_ways: Callable[[Fit, Fit], tuple[Finding, ...]] | None = None,
 ) -> Choice:  # fmt: skip
-    """Search from the base model's fit. `recoloured`: a fit with the noise as that fit leaves it."""
-    return Search(base, tell=tell, seed=seed, recoloured=recoloured).choose()
+    """Search from the base model's fit. `recoloured`: a fit with the noise as that fit leaves it. `own_ways`: trials
+    whose ways of their own are all that speaks against the base model or the best single name; it is asked before a
+    second name is looked for, for no name explains what shows in one trial."""
+    return Search(base, tell=tell, seed=seed, recoloured=recoloured, own_ways=own_ways).choose()
 
 
 def _said(hypothesis: Hypothesis) -> str:

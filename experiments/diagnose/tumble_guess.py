@@ -38,6 +38,8 @@ _ROUNDS, _MORE_ROUNDS = 6, 12
 """Steps over the whole of every trial, of all that are followed and of those that are near the best."""
 _ALL_THE_WAY = 4
 """So many sets of effects at a time are refined with as many steps as are followed to the end."""
+_SAME, _NEAR_BY = 0.003, 0.05
+"""Of their cost, and of the scale of a form's parameters, by which two fits may differ that have come to one place."""
 _HOPELESS = 30.0
 """Times the best one's chi-square, over part of a trial, beyond which a start is given up."""
 
@@ -56,6 +58,13 @@ def _thinned(data: TumbleData) -> TumbleData:
 def _kinds(apart: Sequence[Parameter]) -> tuple[str, ...]:
     """What is fitted to single trials, and within which prior."""
     return tuple(dict.fromkeys(f"{p.kind} {p.std:.4g}" for p in apart))
+
+
+def _alike(form: TumbleForm, one: Fit, other: Fit) -> bool:
+    """Whether two fits of one form have come to the same place, as nearly as fits end."""
+    if abs(one.cost - other.cost) > _SAME * max(one.cost, other.cost):
+        return False
+    return all(abs(one.values[p.name] - other.values[p.name]) <= _NEAR_BY * p.scale for p in form.parameters)
 
 
 class Guesser:
@@ -222,13 +231,15 @@ class Guesser:
             last = running[0][1].horizons[-1] >= 1
             if last:
                 keep([form for form, _ in running], fits)
-            each: dict[str, int] = {}
+            each: dict[str, list[Fit]] = {}
             longer = []
             for k in order:
                 form, found = running[k][0], fits[k]
-                each[form.id] = each.get(form.id, 0) + 1
+                if any(_alike(form, found, other) for other in each.get(form.id, ())):
+                    continue  # from there on two would go one way
+                each.setdefault(form.id, []).append(found)
                 most, alike = (len(effects), 2) if following < 1 else (_FOLLOWED, 1 if last else 2)
-                if each[form.id] <= alike and form.effect in effects[:most] and found.cost <= limit:
+                if len(each[form.id]) <= alike and form.effect in effects[:most] and found.cost <= limit:
                     start = Start(forms=(form,), values=found.values, gravity=found.gravity, scan=not last,
                                   horizons=(following,), apart=bare.apart)  # fmt: skip
                     longer.append((form, start))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial
 
+from experiments.diagnose import deciding
 from experiments.diagnose.bounds import bounds_met
 from experiments.diagnose.colour import find_colours, find_loud
 from experiments.diagnose.deciding import one_number
@@ -186,6 +187,31 @@ def test_an_effect_that_is_there_has_one_amplitude_whichever_condition_is_left_o
     best = SimpleNamespace(forms=(form,), fit=SimpleNamespace(values={"pull.force": 1.0}))
     folds = SimpleNamespace(learned=[{"pull.force": value} for value in learned])
     assert one_number(SimpleNamespace(best=best, predicted=folds)) is same
+
+
+@pytest.mark.parametrize(
+    ("left", "per_sample", "of_form", "too_little"),
+    [
+        (6e3, 1.06, 1.0, True),
+        (4e3, 1.04, 1.0, False),
+        (0.0, 1.2, 0.1, True),
+        (0.0, 1.05, 0.1, False),
+        (2e3, 1.2, 1.0, False),
+    ],
+)
+def test_a_name_that_leaves_too_much_of_what_was_there_is_none(monkeypatch, left, per_sample, of_form, too_little):
+    """Of 1e4 that the base model leaves beyond 1e5 readings' noise, half; or, in the gap's units, a tenth of what it
+    leaves (1.9), though a colour of the noise that was found beside the name hides it. 3 sqrt(2 / 1e5) is chance."""
+
+    def fitted(excess):
+        model = SimpleNamespace(problem=SimpleNamespace(left_by_forms=of_form), trials=("1",))
+        count, free = 100_000, np.ones(5, dtype=bool)
+        return SimpleNamespace(objective=count - 5 + excess, count=count, free=free, model=model)
+
+    monkeypatch.setattr(deciding, "values_of_all", lambda found, held_out: {})
+    monkeypatch.setattr(deciding, "gap_of", lambda *given: SimpleNamespace(fit=1.9))
+    choice = SimpleNamespace(best=SimpleNamespace(fit=fitted(left)), base=SimpleNamespace(fit=fitted(1e4)))
+    assert deciding._too_little(choice, per_sample, ()) is too_little
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -114,6 +114,44 @@ def test_a_single_reading_that_neighbours_and_replicates_do_not_share_is_set_asi
     assert not spikes(spoilt)[1]
 
 
+@pytest.mark.parametrize(("name", "noisy"), [("gyro", True), ("wheel", True), ("wheel", False)])
+def test_a_channel_that_clips_is_said_but_not_a_wheel_that_turns_evenly_without_noise(name, noisy):
+    """All above nine tenths of the largest reading stands there; a wheel without noise may well turn so in a hop."""
+    data = tumble_data(campaign(seed=3, conditions=CONDITIONS[:1]))
+    (trial,) = data.trials
+    rows = trial.of(name).nonzero()[0]
+    value = trial.value.copy()
+    if not noisy:
+        value[rows] = np.linspace(value[rows[0]], value[rows[-1]], len(rows))
+    highest = 0.9 * value[rows].max()
+    value[rows] = np.minimum(value[rows], highest)
+    clean, findings = checked(replace(data, trials=(replace(trial, value=value),)))
+    told = [finding for finding in findings if finding.channel == name and "clips there" in finding.what]
+    assert len(told) == int(noisy)
+    if noisy:
+        rest = clean.trials[0].value[clean.trials[0].of(name)]
+        assert told[0].set_aside and rest.max() < highest and len(rest) > 0.5 * len(rows)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.7])
+def test_the_first_share_of_a_motion_is_what_the_whole_motion_begins_with(share):
+    """What is looked at in part is simulated in part: camera's zero put aside, it reads the same up to there."""
+    data = tumble_data(campaign(seed=3, conditions=CONDITIONS[:2]))
+    problem = TumbleProblem(data)
+    ids = tuple(trial.id for trial in data.trials)
+    (whole,), (part,) = (problem.evaluate_until([{}], (), ids, share) for share in (1.0, share))
+    for trial in data.trials:
+        early = trial.time <= share * trial.end
+        for name in ("gyro", "ax", "ay", "wheel"):
+            mine = trial.of(name)
+            np.testing.assert_allclose(part[trial.id][mine & early], whole[trial.id][mine & early], atol=1e-9)
+        assert not part[trial.id][~early].any()
+    model = Model(problem, Whitener.white(problem), ids).until(share, ids)
+    kept = np.concatenate([part[id] * model.whitener.kept[id] for id in ids])
+    (modes,) = model.evaluate([{}])
+    assert modes @ modes == pytest.approx(kept @ kept)
+
+
 def test_an_effect_from_a_file_moves_the_batch_as_it_moves_the_accurate_integrator():
     """Mean square of the difference over the noise below a hundredth, as for the effects of the library."""
     rise = Effect(id="torque-rise", parameters={"rise": 0.08}, file=RISES)
