@@ -79,7 +79,8 @@ def prepare(campaign: Campaign) -> tuple[list[Prepared], list[Finding]]:
     for table in tables.trial:
         recording = campaign.recording(table.id, "data")
         assert recording is not None
-        trial, found = _one(tables, table, recording, colour=louder if table.mode == "driven" else None, cut=cuts.get(table.id))
+        colour = louder if table.mode == "driven" else None
+        trial, found = _one(tables, table, recording, colour=colour, cut=cuts.get(table.id))
         findings += found
         if trial is not None:
             trials.append(trial)

@@ -211,9 +211,10 @@ def test_the_noise_of_one_sensor_is_one_sentence_whatever_the_number_of_its_rate
     )
     words = together([slow, fast])
     assert "by 0.61, at 2 sampling rates" in words or "by 0.62, at 2 sampling rates" in words
-    assert "1.40 to 2.10 of what is stated and" in together([Colour("x", 1.4, 0.3), Colour("x", 2.1, 0.3)])
+    assert "1.40 to 2.10 times what is stated and" in together([Colour("x", 1.4, 0.3), Colour("x", 2.1, 0.3)])
     assert (
-        together([Colour("force", 0.87, 0.001)]) == "the noise of force is 0.87 of what is stated: taken into account"
+        together([Colour("force", 0.87, 0.001)])
+        == "the noise of force is 0.87 times what is stated: taken into account"
     )
 
 
