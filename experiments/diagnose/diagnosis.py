@@ -188,7 +188,8 @@ class _Course:
         asked = self.asked
         self.first = open_gate(
             self.base, signatures=columns, seed=asked.seed, refit=asked.thorough,
-            draws=_REFITS if asked.thorough else _DRAWS, folder=asked.gates, tell=lambda done: self.tell("making the gate's null", done),
+            draws=_REFITS if asked.thorough else _DRAWS, folder=asked.gates,
+            tell=lambda done: self.tell("making the gate's null", done),
         )[1]  # fmt: skip
 
     # What is missing --------------------------------------------------------------------------------------------------
