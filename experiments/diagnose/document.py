@@ -19,12 +19,12 @@ import numpy as np
 from experiments.runfolder import write_json, write_series, write_text
 
 from .candidates import candidate_rows
-from .diagnosis import Diagnosis
 from .effect_equations import SYMBOLS, equations_of, with_comments
 from .evidence import excess, inflation
 from .fitting import Fit
 from .gaps import Gaps
 from .localise import phases_of
+from .outcome import Diagnosis
 from .problem import Form
 from .scatter_gap import gap_with_scatter, scatter_std, sensor_std
 from .sizes import effect_sizes

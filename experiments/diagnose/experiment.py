@@ -21,9 +21,10 @@ from experiments.runfolder import RunFolder
 from hedgebed import __version__
 
 from .bounds import is_strained
-from .diagnosis import Diagnosis, diagnose
+from .diagnosis import diagnose
 from .document import write_diagnosis
 from .noise_words import together
+from .outcome import Diagnosis
 from .own import load_own
 from .problem import Problem
 from .summary import summary_sentences, title_words

@@ -24,7 +24,7 @@ from .problem import Array, Form, Problem, Values
 from .replicates import groups_of
 
 if TYPE_CHECKING:
-    from .diagnosis import Diagnosis
+    from .outcome import Diagnosis
 
 __all__ = ["ScatterGap", "gap_with_scatter", "scatter_std", "sensor_std", "weighed_residuals"]
 

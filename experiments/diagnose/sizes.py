@@ -18,7 +18,7 @@ from .problem import Form, Values
 from .scatter_gap import sensor_std
 
 if TYPE_CHECKING:
-    from .diagnosis import Diagnosis
+    from .outcome import Diagnosis
 
 __all__ = ["effect_sizes"]
 
