@@ -70,14 +70,16 @@ def stiff_enough(
         gravity: [m/s2].
     """
     from dem.packing import rain_column
+    from dem.prepare import bound_of_mean
     from dem.sizes import Uniform
     from dem.timestep import choose_young
 
+    sizes = Uniform(grain, spread)
     return choose_young(
         stuff,
         pressure=bearing * _PACKING * stuff.density * gravity * depth,
-        speed=math.sqrt(2 * gravity * rain_column(Uniform(grain, spread)) * depth),
-        max_overlap=0.05,
+        speed=math.sqrt(2 * gravity * rain_column(sizes) * depth),
+        max_overlap=bound_of_mean(sizes, 0.05),
         diameter=grain,
     )
 

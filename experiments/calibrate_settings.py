@@ -55,6 +55,8 @@ FREE = {
     "bond_number": "1",
 }
 """What may be free, with its unit. bond_number: pull-off force of two grains over the weight of one."""
+_BOUNDS = {"degrees": (0.0, 90.0), "1": (0.0, 1.0)}
+"""Of a figure's value, by its unit; the others are 0 or more."""
 _PLANES = ("shear", "triaxial", "mohr")
 _SHEARED = ("loose", "dense")
 _FIXED = tuple(f.name for f in fields(Material) if f.name not in ("name", "sources", "grain"))
@@ -264,6 +266,10 @@ def _target(name: str, given: dict[str, Any]) -> Target:
             raise ValueError(f"{called}.{key} = {number!r} must be a number [{FIGURES[kind].unit}]")
     if not given["tolerance"] > 0:
         raise ValueError(f"{called}.tolerance = {given['tolerance']} must be positive: no figure is known exactly")
+    unit, bounds = FIGURES[kind].unit, _BOUNDS.get(FIGURES[kind].unit, (0.0, math.inf))
+    if not bounds[0] <= given["value"] < bounds[1]:
+        most = f" and below {bounds[1]:g}" if math.isfinite(bounds[1]) else ""
+        raise ValueError(f"{called}.value = {given['value']} [{unit}] must be at least {bounds[0]:g}{most}")
     if not (isinstance(given["source"], str) and given["source"].strip()):
         raise ValueError(f"{called}.source = {given['source']!r} must say where the figure comes from")
     figure = FIGURES[kind]
