@@ -266,10 +266,6 @@ def _target(name: str, given: dict[str, Any]) -> Target:
             raise ValueError(f"{called}.{key} = {number!r} must be a number [{FIGURES[kind].unit}]")
     if not given["tolerance"] > 0:
         raise ValueError(f"{called}.tolerance = {given['tolerance']} must be positive: no figure is known exactly")
-    unit, bounds = FIGURES[kind].unit, _BOUNDS.get(FIGURES[kind].unit, (0.0, math.inf))
-    if not bounds[0] <= given["value"] < bounds[1]:
-        most = f" and below {bounds[1]:g}" if math.isfinite(bounds[1]) else ""
-        raise ValueError(f"{called}.value = {given['value']} [{unit}] must be at least {bounds[0]:g}{most}")
     if not (isinstance(given["source"], str) and given["source"].strip()):
         raise ValueError(f"{called}.source = {given['source']!r} must say where the figure comes from")
     figure = FIGURES[kind]
@@ -291,6 +287,10 @@ def _target(name: str, given: dict[str, Any]) -> Target:
         raise ValueError(f"{called}.fit = {fit!r} must be true or false")
     if fit and not figure.state:
         raise ValueError(f"{called}.fit = true: {figure.words} takes minutes and is compared only; false would do")
+    unit, bounds = figure.unit, _BOUNDS.get(figure.unit, (0.0, math.inf))
+    if not bounds[0] <= given["value"] < bounds[1]:
+        most = f" and below {bounds[1]:g}" if math.isfinite(bounds[1]) else ""
+        raise ValueError(f"{called}.value = {given['value']} [{unit}] must be at least {bounds[0]:g}{most}")
     numbers = {"value": float(given["value"]), "tolerance": float(given["tolerance"])}
     return Target(name, **(given | numbers | {"state": state, "fit": fit, "figure": kind}))
 
