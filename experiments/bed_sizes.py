@@ -22,6 +22,7 @@ KEPT: dict[str, tuple[str, int]] = {
 }
 """What can stay the same of grains that stick: in words; the power of d with which surface energy goes."""
 _OF = {"normal": ("deviation", "cut"), "log-normal": ("deviation", "cut"), "sieve": ("openings", "passing")}
+_SPREAD = 0.15  # the default of the setting
 _SHARES = (0.1, 0.3, 0.5, 0.6, 0.9)
 
 
@@ -46,6 +47,8 @@ def distribution(
             raise ValueError(f"{key} = {value} beside distribution = {kind!r}: it is of {owners}; leave it out")
     if kind == "uniform":
         return Uniform(grain, spread)
+    if spread != _SPREAD:
+        raise ValueError(f"spread = {spread} beside distribution = {kind!r}: it is of 'uniform'; leave it out")
     if kind == "sieve":
         if not openings or not passing:
             raise ValueError(

@@ -32,6 +32,7 @@ def test_each_distribution_has_the_mean_asked_for():
         (SIEVE | {"cut": 2.0}, "cut = 2.0 beside distribution = 'sieve'"),
         (SIEVE | {"passing": (0.0, 0.6, 0.2, 1.0)}, "passing = .* rise from 0 to 1"),
         (SIEVE | {"coarse": 0.008, "footprints": (0.0, 0.02)}, "distribution = 'sieve' beside coarse = 0.008"),
+        ({"distribution": "normal", "deviation": 0.2, "spread": 0.1}, "spread = 0.1 beside distribution = 'normal'"),
         ({"keep": "bond"}, "keep = 'bond': material 'sand' does not stick"),
     ],
 )
