@@ -30,7 +30,16 @@ from .sizes import Sizes, Uniform, describe, sizes_of
 from .stages import Preparation
 from .timestep import choose_young
 
-__all__ = ["BEARING", "Specification", "cache_folder", "check_options", "fingerprint", "prepare_bed", "soft_enough"]
+__all__ = [
+    "BEARING",
+    "Specification",
+    "bound_of_mean",
+    "cache_folder",
+    "check_options",
+    "fingerprint",
+    "prepare_bed",
+    "soft_enough",
+]
 
 _EXPECTED_PACKING = 0.57
 # Penetration resistance of sand grows with depth about sixty times as fast as its overburden (3D-RFT, Agarwal et al.
@@ -38,6 +47,8 @@ _EXPECTED_PACKING = 0.57
 BEARING = 30.0
 # A grain that strikes the floor at the end of its fall does the bed no harm: until it is made, this is allowed.
 _RAIN_OVERLAP = 0.05
+# Smallest over mean diameter of the sizes with which ``CHAIN`` was measured.
+_NARROW = 0.85
 # More is rained in than is kept: this much higher, and at least this many diameters.
 _SURPLUS, _SURPLUS_DIAMETERS = 0.06, 2.0
 
@@ -315,9 +326,19 @@ def soft_enough(
         material,
         pressure=(1 + BEARING) * bulk * gravity * size[2],
         speed=math.sqrt(2 * gravity * column * size[2]),
-        max_overlap=max_overlap,
+        max_overlap=bound_of_mean(sizes, max_overlap),
         diameter=sizes.mean,
     )
+
+
+def bound_of_mean(sizes: Sizes | Graded, max_overlap: float) -> float:
+    """Overlap over diameter at which a grain of the mean size is held, so that the smallest keep ``max_overlap``.
+
+    What a contact gives in is much the same, and more of a small grain's diameter. Within ``_NARROW``, the sizes for
+    which forces among many grains were measured, it is ``max_overlap``.
+    """
+    share = sizes.bounds[0] / sizes.mean / _NARROW
+    return max_overlap if share > 1 - 1e-9 else max_overlap * share
 
 
 def check_options(size, grain, gravity, seed, max_overlap) -> None:

@@ -25,17 +25,16 @@ def check(settings: BedConeSettings) -> None:
     """Raise ValueError for a bed that is none or not level, and a cone that cannot go into it."""
     from dem.penetrometer import check_cone
 
-    check_bed(settings)
-    if settings.bed is None:
-        check_cone(
-            size=settings.size,
-            surface=settings.size[2],
-            grain=settings.grain,
-            diameter=settings.diameter,
-            angle=settings.angle,
-            depth=settings.depth,
-            shaft=settings.shaft,
-        )
+    bed = check_bed(settings)
+    check_cone(
+        size=bed.size,
+        surface=bed.surface,
+        grain=bed.grain,
+        diameter=settings.diameter,
+        angle=settings.angle,
+        depth=settings.depth,
+        shaft=settings.shaft,
+    )
 
 
 def place_of(push: int, size: tuple[float, ...]) -> tuple[float, float]:

@@ -24,9 +24,8 @@ def check(settings: BedCutSettings) -> None:
     """Raise ValueError for a bed that is none or not level, or too narrow for a cut with two faces."""
     from dem.cutting import check_width
 
-    check_bed(settings)
-    if settings.bed is None:
-        check_width(settings.width, width=settings.size[0], height=settings.size[2], grain=settings.grain)
+    bed = check_bed(settings)
+    check_width(settings.width, width=bed.size[0], height=bed.surface, grain=bed.grain)
 
 
 def _carry_out(settings: BedCutSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:

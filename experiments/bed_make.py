@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+from dem.materials import Material, material
+
 from .bed_graded import grading_told
-from .bed_settings import GRADED, BedSettings
-from .bed_work import check_memory, check_name, finish_bed, prepared_in
+from .bed_settings import GRADED, SPREAD_OUT, BedSettings
+from .bed_sizes import bond_number, in_grains_of, scaling_told, sizes_table
+from .bed_work import check_memory, check_name, finish_bed, prepared_in, quantity
 from .kept_material import MATERIAL_COPY, keep_material
 from .progress import Progress
 from .runfolder import RunFolder
@@ -17,18 +20,16 @@ __all__ = ["check", "fingerprint", "resume", "run"]
 
 def check(settings: BedSettings) -> None:
     """Raise ValueError, naming key, value and what would do, for what this machine or the material cannot serve."""
-    from dem.materials import material
     from dem.prepare import check_options, soft_enough
-    from dem.sizes import Uniform
     from dem.timestep import time_step_for
 
     check_name(settings.name)
     check_options(settings.size, settings.grain, settings.gravity, settings.seed, settings.max_overlap)
-    graded = settings.sizes
+    graded, local = settings.graded, settings.local
     share = 1.0 if graded is None else graded.share(settings.size)
-    check_memory(settings.size, settings.grain, settings.spread, share=share)
-    sizes = Uniform(settings.grain, settings.spread) if graded is None else graded
-    stuff = material(settings.material, grain=settings.grain)
+    check_memory(settings.size, settings.grain, 0.0, share=share * settings.grain**3 / local.mean_cube)
+    sizes = local if graded is None else graded
+    stuff = material_of(settings, settings.material)
     young = settings.young or soft_enough(
         stuff, size=settings.size, sizes=sizes, gravity=settings.gravity, max_overlap=settings.max_overlap
     )
@@ -49,16 +50,44 @@ def fingerprint() -> str:
     return of_dem()
 
 
+def material_of(settings: BedSettings, name: str) -> Material:
+    """The material of that name or file, as the grains of this bed have it."""
+    own = material(name)
+    if settings.keep == "strength" or own.grain is None:
+        return own.for_grain(settings.grain)
+    return in_grains_of(own, settings.grain, keep=settings.keep, own=own.grain)
+
+
 def _carry_out(settings: BedSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
-    options = settings.model_dump(exclude={"name", "coarse", *GRADED})
-    if (graded := settings.sizes) is not None:
+    options = settings.model_dump(exclude={"name", "coarse", "keep", "distribution", *SPREAD_OUT, *GRADED})
+    graded = settings.graded
+    if graded is not None:
         options |= {"grain": graded, "spread": None}
+    elif settings.distribution != "uniform":
+        options |= {"grain": settings.local, "spread": None}
     with folder.lock():
-        options["material"] = keep_material(settings.material, folder.path)
+        name = keep_material(settings.material, folder.path)
+        options["material"] = material_of(settings, name)
         prepared = prepared_in(folder, progress, options, name=settings.name)
-        told = {} if graded is None else grading_told(prepared)
+        assert prepared.bed is not None
+        if graded is not None:
+            told = grading_told(prepared)
+        else:
+            told = {"tables": [sizes_table(prepared.bed.grains()["radius"], settings.local)]}
+        own = material(name)
+        if own.cohesion != "none":
+            _add_adhesion(told, settings, own, prepared.bed.material)
         title = f"A bed of {prepared.recipe['material']['name']}: {' '.join(settings.stages)}"
         return finish_bed(folder, prepared, progress, experiment="bed make", title=title, name=settings.name, **told)
+
+
+def _add_adhesion(told: dict[str, Any], settings: BedSettings, own: Material, now: Material) -> None:
+    """Put into `told` the grains' Bond number, and what was kept of `own`, of grains of another size."""
+    bond = bond_number(now, diameter=settings.grain, gravity=settings.gravity)
+    told.setdefault("quantities", {})["bond_number"] = quantity(bond, "1", "pull-off of two grains over one's weight")
+    if own.grain != settings.grain:
+        said = scaling_told(own, now, diameter=settings.grain, gravity=settings.gravity, keep=settings.keep)
+        told.setdefault("warnings", []).append(said)
 
 
 run, resume = whole_run("bed make", BedSettings, _carry_out, check=check, material_copy=MATERIAL_COPY)

@@ -16,6 +16,7 @@ from dem.sizes import LogNormal, Normal, Sieve, Sizes, Uniform
 
 from .bed_graded import grading_told
 from .bed_settings import BedRefineSettings
+from .bed_sizes import KEPT, in_grains_of
 from .bed_work import check_memory, check_name, finish_bed, prepared_in
 from .progress import Progress
 from .runfolder import RunFolder
@@ -43,8 +44,7 @@ def refined_options(settings: BedRefineSettings) -> tuple[dict[str, Any], Prepar
     share = grain / sizes.mean
     stuff = Material(**recipe["material"])
     if stuff.cohesion != "none":
-        power = {"strength": 1, "bond": 2, "surface-energy": 0}[settings.keep]
-        stuff = replace(stuff, surface_energy=stuff.surface_energy * share**power, grain=grain)
+        stuff = in_grains_of(stuff, grain, keep=settings.keep, own=sizes.mean)
     last = [stage for stage in recipe["stages"] if stage.partition(":")[0] in ("cut", "tilt")]
     first = [stage for stage in recipe["stages"] if stage not in last]
     # Once grains stick nothing brings them closer: what was poured without adhesion comes to its packing before.
@@ -104,12 +104,13 @@ def check(settings: BedRefineSettings) -> None:
     if isinstance(sizes, Graded):
         sizes.check(options["size"])
         share = sizes.share(options["size"])
-    check_memory(options["size"], sizes.mean, 0.0, share=share)
+    local = sizes.local if isinstance(sizes, Graded) else sizes
+    check_memory(options["size"], sizes.mean, 0.0, share=share * sizes.mean**3 / local.mean_cube)
     check_stages(
         [parse_stage(stage) for stage in options["stages"]],
         size=options["size"],
         grain=sizes.mean,
-        sizes=sizes.local if isinstance(sizes, Graded) else sizes,
+        sizes=local,
         cohesive=options["material"].cohesion != "none",
     )
 
@@ -134,12 +135,8 @@ def _carry_out(settings: BedRefineSettings, folder: RunFolder, progress: Progres
         stuff = options["material"]
         said = []
         if stuff.cohesion != "none":
-            kept = {
-                "strength": "strength (pull-off over d^2)",
-                "bond": "Bond number",
-                "surface-energy": "surface energy",
-            }
-            said.append(f"the grains' {kept[settings.keep]} is kept: surface_energy = {stuff.surface_energy:.4g} J/m2")
+            kept, _ = KEPT[settings.keep]
+            said.append(f"the grains' {kept} is kept: surface_energy = {stuff.surface_energy:.4g} J/m2")
         graded = isinstance(options["grain"], Graded)
         told = grading_told(prepared) if graded else {}
         title = f"{settings.bed} with grains of {1e3 * options['grain'].mean:.4g} mm"

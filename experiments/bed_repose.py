@@ -25,9 +25,8 @@ def check(settings: BedReposeSettings) -> None:
     """Raise ValueError for a bed that is none, not level, or too narrow for two slopes."""
     from dem.repose import check_width
 
-    check_bed(settings)
-    if settings.bed is None:
-        check_width(settings.size[0], slot=settings.slot, grain=settings.grain, depth=settings.size[2])
+    bed = check_bed(settings)
+    check_width(bed.size[0], slot=settings.slot, grain=bed.grain, depth=bed.surface)
 
 
 def _carry_out(settings: BedReposeSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:

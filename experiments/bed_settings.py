@@ -8,17 +8,20 @@ from pydantic import Field, model_validator
 
 from dem.graded import Graded
 from dem.recipe import check_stages, parse_stage
-from dem.sizes import Uniform
+from dem.sizes import Sizes
 
+from .bed_sizes import Distribution, Kept, distribution
 from .settings import STANDARD_GRAVITY
 from .strict import StrictSettings
 
-__all__ = ["BedRefineSettings", "BedSettings"]
+__all__ = ["GRADED", "SPREAD_OUT", "BedRefineSettings", "BedSettings"]
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 SeedNumber = Annotated[int, Field(ge=0, lt=2**31)]
 GRADED = ("footprints", "fine_depth", "growth")
 """Settings that a graded bed alone has, beside ``coarse``."""
+SPREAD_OUT = ("deviation", "cut", "openings", "passing")
+"""Settings of ``distribution``, each of some of them."""
 _NAME = "Name under which the bed is kept on the shelf (HEDGEBED_BEDS); in the run's folder alone if not given."
 
 
@@ -37,6 +40,26 @@ class BedSettings(StrictSettings):
     )
     grain: Positive = Field(0.004, description="Mean grain diameter [m].")
     spread: float = Field(0.15, ge=0, le=0.5, description="Grain diameters are uniform within 1 +- this [1].")
+    distribution: Distribution = Field(
+        "uniform",
+        description="Of the diameters, about `grain`: uniform, normal or log-normal by number; sieve: a table by mass, "
+        "enlarged until its grains have that mean.",
+    )
+    deviation: Positive | None = Field(
+        None, description="Standard deviation over the mean (normal), or of ln diameter (log-normal) [1]."
+    )
+    cut: Positive | None = Field(
+        None, description="Where normal and log-normal are cut off [standard deviations]; 2 if not given."
+    )
+    openings: tuple[Positive, ...] = Field((), description="A sieve table: openings, ascending [m].")
+    passing: tuple[Annotated[float, Field(ge=0, le=1)], ...] = Field(
+        (), description="A sieve table: share of the mass that passes each, from 0 to 1 [1]."
+    )
+    keep: Kept = Field(
+        "strength",
+        description="What stays the same of a material that sticks, in grains of another size than it was found for: "
+        "their strength (pull-off over d^2), their Bond number (pull-off over weight), or the surface energy.",
+    )
     coarse: Positive | None = Field(
         None,
         description="A graded bed: mean diameter of the coarsest grains, away from the footprints, under which "
@@ -67,20 +90,37 @@ class BedSettings(StrictSettings):
     def _can_be(self) -> BedSettings:
         from dem.materials import material
 
-        if self.sizes is not None:
-            self.sizes.check(self.size)
-        stages = [parse_stage(stage) for stage in self.stages]
+        local = self.local
+        if (graded := self.graded) is not None:
+            graded.check(self.size)
+        stuff = material(self.material)
+        if self.keep != "strength" and stuff.grain is None:
+            why = "does not stick" if stuff.cohesion == "none" else "does not say for which grains its numbers hold"
+            raise ValueError(f"keep = {self.keep!r}: material {stuff.name!r} {why}; leave keep out")
         check_stages(
-            stages,
+            [parse_stage(stage) for stage in self.stages],
             size=self.size,
             grain=self.grain,
-            sizes=Uniform(self.grain, self.spread),
-            cohesive=material(self.material).cohesion != "none",
+            sizes=local,
+            cohesive=stuff.cohesion != "none",
         )
         return self
 
     @property
-    def sizes(self) -> Graded | None:
+    def local(self) -> Sizes:
+        """Sizes of grains side by side, under the footprints of one that is graded. Raises ValueError for bad ones."""
+        return distribution(
+            self.distribution,
+            grain=self.grain,
+            spread=self.spread,
+            deviation=self.deviation,
+            cut=self.cut,
+            openings=self.openings,
+            passing=self.passing,
+        )
+
+    @property
+    def graded(self) -> Graded | None:
         """Sizes by place, where the bed is graded. Raises ValueError for what cannot be, or is given by halves."""
         if self.coarse is None:
             given = [name for name in GRADED if getattr(self, name) not in (None, ())]
@@ -89,6 +129,11 @@ class BedSettings(StrictSettings):
                     f"{', '.join(given)}: only of a graded bed; coarse = {2 * self.grain:g} would make one"
                 )
             return None
+        if self.distribution != "uniform":
+            raise ValueError(
+                f"distribution = {self.distribution!r} beside coarse = {self.coarse:g}: the sizes of a graded bed are "
+                f"uniform about those of their place; leave one of them out"
+            )
         ends = self.footprints
         if not ends or len(ends) % 2:
             raise ValueError(f"footprints = {list(ends)} must be pairs: where each begins and ends along x [m]")
@@ -107,7 +152,7 @@ class BedRefineSettings(StrictSettings):
 
     bed: str = Field(description="The bed: a file, the folder of a run of bed make, or a name on the shelf.")
     grain: Positive | None = Field(None, description="Mean grain diameter [m]; half of the bed's own if not given.")
-    keep: Literal["strength", "bond", "surface-energy"] = Field(
+    keep: Kept = Field(
         "strength",
         description="What stays the same of grains that stick: their strength (pull-off over d^2), their Bond number "
         "(pull-off over weight), or the surface energy.",

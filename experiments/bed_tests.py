@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 from typing import Any
@@ -22,14 +23,23 @@ from .progress import Progress
 from .runfolder import RunFolder
 from .stopping import held_back
 
-__all__ = ["about", "check_bed", "carry_out", "quantity", "stiff_enough", "write_frame"]
+__all__ = ["Extent", "about", "check_bed", "carry_out", "quantity", "stiff_enough", "write_frame"]
 
 Run = dict[str, Any]
 _PACKING = 0.6  # about, to reckon what lies on the floor
 
 
-def check_bed(settings: BedTestSettings) -> None:
-    """Raise ValueError for what is no bed, one that is tilted or cut, or one that cannot be prepared."""
+@dataclass(frozen=True)
+class Extent:
+    """Of a bed, before it is read or prepared: periods and depth, height of the surface, mean diameter [m]."""
+
+    size: tuple[float, ...]
+    surface: float
+    grain: float
+
+
+def check_bed(settings: BedTestSettings) -> Extent:
+    """How large the bed is. Raises ValueError for no bed, one that is tilted or cut, or one that cannot be prepared."""
     from dem.bedfile import read_preparation
     from dem.materials import material
     from dem.prepare import check_options
@@ -38,12 +48,16 @@ def check_bed(settings: BedTestSettings) -> None:
     if settings.bed is None:
         material(settings.material)
         check_options(settings.size, settings.grain, settings.gravity, 1, 0.05)
-        return
+        return Extent(settings.size, settings.size[2], settings.grain)
     path = find_bed(settings.bed)
-    stored, _, _ = read_file(path)
-    stages = [report.stage for report in read_preparation(path).reports]
+    stored, state, _ = read_file(path)
+    reports = read_preparation(path).reports
+    stages = [report.stage for report in reports]
     if stored["gravity"][0] or stored["gravity"][1] or any(stage.startswith("cut") for stage in stages):
         raise ValueError(f"bed = {settings.bed!r} was cut or tilted: a level one would do")
+    position = state["position"].astype(float)
+    surface = reports[-1].surface if reports else float(np.quantile(position[:, 2] + position[:, 3], 0.9))
+    return Extent(stored["size"], surface, 2 * float(position[:, 3].mean()))
 
 
 def stiff_enough(
@@ -56,14 +70,16 @@ def stiff_enough(
         gravity: [m/s2].
     """
     from dem.packing import rain_column
+    from dem.prepare import bound_of_mean
     from dem.sizes import Uniform
     from dem.timestep import choose_young
 
+    sizes = Uniform(grain, spread)
     return choose_young(
         stuff,
         pressure=bearing * _PACKING * stuff.density * gravity * depth,
-        speed=math.sqrt(2 * gravity * rain_column(Uniform(grain, spread)) * depth),
-        max_overlap=0.05,
+        speed=math.sqrt(2 * gravity * rain_column(sizes) * depth),
+        max_overlap=bound_of_mean(sizes, 0.05),
         diameter=grain,
     )
 

@@ -55,6 +55,8 @@ FREE = {
     "bond_number": "1",
 }
 """What may be free, with its unit. bond_number: pull-off force of two grains over the weight of one."""
+_BOUNDS = {"degrees": (0.0, 90.0), "1": (0.0, 1.0)}
+"""Of a figure's value, by its unit; the others are 0 or more."""
 _PLANES = ("shear", "triaxial", "mohr")
 _SHEARED = ("loose", "dense")
 _FIXED = tuple(f.name for f in fields(Material) if f.name not in ("name", "sources", "grain"))
@@ -285,6 +287,10 @@ def _target(name: str, given: dict[str, Any]) -> Target:
         raise ValueError(f"{called}.fit = {fit!r} must be true or false")
     if fit and not figure.state:
         raise ValueError(f"{called}.fit = true: {figure.words} takes minutes and is compared only; false would do")
+    unit, bounds = figure.unit, _BOUNDS.get(figure.unit, (0.0, math.inf))
+    if not bounds[0] <= given["value"] < bounds[1]:
+        most = f" and below {bounds[1]:g}" if math.isfinite(bounds[1]) else ""
+        raise ValueError(f"{called}.value = {given['value']} [{unit}] must be at least {bounds[0]:g}{most}")
     numbers = {"value": float(given["value"]), "tolerance": float(given["tolerance"])}
     return Target(name, **(given | numbers | {"state": state, "fit": fit, "figure": kind}))
 

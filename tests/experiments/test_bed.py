@@ -182,6 +182,21 @@ def test_a_lid_that_presses_harder_than_the_grains_bear_is_refused(shelf):
         shear_bed(bed, pressure=5 * floor, way=0.004, inertial_number=0.01, grain=0.004)
 
 
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        ("cone", "diameter = 0.016 m: from three grains"),
+        ("cut", "of the cut: from two grains"),
+        ("repose", "size: x = 0.024 m is too narrow for a slot of"),
+    ],
+)
+def test_a_bed_too_small_for_its_test_is_refused_before_any_work(command, said, shelf, tmp_path, capsys):
+    words = ["bed", "test", command, "--bed", "rained", "--out", str(tmp_path / "run")]
+    assert main(words) == BAD_INPUT
+    assert said in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "run").exists()
+
+
 def test_the_settings_and_the_stages_are_what_the_bed_is_made_from():
     bed_make.check(BedSettings(stages=("rain", "fluff", "level")))
     assert BedSettings().stages == ("rain", "level")

@@ -201,6 +201,7 @@ def test_a_calibration_finds_the_grains_and_resumes(tmp_path, monkeypatch, capsy
         ({"targets": {"critical_angle": ANGLE}}, "targets.critical_angle is no figure: did you mean"),
         ({"targets": {"critical_friction_angle": {"value": 31.0}}}, "tolerance must be given"),
         ({"targets": {"critical_friction_angle": ANGLE | {"tolerance": 0}}}, "tolerance = 0 must be positive"),
+        ({"targets": {"critical_friction_angle": ANGLE | {"value": 95}}}, "value = 95 .* at least 0 and below 90"),
         (
             {"targets": {"critical_friction_angle": ANGLE | {"plane": "oblique"}}},
             "must be 'shear', 'triaxial' or 'mohr'",
