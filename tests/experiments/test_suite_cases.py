@@ -38,7 +38,8 @@ def test_cases_that_can_share_a_bed_do():
 
     for names, seeds in (
         (("grains1-sand", "grains5-landing"), 1), (("grains1-look", "grains5-look"), 3), (("grains3-row",), 3),
-        (("grains3-look",), 3), (("grains6",), 2), (("grains1-coarse-jsc1a",), 1), (("grains2-flight-1e-2-brake", "grains2-flight-1e-4-brake"), 1),
+        (("grains3-look",), 3), (("grains6",), 2), (("grains1-coarse-jsc1a",), 1),
+        (("grains2-flight-1e-2-brake", "grains2-flight-1e-4-brake", "grains2-flight-1e-6-brake"), 1),
     ):  # fmt: skip
         found = beds(*names)
         assert len(found) == len({bed[-1] for bed in found}) == seeds
