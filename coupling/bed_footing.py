@@ -200,6 +200,8 @@ class BedFooting:
         self._mass = float(bed.grains()["mass"].sum())
         self.impulse = np.zeros(3)
         """Of gravity and floor on the grains since the start [N s]."""
+        self.drag_time = math.inf
+        """Of a drag that calms the grains before time begins (`Bed.advance`) [s]; it is in no book."""
         self.grain_steps = 0
         """Grains computed since the start, summed over the bed's steps (fewer where grains sleep)."""
 
@@ -212,6 +214,25 @@ class BedFooting:
     def lag(self) -> float:
         """The bed's step (see `Footing.lag`) [s]."""
         return float(self.bed.time_step)
+
+    @property
+    def gravity(self) -> float:
+        """Of the grains [m/s2]."""
+        return math.hypot(*self.bed.gravity)
+
+    def set_gravity(self, gravity: float) -> None:
+        """See `dem.Bed.set_gravity`; those asleep wake for good."""
+        self.bed.set_gravity(gravity)
+
+    @property
+    def grain(self) -> float:
+        """Mean diameter of the grains [m]."""
+        return 2 * float(np.mean(self.bed.grains()["radius"]))
+
+    def grain_speed(self) -> float:
+        """Root of the mean square of the grains' speeds, by mass [m/s]."""
+        grains = self.bed.grains()
+        return math.sqrt(float(grains["mass"] @ (grains["velocity"] ** 2).sum(axis=1)) / self._mass)
 
     # Where it may start --------------------------------------------------------------------------------------------
 
@@ -272,7 +293,7 @@ class BedFooting:
             spins=np.tile(twist.spin, (len(used), 1)),
         )
         before = self.bed.grain_steps
-        self.bed.advance(steps)
+        self.bed.advance(steps, drag_time=self.drag_time)
         self.grain_steps += self.bed.grain_steps - before
         rows = self.bed.reactions()
         forces, torques = np.hsplit(self.copies * rows[self.bodies], 2)

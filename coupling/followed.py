@@ -31,6 +31,8 @@ class Followed(Books):
     lowering_speed: float | None
     placed: bool
     """Whether the hand has let go."""
+    pace = 1.0
+    """The hand's times over those on grains at 1 g (`lowered_gravity.pace_under`) [1]."""
 
     def _not_begun(self) -> None:
         self.placing_steps = 0
@@ -52,7 +54,7 @@ class Followed(Books):
     @property
     def fraction(self) -> float:
         """How far it is along, 0 to 1, the setting down, as long as it was guessed to take, included."""
-        hand = REST_TIME + PLACING_WAY / self.lowering_speed if self.lowering_speed is not None else 0.0
+        hand = self.pace * REST_TIME + PLACING_WAY / self.lowering_speed if self.lowering_speed is not None else 0.0
         done = hand + self.body.time if self.placed else min(hand, self.body.time)
         return min(1.0, done / (hand + self.duration))
 
@@ -91,20 +93,28 @@ class Followed(Books):
     def _settle(self, reaction: FootReaction, lacking: Vector, moving: Vector) -> None:
         """A step in the hand: what of the weight the ground does not carry yet [N], and the speeds [m/s]. At rest the
         hand lets go. Raises RuntimeError where that takes too long."""
-        self.placing_steps = self.master.count
-        count = max(2, round(REST_TIME / self.master.macro_step))
-        self._settling = [*self._settling, np.concatenate([lacking, moving])][-count:]
         assert self.lowering_speed is not None
-        if len(self._settling) == count and reaction.contacts:
-            mean = np.abs(np.mean(self._settling, axis=0))
+        mean = self._mean_of_late(lacking, moving)
+        if mean is not None and reaction.contacts:
             near = mean[: len(lacking)].max() <= AT_REST * self._weight
             if near and mean[len(lacking) :].max() <= AT_REST * self.lowering_speed:
-                self.body.let_go()
-                self.placed = True
-                self._begin()
-                return
-        if self.body.time > LONGEST_PLACING:
+                self._lies()
+        longest = self.pace * LONGEST_PLACING
+        if self.body.time > longest:  # 0 once it is let go
             raise RuntimeError(
-                f"the platform did not come to rest within {LONGEST_PLACING:g} s of being set down: the ground carried "
+                f"the platform did not come to rest within {longest:.3g} s of being set down: the ground carried "
                 f"{self.master.wrench.force[2]:.3g} of {self._weight:.3g} N at the end"
             )
+
+    def _mean_of_late(self, lacking: Vector, moving: Vector) -> Vector | None:
+        """Size of the mean over the last REST_TIME of what lacks and moves; None as long as there is less of it."""
+        self.placing_steps = self.master.count
+        count = max(2, round(self.pace * REST_TIME / self.master.macro_step))
+        self._settling = [*self._settling, np.concatenate([lacking, moving])][-count:]
+        return np.abs(np.mean(self._settling, axis=0)) if len(self._settling) == count else None
+
+    def _lies(self) -> None:
+        """It lies where it was set down: the hand lets go."""
+        self.body.let_go()
+        self.placed = True
+        self._begin()

@@ -71,15 +71,15 @@ class PlanarBody:
         self._drag = np.zeros(3)
         self.held_by_hand = False
 
-    def take_in_hand(self, lowering_speed: float) -> None:
+    def take_in_hand(self, lowering_speed: float, *, pace: float = 1.0) -> None:
         """From here on a hand lowers it: c = W / lowering_speed [m/s] resists, and what is felt has the mass 2 ms c.
 
         The same in all directions, and about the axis with l^2: it sinks until the ground carries it, and cannot bounce
-        on a ground softer than W / (8 ms lowering_speed). The torque waits.
+        on a ground softer than W / (8 ms lowering_speed). The torque waits. `pace` times 2 ms where all is slower.
         """
         scale = np.array([1.0, 1.0, self.trial.spike_length**2])
         drag = self.trial.weight / lowering_speed
-        self.inertia, self._drag = HAND_TIME * drag * scale, drag * scale
+        self.inertia, self._drag = pace * HAND_TIME * drag * scale, drag * scale
         self.held_by_hand = True
 
     def let_go(self) -> None:

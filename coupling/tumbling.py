@@ -1,14 +1,16 @@
 """A tumble of the planar platform on any footing: set down, let go, turned over by its flywheel.
 
 A stepper as those of `coupling.penetration`: `advance` makes one macro step, `state` and `restore` work between any
-two. On a bed a hand first lowers the platform until the sand carries it (`PlanarBody.take_in_hand`); then time is 0,
-the torque begins and the books are opened. Every macro step leaves one row.
+two. On a bed a hand first lowers the platform until the sand carries it (`PlanarBody.take_in_hand`), under a larger
+gravity if asked to, which then is lowered (`coupling.lowered_gravity`); then time is 0, the torque begins and the books
+are opened. Every macro step leaves one row.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,9 +22,10 @@ from .bed_footing import BedFooting
 from .contact_state import ContactReader, state_of
 from .followed import Followed
 from .footing import Footing, FootReaction, LawFooting
+from .lowered_gravity import LoweredGravity, pace_under
 from .master import Master
 from .planar_body import PlanarBody
-from .poses import Wrench
+from .poses import Vector, Wrench
 
 __all__ = ["MOST_REVERSAL", "CoupledTumble"]
 
@@ -33,6 +36,10 @@ What the grains' integrator and the coupling leave of a lossless collision is 3e
 (tests/coupling); here it is set against the energy of the whole tumble. One on grains that dissipate has shown less
 than 1e-6.
 """
+GRAINS_EVERY = 100
+"""Macro steps between two looks at how fast the grains are that wait under a lowered gravity."""
+LONGEST_CALM = 10.0
+"""A platform that does not come to rest there for longer is an error [of the time watched]."""
 COLUMNS = (
     "time", "x", "y", "theta", "vx", "vy", "omega", "ax", "ay", "alpha", "wheel_speed", "kinetic_energy",
     "potential_energy", "torque_work", "given", "taken",
@@ -51,8 +58,10 @@ class CoupledTumble(Followed):
     height : of the centre at the start [m]; None: on a law where the law carries it, on a bed just clear of the grains.
     energy_interval : between measurements of what the footing holds [s].
     max_wheel_speed : where a motor has no torque left [rad/s].
+    lower_gravity : whether the hand waits until gravity has fallen from the bed's to the trial's.
 
-    Raises ValueError for a start in overlap with grains, and for what `Master` and `PlanarBody` refuse.
+    Raises ValueError for a start in overlap with grains, a gravity to be lowered where there is no hand, no bed or a
+    rig, and for what `Master`, `PlanarBody` and `LoweredGravity` refuse.
     """
 
     def __init__(
@@ -69,6 +78,7 @@ class CoupledTumble(Followed):
         height: float | None = None,
         energy_interval: float = 0.02,
         max_wheel_speed: float = math.inf,
+        lower_gravity: bool = False,
     ) -> None:
         for key, value in {"duration": duration, "energy_interval": energy_interval}.items():
             if not (math.isfinite(value) and value > 0):
@@ -91,6 +101,11 @@ class CoupledTumble(Followed):
             footing.place(self.body.pose)
         self.body.max_wheel_speed = max_wheel_speed
         self.lowering_speed = lowering_speed
+        self.lowered: LoweredGravity | None = None
+        if lower_gravity:
+            if not isinstance(footing, BedFooting) or lowering_speed is None or trial.counterweight > 0:
+                raise ValueError("lower_gravity is for a platform that a hand sets down on a bed, without a rig")
+            self.lowered = LoweredGravity(footing, last=trial.gravity_sim, duration=self.duration)
         rests = lowering_speed is None and height is None
         weight = Wrench(np.array([0.0, 0.0, trial.weight if rests else 0.0]), np.zeros(3))
         self.master = Master(
@@ -115,7 +130,11 @@ class CoupledTumble(Followed):
             self._begin()
         else:
             assert lowering_speed is not None
-            self.body.take_in_hand(lowering_speed)
+            if isinstance(footing, BedFooting):
+                self.pace = pace_under(footing.gravity)
+            if self.lowered is not None:
+                self.body.trial = replace(trial, gravity_sim=self.lowered.now)
+            self.body.take_in_hand(lowering_speed, pace=self.pace)
 
     _free, _turns = (0, 2), (1,)
 
@@ -123,7 +142,7 @@ class CoupledTumble(Followed):
 
     @property
     def _weight(self) -> float:
-        return self.trial.weight
+        return self.body.trial.weight
 
     # Stepping ------------------------------------------------------------------------------------------------------
 
@@ -157,8 +176,45 @@ class CoupledTumble(Followed):
     def _lower(self) -> None:
         reaction = self.master.step()
         wrench, rates, length = self.master.wrench, self.body.rates, self.trial.spike_length
-        lacking = np.array([wrench.force[2] - self.trial.weight, wrench.torque[1] / length])
-        self._settle(reaction, lacking, np.array([rates[1], rates[2] * length]))
+        lacking = np.array([wrench.force[2] - self._weight, wrench.torque[1] / length])
+        moving = np.array([rates[1], rates[2] * length])
+        if self.lowered is None or self.lowered.begun is None:
+            self._settle(reaction, lacking, moving)
+        elif self.lowered.at_last:
+            self._calm(lacking, moving)
+        elif self.lowered.fall(self.body.time):
+            last = self.lowered.at_last
+            self.body.trial = self.trial if last else replace(self.trial, gravity_sim=self.lowered.now)
+            self._settling = []
+
+    def _lies(self) -> None:
+        """It lies: gravity falls, if it is to fall and has not yet, once the grains are calm; else the hand lets go."""
+        if self.lowered is None or self.lowered.begun is not None:
+            super()._lies()
+        elif self.master.count % GRAINS_EVERY == 0 and self.lowered.calm:
+            self.lowered.begin(self.body.time)
+
+    def _calm(self, lacking: Vector, moving: Vector) -> None:
+        """A step in the hand under the run's own gravity: at rest it lets go (see `coupling.lowered_gravity`)."""
+        mean, lowered = self._mean_of_late(lacking, moving), self.lowered
+        assert lowered is not None and lowered.begun is not None and isinstance(self.footing, BedFooting)
+        if mean is None or self.master.count % GRAINS_EVERY:
+            return
+        own = PlanarBody(self.trial, z=0.0).inertia
+        length = self.trial.spike_length
+        lack = mean[0] / own[1], mean[1] * length / own[2] * length
+        speeds = *mean[2:], self.footing.grain_speed()
+        if lowered.far(speeds, lack) <= 1:
+            if not lowered.dragged:
+                self._lies()
+            lowered.drag(False)
+            self._settling = []
+        elif self.body.time > lowered.begun + lowered.steps * lowered.every + LONGEST_CALM * lowered.sees:
+            raise RuntimeError(
+                f"platform and grains did not come to rest in {LONGEST_CALM * lowered.sees:.3g} s under "
+                f"{lowered.last:.3g} m/s2: grains move at {speeds[2]:.2g} m/s, the platform at {max(speeds[:2]):.2g}, "
+                f"{mean[0]:.2g} of {self._weight:.2g} N are lacking; a smaller settle_gravity would do"
+            )
 
     def _begin(self) -> None:
         self._open_books(self.body.momentum, self._turning)
@@ -282,6 +338,7 @@ class CoupledTumble(Followed):
             "tumble.states": np.array(self._states, dtype=np.int8),
             "tumble.feet": self.feet,
         }
+        own |= {"tumble.lowered": self.lowered.numbers()} if self.lowered is not None else {}
         own |= {f"reader.{key}": value for key, value in self.reader.state().items()}
         return own | self._books_state() | self.master.state()
 
@@ -289,6 +346,10 @@ class CoupledTumble(Followed):
         """Go back to what `state` gave."""
         placed, self.placing_steps, self._frames = (int(number) for number in state["tumble.counts"])
         self.placed = bool(placed)
+        if self.lowered is not None:
+            self.lowered.restore(np.asarray(state["tumble.lowered"], dtype=float))
+            now = self.lowered.now
+            self.body.trial = self.trial if self.lowered.at_last else replace(self.trial, gravity_sim=now)
         self._settling = list(np.asarray(state["tumble.settling"], dtype=float))
         self._rows = np.asarray(state["tumble.rows"]).tolist()
         self._states = [int(code) for code in state["tumble.states"]]

@@ -13,19 +13,25 @@ __all__ = ["Cost", "cost_of_tumble"]
 
 RATES = ((2e4, 9.52e6), (1e5, 7.09e6))
 """Grain-steps a second on 2 cores, with rolling, by grain count: docs/performance.md, 2026-11-21, a quiet machine."""
+BOOK = 1.19
+"""Time of a step with the book of what grains lose over one without (docs/coupling.md, 2026-11-22)."""
 SMALL_BED = 2e4
 """Fewer grains than this do not fill two cores: their rate is taken in proportion down to a tenth of the first's."""
 MACRO_STEP = 5e-3
 """Of the coupling beyond the grains, a macro step [s] (docs/coupling.md, 2026-11-21)."""
 SET_DOWN = 0.4 * 0.05
-"""Way that the hand takes, over its speed [m]: 0.39 s at 0.05 m/s in the first look of docs/coupling.md."""
+"""Way that the hand takes in the rig, over its speed [m]: 0.39 s at 0.05 m/s in the first look of docs/coupling.md."""
 FALL_TIMES = 1.5
 """What rain and rest take, over the time of a fall from the column's top: 0.27 s to 0.2 s for the beds of 80 mm in
 docs/performance.md, rounded up."""
 
-AWAKE = 8300 * 3e-3**3 / 0.036
-"""Grains that a motor's tumble keeps awake on average, times their diameter cubed, over the bed's width [m2]: the most
-of the three looks on 3 mm (docs/experiments.md: 15, 25 and 28 % of 29,797). A brake shakes all of it (79, 84 %)."""
+AWAKE = 20260 * 2.4e-3**3 / 0.036
+"""Grains that a motor's tumble keeps awake on average, times their diameter cubed, over the bed's width [m2]:
+grains1-sand-0.0085-0.22, 20.1 % of 100,753 over 2 s (the looks on 3 mm, of 0.9 to 1.2 s: 15, 25 and 28 % of 29,797). A
+brake shakes all of it (79, 84 %)."""
+CALM = 3.0
+"""What rest under a lowered gravity takes, with drag and then without, over the mean that is taken for it [1]: 2.2 at
+1e-6 g (docs/experiments.md)."""
 
 
 @dataclass(frozen=True)
@@ -53,12 +59,15 @@ def cost_of_tumble(settings: TumbleSettings) -> Cost:
 
     Raises ValueError for a bed that will not do, as the run itself would.
     """
+    from coupling.followed import REST_TIME
+    from coupling.lowered_gravity import EFOLD, pace_under
     from dem.timestep import time_step_for
 
     from .tumble_grains import (
         RAIN,
         _check_bed,
         _count,
+        _first_gravity,
         _forecast,
         _grain_gravity,
         _lowering_speed,
@@ -78,15 +87,21 @@ def cost_of_tumble(settings: TumbleSettings) -> Cost:
     smallest = settings.grain * (1 - settings.spread)
     step = time_step_for(soft, diameter=smallest, max_overlap=settings.max_overlap, wanted=None)
     grains = _count(settings, forecast)
-    gravity = _grain_gravity(plan.trial)
+    gravity = _first_gravity(settings, plan)
     fall = math.sqrt(2 * RAIN * settings.bed_size[2] / gravity)
-    steps = (settings.duration + SET_DOWN / _lowering_speed(settings, plan)) / step
+    way = SET_DOWN if plan.trial.counterweight > 0 else forecast.sunk
+    hand = way / _lowering_speed(settings, plan) + pace_under(gravity) * REST_TIME
+    if settings.settle_gravity is not None:
+        last = _grain_gravity(plan.trial)
+        hand += EFOLD * math.sqrt(settings.grain / gravity) * math.log(gravity / last)
+        hand += CALM * pace_under(gravity) * REST_TIME
+    steps = (settings.duration + hand) / step
     computed = grains
     if settings.sleep and settings.actuator == "motor":
         computed = min(grains, AWAKE * settings.bed_size[1] / settings.grain**3)
     return Cost(
         grains=grains, time_step=step, bed_seconds=FALL_TIMES * fall / step * grains / _rate(grains),
-        run_seconds=steps * computed / _rate(computed) + steps / settings.substeps * MACRO_STEP,
+        run_seconds=BOOK * steps * computed / _rate(computed) + steps / settings.substeps * MACRO_STEP,
         grain_steps=steps * computed,
     )  # fmt: skip
 

@@ -86,6 +86,11 @@ class TumbleBedSettings(GrainsSettings):
     )
     spike_diameter: Positive = Field(0.012, description="On a bed: diameter of shaft and ball tip of a spike [m].")
     spike_clear: Positive = Field(0.04, description="On a bed: how far a spike stands out of the hull [m].")
+    settle_gravity: Positive | None = Field(
+        None,
+        description="On a bed, in flight: gravity under which the bed is rained and the platform set down, lowered to "
+        "`gravity` before the torque begins [m/s2]: the same sooner; `gravity` itself if not given.",
+    )
     tumbles: int = Field(
         1,
         ge=1,

@@ -7,7 +7,7 @@ spring-damper's trial is integrated first: it says how far and deep the bed must
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -33,6 +33,7 @@ from .softening import Softening, soften_material
 from .stopping import held_back
 from .surfaces import find_surface, surface_names
 from .tumble_bed_settings import TumbleBedSettings
+from .tumble_flight import lies_in_flight
 from .tumble_grains_frames import TumbleFrames
 from .tumble_grains_result import conclude, sinkage_start, write_trajectory
 from .tumble_platform import torque_within_limit
@@ -70,6 +71,12 @@ class Forecast:
     """Depth of the deepest tip [m]."""
     fastest: float
     """Largest speed of a tip in the ground [m/s]."""
+    sunk: float
+    """Depth of the tips that it stands on before it moves [m]."""
+    margin: float = 1.5
+    """What grains may do beyond it: depth and speed for which their modulus is chosen, over these [1]."""
+    on: str = "on the spring-damper"
+    """What says so, for whom it does not suit."""
 
 
 def check_on_grains(settings: TumbleSettings) -> None:
@@ -141,11 +148,19 @@ def _material(plan: TumblePlan) -> Material:
 
 
 def _lowering_speed(settings: TumbleSettings, plan: TumblePlan) -> float:
-    """As set, or the speed of a grain that has fallen half its diameter [m/s], slow for sand in any gravity.
+    """As set, or sqrt(g z) [m/s], slow for sand in any gravity: z a grain, in flight how deep it lies.
 
-    Its dynamic pressure, 1.1 rho g d, is what sand bears at a depth of a fiftieth of a grain (3D-RFT, `softening`).
+    Its dynamic pressure, 1.1 rho g z, is what sand bears at a depth of z / 50 (3D-RFT, `softening`).
     """
-    return settings.lowering_speed or math.sqrt(_grain_gravity(plan.trial) * settings.grain)
+    if settings.lowering_speed is not None:
+        return settings.lowering_speed
+    deep = settings.grain if plan.trial.counterweight > 0 else _forecast(settings, plan).sunk
+    return math.sqrt(_first_gravity(settings, plan) * deep)
+
+
+def _first_gravity(settings: TumbleSettings, plan: TumblePlan) -> float:
+    """Gravity of the grains when their bed is made and the platform is set down [m/s2]."""
+    return settings.settle_gravity or _grain_gravity(plan.trial)
 
 
 def _grain_gravity(trial: Trial) -> float:
@@ -172,9 +187,27 @@ def _forecast(settings: TumbleSettings, plan: TumblePlan) -> Forecast:
         found.vx[:, None] - found.omega[:, None] * trial.spike_length * np.cos(angles),
         found.vy[:, None] + found.omega[:, None] * trial.spike_length * np.sin(angles),
     )
-    return Forecast(
+    forecast = Forecast(
         found, full, float(tips_x[near].min()), float(tips_x[near].max()), float(depth.max()),
-        float(speed[near].max()),
+        float(speed[near].max()), sunk=float(depth[0].max()),
+    )  # fmt: skip
+    return forecast if trial.counterweight > 0 else _in_flight(settings, plan, forecast)
+
+
+def _in_flight(settings: TumbleSettings, plan: TumblePlan, law: Forecast) -> Forecast:
+    """What the spring-damper, with its one K for any gravity, cannot know (`experiments.tumble_flight`)."""
+    trial = plan.trial
+    lying = lies_in_flight(
+        trial, surface=plan.surface, material=_material(plan), hull_radius=_hull_radius(settings, trial),
+        width=COPIES * settings.bed_size[1], duration=settings.duration, max_wheel_speed=plan.max_wheel_speed,
+    )  # fmt: skip
+    pushed = 0.5 * trial.gravity_sim * settings.duration**2  # by sand that pushes ahead with the weight, as at 1e-2 g
+    ahead = lying.reach + max(pushed, float(law.trajectory.x.max()))
+    landing = settings.drop_speed is not None
+    return replace(
+        law, behind=min(law.behind, -lying.reach), ahead=max(law.ahead, ahead), deepest=max(law.deepest, lying.deepest),
+        fastest=max(law.fastest, lying.fastest), sunk=lying.sunk, margin=1.5 if landing else 1.0,
+        on="on the spring-damper, or turning where it lies on its hull," if lying.on_hull else law.on,
     )  # fmt: skip
 
 
@@ -184,7 +217,7 @@ def _check_bed(settings: TumbleSettings, forecast: Forecast, material: Material)
     need = forecast.ahead - forecast.behind + 2 * margin
     if length < need:
         raise ValueError(
-            f"bed_size = {length:g} m along the motion is too short: on the spring-damper tips come down from "
+            f"bed_size = {length:g} m along the motion is too short: {forecast.on} tips come down from "
             f"{forecast.behind:.3g} to {forecast.ahead:.3g} m of the start within duration = {settings.duration:g} s, "
             f"so with {margin:g} m to spare at both ends {math.ceil(100 * need) / 100:g} m or a shorter one would do"
         )
@@ -195,7 +228,7 @@ def _check_bed(settings: TumbleSettings, forecast: Forecast, material: Material)
     least = forecast.deepest + 2 * spike
     if depth < least:
         raise ValueError(
-            f"bed_size = {depth:g} m deep is too shallow: on the spring-damper a tip goes {forecast.deepest:.2g} m "
+            f"bed_size = {depth:g} m deep is too shallow: {forecast.on} a tip goes {forecast.deepest:.2g} m "
             f"deep, so with two spikes' diameters below it {least:.2g} m would do"
         )
     if settings.place and settings.coarse is not None:
@@ -250,10 +283,10 @@ def _softness(settings: TumbleSettings, plan: TumblePlan, forecast: Forecast) ->
         young=settings.young,
         max_overlap=settings.max_overlap,
         grain=settings.grain,
-        gravity=_grain_gravity(plan.trial),
+        gravity=_first_gravity(settings, plan),
         bed_height=settings.bed_size[2],
-        depth=1.5 * forecast.deepest,
-        speed=max(1.5 * forecast.fastest, _lowering_speed(settings, plan)),
+        depth=forecast.margin * forecast.deepest,
+        speed=max(forecast.margin * forecast.fastest, _lowering_speed(settings, plan)),
         pressure=plan.trial.weight / COPIES / (0.25 * math.pi * settings.spike_diameter**2),
         fall=RAIN * settings.bed_size[2],
     )
@@ -267,7 +300,7 @@ def _prepare(
         "size": settings.bed_size,
         "grain": settings.grain if graded is None else graded,
         "spread": settings.spread if graded is None else None,
-        "gravity": _grain_gravity(plan.trial),
+        "gravity": _first_gravity(settings, plan),
         "seed": settings.seed,
         "young": softening.young,
         "max_overlap": settings.max_overlap,
@@ -284,11 +317,16 @@ def _prepare(
 
 def _members(settings: TumbleSettings, plan: TumblePlan) -> list[Any]:
     trial = plan.trial
-    sides = (trial.spike_length - settings.spike_clear) * math.cos(math.pi / trial.spike_count)
     return platform_members(
         spike_length=trial.spike_length, count=trial.spike_count, diameter=settings.spike_diameter,
-        clear=settings.spike_clear, hull_radius=HULL_SHARE * max(sides, 0.0), width=settings.bed_size[1],
+        clear=settings.spike_clear, hull_radius=_hull_radius(settings, trial), width=settings.bed_size[1],
     )  # fmt: skip
+
+
+def _hull_radius(settings: TumbleSettings, trial: Trial) -> float:
+    """Of the cylinder that stands for the hull [m]."""
+    sides = (trial.spike_length - settings.spike_clear) * math.cos(math.pi / trial.spike_count)
+    return HULL_SHARE * max(sides, 0.0)
 
 
 def _stepper(settings: TumbleSettings, plan: TumblePlan, bed: Bed, forecast: Forecast) -> CoupledTumble:
@@ -302,8 +340,9 @@ def _stepper(settings: TumbleSettings, plan: TumblePlan, bed: Bed, forecast: For
     bed.mark_origin()
     if settings.sleep:
         bed.let_sleep(Sleep(force=settings.sleep_force, share=settings.sleep_share))
+    lowered = {"lower_gravity": True} if settings.settle_gravity is not None else {}
     return stepper_of(
-        settings, plan.trial, footing, duration=settings.duration, substeps=settings.substeps,
+        settings, plan.trial, footing, **lowered, duration=settings.duration, substeps=settings.substeps,
         extrapolation=settings.extrapolation, iterations=settings.iterations, tip_radius=0.5 * settings.spike_diameter,
         lowering_speed=_lowering_speed(settings, plan), max_wheel_speed=plan.max_wheel_speed,
     )  # fmt: skip

@@ -130,6 +130,11 @@ def conclude(
             f"the bed's packing fraction is {bed.packing_fraction:.3g}, and its grains ({surface.grains}) were "
             f"calibrated at {surface.packing:g}: what they show is not {plan.surface}"
         )
+    if surface.granular and plan.trial.counterweight == 0:
+        result["warnings"].append(
+            f"the spring-damper beside has {plan.surface}'s K and C of 1 g, where the strength of grains goes with "
+            f"gravity ({plan.trial.gravity_sim:.3g} m/s2), and no hull: it is no forecast of this run"
+        )
     if surface.granular:
         result["warnings"].append("one bed of one seed: two valid beds differ, so differences need several seeds")
     return result

@@ -188,8 +188,23 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
         for key in ("effects", "sweep", "model"):
             if getattr(self, key):
                 return f"{key} is given with ground = 'bed': on grains there is the base model alone, without it"
+        if self.settle_gravity is not None and (fault := self._settled_under()):
+            return fault
         if self.method == "paper":
             return f"method = {self.method!r} is of the planar model: on grains there is the coupling's own step"
+        return None
+
+    def _settled_under(self) -> str | None:
+        said = f"settle_gravity = {self.settle_gravity:g} m/s2"
+        if self.gravity is None:
+            return f"{said} is of flight: grains in a rig have their own 1 g; give gravity (in m/s2), or leave it out"
+        assert self.settle_gravity is not None
+        if self.settle_gravity < self.gravity:
+            return f"{said} is below gravity = {self.gravity:g} m/s2: it is lowered to that, so more would do"
+        if self.drop_speed is not None:
+            return f"{said} with drop_speed: no hand sets a landing down, so without it"
+        if self.sleep:
+            return f"{said} with sleep: who sleeps would keep the springs of the larger gravity; without one of them"
         return None
 
     def _row_or_landing(self) -> str | None:
