@@ -54,9 +54,14 @@ class Followed(Books):
     @property
     def fraction(self) -> float:
         """How far it is along, 0 to 1, the setting down, as long as it was guessed to take, included."""
-        hand = self.pace * REST_TIME + PLACING_WAY / self.lowering_speed if self.lowering_speed is not None else 0.0
+        hand = self._hand_time
         done = hand + self.body.time if self.placed else min(hand, self.body.time)
         return min(1.0, done / (hand + self.duration))
+
+    @property
+    def _hand_time(self) -> float:
+        """How long setting down was guessed to take [s]; 0 without a hand."""
+        return self.pace * REST_TIME + PLACING_WAY / self.lowering_speed if self.lowering_speed is not None else 0.0
 
     def advance(self) -> None:
         """One macro step; nothing once it is done."""

@@ -20,7 +20,7 @@ from rigid.trial import Trial
 
 from .bed_footing import BedFooting
 from .contact_state import ContactReader, state_of
-from .followed import Followed
+from .followed import REST_TIME, Followed
 from .footing import Footing, FootReaction, LawFooting
 from .lowered_gravity import LoweredGravity, pace_under
 from .master import Master
@@ -143,6 +143,11 @@ class CoupledTumble(Followed):
     @property
     def _weight(self) -> float:
         return self.body.trial.weight
+
+    @property
+    def _hand_time(self) -> float:
+        lowered = self.lowered
+        return super()._hand_time + (lowered.steps * lowered.every + 3 * self.pace * REST_TIME if lowered else 0.0)
 
     # Stepping ------------------------------------------------------------------------------------------------------
 
