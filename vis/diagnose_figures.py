@@ -114,7 +114,7 @@ def read_channel(path: Path) -> Channel:
 def worst(channels: Sequence[Channel], held: set[str]) -> list[Channel]:
     """At most six channels in which the base model fails most, two of them held out where some are.
 
-    No channel is shown more than twice while there are others.
+    Of the fitted ones, and of those held out, no channel is shown more than its share while there are others.
     """
     order = sorted(channels, key=lambda c: -float(np.mean(c.residual("before") ** 2)))
     kinds = len({c.name for c in channels})
@@ -122,10 +122,12 @@ def worst(channels: Sequence[Channel], held: set[str]) -> list[Channel]:
     kept = min(2, sum(c.trial in held for c in channels))
     chosen: list[Channel] = []
     for part, most in ((False, _MOST_ROWS - kept), (True, _MOST_ROWS)):
+        here: list[Channel] = []
         for channel in order:
-            alike = sum(c.name == channel.name for c in chosen)
-            if (channel.trial in held) is part and alike < each and len(chosen) < most:
-                chosen.append(channel)
+            alike = sum(c.name == channel.name for c in here)
+            if (channel.trial in held) is part and alike < each and len(chosen) + len(here) < most:
+                here.append(channel)
+        chosen += here
     return chosen
 
 

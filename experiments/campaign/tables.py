@@ -164,6 +164,12 @@ def _file_name(value: str | None) -> str | None:
     return value
 
 
+def _names_a_file(value: str) -> str:
+    if "/" in value or "\\" in value or value in (".", "..") or not value.isprintable():
+        raise ValueError("a name without / and \\ was expected: files are named after it")
+    return value
+
+
 class TumbleTrial(Table):
     """``[[trial]]`` of tumbles."""
 
@@ -180,6 +186,7 @@ class TumbleTrial(Table):
     imu: str | None = Field(None, description="file with t_s,gyro_rad_s,ax_m_s2,ay_m_s2")
     wheel: str | None = Field(None, description="file with t_s,omega_rad_s")
 
+    _named = field_validator("id")(_names_a_file)
     _relative = field_validator("pose", "imu", "wheel")(_file_name)
 
     @model_validator(mode="after")
@@ -349,6 +356,7 @@ class PenetrationTrial(Table):
     diameter: Positive | None = Field(None, description="m, where it differs from [spike]")
     data: str = Field(description="file with t_s,depth_m,force_N (driven) or t_s,depth_m,accel_m_s2 (drop)")
 
+    _named = field_validator("id")(_names_a_file)
     _relative = field_validator("data")(_file_name)
 
     @model_validator(mode="after")

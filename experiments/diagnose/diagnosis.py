@@ -46,6 +46,8 @@ _DRAWS, _REFITS = 600, 400
 """Made-up campaigns of a null, and of a thorough one, each of them refitted."""
 _MARGIN = 1.5
 """Standard deviations beyond the gate that something without a name must reach: no effect speaks for it."""
+_ON = 1.0
+"""Chi-square by which a fit must go on to be taken instead."""
 _OUT_OF_THE_WAY = 0.5
 """Share of what the base model leaves from which on a name has not taken the motion out of the way."""
 
@@ -287,7 +289,7 @@ class _Course:
         """Named, ambiguous or unknown; a trial that goes its own way, or replicates that do, are asked for first."""
         asked, held_out = self.asked, self.held_out
         self.tell("verdict", 0.0)
-        choice = replace(choice, best=replace(choice.best, fit=settled(choice.best.fit)))
+        choice = self._ended(choice)
         held = self._held_out_gate(choice.best.fit)
         verdict = verdict_of(choice, held, held_out, asked.seed, set_aside=bool(asked.aside))
         # Where a second name was called for, trials were asked before it.
@@ -320,6 +322,16 @@ class _Course:
             self.findings += held_out_ways(choice.best.fit, held_out, asked.seed)
         told = self._told({**model_std, **self.unrest.model_std})
         return told.finish(self.base, choice, verdict, held=held, sure=sure)
+
+    def _ended(self, choice: Choice) -> Choice:
+        """The best fit once more from where it is: one that a bend of the model had stopped may go on, above all along
+        the valley in which a number that is shared and every trial's own factor on it make up for one another."""
+        best = choice.best.fit
+        again = fit(best.model, best.values)
+        if again.objective < best.objective - _ON:
+            left = open_gate(again, seed=self.asked.seed)[1]
+            choice = replace(choice, best=replace(choice.best, fit=again), left=left)
+        return replace(choice, best=replace(choice.best, fit=settled(choice.best.fit)))
 
     def _nothing(self, last: Verdict | None = None) -> Diagnosis:
         """None is missing as far as the fitted trials tell; once more with others held out where these tell more."""

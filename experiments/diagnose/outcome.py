@@ -146,10 +146,15 @@ class Told:
             if verdict != "none" and base.model.scatter
             else base
         )
+        plain = base if plain is base else settled(plain)
         base_values, best_values = values_of_all(plain, held_out), values_of_all(best, held_out)
         effects = choice.best.effects if choice is not None else ()
         before = gap_of(problem, base.model, base_values, fitted, held_out)
         after = before if verdict == "none" else gap_of(problem, best.model, best_values, fitted, held_out)
+        if verdict == "unknown" and choice is not None and effects and _worse(before, after):
+            # A likelihood that knows more of the noise may prefer it; as a model of the motion it is none.
+            without = replace(choice, best=choice.base, rivals=(), alternatives=(), predicted=None, left=self.first)
+            return self.finish(base, without, verdict)
         if verdict == "unknown" and choice is not None and effects:
             stays = effects if certain(base, choice) and closes(base, best, held_out) else sure
             effects = tuple(effect for effect in effects if effect in stays)
@@ -165,7 +170,7 @@ class Told:
             rest = weighed_residuals(problem, self.model_std, best_values, best.model.forms, (*fitted, *held_out))
             left = places_in(problem, best_values, best.model.forms, rest)
         found = Diagnosis(
-            verdict=verdict, problem=problem, base=base, best=best, base_values=base_values, best_values=best_values,
+            verdict=verdict, problem=problem, base=plain, best=best, base_values=base_values, best_values=best_values,
             effects=effects, alternatives=alternatives, rivals=rival_forms, where=tuple(where), before=before,
             after=after, fitted=fitted, held_out=held_out, gate_before=self.first,
             gate_after=last or (choice.left if choice is not None else self.first), gate_held_out=held, choice=choice,
@@ -173,6 +178,11 @@ class Told:
             shares=shares, left=tuple(left), next_experiment="",
         )  # fmt: skip
         return replace(found, next_experiment=_next(found))
+
+
+def _worse(before: Gap, after: Gap) -> bool:
+    """Whether the gap has grown, on the trials that were fitted and on those held out."""
+    return after.fit > before.fit and (after.held_out or 0.0) >= (before.held_out or 0.0)
 
 
 def _next(found: Diagnosis) -> str:
