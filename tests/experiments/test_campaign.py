@@ -200,6 +200,7 @@ def test_a_model_needs_no_trials_but_a_campaign_does(tmp_path):
         ('id = "002"', 'id = "001"', ["[[trial]] 2", "id = '001' is that of [[trial]] 1 too"]),
         ('id = "002"', "id = 2", ["[[trial]] 2", "id = 2", "text"]),
         ('id = "002"', "", ["[[trial]] 2", "id is missing"]),
+        ('id = "002"', 'id = "../002"', ["[[trial]] 2", "id = '../002'", "a name without /"]),
         ("torque = 6.0", 'torque = "strong"', ["[[trial]] 2 (id '002') torque = 'strong'", "N m"]),
         ('actuator = "brake"', 'actuator = "hand"', ["[[trial]] 2 (id '002') actuator = 'hand'", "'motor' or 'brake'"]),
         ("wheel_speed_0 = 500.0", "", ["[[trial]] 2 (id '002')", "nothing to brake", "rad/s"]),

@@ -1,5 +1,6 @@
 """What keeps a diagnosis honest: errors near jumps, numbers too far from what was stated, noise that is none."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +11,8 @@ from experiments.diagnose import deciding
 from experiments.diagnose.bounds import bounds_met
 from experiments.diagnose.colour import find_colours, find_loud
 from experiments.diagnose.deciding import one_number
-from experiments.diagnose.diagnosis import diagnose
+from experiments.diagnose.diagnosis import _Asked, _Course, diagnose
+from experiments.diagnose.evidence import Hypothesis
 from experiments.diagnose.fitting import Model, Whitener, fit, settled
 from experiments.diagnose.gate import held_out_gate, open_gate
 from experiments.diagnose.penetration_problem import make_problem
@@ -25,6 +27,7 @@ from experiments.diagnose.replicates import (
     split_trials,
     trends,
 )
+from experiments.diagnose.search import Choice
 
 COUNT = 400
 
@@ -269,3 +272,26 @@ def test_dampers_that_differ_are_told_from_springs_that_do():
     problem = make_problem(campaign_of(trials))
     found = fit(Model(problem, Whitener.white(problem), tuple(trial.id for trial in problem.trials)))
     assert find_scatter(found, apart=True).model_std == {"bed damping": pytest.approx(0.1, rel=0.5)}
+
+
+def test_a_stiffness_beside_beds_that_differ_is_that_of_the_mean_bed():
+    """A fit that stopped in the valley where K is 5 % low and every trial's own factor 5 % high goes on to its end."""
+    beds = 1 + 0.02 * np.array([-1.2, 0.2, 1.0, 0.9, -0.1, -0.8])
+
+    def straight(bed):
+        return lambda z, v, top: bed * base(z, v, top)
+
+    trials = [
+        (f"{k}", "driven", speed, driven_trial(straight(bed), speed=speed, seed=70 + k))
+        for k, (bed, speed) in enumerate(zip(beds, (0.01, 0.01, 0.01, 0.1, 0.1, 0.1), strict=True))
+    ]
+    problem = make_problem(campaign_of(trials))
+    own = tuple(replace(p, std=0.02) for p in problem.scatter["bed"])
+    model = replace(Model(problem, Whitener.white(problem), tuple(trial.id for trial in problem.trials)), scatter=own)
+    wrong = {"stiffness": 0.95 * STIFFNESS, "damping": 0.95 * DAMPING} | {p.name: 0.05 for p in own}
+    stopped = fit(model, wrong, rounds=0)
+    course = _Course(problem, _Asked(False, 0, lambda what, done: None, None))
+    choice = Choice(Hypothesis(stopped, 0.0), Hypothesis(stopped, 0.0), (), (), open_gate(fit(model))[1])
+    ended = course._ended(choice).best.fit
+    assert ended.objective < stopped.objective - 1
+    assert ended.values["stiffness"] == pytest.approx(STIFFNESS * beds.mean(), rel=0.01)

@@ -7,7 +7,7 @@ import json
 import numpy as np
 
 from vis.diagnose import write_diagnosis_report
-from vis.diagnose_figures import read_channel, worst
+from vis.diagnose_figures import Channel, read_channel, worst
 from vis.palette import line_handles, line_styles
 
 
@@ -70,6 +70,16 @@ def test_the_worst_channels_are_drawn_and_held_out_ones_among_them(tmp_path):
     write_folder(tmp_path, trials={name: float(size) for name, size in zip("abcdefgh", range(9, 1, -1), strict=True)})
     channels = [read_channel(path) for path in sorted((tmp_path / "series").glob("*.csv"))]
     assert [channel.trial for channel in worst(channels, {"h", "g", "f"})] == ["a", "b", "c", "d", "f", "g"]
+
+
+def test_held_out_pushes_are_drawn_where_all_drops_were_fitted():
+    def channel(trial, name, left):
+        one = np.ones(3)
+        return Channel(trial, name, np.arange(3.0), left * one, 0 * one, 0 * one, one, one, np.array([""] * 3), None)
+
+    fitted = [channel(f"d{k}", name, 9.0) for k in range(3) for name in ("depth", "accel", "force")]
+    chosen = worst([*fitted, channel("h1", "force", 2.0), channel("h2", "force", 1.0)], {"h1", "h2"})
+    assert [c.trial for c in chosen][-2:] == ["h1", "h2"] and len(chosen) == 6
 
 
 def test_replicates_share_a_line_and_conditions_do_not():
