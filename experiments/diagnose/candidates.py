@@ -116,7 +116,7 @@ def _note(
             return f"takes up noise: what {together} leaves is no more"
         what = "a further name" if names > told else f"{len(names)} names in the place of {together}"
         share = f"{100 * (left - row['left']) / left:.0f} % of what {together} leaves"
-        of_base = f", {100 * (left - row['left']) / whole:.1g} % of what the base model leaves" if whole > 0 else ""
+        of_base = f", {100 * (left - row['left']) / whole:.2g} % of what the base model leaves" if whole > 0 else ""
         return f"gains {more:.1f} nats, {share}{of_base}: less than {what} must"
     other = next((r for r in said.get("equivalence", [])[1:] if r["effect"] in names - told), None)
     if other is not None and (other.get("left_out_behind") or 0.0) > 0:

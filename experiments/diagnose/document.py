@@ -244,6 +244,7 @@ def _leading(found: Diagnosis) -> dict[str, Any]:
     near = min(rivals, key=lambda rival: rival.behind) if rivals else None
     return {
         "effects": list(found.choice.best.effects), "certain": list(found.effects),
+        "parameters": {effect: found.parameters(effect) for effect in found.choice.best.effects},
         "nearest": None if near is None else {
             "effect": near.effect, "evidence_behind": near.behind, "angle_deg": near.angle,
             "told_apart": not near.same},

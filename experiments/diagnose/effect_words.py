@@ -49,7 +49,8 @@ _CONFIRM: Mapping[str, str] = {
     "bearing-drag": "let the platform turn freely on its shaft and see how fast it slows",
     "clock-offset": "knock on the platform in view of the camera: both should see it that much apart",
     "camera-scale": "film a ruler in the plane of motion",
-    "shaft-friction": "move the spike's guide up and down without a bed: the same resistance should be there",
+    "shaft-friction": "move the spike's guide up and down without a bed: a guide's resistance is there too, that of "
+                      "a shaft or an edge in the bed is not; for that, push a spike with a rougher side",
     "layering": "open the bed, or push at another place: the change should be at the same depth",
 }  # fmt: skip
 

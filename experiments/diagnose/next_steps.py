@@ -95,7 +95,8 @@ def after_unknown(
             f"model comes as near to a trial as another trial of the same condition does. Only trials that repeat "
             f"better can show more."
         )
-    follow = _follow(worst, shares)
+    # What comes back at the same time in every trial is no sensor's drift: time stands for where the spike is.
+    follow = _follow(worst, {name: part for name, part in shares.items() if name != "t_s" or share < _IN_PART})
     if share >= _COMMON:
         return f"It repeats: {measured}, so that it is in {problem.whole}. To find what it is, {follow}."
     if share >= _IN_PART:

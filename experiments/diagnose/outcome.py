@@ -14,7 +14,7 @@ from .colour import Colour
 from .deciding import Gap, certain, closes, gap_of, smallest, unscattered, values_of_all
 from .effect_words import confirmation
 from .equivalence import Rival
-from .evidence import SMALL, inflation
+from .evidence import SMALL, held_out_fit, inflation
 from .fitting import Fit, fit, settled
 from .gate import Verdict
 from .jitter import Jitter
@@ -40,6 +40,9 @@ class Diagnosis:
     base_values: Mapping[str, float]
     """With the held-out trials' own nuisances."""
     best_values: Mapping[str, float]
+    own_values: Mapping[str, float]
+    """The same with each trial's own factor on its bed or its friction, where there are such: what is asked for what is
+    missing."""
     effects: tuple[str, ...]
     alternatives: tuple[str, ...]
     rivals: tuple[Form, ...]
@@ -92,7 +95,7 @@ class Diagnosis:
 
     def latent(self) -> dict[str, Any]:
         """Columns of latent.csv."""
-        return latent_table(self.problem, self.best_values, self.forms)
+        return latent_table(self.problem, self.own_values, self.forms)
 
     def parameters(self, effect: str) -> dict[str, dict[str, Any]]:
         """What diagnosis.json says of an effect: name -> value, std, unit."""
@@ -164,13 +167,18 @@ class Told:
         rival_forms = tuple(next(f for f in rival.forms if f.effect == e)
                             for rival, e in zip(rivals, alternatives, strict=True))  # fmt: skip
         told, shares, left = "", dict[str, float](), list[Place]()
+        own_values: Mapping[str, float] = best_values
         findings = (*self.findings, *(jitter.finding for jitter in self.jitters))
         if verdict == "unknown":
-            told, shares = depends_on(latent_table(problem, best_values, best.model.forms))
-            rest = weighed_residuals(problem, self.model_std, best_values, best.model.forms, (*fitted, *held_out))
-            left = places_in(problem, best_values, best.model.forms, rest)
+            # A trial's own factor is known: what is missing is asked of what that leaves.
+            own_values = held_out_fit(best.model, held_out, best.values) if best.model.scatter else best_values
+            others = {kind: std for kind, std in self.model_std.items() if kind not in getattr(problem, "scatter", {})}
+            told, shares = depends_on(latent_table(problem, own_values, best.model.forms))
+            rest = weighed_residuals(problem, others, own_values, best.model.forms, (*fitted, *held_out))
+            left = places_in(problem, own_values, best.model.forms, rest)
         found = Diagnosis(
             verdict=verdict, problem=problem, base=plain, best=best, base_values=base_values, best_values=best_values,
+            own_values=own_values,
             effects=effects, alternatives=alternatives, rivals=rival_forms, where=tuple(where), before=before,
             after=after, fitted=fitted, held_out=held_out, gate_before=self.first,
             gate_after=last or (choice.left if choice is not None else self.first), gate_held_out=held, choice=choice,
@@ -196,6 +204,6 @@ def _next(found: Diagnosis) -> str:
         return problem.next_experiment(best.model.forms[0], found.rivals[0], best.values)
     weighed = gap_with_scatter(found)
     return after_unknown(
-        problem, found.best_values, found.forms, found.left, found.shares, beside=choice.best.effects,
+        problem, found.own_values, found.forms, found.left, found.shares, beside=choice.best.effects,
         is_scatter=bool(found.effects) and weighed is not None and max(v or 0.0 for v in weighed.after) <= SMALL,
     )  # fmt: skip

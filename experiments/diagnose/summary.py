@@ -180,11 +180,21 @@ def _candidates(said: Mapping[str, Any]) -> list[str]:
             f"{near['angle_deg']:.0f} degrees away in what it changes (0: the same): {apart}"
         )
     sentences.append(f"{first}.")
-    sentences += [*size_sentences(said), *unnamed_sentence(said)]
+    sentences += [*_numbers(leading), *size_sentences(said), *unnamed_sentence(said)]
     rest = [row for row in _singles(said) if row["effects"][0] not in leading["effects"]][: _NAMES - 1]
     if rest and not certain:
         sentences.append(f"Of what the base model leaves beyond the noise{_weighed(said)}, {_closing(rest)}.")
     return [*sentences, *_why_unknown(said)]
+
+
+def _numbers(leading: Mapping[str, Any]) -> list[str]:
+    """The parameters of names that are not certain, which stand in no table."""
+    parts = []
+    for effect, parameters in leading.get("parameters", {}).items():
+        for name, told in parameters.items() if effect not in leading["certain"] else ():
+            error = f" +- {told['std']:.2g}" if told["std"] > 0 else ""
+            parts.append(f"{effect} {name} {told['value']:.4g}{error} {told['unit']}".removesuffix(" 1"))
+    return [f"Its numbers, should it be that: {', '.join(parts)}."] if parts else []
 
 
 def _why_unknown(said: Mapping[str, Any]) -> list[str]:

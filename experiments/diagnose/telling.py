@@ -124,7 +124,7 @@ def small_names(said: Mapping[str, Any]) -> dict[str, str]:
         return {}
     most = max(size["signature"] for size in sizes)
     return {
-        size["effect"]: f"{100 * size['share']:.1g} % of the {size['channel']}" if size["share"] is not None
+        size["effect"]: f"{100 * size['share']:.2g} % of the {size['channel']}" if size["share"] is not None
         else f"{size['signature']:.2g} times the noise"
         for size in sizes if size["signature"] < most and _is_small(size, most)
     }  # fmt: skip
