@@ -34,6 +34,9 @@ _SMOOTH, _ROUGH = 1.7, 3.0
 """Chi-square a row up to which a polynomial goes through both sides of a gap, and beyond which it does not."""
 _LOUDER = 1.2
 """Power of a depth sensor's slow noise, over what is stated, from which on its pushes are smoothed once more."""
+_OF_MEDIAN = 1.8
+"""Relative standard error of a median of n absolute third differences, times the root of n: 1.17 of independent normal
+numbers, and sqrt(1 + 2 (0.75^2 + 0.3^2 + 0.05^2)) for those of neighbours."""
 _OUTLIER = 8.0
 """Noise standard deviations beyond which a lone reading is a fault (once in 1e15 by chance)."""
 
@@ -126,16 +129,18 @@ def _louder(campaign: Campaign) -> Colour | None:
     is correlated they tell less than there is: that is looked for in what is left (`_recoloured`).
     """
     assert isinstance(campaign.tables, PenetrationCampaign)
-    sizes = []
+    sizes, count = [], 0
     for table in campaign.tables.trial:
         recording = campaign.recording(table.id, "data") if table.mode == "driven" else None
         depth = recording["depth_m"] if recording is not None else np.zeros(0)
         third = np.diff(depth[np.isfinite(depth)], 3)
         if len(third) >= _FEWEST:
             sizes.append(float(np.median(np.abs(third))) / (np.sqrt(20.0) * float(norm.ppf(0.75))))
+            count += len(third)
     std = stds(campaign.tables, True)[0] if sizes else 0.0
     louder = float(np.median(sizes)) / std if std > 0 else 1.0
-    return Colour("depth", louder, 0.0) if louder**2 > _LOUDER else None
+    chance = 3 * _OF_MEDIAN / np.sqrt(max(count, 1))
+    return Colour("depth", louder, 0.0) if louder**2 > _LOUDER and louder > 1 + chance else None
 
 
 def _recoloured(
