@@ -272,7 +272,7 @@ class _Course:
         return self._moved(choice, best)
 
     def _moved(self, choice: Choice, best: Fit) -> Choice:
-        """Both fitted in another likelihood; scores stay those of the one in which all were weighed."""
+        """The base model's fit and the best one as they are now; scores stay those by which all were weighed."""
         left = open_gate(best, seed=self.asked.seed)[1]
         base = replace(choice.base, fit=self.base)
         return replace(choice, base=base, best=replace(choice.best, fit=best), left=left)
@@ -295,7 +295,9 @@ class _Course:
         # Where a second name was called for, trials were asked before it.
         before = verdict == "unknown" and choice.left.passed and len(choice.best.effects) > 1
         if not (asked.aside or before):
-            gone = own_ways(self.base, choice, verdict, held_out, asked.seed, self.colours)
+            gone = own_ways(
+                self.base, choice, verdict, held_out=held_out, seed=asked.seed, recoloured=self._recoloured()
+            )
             if gone:
                 self.tell("a trial goes its own way: once more without it", 0.0)
                 anew = self._again(aside=gone, looked_at=asked.looked_at)
@@ -329,8 +331,7 @@ class _Course:
         best = choice.best.fit
         again = fit(best.model, best.values)
         if again.objective < best.objective - _ON:
-            left = open_gate(again, seed=self.asked.seed)[1]
-            choice = replace(choice, best=replace(choice.best, fit=again), left=left)
+            choice = self._moved(choice, again)
         return replace(choice, best=replace(choice.best, fit=settled(choice.best.fit)))
 
     def _nothing(self, last: Verdict | None = None) -> Diagnosis:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 
 from .astray import allowed, astray, astray_finding, astray_held_out
-from .colour import Colour
 from .deciding import gap_of, values_of_all
 from .evidence import SMALL, Hypothesis, held_out_fit, score
 from .fitting import Fit, fit, settled
 from .gate import held_out_gate
 from .problem import Finding
-from .renoised import recoloured
 from .search import Choice
 
 __all__ = ["all_astray", "held_out_ways", "missed", "own_ways"]
@@ -50,11 +48,11 @@ def held_out_ways(found: Fit, held_out: tuple[str, ...], seed: int) -> list[Find
 
 
 def own_ways(
-    base: Fit, choice: Choice, verdict: str, held_out: tuple[str, ...], seed: int, colours: Mapping[str, Colour]
+    base: Fit, choice: Choice, verdict: str, *, held_out: tuple[str, ...], seed: int, recoloured: Callable[[Fit], Fit]
 ) -> tuple[Finding, ...]:
     """Trials that go ways of their own, where the base model explains all others and a name nothing but them, or where
     a name explains all others and nothing has a name as it is."""
-    ask = partial(astray, held_out=held_out, seed=seed, recoloured=partial(recoloured, colours=colours))
+    ask = partial(astray, held_out=held_out, seed=seed, recoloured=recoloured)
     gone = ask(base)
     if verdict == "unknown":
         for other in () if gone else _likeliest(choice):

@@ -291,6 +291,7 @@ def test_a_stiffness_beside_beds_that_differ_is_that_of_the_mean_bed():
     wrong = {"stiffness": 0.95 * STIFFNESS, "damping": 0.95 * DAMPING} | {p.name: 0.05 for p in own}
     stopped = fit(model, wrong, rounds=0)
     course = _Course(problem, _Asked(False, 0, lambda what, done: None, None))
+    course.base = stopped
     choice = Choice(Hypothesis(stopped, 0.0), Hypothesis(stopped, 0.0), (), (), open_gate(fit(model))[1])
     ended = course._ended(choice).best.fit
     assert ended.objective < stopped.objective - 1
