@@ -303,6 +303,15 @@ class _Course:
                 anew = self._again(aside=gone, looked_at=asked.looked_at)
                 if anew.verdict != "unknown":
                     return anew
+        explains = verdict == "unknown" and bool(choice.best.effects) and choice.left.passed
+        if explains and not (asked.looked_at or asked.aside):
+            # What no fitted trial shows of a form may show in these: a name then has to explain all of them.
+            others = missed(choice.best.fit, held_out, asked.seed)
+            if others:
+                self.tell("what the name leaves shows in trials that were held out: others are held out", 0.0)
+                anew = self._again(looked_at=others)
+                if anew.verdict != "unknown":
+                    return anew
         sure: tuple[str, ...] = ()
         model_std = self.model_std
         if verdict == "unknown" and not asked.restless and choice.best.effects:

@@ -60,6 +60,29 @@ PENETRATION = {
 }  # fmt: skip
 """By the id of the form: what it makes of the force F [N] on the spike."""
 
+
+def _times(form: str, depth: str, sharpness: str) -> str:
+    """A form's equation with the factor by which it sets in from the surface on."""
+    first, *rest = PENETRATION[form].split(", ")
+    return ", ".join([f"{first} * y / (1 + y^q)^(1 / q)", f"y = z / {depth}", f"q = {sharpness}", *rest])
+
+
+for _name in ("constant", "by a power of depth", "falling with speed", "mobilised over a way"):
+    PENETRATION[f"shaft-friction:{_name}, setting in"] = _times(
+        f"shaft-friction:{_name}", "shaft_onset", "shaft_sharpness"
+    )
+for _name in ("held", "held by depth", "held wherever it has been"):
+    PENETRATION[f"adhesion:{_name}, fading towards the surface"] = _times(
+        f"adhesion:{_name}", "pull_fade", "pull_fade_sharpness"
+    )
+    PENETRATION[f"adhesion:{_name}, on the way out"] = (
+        PENETRATION[f"adhesion:{_name}"] + "; times 1 - pull_out where it sinks again"
+    )
+for _name in ("crater", "curved crater", "stiffer unloading"):
+    PENETRATION[f"plastic-sinkage:{_name}, empty"] = (
+        PENETRATION[f"plastic-sinkage:{_name}"] + "; where that is 0, C times 1 - crater_open"
+    )
+
 TUMBLE = {
     "wheel-vibration": "mu_s and mu_d times 1 - reduction * w^power / (w^power + speed^power), w the wheel's speed",
     "pendulum": "- m_b * g * (x - offset) / length along the surface; with arc = 1 on the arc of that length",

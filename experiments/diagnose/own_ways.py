@@ -23,11 +23,11 @@ _SEEN_ELSEWHERE = 3.0
 """Nats by which a name must be better than none on the other trials, where one trial goes its own way."""
 
 
-def missed(base: Fit, held_out: tuple[str, ...], seed: int) -> tuple[str, ...]:
-    """Trials held out that the base model does not explain, although it does all that were fitted."""
+def missed(found: Fit, held_out: tuple[str, ...], seed: int) -> tuple[str, ...]:
+    """Trials held out that a model does not explain, although it does all that were fitted."""
     if not held_out:
         return ()
-    found = settled(base)
+    found = settled(found)
     values = held_out_fit(found.model, held_out, found.values)
     if astray_held_out(found, held_out, values, allowed(len(held_out)), seed=seed) is not None:
         return ()

@@ -46,8 +46,8 @@ class Library:
     forms: tuple[Form, ...]
     slots: dict[str, dict[str, Slot]]
     """Form id -> parameter -> slot."""
-    shapes: dict[str, Form]
-    """Form id -> the same form with one more number, tried from where the plain one ends."""
+    shapes: dict[str, tuple[Form, ...]]
+    """Form id -> the same form with more numbers, tried from where the plain one ends."""
 
 
 _Add = Callable[..., None]
@@ -100,12 +100,64 @@ def make_library(scales: Scales, *, retreats: bool, speeds_differ: bool) -> Libr
         _add_plastic(add)
         _add_adhesion(add)
     _add_shaft(add, retreats)
-    (plain,) = [form for form in forms if form.id == "depth-hardening:quadratic"]
-    steeper = Parameter(name="depth-hardening.hardening_steeper", unit="1", value=0.0, std=0.5, scale=0.1, lowest=-0.8,
-                        highest=2.0, step=1e-3)  # fmt: skip
-    bent = replace(plain, name="with a power", parameters=(*plain.parameters, steeper), linear=False)
-    slots[bent.id] = {**slots[plain.id], steeper.name: Slot("hardening_steeper", "plain")}
-    return Library(tuple(forms), slots, {plain.id: bent})
+    shapes: dict[str, tuple[Form, ...]] = {}
+    for plain in forms:
+        bent = [
+            _with_more(plain, shape) for shape in _SHAPES if plain.name in shape.of and plain.effect == shape.effect
+        ]
+        for form, shape in bent:
+            slots[form.id] = {**slots[plain.id], **{f"{plain.effect}.{slot}": Slot(slot, how)
+                                                    for slot, how, *_ in shape.more}}  # fmt: skip
+        if bent:
+            shapes[plain.id] = tuple(form for form, _ in bent)
+    return Library(tuple(forms), slots, shapes)
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """What bends a form: nature's law is never quite the library's."""
+
+    effect: str
+    of: tuple[str, ...]
+    """Names of the forms that it bends."""
+    name: str
+    """The bent form's, with the plain one's for {}."""
+    more: tuple[tuple[str, str, float, float, float, float], ...]
+    """Of each number: slot, how, value and std of the prior, lowest, highest."""
+    starts: tuple[tuple[float, ...], ...]
+
+
+_SHAPES = (
+    _Shape("depth-hardening", ("quadratic",), "with a power", (("hardening_steeper", "plain", 0.0, 0.5, -0.8, 2.0),),
+           ((-0.35,), (0.35,))),
+    # The shaft behind a wider tip, or a plate's edge: from a depth on it rubs as it will.
+    _Shape("shaft-friction", ("constant", "by a power of depth", "falling with speed", "mobilised over a way"),
+           "{}, setting in", (("shaft_onset", "depth", -3.0, 1.5, -6.0, 0.0),
+                              ("shaft_sharpness", "plain", 2.5, 2.0, 0.7, 8.0)), ((-3.0, 3.0), (-1.3, 3.0))),
+    # What is held loses its hold as the spike comes out.
+    _Shape("adhesion", ("held", "held by depth", "held wherever it has been"), "{}, fading towards the surface",
+           (("pull_fade", "depth", -2.0, 1.5, -6.0, 1.0), ("pull_fade_sharpness", "plain", 2.5, 2.0, 0.7, 8.0)),
+           ((-2.5, 2.0), (-0.7, 2.0))),
+    # What takes a motion away from the bed to act lets go of a spike that goes in again.
+    _Shape("adhesion", ("held", "held by depth", "held wherever it has been"), "{}, on the way out",
+           (("pull_out", "plain", 0.5, 0.5, 0.0, 1.0),), ((0.9,),)),
+    # Where the crater is empty nothing is touched, and no damper acts.
+    _Shape("plastic-sinkage", ("crater", "curved crater", "stiffer unloading"), "{}, empty",
+           (("crater_open", "plain", 0.5, 0.5, 0.0, 1.0),), ((0.9,),)),
+)  # fmt: skip
+
+
+def _with_more(plain: Form, shape: _Shape) -> tuple[Form, _Shape]:
+    """`plain` with the numbers of `shape`."""
+    more = tuple(
+        Parameter(name=f"{plain.effect}.{slot}", unit="1", value=value, std=std, scale=0.2 * std, lowest=lowest,
+                  highest=highest, step=1e-3)
+        for slot, _, value, std, lowest, highest in shape.more
+    )  # fmt: skip
+    bends = tuple(dict(zip((p.name for p in more), start, strict=True)) for start in shape.starts)
+    starts = tuple({**start, **bend} for bend in bends for start in plain.starts)
+    return replace(plain, name=shape.name.format(plain.name), parameters=(*plain.parameters, *more), starts=starts,
+                   linear=False), shape  # fmt: skip
 
 
 def _add_hardening(add: _Add) -> None:

@@ -38,12 +38,12 @@ SLOTS = (
     "hardening_early", "hardening_reach", "hardening_level", "hardening_sharpness",
     "hardening_steeper",
     "layer_depth", "layer_width", "layer_slope", "layer_step", "layer_factor", "layer_bump",
-    "crater_share", "crater_bend", "unload_stiffness",
+    "crater_share", "crater_bend", "crater_open", "unload_stiffness",
     "drag", "drag_onset", "drag_reach", "drag_deep", "drag_both", "drag_tip",
     "shaft", "shaft_deep", "shaft_power", "shaft_viscous", "shaft_slow", "shaft_speed",
-    "shaft_held", "shaft_reach", "shaft_growth",
+    "shaft_held", "shaft_reach", "shaft_growth", "shaft_onset", "shaft_sharpness",
     "pull", "pull_reach", "pull_deep", "pull_growth", "pull_ever", "pull_short", "pull_viscous",
-    "pull_sharpness", "shift_depth", "shift_speed",
+    "pull_sharpness", "pull_fade", "pull_fade_sharpness", "pull_out", "shift_depth", "shift_speed",
 )  # fmt: skip
 """Numbers of a lane, in order. `radius_depth`: depth at which the tip is wholly in; `speed_scale`: below it the
 direction of a driven spike is not certain; shifts: added to a driven spike's path, for derivatives."""
@@ -173,7 +173,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
     LEVEL, LEVEL_SHARPNESS = S["hardening_level"], S["hardening_sharpness"]
     LAYER_DEPTH, LAYER_WIDTH, LAYER_SLOPE = S["layer_depth"], S["layer_width"], S["layer_slope"]
     LAYER_STEP, LAYER_FACTOR, LAYER_BUMP = S["layer_step"], S["layer_factor"], S["layer_bump"]
-    BEND = S["crater_bend"]
+    BEND, OPEN = S["crater_bend"], S["crater_open"]
     CRATER, UNLOAD = S["crater_share"], S["unload_stiffness"]
     DRAG, DRAG_DEEP, DRAG_BOTH, DRAG_TIP = S["drag"], S["drag_deep"], S["drag_both"], S["drag_tip"]
     DRAG_ONSET, DRAG_REACH = S["drag_onset"], S["drag_reach"]
@@ -181,10 +181,12 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
         S["shaft"], S["shaft_deep"], S["shaft_power"], S["shaft_viscous"], S["shaft_slow"], S["shaft_speed"],
     )  # fmt: skip
     SHAFT_HELD, SHAFT_REACH, SHAFT_GROWTH = S["shaft_held"], S["shaft_reach"], S["shaft_growth"]
+    SHAFT_ONSET, SHAFT_SHARPNESS = S["shaft_onset"], S["shaft_sharpness"]
     PULL, PULL_REACH, PULL_DEEP, PULL_SHORT, PULL_VISCOUS = (
         S["pull"], S["pull_reach"], S["pull_deep"], S["pull_short"], S["pull_viscous"],
     )  # fmt: skip
     PULL_GROWTH, PULL_EVER, SHARPNESS = S["pull_growth"], S["pull_ever"], S["pull_sharpness"]
+    FADE, FADE_SHARPNESS, PULL_OUT = S["pull_fade"], S["pull_fade_sharpness"], S["pull_out"]
     SHIFT_DEPTH, SHIFT_SPEED = S["shift_depth"], S["shift_speed"]
     Table = ti.types.ndarray(dtype=ti.f64, ndim=2)
     Line = ti.types.ndarray(dtype=ti.f64, ndim=1)
@@ -261,30 +263,38 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
             total = spring
             sinking = ti.max(v, 0.0)
             rising = ti.max(-v, 0.0)
-            total += n[k, DAMPING] * sinking
+            total += n[k, DAMPING] * sinking * (1.0 if spring > 0.0 else 1.0 - n[k, OPEN])
             shape = ti.min(z / n[k, RADIUS_DEPTH], 1.0)
             share = n[k, DRAG] + n[k, DRAG_DEEP] * x + n[k, DRAG_TIP] * shape * (2.0 - shape)
             if n[k, DRAG_ONSET] != 0.0:
                 share += n[k, DRAG_ONSET] * (1.0 - ti.exp(-z / n[k, DRAG_REACH]))
             total += share * sinking * sinking + n[k, DRAG_BOTH] * v * ti.abs(v)
-            total += (n[k, SHAFT] + n[k, SHAFT_DEEP] * x) * way + n[k, SHAFT_VISCOUS] * v
+            rub = (n[k, SHAFT] + n[k, SHAFT_DEEP] * x) * way
             if n[k, SHAFT_POWER] != 0.0:
-                total += n[k, SHAFT_POWER] * ti.pow(x, n[k, SHAFT_GROWTH]) * way
+                rub += n[k, SHAFT_POWER] * ti.pow(x, n[k, SHAFT_GROWTH]) * way
             if n[k, SHAFT_SLOW] != 0.0:
-                total += n[k, SHAFT_SLOW] * ti.exp(-ti.abs(v) / n[k, SHAFT_SPEED]) * way
+                rub += n[k, SHAFT_SLOW] * ti.exp(-ti.abs(v) / n[k, SHAFT_SPEED]) * way
             if n[k, SHAFT_HELD] != 0.0:
                 bound = n[k, SHAFT_HELD] * ti.pow(x, n[k, SHAFT_GROWTH])
-                total += bound * taken(z, way, turn_z, turn_w, n, k)
+                rub += bound * taken(z, way, turn_z, turn_w, n, k)
+            if n[k, SHAFT_ONSET] > 0.0:
+                rub *= mobilised(z / n[k, SHAFT_ONSET], n[k, SHAFT_SHARPNESS])
+            total += rub + n[k, SHAFT_VISCOUS] * v
+            pull = 0.0
             if back > 0.0:
                 held = back / n[k, PULL_REACH]
                 grown = n[k, PULL]
                 if n[k, PULL_DEEP] != 0.0:
                     grown += n[k, PULL_DEEP] * ti.pow(most / n[k, REFERENCE], n[k, PULL_GROWTH])
-                total -= grown * mobilised(held, n[k, SHARPNESS])
-                total -= n[k, PULL_SHORT] * held * ti.exp(1.0 - held)
+                pull += grown * mobilised(held, n[k, SHARPNESS])
+                pull += n[k, PULL_SHORT] * held * ti.exp(1.0 - held)
             if n[k, PULL_EVER] != 0.0 and z < ever:
                 part = mobilised((ever - z) / n[k, PULL_REACH], n[k, SHARPNESS])
-                total -= n[k, PULL_EVER] * ti.pow(ever / n[k, REFERENCE], n[k, PULL_GROWTH]) * part
+                pull += n[k, PULL_EVER] * ti.pow(ever / n[k, REFERENCE], n[k, PULL_GROWTH]) * part
+            if n[k, FADE] > 0.0:
+                pull *= mobilised(z / n[k, FADE], n[k, FADE_SHARPNESS])
+            pull *= 1.0 - n[k, PULL_OUT] * ti.max(way, 0.0)
+            total -= pull
             total -= n[k, PULL_VISCOUS] * rising
             if ti.static(OWN):
                 s = State(mass=n[k, MASS], gravity=n[k, GRAVITY], weight=n[k, MASS] * n[k, GRAVITY], y=-z, vy=-v)

@@ -89,7 +89,7 @@ class PenetrationProblem:
                 raise ValueError(f"effect_file = {str(effect.file)!r}: the id {effect.id!r} is taken; choose another")
             taken.add(effect.id)
         self.forms: tuple[Form, ...] = (*self._library.forms, *(_own_form(effect) for effect in own))
-        self.shapes: Mapping[str, Form] = self._library.shapes
+        self.shapes: Mapping[str, tuple[Form, ...]] = self._library.shapes
         self._own_slots = {name: len(SLOTS) + place for place, name in enumerate(_own_names(own))}
         self._whitening: dict[str, tuple[Array, Array, Array]] = {}
         self._shaken: dict[str, Shaken] = {}

@@ -14,7 +14,7 @@ from .fitting import Fit, Model, fit
 from .gate import Verdict, open_gate
 from .pairs import FormsStart, next_starts, pair_starts
 from .prediction import Predicted, folds_of, predict
-from .problem import Finding, Form
+from .problem import Finding, Form, Values
 
 __all__ = ["Choice", "Search", "choose"]
 
@@ -210,19 +210,20 @@ class Search:
         best = hypothesis
         shapes = getattr(best.fit.model.problem, "shapes", {})
         for plain in hypothesis.forms if hypothesis.score > self._most - _BEHIND else ():
-            finer = shapes.get(plain.id)
-            if finer is None or excess(best.fit) < 0.5 * np.sqrt(2.0 * best.fit.count):
-                continue
-            model = best.fit.model.with_forms([finer if form is plain else form for form in best.forms])
-            (new,) = [p for p in finer.parameters if p.name not in {q.name for q in plain.parameters}]
-            begun = [fit(model, {**best.fit.values, new.name: side * new.std}, rounds=3) for side in (-0.7, 0.7)]
-            found = fit(model, min(begun, key=lambda one: one.objective).values)
-            made = Hypothesis(found, score(found))
-            self.table.append((_said(made), made))
-            if made.score > best.score + 1.0:
-                best = made
-                if len(made.forms) == 1:
-                    self._alone[finer.id] = made
+            start, known = best, {p.name for p in plain.parameters}
+            if excess(start.fit) < 0.5 * np.sqrt(2.0 * start.fit.count):
+                break
+            for finer in shapes.get(plain.id, ()):
+                model = start.fit.model.with_forms([finer if form is plain else form for form in start.forms])
+                bends = [{k: v for k, v in point.items() if k not in known} for point in finer.starts]
+                begun = [fit(model, {**start.fit.values, **bend}, rounds=3) for bend in _once(bends)]
+                found = fit(model, min(begun, key=lambda one: one.objective).values)
+                made = Hypothesis(found, score(found))
+                self.table.append((_said(made), made))
+                if made.score > max(best.score, start.score + 1.0):
+                    best = made
+                    if len(made.forms) == 1:
+                        self._alone[finer.id] = made
         return best
 
     def _enriched(self, hypothesis: Hypothesis) -> Hypothesis:
@@ -498,6 +499,11 @@ def choose(
     whose ways of their own are all that speaks against the base model or the best single name; it is asked before a
     second name is looked for, for no name explains what shows in one trial."""
     return Search(base, tell=tell, seed=seed, recoloured=recoloured, own_ways=own_ways).choose()
+
+
+def _once(places: Sequence[Values]) -> list[Values]:
+    """Each of them once."""
+    return [dict(numbers) for numbers in dict.fromkeys(tuple(place.items()) for place in places)]
 
 
 def _said(hypothesis: Hypothesis) -> str:

@@ -171,7 +171,7 @@ class TumbleProblem:
         )
 
     @cached_property
-    def shapes(self) -> dict[str, TumbleForm]:
+    def shapes(self) -> dict[str, tuple[TumbleForm, ...]]:
         """Forms of another shape, to go on to from the plain ones, by the id of these."""
         return shaped(self.forms)
 

@@ -58,9 +58,9 @@ class _Bent:
         return self.form.physical(values) | {self.shape.name: bent}
 
 
-def shaped(forms: tuple[TumbleForm, ...]) -> dict[str, TumbleForm]:
+def shaped(forms: tuple[TumbleForm, ...]) -> dict[str, tuple[TumbleForm, ...]]:
     """The forms that can be bent, with the number that bends them: id of the plain form -> the shaped one."""
-    found = {}
+    found: dict[str, tuple[TumbleForm, ...]] = {}
     for form in forms:
         shape = _SHAPES.get(form.id)
         if shape is None:
@@ -69,7 +69,8 @@ def shaped(forms: tuple[TumbleForm, ...]) -> dict[str, TumbleForm]:
             name=f"{shape.name}_change", unit=shape.unit, value=0.0, std=shape.std, scale=0.3 * shape.std,
             lowest=shape.lowest, highest=shape.highest, step=0.02 * shape.std,
         )  # fmt: skip
-        found[form.id] = replace(
-            form, name=f"{form.name}, of any shape", parameters=(*form.parameters, bend), physical=_Bent(form, shape)
-        )
+        bends = tuple({bend.name: side * shape.std} for side in (-0.7, 0.7))
+        starts = tuple({**start, **by} for by in bends for start in form.starts or ({},))
+        found[form.id] = (replace(form, name=f"{form.name}, of any shape", parameters=(*form.parameters, bend),
+                                  physical=_Bent(form, shape), starts=starts),)  # fmt: skip
     return found
