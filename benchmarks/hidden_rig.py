@@ -27,6 +27,8 @@ OUTSIDE = ("relaxation", "collapse", "magnet", "cell-drift", "ringing", "rate", 
 
 _WRONG_MASS = 0.06
 _HALVINGS = 9
+_ONE_CURVE = {"depth-hardening", "layering"}
+"""Two names for one curve of force over depth: no data could tell the two together from either alone."""
 
 Array = NDArray[np.float64]
 _Columns = dict[str, Array]
@@ -50,7 +52,7 @@ def make_rig(
         raise ValueError(f"kind = {kind!r}: null, pair, {', '.join((*EFFECTS, *OUTSIDE))} was expected")
     strength = strength if strength is not None else float(np.exp(random.uniform(math.log(0.7), math.log(50.0))))
     effects = (kind,) if kind in EFFECTS else ()
-    if kind == "pair":
+    while kind == "pair" and (not effects or set(effects) == _ONE_CURVE):
         effects = tuple(str(e) for e in random.choice(EFFECTS, 2, replace=False))
     outside = kind if kind in OUTSIDE else None
     rig, design = draw_rig(random, effects, outside, trials)

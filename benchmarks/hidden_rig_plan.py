@@ -91,6 +91,8 @@ def draw_rig(
     for name, share in NUISANCES.items():
         size = between(*sizes_of[name])
         wandering[name] = size if chance(share) else 0.0
+    if outside == "wrong-mass":
+        wandering["bed"] = 0.0  # to a drop K/m and C/m are all: where K differs anyway, no data could tell m
     sizes = int(random.choice([1, 1, 1, 2, 3]))
     diameters = [SIZES[1]] if sizes == 1 else list(SIZES[:sizes])
     speeds = np.exp(np.linspace(math.log(between(0.001, 0.01)), math.log(between(0.06, 0.2)), 4 if chance(0.5) else 3))

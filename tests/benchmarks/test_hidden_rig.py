@@ -45,6 +45,13 @@ def test_a_null_holds_nothing_and_what_wanders_is_recorded_as_it_was_drawn():
         assert (max(one.extra["louder"].values()) > 1) == (wandering["loud"] > 0)
 
 
+def test_what_no_data_could_tell_is_not_hidden():
+    pairs = [set(make_rig(seed, kind="pair", strength=5.0, trials=6)[1].effects) for seed in range(8)]
+    assert {"depth-hardening", "layering"} not in pairs and all(len(pair) == 2 for pair in pairs)
+    masses = [make_rig(seed, kind="wrong-mass", trials=6)[1] for seed in range(8)]
+    assert all(told.extra["nuisances"]["bed"] == 0.0 and told.extra["design"]["drops"] >= 2 for told in masses)
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_campaigns_are_read_and_checked(tmp_path, seed):
     """Units by suffix, gaps, an accelerometer that was not fitted: nothing is refused, and depths agree in metres."""
