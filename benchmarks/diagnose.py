@@ -1,6 +1,6 @@
 """`hedgebed bench diagnose`: campaigns with something hidden in them, diagnosed; what was named, what was missed.
 
-    hedgebed bench diagnose [--kind penetration|tumble|both] [--count 40] [--seed 1] [--only WHAT] [--trials N]
+    hedgebed bench diagnose [--kind penetration|tumble|rig|both|all] [--count 40] [--seed 1] [--only WHAT] [--trials N]
                             [--baselines yes|no] [--out DIR]
 
 The campaigns are those of `hidden_suite`. Each is written to a folder, and a process of its own that is given that
@@ -27,7 +27,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from experiments.campaign import write_campaign
+from experiments.campaign import read_campaign, write_campaign
 from experiments.progress import Progress
 
 from . import baselines as others
@@ -42,8 +42,10 @@ _ROOT = Path(__file__).resolve().parent.parent
 _CODE = {
     "code": ("experiments/diagnose", "experiments/campaign", "rigid"),
     "suite": ("benchmarks/hidden_penetration.py", "benchmarks/hidden_tumble.py", "benchmarks/hidden_tumble_motion.py"),
+    "rig": ("benchmarks/hidden_rig.py", "benchmarks/hidden_rig_bed.py", "benchmarks/hidden_rig_plan.py"),
     "baselines": ("benchmarks/baselines.py", "benchmarks/baseline_rows.py", "benchmarks/baseline_motion.py"),
 }
+_SEVERAL = {"both": ("penetration", "tumble"), "all": KINDS}
 _FILE = "cases.jsonl"
 
 
@@ -56,7 +58,7 @@ def run(
     Args:
         out: folder of cases.jsonl, which grows as it goes, and is where it goes on.
         progress: what is done, and how long it has to go.
-        kind: of trials: penetration, tumble or both.
+        kind: of campaigns: penetration, tumble, rig (penetrations of another maker), both (the first two) or all.
         count: campaigns of each kind.
         seed: of the suite.
         only: hide this in every campaign; empty: the suite's mixture.
@@ -66,15 +68,15 @@ def run(
 
     Raises ValueError for settings that cannot be.
     """
-    if kind not in (*KINDS, "both"):
-        raise ValueError(f"kind = {kind!r}: {', '.join(KINDS)} or both was expected")
+    if kind not in (*KINDS, *_SEVERAL):
+        raise ValueError(f"kind = {kind!r}: {', '.join(KINDS)}, both or all was expected")
     if count < 1:
         raise ValueError(f"count = {count}: at least 1 was expected")
     if trials and not 4 <= trials <= 100:
         raise ValueError(f"trials = {trials}: 0 (6 to 24), or 4 to 100, was expected")
     if baselines not in ("yes", "no"):
         raise ValueError(f"baselines = {baselines!r}: yes or no was expected")
-    kinds = KINDS if kind == "both" else (kind,)
+    kinds = _SEVERAL.get(kind, (kind,))
     plans = {one: suite(one, count, seed=seed, only=only or None, trials=trials or None) for one in kinds}
     missing = others.missing() if baselines == "yes" else ""
     if missing:
@@ -82,7 +84,7 @@ def run(
     wanted = baselines == "yes" and not missing
     progress.plan({f"diagnose {one}": float(count) for one in kinds})
     _mend(out / _FILE)
-    done = {_key(case): case for case in read_cases(out) if _current(case, "code") and _current(case, "suite")}
+    done = {_key(case): case for case in read_cases(out) if _current(case)}
     with _asking(ask) as asked:
         for one, cases in plans.items():
             left = [case for case in cases if not _finished(done.get(_key({"kind": one, "case": case})), wanted)]
@@ -97,7 +99,8 @@ def run(
                 progress.message(_line(record))
                 progress.update(number)
     result: dict[str, Any] = {"format": "hedgebed-bench/1", "what": "diagnose", "seed": seed, "count": count}
-    result |= {"date": _now(), "code": digest("code"), "suite": digest("suite"), "baselines": missing or baselines}
+    made_by = " ".join(sorted({digest(_maker(one)) for one in kinds}))
+    result |= {"date": _now(), "code": digest("code"), "suite": made_by, "baselines": missing or baselines}
     for one, cases in plans.items():
         result[one] = summarise([done[_key({"kind": one, "case": case})] for case in cases])
         show(one, result[one])
@@ -137,7 +140,7 @@ def _mend(path: Path) -> None:
 
 @cache
 def digest(what: str) -> str:
-    """Of the sources behind a record: "code" that diagnoses, "suite" that makes up, or "baselines".
+    """Of the sources behind a record: "code" that diagnoses, "suite" or "rig" that make up, or "baselines".
 
     What is said about the code (comments, docstrings, how its lines are broken) does not count.
     """
@@ -162,15 +165,16 @@ def _one(kind: str, case: dict[str, Any], ask: Ask, before: dict[str, Any] | Non
     """One record; `before` is one that lacks the baselines only."""
     campaign, hidden = make_case(kind, case)
     record = before
+    with tempfile.TemporaryDirectory(prefix="hedgebed-bench-") as place:
+        folder = write_campaign(Path(place) / "campaign", campaign)
+        said = ask(str(folder)) if record is None else {}
+        campaign = read_campaign(folder)  # in the format's units
     if record is None:
-        with tempfile.TemporaryDirectory(prefix="hedgebed-bench-") as place:
-            write_campaign(Path(place) / "campaign", campaign)
-            said = ask(str(Path(place) / "campaign"))
         record = {
-            "kind": kind, "case": case, "date": _now(), "code": digest("code"), "suite": digest("suite"),
+            "kind": kind, "case": case, "date": _now(), "code": digest("code"), "suite": digest(_maker(kind)),
             "truth": list(hidden.effects), "outside": hidden.outside, "signature": float(hidden.signature),
             "true_parameters": hidden.parameters if kind == "tumble" else {}, "coloured": bool(hidden.coloured),
-            "trials": len(campaign.tables.trial),
+            "trials": len(campaign.tables.trial), **({"hidden": hidden.extra} if kind == "rig" else {}),
         } | said  # fmt: skip
     if wanted and "base_values" in record:
         with threadpool_limits(1):
@@ -186,8 +190,13 @@ def _finished(record: dict[str, Any] | None, wanted: bool) -> bool:
     return tried or not wanted or "base_values" not in record
 
 
-def _current(record: dict[str, Any], what: str) -> bool:
-    return record.get(what) == digest(what)
+def _maker(kind: str) -> str:
+    """What `digest` calls the sources that make campaigns of this kind up."""
+    return "rig" if kind == "rig" else "suite"
+
+
+def _current(record: dict[str, Any]) -> bool:
+    return record.get("code") == digest("code") and record.get("suite") == digest(_maker(record["kind"]))
 
 
 def _key(record: dict[str, Any]) -> str:

@@ -18,20 +18,22 @@ import numpy as np
 
 from experiments.campaign import Campaign, write_campaign
 
-from . import hidden_penetration, hidden_tumble
+from . import hidden_penetration, hidden_rig, hidden_tumble
 
 __all__ = ["KINDS", "STRENGTHS", "make_case", "suite", "write_suite"]
 
-KINDS = ("penetration", "tumble")
+KINDS = ("penetration", "tumble", "rig")
+"""Of made-up campaigns: those of a rig are penetrations, too, of another maker."""
 STRENGTHS = (0.7, 50.0)
 """Signatures that are aimed at, over the noise: from not quite to be seen to plain."""
 
 _SHARES = {"effect": 0.53, "null": 0.22, "outside": 0.17, "pair": 0.08}
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
-_MODULES = {"penetration": hidden_penetration, "tumble": hidden_tumble}
+_MODULES = {"penetration": hidden_penetration, "tumble": hidden_tumble, "rig": hidden_rig}
 _MAKERS: dict[str, Callable[..., tuple[Campaign, Any]]] = {
     "penetration": hidden_penetration.make_hidden,
     "tumble": hidden_tumble.make_hidden_tumble,
+    "rig": hidden_rig.make_rig,
 }
 
 
