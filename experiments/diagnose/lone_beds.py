@@ -28,6 +28,8 @@ _FEWEST = 5
 _GOES = 0.02
 """Chance below which a factor goes with a setting."""
 _DRAWS = 4999
+_EXPLAINED = 0.75
+"""Share of the factors' variance that a setting explains, by a straight line, from which on they go with it."""
 _WITHOUT = 0.25
 """Share of the spread that must be left without the farthest trial: else that one is at odds with all others."""
 
@@ -51,8 +53,12 @@ def find_lone_scatter(found: Fit) -> tuple[Scatter, list[Finding]]:
         own = {id: scatter.values[f"{kind}[{id}]"] for id in order if f"{kind}[{id}]" in scatter.values}
         alike = [[id for id in ids if id in own] for ids in _alike(trials, sets)]
         kinds = {trial.id: float(trial.condition[0] == trials[0].condition[0]) for trial in trials}
+        same = [[id for id in ids if id in own] for ids in sets.values()]
         chances = {name: _chance(own, numbers, alike) for name, numbers in settings.items()}
-        chances["kind"] = _chance(own, kinds, [[id for id in ids if id in own] for ids in sets.values()])
+        chances["kind"] = 0.0 if _explained(own, kinds, same) > _EXPLAINED else _chance(own, kinds, same)
+        for name, numbers in settings.items():
+            if max(_explained(own, numbers, compared) for compared in (alike, same)) > _EXPLAINED:
+                chances[name] = 0.0
         without = _without_farthest([[own[id] for id in ids if id in own] for ids in sets.values()])
         if without[1] < _WITHOUT:
             farthest = next(id for id, value in own.items() if value == without[0])
@@ -61,8 +67,8 @@ def find_lone_scatter(found: Fit) -> tuple[Scatter, list[Finding]]:
         for name, chance in chances.items():
             if chance < _GOES:
                 what = (
-                    f"{kind} differs from trial to trial, but not at random: it goes with {_words(name)} (ranks; by "
-                    f"chance once in {1 / chance:.0f} times), so that it is no scatter of beds"
+                    f"{kind} differs from trial to trial, but not at random: it goes with {_words(name)}, so that it "
+                    f"is no scatter of beds"
                 )
                 findings.append(Finding(trial="", what=what))
     return (Scatter(), findings) if findings else (scatter, [])
@@ -106,6 +112,21 @@ def _chance(own: Mapping[str, float], numbers: Mapping[str, float], alike: Seque
     seen = abs(sum(float(a @ b) for a, b in pairs))
     drawn = sum(np.array([random.permutation(a) @ b for _ in range(_DRAWS)]) for a, b in pairs)
     return (1 + int(np.sum(np.abs(drawn) >= seen * (1 - 1e-12)))) / (1 + _DRAWS)
+
+
+def _explained(own: Mapping[str, float], numbers: Mapping[str, float], alike: Sequence[Sequence[str]]) -> float:
+    """The share of the variance within the sets that goes with `numbers`, in proportion."""
+    pairs = []
+    for ids in alike:
+        inside = [id for id in ids if id in numbers]
+        if len(inside) > 1:
+            pairs.append((np.array([own[id] for id in inside]), np.array([numbers[id] for id in inside])))
+    if not pairs:
+        return 0.0
+    a = np.concatenate([values - values.mean() for values, _ in pairs])
+    b = np.concatenate([settings - settings.mean() for _, settings in pairs])
+    whole = float(a @ a) * float(b @ b)
+    return float(a @ b) ** 2 / whole if whole > 0 and len(a) - len(pairs) >= _FEWEST - 2 else 0.0
 
 
 def _without_farthest(groups: Sequence[Sequence[float]]) -> tuple[float, float]:

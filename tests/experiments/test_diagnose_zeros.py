@@ -6,6 +6,7 @@ from penetration_campaigns import DAMPING, DEPTH_STD, FORCE_STD, STIFFNESS, camp
 
 from experiments.campaign import Recording
 from experiments.diagnose.diagnosis import diagnose
+from experiments.diagnose.lone_beds import _explained
 from experiments.diagnose.penetration_problem import make_problem
 
 SPEEDS = (0.01, 0.01, 0.03, 0.03, 0.1, 0.1)
@@ -85,6 +86,14 @@ def test_a_stiffness_that_goes_with_the_speed_is_no_scatter():
     found = diagnose(problem_of(straight, ALONE, beds=np.sort(BEDS)))
     assert found.verdict != "none"
     assert any("it goes with the trial's speed" in finding.what for finding in found.findings)
+
+
+def test_pushes_and_drops_that_differ_are_no_scatter():
+    """A falling mass that is another than stated changes K / m of all drops alike."""
+    kinds = {f"{k}": float(k > 3) for k in range(8)}
+    noisy = {id: -0.06 * kind + 0.001 * (-1) ** int(id) for id, kind in kinds.items()}
+    assert _explained(noisy, kinds, [list(kinds)]) > 0.95
+    assert _explained(dict(zip(kinds, BEDS, strict=True)), kinds, [list(kinds)]) < 0.5
 
 
 def test_one_bed_that_is_another_is_no_scatter():
