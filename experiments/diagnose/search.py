@@ -215,7 +215,12 @@ class Search:
                 continue
             model = best.fit.model.with_forms([finer if form is plain else form for form in best.forms])
             (new,) = [p for p in finer.parameters if p.name not in {q.name for q in plain.parameters}]
-            begun = [fit(model, {**best.fit.values, new.name: side * new.std}, rounds=3) for side in (-0.7, 0.7)]
+            bends = [{**best.fit.values, new.name: side * new.std} for side in (-0.7, 0.7)]
+            begun = [fit(model, values, rounds=3) for values in bends]
+            refine = getattr(model.problem, "refine", None)
+            if refine is not None:  # a bend alone may put trials on other branches: from their beginnings, too
+                found_anew = refine([(model.forms, values) for values in bends], model.trials, apart=model.scatter)
+                begun += [fit(model, values, rounds=3) for values in found_anew]
             found = fit(model, min(begun, key=lambda one: one.objective).values)
             made = Hypothesis(found, score(found))
             self.table.append((_said(made), made))
