@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from .astray import allowed, astray_held_out
-from .bounds import bounds_met, is_strained
+from .bounds import bends_little_away, bounds_met, is_strained
 from .evidence import SMALL, Hypothesis, excess, held_out_fit
 from .fitting import Fit, Model
 from .gate import Verdict
@@ -92,7 +92,7 @@ def verdict_of(
     little to speak of, or what a form that is not nature's leaves; and where it needs no number that the campaign all
     but excludes. Else something is unknown."""
     found = choice.best.fit
-    if not choice.best.effects or is_strained(found):
+    if not choice.best.effects or is_strained(found) or bends_little_away(found, choice.base.fit):
         return "unknown"
     if len(choice.best.effects) + set_aside >= _MANY and (choice.predicted is None or not one_number(choice)):
         return "unknown"
@@ -153,7 +153,9 @@ def certain(base: Fit, choice: Choice) -> bool:
     a scale that ends where the library does: with one, it may be no more than what bends nearest to something else."""
     amplitudes = {form.amplitude for form in choice.best.forms}
     ends = any(not met.strains and met.parameter not in amplitudes for met in bounds_met(choice.best.fit))
-    if ends or is_strained(choice.best.fit) or excess(choice.best.fit) >= _CERTAIN * excess(base):
+    if ends or is_strained(choice.best.fit) or bends_little_away(choice.best.fit, base):
+        return False
+    if excess(choice.best.fit) >= _CERTAIN * excess(base):
         return False
     if choice.predicted is None or not one_number(choice):
         return False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
@@ -16,6 +17,7 @@ from .evidence import Hypothesis, excess, held_out_fit, score, signature_matrix
 from .fitting import Fit, Model, Whitener, fit, settled
 from .gate import Verdict, held_out_gate, open_gate
 from .jitter import Jitter
+from .lone_beds import lone_finding
 from .outcome import Diagnosis, Told
 from .own_ways import all_astray, held_out_ways, missed, own_ways
 from .problem import Finding, Problem
@@ -26,6 +28,7 @@ from .renoised import (
     differ,
     doubted,
     jittered,
+    lone_scatter_of,
     plain,
     recoloured,
     rescattered,
@@ -125,7 +128,10 @@ class _Course:
             self.tell("a trial goes its own way: once more without it", 0.0)
             anew = self._again(aside=choice.astray, looked_at=asked.looked_at)
             return anew if anew.verdict != "unknown" else self._again(looked_at=asked.looked_at, patient=True)
-        for step in (self._scattered, self._scattered_beside, self._timed, self._recoloured_choice, self._doubted):
+        for step in (
+            self._scattered, self._scattered_beside, self._scattered_alone, self._timed, self._recoloured_choice,
+            self._doubted,
+        ):  # fmt: skip
             choice = step(choice)
         if asked.thorough and choice.best.effects:
             choice = replace(choice, left=self._thorough_gate(choice.best.fit))
@@ -222,8 +228,9 @@ class _Course:
 
     def _scattered_beside(self, choice: Choice) -> Choice:
         """Where something is left, replicates are compared by what each has of its own."""
-        for beside in () if self.asked.restless else (choice.best.fit, choice.base.fit):
-            scatter = scatter_apart(beside, self.held_out) if not choice.left.passed else Scatter()
+        fits = () if self.asked.restless else (choice.best.fit, choice.base.fit)
+        for zeros, beside in itertools.product((False, True), fits):
+            scatter = scatter_apart(beside, self.held_out, zeros=zeros) if not choice.left.passed else Scatter()
             if scatter.parameters and set(scatter.model_std) != set(self.model_std):
                 self.tell("replicates are found to differ beside what is left: choosing again", 0.0)
                 before = self.base
@@ -233,6 +240,24 @@ class _Course:
                     choice, self.model_std = other, scatter.model_std
                 else:
                     self.base = before
+        return choice
+
+    def _scattered_alone(self, choice: Choice) -> Choice:
+        """Where no trial repeats another, and something is left: whether beds differ without going with anything."""
+        for beside in () if self.asked.restless or choice.left.passed else (choice.best.fit, choice.base.fit):
+            scatter, findings = lone_scatter_of(beside, self.held_out)
+            self.findings += [finding for finding in findings if finding not in self.findings]
+            if not scatter.parameters:
+                continue
+            self.tell("trials are found to differ without a rule: choosing again", 0.0)
+            before = self.base
+            self.base = coloured(rescattered(plain(before), scatter), self.colours)
+            other = self._chosen()
+            if other.left.passed:
+                self.model_std = scatter.model_std
+                self.findings.append(lone_finding(scatter))
+                return other
+            self.base = before
         return choice
 
     def _timed(self, choice: Choice) -> Choice:
@@ -354,6 +379,7 @@ class _Course:
         return told.finish(self.base, None, "none", last=last)
 
     def _told(self, model_std: Mapping[str, float]) -> Told:
+        model_std = {**getattr(self.problem, "known_std", {}), **model_std}
         return Told(self.problem, self.first, self.findings, self.held_out, self.jitters, self.colours, model_std)
 
     def _held_out_gate(self, found: Fit) -> Verdict | None:

@@ -76,7 +76,9 @@ def diagnose_campaign(
         gates = cache_folder() / "gates"
     with threadpool_limits(1):  # matrices are small: threads of the linear algebra only get in each other's way
         found = diagnose(problem, thorough=thorough, seed=seed, tell=tell, gates=gates)
-    seen = (*missing_sensors(measured), *find_implausible(measured), *findings_in_words(found.findings))
+    known = getattr(problem, "explains", lambda finding: False)
+    odd = (finding for finding in find_implausible(measured) if not known(finding))
+    seen = (*missing_sensors(measured), *odd, *findings_in_words(found.findings))
     return replace(found, findings=seen)
 
 
@@ -118,8 +120,10 @@ def _quantity(entry: dict[str, Any], *, at_end: bool) -> dict[str, Any]:
     return {**entry, "note": "standard error of the fit, right if the model is and the noise is as it was found"}
 
 
-_UNITS = {"force": "N", "depth": "m", "accel": "m/s2"}
-"""Of channels in `model_std`, which holds relative numbers otherwise."""
+_UNITS = {"force": "N, each in its own way", "depth": "m, each in its own way", "accel": "m/s2, each in its own way",
+          "depth zero": "m", "force zero": "N"}  # fmt: skip
+"""Of channels and zeros in `model_std`, which holds relative numbers otherwise."""
+_SENSORS = ("depth zero", "force zero")
 
 
 def _whose(found: Diagnosis) -> str:
@@ -161,8 +165,8 @@ def _result(found: Diagnosis, said: dict[str, Any]) -> dict[str, Any]:
     sentences += [f"{words[0].upper()}{words[1:]}." for words in noises]
     sentences += [
         f"Replicates differ by more than the sensors: {kind}, standard deviation {std:.3g} "
-        + (f"{_UNITS[kind]}, each in its own way" if kind in _UNITS else "(relative)")
-        + f"; it is {_whose(found)}."
+        + _UNITS.get(kind, "(relative)")
+        + f"; it is {'the zero of a sensor, or of where it was set up' if kind in _SENSORS else _whose(found)}."
         for kind, std in found.model_std.items()
     ]
     warnings = [finding.what for finding in said_once(found.findings)]

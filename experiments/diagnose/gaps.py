@@ -16,7 +16,7 @@ __all__ = ["Gaps", "numeral", "unit_of"]
 _UNITS: dict[str, tuple[str, float]] = {
     "x": ("mm", 1e3), "y": ("mm", 1e3), "theta": ("degrees", 180 / math.pi), "gyro": ("rad/s", 1.0),
     "ax": ("m/s2", 1.0), "ay": ("m/s2", 1.0), "wheel": ("rad/s", 1.0), "depth": ("mm", 1e3), "force": ("N", 1.0),
-    "accel": ("m/s2", 1.0),
+    "accel": ("m/s2", 1.0), "depth zero": ("mm", 1e3), "force zero": ("N", 1.0),
 }  # fmt: skip
 _ZEROED = ("x", "y", "theta")
 """Channels whose zero is fitted in each trial."""

@@ -172,7 +172,8 @@ class Told:
         if verdict == "unknown":
             # A trial's own factor is known: what is missing is asked of what that leaves.
             own_values = held_out_fit(best.model, held_out, best.values) if best.model.scatter else best_values
-            others = {kind: std for kind, std in self.model_std.items() if kind not in getattr(problem, "scatter", {})}
+            asked_of_all = set(getattr(problem, "scatter", {})) - set(getattr(problem, "known_std", {}))
+            others = {kind: std for kind, std in self.model_std.items() if kind not in asked_of_all}
             told, shares = depends_on(latent_table(problem, own_values, best.model.forms))
             rest = weighed_residuals(problem, others, own_values, best.model.forms, (*fitted, *held_out))
             left = places_in(problem, own_values, best.model.forms, rest)

@@ -64,9 +64,7 @@ class SmoothDepth:
         return np.sqrt((self.speed_error**2).sum(axis=1))
 
 
-def smooth_depth(
-    time: Array, depth: Array, std: float, *, alike: Holds = (), persistence: float = 0.0
-) -> SmoothDepth:
+def smooth_depth(time: Array, depth: Array, std: float, *, alike: Holds = (), persistence: float = 0.0) -> SmoothDepth:
     """Smooth a depth column [m] at times [s], both of shape [n], with noise of standard deviation `std` [m].
 
     `alike`: the holds of most of the machine's other pushes. `persistence`: correlation of the noise of a row with
@@ -140,9 +138,7 @@ def _curve(
     return *drive.curve(u), (depths, speeds), drive.softened(u, weigh).changes(u), _BENDS
 
 
-def _shrunk(
-    basis: Array, fixed: int, depth: Array, std: float, weigh: Weights
-) -> tuple[float, Array, Array]:
+def _shrunk(basis: Array, fixed: int, depth: Array, std: float, weigh: Weights) -> tuple[float, Array, Array]:
     """Evidence, coefficients and a factor of their covariance, all columns but the first `fixed` held small by a prior.
     `depth` is over the noise, `basis` in metres.
 

@@ -26,6 +26,7 @@ from .penetration_data import Prepared, prepare, stds
 from .penetration_forms import Library, Scales, make_library, physical, unit_of
 from .penetration_law import PHASES, SLOTS, fall, push, slot_table
 from .penetration_remarks import Push, remarks
+from .penetration_zeros import find_force_zeros
 from .problem import Array, Finding, Form, Parameter, Samples, TrialInfo, Values
 from .slopes import acceleration
 
@@ -37,6 +38,10 @@ _SHALLOW = 0.02
 """Share of D that counts as just below the surface."""
 _BESIDE = 5
 """Rows before and after a turn that tell the force there."""
+_ZERO_DEPTH = 0.1
+"""How far a depth's zero may differ between pushes while it is asked whether it does, over D."""
+_LEAST_ZERO = 0.2
+"""Zeros that differ by less than this share of the noise say nothing."""
 _BED_STD = 0.5
 """How far the bed may differ between replicates while it is asked whether it does [1]."""
 
@@ -58,6 +63,13 @@ class PenetrationProblem:
     """Channels whose times come from one clock."""
     hidden_scatter = ("bed damping",)
     """Kinds of scatter that are asked for only where something is left: they come near to what a speed does."""
+    zero_scatter = ("bed", "depth zero")
+    """Kinds that are asked for by themselves where the others do not explain what is left, and where no trial repeats
+    another (`lone_beds`): at one speed a damper and a depth's zero are the same."""
+    special_scatter = ("depth zero", "force zero")
+    """Kinds that are not asked for with all others at once."""
+    own_base = "diameter_m"
+    """The setting each value of which has base parameters of its own."""
 
     def __init__(self, campaign: Campaign, *, own: Sequence[OwnEffect] = ()) -> None:
         tables = campaign.tables
@@ -78,6 +90,10 @@ class PenetrationProblem:
         self.trials: tuple[TrialInfo, ...] = tuple(trial.info for trial in prepared)
         self._diameters = sorted({trial.diameter for trial in prepared})
         self._middle = self._diameters[len(self._diameters) // 2]
+        driven = any(trial.driven for trial in prepared)
+        self._zeros = find_force_zeros(prepared, stds(self.tables, True)[1]) if driven else None
+        if self._zeros is not None:
+            self.findings = (*self.findings, self._zeros.finding)
         self.base: tuple[Parameter, ...] = self._base_parameters()
         self._scales = self._find_scales()
         speeds = np.array([s for trial in prepared for s in _speeds(trial)])
@@ -128,13 +144,36 @@ class PenetrationProblem:
     def scatter(self) -> dict[str, tuple[Parameter, ...]]:
         """What may differ between replicates beyond the sensors: kind -> one nuisance a trial, mostly not fitted.
 
-        A factor on K and C, and one on C alone.
+        A factor on K and C, and one on C alone; of pushes where the depth is counted from, and what the force reads
+        at none.
         """
-        return {kind: tuple(
+        found = {kind: tuple(
             Parameter(name=f"{kind}[{id}]", unit="1", value=0.0, std=_BED_STD, scale=0.02, lowest=-0.95, highest=5.0,
                       trial=id, kind=kind, step=1e-4)
             for id in self._trials
         ) for kind in ("bed", "bed damping")}  # fmt: skip
+        pushes = [id for id, trial in self._trials.items() if trial.driven]
+        if not pushes:
+            return found
+        far = _ZERO_DEPTH * self._scales.depth
+        noises = dict(zip(("depth zero", "force zero"), stds(self.tables, True), strict=True))
+        ends = {"depth zero": far, "force zero": far * self._scales.force / self._scales.depth}
+        return found | {kind: tuple(
+            Parameter(name=f"{kind}[{id}]", unit=unit, value=0.0, std=ends[kind], scale=0.1 * max(ends[kind], 1e-12),
+                      lowest=-2 * ends[kind], highest=2 * ends[kind], trial=id, kind=kind, step=1e-3 * ends[kind],
+                      least=_LEAST_ZERO * noises[kind])
+            for id in pushes
+        ) for kind, unit in (("depth zero", "m"), ("force zero", "N"))}  # fmt: skip
+
+    @property
+    def known_std(self) -> dict[str, float]:
+        """What differs from trial to trial as the readings themselves tell: kind -> std, in its unit."""
+        return {"force zero": self._zeros.std} if self._zeros is not None else {}
+
+    def explains(self, finding: Finding) -> bool:
+        """Whether something odd about a recording is one of the zeros that are taken into account."""
+        read = finding.channel == "force" and "above the surface" in finding.what
+        return read and self._zeros is not None and self._zeros.usual(finding.trial)
 
     @property
     def rough(self) -> tuple[str, ...]:
@@ -201,6 +240,7 @@ class PenetrationProblem:
         into[_SLOT["reference"]] = self._scales.depth
         into[_SLOT["radius_depth"]] = _tip_depth(self.tables.spike, trial.diameter)
         if trial.smooth is not None:
+            into[_SLOT["shift_depth"]] = -values.get(f"depth zero[{trial.info.id}]", 0.0)
             fast = float(np.abs(trial.smooth.speed).max())
             into[_SLOT["speed_scale"]] = max(0.02 * fast, 2 * float(np.median(trial.smooth.speed_std)), 1e-12)
         size = trial.diameter / self._middle
@@ -230,12 +270,17 @@ class PenetrationProblem:
         for place, trial in enumerate(trials):
             for k, values in enumerate(points):
                 self._numbers(values, forms, trial, numbers[place * count + k])
-        numbers[:, _SLOT["shift_depth"]], numbers[:, _SLOT["shift_speed"]] = shifts
+        numbers[:, _SLOT["shift_depth"]] += shifts[0]
+        numbers[:, _SLOT["shift_speed"]] = shifts[1]
         starts = np.cumsum([0, *(len(trial.time) for trial in trials)]).astype(np.int32)
         if trials[0].driven:
             depth = np.concatenate([trial.smooth.depth for trial in trials if trial.smooth is not None])
             speed = np.concatenate([trial.smooth.speed for trial in trials if trial.smooth is not None])
             out = push(numbers, lanes, starts, depth, speed, own)
+            for place, trial in enumerate(trials):
+                zeros = np.array([values.get(f"force zero[{trial.info.id}]", 0.0) for values in points])
+                if zeros.any():
+                    out[place * count : (place + 1) * count] += zeros[:, None]
         else:
             speeds = np.array([trial.table.speed or 0.0 for trial in trials])
             out = fall(numbers, lanes, starts, np.concatenate([trial.time for trial in trials]), speeds, own)
@@ -312,6 +357,8 @@ class PenetrationProblem:
             assert trial.smooth is not None
             smooth = trial.smooth
             factor = by_depth[:, None] * smooth.depth_error + by_speed[:, None] * smooth.speed_error
+            if self._zeros is not None:
+                factor = np.column_stack([factor, np.full(len(factor), self._zeros.std)])
             # Where the error may cross the surface or the turning point, the force is no linear function of it.
             bend = np.abs(by_speed).max() * smooth.speed_std * (np.abs(smooth.speed) < 3 * smooth.speed_std)
             jump = float(np.abs(by_speed).max() * np.abs(smooth.speed).max())

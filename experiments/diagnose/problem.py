@@ -57,6 +57,8 @@ class Parameter:
     once when a Jacobian is made, since none touches another's trial."""
     step: float | None = None
     """Step of finite differences, in units of the parameter; for models whose contacts make small steps rough."""
+    least: float | None = None
+    """Of what may differ between replicates: the std below which it says nothing; None: the problem's own."""
 
 
 @dataclass(frozen=True, kw_only=True)

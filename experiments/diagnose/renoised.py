@@ -12,12 +12,14 @@ from .deciding import unscattered, values_of_all
 from .evidence import held_out_fit
 from .fitting import Fit, Model, Whitener, by_beginnings, fit
 from .jitter import Jitter, find_jitter, steepness
+from .lone_beds import find_lone_scatter
+from .problem import Finding
 from .replicates import Scatter, find_scatter, groups_of, with_scatter
 from .unrest import Unrest, find_unrest
 
 __all__ = [
-    "calmed", "coloured", "colours_of", "differ", "doubted", "jittered", "plain", "recoloured", "rescattered",
-    "scatter_apart", "scatter_of", "unrest_of", "whitened_fit",
+    "calmed", "coloured", "colours_of", "differ", "doubted", "jittered", "lone_scatter_of", "plain", "recoloured",
+    "rescattered", "scatter_apart", "scatter_of", "unrest_of", "whitened_fit",
 ]  # fmt: skip
 
 _MOST_FOR_COLOUR = 2.5
@@ -92,17 +94,29 @@ def colours_of(found: Fit) -> dict[str, Colour]:
     return loud | find_colours(found)
 
 
-def scatter_of(found: Fit, held_out: tuple[str, ...], *, apart: bool = False) -> Scatter:
+def scatter_of(found: Fit, held_out: tuple[str, ...], *, apart: bool = False, kinds: tuple[str, ...] = ()) -> Scatter:
     """Asked of all trials, and of the model without any scatter so far."""
     model = replace(found.model, scatter=())
     if all(len(ids) < 2 for ids in groups_of(model.problem.trials).values()):
         return Scatter()
-    return find_scatter(fit(model.on((*model.trials, *held_out)), unscattered(found)), apart=apart)
+    return find_scatter(fit(model.on((*model.trials, *held_out)), unscattered(found)), apart=apart, kinds=kinds)
 
 
-def scatter_apart(found: Fit, held_out: tuple[str, ...]) -> Scatter:
-    """What replicates differ by where what is left hides it; none where they cannot be compared row by row."""
-    return scatter_of(found, held_out, apart=True) if hasattr(found.model.problem, "calm") else Scatter()
+def scatter_apart(found: Fit, held_out: tuple[str, ...], *, zeros: bool) -> Scatter:
+    """What replicates differ by where what is left hides it; none where they cannot be compared row by row. `zeros`:
+    asked for the kinds that stand by themselves."""
+    kinds = getattr(found.model.problem, "zero_scatter", ()) if zeros else ()
+    if not hasattr(found.model.problem, "calm") or (zeros and not kinds):
+        return Scatter()
+    return scatter_of(found, held_out, apart=True, kinds=kinds)
+
+
+def lone_scatter_of(found: Fit, held_out: tuple[str, ...]) -> tuple[Scatter, list[Finding]]:
+    """The same of trials of which none repeats another, and what speaks against it; nothing where one does."""
+    model = replace(found.model, scatter=())
+    if not hasattr(model.problem, "zero_scatter") or any(len(i) > 1 for i in groups_of(model.problem.trials).values()):
+        return Scatter(), []
+    return find_lone_scatter(fit(model.on((*model.trials, *held_out)), unscattered(found)))
 
 
 def unrest_of(found: Fit, held_out: tuple[str, ...]) -> Unrest:

@@ -12,11 +12,12 @@ from scipy import stats
 
 from .evidence import inflation, slow_count
 from .fitting import Fit, Model, fit, scanned
+from .gaps import unit_of
 from .gate import low_modes
 from .problem import Finding, Parameter, Problem, TrialInfo, Values
 
-__all__ = ["Scatter", "exchanged", "find_scatter", "groups_of", "odd_trials", "parted", "split_trials", "trends",
-           "with_scatter"]  # fmt: skip
+__all__ = ["Scatter", "exchanged", "find_scatter", "groups_of", "likeliest_scatter", "odd_trials", "parted",
+           "split_trials", "trends", "with_scatter"]  # fmt: skip
 
 _SURE = 1e-4
 _LEAST = 0.005
@@ -126,7 +127,9 @@ def exchanged(
     return tuple(t for t in every if t not in out), tuple(t for t in every if t in out)
 
 
-def find_scatter(found: Fit, *, apart: bool = False) -> Scatter:
+def find_scatter(
+    found: Fit, *, apart: bool = False, kinds: Sequence[str] = (), alone: Sequence[Sequence[str]] = ()
+) -> Scatter:
     """Nuisances that the replicates call for, their priors estimated, and what is written as model_std.
 
     Each trial's own numbers (bed, friction, whatever the problem offers) are fitted, all kinds at once, so that none
@@ -135,27 +138,31 @@ def find_scatter(found: Fit, *, apart: bool = False) -> Scatter:
     are those of noise as loud as what is left (`inflation`), or, `apart`, as what each has left of its own
     (`_louder`), and all kinds are asked for. The scatter is the most likely one beside these errors, each condition's
     mean taken out (restricted likelihood): trials that say nothing of a kind count for nothing. Once found, it is the
-    prior under which all is fitted and asked again.
+    prior under which all is fitted and asked again. `kinds`: those that are asked for; none: all that no other
+    question is for. `alone`: sets of trials that are compared although none repeats another (`lone_beds`).
     """
     problem: Problem = found.model.problem
     offered: dict[str, tuple[Parameter, ...]] = getattr(problem, "scatter", {})
-    late = () if apart else getattr(problem, "hidden_scatter", ())
-    offered = {kind: parameters for kind, parameters in offered.items() if kind not in late}
+    asked = tuple(kinds)
+    if not asked:
+        late = () if apart else getattr(problem, "hidden_scatter", ())
+        asked = tuple(kind for kind in offered if kind not in (*late, *getattr(problem, "special_scatter", ())))
+    offered = {kind: parameters for kind, parameters in offered.items() if kind in asked}
     inside = [t for t in problem.trials if t.id in found.model.trials]
-    groups = [ids for ids in groups_of(inside).values() if len(ids) > 1]
+    groups = [list(ids) for ids in alone or groups_of(inside).values() if len(ids) > 1]
     if not groups or not offered:
         return Scatter()
     every = tuple(p for parameters in offered.values() for p in parameters)
     wide = fit(replace(found.model, scatter=every), found.values, rounds=_LOOKS)
-    kinds = _scattered(wide, offered, groups, apart)
-    while kinds:
-        active = tuple(replace(p, std=std) for kind, std in kinds.items() for p in offered[kind])
+    differ = _scattered(wide, offered, groups, apart)
+    while differ:
+        active = tuple(replace(p, std=std) for kind, std in differ.items() for p in offered[kind])
         wide = with_scatter(replace(found.model, scatter=active), wide.values)
-        sure = _scattered(wide, {kind: offered[kind] for kind in kinds}, groups, apart)
-        if sure.keys() == kinds.keys():
+        sure = _scattered(wide, {kind: offered[kind] for kind in differ}, groups, apart)
+        if sure.keys() == differ.keys():
             parameters = tuple(replace(p, std=sure[p.kind]) for p in active)
             return Scatter(parameters, sure, wide.values)
-        kinds = sure
+        differ = sure
     return Scatter()
 
 
@@ -212,9 +219,11 @@ def trends(scatter: Scatter, trials: Sequence[TrialInfo]) -> list[Finding]:
         if chance < _TREND:
             slope = seen / sum(float(order @ order) for order, _ in (group.T for group in apart))
             way = "grows" if seen > 0 else "falls"
+            unit, factor = unit_of(kind)
+            size = f"{100 * abs(slope):.2g} %" if unit == "SI" else f"{factor * abs(slope):.2g} {unit}"
             what = (
                 f"what replicates differ by is no scatter: {kind} {way} from trial to trial, in the campaign's order, "
-                f"by {100 * abs(slope):.2g} % each on the mean (by chance once in {1 / chance:.0f} times or less): "
+                f"by {size} each on the mean (by chance once in {1 / chance:.0f} times or less): "
                 f"what has changed with time, the bed, the surface, a tip or a sensor's gain, no effect has"
             )
             found.append(Finding(trial="", what=what, doubt=True))
@@ -235,8 +244,8 @@ def _scattered(
         surprise = sum(float((((b - _mean(b, s)) / s) ** 2).sum()) for b, s in (pair.T for pair in pairs))
         if not pairs or stats.chi2.sf(surprise, sum(len(pair) - 1 for pair in pairs)) >= _SURE:
             continue
-        std = min(_likeliest_scatter(pairs), max(p.std for p in parameters))
-        if std > least:
+        std = min(likeliest_scatter(pairs), max(p.std for p in parameters))
+        if std > (least if parameters[0].least is None else parameters[0].least):
             scatter[kind] = std
     return scatter
 
@@ -291,7 +300,7 @@ def _mean(values: np.ndarray, errors: np.ndarray) -> float:
     return float((values / errors**2).sum() / (1 / errors**2).sum())
 
 
-def _likeliest_scatter(pairs: Sequence[np.ndarray]) -> float:
+def likeliest_scatter(pairs: Sequence[np.ndarray]) -> float:
     """Std between replicates that is most likely beside the errors of what is told of each, the groups' means unknown.
 
     `pairs`: of each group values and errors, shape [trial_count, 2].

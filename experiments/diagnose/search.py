@@ -214,10 +214,7 @@ class Search:
             if excess(start.fit) < 0.5 * np.sqrt(2.0 * start.fit.count):
                 break
             for finer in shapes.get(plain.id, ()):
-                model = start.fit.model.with_forms([finer if form is plain else form for form in start.forms])
-                bends = [{k: v for k, v in point.items() if k not in known} for point in finer.starts]
-                begun = [fit(model, {**start.fit.values, **bend}, rounds=3) for bend in _once(bends)]
-                found = fit(model, min(begun, key=lambda one: one.objective).values)
+                found = self._fitted_bend(start.fit, plain, finer, known)
                 made = Hypothesis(found, score(found))
                 self.table.append((_said(made), made))
                 if made.score > max(best.score, start.score + 1.0):
@@ -225,6 +222,19 @@ class Search:
                     if len(made.forms) == 1:
                         self._alone[finer.id] = made
         return best
+
+    @staticmethod
+    def _fitted_bend(start: Fit, plain: Form, finer: Form, known: set[str]) -> Fit:
+        """With the `finer` form in place of the plain one, whose parameters are `known`."""
+        model = start.model.with_forms([finer if form is plain else form for form in start.model.forms])
+        bends = _once([{k: v for k, v in point.items() if k not in known} for point in finer.starts])
+        places: list[Values] = [{**start.values, **bend} for bend in bends]
+        begun = [fit(model, values, rounds=3) for values in places]
+        refine = getattr(model.problem, "refine", None)
+        if refine is not None:  # a bend alone may put trials on other branches: from their beginnings, too
+            found_anew = refine([(model.forms, values) for values in places], model.trials, apart=model.scatter)
+            begun += [fit(model, values, rounds=3) for values in found_anew]
+        return fit(model, min(begun, key=lambda one: one.objective).values)
 
     def _enriched(self, hypothesis: Hypothesis) -> Hypothesis:
         """Of another shape or with a second form of an effect, where that helps: nature's is between the library's."""

@@ -240,6 +240,8 @@ def _ends(trial: TrialData, name: str, keep: NDArray[np.bool_], findings: list[F
     longest = max(float(np.ptp(own)) for other in CHANNELS if len(own := trial.time[trial.of(other) & keep]))
     least = max(10 * float(np.median(np.diff(time))), _END)
     first, last = float(whole.min()), float(whole.max())
+    if name == "wheel":  # before the torque it turns as is stated: a tachometer that starts with it misses nothing
+        first = max(first, 0.0)
     for low, high, words in (
         (first, float(time[0]), f"before {time[0]:.3g} s, others begin at {first:.3g} s"),
         (float(time[-1]), last, f"after {time[-1]:.3g} s, others go on to {last:.3g} s"),

@@ -8,7 +8,7 @@ import pytest
 from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial
 
 from experiments.diagnose import deciding
-from experiments.diagnose.bounds import bounds_met
+from experiments.diagnose.bounds import bends_little_away, bounds_met
 from experiments.diagnose.colour import find_colours, find_loud
 from experiments.diagnose.deciding import one_number
 from experiments.diagnose.diagnosis import _Asked, _Course, diagnose
@@ -296,3 +296,14 @@ def test_a_stiffness_beside_beds_that_differ_is_that_of_the_mean_bed():
     ended = course._ended(choice).best.fit
     assert ended.objective < stopped.objective - 1
     assert ended.values["stiffness"] == pytest.approx(STIFFNESS * beds.mean(), rel=0.01)
+
+
+def test_a_name_beside_a_shared_number_too_far_off_explains_no_little_thing():
+    """k is stated as 1 +- 0.1. (A sideways force of 1.2 % of the weight was named beside a mass 4.4 sigma off.)"""
+    found = fitted(Line())
+    base, near, far = found, dict(found.values), {**found.values, "k": 1.4}
+    assert not bends_little_away(replace(found, values=near), base)
+    assert bends_little_away(replace(found, values=far), base)
+    # Where much was missing the form of what is named may bend it as far.
+    plain = replace(base, chi_square=2.0 * base.count)
+    assert not bends_little_away(replace(found, values=far), plain)

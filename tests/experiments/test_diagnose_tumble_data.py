@@ -71,6 +71,19 @@ def test_rows_that_were_lost_are_a_gap_and_no_jump_of_the_clock():
     assert findings and not any(finding.set_aside for finding in findings)
 
 
+@pytest.mark.parametrize(
+    ("sensor", "begins", "said"), [("wheel", 0.0, False), ("wheel", 0.3, True), ("imu", 0.0, True)]
+)
+def test_a_wheel_that_is_read_from_the_torques_start_on_misses_nothing(sensor, begins, said):
+    """Before t = 0 it turns as the campaign states; what the others read then tells their zero."""
+    made = campaign(seed=1, conditions=CONDITIONS[:1])
+    recording = made.recordings["001", sensor]
+    kept = recording.time >= begins
+    columns = {name: np.asarray(column)[kept] for name, column in recording.columns.items()}
+    _, findings = checked(tumble_data(changed(made, sensor, columns)))
+    assert any("no valid row before" in finding.what for finding in findings) == said
+
+
 def test_a_trials_own_friction_and_bed_are_factors_on_what_all_share():
     data = tumble_data(campaign(conditions=CONDITIONS[:2]))
     problem = TumbleProblem(data)
