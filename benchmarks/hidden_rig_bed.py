@@ -63,7 +63,7 @@ def draw_law(random: np.random.Generator, name: str, depth: float, kind: str | N
         n = {"onset": between(0.1, 0.5) * depth}
     elif name == "depth-hardening":
         n = {"reference": between(0.4, 0.8) * depth, "softer": float(random.random() < 0.35),
-             "corner": between(0.3, 0.6) * depth, "width": between(0.3, 0.5) * depth}  # fmt: skip
+             "corner": between(0.0, 0.1) * depth, "width": between(0.3, 0.5) * depth}  # fmt: skip
     elif name == "plastic-sinkage":
         n = {"bend": between(1.3, 2.2)}
     elif name == "adhesion":
