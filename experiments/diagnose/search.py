@@ -48,6 +48,8 @@ _BEST = 5
 _PAIRS = 8
 """Pairs of effects that are looked at where no single name does, and how many of them are fitted in full."""
 _FOLLOWED = 3
+_SMALL_PART, _PARTS = 0.3, (0.1, 1.0)
+"""Of the amplitude that a form has alone, and of those that its starts have, for fits of it beside others."""
 
 Tell = Callable[[str, float], None]
 
@@ -132,8 +134,12 @@ class Search:
         else:  # where it stood alone is a good place to begin from beside others, and a small amplitude is another
             amplitude = forms[0].amplitude
             values = {**{p.name: alone.fit.values[p.name] for p in forms[0].parameters}, **start.fit.values}
-            small = {**values, amplitude: 0.3 * values[amplitude]}
-            first = [fit(model, values, rounds=4), fit(model, small, rounds=4)]
+            places: list[Values] = [values, {**values, amplitude: _SMALL_PART * values[amplitude]}]
+            if forms[0].effect in start.effects and not hasattr(model.problem, "guess"):
+                # What it was alone, another form of the effect now is: little of it, in all its shapes.
+                for own in forms[0].starts:
+                    places += [{**start.fit.values, **own, amplitude: part * own[amplitude]} for part in _PARTS]
+            first = [fit(model, place, rounds=4) for place in places]
             best = min(first, key=lambda f: f.objective)
             found = fit(model, best.values)
         if not start.forms:
