@@ -253,10 +253,10 @@ TANGENTIAL_DASHPOT = (
     "only near 10 degrees, where the contact sticks and swings back. It is not the step (below). The figure's points "
     "are those of one law and no measurement: one spring for the whole contact, stretched by the slip, without a "
     "dashpot, is within the band at all thirteen (below; laws that sum the force instead of the slip are off more at 5 "
-    "and 10 degrees). An elastic sphere whose contact slips ring by ring, with which measured rebounds are said to agree "
-    "(Kharaz, Gorham & Salman 2001, Powder Technol. 120:281, abstract), is 17 to 71 rad/s above them below 25 degrees. "
-    "Of the 6.8 rad/s 2.9 are the dashpot of our tangential spring, without which beds would ring, and 3.3 are within "
-    "what the figure can be read to, 3.7 (2026-11-22)"
+    "and 10 degrees). An elastic sphere whose contact slips ring by ring, with which measured rebounds are said to "
+    "agree (Kharaz, Gorham & Salman 2001, Powder Technol. 120:281, abstract), is 17 to 71 rad/s above them below 25 "
+    "degrees. Of the 6.8 rad/s 2.9 are the dashpot of our tangential spring, without which beds would ring, 3.3 are "
+    "within what the figure can be read to, 3.7 (2026-11-22)"
 )
 CASES = [
     Case(
