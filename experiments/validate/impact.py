@@ -57,7 +57,7 @@ WHY_FINE = (
     "stops at 17.6, 26.0 and 40.8 mm, 13 to 21 % above the law's depths. Of the three sizes d1 is a straight line in "
     "d / (D + d), which at the beads' 1 / 85 comes to 3.8 cm: less than half of what is wanted, and what lacks then "
     "was not found. Beads are 85 across. Friction and rolling friction are chosen for their tan 24 degrees, 0.445, and "
-    "sheared samples of these grains have 0.45 (case rft); less of them helps (katsuragi-durian)"
+    "sheared samples of these grains have 0.46 (case rft); less of them helps (katsuragi-durian)"
 )
 
 
