@@ -163,10 +163,14 @@ def check_width(cut: float | None, *, width: float, height: float, grain: float)
     cut = height if cut is None else cut
     most = width - 2 * (_WEDGE * height + 3 * grain)
     if not 2 * grain <= cut <= most:
+        would_do = (
+            f"to {most:.4g} m would do"
+            if most >= 2 * grain
+            else f"and a bed {width + 2 * grain - most:.4g} m wide would do"
+        )
         raise ValueError(
-            f"width = {cut:.4g} m of the cut: from two grains, {2 * grain:.4g} m, to what leaves two wedges and "
-            f"three grains beside each, {most:.4g} m, would do"
-            + ("; a wider bed is needed" if most < 2 * grain else "")
+            f"width = {cut:.4g} m of the cut: two wedges and three grains beside each must be left; from two grains, "
+            f"{2 * grain:.4g} m, {would_do}"
         )
 
 

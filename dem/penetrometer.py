@@ -153,10 +153,14 @@ def check_cone(
     """Refuse a cone that cannot go into a bed of that size and surface [m]. Raises ValueError as ``push_cone`` does."""
     depth = 0.5 * surface if depth is None else depth
     shaft = SHAFT * diameter if shaft is None else shaft
-    if not LEAST_GRAINS * grain <= diameter <= min(size[:2]) / LEAST_WIDTH:
+    least, most = LEAST_GRAINS * grain, min(size[:2]) / LEAST_WIDTH
+    if not least <= diameter <= most:
+        narrow = (
+            f"; the bed is too narrow for any, a width of {LEAST_WIDTH * least:.4g} m is needed" if most < least else ""
+        )
         raise ValueError(
-            f"diameter = {diameter:g} m: from three grains, {LEAST_GRAINS * grain:.4g} m, to a third of the bed's "
-            f"width, {min(size[:2]) / LEAST_WIDTH:.4g} m, would do"
+            f"diameter = {diameter:g} m: from three grains, {least:.4g} m, to a third of the bed's width, "
+            f"{most:.4g} m, would do{narrow}"
         )
     if not 10 <= angle <= 150:
         raise ValueError(f"angle = {angle:g} degrees: a full angle of 10 to 150 would do")

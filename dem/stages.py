@@ -59,6 +59,7 @@ class Preparation:
         self._progress = progress
         self._path = path
         self._kept = time.monotonic()
+        self._densest: dict[str, np.ndarray] = {}  # state of the bed where taps had it densest
 
     def run(self) -> Bed:
         """Go on to the end; the bed. Raises BedFailure where it does not come to rest.
@@ -81,6 +82,8 @@ class Preparation:
         """Write it down as it is."""
         if self._path is not None:
             self.bed.save(self._path)
+            if self._densest:
+                np.savez(self._path.with_suffix(".densest.npz"), **self._densest)  # type: ignore[arg-type]
             kept = self._told() | {"notes": self.notes, "steps": self.bed.steps}
             self._path.with_suffix(".json").write_text(json.dumps(kept))
             self._kept = self._now()
@@ -94,6 +97,9 @@ class Preparation:
             bed, notes = Bed.load(self._path, **options), dict(kept["notes"])
             if kept["steps"] != bed.steps or not self._recall(kept):  # ended between the two files, or another's
                 return
+            if (densest := self._path.with_suffix(".densest.npz")).exists():
+                with np.load(densest) as file:
+                    self._densest = {key: file[key] for key in file.files}
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             return
         self.bed, self.notes = bed, notes
@@ -110,8 +116,8 @@ class Preparation:
     def forget(self) -> None:
         """Remove what was kept."""
         if self._path is not None:
-            self._path.unlink(missing_ok=True)
-            self._path.with_suffix(".json").unlink(missing_ok=True)
+            for path in (self._path, self._path.with_suffix(".json"), self._path.with_suffix(".densest.npz")):
+                path.unlink(missing_ok=True)
 
     @staticmethod
     def _now() -> float:
@@ -259,15 +265,26 @@ class Preparation:
 
         The surface sinks meanwhile and stays nearly level. A tap is half a sine of acceleration of the bed's frame, 3 g
         high, as long as a grain falls for its diameter; one that goes too far is taken back and made half as high.
+        With None the bed is left as it was densest. Taps of 3 g throw it up, and what sticks may come down in looser
+        lumps: such grains are tapped half as hard from there, and again, until that gains nothing either.
         """
         bed = self.bed
         if "taps" not in notes:
-            notes |= {"taps": 0, "height": _TAP, "trace": [bed.packing_fraction]}
+            notes |= {"taps": 0, "height": _TAP, "trace": [bed.packing_fraction], "round": 0}
+            self._densest = bed.state() if packing is None else {}
         trace = notes["trace"]
         while packing is None or bed.packing_fraction < packing - _SHORT:
-            gained = trace[-1] - trace[-1 - _TELLING_TAPS] if len(trace) > _TELLING_TAPS else math.inf
+            tapped = len(trace) - 1 - notes["round"]
+            gained = trace[-1] - trace[-1 - _TELLING_TAPS] if tapped >= _TELLING_TAPS else math.inf
             if packing is None and (gained < _NOTHING_GAINED or notes["taps"] >= 2 * _MOST_TAPS):
-                return
+                if bed.packing_fraction < max(trace):
+                    bed.restore(self._densest)
+                softer = notes["height"] / 2
+                if bed.material.cohesion == "none" or softer < _SOFTEST_TAP or notes["taps"] >= 2 * _MOST_TAPS:
+                    self._densest = {}
+                    return
+                notes |= {"height": softer, "round": len(trace)}
+                trace.append(bed.packing_fraction)
             if packing is not None:
                 self._refuse_dense(packing, gained / _TELLING_TAPS, notes)
             before = bed.state()
@@ -280,6 +297,8 @@ class Preparation:
                 notes["height"] /= 2
             else:
                 trace.append(bed.packing_fraction)
+                if packing is None and trace[-1] == max(trace):
+                    self._densest = bed.state()
             way = (packing or 1.1 * trace[0]) - trace[0]
             self._pause(min(1.0, max(0.0, (bed.packing_fraction - trace[0]) / max(1e-9, way))))
 

@@ -213,6 +213,7 @@ def choose_softness(settings: PenetrateSettings) -> Softening:
         young=settings.young,
         max_overlap=settings.max_overlap,
         grain=settings.grain,
+        spread=settings.spread,
         gravity=settings.gravity,
         bed_height=settings.bed_size[2],
         depth=min(deepest(settings), max(settings.depth, *drops) if drops else settings.depth),

@@ -137,12 +137,28 @@ def soften(
     return Softening(min(real_young, max(static, struck, landed)), highest, speed, real_young)
 
 
-def soften_material(material: Any, *, young: float | None, fastest: str = "speed", **case: float) -> Softening:
+def soften_material(
+    material: Any,
+    *,
+    young: float | None,
+    max_overlap: float,
+    grain: float,
+    spread: float,
+    fastest: str = "speed",
+    **case: float,
+) -> Softening:
     """`soften` for the grains of a material; where `young` [Pa] is set, that, with what presses and how fast.
 
-    `case` are the options of `soften` that are not the material's. Raises ValueError as `soften` does.
+    Diameters are uniform within 1 +- `spread`: where that is wide, the mean grain is held to less than `max_overlap`,
+    so that the smallest keep it (`dem.prepare.bound_of_mean`). `case` are the options of `soften` that are not the
+    material's. Raises ValueError as `soften` does.
     """
+    from dem.prepare import bound_of_mean
+    from dem.sizes import Uniform
+
     chosen = soften(
+        max_overlap=bound_of_mean(Uniform(grain, spread), max_overlap),
+        grain=grain,
         density=material.density,
         poisson=material.poisson,
         friction=material.friction,

@@ -200,8 +200,8 @@ def _softness(settings: SpatialSettings, plan: SpatialPlan, forecast: Forecast) 
     load = float(np.linalg.norm(plan.trial.weight)) / feet
     return soften_material(
         _material(plan), young=settings.young, max_overlap=settings.max_overlap, grain=settings.grain,
-        gravity=_grain_gravity(plan), bed_height=settings.bed_size[2], depth=1.5 * forecast.deepest,
-        speed=max(1.5 * forecast.fastest, _lowering_speed(settings, plan) or 0.0),
+        spread=settings.spread, gravity=_grain_gravity(plan), bed_height=settings.bed_size[2],
+        depth=1.5 * forecast.deepest, speed=max(1.5 * forecast.fastest, _lowering_speed(settings, plan) or 0.0),
         pressure=load / (math.pi * plan.trial.platform.tip_radius**2), fall=RAIN * settings.bed_size[2],
     )  # fmt: skip
 

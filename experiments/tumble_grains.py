@@ -283,6 +283,7 @@ def _softness(settings: TumbleSettings, plan: TumblePlan, forecast: Forecast) ->
         young=settings.young,
         max_overlap=settings.max_overlap,
         grain=settings.grain,
+        spread=settings.spread,
         gravity=_first_gravity(settings, plan),
         bed_height=settings.bed_size[2],
         depth=forecast.margin * forecast.deepest,

@@ -23,7 +23,7 @@ from .case import Case, Comparison, Curve, Outcome, Plot
 from .drops import BEADS, drop, prepared
 from .parts import part
 
-__all__ = ["CASES", "Fall", "energy", "fit_law"]
+__all__ = ["BALL", "CASES", "Fall", "K_OVER_M", "MASS", "energy", "fit_law"]
 
 BALL, BEAD, MASS, GRAVITY = 0.0254, 0.0003, 0.0692, 9.81  # diameters [m], [kg], [m/s2]
 D1, K_OVER_M = 0.087, 1040.0  # published [m], [1/s2]
@@ -56,8 +56,8 @@ WHY_FINE = (
     "grains, a bed of 2.6 x 2.6 x 2.0, six drops, 2026-11-22) d1 is 2.89 +- 0.22 cm, k/m 1190 +- 70 1/s2, and it "
     "stops at 17.6, 26.0 and 40.8 mm, 13 to 21 % above the law's depths. Of the three sizes d1 is a straight line in "
     "d / (D + d), which at the beads' 1 / 85 comes to 3.8 cm: less than half of what is wanted, and what lacks then "
-    "was not found. Beads are 85 across; friction and rolling friction are chosen for the beads' tan 24 degrees and "
-    "not measured, and less of them helps (katsuragi-durian)"
+    "was not found. Beads are 85 across. Friction and rolling friction are chosen for their tan 24 degrees, 0.445, and "
+    "sheared samples of these grains have 0.46 (case rft); less of them helps (katsuragi-durian)"
 )
 
 

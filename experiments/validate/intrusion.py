@@ -1,9 +1,17 @@
-"""Slow plates and a cone against 3D-RFT, with the friction that a shear test of the same bed gives.
+"""Slow plates and a cone against 3D-RFT, with the friction that a shear test of the same grains gives.
 
 A level plate going straight down bears 0.876 xi_n z A, a cone xi_n alpha_z z^3 pi tan(b) / (3 cos(b)), b its
 half-angle (`rigid.rft` has alpha and xi_n). Both are for grains small against the body. Here they are not, so both are
-fitted in a form in which a margin of some grain around the body drops out: sqrt(dF/dz) of plates is linear in their
-diameter, with the margin where it cuts the axis, and the cube root of a cone's force is linear in depth.
+fitted in a form in which a margin of some grain around the body drops out: a plate bears as one of its diameter and the
+margin, and the cube root of a cone's force is linear in depth.
+
+A plate's force is linear only once a cone of grains at rest has grown under it, which it then pushes along: it starts
+above zero, as if the plate were as much deeper as that cone has volume over area, a share of its diameter (Kang, Feng,
+Liu & Blumenfeld 2018, Nat. Commun. 9:1101). 3D-RFT, which is local, knows the slope alone; so the share is fitted too.
+
+Its mu is that of a continuum, shear over mean stress at the critical state (the flow rule that it was found with, after
+Dunatunga & Kamrin 2015, J. Fluid Mech. 779:483), not shear over normal stress on the plane of shear, which is some 7 %
+less of the same grains.
 """
 
 from __future__ import annotations
@@ -12,27 +20,30 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from dem import Cone, Cylinder
-from dem.shearing import shear_bed
-from experiments.bed_shear import strength_of
+from dem.element import shear_element
+from rigid.laws import find_law
 from rigid.rft import flat_plate, stress_gradient, tractions
 
+from ..calibrate_tests import summary_of
 from .case import Case, Comparison, Curve, Outcome, Plot
-from .drops import BEADS, drive_down, prepared
+from .drops import BEADS, SPREAD, drive_down, prepared
+from .impact import BALL, K_OVER_M, MASS
 from .parts import part
 
 __all__ = ["CASES", "cone_coefficient", "plate_law"]
 
-GRAIN = 0.0257 / 6  # as in the coarser bed of the case katsuragi-durian: the bed is the same
-SIZE = (3.2 * 0.0257, 3.2 * 0.0257, 2.15 * 0.0257)
+GRAIN = 0.0257 / 6  # as in the coarser bed of the case katsuragi-durian
+SIZE = (26 * GRAIN, 26 * GRAIN, 18 * GRAIN)
 GRAVITY, SEED = 9.81, 1
 PLACES = ((0.25, 0.25), (0.75, 0.75))
-PLATES = (3.5, 5.0, 7.0)  # diameters, over d
+PLATES = (5.0, 7.0, 9.0)  # diameters, over d
 HALF_ANGLE = math.radians(30.0)
 SPEED = 0.15  # [m/s]
-PLATE_DEPTHS, CONE_DEPTHS = (1.5, 5.0), (2.5, 7.0)  # over which the law is fitted, over d
-PRESSURES, WAY, INERTIAL_NUMBER = (1.0, 3.0), 6.0, 5e-3  # of the shear test: over the bed's weight; over d
+PLATE_DEPTHS, CONE_DEPTHS = (2.0, 7.0), (3.5, 8.5)  # over which the law is fitted, over d
+SAMPLES, PRESSURE, STRAIN, INERTIAL_NUMBER = range(1, 7), 1000.0, 2.0, 5e-3  # of the shear test: seeds; [Pa]
 BAND = 0.25
 
 
@@ -43,10 +54,24 @@ def cone_coefficient(half_angle: float, *, surface_friction: float) -> float:
     return alpha * math.pi * math.tan(half_angle) / (3 * cosine)
 
 
-def plate_law(diameters: Sequence[float], slopes: Sequence[float]) -> tuple[float, float]:
-    """Stress gradient [Pa/m] and margin [m] from dF/dz [N/m] of plates: dF/dz = gradient pi / 4 (D + margin)^2."""
-    rise, start = np.polyfit(diameters, np.sqrt(np.asarray(slopes) * 4 / math.pi), 1)
-    return float(rise) ** 2, float(start / rise)
+def plate_law(pushes: Sequence[tuple[float, np.ndarray, np.ndarray]]) -> tuple[float, float, float]:
+    """Stress gradient [Pa/m], margin [m] and share [1] of F = gradient (z + share D) pi / 4 (D + margin)^2.
+
+    ``pushes``: diameter D [m], depths [m] and forces [N] of each plate; each counts alike, as stress over depth.
+    """
+    across = np.concatenate([np.full(len(depth), diameter) for diameter, depth, _ in pushes])
+    deep, stress = (np.concatenate([push[k] for push in pushes]) for k in (1, 2))
+    area = 0.25 * math.pi * across**2
+    weight = np.concatenate([np.full(len(depth), 1 / math.sqrt(len(depth))) for _, depth, _ in pushes])
+    stress = stress / area
+    scale, grain = float((stress * weight**2).sum() / (deep * weight**2).sum()), 0.1 * float(across.min())
+
+    def misses(x: np.ndarray) -> np.ndarray:
+        model = x[0] * scale * (deep + x[2] * across) * (1 + x[1] * grain / across) ** 2
+        return weight * (model - stress) / (scale * deep)
+
+    found = least_squares(misses, [0.7, 0.5, 0.2]).x
+    return float(found[0]) * scale, float(found[1]) * grain, float(found[2])
 
 
 def _driven(name: str, shape: Cone | Cylinder, place: tuple[float, float], depth: float) -> dict[str, np.ndarray]:
@@ -58,22 +83,23 @@ def _driven(name: str, shape: Cone | Cylinder, place: tuple[float, float], depth
     return part("intrusion", {"body": name, "at": place, "depth": depth, "speed": SPEED, "size": SIZE}, compute)
 
 
-def _sheared(pressure: float) -> dict[str, np.ndarray]:
-    """Critical and peak stress ratio [1], normal stress [Pa], and the bed's density [kg/m3]."""
+def _sheared(seed: int) -> dict[str, np.ndarray]:
+    """One sample at large strain: shear over mean stress and over that on its plane [1], packing fraction [1]."""
 
     def compute() -> dict[str, np.ndarray]:
-        bed = prepared(grain=GRAIN, size=SIZE, gravity=GRAVITY, seed=SEED)
-        density = bed.packing_fraction * BEADS.density
-        run = shear_bed(
-            bed, pressure=pressure * bed.weight / (SIZE[0] * SIZE[1]), way=WAY * GRAIN,
-            inertial_number=INERTIAL_NUMBER, grain=GRAIN,
+        run = shear_element(
+            BEADS, pressure=PRESSURE, grain=GRAIN, spread=SPREAD, strain=STRAIN, inertial_number=INERTIAL_NUMBER,
+            seed=seed,
         )  # fmt: skip
-        found = strength_of(run, GRAIN)
-        numbers = {"critical": found.critical / found.normal, "peak": found.peak / found.normal, "density": density,
-                   "error": found.critical_error / found.normal}  # fmt: skip
-        return {key: np.array(value) for key, value in numbers.items()}
+        said = summary_of(run, BEADS.density)
+        late = run.inside_strain > 0.5 * STRAIN
+        return {
+            "over_mean": np.array(3 * said["shear"] / float(np.trace(said["tensor"]))),
+            "over_normal": np.array(said["shear"] / said["normal"]),
+            "packing": np.array(run.packing[late].mean()),
+        }
 
-    return part("sheared", {"pressure": pressure, "way": WAY, "number": INERTIAL_NUMBER, "size": SIZE}, compute)
+    return part("sheared", {"seed": seed, "pressure": PRESSURE, "strain": STRAIN, "number": INERTIAL_NUMBER}, compute)
 
 
 def _between(run: dict[str, np.ndarray], depths: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
@@ -82,7 +108,7 @@ def _between(run: dict[str, np.ndarray], depths: tuple[float, float]) -> tuple[n
 
 
 def _compute(tell: Callable[[float], None]) -> Outcome:
-    whole = len(PRESSURES) + len(PLACES) * (len(PLATES) + 1)
+    whole = len(SAMPLES) + len(PLACES) * (len(PLATES) + 1)
     done = 0
 
     def ticked(found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -91,31 +117,31 @@ def _compute(tell: Callable[[float], None]) -> Outcome:
         tell(done / whole)
         return found
 
-    tests = [ticked(_sheared(pressure)) for pressure in PRESSURES]
-    # As `bed test shear`: the slope, since the weight between lid and shear band, the same in all, feigns a cohesion.
-    normal = np.array(PRESSURES)
-    mu = float(np.polyfit(normal, normal * [float(test["critical"]) for test in tests], 1)[0])
-    density = float(tests[0]["density"])
+    samples = [ticked(_sheared(seed)) for seed in SAMPLES]
+    told = {key: np.array([float(one[key]) for one in samples]) for key in ("over_mean", "over_normal", "packing")}
+    mu, density = float(told["over_mean"].mean()), float(told["packing"].mean()) * BEADS.density
     gradient = stress_gradient(bulk_density=density, friction=mu, gravity=GRAVITY)
-    slopes, shares, curves = [], [], []
+    height = (CONE_DEPTHS[1] + 2) * GRAIN
+    shape = Cone(0.0, height, 0.0, height * math.tan(HALF_ANGLE))
+    cones = [ticked(_driven("cone", shape, place, CONE_DEPTHS[1] + 0.5)) for place in PLACES]
+    pushes, means, curves = [], [], []
     for across in PLATES:
-        radius = 0.5 * across * GRAIN
+        diameter = across * GRAIN
         runs = [
-            ticked(_driven(f"plate {across:g}", Cylinder(0.0, GRAIN, radius), place, PLATE_DEPTHS[1] + 0.5))
+            ticked(_driven(f"plate {across:g}", Cylinder(0.0, GRAIN, 0.5 * diameter), place, PLATE_DEPTHS[1] + 0.5))
             for place in PLACES
         ]
         pieces = [_between(run, PLATE_DEPTHS) for run in runs]
-        law = flat_plate() * gradient * math.pi * radius**2
-        shares.append(float(np.mean([force.mean() / (law * depth.mean()) for depth, force in pieces])))
-        slopes.append(float(np.mean([np.polyfit(*piece, 1)[0] for piece in pieces])))
+        pushes += [(diameter, *piece) for piece in pieces]
+        law = flat_plate() * gradient * 0.25 * math.pi * diameter**2
+        means.append([float(force.mean() / (law * depth.mean())) for depth, force in pieces])
         grid = np.linspace(0.0, PLATE_DEPTHS[1] * GRAIN, 50)
         mean = np.mean([np.interp(grid, run["depth"], run["force"]) for run in runs], axis=0)
         curves += [Curve(f"3D-RFT, {across:g} d", 1e3 * grid, law * grid, False),
                    Curve(f"plate of {across:g} d", 1e3 * grid, mean)]  # fmt: skip
-    found, margin = plate_law([across * GRAIN for across in PLATES], slopes)
-    height = (CONE_DEPTHS[1] + 2) * GRAIN
-    shape = Cone(0.0, height, 0.0, height * math.tan(HALF_ANGLE))
-    cones = [ticked(_driven("cone", shape, place, CONE_DEPTHS[1] + 0.5)) for place in PLACES]
+    found, margin, share = plate_law(pushes)
+    left_out = [plate_law([*pushes[:k], *pushes[k + 1 :]])[0] for k in range(len(pushes))]
+    error = math.sqrt((len(left_out) - 1) * float(np.var(left_out)))
     roots = [np.polyfit(z, np.cbrt(np.maximum(f, 0.0)), 1)[0] for z, f in (_between(run, CONE_DEPTHS) for run in cones)]
     cone = float(np.mean(roots)) ** 3
     wanted_cone = gradient * cone_coefficient(HALF_ANGLE, surface_friction=BEADS.friction)
@@ -125,25 +151,51 @@ def _compute(tell: Callable[[float], None]) -> Outcome:
         Comparison("F / z^3 of the cone", "MPa/m", 1e-6 * wanted_cone, 1e-6 * cone, BAND),
     ]
     steep = (3 * 894 * mu**2 - 2 * 386 * mu + 89) / (894 * mu**3 - 386 * mu**2 + 89 * mu)
-    ratios = {key: ", ".join(f"{float(test[key]):.3f}" for test in tests) for key in ("critical", "peak")}
-    presses = ", ".join(f"{pressure:g}" for pressure in PRESSURES)
-    as_is = ", ".join(
-        f"{slope / (0.25 * math.pi * (across * GRAIN) ** 2) / (flat_plate() * gradient):.2f} at {across:g} d"
-        for across, slope in zip(PLATES, slopes, strict=True)
+    shares = "; ".join(
+        f"{' and '.join(f'{one:.2f}' for one in each)} at {across:g} d"
+        for across, each in zip(PLATES, means, strict=True)
     )
-    means = ", ".join(f"{share:.2f} at {across:g} d" for across, share in zip(PLATES, shares, strict=True))
+    stagnant = math.tan(math.radians(45) + 0.5 * math.asin(min(1.0, mu))) / 6
     remark = (
-        f"Critical friction of the bed {mu:.3f}, the slope of shear over normal stress (ratios {ratios['critical']} at "
-        f"{presses} times its weight; peaks {ratios['peak']}), bulk density {density:.0f} kg/m3; 0.01 more of it are "
-        f"{steep:.0f} % more of xi_n. Over the plate's own area, over 3D-RFT: dF/dz {as_is}; mean force over the same "
-        f"depths {means}. Plates and cone (half-angle {math.degrees(HALF_ANGLE):g} degrees) at {SPEED:g} m/s, each at "
-        f"two places of one bed of grains of {1e3 * GRAIN:.2f} mm, {SIZE[0] / GRAIN:.1f} of them wide and "
-        f"{SIZE[2] / GRAIN:.1f} deep; plates fitted over {PLATE_DEPTHS[0]:g} to {PLATE_DEPTHS[1]:g} d of depth, the "
-        f"cone over {CONE_DEPTHS[0]:g} to {CONE_DEPTHS[1]:g} d."
+        f"Critical friction of the grains, shear over mean stress, {mu:.3f} ({_each(told['over_mean'])}; over the "
+        f"stress on the plane of shear {told['over_normal'].mean():.3f}), at a density of {density:.0f} kg/m3; 0.01 "
+        f"more of it are {steep:.0f} % more of xi_n. Mean force of the plates on their own area over 3D-RFT's, at "
+        f"each of two places: {shares}; fitted gradient {1e-6 * found:.3f} +- {1e-6 * error:.3f} MPa/m (one push left "
+        f"out after the other). The plates bear as if deeper by {share:.2f} of their diameter; a cone at rest under "
+        f"them, of 45 + phi / 2 degrees, has {stagnant:.2f} of volume over area. Plates and cone "
+        f"(half-angle {math.degrees(HALF_ANGLE):g} degrees) at {SPEED:g} m/s, in one bed of grains of "
+        f"{1e3 * GRAIN:.2f} mm, {SIZE[0] / GRAIN:.0f} of them wide and {SIZE[2] / GRAIN:.0f} deep; plates fitted over "
+        f"{PLATE_DEPTHS[0]:g} to {PLATE_DEPTHS[1]:g} d of depth, the cone over {CONE_DEPTHS[0]:g} to "
+        f"{CONE_DEPTHS[1]:g} d; F / z^3 of the cone at the two places {_each(1e-6 * np.array(roots) ** 3)} MPa/m."
     )
-    return Outcome(rows, [Plot("Plates going down", "depth [mm]", "force [N]", curves)], [remark])
+    whole_ball, radius = find_law("rft"), 0.5 * BALL
+    beads = {"radius": radius, "bulk_density": 1520.0, "friction": math.tan(math.radians(24)), "gravity": GRAVITY}
+    asked = whole_ball.force(radius, 0.0, whole_ball.numbers(beads))
+    beside = (
+        f"Of one and the same beads (1520 kg/m3, mu = tan 24 degrees) 3D-RFT asks for {asked:.2f} N under a ball of "
+        f"{1e3 * BALL:g} mm sunk by its radius, and Katsuragi & Durian 2007 measured k z = "
+        f"{K_OVER_M * MASS * radius:.2f} N."
+    )
+    return Outcome(rows, [Plot("Plates going down", "depth [mm]", "force [N]", curves)], [remark, beside])
 
 
+def _each(values: np.ndarray) -> str:
+    return ", ".join(f"{value:.3g}" for value in values)
+
+
+WHY = (
+    "the law's one number, xi_n by its cubic in mu, is too large for such grains, and not for ours alone: of "
+    "Katsuragi & Durian's beads, whose mu is near to these', it asks for 2.8 times the static force that they "
+    "measured (below), and their k is met here within 16 % (case katsuragi-durian). Plates have, on their own area, "
+    "0.8 to 1.0 (5 d), 0.4 to 0.7 (7 d) and 0.5 to 0.75 (9 d) of 3D-RFT's slope. Three sizes hardly tell margin "
+    "and gradient apart: with the margin held at 0.5 d the gradient is 0.37 MPa/m, 0.63 of the law's. In the mean "
+    "force plates seem to agree, 0.87 to 1.01, since a cone of grains at rest under them makes them bear as if 0.2 "
+    "to 0.3 of their diameter deeper, as is published (Kang et al. 2018); 3D-RFT has no such start, and until "
+    "2026-11-22 it was taken for a margin here. The cone bears half of the law where it is deepest, 9 d across, and "
+    "a quarter by how its cube root grows. It is not the bed: this one has 2.6 times the grains of the one before, "
+    "under plates of up to 9 d for 7 d, and 11 d below them. Nor is it which mu is meant: on the plane of shear, "
+    "0.432, xi_n is 0.84 of this, and 0.63 of it takes 0.39, less than any of six samples has"
+)
 CASES = [
     Case(
         "rft",
@@ -153,10 +205,7 @@ CASES = [
         "Agarwal et al. 2023, PNAS 120, e2214017120 (arXiv 2205.14920); the bands are ours",
         _compute,
         slow=True,
-        seconds=300,
-        reason="the plates' force does not begin at zero where they touch, so that over these few grains of depth its "
-        "mean lies 18 to 51 % above 3D-RFT's, what a margin of 0.6 to 0.8 grains makes, and its slope, held to the law "
-        "here, falls short and scatters; the cone is 8 grains across where it is deepest and 3 where the fit begins. "
-        "Bodies of more grains, driven deeper, are to tell whether more is behind it",
+        seconds=700,
+        reason=WHY,
     )
 ]

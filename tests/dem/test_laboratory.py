@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -195,3 +196,22 @@ def test_a_report_of_a_bed_can_be_had_at_any_time(bed):
     report = measure_stage(bed, "now", grain=GRAIN)
     assert report.stage == "now" and report.grain_count == bed.grain_count and report.notes == {}
     assert isinstance(bed, Bed)
+
+
+def test_taps_leave_grains_that_stick_as_they_were_densest(tmp_path, monkeypatch):
+    """Full taps throw such a bed up, and lumps come down; then softer ones go on from the best. Stopped in between."""
+    monkeypatch.setattr("dem.stages._TELLING_TAPS", 2)
+    stuff = replace(SAND, cohesion="dmt", surface_energy=0.6)
+    made = {"stages": ["rain", "compact:densest"], "size": (0.024, 0.024, 0.016), "grain": GRAIN, "threads": 1}
+    whole = prepare_as(stuff, **made)
+    rain, tapped = whole.reports
+    trace = tapped.notes["trace"]
+    assert (np.diff(trace) < 0).any() and tapped.packing_fraction == max(trace) > rain.packing_fraction == trace[0]
+    rounds = len(trace) - 1 - tapped.notes["taps"]  # where a softer one began from the densest
+    assert rounds == 3
+    with pytest.raises(KeyboardInterrupt):
+        prepare_as(stuff, **made, keep=tmp_path / "kept.npz", progress=Interrupted("compact:densest", 4))
+    assert (tmp_path / "kept.densest.npz").exists()
+    again = prepare_as(stuff, **made, keep=tmp_path / "kept.npz")
+    assert again.reports[1].notes["trace"] == trace
+    assert again.bed.state()["position"].tobytes() == whole.bed.state()["position"].tobytes()

@@ -6,7 +6,7 @@ import pytest
 
 from dem import Material
 from dem.timestep import choose_young
-from experiments.softening import bearing_gradient, chain, drop_depth, soften
+from experiments.softening import bearing_gradient, chain, drop_depth, soften, soften_material
 
 SAND = {"grain": 0.0024, "density": 2650.0, "poisson": 0.25, "friction": 0.5, "real_young": 7e10, "gravity": 9.81,
         "bed_height": 0.05, "depth": 0.02, "speed": 0.1}  # fmt: skip
@@ -39,6 +39,15 @@ def test_grains_that_stick_are_as_stiff_as_their_pull_asks_for():
     assert 2 / 3 * star * 0.0024**2 * 0.05**1.5 == pytest.approx(4 * math.pi * 0.5 * 0.0012)
     sticky = Material("sticky", 2650, 7e10, 0.25, 0.5, 0.5, 0.1, "dmt", 0.5)
     assert young == pytest.approx(choose_young(sticky, pressure=0.0, speed=0.0, max_overlap=0.05, diameter=0.0024))
+
+
+def test_the_smallest_of_wide_sizes_keep_the_bound():
+    """Within 1 +- 0.15 nothing changes; within 1 +- 0.5 the mean grain is held to 0.5 / 0.85 of the bound."""
+    stuff = Material("stuff", 2650, 7e10, 0.25, 0.5, 0.5)
+    case = {key: SAND[key] for key in ("grain", "gravity", "bed_height", "depth", "speed")} | {"young": None}
+    narrow, usual, wide = (soften_material(stuff, max_overlap=0.05, spread=s, **case).young for s in (0.05, 0.15, 0.5))
+    assert narrow == usual == soften(max_overlap=0.05, **SAND).young
+    assert wide == soften(max_overlap=0.05 * 0.5 / 0.85, **SAND).young > 2 * usual
 
 
 def test_fast_spikes_need_stiffer_grains_and_real_grains_are_the_bound():

@@ -37,14 +37,15 @@ def test_the_law_of_katsuragi_and_durian_is_read_off_its_own_trajectories():
 
 
 def test_a_cone_bears_the_sum_of_its_rings_and_plates_give_back_their_margin():
-    """F = xi_n alpha int_0^z 2 pi h tan b (z - h) dh / cos b; dF/dz = gradient pi / 4 (D + margin)^2."""
+    """F = xi_n alpha int_0^z 2 pi h tan b (z - h) dh / cos b; F = gradient (z + share D) pi / 4 (D + margin)^2."""
     half = math.radians(30)
     alpha = tractions([[math.cos(half), 0, -math.sin(half)]], (0, 0, -1), surface_friction=0.5)[0, 2]
     h = (np.arange(4000) + 0.5) / 4000
     rings = alpha * (2 * math.pi * h * math.tan(half) / math.cos(half) * (1 - h)).mean()
     assert cone_coefficient(half, surface_friction=0.5) == pytest.approx(rings, rel=1e-6)
-    diameters = np.array([0.015, 0.02, 0.03])
-    assert plate_law(diameters, 4e5 * math.pi / 4 * (diameters + 0.002) ** 2) == pytest.approx((4e5, 0.002))
+    depth = np.linspace(0.01, 0.03, 50)
+    pushes = [(d, depth, 4e5 * (depth + 0.25 * d) * math.pi / 4 * (d + 0.002) ** 2) for d in (0.015, 0.02, 0.03)]
+    assert plate_law(pushes) == pytest.approx((4e5, 0.002, 0.25))
 
 
 def test_curves_of_one_law_at_several_gravities_collapse():
