@@ -71,6 +71,10 @@ for _name in ("constant", "by a power of depth", "falling with speed", "mobilise
     PENETRATION[f"shaft-friction:{_name}, setting in"] = _times(
         f"shaft-friction:{_name}", "shaft_onset", "shaft_sharpness"
     )
+for _name in ("constant", "growing with depth", "by a power of depth"):
+    PENETRATION[f"shaft-friction:{_name}, rising with speed"] = (
+        PENETRATION[f"shaft-friction:{_name}"] + " * tanh(abs(v) / shaft_rise)"
+    )
 for _name in ("held", "held by depth", "held wherever it has been"):
     PENETRATION[f"adhesion:{_name}, fading towards the surface"] = _times(
         f"adhesion:{_name}", "pull_fade", "pull_fade_sharpness"

@@ -134,6 +134,9 @@ _SHAPES = (
     _Shape("shaft-friction", ("constant", "by a power of depth", "falling with speed", "mobilised over a way"),
            "{}, setting in", (("shaft_onset", "depth", -3.0, 1.5, -6.0, 0.0),
                               ("shaft_sharpness", "plain", 2.5, 2.0, 0.7, 8.0)), ((-3.0, 3.0), (-1.3, 3.0))),
+    # What shears between the shaft and the bed resists the more the faster, up to a bound.
+    _Shape("shaft-friction", ("constant", "growing with depth", "by a power of depth"), "{}, rising with speed",
+           (("shaft_rise", "speed", -3.0, 1.5, -8.0, 0.0),), ((-2.5,), (-4.0,))),
     # What is held loses its hold as the spike comes out.
     _Shape("adhesion", ("held", "held by depth", "held wherever it has been"), "{}, fading towards the surface",
            (("pull_fade", "depth", -2.0, 1.5, -6.0, 1.0), ("pull_fade_sharpness", "plain", 2.5, 2.0, 0.7, 8.0)),

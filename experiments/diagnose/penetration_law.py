@@ -41,7 +41,7 @@ SLOTS = (
     "crater_share", "crater_bend", "crater_open", "unload_stiffness",
     "drag", "drag_onset", "drag_reach", "drag_deep", "drag_both", "drag_tip",
     "shaft", "shaft_deep", "shaft_power", "shaft_viscous", "shaft_slow", "shaft_speed",
-    "shaft_held", "shaft_reach", "shaft_growth", "shaft_onset", "shaft_sharpness",
+    "shaft_held", "shaft_reach", "shaft_growth", "shaft_onset", "shaft_sharpness", "shaft_rise",
     "pull", "pull_reach", "pull_deep", "pull_growth", "pull_ever", "pull_short", "pull_viscous",
     "pull_sharpness", "pull_fade", "pull_fade_sharpness", "pull_out", "shift_depth", "shift_speed",
 )  # fmt: skip
@@ -181,7 +181,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
         S["shaft"], S["shaft_deep"], S["shaft_power"], S["shaft_viscous"], S["shaft_slow"], S["shaft_speed"],
     )  # fmt: skip
     SHAFT_HELD, SHAFT_REACH, SHAFT_GROWTH = S["shaft_held"], S["shaft_reach"], S["shaft_growth"]
-    SHAFT_ONSET, SHAFT_SHARPNESS = S["shaft_onset"], S["shaft_sharpness"]
+    SHAFT_ONSET, SHAFT_SHARPNESS, SHAFT_RISE = S["shaft_onset"], S["shaft_sharpness"], S["shaft_rise"]
     PULL, PULL_REACH, PULL_DEEP, PULL_SHORT, PULL_VISCOUS = (
         S["pull"], S["pull_reach"], S["pull_deep"], S["pull_short"], S["pull_viscous"],
     )  # fmt: skip
@@ -279,6 +279,8 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
                 rub += bound * taken(z, way, turn_z, turn_w, n, k)
             if n[k, SHAFT_ONSET] > 0.0:
                 rub *= mobilised(z / n[k, SHAFT_ONSET], n[k, SHAFT_SHARPNESS])
+            if n[k, SHAFT_RISE] > 0.0:
+                rub *= ti.tanh(ti.abs(v) / n[k, SHAFT_RISE]) / ti.max(ti.abs(way), 1e-9)  # in place of the direction
             total += rub + n[k, SHAFT_VISCOUS] * v
             pull = 0.0
             if back > 0.0:

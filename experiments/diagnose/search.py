@@ -242,9 +242,25 @@ class Search:
             begun += [fit(model, values, rounds=3) for values in found_anew]
         return fit(model, min(begun, key=lambda one: one.objective).values)
 
+    def _siblings(self, hypothesis: Hypothesis) -> list[Hypothesis]:
+        """Other forms of a single name, alone: bent, one that was behind may come nearer than the one that leads."""
+        problem = hypothesis.fit.model.problem
+        if len(hypothesis.forms) != 1 or hasattr(problem, "guess"):
+            return []
+        shapes = getattr(problem, "shapes", {})
+        found: dict[str, Hypothesis] = {}
+        for _, tried in self.table:
+            if len(tried.forms) != 1 or tried.effects != hypothesis.effects or tried.forms == hypothesis.forms:
+                continue
+            known = found.get(tried.forms[0].id)
+            near = tried.score > hypothesis.score - _BEHIND and (known is None or tried.score > known.score)
+            if near and tried.forms[0].id in shapes:
+                found[tried.forms[0].id] = tried
+        return list(found.values())
+
     def _enriched(self, hypothesis: Hypothesis) -> Hypothesis:
         """Of another shape or with a second form of an effect, where that helps: nature's is between the library's."""
-        best = self._bent(hypothesis)
+        best = max([self._bent(one) for one in (hypothesis, *self._siblings(hypothesis))], key=lambda h: h.score)
         for _ in range(2):
             start = best
             if excess(start.fit) < 0.5 * np.sqrt(2.0 * start.fit.count):

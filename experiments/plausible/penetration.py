@@ -110,7 +110,8 @@ def _driven(
                 "its noise: its zero, or the spike's weight, is to be taken off",
             )
     if trial.speed:
-        moving = into & (depth > 0.05 * depth[last]) & (depth < 0.95 * depth[last])
+        # Until it is first so deep: rows of a hold that the noise lifts are none of the way in.
+        moving = into & (depth > 0.05 * depth[last]) & (np.fmax.accumulate(depth) < 0.95 * depth[last])
         if moving.sum() >= 8 and np.ptp(time[moving]) > 0:
             speed = float(np.polyfit(time[moving], depth[moving], 1)[0])
             if not 0.5 < speed / trial.speed < 2.0:

@@ -51,7 +51,7 @@ def told(form_id: str, numbers: dict[str, float], z: float, v: float, deepest: f
     first, *clauses = re.split(r", (?![^(]*\))", text)  # not within parentheses
     names = numbers | {
         "K": K, "D": D, "H": H, "z": z, "v": v, "z_m": deepest, "r": deepest - z, "exp": math.exp, "min": min,
-        "max": max, "abs": abs, "sign": np.sign,
+        "max": max, "abs": abs, "sign": np.sign, "tanh": math.tanh,
     }  # fmt: skip
     if form_id.startswith("shaft-friction:mobilised over a way"):  # dw = (sign(dz) - w) |dz| / reach, solved
         reach = numbers["shaft_reach"]
