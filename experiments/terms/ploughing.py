@@ -25,7 +25,7 @@ TERM = Term(
     parameters=(
         Parameter(name="strength", unit="N/m2", default=0.0, lowest=0.0, summary="k, of a row"),
         Parameter(
-            name="speed", unit="m/s", default=0.01, lowest=0.0, above_lowest=True,
+            name="speed", unit="m/s", default=0.01, lowest=1e-3,
             summary="w: slower than this it resists less",
         ),
     ),
