@@ -311,10 +311,11 @@ class Engine(Lists, Shapes, Sleepers, Bookkeeping):
         """From here on kernels know of sleep; all are awake still."""
         if self._kept_rest is None:
             self._kept_rest = Rest(
-                grains=self.id.shape[0], chunks=self.overlap.shape[0], rows=self.pair.shape[0], real=self.real
-            )
+                grains=self.id.shape[0], cells=self.rank.shape[0], chunks=self.overlap.shape[0],
+                rows=self.pair.shape[0], real=self.real,
+            )  # fmt: skip
         self.rest = rest = self._kept_rest
-        for field in (rest.asleep, rest.was, rest.woken, rest.leaves, rest.quiet, rest.mark, rest.start, rest.end):
+        for field in (rest.asleep, rest.was, rest.woken, rest.leaves, rest.quiet, rest.start, rest.end):
             field.fill(0)
         for field in (rest.side, rest.mass, rest.news, rest.held):
             field.fill(0)

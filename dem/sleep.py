@@ -2,16 +2,13 @@
 
 The rules, in numbers of ``Sleep``; d is the mean diameter, m the mean mass, g gravity, all of the bed:
 
-* A grain falls asleep when it went less far than ``speed`` sqrt(g d) times the time between any two of the four looks
-  over ``calm`` sqrt(d / g), its surface turned at less than ``turning`` sqrt(g d) at each, all awake that it touches
-  have been as calm at the last look, and no body but the floor is within ``reach`` d. Way and not speed: grains beside
-  a flow tremble where they are.
+* A grain falls asleep when its speed and its surface's turning have been below ``speed`` sqrt(g d) at every look for
+  ``calm`` sqrt(d / g), no grain that it touches moves faster, and no body but the floor is within ``reach`` d.
 * Asleep it stands still, an unmovable grain to those awake, and its contacts with other sleepers keep their springs.
 * It wakes when a body comes within ``reach`` d; when the spring force of a contact with a grain awake has changed by
   ``force`` m g, and by ``share`` of what it was, since the two last were alike, be it that the contact opens or closes;
-  when a grain awake that is faster than ``waking_speed`` sqrt(g d) touches it, or would by the next look. For the last
-  two the sleepers that it touches wake with it (``shells`` times over). Looked at every ``every`` steps, and when lists
-  are made.
+  when a grain awake that is listed with it moves faster than ``waking_speed`` sqrt(g d). For the last two all sleepers
+  in its cell of the grid and the 26 around it wake with it. Looked at every ``every`` steps, and when lists are made.
 
 Whether a packing that bears F yields under a change of F goes by their ratio, for friction has no force of its own;
 hence ``share``. ``force`` is for contacts that carry next to nothing.
@@ -47,9 +44,9 @@ _LOOKS_OF_CALM = 4
 class Sleep:
     """When grains sleep and wake; see the module for what the numbers are shares of."""
 
-    speed: float = 1e-2
-    """A grain whose way over a while is less than this speed would take it may fall asleep [sqrt(g d)]."""
-    calm: float = 0.5
+    speed: float = 5e-3
+    """A grain slower than this may fall asleep [sqrt(g d)]."""
+    calm: float = 1.0
     """For how long it must be [sqrt(d / g)]."""
     reach: float = 3.0
     """No grain this near to a body sleeps [d]."""
@@ -59,30 +56,16 @@ class Sleep:
     """the least of it over the force itself [1]; both must be reached."""
     waking_speed: float = 5e-2
     """Speed of a neighbour that wakes [sqrt(g d)]."""
-    turning: float = 2e-2
-    """Speed of its surface, by its spin, below which a grain may fall asleep [sqrt(g d)]."""
-    shells: int = 1
-    """How far from a sleeper that is woken by these others wake with it: in contacts [1]."""
     every: int = 50
     """Steps between two looks: what wakes makes new lists, and those cost as much as four steps of all grains."""
-
-    @classmethod
-    def of_numbers(cls, numbers: np.ndarray) -> "Sleep":
-        """From what ``astuple`` gave, as an array keeps it."""
-        whole = ("shells", "every")
-        given: dict[str, Any] = {field.name: float(n) for field, n in zip(fields(cls), numbers, strict=True)}
-        return cls(**given | {name: int(given[name]) for name in whole})
 
     def __post_init__(self):
         for field in fields(self):
             value = getattr(self, field.name)
-            none_will_do = field.name == "shells" and value == 0
-            if not (math.isfinite(value) and (value > 0 or none_will_do)):
-                least = "at least" if field.name == "shells" else "above"
-                raise ValueError(f"Sleep: {field.name} = {value} must be {least} 0")
-        for name in ("shells", "every"):
-            if int(getattr(self, name)) != getattr(self, name):
-                raise ValueError(f"Sleep: {name} = {getattr(self, name)} must be a whole number")
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"Sleep: {field.name} = {value} must be above 0")
+        if int(self.every) != self.every:
+            raise ValueError(f"Sleep: every = {self.every} must be a whole number of steps")
         if self.waking_speed <= self.speed:
             raise ValueError(
                 f"Sleep: waking_speed = {self.waking_speed} must be above speed = {self.speed}, or no neighbour of one "
@@ -100,12 +83,10 @@ class Sleeper:
         # The same to the bit in whatever order the grains lie.
         weight = g * math.fsum(bed._engine.read("velocity")[:, 3]) / bed.grain_count
         self.limit = rules.force * weight
-        self.fast, self.turning = (share * math.sqrt(g * d) for share in (rules.waking_speed, rules.turning))
+        self.fast, self.slow = (share * math.sqrt(g * d) for share in (rules.waking_speed, rules.speed))
         self.reach = rules.reach * d
         looks = rules.calm * math.sqrt(d / g) / bed.time_step / rules.every / _LOOKS_OF_CALM
         self.rest_every = max(1, round(looks)) * rules.every
-        self.way = rules.speed * math.sqrt(g * d) * self.rest_every * bed.time_step
-        self.ahead = rules.every * bed.time_step
         self.awake = bed.grain_count
         self.mass = 0.0
         self.slept = 0.0
@@ -122,10 +103,10 @@ class Sleeper:
         if steps % self.rules.every:
             return False
         if self.awake < self.bed.grain_count:
-            e.look(self.limit, self.rules.share, self.fast, self.ahead, rest)
+            e.look(self.limit, self.rules.share, self.fast, rest)
         self.leaving = False
         if steps % self.rest_every == 0:
-            e.look_for_rest(self.way, self.turning, _LOOKS_OF_CALM, self.reach, rest, e.shapes)
+            e.look_for_rest(self.slow, _LOOKS_OF_CALM, self.reach, rest, e.shapes)
         news = rest.news.to_numpy()
         self.leaving = steps % self.rest_every == 0 and int(news[LEAVING]) > _WORTH * self.awake
         return bool(news[WOKEN]) or self.leaving
@@ -136,9 +117,7 @@ class Sleeper:
         if all_awake:
             rest.woken.fill(1)
         elif self.awake < self.bed.grain_count:
-            e.look(self.limit, self.rules.share, self.fast, self.ahead, rest)
-            for _ in range(self.rules.shells):
-                e.wake_beside(rest)
+            e.look(self.limit, self.rules.share, self.fast, rest)
         e.stir(self.bed.time_step, self.reach, int(self.leaving), rest, e.shapes, e.ledger)
         rest.news.fill(0)
         if self.leaving:
@@ -205,7 +184,6 @@ class Sleeper:
             "rules": np.array(astuple(self.rules), dtype=float),
             "asleep": rest.asleep.to_numpy()[:n],
             "quiet": rest.quiet.to_numpy()[:n],
-            "mark": rest.mark.to_numpy()[:n],
             "force": rest.force.to_numpy()[rows],
             "held": rest.held.to_numpy()[: e.chunk_count],
             "numbers": np.array([self.awake, int(e.count[CHUNKS]), self.bed.grain_steps]),
@@ -223,7 +201,7 @@ class Sleeper:
             array[where] = values
             field.from_numpy(array)
 
-        for name in ("asleep", "quiet", "mark"):
+        for name in ("asleep", "quiet"):
             put(getattr(rest, name), state[f"sleep_{name}"], slice(n))
         put(rest.force, state["sleep_force"], rows)
         put(rest.held, state["sleep_held"], slice(e.chunk_count))

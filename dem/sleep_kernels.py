@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import taichi as ti
 
-from .lists import ALL_CHUNKS, AWAKE, BUILT, CHUNKS, GRAINS, INDEX_MASK, PERIOD_X, PERIOD_Y, QUEUE
+from .lists import ALL_CHUNKS, AWAKE, BUILT, CELLS, CHUNKS, GRAINS, INDEX_MASK, NX, NY, NZ, QUEUE
 
 __all__ = ["EVERYONE", "FULL", "LEAVING", "Rest", "Sleepers", "WOKEN"]
 
@@ -35,16 +35,15 @@ class Rest:
     on = True
     sets = 2
 
-    def __init__(self, *, grains: int, chunks: int, rows: int, real):
+    def __init__(self, *, grains: int, cells: int, chunks: int, rows: int, real):
         F = ti.Vector.field
         self.asleep = ti.field(ti.i32, grains)
         self.was = ti.field(ti.i32, grains)  # before the lists were last made
         self.woken = ti.field(ti.i32, grains)
-        self.beside = ti.field(ti.i32, grains)  # woken, and those that they touch
         self.leaves = ti.field(ti.i32, grains)
-        self.quiet = ti.field(ti.i32, grains)  # looks in a row since which it has hardly moved
-        self.mark = F(3, real, grains)  # where it was at the last of these looks [m]
+        self.quiet = ti.field(ti.i32, grains)  # looks in a row at which it was slow
         self.busy = ti.field(ti.i32, grains)
+        self.flagged = ti.field(ti.i32, cells)
         # Of a row of the pair lists whose neighbour sleeps: the spring force that it had when the two were last alike.
         self.force = F(3, real, rows)
         self.old_force = F(3, real, rows)
@@ -106,26 +105,25 @@ class Sleepers:
         return found
 
     @ti.kernel
-    def look(self, limit: float, share: float, fast: float, ahead: float, rest: ti.template()):
+    def look(self, limit: float, share: float, fast: float, rest: ti.template()):
         """Raise the flags of sleepers that are to wake: a contact's force changed by ``limit`` [N] and this share of
-        it, a neighbour that is ``fast`` [m/s] and there within the time ``ahead`` [s]."""
+        it, a ``fast`` [m/s] neighbour."""
         for _ in range(1):
             self.ticket[QUEUE] = 0
         for w in range(self.cpu_items):
             c = self.next_chunk(w, True)
             while c < self.count[CHUNKS]:
                 self.look_around(
-                    c, ti.cast(limit, self.real), ti.cast(share, self.real), ti.cast(fast, self.real),
-                    ti.cast(ahead, self.real), rest,
-                )  # fmt: skip
+                    c, ti.cast(limit, self.real), ti.cast(share, self.real), ti.cast(fast, self.real), rest
+                )
                 c = self.next_chunk(w, False)
 
     @ti.func
-    def look_around(self, c, limit, share, fast, ahead, rest: ti.template()):
+    def look_around(self, c, limit, share, fast, rest: ti.template()):
         start, end = self.chunk_range(c)
         awake = self.count[AWAKE]
         for i in range(start, end):
-            speed = self.velocity[i].xyz.norm()
+            quick = self.velocity[i].xyz.norm_sqr() > fast * fast
             for s in range(self.pair_start[i], self.pair_end[i]):
                 code = self.pair[s]
                 bits = ti.select(code < 0, ~code, code)
@@ -133,31 +131,21 @@ class Sleepers:
                 if j >= awake:
                     f = self.spring_force(self.position[i], self.position[j], bits, self.slide[s])
                     before = rest.force[s]
-                    wakes = (f - before).norm_sqr() > ti.max(limit * limit, share * share * before.norm_sqr())
-                    if speed > fast and not wakes:
-                        x, y = self.position[i], self.position[j]
-                        wakes = self.apart(x, y, bits).norm() < x.w + y.w + speed * ahead
-                    if wakes:
+                    least = ti.max(limit * limit, share * share * before.norm_sqr())
+                    if quick or (f - before).norm_sqr() > least:
                         rest.woken[self.id[j]] = 1
                         rest.news[WOKEN] = 1
 
     @ti.kernel
-    def look_for_rest(
-        self, way: float, turning: float, patience: int, reach: float, rest: ti.template(), shapes: ti.template()
-    ):
-        """Mark who may fall asleep, and count them: those that went less than ``way`` [m] since the last such look and
-        whose surface turns at less than ``turning`` [m/s]."""
+    def look_for_rest(self, slow: float, patience: int, reach: float, rest: ti.template(), shapes: ti.template()):
+        """Mark who may fall asleep, and count them."""
         for _ in range(1):
             rest.news[LEAVING] = 0
         for i in range(self.count[AWAKE]):
             k = self.id[i]
             r = self.position[i].w
-            went = self.position[i].xyz - rest.mark[k]
-            went.x -= self.box[PERIOD_X] * ti.round(went.x / self.box[PERIOD_X])
-            went.y -= self.box[PERIOD_Y] * ti.round(went.y / self.box[PERIOD_Y])
-            rest.mark[k] = self.position[i].xyz
-            still = went.norm_sqr() < ti.cast(way * way, self.real)
-            still = still and r * r * self.spin[i].xyz.norm_sqr() < ti.cast(turning * turning, self.real)
+            square = ti.cast(slow * slow, self.real)
+            still = self.velocity[i].xyz.norm_sqr() < square and r * r * self.spin[i].xyz.norm_sqr() < square
             rest.quiet[k] = ti.select(still, rest.quiet[k] + 1, 0)
             rest.busy[k] = 0
             rest.leaves[k] = 0
@@ -181,37 +169,24 @@ class Sleepers:
                     ti.atomic_add(rest.news[LEAVING], 1)
 
     @ti.kernel
-    def wake_beside(self, rest: ti.template()):
-        """Flag the sleepers that touch a flagged one."""
-        side = rest.side[None]
-        for k in range(self.count[GRAINS]):
-            rest.beside[k] = rest.woken[k]
-        for k in range(self.count[GRAINS]):
-            if rest.asleep[k] == 1:
-                for s in range(rest.start[side, k], rest.end[side, k]):
-                    other = rest.who[side, s]
-                    if other >= 0:
-                        if rest.asleep[other] == 1:
-                            if rest.woken[k] == 1:
-                                rest.beside[other] = 1
-                            if rest.woken[other] == 1:
-                                rest.beside[k] = 1
-        for k in range(self.count[GRAINS]):
-            rest.woken[k] = rest.beside[k]
-
-    @ti.kernel
     def stir(
         self, dt: float, reach: float, leaving: int, rest: ti.template(), shapes: ti.template(), ledger: ti.template()
     ):
-        """Wake those flagged and those that a body comes near; let those fall asleep that may.
+        """Wake those flagged, with all around them, and those that a body comes near; let those fall asleep that may.
 
         Between ``keep_lists`` and ``sort``: the lists are still those of before.
         """
+        for r in range(self.count[CELLS]):
+            rest.flagged[r] = 0
         for k in range(self.count[GRAINS]):
             rest.was[k] = rest.asleep[k]
         for i in range(self.count[AWAKE], self.count[GRAINS]):
+            if rest.woken[self.id[i]] == 1:
+                ci, cj, ck = self.cell_of(self.position[i])
+                rest.flagged[self.cell_index(ci, cj, ck)] = 1
+        for i in range(self.count[AWAKE], self.count[GRAINS]):
             k = self.id[i]
-            if rest.woken[k] == 1 or self.close_to_body(i, ti.cast(reach, self.real), shapes):
+            if self.flag_around(self.position[i], rest) or self.close_to_body(i, ti.cast(reach, self.real), shapes):
                 rest.asleep[k] = 0
                 rest.quiet[k] = 0
         for c in range(self.count[CHUNKS]):
@@ -230,6 +205,20 @@ class Sleepers:
                         self.spin[i] = ti.Vector.zero(self.real, 4)
         for k in range(self.count[GRAINS]):
             rest.woken[k] = 0
+
+    @ti.func
+    def flag_around(self, x, rest: ti.template()):
+        """Whether the cell of a place or one around it is flagged."""
+        ci, cj, ck = self.cell_of(x)
+        found = False
+        for dk, dj, di in ti.ndrange((-1, 2), (-1, 2), (-1, 2)):
+            k = ck + dk
+            if k >= 0 and k < self.count[NZ]:
+                i = (ci + di + self.count[NX]) % self.count[NX]
+                j = (cj + dj + self.count[NY]) % self.count[NY]
+                if rest.flagged[self.cell_index(i, j, k)] == 1:
+                    found = True
+        return found
 
     @ti.kernel
     def store_contacts(self, rest: ti.template()):

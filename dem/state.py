@@ -135,7 +135,7 @@ def put_back(bed: Bed, state: dict[str, np.ndarray]) -> None:
     if "sleep_rules" in state:
         e.let_sleep()
         e.count[AWAKE], e.count[CHUNKS] = int(awake), int(chunks)
-        bed._sleeper = Sleeper(bed, Sleep.of_numbers(state["sleep_rules"]))
+        bed._sleeper = Sleeper(bed, Sleep(*state["sleep_rules"][:-1], every=int(state["sleep_rules"][-1])))
         bed._sleeper.restore(state, rows)
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from coupling import BedFooting, LawFooting, SpatialRun, spatial_members
-from dem import Bed
+from dem import Bed, Sleep
 from dem.materials import Material
 from dem.materials import material as find_material
 from rigid.platform import Platform
@@ -34,7 +34,7 @@ from .spatial_trial import SpatialPlan, plan_spatial
 from .stopping import held_back
 from .surfaces import find_surface, surface_names
 from .tumble_coupled import STEP
-from .tumble_grains import MARGIN, MOST_GRAINS, RAIN, TOUCH, sleep_of
+from .tumble_grains import MARGIN, MOST_GRAINS, RAIN, TOUCH
 from .whole_runs import whole_run
 
 __all__ = ["check", "resume", "run"]
@@ -230,7 +230,7 @@ def _on_bed(settings: SpatialSettings, plan: SpatialPlan, bed: Bed, forecast: Fo
     bed.max_overlap = 0.0
     bed.mark_origin()
     if settings.sleep:
-        bed.let_sleep(sleep_of(settings))
+        bed.let_sleep(Sleep(force=settings.sleep_force, share=settings.sleep_share))
     return SpatialRun(
         plan.trial, footing, lowering_speed=_lowering_speed(settings, plan),
         **_start(settings, plan.trial.platform),

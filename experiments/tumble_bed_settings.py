@@ -55,10 +55,6 @@ class GrainsSettings(StrictSettings):
         1.0, description="Of sleep: change of a contact's force that wakes a grain, over its weight [1], and"
     )
     sleep_share: Positive = Field(0.5, description="Of sleep: the least of it over the force itself [1].")
-    sleep_speed: Positive = Field(
-        0.01, lt=0.05, description="Of sleep: a grain that creeps more slowly than this sleeps [sqrt(gravity x grain)]."
-    )
-    sleep_calm: Positive = Field(0.5, description="Of sleep: once it has for so long [sqrt(grain / gravity)].")
     frame_count: int = Field(30, ge=0, le=1000, description="On a bed: frames for ParaView; 0: none.")
     checkpoint_interval: Positive = Field(60.0, description="On a bed: time between checkpoints [s].")
     threads: int | None = Field(None, ge=1, description="On a bed: threads; all cores if not given.")

@@ -32,7 +32,7 @@ from .settings import expected_grain_count
 from .softening import Softening, soften_material
 from .stopping import held_back
 from .surfaces import find_surface, surface_names
-from .tumble_bed_settings import GrainsSettings, TumbleBedSettings
+from .tumble_bed_settings import TumbleBedSettings
 from .tumble_flight import lies_in_flight
 from .tumble_grains_frames import TumbleFrames
 from .tumble_grains_result import conclude, sinkage_start, write_trajectory
@@ -41,7 +41,7 @@ from .tumble_settings import TumbleSettings
 from .tumble_steppers import is_plain, stepper_of
 from .tumble_trial import TumblePlan, plan_tumble
 
-__all__ = ["Forecast", "check_on_grains", "sleep_of", "tumble_on_grains"]
+__all__ = ["Forecast", "check_on_grains", "tumble_on_grains"]
 
 COPIES = 2.0
 """Spikes in a row: the bed holds one of them and the sand that it has for itself."""
@@ -329,13 +329,6 @@ def _hull_radius(settings: TumbleSettings, trial: Trial) -> float:
     return HULL_SHARE * max(sides, 0.0)
 
 
-def sleep_of(settings: GrainsSettings) -> Sleep:
-    """The rules by which grains sleep."""
-    return Sleep(
-        speed=settings.sleep_speed, calm=settings.sleep_calm, force=settings.sleep_force, share=settings.sleep_share
-    )
-
-
 def _stepper(settings: TumbleSettings, plan: TumblePlan, bed: Bed, forecast: Forecast) -> CoupledTumble:
     """The run, the footprints expected put in the middle of the bed."""
     footing = BedFooting(
@@ -346,7 +339,7 @@ def _stepper(settings: TumbleSettings, plan: TumblePlan, bed: Bed, forecast: For
     bed.max_overlap = 0.0
     bed.mark_origin()
     if settings.sleep:
-        bed.let_sleep(sleep_of(settings))
+        bed.let_sleep(Sleep(force=settings.sleep_force, share=settings.sleep_share))
     lowered = {"lower_gravity": True} if settings.settle_gravity is not None else {}
     return stepper_of(
         settings, plan.trial, footing, **lowered, duration=settings.duration, substeps=settings.substeps,
