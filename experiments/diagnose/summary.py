@@ -15,7 +15,7 @@ from .telling import shares_words, size_sentences, small_names, sure_sentences
 __all__ = ["scatter_sentence", "summary_sentences", "title_words"]
 
 _WORTH_SAYING = 0.5
-"""Share of what is beyond the noise that a candidate must close to be called the likeliest where its evidence does not lead."""
+"""Share of what is beyond the noise that a candidate without the best evidence must close to be called likeliest."""
 _AS_LIKELY = 1.0
 """Nats within which another name is said beside the likeliest."""
 _NAMES = 3
