@@ -154,7 +154,7 @@ class Told:
         effects = choice.best.effects if choice is not None else ()
         before = gap_of(problem, base.model, base_values, fitted, held_out)
         after = before if verdict == "none" else gap_of(problem, best.model, best_values, fitted, held_out)
-        if not effects and _worse(before, after):  # what only the noise is taken for otherwise is no other model
+        if not effects:  # what only the noise is taken for otherwise is no other model
             best_values, after = base_values, before
         if verdict == "unknown" and choice is not None and effects and _worse(before, after):
             # A likelihood that knows more of the noise may prefer it; as a model of the motion it is none.

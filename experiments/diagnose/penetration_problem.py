@@ -503,6 +503,7 @@ class PenetrationProblem:
             for name, measured, rows, column in (
                 ("depth", this.depth, this.has_depth, 0), ("accel", this.other, this.has_other, 2),
             )
+            if rows.any()  # a sensor that this trial lacks is none of its channels
         }  # fmt: skip
 
     # What is written --------------------------------------------------------------------------------------------------

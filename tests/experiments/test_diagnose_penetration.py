@@ -14,6 +14,7 @@ from experiments.diagnose.localise import depends_on
 from experiments.diagnose.penetration_depth import smooth_depth
 from experiments.diagnose.penetration_law import SLOTS, fall, push, slot_table
 from experiments.diagnose.penetration_problem import make_problem
+from experiments.diagnose.scatter_gap import weighed_residuals
 
 SLOT = {name: place for place, name in enumerate(SLOTS)}
 
@@ -375,3 +376,18 @@ def test_a_fitted_model_file_reads_back_with_its_effects(tmp_path):
     model = read_model(tmp_path / "model.toml")
     assert model.surface.stiffness == 800.0
     assert [(effect.id, effect.parameters["hardening_power"]) for effect in model.effect] == [("depth-hardening", 0.2)]
+
+
+def test_drops_of_which_only_the_depth_was_read_have_one_channel_in_what_is_told_of_them():
+    def knocked(z, v):
+        return base(z, v) + (6.0 if 0.004 < z < 0.006 and v > 0 else 0.0)
+
+    trials = []
+    for k, speed in enumerate((0.2, 0.2, 0.3, 0.3, 0.4, 0.4)):
+        rows = drop_trial(knocked, speed=speed, seed=k)
+        lost = {"accel_m_s2": np.full(151, np.nan)}
+        trials.append((f"{k}", "drop", speed, Recording({name: rows[name] for name in ("t_s", "depth_m")} | lost)))
+    problem = make_problem(campaign_of(trials))
+    assert set(problem.compare({}, (), "0")) == {"depth"} == set(problem.samples("0").channel.tolist())
+    told = weighed_residuals(problem, {"bed": 0.02}, {}, (), ("0", "1"))
+    assert [len(told[trial]) for trial in ("0", "1")] == [151, 151]
