@@ -50,8 +50,7 @@ class Bound:
 
 def is_strained(found: Fit) -> bool:
     """Whether the model needs numbers that the campaign all but excludes, but for those that its forms redefine."""
-    redefined = {name for form in found.model.forms for name in form.redefines}
-    return any(b.strains and re.split(r"[@\[]", b.parameter)[0] not in redefined for b in bounds_met(found))
+    return any(b.strains and not _redefined(found, b.parameter) for b in bounds_met(found))
 
 
 def bends_little_away(found: Fit, base: Fit) -> bool:
@@ -59,13 +58,15 @@ def bends_little_away(found: Fit, base: Fit) -> bool:
     was stated: what is missing is then something else, which that number and the name take up between them."""
     if base.chi_square > (1 + _LITTLE) * base.count:
         return False
-    redefined = {name for form in found.model.forms for name in form.redefines}
     shared = [p for p in found.model.problem.base if p.trial is None and math.isfinite(p.std)]
     return any(
-        abs(found.values[p.name] - p.value) > _FAR_FOR_LITTLE * p.std
-        for p in shared
-        if re.split(r"[@\[]", p.name)[0] not in redefined
+        abs(found.values[p.name] - p.value) > _FAR_FOR_LITTLE * p.std for p in shared if not _redefined(found, p.name)
     )
+
+
+def _redefined(found: Fit, parameter: str) -> bool:
+    """Whether a base parameter, of whichever diameter or trial, means another thing beside the model's forms."""
+    return re.split(r"[@\[]", parameter)[0] in {name for form in found.model.forms for name in form.redefines}
 
 
 def bounds_met(found: Fit) -> tuple[Bound, ...]:

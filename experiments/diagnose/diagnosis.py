@@ -233,13 +233,7 @@ class _Course:
             scatter = scatter_apart(beside, self.held_out, zeros=zeros) if not choice.left.passed else Scatter()
             if scatter.parameters and set(scatter.model_std) != set(self.model_std):
                 self.tell("replicates are found to differ beside what is left: choosing again", 0.0)
-                before = self.base
-                self.base = coloured(rescattered(plain(before), scatter), self.colours)
-                other = self._chosen()
-                if other.left.score < choice.left.score:
-                    choice, self.model_std = other, scatter.model_std
-                else:
-                    self.base = before
+                choice = self._chosen_with(scatter, partial(_leaves_less, than=choice)) or choice
         return choice
 
     def _scattered_alone(self, choice: Choice) -> Choice:
@@ -250,15 +244,21 @@ class _Course:
             if not scatter.parameters:
                 continue
             self.tell("trials are found to differ without a rule: choosing again", 0.0)
-            before = self.base
-            self.base = coloured(rescattered(plain(before), scatter), self.colours)
-            other = self._chosen()
-            if other.left.passed:
-                self.model_std = scatter.model_std
+            if other := self._chosen_with(scatter, lambda other: other.left.passed):
                 self.findings.append(lone_finding(scatter))
                 return other
-            self.base = before
         return choice
+
+    def _chosen_with(self, scatter: Scatter, stands: Callable[[Choice], bool]) -> Choice | None:
+        """A choice anew beside `scatter`, kept where it `stands`; else None, and all is as before."""
+        before = self.base
+        self.base = coloured(rescattered(plain(before), scatter), self.colours)
+        other = self._chosen()
+        if stands(other):
+            self.model_std = scatter.model_std
+            return other
+        self.base = before
+        return None
 
     def _timed(self, choice: Choice) -> Choice:
         """Times that jitter, at the slopes of the motion as it is now known."""
@@ -393,3 +393,7 @@ class _Course:
         """The whole course once more, with other trials aside or held out."""
         usual: dict[str, Any] = {"aside": (), "looked_at": (), "patient": False, "begun": self.begun}
         return _Course(problem or self.problem, replace(self.asked, **{**usual, **changes})).run()
+
+
+def _leaves_less(choice: Choice, *, than: Choice) -> bool:
+    return choice.left.score < than.left.score

@@ -10,7 +10,7 @@ import numpy as np
 
 from .problem import Array
 
-__all__ = ["Gaps", "numeral", "unit_of"]
+__all__ = ["Gaps", "numeral", "size_words", "unit_of"]
 
 #: channel -> (unit, factor on SI)
 _UNITS: dict[str, tuple[str, float]] = {
@@ -29,6 +29,12 @@ _SIGMAS = 5.0
 def unit_of(channel: str) -> tuple[str, float]:
     """The unit in which a channel is told, and its size in SI units."""
     return _UNITS.get(channel, ("SI", 1.0))
+
+
+def size_words(kind: str, size: float) -> str:
+    """How much replicates differ by: 3.5 %, or of a channel or a zero 0.09 N."""
+    unit, factor = unit_of(kind)
+    return f"{100 * size:.2g} %" if unit == "SI" else f"{factor * size:.2g} {unit}"
 
 
 def numeral(value: float, digits: int = 3) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.stats import rankdata
 
 from .fitting import Fit
-from .gaps import unit_of
+from .gaps import size_words
 from .problem import Finding, TrialInfo
 from .replicates import Scatter, find_scatter, groups_of
 
@@ -76,10 +76,7 @@ def find_lone_scatter(found: Fit) -> tuple[Scatter, list[Finding]]:
 
 def lone_finding(scatter: Scatter) -> Finding:
     """What is said of it."""
-    sizes = []
-    for kind, std in scatter.model_std.items():
-        unit, factor = unit_of(kind)
-        sizes.append(f"{kind} by {100 * std:.2g} %" if unit == "SI" else f"{kind} by {factor * std:.2g} {unit}")
+    sizes = [f"{kind} by {size_words(kind, std)}" for kind, std in scatter.model_std.items()]
     what = (
         f"trials differ beyond the sensors ({', '.join(sizes)}, standard deviation), although none repeats another: "
         f"with that each is explained from end to end, and it goes with neither speed nor order, as what a bed has of "

@@ -12,7 +12,7 @@ from scipy import stats
 
 from .evidence import inflation, slow_count
 from .fitting import Fit, Model, fit, scanned
-from .gaps import unit_of
+from .gaps import size_words
 from .gate import low_modes
 from .problem import Finding, Parameter, Problem, TrialInfo, Values
 
@@ -219,8 +219,7 @@ def trends(scatter: Scatter, trials: Sequence[TrialInfo]) -> list[Finding]:
         if chance < _TREND:
             slope = seen / sum(float(order @ order) for order, _ in (group.T for group in apart))
             way = "grows" if seen > 0 else "falls"
-            unit, factor = unit_of(kind)
-            size = f"{100 * abs(slope):.2g} %" if unit == "SI" else f"{factor * abs(slope):.2g} {unit}"
+            size = size_words(kind, abs(slope))
             what = (
                 f"what replicates differ by is no scatter: {kind} {way} from trial to trial, in the campaign's order, "
                 f"by {size} each on the mean (by chance once in {1 / chance:.0f} times or less): "

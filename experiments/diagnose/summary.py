@@ -9,7 +9,7 @@ from typing import Any
 from .candidates import unnamed_sentence
 from .effect_words import meaning
 from .evidence import SMALL
-from .gaps import numeral, unit_of
+from .gaps import numeral, size_words
 from .telling import shares_words, size_sentences, small_names, sure_sentences
 
 __all__ = ["scatter_sentence", "summary_sentences", "title_words"]
@@ -111,12 +111,7 @@ def scatter_sentence(said: Mapping[str, Any]) -> list[str]:
 
 def _scatter(said: Mapping[str, Any]) -> str:
     """By how much replicates differ, in parentheses: a channel in its unit, a trial's own factor in per cent."""
-    parts = []
-    for kind, std in said.get("model_std", {}).items():
-        unit, factor = unit_of(kind)
-        parts.append(
-            f"{kind.replace('_', ' ')} " + (f"{100 * std:.2g} %" if unit == "SI" else f"{factor * std:.2g} {unit}")
-        )
+    parts = [f"{kind.replace('_', ' ')} {size_words(kind, std)}" for kind, std in said.get("model_std", {}).items()]
     return f" ({', '.join(parts)})" if parts else ""
 
 
