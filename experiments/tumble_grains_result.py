@@ -107,6 +107,12 @@ def conclude(
             f"dissipation_reversal = {made:.2g} is above {MOST_REVERSAL:g}: the bed made energy, so this run's "
             f"numbers are not to be trusted; fewer substeps tell whether it is the coupling"
         )
+    if bed.max_overlap > settings.max_overlap:
+        stiffer = softening.young * (bed.max_overlap / settings.max_overlap) ** 1.5
+        result["warnings"].append(
+            f"the largest overlap was {100 * bed.max_overlap:.2g} % of a diameter, where max_overlap = "
+            f"{settings.max_overlap:g} was meant to hold: young = {stiffer:.2g} Pa or more would keep it"
+        )
     coarsest = settings.grain
     if graded is not None:
         coarsest = coarsest_touched(run, graded, size=settings.bed_size)

@@ -90,12 +90,14 @@ def small_bed(*_):
 
 
 @pytest.mark.parametrize("false", [False, True])
-def test_the_result_dates_the_wheels_limit_and_warns_of_energy_that_the_ground_made(false, tmp_path):
+def test_the_result_dates_the_wheels_limit_and_warns_of_energy_made_and_of_overlaps_past_the_bound(false, tmp_path):
     """On the spring-damper in place of grains, which for once holds 1 W more and more than it took."""
     settings = on_bed(torque=0.125, max_wheel_speed=1.0, duration=0.1, bed_size=(0.4, 0.06, 0.046))
     plan = tumble_grains._plan(settings)
     footing = LawFooting.of_trial(plan.trial)
-    footing.bed = SimpleNamespace(grain_count=1, packing_fraction=0.6, surface=0.0, time_step=1e-4, max_overlap=0.0)
+    footing.bed = SimpleNamespace(
+        grain_count=1, packing_fraction=0.6, surface=0.0, time_step=1e-4, max_overlap=0.2 if false else 0.0
+    )
     run = CoupledTumble(plan.trial, footing, duration=0.1, max_wheel_speed=plan.max_wheel_speed)
     if false:
         footing.energies = lambda: {"springs": run.body.time}
@@ -107,6 +109,7 @@ def test_the_result_dates_the_wheels_limit_and_warns_of_energy_that_the_ground_m
     assert any("max_wheel_speed = 1 rad/s, at 0.0096 s" in said for said in result["warnings"])
     reversal = result["quantities"]["dissipation_reversal"]["value"]
     assert any("dissipation_reversal" in said for said in result["warnings"]) == false == (reversal > 1e-3)
+    assert any("young = 8e+07 Pa or more" in said for said in result["warnings"]) == false  # F ~ E overlap^1.5
     assert "dissipated_friction" not in result["quantities"]  # a law keeps no such book
 
 
