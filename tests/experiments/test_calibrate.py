@@ -218,6 +218,7 @@ def test_a_calibration_finds_the_grains_and_resumes(tmp_path, monkeypatch, capsy
         ({"fixed": {"colour": 3.0}}, "fixed.colour is no number of a material"),
         ({"check_seeds": (1, 2)}, "the seed of exploring"),
         ({"most_points": 4}, "at least 3 points"),
+        ({"name": "sand"}, "name = 'sand' is that of the material it starts from"),
     ],
 )
 def test_targets_that_will_not_do_are_refused(options, said):
