@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from coupling import CoupledTumble, LawFooting, LeftTheBedError
+from dem import SAND
 from experiments import following, tumble, tumble_grains, tumble_grains_result, tumble_steppers
 from experiments.cli import main
 from experiments.runfolder import RunFolder
@@ -95,7 +96,9 @@ def test_the_result_dates_the_wheels_limit_and_warns_of_energy_that_the_ground_m
     settings = on_bed(torque=0.125, max_wheel_speed=1.0, duration=0.1, bed_size=(0.4, 0.06, 0.046))
     plan = tumble_grains._plan(settings)
     footing = LawFooting.of_trial(plan.trial)
-    footing.bed = SimpleNamespace(grain_count=1, packing_fraction=0.6, surface=0.0, time_step=1e-4, max_overlap=0.0)
+    footing.bed = SimpleNamespace(
+        grain_count=1, packing_fraction=0.6, surface=0.0, time_step=1e-4, max_overlap=0.0, material=SAND
+    )
     run = CoupledTumble(plan.trial, footing, duration=0.1, max_wheel_speed=plan.max_wheel_speed)
     if false:
         footing.energies = lambda: {"springs": run.body.time}
@@ -107,6 +110,7 @@ def test_the_result_dates_the_wheels_limit_and_warns_of_energy_that_the_ground_m
     assert any("max_wheel_speed = 1 rad/s, at 0.0096 s" in said for said in result["warnings"])
     reversal = result["quantities"]["dissipation_reversal"]["value"]
     assert any("dissipation_reversal" in said for said in result["warnings"]) == false == (reversal > 1e-3)
+    assert any("'sand': its rolling friction is a guess" in said for said in result["warnings"])
     assert "dissipated_friction" not in result["quantities"]  # a law keeps no such book
 
 
