@@ -341,6 +341,9 @@ class Bed:
         Args:
             position: of its origin [m]. velocity: [m/s].
             turn: unit quaternion, scalar first. spin: angular velocity [rad/s].
+
+        Raises:
+            ValueError: a body that is not there, numbers that are not finite, a turn that is not of length 1.
         """
         self._check_body(body)
         e = self._engine
@@ -354,6 +357,8 @@ class Bed:
                 numbers = [float(v) for v in value]
                 if len(numbers) != width or not all(map(math.isfinite, numbers)):
                     raise ValueError(f"{name[5:]} = {tuple(value)} must be {width} finite numbers")
+                if name == "body_turn":
+                    _refuse_turns("turn", np.array([numbers]))
                 getattr(e, name)[body] = numbers
 
     def move_bodies(
@@ -372,7 +377,7 @@ class Bed:
             turns: unit quaternions, scalar first, shape [body, 4].
 
         Raises:
-            ValueError: a body that is not there, numbers that are not finite, a wrong shape.
+            ValueError: a body that is not there, numbers that are not finite, a wrong shape, a turn not of length 1.
         """
         self._check_valid()
         count = int(self._engine.body_count[None])
@@ -382,6 +387,7 @@ class Bed:
         given = {"positions": positions, "velocities": velocities, "turns": turns, "spins": spins}
         for name, values in given.items():
             _check_array(name, np.asarray(values, dtype=float), (n, 4 if name == "turns" else 3))
+        _refuse_turns("turns", np.asarray(turns, dtype=float))
         self._engine.place_bodies(np.array(bodies, dtype=np.int32), np.hstack(list(given.values())).astype(float))
 
     def body_position(self, body: int) -> np.ndarray:
@@ -531,11 +537,16 @@ class Bed:
                 of preparation, off by default.
 
         Raises:
-            ValueError: a drag time shorter than two steps.
+            ValueError: steps that are no whole number, a drag time shorter than two steps.
             BedFailure: a grain left the box, a number is not a number, or an overlap went past its bound.
         """
         self._check_valid()
         e = self._engine
+        if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 0:
+            raise ValueError(
+                f"steps = {steps!r} must be a whole number of time steps of {self.time_step:.3g} s, 0 or more; "
+                f"round(time / bed.time_step) is that for a time"
+            )
         if not drag_time >= 2 * self.time_step:
             raise ValueError(f"drag_time = {drag_time} s must be at least two time steps of {self.time_step:.3g} s")
         keep = 1 - self.time_step / drag_time
@@ -841,6 +852,12 @@ def _vector(gravity: float | Sequence[float]) -> tuple[float, float, float]:
     if len(vector) != 3 or not all(map(math.isfinite, vector)):
         raise ValueError(f"gravity = {gravity} must be a number, downwards [m/s2], or three of them")
     return vector
+
+
+def _refuse_turns(name: str, turns: np.ndarray) -> None:
+    """Raise ValueError where a quaternion of shape [n, 4] is not of length 1, which would stretch the body."""
+    for turn in turns[~(np.abs((turns**2).sum(axis=1) - 1) < 1e-3)]:
+        raise ValueError(f"{name} = {tuple(map(float, turn))} must be of length 1 (a unit quaternion, scalar first)")
 
 
 def _check_array(name: str, array: np.ndarray, shape: tuple[int, ...]) -> None:

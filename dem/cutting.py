@@ -18,7 +18,7 @@ import numpy as np
 from .bed import Bed, BedFailure
 from .repose import COLUMN, Flank, measure_flanks, thickness_profile
 
-__all__ = ["LEAST", "MOST", "VerticalCut", "check_width", "cohesion_of", "cut_and_load"]
+__all__ = ["FALLEN_SHARE", "LEAST", "MOST", "VerticalCut", "check_width", "cohesion_of", "cut_and_load"]
 
 LEAST, MOST = 0.1, 4.0
 """Gravities between which a face is tried if nothing else is said, over the bed's own [1]; the grains of a bed may be
@@ -30,7 +30,7 @@ _WEDGE = math.tan(math.radians(30.0))
 # It has fallen where this share of the wedge's grains have moved by more than so many diameters. Wedges of larger
 # friction angles are steeper and smaller (0.46 of the one that is watched at 60 degrees), and their toe stays: faces of
 # grains that stick slumped to where they stand again after 0.38 had moved at one gravity, where none had before.
-_FALLEN_SHARE, _FALLEN = 0.2, 1.0
+FALLEN_SHARE, _FALLEN = 0.2, 1.0
 # Gravity rises over one time in which a grain falls the bed's height, in so many pieces; then the face is watched for
 # so many of them, and on until it is calm (energy of a wedge's grain in m g d), at most for so many.
 _PIECES, _WATCH, _CALM, _LONGEST = 10, 2.0, 1e-3, 10.0
@@ -128,7 +128,7 @@ def cut_and_load(
         share = _watch(bed, level * own, height, grain, watched, moved)
         trials.append((level, share))
         tell(0.8 * (k + 1) / len(levels))
-        if share > _FALLEN_SHARE:
+        if share > FALLEN_SHARE:
             fell = level
             break
         stood, kept = level, bed.state()
@@ -139,7 +139,7 @@ def cut_and_load(
         middle = math.sqrt(stood * fell)
         share = _watch(bed, middle * own, height, grain, watched, moved)
         trials.append((middle, share))
-        if share > _FALLEN_SHARE:
+        if share > FALLEN_SHARE:
             fell = middle
         else:
             stood = middle
@@ -230,7 +230,7 @@ def _watch(
         bed.advance(steps)
         waited += steps * bed.time_step / fall
         share = moved()
-        if share > _FALLEN_SHARE or waited > _LONGEST:
+        if share > FALLEN_SHARE or waited > _LONGEST:
             return share
         g = bed.grains()
         speed = (g["velocity"] ** 2).sum(axis=1)

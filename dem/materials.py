@@ -29,7 +29,18 @@ from dataclasses import MISSING, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
-__all__ = ["COHESIONS", "Facing", "MATERIALS", "MATERIAL_FORMAT", "Material", "SAND", "material", "read_material"]
+__all__ = [
+    "CAVEATS",
+    "COHESIONS",
+    "Facing",
+    "MATERIALS",
+    "MATERIAL_FORMAT",
+    "Material",
+    "SAND",
+    "caveat",
+    "material",
+    "read_material",
+]
 
 MATERIAL_FORMAT = "hedgebed-material/1"
 _NAME = re.compile(r"[a-z0-9][a-z0-9._+-]*")
@@ -254,6 +265,19 @@ MATERIALS = {SAND.name: SAND} | {
 }
 """The materials that ship: ``SAND``, and the calibrated ones of dem/presets (docs/materials.md)."""
 
+CAVEATS = {
+    "sand": "its rolling friction is a guess: 24 to 25 degrees of triaxial friction, where fine sand has 30 to 33; "
+    "'sand-calibrated' has 31, and a spike meets 1.7 times the force in it",
+    "jsc-1a-loose": "calibrated to a cohesion that is JSC-1A's at most: faces of it stand seven times as high as "
+    "JSC-1A's; 'jsc-1a-loose-heights' is the one to take",
+    "jsc-1a-dense": "calibrated to a cohesion that is JSC-1A's at most: faces of it stand ten times as high as "
+    "JSC-1A's; 'jsc-1a-dense-heights' is the one to take",
+    "jsc-1a-loose-heights": "faces of it stand 2.7 times as high as JSC-1A's",
+    "jsc-1a-dense-heights": "faces of it stand 2.4 times as high as JSC-1A's, and it peaks at 52 degrees in ring "
+    "shear, where the vibrated powder, which is denser, has 60",
+}
+"""What a user of a material that ships has to know of it, by name: where its bulk figures are not the real one's."""
+
 
 def material(name: str | Path | Material, *, grain: float | None = None) -> Material:
     """The material of that name or in that file, or the material itself.
@@ -267,6 +291,12 @@ def material(name: str | Path | Material, *, grain: float | None = None) -> Mate
     """
     stuff = name if isinstance(name, Material) else _find(name)
     return stuff if grain is None else stuff.for_grain(grain)
+
+
+def caveat(stuff: Material) -> str | None:
+    """A sentence for the warnings of a run: what ``CAVEATS`` says of the material; None where there is nothing."""
+    said = CAVEATS.get(stuff.name)
+    return said and f"the grains are {stuff.name!r}: {said} (docs/materials.md)"
 
 
 def _find(name: str | Path) -> Material:

@@ -26,6 +26,18 @@ def refuse_length(kind: str, **values: float) -> None:
             raise ValueError(f"{kind}: {name} = {value} must be a positive length [m]")
 
 
+def refuse_point(kind: str, **points: tuple[float, ...]) -> None:
+    """Raises ValueError for what is not three finite numbers; ``kind`` says whose."""
+    for name, point in points.items():
+        if len(point) != 3 or not all(map(math.isfinite, point)):
+            raise ValueError(f"{kind}: {name} = {tuple(point)} must be 3 finite numbers [m]")
+
+
+def _refuse_heights(kind: str, bottom: float, top: float) -> None:
+    if not (math.isfinite(bottom) and math.isfinite(top) and top > bottom):
+        raise ValueError(f"{kind}: top = {top} must lie above bottom = {bottom}, both finite [m]")
+
+
 @dataclass(frozen=True)
 class Plane:
     """A plane through ``point`` with the outward ``normal`` (need not be of unit length); grains stay on its side."""
@@ -34,8 +46,9 @@ class Plane:
     normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
     def __post_init__(self):
-        if not math.hypot(*self.normal) > 0:
-            raise ValueError(f"Plane: normal = {self.normal} must not be zero")
+        refuse_point("Plane", point=self.point)
+        if len(self.normal) != 3 or not 0 < math.hypot(*self.normal) < math.inf:
+            raise ValueError(f"Plane: normal = {tuple(self.normal)} must be 3 finite numbers, not all zero")
 
     kind = PLANE
 
@@ -57,6 +70,7 @@ class Ball:
     radius: float = 0.0
 
     def __post_init__(self):
+        refuse_point("Ball", center=self.center)
         refuse_length("Ball", radius=self.radius)
 
     kind = BALL
@@ -80,10 +94,13 @@ class Cone:
     top_radius: float
 
     def __post_init__(self):
-        if not self.top > self.bottom:
-            raise ValueError(f"Cone: top = {self.top} must lie above bottom = {self.bottom} [m]")
-        if self.bottom_radius < 0 or self.top_radius < 0 or self.bottom_radius + self.top_radius <= 0:
-            raise ValueError(f"Cone: radii {self.bottom_radius}, {self.top_radius} must be >= 0 and not both 0 [m]")
+        _refuse_heights("Cone", self.bottom, self.top)
+        radii = (self.bottom_radius, self.top_radius)
+        if not all(0 <= radius < math.inf for radius in radii) or not any(radii):
+            raise ValueError(
+                f"Cone: bottom_radius = {self.bottom_radius}, top_radius = {self.top_radius} must be finite, 0 or more "
+                f"and not both 0 [m]"
+            )
 
     kind = FRUSTUM
 
@@ -106,8 +123,7 @@ class Cylinder:
 
     def __post_init__(self):
         refuse_length("Cylinder", radius=self.radius)
-        if not self.top > self.bottom:
-            raise ValueError(f"Cylinder: top = {self.top} must lie above bottom = {self.bottom} [m]")
+        _refuse_heights("Cylinder", self.bottom, self.top)
 
     kind = FRUSTUM
 

@@ -11,7 +11,7 @@ import numpy as np
 import taichi as ti
 
 from .mesh import Mesh, Polyhedron
-from .shapes import Ball, Cone, Cylinder, Plane, refuse_length
+from .shapes import Ball, Cone, Cylinder, Plane, refuse_length, refuse_point
 
 __all__ = ["BOX", "Box", "CAPSULE", "Capsule", "PLACE_WIDTH", "PLACED", "Placed", "TUBE", "Tube", "AnyShape"]
 
@@ -35,7 +35,7 @@ class Capsule:
 
     def __post_init__(self):
         refuse_length("Capsule", radius=self.radius)
-        _refuse_point("Capsule", start=self.start, end=self.end)
+        refuse_point("Capsule", start=self.start, end=self.end)
         if not math.dist(self.start, self.end) > 0:
             raise ValueError(f"Capsule: end = {self.end} must be another point than start; use a Ball")
 
@@ -63,7 +63,7 @@ class Box:
     def __post_init__(self):
         if len(self.size) != 3 or not all(math.isfinite(s) and s > 0 for s in self.size):
             raise ValueError(f"Box: size = {tuple(self.size)} must be three positive lengths [m]")
-        _refuse_point("Box", center=self.center)
+        refuse_point("Box", center=self.center)
 
     def row(self) -> list[float]:
         """The numbers that the kernels read."""
@@ -117,7 +117,7 @@ class Placed:
     def __post_init__(self):
         if isinstance(self.shape, Placed):
             raise ValueError("Placed: shape is itself a Placed; give the one position and turn that the two make")
-        _refuse_point("Placed", position=self.position)
+        refuse_point("Placed", position=self.position)
         if len(self.turn) != 4 or not all(map(math.isfinite, self.turn)) or not math.hypot(*self.turn) > 0:
             raise ValueError(f"Placed: turn = {tuple(self.turn)} must be a quaternion of four numbers, scalar first")
 
@@ -147,12 +147,6 @@ def place_row(shape: AnyShape) -> list[float]:
         place = [*map(float, shape.position), *(turn / math.hypot(*shape.turn)).tolist()]
     inner = bare(shape)
     return [*place, float(inner.radius) if isinstance(inner, Capsule) else 0.0]
-
-
-def _refuse_point(kind: str, **points: tuple[float, ...]) -> None:
-    for name, point in points.items():
-        if len(point) != 3 or not all(map(math.isfinite, point)):
-            raise ValueError(f"{kind}: {name} = {tuple(point)} must be 3 finite numbers [m]")
 
 
 # Each returns the signed distance [m], the outward unit normal and the curvature [1/m] at a point of the shape's frame.

@@ -11,7 +11,7 @@ from dem.recipe import check_stages, parse_stage
 from dem.sizes import Sizes
 
 from .bed_sizes import Distribution, Kept, distribution
-from .settings import STANDARD_GRAVITY
+from .settings import MATERIAL, STANDARD_GRAVITY
 from .strict import StrictSettings
 
 __all__ = ["GRADED", "SPREAD_OUT", "BedRefineSettings", "BedSettings"]
@@ -28,7 +28,7 @@ _NAME = "Name under which the bed is kept on the shelf (HEDGEBED_BEDS); in the r
 class BedSettings(StrictSettings):
     """A bed prepared as in a laboratory, stage by stage."""
 
-    material: str = Field("sand", description="Grain material: a name, or a material.toml.")
+    material: str = Field("sand", description=MATERIAL)
     stages: tuple[str, ...] = Field(
         ("rain", "level"),
         min_length=1,

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from dem.bedfile import find_bed, load_prepared
+from dem.materials import caveat
 from dem.shearing import Shearing, shear_bed
 from hedgebed import __version__
 
@@ -207,6 +208,8 @@ def _result(
         )
     if len(runs) < 3:
         warnings.append("fewer than three pressures: the line through them has no error that could be told")
+    if doubt := caveat(bed.material):
+        warnings.append(doubt)
     return {
         "format": "hedgebed-result/1",
         "experiment": "bed test shear",

@@ -6,7 +6,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from .settings import STANDARD_GRAVITY
+from .settings import MATERIAL, STANDARD_GRAVITY
 from .strict import StrictSettings
 
 __all__ = ["BedConeSettings", "BedCutSettings", "BedReposeSettings", "BedTestSettings"]
@@ -27,7 +27,7 @@ class BedTestSettings(StrictSettings):
         description="The bed: a file, the folder of a run of bed make, or a name on the shelf. Decides material, size, "
         "grain, spread, packing, gravity and seed; beds are prepared, or taken from the cache, if not given.",
     )
-    material: str = Field("sand", description="Grain material: a name, or a material.toml.")
+    material: str = Field("sand", description=MATERIAL)
     size: Size = Field((0.16, 0.024, 0.04), description=_SIZE)
     grain: Positive = Field(0.004, description="Mean grain diameter [m].")
     spread: float = Field(0.15, ge=0, le=0.5, description="Grain diameters are uniform within 1 +- this [1].")

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from dem.bedfile import find_bed, load_prepared
-from dem.materials import Material
+from dem.materials import Material, caveat
 from hedgebed import __version__
 
 from .bed_progress import BedProgress
@@ -168,6 +168,8 @@ def carry_out(
                     found = test(bed, which, partial(_tell, progress, copy))
                 except ValueError as error:  # a bed whose surface lies otherwise than its depth says
                     raise RuntimeError(f"{which}: {error}") from error
+                if doubt := caveat(bed.material):
+                    found["warnings"] = [*found["warnings"], doubt]
                 bed = None  # its engine serves the next
                 folder.mark_done(which, {"id": which} | found)
                 runs.append(folder.done_data(which))

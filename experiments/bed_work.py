@@ -11,6 +11,7 @@ import numpy as np
 
 from dem.bedfile import load_prepared, save_prepared, shelf_path
 from dem.laboratory import Prepared, StageReport, prepare_as
+from dem.materials import caveat
 from hedgebed import __version__
 
 from .memory import memory_there
@@ -193,6 +194,8 @@ def _warnings(prepared: Prepared) -> list[str]:
             f"the bed is only {prepared.reports[-1].surface / grain:.2g} grains deep: floor and surface weigh in its "
             f"packing fraction"
         )
+    if doubt := caveat(bed.material):
+        said.append(doubt)
     return said
 
 

@@ -153,6 +153,11 @@ def _warnings(settings: CalibrateSettings, fit: Fit) -> list[str]:
             f"{key} lies at the {end} end of its range, {low:g} to {high:g}: what the figures ask for may lie beyond"
         )
     said += [f"{key} is hardly decided by the figures: its uncertainty is that of its range" for key in fit.vague]
+    if settings.name in MATERIALS:
+        said.append(
+            f"name = {settings.name!r} is that of a material that ships: --material takes the file only where its "
+            f"numbers are the same; another name would do"
+        )
     return said
 
 

@@ -189,6 +189,11 @@ class CalibrateSettings(StrictSettings):
     @model_validator(mode="after")
     def _can_be(self) -> CalibrateSettings:
         base = self._base()
+        if self.name == material(self.material).name:
+            raise ValueError(
+                f"name = {self.name!r} is that of the material it starts from, so that no command would take the file "
+                f"that comes out: 'my-{self.name}' would do"
+            )
         _check_free(self.free, base, self.fixed)
         wanted = self.wanted
         fitted = [name for name, target in wanted.items() if target.fit]

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from coupling import BedGround, Run
+from dem.materials import caveat
 from hedgebed import __version__
 
 from .amended import read_law
@@ -512,6 +513,8 @@ def _conclude(
     warnings = findings.warnings()
     if near := overlap_warning(overlap, settings, softening):
         warnings.append(near)
+    if doubt := caveat(find_material(settings)):
+        warnings.append(doubt)
     if len(settings.seeds) < 3:
         warnings.append("fewer than three seeds: the spread between beds is not known well")
     codes = ({note.get("code") for note in notes.values()} | {folder.code}) - {None, ""}

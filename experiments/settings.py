@@ -21,6 +21,10 @@ STANDARD_GRAVITY = 9.80665
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 SeedNumber = Annotated[int, Field(ge=0, lt=2**31)]
+MATERIAL = (
+    "Grain material: sand, sand-calibrated, jsc-1a-loose-heights or another that ships (docs/materials.md), or a "
+    "material.toml."
+)
 
 
 def expected_grain_count(bed_size: tuple[float, float, float], grain: float, spread: float) -> float:
@@ -38,7 +42,7 @@ class PenetrateSettings(StrictSettings):
         description="A bed of `hedgebed bed make`: its file, its run's folder, or its name on the shelf. Decides "
         "material, bed_size, grain, spread, gravity, seeds and softness; a bed is prepared if not given.",
     )
-    material: str = Field("sand", description="Grain material: a name, or a material.toml.")
+    material: str = Field("sand", description=MATERIAL)
     bed_size: tuple[Positive, Positive, Positive] = Field(
         (0.072, 0.072, 0.0508), description="Bed: both widths (periodic) and depth of grains [m]."
     )

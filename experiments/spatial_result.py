@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from coupling import MOST_REVERSAL, BedFooting, SpatialRun
+from dem.materials import caveat
 from dem.prepare import fingerprint
 from hedgebed import __version__
 from rigid.quaternions import to_matrix
@@ -246,4 +247,6 @@ def _add_grains(
             f"the bed's packing fraction is {bed.packing_fraction:.3g}, and its grains ({surface.grains}) were "
             f"calibrated at {surface.packing:g}: what they show is not {plan.surface}"
         )
+    if doubt := caveat(bed.material):
+        warnings.append(doubt)
     warnings.append("one bed of one seed: two valid beds differ, so differences need several seeds")

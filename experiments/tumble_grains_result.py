@@ -9,6 +9,7 @@ import numpy as np
 
 from coupling import MOST_REVERSAL, CoupledTumble
 from dem import Graded
+from dem.materials import caveat
 from dem.prepare import fingerprint
 from rigid.trajectory import Trajectory
 
@@ -136,6 +137,8 @@ def conclude(
             f"the bed's packing fraction is {bed.packing_fraction:.3g}, and its grains ({surface.grains}) were "
             f"calibrated at {surface.packing:g}: what they show is not {plan.surface}"
         )
+    if doubt := caveat(bed.material):
+        result["warnings"].append(doubt)
     if surface.granular and plan.trial.counterweight == 0:
         result["warnings"].append(
             f"the spring-damper beside has {plan.surface}'s K and C of 1 g, where the strength of grains goes with "

@@ -18,7 +18,10 @@ from vis.plot_parts import Plot, legend_above, new_panels, shades
 from vis.style import BED, MODEL, styled
 from vis.tumble import read_columns
 
-__all__ = ["write_cut_report"]
+__all__ = ["FALLEN_SHARE", "write_cut_report"]
+
+FALLEN_SHARE = 0.2
+"""Of a wedge's grains: `dem.cutting`'s, which a test holds it to; reports read run folders only."""
 
 METHOD = (
     "A strip is dug out of a level bed at a tenth of its gravity, which leaves two vertical faces as high as the bed. "
@@ -44,9 +47,11 @@ def _tiles(result: Mapping[str, Any]) -> list[Tile]:
     between = f"more than {1e3 * min(bounds[0]):.3g} mm" if any(bounds[0]) else "no face stood"
     if len(bounds[1]) == len(runs):
         between += f", less than {1e3 * max(bounds[1]):.3g} mm"
+    note = str(quantities["cohesion"]["note"]).partition(";")[0]
+    angle = f"Terzaghi, with {note.partition(' with ')[2]}" if " with phi" in note else note
     return [
         Tile("Critical height", said(quantities["critical_height"], 1e3, " mm"), between),
-        Tile("Cohesion", said(quantities["cohesion"], 1.0, " Pa"), "Terzaghi"),
+        Tile("Cohesion", said(quantities["cohesion"], 1.0, " Pa"), angle),
         Tile("Slumped to", said(quantities["slumped_to"], 1.0, "°"), "slope of a fallen face"),
         Tile("Height of the faces", f"{1e3 * runs[0]['height']:.3g} mm", f"{len(runs)} beds"),
     ]
@@ -109,7 +114,7 @@ def _trials(result: Mapping[str, Any]) -> Plot:
             trials = np.array(sorted(run["trials"]))
             axis.plot(1e3 * run["height"] * trials[:, 0], trials[:, 1], color=colour, marker="o", ms=4)
             handles.append(Line2D([], [], color=colour, marker="o", ms=4, label=run["id"]))
-        axis.axhline(0.5, color=MODEL, lw=1.0, ls="--")
+        axis.axhline(FALLEN_SHARE, color=MODEL, lw=1.0, ls="--")
         axis.set_xscale("log")
         heights = [1e3 * run["height"] for run in runs]
         axis.set_xlim(0.09 * min(heights), 4.4 * max(heights))

@@ -87,7 +87,7 @@ def said(entry: Mapping[str, Any], scale: float = 1.0, unit: str = "") -> str:
     if entry["value"] is None:
         return "–"
     value, std = scale * entry["value"], entry["std"]
-    return f"{quote(value)}{unit}" if std is None else f"{value:.3g} ± {scale * std:.1g}{unit}"
+    return f"{quote(value, None if std is None else scale * std)}{unit}"
 
 
 def side_plot(

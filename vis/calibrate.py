@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from vis.bed_repose import flank_lines
+from vis.numbers import quote
 from vis.page import Page, Section, Tile, code, figure, table, text, write_page
 from vis.plot_parts import Plot, legend_above, new_panels
 from vis.style import BED, GREY, INK, MODEL, styled
@@ -81,7 +82,7 @@ def _said(entry: Mapping[str, Any]) -> str:
     unit = {"1": "", "degrees": "°"}.get(entry["unit"], f" {entry['unit']}")
     if entry["value"] is None:
         return "–"
-    return f"{entry['value']:.3g}" + ("" if entry["std"] is None else f" ± {entry['std']:.1g}") + unit
+    return quote(entry["value"], entry["std"]) + unit
 
 
 def _axis_words(entry: Mapping[str, Any]) -> str:

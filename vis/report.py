@@ -38,6 +38,7 @@ _OTHERS = {
     "bed test repose": ("vis.bed_repose", "write_repose_report"),
     "bed test cone": ("vis.bed_cone", "write_cone_report"),
     "bed test cut": ("vis.bed_cut", "write_cut_report"),
+    "bed calibrate": ("vis.calibrate", "write_calibration_report"),
     "compare": ("vis.compare", "write_compare_report"),
     "validate": ("vis.validation", "write_validation_report"),
 }

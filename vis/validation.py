@@ -19,8 +19,11 @@ from vis.style import GREY, styled
 __all__ = ["write_validation_report"]
 
 _WIDTH, _HEIGHT, _DPI = 5.6, 3.6, 110
-_COLOURS = ("#0072B2", "#E69F00", "#CC79A7", "#009E73", "#D55E00", "#56B4E9", "#8a8a8a", "#222222")
-_HEAD = ("case", "wanted", "ours", "difference", "band", "")
+_COLOURS = ("#0072B2", "#E69F00", "#CC79A7", "#009E73", "#D55E00", "#56B4E9", "#8a8a8a", "#222222", "#8C564B")
+_HEAD = ("wanted", "ours", "difference", "band", "")
+#: Entries of a legend that find room in the plot; more stand beneath it, in three columns up to so many characters.
+_INSIDE, _THREE_COLUMNS = 4, 24
+_LEGEND_ROW = 0.16
 
 
 def write_validation_report(folder: str | Path, *, progress: Callable[[float], None] | None = None) -> Path:
@@ -46,8 +49,11 @@ def _draw(folder: Path, case: Mapping[str, Any], plot: Mapping[str, Any], number
         for row in csv.DictReader(file):
             curves.setdefault(row["curve"], []).append((float(row["x"]), float(row["y"])))
     path = folder / "figures" / f"{case['id']}-{number}.png"
+    beneath = len(curves) > _INSIDE
+    across = 3 if max(map(len, curves)) <= _THREE_COLUMNS else 2
+    below = _LEGEND_ROW * -(-len(curves) // across) if beneath else 0.0
     with styled():
-        drawing = Figure(figsize=(_WIDTH, _HEIGHT))
+        drawing = Figure(figsize=(_WIDTH, _HEIGHT + below))
         FigureCanvasAgg(drawing)
         axis = drawing.subplots()
         colours = cycle(_COLOURS)
@@ -62,7 +68,10 @@ def _draw(folder: Path, case: Mapping[str, Any], plot: Mapping[str, Any], number
             axis.set_xscale("log")
         if "y" in plot["log"]:
             axis.set_yscale("log")
-        axis.legend(fontsize=7)
+        if beneath:
+            drawing.legend(fontsize=7, loc="outside lower center", ncols=across)
+        else:
+            axis.legend(fontsize=7)
         drawing.savefig(path, dpi=_DPI)
     caption = "Lines: the reference; dots: the bed." if plot["lines"] else "Dots: the bed."
     return figure(path, title=plot["title"], caption=caption, half=True)
@@ -118,7 +127,7 @@ def _page(result: Mapping[str, Any], blocks: Mapping[str, Sequence[Block]]) -> P
         sections=sections,
         tiles=tiles,
         warnings=result["warnings"],
-        missing=[_absent(case) for case in cases if case["status"] not in ("pass", "fail")],
+        missing=_absent(cases),
     )
 
 
@@ -127,20 +136,30 @@ def _overview(run: Sequence[Mapping[str, Any]]) -> Section:
     for case in run:
         worst = case["worst"]
         cells = _cells(worst)[:-1] if worst else ("–",) * 4
-        rows.append((f"{case['id']}: {case['title']}", *cells, "pass" if case["status"] == "pass" else "FAIL"))
+        wanted = f"{case['reference']} ({case['source']})"
+        verdict = "pass" if case["status"] == "pass" else "FAIL"
+        rows.append((f"{case['id']}: {case['title']}", *cells, verdict, wanted))
     lead = "A row shows the number of its case that takes the largest share of its band; all numbers follow below."
-    return Section("Every case", [text(lead), table(_HEAD, rows)])
+    head = ("case", *_HEAD, "closed form or figure (source)")
+    return Section("Every case", [text(lead), table(head, rows)])
 
 
 def _case(case: Mapping[str, Any], blocks: Mapping[str, Sequence[Block]]) -> list[Block]:
     found = [text(f"{case['id']}: {case['title']}. {case['reference']} ({case['source']})."), *blocks[case["id"]]]
     if case["comparisons"]:
         rows = [(one["quantity"], *_cells(one)) for one in case["comparisons"]]
-        found.append(table(("number", *_HEAD[1:]), rows))
+        found.append(table(("number", *_HEAD), rows))
     found += [text(remark, small=True) for remark in case["remarks"]]
     return found
 
 
-def _absent(case: Mapping[str, Any]) -> str:
-    why = case.get("waits_for") or case.get("skipped") or "left out of this run"
-    return f"{case['id']} ({case['title']}): {case['status']}, {why}"
+def _absent(cases: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What is not in the report: each case that could not be run, and in one sentence those that were left out."""
+    said, left = [], []
+    for case in cases:
+        why = case.get("waits_for") or case.get("skipped")
+        if why:
+            said.append(f"{case['id']} ({case['title']}): {case['status']}, {why}")
+        elif case["status"] not in ("pass", "fail"):
+            left.append(case["id"])
+    return [*said, f"left out of this run: {', '.join(left)}"] if left else said

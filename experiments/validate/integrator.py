@@ -208,7 +208,7 @@ def _bouncing(tell: Callable[[float], None]) -> Outcome:
         tell(done / len(counts))
     order = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
     curves = [
-        Curve("order 2", counts, errors[0] * (counts[0] / counts) ** 2.0, False),
+        Curve("order 2.5", counts, errors[0] * (counts[0] / counts) ** 2.5, False),
         Curve("worst of sixteen phases", counts, errors),
     ]
     return Outcome(

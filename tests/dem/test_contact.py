@@ -1,6 +1,8 @@
 """The contact law's parameters and the time step: against the equation of motion and Hertz's closed forms."""
 
 import math
+import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from scipy.integrate import solve_ivp
 from dem import MATERIALS, SAND, Bed, Facing, Material, material
 from dem.cohesion import jkr_contact
 from dem.contact import damping_factor, effective_moduli, pair_parameters
+from dem.materials import CAVEATS, caveat
 from dem.timestep import CHAIN, choose_young, contact_time, longest_step, time_step_for
 
 
@@ -234,3 +237,12 @@ def test_materials_are_found_by_name_and_the_nearest_is_offered():
 def test_every_number_of_a_preset_has_a_source():
     for stuff in MATERIALS.values():
         assert set(stuff.sources) >= {"density", "young", "poisson", "friction", "restitution", "rolling_friction"}
+
+
+def test_a_preset_whose_bulk_figures_are_off_says_so():
+    """By the names that there are, and never of what a user calibrated."""
+    assert set(CAVEATS) == set(MATERIALS) - {"sand-calibrated"}
+    assert caveat(SAND) == f"the grains are 'sand': {CAVEATS['sand']} (docs/materials.md)"
+    assert caveat(material("sand-calibrated")) is caveat(replace(SAND, name="mine")) is None
+    for said in CAVEATS.values():
+        assert all(name in MATERIALS for name in re.findall(r"'([a-z0-9-]+)'", said))

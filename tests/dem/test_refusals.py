@@ -132,8 +132,24 @@ def test_moving_a_body_that_is_not_there_or_to_nowhere_is_refused():
         bed.move_body(0, velocity=(0, 0, math.nan))
     with pytest.raises(ValueError, match=r"turn = .* must be 4 finite numbers"):
         bed.move_body(0, turn=(1, 0, 0))
+    for turn in ((0, 0, 0, 0), (2, 0, 0, 0)):
+        with pytest.raises(ValueError, match=r"turn = .* must be of length 1 \(a unit quaternion"):
+            bed.move_body(0, turn=turn)
+    still = np.zeros((1, 3))
+    with pytest.raises(ValueError, match=r"turns = \(0.0, 0.0, 0.0, 0.0\) must be of length 1"):
+        bed.move_bodies([0], positions=still, velocities=still, turns=np.zeros((1, 4)), spins=still)
     with pytest.raises(ValueError, match="drag_time"):
         bed.advance(10, drag_time=0.0)
+
+
+@pytest.mark.parametrize("steps", [1e-3, math.nan, -1, True, "10"])
+def test_steps_that_are_no_whole_number_are_refused(steps):
+    """A time in seconds among them, for which nothing was done, and nothing said, until 2026-11-23."""
+    bed = make()
+    with pytest.raises(ValueError, match=r"steps = .* must be a whole number of time steps of .* s, 0 or more; round"):
+        bed.advance(steps)
+    bed.advance(np.int64(2))
+    assert bed.steps == 2
 
 
 def test_many_bodies_are_told_apart():

@@ -132,7 +132,15 @@ def test_the_normal_on_the_surface_is_a_unit_vector(distances, shape):
         (lambda: Cylinder(1.0, 1.0, 1.0), "Cylinder: top = 1.0 must lie above"),
         (lambda: Cone(0.0, 1.0, 0.0, 0.0), "not both 0"),
         (lambda: Cone(0.0, math.nan, 0.0, 1.0), "Cone: top = nan"),
-        (lambda: Plane(normal=(0.0, 0.0, 0.0)), "must not be zero"),
+        (lambda: Plane(normal=(0.0, 0.0, 0.0)), "must be 3 finite numbers, not all zero"),
+        (lambda: Plane(normal=(math.inf, 0.0, 1.0)), "must be 3 finite numbers, not all zero"),
+        (lambda: Plane(point=(math.nan, 0.0, 0.0)), "Plane: point = .* must be 3 finite numbers"),
+        (lambda: Plane(point=(0.0, 0.0)), "Plane: point = .* must be 3 finite numbers"),
+        (lambda: Ball(center=(math.nan, 0.0, 0.0), radius=1.0), "Ball: center = .* must be 3 finite numbers"),
+        (lambda: Cone(0.0, 1.0, math.nan, 0.1), "Cone: bottom_radius = nan, top_radius = 0.1 must be finite"),
+        (lambda: Cone(0.0, 1.0, 0.1, math.inf), "Cone: .* must be finite, 0 or more and not both 0"),
+        (lambda: Cone(0.0, math.inf, 0.1, 0.1), "Cone: top = inf must lie above bottom = 0.0, both finite"),
+        (lambda: Cylinder(-math.inf, 0.0, 0.1), "Cylinder: top = 0.0 must lie above bottom = -inf, both finite"),
     ],
 )
 def test_a_shape_that_cannot_be_is_refused(make, words):

@@ -60,6 +60,7 @@ def test_a_bed_is_made_and_its_folder_says_what_every_stage_left(made):
     page = (run / "report.html").read_text()
     assert "Stage by stage" in page and "hedgebed bed make run.toml" in page
     assert any("grains wide" in warning for warning in result["warnings"])
+    assert any("'sand': its rolling friction is a guess" in warning for warning in result["warnings"])
     assert not list((run / "checkpoint").glob("bed.npz"))
     assert read_preparation(run / "bed.npz").recipe["stages"] == ["rain"]
 

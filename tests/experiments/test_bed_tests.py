@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dem import SAND, Bed
+from dem import SAND, Bed, cutting
 from dem.cutting import cohesion_of, cut_and_load
 from dem.penetrometer import ConePush, cone_gradient, cone_length, standard_speed
 from dem.repose import fit_flank
@@ -15,6 +15,8 @@ from experiments.bed_test_settings import BedConeSettings, BedCutSettings, BedRe
 from experiments.bed_tests import quantity
 from experiments.cli import BAD_INPUT, DONE, main
 from experiments.runfolder import read_series
+from vis import bed_cut
+from vis.bed_tests import said
 
 GRAIN = 0.004
 SIZE = (0.072, 0.038, 0.02)
@@ -159,3 +161,16 @@ def test_defaults_can_be_run():
         (bed_cut, BedCutSettings()),
     ):
         module.check(settings)
+
+
+def test_the_line_above_which_a_face_has_fallen_is_drawn_where_it_falls():
+    assert bed_cut.FALLEN_SHARE == cutting.FALLEN_SHARE
+    assert "A face has fallen once a fifth of the grains" in " ".join(bed_cut.METHOD)
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "words"), [(0.164, 0.0143, "164 ± 14 mm"), (0.0584, 0.00504, "58 ± 5 mm"), (0.05, None, "50 mm")]
+)
+def test_a_tile_has_the_digits_that_its_error_lets_it_have(value, std, words):
+    told = said({"value": value, "std": std, "unit": "m"}, 1e3, " mm").replace("\N{NO-BREAK SPACE}", " ")
+    assert told.replace("50.0", "50") == words

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+import vis
 from dem.element import ElementShear
 from dem.materials import MATERIALS, material, read_material
 from experiments import calibrate, calibrate_tests
@@ -177,6 +178,8 @@ def test_a_calibration_finds_the_grains_and_resumes(tmp_path, monkeypatch, capsy
     figures = {entry["name"]: entry for entry in result["figures"]}
     assert figures["critical_friction_angle"]["verdict"] == figures["cohesion"]["verdict"] == "met"
     assert figures["ring"]["verdict"] == "not met" and any("ring = 31" in w for w in result["warnings"])
+    page = (out / "report.html").read_text()
+    assert vis.write_report(out).read_text() == page and "Figure by figure" in page  # and again, as `render` does
     rolling = result["quantities"]["rolling_friction"]
     assert angle_at(rolling["value"]) == pytest.approx(31, abs=1) and 0 < rolling["std"] < 0.2
     assert result["quantities"]["surface_energy"]["value"] == pytest.approx(0.8, abs=0.1)
@@ -218,6 +221,7 @@ def test_a_calibration_finds_the_grains_and_resumes(tmp_path, monkeypatch, capsy
         ({"fixed": {"colour": 3.0}}, "fixed.colour is no number of a material"),
         ({"check_seeds": (1, 2)}, "the seed of exploring"),
         ({"most_points": 4}, "at least 3 points"),
+        ({"name": "sand"}, "name = 'sand' is that of the material it starts from"),
     ],
 )
 def test_targets_that_will_not_do_are_refused(options, said):

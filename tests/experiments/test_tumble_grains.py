@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from coupling import CoupledTumble, LawFooting, LeftTheBedError
+from dem import SAND
 from experiments import following, tumble, tumble_grains, tumble_grains_result, tumble_steppers
 from experiments.cli import main
 from experiments.runfolder import RunFolder
@@ -96,8 +97,9 @@ def test_the_result_dates_the_wheels_limit_and_warns_of_energy_made_and_of_overl
     plan = tumble_grains._plan(settings)
     footing = LawFooting.of_trial(plan.trial)
     footing.bed = SimpleNamespace(
-        grain_count=1, packing_fraction=0.6, surface=0.0, time_step=1e-4, max_overlap=0.2 if false else 0.0
-    )
+        grain_count=1, packing_fraction=0.6, surface=0.0, time_step=1e-4, max_overlap=0.2 if false else 0.0,
+        material=SAND,
+    )  # fmt: skip
     run = CoupledTumble(plan.trial, footing, duration=0.1, max_wheel_speed=plan.max_wheel_speed)
     if false:
         footing.energies = lambda: {"springs": run.body.time}
@@ -110,6 +112,7 @@ def test_the_result_dates_the_wheels_limit_and_warns_of_energy_made_and_of_overl
     reversal = result["quantities"]["dissipation_reversal"]["value"]
     assert any("dissipation_reversal" in said for said in result["warnings"]) == false == (reversal > 1e-3)
     assert any("young = 8e+07 Pa or more" in said for said in result["warnings"]) == false  # F ~ E overlap^1.5
+    assert any("'sand': its rolling friction is a guess" in said for said in result["warnings"])
     assert "dissipated_friction" not in result["quantities"]  # a law keeps no such book
 
 

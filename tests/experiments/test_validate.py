@@ -2,6 +2,7 @@
 
 import json
 
+import matplotlib.image
 import numpy as np
 import pytest
 
@@ -13,6 +14,7 @@ from experiments.validate.document import markdown
 from experiments.validate.friction_angle import mohr_angle
 from experiments.validate.suite import SUITE, chosen
 from experiments.validate_settings import ValidateSettings
+from vis.validation import _COLOURS, _draw
 
 
 def good(tell):
@@ -71,9 +73,24 @@ def test_a_table_and_a_page_show_every_case(suite, tmp_path, capsys):
     assert "**FAIL**" in text and "it is known to be bad" in text
     assert "skipped: there is no code" in text and "not yet: walls" in text
     page = (tmp_path / "run" / "report.html").read_text()
+    assert "y = 2 x (a book)" in page and "lacking (One that lacks a code): skipped, there is no code" in page
     assert "A line, drawn" in page and "data:image/png" in page and "it is known to be bad" in page
     assert vis.write_report(tmp_path / "run").read_text() == page  # the page of any folder, made again
     assert "bad fails: c is 1.5, 1 was wanted" in " ".join(capsys.readouterr().out.split())
+
+
+def test_many_curves_are_told_beneath_their_plot(tmp_path):
+    """With a colour each, and where none of them runs through their names: the plot is as high, the picture higher."""
+    (tmp_path / "figures").mkdir()
+    heights = []
+    for count in (2, 9):
+        rows = [f"{name},{x},{x * k}" for k, name in enumerate("abcdefghi"[:count]) for x in (0.0, 1.0)]
+        (tmp_path / "curves.csv").write_text("\n".join(["curve,x,y", *rows]))
+        plot = {"series": "curves.csv", "title": "t", "x": "x", "y": "y", "log": "", "lines": ["a"]}
+        _draw(tmp_path, {"id": f"of-{count}"}, plot, 1)
+        heights.append(matplotlib.image.imread(tmp_path / "figures" / f"of-{count}-1.png").shape[0])
+    assert heights[1] > heights[0] + 30
+    assert len(set(_COLOURS)) == len(_COLOURS) >= 9
 
 
 def test_finished_cases_are_kept_until_their_code_changes(suite, tmp_path, monkeypatch):
@@ -93,6 +110,8 @@ def test_part_of_the_suite_leaves_the_committed_table_alone(suite, tmp_path, mon
     experiment.run(ValidateSettings(only=("good",)), tmp_path / "one")
     experiment.run(ValidateSettings(quick=True), tmp_path / "quick")
     assert suite == {"good": 2, "bad": 1, "lacking": 1}
+    page = (tmp_path / "one" / "report.html").read_text()
+    assert "left out of this run: bad, long, lacking" in page and "later (One for later): not yet, walls" in page
     assert not (tmp_path / "docs" / "validation.md").exists()
     experiment.run(ValidateSettings(), tmp_path / "all")
     assert "hedgebed validate`" in (tmp_path / "docs" / "validation.md").read_text()
