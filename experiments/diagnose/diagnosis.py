@@ -232,7 +232,7 @@ class _Course:
         choice = self._moved(choice, found)
         if not choice.left.passed and (other := self._recoloured()(found)) is not found:
             choice = replace(choice, left=open_gate(other, seed=self.asked.seed)[1])
-        if choice.left.passed and len(best.forms) == 1 and not choice.alternatives:
+        if choice.left.passed and len(best.effects) == 1 and not choice.alternatives:
             return choice
         self.tell("rows are weighed otherwise beside what was found: choosing again", 0.0)
         return self._chosen()
