@@ -254,11 +254,12 @@ class _Course:
     def _scattered_beside(self, choice: Choice) -> Choice:
         """Where something is left, replicates are compared by what each has of its own."""
         fits = () if self.asked.restless else (choice.best.fit, choice.base.fit)
-        for zeros, beside in itertools.product((False, True), fits):
-            scatter = scatter_apart(beside, self.held_out, zeros=zeros) if not choice.left.passed else Scatter()
+        for kinds, beside in itertools.product(("", "zero_scatter", "force_scatter"), fits):
+            scatter = scatter_apart(beside, self.held_out, kinds=kinds) if not choice.left.passed else Scatter()
             if scatter.parameters and set(scatter.model_std) != set(self.model_std):
                 self.tell("replicates are found to differ beside what is left: choosing again", 0.0)
-                choice = self._chosen_with(scatter, partial(_leaves_less, than=choice)) or choice
+                stands = _explains if kinds == "force_scatter" else partial(_leaves_less, than=choice)
+                choice = self._chosen_with(scatter, stands) or choice
         return choice
 
     def _scattered_alone(self, choice: Choice) -> Choice:
@@ -419,6 +420,10 @@ class _Course:
         """The whole course once more, with other trials aside or held out."""
         usual: dict[str, Any] = {"aside": (), "looked_at": (), "patient": False, "begun": self.begun}
         return _Course(problem or self.problem, replace(self.asked, **{**usual, **changes})).run()
+
+
+def _explains(choice: Choice) -> bool:
+    return choice.left.passed
 
 
 def _leaves_less(choice: Choice, *, than: Choice) -> bool:

@@ -69,6 +69,9 @@ class PenetrationProblem:
     zero_scatter = ("bed", "depth zero")
     """Kinds that are asked for by themselves where the others do not explain what is left, and where no trial repeats
     another (`lone_beds`): at one speed a damper and a depth's zero are the same."""
+    force_scatter = ("force zero",)
+    """And after these, of pushes that begin at the surface, where no row reads it: in a stiff bed the two are next to
+    the same; it counts where it explains all."""
     special_scatter = ("depth zero", "force zero")
     """Kinds that are not asked for with all others at once."""
     by_path = True
