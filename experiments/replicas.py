@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from .campaign import Campaign, PenetrationCampaign, Recording, TumbleCampaign
 from .campaign.tables import PenetrationTrial, TumbleTrial
 from .diagnose.problem import Finding
+from .diagnose.unit_factors import factor_words
 
 __all__ = ["Condition", "condition_of", "condition_words", "odd_replicates"]
 
@@ -66,6 +67,7 @@ def odd_replicates(campaign: Campaign) -> list[Finding]:
         if len(trials) < 3:
             continue
         worst: dict[str, tuple[float, str]] = {}
+        units: dict[str, str] = {}
         for sensor in trials[0].files:
             own = [campaign.recording(trial.id, sensor) for trial in trials]
             here = [(trial, recording) for trial, recording in zip(trials, own, strict=True) if recording is not None]
@@ -74,14 +76,22 @@ def odd_replicates(campaign: Campaign) -> list[Finding]:
             for channel, std, curves in _curves(tables, sensor, here):
                 for name, ratio in _at_odds([trial.id for trial, _ in here], curves, std):
                     worst[name] = max(worst.get(name, (0.0, "")), (ratio, channel))
+                    units[name] = units.get(name) or factor_words(
+                        channel, *_parted([trial.id for trial, _ in here], curves, name)
+                    )
         if 2 * len(worst) < len(trials):  # where half of them are odd, none is
             found += [
                 Finding(trial=id, channel=channel, what=f"trial {id} is at odds with its {len(trials) - 1} replicates, "
                         f"which agree with one another: in {channel} it lies {ratio:.0f} times as far from them"
-                        + _own_gravity(tables))
+                        + units[id] + _own_gravity(tables))
                 for id, (ratio, channel) in worst.items()
             ]  # fmt: skip
     return found
+
+
+def _parted(ids: list[str], curves: list[Array], name: str) -> tuple[Array, list[Array]]:
+    """The curve of one trial, and those of the others."""
+    return curves[ids.index(name)], [curve for id, curve in zip(ids, curves, strict=True) if id != name]
 
 
 def _own_gravity(tables: TumbleCampaign | PenetrationCampaign) -> str:

@@ -43,7 +43,8 @@ def drop_trial(force, *, speed, seed=0):
     })  # fmt: skip
 
 
-def campaign_of(trials, *, stiffness=1.05 * STIFFNESS, damping=0.9 * DAMPING, doubt=(0.1, 0.2), diameter=0.012):
+def campaign_of(trials, *, stiffness=1.05 * STIFFNESS, damping=0.9 * DAMPING, doubt=(0.1, 0.2), diameter=0.012,
+                depth_std=DEPTH_STD):  # fmt: skip
     """A campaign of (id, mode, speed, recording), or of (id, mode, speed, recording, more keys of the trial)."""
     tables, recordings = [], {}
     for name, mode, speed, recording, *more in trials:
@@ -55,7 +56,7 @@ def campaign_of(trials, *, stiffness=1.05 * STIFFNESS, damping=0.9 * DAMPING, do
         "spike": {"mass": MASS, "diameter": diameter, "tip": "sphere"},
         "surface": {"kind": "sand", "stiffness": stiffness, "damping": damping},
         "uncertainty": {"stiffness": doubt[0], "damping": doubt[1]},
-        "sensors": {"depth": {"std": (DEPTH_STD,)}, "force": {"std": (FORCE_STD,)}, "accel": {"std": (ACCEL_STD,)}},
+        "sensors": {"depth": {"std": (depth_std,)}, "force": {"std": (FORCE_STD,)}, "accel": {"std": (ACCEL_STD,)}},
         "trial": tuple(tables),
     }  # fmt: skip
     return Campaign(PenetrationCampaign.model_validate(text), recordings)

@@ -49,6 +49,8 @@ _DRAWS, _REFITS = 600, 400
 """Made-up campaigns of a null, and of a thorough one, each of them refitted."""
 _MARGIN = 1.5
 """Standard deviations beyond the gate that something without a name must reach: no effect speaks for it."""
+_MOST_LEFT = 2.5
+"""Chi-square a sample up to which a name is near enough to the motion for rows to be weighed by it."""
 _ON = 1.0
 """Chi-square by which a fit must go on to be taken instead."""
 _OUT_OF_THE_WAY = 0.5
@@ -111,6 +113,8 @@ class _Course:
         self.model_std: Mapping[str, float] = {}
         self.first: Verdict
         """The gate on the base model."""
+        self.alone: Fit | None = None
+        """The base model's fit as its own weights have it."""
 
     def run(self) -> Diagnosis:
         """All steps; some findings begin the course anew."""
@@ -129,8 +133,8 @@ class _Course:
             anew = self._again(aside=choice.astray, looked_at=asked.looked_at)
             return anew if anew.verdict != "unknown" else self._again(looked_at=asked.looked_at, patient=True)
         for step in (
-            self._scattered, self._scattered_beside, self._scattered_alone, self._timed, self._recoloured_choice,
-            self._doubted,
+            self._reweighed, self._scattered, self._scattered_beside, self._scattered_alone, self._timed,
+            self._recoloured_choice, self._doubted,
         ):  # fmt: skip
             choice = step(choice)
         if asked.thorough and choice.best.effects:
@@ -212,6 +216,27 @@ class _Course:
             self.base = choice.base.fit
         return choice
 
+    def _reweighed(self, choice: Choice) -> Choice:
+        """With rows weighed as the best model has it: what the error of a path does to a force goes with the model, and
+        one that lacks something plain bends its numbers."""
+        best = choice.best
+        if self.asked.restless or not (best.effects and getattr(self.problem, "by_path", False)):
+            return choice
+        loud = best.fit.chi_square > _MOST_LEFT * best.fit.count
+        if loud or excess(best.fit) >= _OUT_OF_THE_WAY * excess(self.base):
+            return choice
+        self.alone = fit(replace(self.base.model, scatter=()), unscattered(self.base))
+        self.problem.rewhiten(best.fit.values, best.fit.model.forms)
+        self.base = fit(self.base.model, self.base.values)
+        found = fit(best.fit.model, best.fit.values)
+        choice = self._moved(choice, found)
+        if not choice.left.passed and (other := self._recoloured()(found)) is not found:
+            choice = replace(choice, left=open_gate(other, seed=self.asked.seed)[1])
+        if choice.left.passed and len(best.effects) == 1 and not choice.alternatives:
+            return choice
+        self.tell("rows are weighed otherwise beside what was found: choosing again", 0.0)
+        return self._chosen()
+
     def _scattered(self, choice: Choice) -> Choice:
         """With the motion out of the way replicates are compared once more."""
         best = choice.best
@@ -229,11 +254,12 @@ class _Course:
     def _scattered_beside(self, choice: Choice) -> Choice:
         """Where something is left, replicates are compared by what each has of its own."""
         fits = () if self.asked.restless else (choice.best.fit, choice.base.fit)
-        for zeros, beside in itertools.product((False, True), fits):
-            scatter = scatter_apart(beside, self.held_out, zeros=zeros) if not choice.left.passed else Scatter()
+        for kinds, beside in itertools.product(("", "zero_scatter", "force_scatter"), fits):
+            scatter = scatter_apart(beside, self.held_out, kinds=kinds) if not choice.left.passed else Scatter()
             if scatter.parameters and set(scatter.model_std) != set(self.model_std):
                 self.tell("replicates are found to differ beside what is left: choosing again", 0.0)
-                choice = self._chosen_with(scatter, partial(_leaves_less, than=choice)) or choice
+                stands = _explains if kinds == "force_scatter" else partial(_leaves_less, than=choice)
+                choice = self._chosen_with(scatter, stands) or choice
         return choice
 
     def _scattered_alone(self, choice: Choice) -> Choice:
@@ -380,7 +406,8 @@ class _Course:
 
     def _told(self, model_std: Mapping[str, float]) -> Told:
         model_std = {**getattr(self.problem, "known_std", {}), **model_std}
-        return Told(self.problem, self.first, self.findings, self.held_out, self.jitters, self.colours, model_std)
+        return Told(self.problem, self.first, self.findings, self.held_out, self.jitters, self.colours, model_std,
+                    self.alone)  # fmt: skip
 
     def _held_out_gate(self, found: Fit) -> Verdict | None:
         """The gate on trials that took no part, with the scatter of replicates where it was found."""
@@ -393,6 +420,10 @@ class _Course:
         """The whole course once more, with other trials aside or held out."""
         usual: dict[str, Any] = {"aside": (), "looked_at": (), "patient": False, "begun": self.begun}
         return _Course(problem or self.problem, replace(self.asked, **{**usual, **changes})).run()
+
+
+def _explains(choice: Choice) -> bool:
+    return choice.left.passed
 
 
 def _leaves_less(choice: Choice, *, than: Choice) -> bool:

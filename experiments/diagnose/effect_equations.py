@@ -26,6 +26,7 @@ PENETRATION = {
     "depth-hardening:with a power": "K * z * (1 + hardening_quadratic * (z / D)^(1 + hardening_steeper))",
     "depth-hardening:cubic": "K * z * (1 + hardening_cubic * (z / D)^2)",
     "depth-hardening:exponential": "K * z * (exp(h) - 1) / h, h = hardening_exponential * z / D",
+    "depth-hardening:locking": "K * z / max(1 - hardening_locking * z / D, 0.05)",
     "depth-hardening:early": "K * z + hardening_early * (1 - exp(-z / hardening_reach))",
     "depth-hardening:levelling off":
         "K * z / (1 + x^hardening_sharpness)^(1 / hardening_sharpness), x = hardening_level * z / D",
@@ -61,31 +62,41 @@ PENETRATION = {
 """By the id of the form: what it makes of the force F [N] on the spike."""
 
 
-def _times(form: str, depth: str, sharpness: str) -> str:
-    """A form's equation with the factor by which it sets in from the surface on."""
-    first, *rest = PENETRATION[form].split(", ")
-    return ", ".join([f"{first} * y / (1 + y^q)^(1 / q)", f"y = z / {depth}", f"q = {sharpness}", *rest])
+def _times(text: str, factor: str, *clauses: str) -> str:
+    """An equation with one more factor, and the clauses that define it."""
+    first, *rest = text.split(", ")
+    return ", ".join([f"{first} * {factor}", *clauses, *rest])
 
 
-for _name in ("constant", "by a power of depth", "falling with speed", "mobilised over a way"):
-    PENETRATION[f"shaft-friction:{_name}, setting in"] = _times(
-        f"shaft-friction:{_name}", "shaft_onset", "shaft_sharpness"
-    )
-for _name in ("constant", "growing with depth", "by a power of depth"):
-    PENETRATION[f"shaft-friction:{_name}, rising with speed"] = (
-        PENETRATION[f"shaft-friction:{_name}"] + " * tanh(abs(v) / shaft_rise)"
-    )
-for _name in ("held", "held by depth", "held wherever it has been"):
-    PENETRATION[f"adhesion:{_name}, fading towards the surface"] = _times(
-        f"adhesion:{_name}", "pull_fade", "pull_fade_sharpness"
-    )
-    PENETRATION[f"adhesion:{_name}, on the way out"] = (
-        PENETRATION[f"adhesion:{_name}"] + "; times 1 - pull_out where it sinks again"
-    )
-for _name in ("crater", "curved crater", "stiffer unloading"):
-    PENETRATION[f"plastic-sinkage:{_name}, empty"] = (
-        PENETRATION[f"plastic-sinkage:{_name}"] + "; where that is 0, C times 1 - crater_open"
-    )
+_SETS_IN = "y / (1 + y^q)^(1 / q)"
+_HELDS = ("held", "held by depth", "held wherever it has been")
+_ONSET = " * (1 - exp(-z / drag_reach))"
+_BENT: tuple[tuple[str, tuple[str, ...], str, Callable[[str], str]], ...] = (
+    ("inertial-drag", ("with an onset",), "as sharp as it is",
+     lambda text: _times(text.replace(_ONSET, ""), _SETS_IN, "y = z / drag_reach", "q = drag_sharpness")),
+    ("shaft-friction", ("constant", "by a power of depth", "falling with speed", "mobilised over a way"), "setting in",
+     lambda text: _times(text, _SETS_IN, "y = z / shaft_onset", "q = shaft_sharpness")),
+    ("shaft-friction", ("constant", "growing with depth", "by a power of depth"), "rising with speed",
+     lambda text: _times(text, "tanh(abs(v) / shaft_rise)")),
+    ("adhesion", _HELDS, "fading towards the surface",
+     lambda text: _times(text, _SETS_IN, "y = z / pull_fade", "q = pull_fade_sharpness")),
+    ("adhesion", _HELDS, "on the way out", lambda text: text + "; times 1 - pull_out where it sinks again"),
+    ("adhesion", _HELDS, "letting go", lambda text: _times(text, "exp(-r / pull_let)")),
+    ("plastic-sinkage", ("crater", "curved crater", "stiffer unloading"), "empty",
+     lambda text: text + "; where that is 0, C times 1 - crater_open"),
+)  # fmt: skip
+"""Shapes in the order in which they are laid upon one another: effect, plain forms, name, what becomes of a text."""
+
+
+def _bend(form: str, plain: str, ways: Sequence[tuple[str, tuple[str, ...], str, Callable[[str], str]]]) -> None:
+    for place, (effect, of, name, made) in enumerate(ways):
+        if plain in [f"{effect}:{one}" for one in of]:
+            PENETRATION[f"{form}, {name}"] = made(PENETRATION[form])
+            _bend(f"{form}, {name}", plain, ways[place + 1 :])
+
+
+for _plain in tuple(PENETRATION):
+    _bend(_plain, _plain, _BENT)
 
 TUMBLE = {
     "wheel-vibration": "mu_s and mu_d times 1 - reduction * w^power / (w^power + speed^power), w the wheel's speed",

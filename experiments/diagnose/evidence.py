@@ -94,6 +94,8 @@ def score(found: Fit) -> float:
     return likelihood - cost
 
 
+_PLACES = 8
+"""Signs of the amplitude, lengths and other numbers from which a form is fitted, at most."""
 _SIZES = (0.1, 0.4, 1.0, 3.0)
 _FIRST = 0.2
 
@@ -111,27 +113,33 @@ def best_start(model: Model, form: Form, values: Values, *, rounds: int = 6) -> 
     amplitude = next(p for p in form.parameters if p.name == form.amplitude)
     known = {p.name: p.value for p in (*model.problem.base, *model.scatter) if math.isfinite(p.std)}
     points = []
+    places: list[tuple[float, ...]] = []
     for start in starts:
+        place = tuple(math.copysign(1.0, v) if name == form.amplitude else v for name, v in start.items())
         for size in _SIZES:
             value = float(np.clip(size * start[form.amplitude], amplitude.lowest, 0.95 * amplitude.highest))
             for others in (values, {**values, **known}) if known else (values,):
                 points.append({**others, **start, form.amplitude: value})
+                places.append(place)
     objectives = np.array([float(modes @ modes) for modes in model.evaluate(points)])
     order = np.argsort(objectives)
-    chosen = [int(order[0])]
-    for k in order[1:]:  # the next best that is not of the same start
-        if len(chosen) < 3 and all(abs(int(k) - c) >= 2 for c in chosen):
-            chosen.append(int(k))
+    chosen: list[int] = []
+    for k in order.tolist():  # of each place one: an amplitude hardly goes through zero
+        if len(chosen) < _PLACES and all(places[k] != places[c] for c in chosen):
+            chosen.append(k)
+    for k in order.tolist():  # and the next best that is not of the same start
+        if len(chosen) < 3 and all(abs(k - c) >= 2 for c in chosen):
+            chosen.append(k)
     fits = [fit(model, points[k], rounds=5) for k in chosen]
     best = min(fits, key=lambda found: found.objective)
     best = fit(model, best.values)
     if getattr(model.problem, "rough", ()) and excess(best) > 6 * math.sqrt(2.0 * best.count):
         part = model.until(_FIRST)
         early = [float(modes @ modes) for modes in part.evaluate(points)]
-        place: Values = points[int(np.argmin(early))]
+        begun: Values = points[int(np.argmin(early))]
         for share in (_FIRST, 0.4, 0.7):
-            place = fit(model.until(share), place, rounds=8).values
-        other = fit(model, place)
+            begun = fit(model.until(share), begun, rounds=8).values
+        other = fit(model, begun)
         best = other if other.objective < best.objective else best
     return best
 

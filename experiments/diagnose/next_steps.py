@@ -82,8 +82,8 @@ def after_unknown(
     if not alike:
         which = f"trial {trial}, the one with the largest gap," if sums else f"trial {trial}"
         return (
-            f"Repeat {which} twice without changing anything: what comes back is in {problem.whole}, what does not is "
-            f"in the room. And {_follow(worst, shares)}."
+            f"Repeat {which} twice without changing anything: what comes back is in {problem.whole} or in how a sensor "
+            f"follows them, what does not is in the room. And {_follow(worst, shares)}."
         )
     share = common_share(problem, values, forms, (trial, *alike))
     others = f"{alike[0]} to {alike[-1]}" if len(alike) > 3 else " and ".join(alike)
@@ -98,7 +98,10 @@ def after_unknown(
     # What comes back at the same time in every trial is no sensor's drift: time stands for where the spike is.
     follow = _follow(worst, {name: part for name, part in shares.items() if name != "t_s" or share < _IN_PART})
     if share >= _COMMON:
-        return f"It repeats: {measured}, so that it is in {problem.whole}. To find what it is, {follow}."
+        return (
+            f"It repeats: {measured}, so that it is in {problem.whole}, or in a sensor that misreads them alike each "
+            f"time (one that lags, say). To find what it is, {follow}."
+        )
     if share >= _IN_PART:
         return f"It repeats in part: {measured}. Of that part, {follow}; for the rest, see what differs between them."
     alone = (

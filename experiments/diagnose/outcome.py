@@ -133,6 +133,8 @@ class Told:
     jitters: tuple[Jitter, ...]
     colours: Mapping[str, Colour]
     model_std: Mapping[str, float]
+    alone: Fit | None = None
+    """The base model's fit with rows weighed as it has them itself, where they are weighed otherwise now."""
 
     def finish(
         self, base: Fit, choice: Choice | None, verdict: str, *, last: Verdict | None = None,
@@ -149,7 +151,7 @@ class Told:
             if verdict != "none" and base.model.scatter
             else base
         )
-        plain = base if plain is base else settled(plain)
+        plain = settled(self.alone) if self.alone is not None else base if plain is base else settled(plain)
         base_values, best_values = values_of_all(plain, held_out), values_of_all(best, held_out)
         effects = choice.best.effects if choice is not None else ()
         before = gap_of(problem, base.model, base_values, fitted, held_out)

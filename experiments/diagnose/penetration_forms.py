@@ -8,7 +8,7 @@ with d, and what belongs to the bed's spring with that diameter's own K; this is
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from .problem import Form, Parameter
@@ -47,7 +47,7 @@ class Library:
     slots: dict[str, dict[str, Slot]]
     """Form id -> parameter -> slot."""
     shapes: dict[str, tuple[Form, ...]]
-    """Form id -> the same form with more numbers, tried from where the plain one ends."""
+    """Form id -> the same form with more numbers, tried from where the plain one ends; a bent one may be bent again."""
 
 
 _Add = Callable[..., None]
@@ -101,15 +101,17 @@ def make_library(scales: Scales, *, retreats: bool, speeds_differ: bool) -> Libr
         _add_adhesion(add)
     _add_shaft(add, retreats)
     shapes: dict[str, tuple[Form, ...]] = {}
+
+    def bend(form: Form, ways: Sequence[_Shape]) -> None:
+        """All `ways` of a form, and of what each makes of it those that come after."""
+        for place, shape in enumerate(ways):
+            bent = _with_more(form, shape)
+            slots[bent.id] = slots[form.id] | {f"{form.effect}.{slot}": Slot(slot, how) for slot, how, *_ in shape.more}
+            shapes[form.id] = (*shapes.get(form.id, ()), bent)
+            bend(bent, ways[place + 1 :])
+
     for plain in forms:
-        bent = [
-            _with_more(plain, shape) for shape in _SHAPES if plain.name in shape.of and plain.effect == shape.effect
-        ]
-        for form, shape in bent:
-            slots[form.id] = {**slots[plain.id], **{f"{plain.effect}.{slot}": Slot(slot, how)
-                                                    for slot, how, *_ in shape.more}}  # fmt: skip
-        if bent:
-            shapes[plain.id] = tuple(form for form, _ in bent)
+        bend(plain, [shape for shape in _SHAPES if plain.name in shape.of and plain.effect == shape.effect])
     return Library(tuple(forms), slots, shapes)
 
 
@@ -130,6 +132,9 @@ class _Shape:
 _SHAPES = (
     _Shape("depth-hardening", ("quadratic",), "with a power", (("hardening_steeper", "plain", 0.0, 0.5, -0.8, 2.0),),
            ((-0.35,), (0.35,))),
+    # A tip that is in when it is in, or a stream that goes on widening.
+    _Shape("inertial-drag", ("with an onset",), "{}, as sharp as it is",
+           (("drag_sharpness", "plain", 2.5, 2.0, 0.7, 8.0),), ((1.0,), (4.0,))),
     # The shaft behind a wider tip, or a plate's edge: from a depth on it rubs as it will.
     _Shape("shaft-friction", ("constant", "by a power of depth", "falling with speed", "mobilised over a way"),
            "{}, setting in", (("shaft_onset", "depth", -3.0, 1.5, -6.0, 0.0),
@@ -144,13 +149,16 @@ _SHAPES = (
     # What takes a motion away from the bed to act lets go of a spike that goes in again.
     _Shape("adhesion", ("held", "held by depth", "held wherever it has been"), "{}, on the way out",
            (("pull_out", "plain", 0.5, 0.5, 0.0, 1.0),), ((0.9,),)),
+    # What is held at once may let go over another way than that over which it was taken up: a meniscus, a tail.
+    _Shape("adhesion", ("held", "held by depth", "held wherever it has been"), "{}, letting go",
+           (("pull_let", "depth", -1.0, 1.5, -5.0, 3.0),), ((-1.8,), (-0.5,))),
     # Where the crater is empty nothing is touched, and no damper acts.
     _Shape("plastic-sinkage", ("crater", "curved crater", "stiffer unloading"), "{}, empty",
            (("crater_open", "plain", 0.5, 0.5, 0.0, 1.0),), ((0.9,),)),
 )  # fmt: skip
 
 
-def _with_more(plain: Form, shape: _Shape) -> tuple[Form, _Shape]:
+def _with_more(plain: Form, shape: _Shape) -> Form:
     """`plain` with the numbers of `shape`."""
     more = tuple(
         Parameter(name=f"{plain.effect}.{slot}", unit="1", value=value, std=std, scale=0.2 * std, lowest=lowest,
@@ -160,7 +168,7 @@ def _with_more(plain: Form, shape: _Shape) -> tuple[Form, _Shape]:
     bends = tuple(dict(zip((p.name for p in more), start, strict=True)) for start in shape.starts)
     starts = tuple({**start, **bend} for bend in bends for start in plain.starts)
     return replace(plain, name=shape.name.format(plain.name), parameters=(*plain.parameters, *more), starts=starts,
-                   linear=False), shape  # fmt: skip
+                   linear=False)  # fmt: skip
 
 
 def _add_hardening(add: _Add) -> None:
@@ -169,6 +177,8 @@ def _add_hardening(add: _Add) -> None:
     add(effect, "quadratic", ("hardening_quadratic", "plain", 0.8, -0.6, 20.0), starts=((0.3,), (-0.2,)))
     add(effect, "cubic", ("hardening_cubic", "plain", 0.8, -0.4, 20.0), starts=((0.3,), (-0.15,)))
     add(effect, "exponential", ("hardening_exponential", "plain", 0.8, -8.0, 6.0), starts=((0.5,), (-0.5,)))
+    # Towards a depth that it never reaches: a bed that locks.
+    add(effect, "locking", ("hardening_locking", "plain", 0.4, 0.0, 0.71), starts=((0.2,), (0.5,)))
     add(effect, "early", ("hardening_early", "spring force", 0.5, 0.0, 20.0), ("hardening_reach", "depth", -4.0, 0.0),
         starts=((0.1, -2.5), (0.2, -1.0)))  # fmt: skip
     # Towards a bound, a hyperbola (Kondner, J. Soil Mech. Found. Div. 89 (1963), 115) where the sharpness is 1.

@@ -36,17 +36,19 @@ SLOTS = (
     "mass", "gravity", "stiffness", "damping", "reference", "speed_scale", "radius_depth",
     "hardening_power", "hardening_quadratic", "hardening_cubic", "hardening_exponential",
     "hardening_early", "hardening_reach", "hardening_level", "hardening_sharpness",
-    "hardening_steeper",
+    "hardening_steeper", "hardening_locking",
     "layer_depth", "layer_width", "layer_slope", "layer_step", "layer_factor", "layer_bump",
     "crater_share", "crater_bend", "crater_open", "unload_stiffness",
-    "drag", "drag_onset", "drag_reach", "drag_deep", "drag_both", "drag_tip",
+    "drag", "drag_onset", "drag_reach", "drag_sharpness", "drag_deep", "drag_both", "drag_tip",
     "shaft", "shaft_deep", "shaft_power", "shaft_viscous", "shaft_slow", "shaft_speed",
     "shaft_held", "shaft_reach", "shaft_growth", "shaft_onset", "shaft_sharpness", "shaft_rise",
     "pull", "pull_reach", "pull_deep", "pull_growth", "pull_ever", "pull_short", "pull_viscous",
-    "pull_sharpness", "pull_fade", "pull_fade_sharpness", "pull_out", "shift_depth", "shift_speed",
+    "pull_sharpness", "pull_fade", "pull_fade_sharpness", "pull_out", "pull_let",
+    "shift_depth", "shift_row", "shift_speed",
 )  # fmt: skip
 """Numbers of a lane, in order. `radius_depth`: depth at which the tip is wholly in; `speed_scale`: below it the
-direction of a driven spike is not certain; shifts: added to a driven spike's path, for derivatives."""
+direction of a driven spike is not certain; shifts: added to a driven spike's path, for derivatives (`shift_row`: to the
+depth of each row alone, all that came before it as it was)."""
 PHASES = ("free", "in", "rest", "out")
 
 _SLOT = {name: place for place, name in enumerate(SLOTS)}
@@ -169,14 +171,14 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
     REFERENCE, SPEED_SCALE, RADIUS_DEPTH = S["reference"], S["speed_scale"], S["radius_depth"]
     POWER, QUADRATIC, CUBIC = S["hardening_power"], S["hardening_quadratic"], S["hardening_cubic"]
     EXPONENTIAL, EARLY, EARLY_REACH = S["hardening_exponential"], S["hardening_early"], S["hardening_reach"]
-    STEEPER = S["hardening_steeper"]
+    STEEPER, LOCKING = S["hardening_steeper"], S["hardening_locking"]
     LEVEL, LEVEL_SHARPNESS = S["hardening_level"], S["hardening_sharpness"]
     LAYER_DEPTH, LAYER_WIDTH, LAYER_SLOPE = S["layer_depth"], S["layer_width"], S["layer_slope"]
     LAYER_STEP, LAYER_FACTOR, LAYER_BUMP = S["layer_step"], S["layer_factor"], S["layer_bump"]
     BEND, OPEN = S["crater_bend"], S["crater_open"]
     CRATER, UNLOAD = S["crater_share"], S["unload_stiffness"]
     DRAG, DRAG_DEEP, DRAG_BOTH, DRAG_TIP = S["drag"], S["drag_deep"], S["drag_both"], S["drag_tip"]
-    DRAG_ONSET, DRAG_REACH = S["drag_onset"], S["drag_reach"]
+    DRAG_ONSET, DRAG_REACH, DRAG_SHARPNESS = S["drag_onset"], S["drag_reach"], S["drag_sharpness"]
     SHAFT, SHAFT_DEEP, SHAFT_POWER, SHAFT_VISCOUS, SHAFT_SLOW, SHAFT_SPEED = (
         S["shaft"], S["shaft_deep"], S["shaft_power"], S["shaft_viscous"], S["shaft_slow"], S["shaft_speed"],
     )  # fmt: skip
@@ -187,7 +189,8 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
     )  # fmt: skip
     PULL_GROWTH, PULL_EVER, SHARPNESS = S["pull_growth"], S["pull_ever"], S["pull_sharpness"]
     FADE, FADE_SHARPNESS, PULL_OUT = S["pull_fade"], S["pull_fade_sharpness"], S["pull_out"]
-    SHIFT_DEPTH, SHIFT_SPEED = S["shift_depth"], S["shift_speed"]
+    LET = S["pull_let"]
+    SHIFT_DEPTH, SHIFT_ROW, SHIFT_SPEED = S["shift_depth"], S["shift_row"], S["shift_speed"]
     Table = ti.types.ndarray(dtype=ti.f64, ndim=2)
     Line = ti.types.ndarray(dtype=ti.f64, ndim=1)
     Whole = ti.types.ndarray(dtype=ti.i32, ndim=1)
@@ -218,6 +221,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
         if n[k, STEEPER] != 0.0:
             y = ti.pow(ti.max(x, 1e-9), 1.0 + n[k, STEEPER])
         grown *= 1.0 + n[k, QUADRATIC] * y + n[k, CUBIC] * x * x
+        grown /= ti.max(1.0 - n[k, LOCKING] * x, 0.05)
         if n[k, EARLY] != 0.0:
             grown += n[k, EARLY] * (1.0 - ti.exp(-depth / n[k, EARLY_REACH]))
         away = (depth - n[k, LAYER_DEPTH]) / n[k, LAYER_WIDTH]
@@ -267,7 +271,7 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
             shape = ti.min(z / n[k, RADIUS_DEPTH], 1.0)
             share = n[k, DRAG] + n[k, DRAG_DEEP] * x + n[k, DRAG_TIP] * shape * (2.0 - shape)
             if n[k, DRAG_ONSET] != 0.0:
-                share += n[k, DRAG_ONSET] * (1.0 - ti.exp(-z / n[k, DRAG_REACH]))
+                share += n[k, DRAG_ONSET] * mobilised(z / n[k, DRAG_REACH], n[k, DRAG_SHARPNESS])
             total += share * sinking * sinking + n[k, DRAG_BOTH] * v * ti.abs(v)
             rub = (n[k, SHAFT] + n[k, SHAFT_DEEP] * x) * way
             if n[k, SHAFT_POWER] != 0.0:
@@ -295,6 +299,9 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
                 pull += n[k, PULL_EVER] * ti.pow(ever / n[k, REFERENCE], n[k, PULL_GROWTH]) * part
             if n[k, FADE] > 0.0:
                 pull *= mobilised(z / n[k, FADE], n[k, FADE_SHARPNESS])
+            if n[k, LET] > 0.0:
+                gone = back if n[k, PULL_EVER] == 0.0 else ever - z
+                pull *= ti.exp(-gone / n[k, LET])
             pull *= 1.0 - n[k, PULL_OUT] * ti.max(way, 0.0)
             total -= pull
             total -= n[k, PULL_VISCOUS] * rising
@@ -318,7 +325,8 @@ def _kernels(own: tuple[Term, ...]) -> tuple[Any, Any]:
                     before = z
                 top, deepest = ti.max(top, z), ti.max(deepest, z)
                 way = ti.tanh(v / numbers[k, SPEED_SCALE])
-                out[k, row - starts[path]] = force(z, v, way, top, deepest, z, share, numbers, k)
+                here = z + numbers[k, SHIFT_ROW]
+                out[k, row - starts[path]] = force(here, v, way, top, deepest, z, share, numbers, k)
 
     @ti.kernel
     def fall_all(numbers: Table, lane_path: Whole, starts: Whole, times: Line, speeds: Line, steps: Line, out: Cube):

@@ -23,6 +23,7 @@ from experiments.campaign import Campaign, EffectTable, PenetrationCampaign, Pen
 from .jitter import Shaken
 from .own import PENETRATION_HOOKS, OwnEffect, own_parameters, own_starts
 from .penetration_data import Prepared, prepare, stds
+from .penetration_depth import SmoothDepth
 from .penetration_forms import Library, Scales, make_library, physical, unit_of
 from .penetration_law import PHASES, SLOTS, fall, push, slot_table
 from .penetration_remarks import Push, remarks
@@ -38,6 +39,8 @@ _SHALLOW = 0.02
 """Share of D that counts as just below the surface."""
 _BESIDE = 5
 """Rows before and after a turn that tell the force there."""
+_AT_TURN = 6
+"""Rows that a turn may last; where a spike is slow for longer it is held, or eased, and its direction is what it is."""
 _ZERO_DEPTH = 0.1
 """How far a depth's zero may differ between pushes while it is asked whether it does, over D."""
 _LEAST_ZERO = 0.2
@@ -66,8 +69,13 @@ class PenetrationProblem:
     zero_scatter = ("bed", "depth zero")
     """Kinds that are asked for by themselves where the others do not explain what is left, and where no trial repeats
     another (`lone_beds`): at one speed a damper and a depth's zero are the same."""
+    force_scatter = ("force zero",)
+    """And after these, of pushes that begin at the surface, where no row reads it: in a stiff bed the two are next to
+    the same; it counts where it explains all."""
     special_scatter = ("depth zero", "force zero")
     """Kinds that are not asked for with all others at once."""
+    by_path = True
+    """What the error of a path does to a reading goes with the model (`rewhiten`)."""
     own_base = "diameter_m"
     """The setting each value of which has base parameters of its own."""
 
@@ -260,7 +268,7 @@ class PenetrationProblem:
         return next((parameter.value for parameter in self.base if parameter.name == name), stated)
 
     def _run(self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[Prepared],
-             shifts: tuple[float, float] = (0.0, 0.0)) -> list[Array]:  # fmt: skip
+             shifts: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> list[Array]:  # fmt: skip
         """Forces [points, n] of driven trials, or motions [points, n, 4] of drops; all trials of one mode."""
         count = len(points)
         # Effects from files are compiled in where one of them is on: another kernel.
@@ -271,7 +279,7 @@ class PenetrationProblem:
             for k, values in enumerate(points):
                 self._numbers(values, forms, trial, numbers[place * count + k])
         numbers[:, _SLOT["shift_depth"]] += shifts[0]
-        numbers[:, _SLOT["shift_speed"]] = shifts[1]
+        numbers[:, _SLOT["shift_speed"]], numbers[:, _SLOT["shift_row"]] = shifts[1:]
         starts = np.cumsum([0, *(len(trial.time) for trial in trials)]).astype(np.int32)
         if trials[0].driven:
             depth = np.concatenate([trial.smooth.depth for trial in trials if trial.smooth is not None])
@@ -353,10 +361,10 @@ class PenetrationProblem:
         if not driven:
             return
         std_force = stds(self.tables, True)[1]
-        for trial, by_depth, by_speed in self._slopes(values, forms, driven):
+        for trial, by_depth, by_row, by_speed in self._slopes(values, forms, driven):
             assert trial.smooth is not None
             smooth = trial.smooth
-            factor = by_depth[:, None] * smooth.depth_error + by_speed[:, None] * smooth.speed_error
+            factor = _by_depth(smooth, by_depth, by_row) + by_speed[:, None] * smooth.speed_error
             if self._zeros is not None:
                 factor = np.column_stack([factor, np.full(len(factor), self._zeros.std)])
             # Where the error may cross the surface or the turning point, the force is no linear function of it.
@@ -379,16 +387,22 @@ class PenetrationProblem:
 
     def _slopes(
         self, values: Values, forms: Sequence[Form], driven: list[Prepared]
-    ) -> list[tuple[Prepared, Array, Array]]:
-        """dF/dz [N/m] and dF/dv [N s/m] along each path, by central differences."""
+    ) -> list[tuple[Prepared, Array, Array, Array]]:
+        """By central differences along each path: dF/dz [N/m] where all of the path is moved, where each row is moved
+        alone (what the bed remembers stays as deep as it was), and dF/dv [N s/m]."""
         dz, dv = 1e-4 * self._scales.depth, 1e-4 * self._scales.speed
-        sides = [self._run([values], forms, driven, shift) for shift in ((dz, 0), (-dz, 0), (0, dv), (0, -dv))]
+        ways = [(dz, 0.0, 0.0), (0.0, dv, 0.0), *([(0.0, 0.0, dz)] if forms else [])]
+        sides = [[self._run([values], forms, driven, (s * a, s * b, s * c)) for s in (1, -1)] for a, b, c in ways]
         found = []
         for place, trial in enumerate(driven):
-            up, down, fast, slow = (side[place][0] for side in sides)
+            apart = [up[place][0] - down[place][0] for up, down in sides]
+            whole, fast, alone = apart[0], apart[1], apart[-1] if forms else apart[0]
             # a shift of the path may cross the surface: the force there is no slope
-            most = 20 * np.median(np.abs(up - down)) + 1e-12
-            found.append((trial, np.clip(up - down, -most, most) / (2 * dz), (fast - slow) / (2 * dv)))
+            by_depth, by_row = (
+                np.clip(one, -most, most) / (2 * dz)
+                for one, most in ((one, 20 * np.median(np.abs(one)) + 1e-12) for one in (whole, alone))
+            )
+            found.append((trial, by_depth, by_row, fast / (2 * dv)))
         return found
 
     def chi_square(self, values: Values, forms: Sequence[Form], trial: str) -> tuple[float, int]:
@@ -405,13 +419,18 @@ class PenetrationProblem:
         """Of each reading of a driven trial's force, as docs/diagnose.md has it for the gap [N], shape [n]."""
         this = self._trials[trial]
         assert this.smooth is not None
-        ((_, by_depth, _),) = self._slopes(values, forms, [this])
-        doubt = np.abs(by_depth) * this.smooth.depth_std / this.smooth.inflation
+        ((_, by_depth, by_row, _),) = self._slopes(values, forms, [this])
+        doubt = np.linalg.norm(_by_depth(this.smooth, by_depth, by_row), axis=1) / this.smooth.inflation
         touch = _touching(this)
         if touch.any():  # the force begins with a jump: half of what it may be over what the depth leaves open
             most = float(_off_surface(this)[touch].max())
-            deep, shallow = (self._run([values], forms, [this], (shift, 0.0))[0][0] for shift in (most, -most))
+            deep, shallow = (self._run([values], forms, [this], (shift, 0.0, 0.0))[0][0] for shift in (most, -most))
             doubt = np.where(touch, np.maximum(doubt, 0.5 * np.abs(deep - shallow)), doubt)
+        turn = _reversing(this)
+        if turn.any():  # and so it does where the direction of motion is another, which friction goes with
+            most = float(np.maximum(_off_rest(this), np.abs(this.smooth.speed))[turn].max())
+            fast, slow = (self._run([values], forms, [this], (0.0, shift, 0.0))[0][0] for shift in (most, -most))
+            doubt = np.where(turn, np.maximum(doubt, 0.5 * np.abs(fast - slow)), doubt)
         return np.hypot(stds(self.tables, True)[1], doubt[this.has_other])
 
     # What is seen -----------------------------------------------------------------------------------------------------
@@ -562,6 +581,18 @@ class PenetrationProblem:
         )
 
 
+def _by_depth(smooth: SmoothDepth, by_depth: Array, by_row: Array) -> Array:
+    """What the error of a smoothed depth makes of the force [N], shape [n, error_count].
+
+    A force on the way back goes with two depths, where the spike is and how deep it has been, whose errors are not one:
+    a crater that is steep on the way out sees their difference.
+    """
+    deepest = np.maximum.accumulate(np.where(smooth.depth >= np.maximum.accumulate(smooth.depth),
+                                             np.arange(len(smooth.depth)), 0))  # fmt: skip
+    far = (by_depth - by_row)[:, None] * smooth.depth_error[deepest]
+    return by_row[:, None] * smooth.depth_error + far
+
+
 def _touching(trial: Prepared) -> NDArray[np.bool_]:
     """Rows of a driven trial that may lie on either side of the surface."""
     assert trial.smooth is not None
@@ -574,6 +605,29 @@ def _off_surface(trial: Prepared) -> Array:
     assert trial.smooth is not None
     smooth = trial.smooth
     return 3 * smooth.depth_std + np.abs(smooth.speed) * np.gradient(trial.time)
+
+
+def _off_rest(trial: Prepared) -> Array:
+    """How far from rest [m/s] a row may be and yet move the other way: the speed's error, and what it changes by within
+    a row."""
+    assert trial.smooth is not None
+    return 3 * trial.smooth.speed_std + np.abs(np.gradient(trial.smooth.speed))
+
+
+def _reversing(trial: Prepared) -> NDArray[np.bool_]:
+    """The few rows at which a driven spike may already come back or still go on; none of those where it is held."""
+    assert trial.smooth is not None
+    speed, off = trial.smooth.speed, _off_rest(trial)
+    found = np.zeros(len(speed), dtype=bool)
+    unsure = np.concatenate([[0], (np.abs(speed) < off).astype(int), [0]])
+    edges = np.flatnonzero(np.diff(unsure))
+    for low, high in zip(edges[::2], edges[1::2], strict=True):
+        low, high = max(0, int(low) - 1), min(len(speed) - 1, int(high))
+        if high - low <= _AT_TURN and speed[low] * speed[high] < 0:
+            found[low + 1 : high] = True
+    for k in np.flatnonzero(speed[1:] * speed[:-1] < 0):  # between two rows, neither of which is in doubt
+        found[k + int(abs(speed[k + 1]) < abs(speed[k]))] = True
+    return found
 
 
 def _turning(speed: Array, std: Array, force: Array, noise: float) -> Array:

@@ -102,13 +102,13 @@ def scatter_of(found: Fit, held_out: tuple[str, ...], *, apart: bool = False, ki
     return find_scatter(fit(model.on((*model.trials, *held_out)), unscattered(found)), apart=apart, kinds=kinds)
 
 
-def scatter_apart(found: Fit, held_out: tuple[str, ...], *, zeros: bool) -> Scatter:
-    """What replicates differ by where what is left hides it; none where they cannot be compared row by row. `zeros`:
-    asked for the kinds that stand by themselves."""
-    kinds = getattr(found.model.problem, "zero_scatter", ()) if zeros else ()
-    if not hasattr(found.model.problem, "calm") or (zeros and not kinds):
+def scatter_apart(found: Fit, held_out: tuple[str, ...], *, kinds: str = "") -> Scatter:
+    """What replicates differ by where what is left hides it; none where they cannot be compared row by row. `kinds`:
+    the problem's name of those that are asked for by themselves."""
+    asked = getattr(found.model.problem, kinds, ()) if kinds else ()
+    if not hasattr(found.model.problem, "calm") or (kinds and not asked):
         return Scatter()
-    return scatter_of(found, held_out, apart=True, kinds=kinds)
+    return scatter_of(found, held_out, apart=True, kinds=asked)
 
 
 def lone_scatter_of(found: Fit, held_out: tuple[str, ...]) -> tuple[Scatter, list[Finding]]:

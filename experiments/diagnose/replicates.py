@@ -15,6 +15,7 @@ from .fitting import Fit, Model, fit, scanned
 from .gaps import size_words
 from .gate import low_modes
 from .problem import Finding, Parameter, Problem, TrialInfo, Values
+from .unit_factors import factor_words
 
 __all__ = ["Scatter", "exchanged", "find_scatter", "groups_of", "likeliest_scatter", "odd_trials", "parted",
            "split_trials", "trends", "with_scatter"]  # fmt: skip
@@ -318,6 +319,18 @@ def likeliest_scatter(pairs: Sequence[np.ndarray]) -> float:
     return float(tried[int(np.argmax([log_likelihood(scatter) for scatter in tried]))])
 
 
+def _units(found: Fit, trial: str, others: Sequence[str]) -> str:
+    """Whether one of its channels is its replicates' in another unit."""
+    problem = found.model.problem
+    read = {id: problem.compare(found.values, found.model.forms, id) for id in (trial, *others)}
+    for channel, own in read[trial].items():
+        if all(channel in read[id] for id in others):
+            curves = [np.interp(own["t_s"], read[id][channel]["t_s"], read[id][channel]["measured"]) for id in others]
+            if said := factor_words(channel, own["measured"], curves):
+                return said
+    return ""
+
+
 def odd_trials(found: Fit) -> list[Finding]:
     """Trials at odds with at least two replicates that agree with one another."""
     slow = low_modes(found.model)
@@ -341,6 +354,7 @@ def odd_trials(found: Fit) -> list[Finding]:
                 what = (
                     f"trial {id} is at odds with its {len(others)} replicates, which agree with one another: in mean "
                     f"square it lies {mine / max(theirs, 1e-12):.0f} times as far from them; it is set aside"
+                    f"{_units(found, id, others)}"
                 )
                 findings.append(Finding(trial=id, what=what, set_aside=True))
     return findings

@@ -195,7 +195,7 @@ class Search:
         """The best of the forms that share scales with this single one, begun where it ended: what a pull's reach is to
         one form it is to the next."""
         best, (plain,) = one, one.forms
-        if one.score < self.base.score + _WORTH or excess(one.fit) < 2 * np.sqrt(2.0 * one.fit.count):
+        if one.score < self.base.score + _WORTH or excess(one.fit) < 0.5 * np.sqrt(2.0 * one.fit.count):
             return one
         scales = {p.name for p in plain.parameters} - {plain.amplitude}
         for form in one.fit.model.problem.forms:
@@ -212,21 +212,25 @@ class Search:
         return best
 
     def _bent(self, hypothesis: Hypothesis) -> Hypothesis:
-        """With forms of another shape (the problem's `shapes`) where that helps, from where the plain ones are."""
+        """With forms of another shape (the problem's `shapes`) where that helps, from where the plain ones are; what
+        is bent may be bent in a second way."""
         best = hypothesis
         shapes = getattr(best.fit.model.problem, "shapes", {})
-        for plain in hypothesis.forms if hypothesis.score > self._most - _BEHIND else ():
-            start, known = best, {p.name for p in plain.parameters}
+        plain = list(hypothesis.forms) if hypothesis.score > self._most - _BEHIND else []
+        while plain:
+            form, start = plain.pop(0), best
+            known = {p.name for p in form.parameters}
             if excess(start.fit) < 0.5 * np.sqrt(2.0 * start.fit.count):
                 break
-            for finer in shapes.get(plain.id, ()):
-                found = self._fitted_bend(start.fit, plain, finer, known)
+            for finer in shapes.get(form.id, ()):
+                found = self._fitted_bend(start.fit, form, finer, known)
                 made = Hypothesis(found, score(found))
                 self.table.append((_said(made), made))
                 if made.score > max(best.score, start.score + 1.0):
                     best = made
                     if len(made.forms) == 1:
                         self._alone[finer.id] = made
+            plain += [made for made in best.forms if made not in start.forms]
         return best
 
     @staticmethod
@@ -247,7 +251,7 @@ class Search:
         problem = hypothesis.fit.model.problem
         if len(hypothesis.forms) != 1 or hasattr(problem, "guess"):
             return []
-        shapes = getattr(problem, "shapes", {})
+        shapes = getattr(problem, "shapes", {}).keys() & {form.id for form in problem.forms}
         found: dict[str, Hypothesis] = {}
         for _, tried in self.table:
             if len(tried.forms) != 1 or tried.effects != hypothesis.effects or tried.forms == hypothesis.forms:

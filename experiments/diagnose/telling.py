@@ -76,8 +76,8 @@ def where_sentences(said: Mapping[str, Any]) -> list[str]:
         f"noise; its worst stretch is {first['channel']} of trial {first['trial']} from {first['from_s']:.4g} to "
         f"{first['to_s']:.4g} s."
     )
-    settings = _settings(places, total)
-    return [said_first, *([f"Most of it is at {settings}."] if settings else []), *_parted(said)]
+    settings = _settings(said)
+    return [said_first, *([f"Sample for sample most of it is at {settings}."] if settings else []), *_parted(said)]
 
 
 def sure_sentences(said: Mapping[str, Any]) -> list[str]:
@@ -186,19 +186,25 @@ def shares_words(places: Sequence[Mapping[str, Any]], key: str, total: float) ->
     return " and ".join(f"{name} ({100 * value / total:.0f} %)" for name, value in shown)
 
 
-def _settings(places: Sequence[Mapping[str, Any]], total: float) -> str:
-    """Values of settings that hold most of what is beyond the noise, where trials differ in them."""
-    names = dict.fromkeys(name for place in places for name in place.get("settings", {}))
+def _settings(said: Mapping[str, Any]) -> str:
+    """Values of settings at which a sample holds most of what is beyond the noise, where trials differ in them: a slow
+    trial has many samples."""
+    rows = [row for row in said.get("by_condition", []) if row["before"] > 1.0]
+    names = dict.fromkeys(name for row in rows for name in row["settings"])
     shown = []
     for name in names:
-        sums: dict[float, float] = {}
-        for place in places:
-            value = place.get("settings", {}).get(name)
+        beyond: dict[float, list[float]] = {}
+        for row in said["by_condition"]:
+            value = row["settings"].get(name)
             if value is not None:
-                sums[value] = sums.get(value, 0.0) + place["excess"]
-        value, most = max(sums.items(), key=lambda pair: pair[1])
-        if max(sums) - min(sums) > _OTHER * max(map(abs, sums)) and most >= _MAINLY * total:
-            shown.append(f"{setting_words(name, value)} ({100 * most / total:.0f} %)")
+                sums = beyond.setdefault(value, [0.0, 0.0])
+                sums[0] += row["samples"]
+                sums[1] += row["samples"] * max(row["before"] - 1.0, 0.0)
+        means = {value: total / count for value, (count, total) in beyond.items()}
+        value, most = max(means.items(), key=lambda pair: pair[1])
+        share = most / max(sum(means.values()), 1e-300)
+        if max(means) - min(means) > _OTHER * max(map(abs, means)) and share >= _MAINLY:
+            shown.append(f"{setting_words(name, value)} ({100 * share:.0f} %)")
     return ", ".join(shown)
 
 

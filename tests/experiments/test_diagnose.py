@@ -13,9 +13,12 @@ from experiments.campaign import read_model
 from experiments.cli import main
 from experiments.diagnose.diagnosis import diagnose
 from experiments.diagnose.document import document
+from experiments.diagnose.fitting import Model, Whitener
 from experiments.diagnose.penetration_problem import make_problem
 from experiments.diagnose.problem import TrialInfo
-from experiments.diagnose.replicates import split_trials
+from experiments.diagnose.renoised import whitened_fit
+from experiments.diagnose.replicates import odd_trials, split_trials
+from experiments.replicas import odd_replicates
 
 SCHEMA = json.loads(files("experiments.diagnose").joinpath("diagnosis.schema.json").read_text(encoding="utf-8"))
 SPEEDS = (0.01, 0.03, 0.1)
@@ -101,6 +104,20 @@ def test_a_vibration_is_unknown_and_goes_with_time():
     said = document(found)
     jsonschema.validate(said, SCHEMA)
     assert len(found.latent()["latent_force_N"]) == 5 * 400
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "mN"), (1 / 9.80665, "kilograms of force"), (1.3, "")])
+def test_one_file_of_three_in_another_unit_is_set_aside_and_the_unit_said(factor, unit):
+    trials = [(f"{k}", "driven", 0.05, driven_trial(base, speed=0.05, seed=k)) for k in range(3)]
+    trials += [(f"{k}", "driven", 0.02, driven_trial(base, speed=0.02, seed=k)) for k in range(3, 6)]
+    trials[1][3]["force_N"][:] *= factor
+    problem = make_problem(campaign_of(trials))
+    found = whitened_fit(Model(problem, Whitener.white(problem), tuple(trial.id for trial in problem.trials)))
+    (odd,) = odd_trials(found)
+    assert odd.trial == "1" and odd.set_aside and ("as if it were in" in odd.what) == bool(unit)
+    assert f"as if it were in {unit}" in odd.what or not unit
+    (said,) = odd_replicates(campaign_of(trials))
+    assert said.trial == "1" and (f"as if it were in {unit}" in said.what) == bool(unit)
 
 
 def test_a_trial_at_odds_with_its_replicates_is_set_aside_and_said():

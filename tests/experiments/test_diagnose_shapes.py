@@ -18,8 +18,12 @@ from penetration_campaigns import (
 
 from experiments.campaign import Recording
 from experiments.diagnose.diagnosis import diagnose
+from experiments.diagnose.evidence import best_start
+from experiments.diagnose.fitting import Model, Whitener
+from experiments.diagnose.penetration_forms import Scales, make_library
 from experiments.diagnose.penetration_law import SLOTS, fall, push, slot_table
 from experiments.diagnose.penetration_problem import make_problem
+from experiments.diagnose.renoised import whitened_fit
 from experiments.diagnose.replicates import split_trials
 
 ONSET = 1e-3
@@ -131,3 +135,74 @@ def test_what_no_fitted_trial_shows_of_a_form_is_learnt_from_those_held_out_and_
     assert found.verdict == "named" and found.effects == ("adhesion",)
     assert found.held_out == ("00", "20")
     assert found.after.held_out < 1.3 and found.forms[0].name.endswith("on the way out")
+
+
+def test_a_pull_lets_go_over_another_way_than_it_is_taken_up():
+    depth = np.concatenate([np.linspace(1e-4, 0.02, 400), np.linspace(0.02, 0.001, 400)[1:]])
+    speed, force = pushed(depth, pull=2.0, pull_reach=1e-4, pull_sharpness=5.0, pull_let=4e-3)
+    pull = STIFFNESS * depth + DAMPING * np.maximum(speed, 0.0) - force
+    back = 0.02 - depth
+    gone = (np.arange(len(depth)) > 400) & (back > 5e-4)
+    assert pull[gone] == pytest.approx(2.0 * np.exp(-back[gone] / 4e-3), rel=1e-3)
+    assert pull[:400] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_drag_that_grows_until_the_tip_is_in_has_a_corner_there():
+    depth = np.linspace(1e-4, 0.02, 400)
+    speed, force = pushed(depth, drag_onset=1e4, drag_reach=6e-3, drag_sharpness=8.0)
+    drag = (force - STIFFNESS * depth - DAMPING * speed) / (1e4 * speed**2)
+    away = np.abs(depth - 6e-3) > 2e-3
+    assert drag[away] == pytest.approx(np.minimum(1.0, depth / 6e-3)[away], abs=0.015)
+
+
+def test_what_is_bent_may_be_bent_once_more_each_way_once():
+    scales = Scales(depth=0.015, speed=0.05, force=13.0)
+    shapes = make_library(scales, retreats=True, speeds_differ=True).shapes
+    (twice,) = shapes["shaft-friction:by a power of depth, setting in"]
+    assert twice.id == "shaft-friction:by a power of depth, setting in, rising with speed"
+    names = {p.name.partition(".")[2] for p in twice.parameters}
+    assert {"shaft_power", "shaft_growth", "shaft_onset", "shaft_rise"} <= names
+    assert twice.id not in shapes and "shaft-friction:by a power of depth, rising with speed" not in shapes
+
+
+def lets_go(z, v, top=0.0):
+    back = top - z
+    pull = 2.5 * math.exp(-back / 4e-3) * (1 - math.exp(-back / 2e-4)) if v < 0 else 0.0
+    return STIFFNESS * z + DAMPING * max(v, 0.0) - pull
+
+
+def test_a_pull_that_is_there_at_once_and_lets_go_over_millimetres_is_adhesion():
+    trials = []
+    for k, speed in enumerate((0.01, 0.03, 0.06) * 2):
+        trials.append((f"{k:02d}", "driven", speed, driven_trial(lets_go, speed=speed, retreat=True, seed=60 + k)))
+    found = diagnose(make_problem(campaign_of(trials)))
+    assert (found.verdict, found.effects) == ("named", ("adhesion",))
+    assert found.before.held_out > 20 and found.after.held_out < 1.2
+
+
+def locking(z, v, top=0.0):
+    return STIFFNESS * z / (1 - z / 0.035) + DAMPING * max(v, 0.0)
+
+
+def test_a_bed_that_locks_is_hardening_and_no_layer():
+    trials = [(f"{k:02d}", "driven", speed, driven_trial(locking, speed=speed, seed=70 + k))
+              for k, speed in enumerate((0.01, 0.03, 0.06) * 2)]  # fmt: skip
+    found = diagnose(make_problem(campaign_of(trials)))
+    assert (found.verdict, found.effects) == ("named", ("depth-hardening",))
+    assert found.after.held_out < 1.2
+
+
+def test_a_small_step_is_found_from_the_side_on_which_it_lies():
+    # From a step down it would have to go through none at all, where its place and width say nothing.
+    def step(z, v, top=0.0):
+        return STIFFNESS * z + DAMPING * max(v, 0.0) + 0.5 / (1 + math.exp(-(z - 0.01) / 6e-4))
+
+    trials = [(f"{k:02d}", "driven", speed, driven_trial(step, speed=speed, seed=80 + k))
+              for k, speed in enumerate((0.01, 0.03, 0.06, 0.03))]  # fmt: skip
+    problem = make_problem(campaign_of(trials))
+    base = whitened_fit(Model(problem, Whitener.white(problem), tuple(t.id for t in problem.trials)))
+    form = next(form for form in problem.forms if form.id == "layering:step")
+    found = best_start(base.model.with_forms([form]), form, base.values)
+    assert problem.reported(found.values, form)["layer_step"][0] == pytest.approx(0.5, rel=0.1)
+    assert problem.reported(found.values, form)["layer_depth"][0] == pytest.approx(0.01, rel=0.03)
+    assert found.chi_square / found.count < 1.1

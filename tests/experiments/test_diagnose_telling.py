@@ -55,10 +55,13 @@ def place(trial: str, channel: str, phase: str, excess: float, torque: float) ->
 def test_where_the_model_fails_is_said_with_phase_channel_seconds_and_torque():
     places = [place("001", "x", "slip", 80.0, 6.0), place("002", "gyro", "slip", 15.0, 0.22),
               place("002", "x", "hop", 5.0, 0.22)]  # fmt: skip
-    first, second = where_sentences({"where": places})
+    slow = {"settings": {"torque_N_m": 0.22, "gravity_m_s2": 0.08}, "samples": 4000, "before": 2.0}
+    fast = {"settings": {"torque_N_m": 6.0, "gravity_m_s2": 0.08}, "samples": 100, "before": 5.0}
+    first, second = where_sentences({"where": places, "by_condition": [slow, fast]})
     assert "in phase slip (95 %) and channel x (85 %)" in first
     assert "x of trial 001 from 0.4 to 0.9 s" in first
-    assert second == "Most of it is at torque 6 N m (80 %)."  # all trials share the gravity: it tells nothing
+    # The slow trials hold 4000 of 4400 beyond noise, in forty times as many samples; the gravity is shared by all.
+    assert second == "Sample for sample most of it is at torque 6 N m (80 %)."
     assert where_sentences({"where": []}) == []
 
 

@@ -100,3 +100,21 @@ def test_one_bed_that_is_another_is_no_scatter():
     found = diagnose(problem_of(straight, ALONE, beds=np.where(np.arange(8) == 3, 0.2, 0.0)))
     assert found.verdict != "none"
     assert any("another in trial 3 than in all others" in finding.what for finding in found.findings)
+
+
+def test_a_force_zero_of_pushes_that_begin_at_the_surface_is_nothing_missing():
+    # At rest on the surface no row reads the zero for certain; a depth's zero takes up most of it, but not there.
+    trials = []
+    for k, (speed, off) in enumerate(zip(SPEEDS, OFF, strict=True)):
+        random = np.random.default_rng(90 + k)
+        time = np.arange(0.0, 0.3 + 0.012 / speed + 0.3, 0.004)
+        z = np.clip(speed * (time - 0.3), 0.0, 0.012)
+        v = np.where((time > 0.3) & (z < 0.012), speed, 0.0)
+        force = STIFFNESS * z + DAMPING * v + 1.5 * FORCE_STD * off
+        trials.append((f"{k}", "driven", speed, Recording({
+            "t_s": time, "depth_m": z + 2e-5 * random.standard_normal(len(z)),
+            "force_N": force + FORCE_STD * random.standard_normal(len(z)),
+        })))  # fmt: skip
+    found = diagnose(make_problem(campaign_of(trials, depth_std=2e-5)))
+    assert found.verdict == "none"
+    assert found.model_std["force zero"] == pytest.approx(1.5 * FORCE_STD, rel=0.4)
