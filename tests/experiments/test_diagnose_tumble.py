@@ -29,6 +29,19 @@ from rigid import STATES, Effect
         ((Effect(id="com-offset", parameters={"x": 4e-4, "y": -3e-4}),), {"com-offset.x": 4e-4, "com-offset.y": -3e-4}),
         (
             (
+                Effect(id="plastic-sinkage", parameters={"share": 0.5, "open": 1.0}),
+                Effect(id="adhesion", parameters={"force": 0.1, "reach": 2e-5, "speed": 2e-3}),
+            ),
+            {
+                "plastic-sinkage.share": 0.5,
+                "plastic-sinkage.open": 1.0,
+                "adhesion.force": 0.1,
+                "adhesion.reach": 2e-5,
+                "adhesion.speed": 2e-3,
+            },
+        ),
+        (
+            (
                 Effect(id="clock-offset", parameters={"offset": 0.013, "drift": 0.004}),
                 Effect(id="camera-scale", parameters={"scale": 1.02, "bend": 0.3}),
             ),
