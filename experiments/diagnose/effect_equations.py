@@ -110,8 +110,8 @@ TUMBLE = {
                 "acts while the tip goes out at v, times 1 - exp(-v / speed)",
     "rate-friction": "mu_d times 1 + change * abs(u)^power / (abs(u)^power + speed^power), u the sliding speed, power "
                      "1 where it is not named",
-    "umbilical": "a torque - stiffness * theta * abs(theta)^(spring_power - 1) - drag * omega * "
-                 "abs(omega)^(drag_power - 1), powers 1 where they are not named",
+    "umbilical": "a torque - stiffness * a * abs(a)^(spring_power - 1) - drag * omega * abs(omega)^(drag_power - 1), "
+                 "a = theta - rest, powers 1 and rest 0 where they are not named",
     "bearing-drag": "a torque - torque * sign(omega)",
     "clock-offset": "the IMU's time = (1 + drift) * t + offset",
     "camera-scale": "x and y as seen = (scale + bend * d^2) times the true ones, d the distance from the start",
