@@ -153,8 +153,8 @@ class System:
         if not self.model.has_memory:
             return False
         depth = 1e-3
-        fresh = self.model.contact(self.p, self.s, self.q, depth, 0.0, 0.0, depth, depth)
-        again = self.model.contact(self.p, self.s, self.q, depth, 0.0, 0.0, 2 * depth, 2 * depth)
+        fresh = self.model.contact(self.p, self.s, self.q, depth, -1.0, 0.0, depth, depth)
+        again = self.model.contact(self.p, self.s, self.q, depth, -1.0, 0.0, 2 * depth, 2 * depth)
         return bool(self.crater != 0.0 or fresh != again)
 
     # -- geometry ----------------------------------------------------------------------------------------------------

@@ -109,7 +109,7 @@ class Model:
     @property
     def has_memory(self) -> bool:
         """Whether the deepest depth of a spike matters."""
-        return self.law.has_memory or self.has("crater", "hold", "unload")
+        return self.law.has_memory or self.has("crater", "hold", "unload", "rate_pull")
 
 
 def parameter_names(terms: Sequence[Term]) -> tuple[str, ...]:
@@ -182,16 +182,18 @@ def model_source(terms: Sequence[Term], law: SurfaceLaw) -> str:
         out += [f"    {hook} = {call}" for call in _calls(every, f"inner_{hook}", "s")]
     out += ["    return mass, force, holds\n", "def plastic_share(p):", "    left = 1.0"]
     out += [f"    left = left * (1.0 - {call})" for call in _calls(every, "crater", "")]
-    out += ["    return 1.0 - left\n", "def crater(p):"]
+    out += ["    return 1.0 - left\n", "def hollow(p):", "    open = 0.0"]
+    out += [f"    open = max(open, {call})" for call in _calls(every, "hollow", "")]
+    out += ["    return open\n", "def crater(p):", "    f = plastic_share(p)"]
     if law.has_memory:
-        out += ["    f = plastic_share(p)", "    return f + (1.0 - f) * (1.0 - p.rebound)\n"]
-    else:
-        out += ["    return plastic_share(p)\n"]
+        out += ["    f = f + (1.0 - f) * (1.0 - p.rebound)"]
+    out += ["    if hollow(p) > 0.0:", "        f = 0.0", "    return f\n"]
     out += ["def contact(p, s, q, depth, rate, slip, top, held):"]
     if _calls(every, "crater", ""):
         out += ["    f = plastic_share(p)", "    z = (depth - f * top) / (1.0 - f)", "    left = 1.0 - f"]
+        out += ["    damped = z", "    if hollow(p) > 0.0:", "        z = max(z, 0.0)", "        damped = depth"]
     else:
-        out += ["    z = depth"]
+        out += ["    z = depth", "    damped = z"]
     at = "top" if law.has_memory else "z"
     out += [f"    elastic = law_loading({at}, q)", f"    stored = law_loading_work({at}, q)"]
     out += [f"    elastic, stored = {call}" for call in _calls(every, "stiffen", f"{at}, elastic, stored")]
@@ -205,8 +207,9 @@ def model_source(terms: Sequence[Term], law: SurfaceLaw) -> str:
         out += ["    stored = left * stored"]
     for call in _calls(every, "hold", "s, depth, held"):
         out += [f"    pull, work = {call}", "    elastic = elastic - pull", "    stored = stored + work"]
-    out += ["    lost = law_rate_force(z, rate, q)"]
+    out += ["    lost = law_rate_force(damped, rate, q)"]
     out += [f"    lost = lost + {call}" for call in _calls(every, "rate_force", "s, depth, rate")]
+    out += [f"    lost = lost + {call}" for call in _calls(every, "rate_pull", "s, depth, rate, held")]
     out += ["    side = 0.0"]
     out += [f"    side = side + {call}" for call in _calls(every, "side_force", "s, depth, slip")]
     out += ["    factor_s = 1.0", "    factor_d = 1.0"]
@@ -234,7 +237,7 @@ def _hooks(terms: Sequence[Term], law: SurfaceLaw) -> dict[str, Callable[..., An
 
 _GLUE = (
     "vertical", "tip_radius", "torque_factor", "inertia", "applied", "potential", "losses", "dry_friction",
-    "inner_start", "inner", "plastic_share", "crater", "contact",
+    "inner_start", "inner", "plastic_share", "hollow", "crater", "contact",
 )  # fmt: skip
 
 

@@ -182,11 +182,13 @@ class Trial:
             if effect.term.needs_rig and self.counterweight == 0:
                 raise ValueError(f"effect {effect.id!r} needs a rig: counterweight = 0 must be above 0 (kg)")
         law, crater = self.ground.law if self.ground else None, self.effect_values("plastic-sinkage")
-        if law and law.has_memory and crater and crater["bend"]:
-            raise ValueError(
-                f"plastic-sinkage.bend = {crater['bend']:g} must be 0 on ground {law.name!r}, whose unloading has "
-                "a curve of its own"
-            )
+        if law and law.has_memory and crater:
+            for key in ("bend", "open"):
+                if crater[key]:
+                    raise ValueError(
+                        f"plastic-sinkage.{key} = {crater[key]:g} must be 0 on ground {law.name!r}, whose unloading "
+                        "has a curve of its own"
+                    )
         offset = self.effect_values("com-offset")
         if offset and self.mass * (offset["x"] ** 2 + offset["y"] ** 2) >= self.inertia:
             raise ValueError(

@@ -19,6 +19,7 @@ from .evidence import held_out_fit
 from .fitting import Fit, by_beginnings, fit
 from .gate import held_out_gate, open_gate
 from .problem import Finding
+from .replicates import groups_of
 
 __all__ = ["allowed", "astray", "astray_finding", "astray_held_out"]
 
@@ -27,6 +28,9 @@ _ONE_OF = 6
 _MOST_LEFT = 0.5
 """Share of what a model leaves that may be left without those trials, to first order, for a refit to be worth it: on
 another branch it may take more."""
+_OF_CONDITION = 3
+"""Of so many trials as many as one condition has may have gone a way of their own together, where replicates repeat a
+touch: beside a name that explains all the others."""
 _FAR = 3.0
 """Chi-square per sample beyond which a trial is one of those that the model does not explain; a single trial that goes
 its own way may bend the fit to one other as far."""
@@ -51,13 +55,19 @@ def astray(
         return ()
     most = allowed(len(trials))
     bare = not found.model.forms  # then one of all of them: what shows in two trials may be an effect
+    groups = {} if bare else groups_of([trial for trial in problem.trials if trial.id in trials])
+    largest = max((len(ids) for ids in groups.values() if len(ids) * _OF_CONDITION <= len(trials)), default=0)
     left = {trial: float(found.modes[rows] @ found.modes[rows]) / (rows.stop - rows.start)
             for trial, rows in found.model.rows().items()}  # fmt: skip
-    if sum(per_sample > _FAR for per_sample in left.values()) > most + 1:
+    if sum(per_sample > _FAR for per_sample in left.values()) > max(most, largest) + 1:
         return ()  # that is no affair of single trials
     order = sorted(trials, key=lambda trial: -left[trial])
-    for count in range(1, most + 1):
-        rest = tuple(trial for trial in trials if trial not in order[:count])
+    tried = [order[:count] for count in range(1, most + 1)]
+    worst = next((list(ids) for ids in groups.values() if order[0] in ids), [])
+    if most < len(worst) <= largest:
+        tried.append(worst)
+    for gone in tried:
+        rest = tuple(trial for trial in trials if trial not in gone)
         if len(rest) < 3:
             break
         if _unexplained(found, rest) > _MOST_LEFT * _unexplained(found, trials):
@@ -66,10 +76,10 @@ def astray(
         if is_strained(learned) or not open_gate(learned, seed=seed)[1].passed:
             continue
         values = held_out_fit(learned.model, held_out, learned.values)
-        others = allowed(len(trials) + len(held_out)) - count if bare else allowed(len(held_out))
+        others = allowed(len(trials) + len(held_out)) - len(gone) if bare else allowed(len(held_out))
         if astray_held_out(learned, held_out, values, others, seed=seed) is None:
             return ()
-        told = [astray_finding(learned, trial, learned.values) for trial in order[:count]]
+        told = [astray_finding(learned, trial, learned.values) for trial in gone]
         return tuple(one for one in told if one is not None) if None not in told else ()
     return ()
 

@@ -11,14 +11,17 @@ import numpy as np
 
 from .astray import allowed, astray_held_out
 from .bounds import bends_little_away, bounds_met, is_strained
-from .evidence import SMALL, Hypothesis, excess, held_out_fit
+from .evidence import SMALL, Hypothesis, excess, held_out_fit, inflation
 from .fitting import Fit, Model
 from .gate import Verdict
 from .prediction import folds_of, predict
 from .problem import Problem
 from .search import Choice
 
-__all__ = ["Gap", "certain", "closes", "gap_of", "one_number", "smallest", "unscattered", "values_of_all", "verdict_of"]
+__all__ = [
+    "Gap", "certain", "closes", "gap_of", "one_number", "smallest", "unscattered", "values_of_all", "verdict_of",
+    "well_known",
+]  # fmt: skip
 
 _AS_LIKELY = 1.0
 """Nats within which a third name is said as well."""
@@ -157,7 +160,7 @@ def certain(base: Fit, choice: Choice) -> bool:
         return False
     if excess(choice.best.fit) >= _CERTAIN * excess(base):
         return False
-    if choice.predicted is None or not one_number(choice):
+    if choice.predicted is None or not one_number(choice) or not well_known(choice.best.fit):
         return False
     trials = [trial for trial in base.model.problem.trials if trial.id in base.model.trials]
     predicted = predict(base, folds_of(trials))
@@ -176,6 +179,18 @@ def one_number(choice: Choice) -> bool:
         if error > _ONE_NUMBER * abs(choice.best.fit.values[form.amplitude]):
             return False
     return True
+
+
+def well_known(found: Fit) -> bool:
+    """Whether the fit itself, its misfit counted as noise, knows each effect's amplitude as well as that: a form whose
+    other numbers can stand in for its amplitude (a pendulum far off its centre is a steady push) names nothing."""
+    names = [p.name for p in found.model.parameters]
+    variance = np.diag(found.covariance(inflation=inflation(found)))
+    return all(
+        math.sqrt(max(float(variance[names.index(form.amplitude)]), 0.0))
+        <= _ONE_NUMBER * abs(found.values[form.amplitude])
+        for form in found.model.forms
+    )
 
 
 def closes(base: Fit, best: Fit, held_out: tuple[str, ...]) -> bool:

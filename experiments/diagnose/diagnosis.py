@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from .astray import allowed
 from .bounds import is_strained
 from .colour import Colour
 from .deciding import unscattered, verdict_of
@@ -131,7 +132,9 @@ class _Course:
         if choice.astray:
             self.tell("a trial goes its own way: once more without it", 0.0)
             anew = self._again(aside=choice.astray, looked_at=asked.looked_at)
-            return anew if anew.verdict != "unknown" else self._again(looked_at=asked.looked_at, patient=True)
+            if self._stands(anew, choice.astray):
+                return anew
+            return self._again(looked_at=asked.looked_at, patient=True)
         for step in (
             self._reweighed, self._scattered, self._scattered_beside, self._scattered_alone, self._timed,
             self._recoloured_choice, self._doubted,
@@ -352,7 +355,7 @@ class _Course:
             if gone:
                 self.tell("a trial goes its own way: once more without it", 0.0)
                 anew = self._again(aside=gone, looked_at=asked.looked_at)
-                if anew.verdict != "unknown":
+                if self._stands(anew, gone):
                     return anew
         explains = verdict == "unknown" and bool(choice.best.effects) and choice.left.passed
         if explains and not (asked.looked_at or asked.aside):
@@ -384,6 +387,12 @@ class _Course:
             self.findings += held_out_ways(choice.best.fit, held_out, asked.seed)
         told = self._told({**model_std, **self.unrest.model_std})
         return told.finish(self.base, choice, verdict, held=held, sure=sure)
+
+    def _stands(self, anew: Diagnosis, gone: Sequence[Finding]) -> bool:
+        """Whether what was found without the trials that are `gone` stands. A whole condition is set aside for a name
+        only: where nothing is missing without it, what is missing shows in it."""
+        few = len(gone) <= allowed(len(self.base.model.trials))
+        return anew.verdict != "unknown" and (few or anew.verdict != "none")
 
     def _ended(self, choice: Choice) -> Choice:
         """The best fit once more from where it is: one that a bend of the model had stopped may go on, above all along

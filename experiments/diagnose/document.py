@@ -28,6 +28,7 @@ from .outcome import Diagnosis
 from .problem import Form
 from .scatter_gap import gap_with_scatter, scatter_std, sensor_std
 from .sizes import effect_sizes
+from .spectrum import line_rows
 from .telling import PhaseTable, valid_residuals
 
 __all__ = ["document", "write_diagnosis"]
@@ -69,7 +70,8 @@ def document(found: Diagnosis) -> dict[str, Any]:
              "excess": p.excess}
             for p in found.left
         ]  # fmt: skip
-        said["latent"] = {"file": "latent.csv", "depends_on": found.depends_on, "explained": dict(found.shares)}
+        said["latent"] = {"file": "latent.csv", "depends_on": found.depends_on, "explained": dict(found.shares),
+                          "lines": line_rows(found.lines)}  # fmt: skip
     said["base"] = _base_values(found)
     said["gate"] = {
         "before": {"passed": found.gate_before.passed, "score": found.gate_before.score,

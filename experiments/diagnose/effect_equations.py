@@ -114,13 +114,15 @@ TUMBLE = {
     "depth-hardening": "the law's force times (z / reference)^(exponent - 1), or times 1 + bend * z (bend below 0: "
                        "over 1 - bend * z)",
     "plastic-sinkage": "on the way back the law's force at (z - share * z_m) / (1 - share), times (that over z_m)^a, "
-                       "a = bend * (1 - exp(-20 * share)); z_m the deepest depth since it touched",
+                       "a = bend * (1 - exp(-20 * share)); z_m the deepest depth since it touched; with open = 1 a "
+                       "tip above the bottom of its crater still touches: the torque and the damper act",
     "adhesion": "- force * ((1 - sharpness) * (1 - exp(-x)) + sharpness * tanh(x)), x = (z_m - z) / reach the way "
-                "back; friction keeps the share grip of it (both 0 where they are not named)",
+                "back; friction keeps the share grip of it (both 0 where they are not named); with a speed it "
+                "acts while the tip goes out at v, times 1 - exp(-v / speed)",
     "rate-friction": "mu_d times 1 + change * abs(u)^power / (abs(u)^power + speed^power), u the sliding speed, power "
                      "1 where it is not named",
-    "umbilical": "a torque - stiffness * theta * abs(theta)^(spring_power - 1) - drag * omega * "
-                 "abs(omega)^(drag_power - 1), powers 1 where they are not named",
+    "umbilical": "a torque - stiffness * a * abs(a)^(spring_power - 1) - drag * omega * abs(omega)^(drag_power - 1), "
+                 "a = theta - rest, powers 1 and rest 0 where they are not named",
     "bearing-drag": "a torque - torque * sign(omega)",
     "clock-offset": "the IMU's time = (1 + drift) * t + offset",
     "camera-scale": "x and y as seen = (scale + bend * d^2) times the true ones, d the distance from the start",

@@ -24,6 +24,7 @@ from .prediction import Predicted
 from .problem import Finding, Form, Problem
 from .scatter_gap import gap_with_scatter, weighed_residuals
 from .search import Choice
+from .spectrum import Line, lines_of
 
 __all__ = ["Diagnosis", "Told"]
 
@@ -65,6 +66,8 @@ class Diagnosis:
     next_experiment: str
     depends_on: str = ""
     shares: Mapping[str, float] = field(default_factory=dict)
+    lines: tuple[Line, ...] = ()
+    """In the spectrum of what the best model leaves, if the verdict is unknown."""
     left: tuple[Place, ...] = ()
     """Where the best model fails beyond what replicates differ by, if the verdict is unknown."""
 
@@ -170,7 +173,7 @@ class Told:
         alternatives = tuple(next(e for e in rival.effects if e not in effects) for rival in rivals)
         rival_forms = tuple(next(f for f in rival.forms if f.effect == e)
                             for rival, e in zip(rivals, alternatives, strict=True))  # fmt: skip
-        told, shares, left = "", dict[str, float](), list[Place]()
+        told, shares, left, lines = "", dict[str, float](), list[Place](), list[Line]()
         own_values: Mapping[str, float] = best_values
         findings = (*self.findings, *(jitter.finding for jitter in self.jitters))
         if verdict == "unknown":
@@ -181,6 +184,7 @@ class Told:
             told, shares = depends_on(latent_table(problem, own_values, best.model.forms))
             rest = weighed_residuals(problem, others, own_values, best.model.forms, (*fitted, *held_out))
             left = places_in(problem, own_values, best.model.forms, rest)
+            lines = lines_of(problem, own_values, best.model.forms, (*fitted, *held_out))
         found = Diagnosis(
             verdict=verdict, problem=problem, base=plain, best=best, base_values=base_values, best_values=best_values,
             own_values=own_values,
@@ -188,7 +192,7 @@ class Told:
             after=after, fitted=fitted, held_out=held_out, gate_before=self.first,
             gate_after=last or (choice.left if choice is not None else self.first), gate_held_out=held, choice=choice,
             colours=self.colours, jitters=self.jitters, model_std=self.model_std, findings=findings, depends_on=told,
-            shares=shares, left=tuple(left), next_experiment="",
+            shares=shares, lines=tuple(lines), left=tuple(left), next_experiment="",
         )  # fmt: skip
         return replace(found, next_experiment=_next(found))
 

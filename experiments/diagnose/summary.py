@@ -10,6 +10,7 @@ from .candidates import unnamed_sentence
 from .effect_words import meaning
 from .evidence import SMALL
 from .gaps import numeral, size_words
+from .spectrum import line_sentence
 from .telling import shares_words, size_sentences, small_names, sure_sentences
 
 __all__ = ["scatter_sentence", "summary_sentences", "title_words"]
@@ -259,4 +260,5 @@ def _left(said: Mapping[str, Any]) -> list[str]:
         )
     if "latent" in said:
         sentences.append(f"The force that is missing goes with {said['latent']['depends_on']}.")
+        sentences += [line_sentence(row) for row in said["latent"].get("lines", [])]
     return sentences

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -91,6 +91,20 @@ def _gripping(values: Mapping[str, Array], *, reach: float) -> Columns:
     return {"adhesion.force": force, "adhesion.reach": reach * np.exp(log_reach), "adhesion.grip": np.ones_like(force)}
 
 
+def _torn(values: Mapping[str, Array], *, reach: float, speed: float) -> Columns:
+    log_reach, log_speed = (np.asarray(values[f"adhesion.log_{name}"], dtype=float) for name in ("reach", "speed"))
+    return {
+        "adhesion.force": np.asarray(values["adhesion.force"], dtype=float),
+        "adhesion.reach": reach * np.exp(log_reach),
+        "adhesion.speed": speed * np.exp(log_speed),
+    }
+
+
+def _hollow(values: Mapping[str, Array]) -> Columns:
+    share = np.asarray(values["plastic-sinkage.share"], dtype=float)
+    return {"plastic-sinkage.share": share, "plastic-sinkage.open": np.ones_like(share)}
+
+
 def _scaled(
     amplitude: str, scale: str, typical: float, *, shift: float = 0.0, log: str
 ) -> Callable[[Mapping[str, Array]], Columns]:
@@ -106,7 +120,7 @@ def _own(amplitude: str, shift: float) -> str:
 
 def tumble_forms(
     *, rig: bool, sinkage: float, weight: float, friction_speed: float = 0.05, wheel_speed: float = 100.0,
-    own: Sequence[OwnEffect] = (),
+    lift_speed: float = 2e-3, own: Sequence[OwnEffect] = (),
 ) -> tuple[TumbleForm, ...]:  # fmt: skip
     """The library for one campaign.
 
@@ -116,6 +130,7 @@ def tumble_forms(
         weight: on the surface [N]: amplitudes of forces are about a hundredth of it.
         friction_speed: typical sliding speed [m/s].
         wheel_speed: typical speed of the wheel [rad/s].
+        lift_speed: typical speed of a tip that goes out [m/s]: the depth at rest times the frequency of bouncing.
         own: effects from files.
     """
     force, moment = 0.02 * weight, 0.005 * weight
@@ -252,6 +267,14 @@ def tumble_forms(
             starts=tuple({"plastic-sinkage.share": f, "plastic-sinkage.bend": 0.3} for f in (0.05, 0.15, 0.5, 0.85)),
         ),
         TumbleForm(
+            effect="plastic-sinkage",
+            name="open crater",
+            amplitude="plastic-sinkage.share",
+            parameters=(_free("plastic-sinkage.share", "1", 0.1, lowest=0.0, highest=0.93),),
+            physical=_hollow,
+            starts=tuple({"plastic-sinkage.share": f} for f in (0.15, 0.5, 0.85)),
+        ),
+        TumbleForm(
             effect="adhesion",
             name="mobilised",
             amplitude="adhesion.force",
@@ -272,6 +295,21 @@ def tumble_forms(
             ),
             physical=partial(_gripping, reach=max(sinkage, 1e-6)),
             starts=pulls,
+        ),
+        TumbleForm(
+            effect="adhesion",
+            name="on the way out",
+            amplitude="adhesion.force",
+            parameters=(
+                _free("adhesion.force", "N", force, lowest=0.0, highest=20 * weight),
+                _log("adhesion.log_reach"),
+                replace(_log("adhesion.log_speed"), std=2.0, lowest=-1.5),
+            ),
+            physical=partial(_torn, reach=max(sinkage, 1e-6), speed=lift_speed),
+            starts=tuple(
+                {"adhesion.force": a * force, "adhesion.log_reach": d, "adhesion.log_speed": v}
+                for a, d, v in ((3, -1.0, -1.0), (10, -1.5, 0.5), (10, 1.5, -1.0))
+            ),
         ),
         TumbleForm(
             effect="rate-friction",

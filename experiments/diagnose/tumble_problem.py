@@ -162,9 +162,12 @@ class TumbleProblem:
             else trial.wheel_speed_0 + trial.torque * min(trial.torque_until, trial.end) / wheel_inertia
             for trial in self.data.trials
         ]
+        stiffness = self.forward.nominal["stiffness"]
+        carried = self.forward.nominal["mass"] + float(np.mean([trial.counterweight for trial in self.data.trials]))
         return tumble_forms(
             rig=self.forward.rig,
-            sinkage=0.5 * weight / self.forward.nominal["stiffness"],
+            sinkage=0.5 * weight / stiffness,
+            lift_speed=0.5 * weight / math.sqrt(stiffness * carried),
             weight=weight,
             wheel_speed=max(10.0, 0.5 * float(np.mean(wheel))),
             own=tuple(self.own.values()),

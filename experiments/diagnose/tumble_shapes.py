@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,19 +32,24 @@ class _Shape:
 
 
 _POWER = (1.0, 0.4, -0.65, 2.0)
-_SHAPES: Mapping[str, _Shape] = {
+_WOUND = _Shape("umbilical.rest", 0.0, 0.5, -3.0, 3.0, "rad")
+_SHAPES: Mapping[str, _Shape | tuple[tuple[_Shape, ...], ...]] = {
     "wheel-vibration:saturating": _Shape("wheel-vibration.power", 2.0, 0.8, -1.4, 5.0),
     "torque-fade:speed": _Shape("torque-fade.speed_power", *_POWER),
     "torque-fade:time": _Shape("torque-fade.time_power", *_POWER),
-    "umbilical:spring": _Shape("umbilical.spring_power", *_POWER),
-    "umbilical:both": _Shape("umbilical.drag_power", *_POWER),
+    "umbilical:spring": ((_Shape("umbilical.spring_power", *_POWER),), (_WOUND,)),
+    "umbilical:both": (
+        (_Shape("umbilical.drag_power", *_POWER),),
+        (_WOUND,),
+        (_WOUND, _Shape("umbilical.drag_power", *_POWER)),
+    ),
     "rate-friction:saturating": _Shape("rate-friction.power", 1.0, 0.5, -0.7, 4.0),
     "clock-offset:constant": _Shape("clock-offset.drift", 0.0, 0.01, -0.2, 0.2),
     "camera-scale:same in x and y": _Shape("camera-scale.bend", 0.0, 0.5, -10.0, 10.0, "1/m2"),
     "adhesion:mobilised": _Shape("adhesion.sharpness", 0.0, 0.7, -1.0, 2.0),
     "adhesion:that friction does not lose": _Shape("adhesion.sharpness", 0.0, 0.7, -1.0, 2.0),
 }
-"""By the id of the plain form."""
+"""By the id of the plain form; where there are several ways to bend it, the numbers of each."""
 
 
 @dataclass(frozen=True)
@@ -51,26 +57,40 @@ class _Bent:
     """Arrays of the shaped form's parameters -> arrays of the term's."""
 
     form: TumbleForm
-    shape: _Shape
+    shapes: tuple[_Shape, ...]
 
     def __call__(self, values: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
-        bent = self.shape.plain + np.asarray(values[f"{self.shape.name}_change"], dtype=float)
-        return self.form.physical(values) | {self.shape.name: bent}
+        bent = {shape.name: shape.plain + np.asarray(values[f"{shape.name}_change"], dtype=float)
+                for shape in self.shapes}  # fmt: skip
+        return self.form.physical(values) | bent
 
 
 def shaped(forms: tuple[TumbleForm, ...]) -> dict[str, tuple[TumbleForm, ...]]:
-    """The forms that can be bent, with the number that bends them: id of the plain form -> the shaped one."""
+    """The forms that can be bent, with the numbers that bend them: id of the plain form -> the shaped ones."""
     found: dict[str, tuple[TumbleForm, ...]] = {}
     for form in forms:
-        shape = _SHAPES.get(form.id)
-        if shape is None:
+        ways = _SHAPES.get(form.id)
+        if ways is None:
             continue
-        bend = Parameter(
-            name=f"{shape.name}_change", unit=shape.unit, value=0.0, std=shape.std, scale=0.3 * shape.std,
-            lowest=shape.lowest, highest=shape.highest, step=0.02 * shape.std,
-        )  # fmt: skip
-        bends = tuple({bend.name: side * shape.std} for side in (-0.7, 0.7))
-        starts = tuple({**start, **by} for by in bends for start in form.starts or ({},))
-        found[form.id] = (replace(form, name=f"{form.name}, of any shape", parameters=(*form.parameters, bend),
-                                  physical=_Bent(form, shape), starts=starts),)  # fmt: skip
+        ways = ((ways,),) if isinstance(ways, _Shape) else ways
+        found[form.id] = tuple(_bent(form, shapes) for shapes in ways)
     return found
+
+
+def _bent(form: TumbleForm, shapes: tuple[_Shape, ...]) -> TumbleForm:
+    bends = tuple(
+        Parameter(name=f"{shape.name}_change", unit=shape.unit, value=0.0, std=shape.std, scale=0.3 * shape.std,
+                  lowest=shape.lowest, highest=shape.highest, step=0.02 * shape.std)
+        for shape in shapes
+    )  # fmt: skip
+    places = [
+        {bend.name: side * shape.std for bend, shape, side in zip(bends, shapes, sides, strict=True)}
+        for sides in product((-0.7, 0.7), repeat=len(shapes))
+    ]
+    starts = tuple({**start, **place} for place in places for start in form.starts or ({},))
+    word = "of any shape" if shapes != (_WOUND,) else "wound up"
+    word = "wound up, of any shape" if len(shapes) > 1 else word
+    return replace(
+        form, name=f"{form.name}, {word}", parameters=(*form.parameters, *bends), physical=_Bent(form, shapes),
+        starts=starts,
+    )  # fmt: skip

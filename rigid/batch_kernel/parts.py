@@ -37,7 +37,7 @@ def make_parts(terms: tuple[Term, ...], ground: str, count: int) -> SimpleNamesp
     crater_of, contact, arms, divide = model.crater, model.contact, model.contact_arms, model.divide_mass
     MEMORY = model.has_memory
     SHEDS = model.law.has_memory or model.has("crater", "unload")
-    HOLDS = model.has("hold")
+    HOLDS = model.has("hold", "rate_pull")
     DRY = model.has("vertical_friction", "rotation_friction")
     INNER = model.has("inner_mass")
     BETA = 2 * math.pi / count

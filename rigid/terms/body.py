@@ -72,19 +72,21 @@ def bearing_drag(s, torque):
     return torque + 0.0 * s.omega
 
 
-def umbilical_potential(s, stiffness, spring_power):
-    """V = k |theta|^(n + 1) / (n + 1)."""
-    energy = 0.5 * stiffness * s.theta * s.theta
+def umbilical_potential(s, stiffness, spring_power, rest):
+    """V = k |theta - theta_0|^(n + 1) / (n + 1)."""
+    turned = s.theta - rest
+    energy = 0.5 * stiffness * turned * turned
     if spring_power != 1.0:
-        energy = stiffness * max(abs(s.theta), 1e-12) ** (spring_power + 1.0) / (spring_power + 1.0)
+        energy = stiffness * max(abs(turned), 1e-12) ** (spring_power + 1.0) / (spring_power + 1.0)
     return energy
 
 
-def umbilical_force(s, stiffness, drag, spring_power, drag_power):
-    """-k theta |theta|^(n - 1) - c omega |omega|^(m - 1)."""
-    spring = stiffness * s.theta
+def umbilical_force(s, stiffness, drag, spring_power, drag_power, rest):
+    """-k (theta - theta_0) |theta - theta_0|^(n - 1) - c omega |omega|^(m - 1)."""
+    turned = s.theta - rest
+    spring = stiffness * turned
     if spring_power != 1.0:
-        spring = spring * max(abs(s.theta), 1e-12) ** (spring_power - 1.0)
+        spring = spring * max(abs(turned), 1e-12) ** (spring_power - 1.0)
     resisted = drag * s.omega
     if drag_power != 1.0:
         resisted = resisted * max(abs(s.omega), 1e-12) ** (drag_power - 1.0)
@@ -176,8 +178,10 @@ BODY_EFFECTS: tuple[Term, ...] = (
                       summary="of the angle that its torque goes with; where it is not 1, stiffness is at 1 rad"),
             Parameter(name="drag_power", unit="1", default=1.0, lowest=0.3, highest=3.0,
                       summary="of the rate that its drag goes with; where it is not 1, drag is at 1 rad/s"),
+            Parameter(name="rest", unit="rad", default=0.0,
+                      summary="theta_0: the angle at which it is free of torque; a cable that hangs wound up"),
         ),
-        source="a cable as a torsion spring and a damper, straight or not, free of torque at theta = 0",
+        source="a cable as a torsion spring and a damper, straight or not",
         limits="the cable's pull on x and y is left out",
         hooks={"potential": umbilical_potential, "force": umbilical_force, "loss": umbilical_loss},
     ),

@@ -73,6 +73,11 @@ def crater_share(share):
     return share
 
 
+def open_crater(open):
+    """Whether a tip above the bottom of its crater counts as touching, although nothing carries it [0 or 1]."""
+    return open
+
+
 def bent_unloading(depth, top, force, share, bend):
     """The force times (z / z_top)^a, a = c (1 - exp(-f / 0.05)): 0 where nothing stays; `depth` is the compressed z."""
     left = force
@@ -81,14 +86,14 @@ def bent_unloading(depth, top, force, share, bend):
     return left
 
 
-def held_back(s, depth, held, force, reach, sharpness):
+def held_back(s, depth, held, force, reach, sharpness, speed):
     """A (1 - exp(-x)) of pull, x = (top - z) / d the retreat from the deepest depth since it touched.
 
     A sharpness m takes A ((1 - m) (1 - exp(-x)) + m tanh(x)) instead: at 1 it is mobilised in full over a shorter way.
     """
     pull = 0.0
     work = 0.0
-    if force != 0.0:
+    if force != 0.0 and speed == 0.0:
         x = max(held - depth, 0.0) / reach
         left = exp(-x)
         share = 1.0 - left
@@ -102,10 +107,18 @@ def held_back(s, depth, held, force, reach, sharpness):
     return pull, work
 
 
-def gripping(s, depth, held, force, reach, sharpness, grip):
+def pulled_out(s, depth, rate, held, force, reach, speed):
+    """-A (1 - exp(-|v| / v_0)) (1 - exp(-x)) while the tip goes out at v, x the retreat over d; 0 on the way in."""
+    pull = 0.0
+    if speed > 0.0 and rate < 0.0:
+        pull = -force * (1.0 - exp(rate / speed)) * (1.0 - exp(-max(held - depth, 0.0) / reach))
+    return pull
+
+
+def gripping(s, depth, held, force, reach, sharpness, speed, grip):
     """The share `grip` of the same pull, which presses the tip and the ground together all the same."""
     more = 0.0
-    if force != 0.0 and grip != 0.0:
+    if force != 0.0 and grip != 0.0 and speed == 0.0:
         x = max(held - depth, 0.0) / reach
         left = exp(-x)
         twice = left * left
@@ -182,12 +195,15 @@ CONTACT_EFFECTS: tuple[Term, ...] = (
                               summary="of the deepest depth that stays when the load is gone"),
             Parameter(name="bend", unit="1", default=0.0, lowest=0.0, highest=4.0,
                       summary="c: what unloading's exponent has more than loading's, fully from a share of 0.2 on"),
+            Parameter(name="open", unit="1", default=0.0, lowest=0.0, highest=1.0,
+                      summary="1: a tip in its crater still touches, without a load, until it is above the undisturbed "
+                              "surface (the torque acts, the damper too); 0: it touches the crater's bottom"),
         ),
         source="elastic-plastic unloading as in Walton and Braun 1986, with the unloading curve similar to the loading "
-               "(bend = 0); the bend is ours",
+               "(bend = 0); the bend and the open crater are ours",
         limits="a spike forgets its crater when its tip leaves the undisturbed surface; the way back in is the way "
-               "out; no bend on laws whose unloading has a curve of its own",
-        hooks={"crater": crater_share, "unload": bent_unloading},
+               "out; no bend and no open crater on laws whose unloading has a curve of its own",
+        hooks={"crater": crater_share, "hollow": open_crater, "unload": bent_unloading},
     ),
     Term(
         id="adhesion", summary="the tip is held on retreat", acts="normal force, with memory",
@@ -197,6 +213,9 @@ CONTACT_EFFECTS: tuple[Term, ...] = (
                       summary="retreat over which it is mobilised"),
             Parameter(name="sharpness", unit="1", default=0.0, lowest=-1.0, highest=2.5,
                       summary="m: 0 as 1 - exp, 1 as tanh of the retreat over that reach"),
+            Parameter(name="speed", unit="m/s", default=0.0, lowest=0.0,
+                      summary="v_0: where it is not 0 the pull acts on the way out only, at the speed v times "
+                              "1 - exp(-v / v_0), and friction loses it all"),
             Parameter(name="grip", unit="1", default=0.0, lowest=0.0, highest=1.0,
                       summary="share of the pull that friction does not lose: at 0 its bound goes with the net normal "
                               "force, at 1 with what the ground presses alone"),
@@ -204,7 +223,7 @@ CONTACT_EFFECTS: tuple[Term, ...] = (
         source="pull-off force of cohesive ground; mobilised over a distance so that rest is well defined; friction "
                "of what sticks together goes with the load and the adhesion (Derjaguin 1934, Z. Phys. 88:661)",
         limits="breaks where the tip leaves the surface",
-        hooks={"hold": held_back, "grip": gripping},
+        hooks={"hold": held_back, "rate_pull": pulled_out, "grip": gripping},
     ),
     Term(
         id="rate-friction", summary="friction depends on the sliding speed", acts="mu_d",

@@ -18,12 +18,14 @@ the fixed ones listed below, then the term's own parameters, by name, in any num
 | `vertical_friction`  | s                         | bound [N] of a dry friction on the vertical motion           |
 | `rotation_friction`  | s                         | bound [N m] of a dry friction on the rotation                |
 | `crater`             |                           | share of the deepest depth that stays [1], 0 to below 1      |
+| `hollow`             |                           | 1 where a tip in its crater still touches, unloaded; else 0  |
 | `stiffen`            | depth, force, work        | the law's force [N] and work [J] at a new depth, altered     |
 | `unload`             | depth, top, force         | that force [N] where the tip has been down to `top`, altered, |
 |                      |                           | at `top` itself it is left; not on laws with a memory        |
 | `hold`               | s, depth, held            | pull [N], energy stored [J]; held: deepest since it touched   |
 | `grip`               | s, depth, held            | load that friction sees beside the normal force [N]          |
 | `rate_force`         | s, depth, rate            | normal force [N] that dissipates, by the rate of sinking     |
+| `rate_pull`          | s, depth, rate, held      | the same of a term that looks at the way back, too           |
 | `side_force`         | s, depth, slip            | tangential force [N] on the tip against its slip speed       |
 | `friction_factor`    | s, slip                   | factors on mu_s and mu_d [1]                                 |
 | `inner_mass`         | s                         | inertia of a coordinate of the term's own; 0: it has none    |
@@ -60,11 +62,13 @@ FIXED_ARGUMENTS: dict[str, tuple[str, ...]] = {
     "vertical_friction": ("s",),
     "rotation_friction": ("s",),
     "crater": (),
+    "hollow": (),
     "stiffen": ("depth", "force", "work"),
     "unload": ("depth", "top", "force"),
     "hold": ("s", "depth", "held"),
     "grip": ("s", "depth", "held"),
     "rate_force": ("s", "depth", "rate"),
+    "rate_pull": ("s", "depth", "rate", "held"),
     "side_force": ("s", "depth", "slip"),
     "friction_factor": ("s", "slip"),
     "inner_mass": ("s",),

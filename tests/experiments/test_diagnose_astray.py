@@ -56,6 +56,19 @@ def test_what_two_trials_of_six_show_is_no_affair_of_single_trials(made, moment)
     assert astray_in(gone(gone(made, "001", moment), "002", moment)) == ()
 
 
+@pytest.mark.parametrize(("beside_a_name", "said"), [(True, {"001", "007"}), (False, set())])
+def test_all_of_one_condition_in_three_may_part_at_a_touch_beside_a_name_and_not_without_one(
+    moment, beside_a_name, said
+):
+    # Replicates repeat a touch: a reviewer's wheel-vibration was explained but for one landing, in both of its trials.
+    made = campaign(seed=4, off=0.5, conditions=(*SIX, *SIX[:2]))
+    problem = make_problem(gone(gone(made, "001", moment), "007", moment))
+    forms = [form for form in problem.forms if form.effect == "camera-scale"] if beside_a_name else []
+    fitted = ("001", "002", "003", "004", "007", "008")
+    found = fit(Model(problem, Whitener.white(problem), fitted, tuple(forms)))
+    assert {finding.trial for finding in astray(found, HELD_OUT, seed=0)} == said
+
+
 def test_a_trial_that_never_follows_the_model_has_not_gone_astray(made):
     assert astray_in(gone(made, "001", 0.0)) == ()
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from experiments.diagnose.tumble_forms import tumble_forms
 from experiments.diagnose.tumble_forward import Forward
 from experiments.diagnose.tumble_guess import Guesser
 from experiments.diagnose.tumble_problem import TumbleProblem, make_problem
+from experiments.diagnose.tumble_shapes import shaped
 from experiments.diagnose.tumble_steps import ZERO_STD, Start, whiten
 from rigid import STATES, Effect
 
@@ -27,6 +29,19 @@ from rigid import STATES, Effect
         ((Effect(id="pendulum", parameters={"length": 2.2}),), {"pendulum.length": 2.2}),
         ((Effect(id="slope", parameters={"angle": 0.01}),), {"slope.angle": 0.01}),
         ((Effect(id="com-offset", parameters={"x": 4e-4, "y": -3e-4}),), {"com-offset.x": 4e-4, "com-offset.y": -3e-4}),
+        (
+            (
+                Effect(id="plastic-sinkage", parameters={"share": 0.5, "open": 1.0}),
+                Effect(id="adhesion", parameters={"force": 0.1, "reach": 2e-5, "speed": 2e-3}),
+            ),
+            {
+                "plastic-sinkage.share": 0.5,
+                "plastic-sinkage.open": 1.0,
+                "adhesion.force": 0.1,
+                "adhesion.reach": 2e-5,
+                "adhesion.speed": 2e-3,
+            },
+        ),
         (
             (
                 Effect(id="clock-offset", parameters={"offset": 0.013, "drift": 0.004}),
@@ -256,3 +271,15 @@ def test_a_sensor_without_noise_is_refused():
     tables = made.tables.model_copy(update={"sensors": made.tables.sensors.model_copy(update={"wheel": wheel})})
     with pytest.raises(ValueError, match=r"\[sensors.wheel\] std = \[0.0\]"):
         tumble_data(Campaign(tables, made.recordings))
+
+
+def test_a_cable_may_hang_wound_up_with_drag_of_any_power_beside():
+    forms = tumble_forms(rig=True, sinkage=3e-5, weight=0.88)
+    bent = {form.name: form for form in shaped(forms)["umbilical:both"]}
+    assert set(bent) == {"both, of any shape", "both, wound up", "both, wound up, of any shape"}
+    form = bent["both, wound up, of any shape"]
+    values = {p.name: np.zeros(1) for p in form.parameters} | {"umbilical.rest_change": np.array([-0.3])}
+    told = form.physical(values)
+    assert told["umbilical.rest"] == -0.3 and told["umbilical.drag_power"] == 1.0
+    names = [f"umbilical.{name}_change" for name in ("rest", "drag_power")]
+    assert {tuple(start[name] > 0 for name in names) for start in form.starts} == set(product((False, True), repeat=2))

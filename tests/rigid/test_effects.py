@@ -179,6 +179,34 @@ def test_plastic_sinkage_leaves_a_crater_and_takes_its_share_of_the_work(bend):
     assert rows[-1, 9] == pytest.approx(0.5 * MASS * (v**2 - rows[-1, 5] ** 2), rel=2e-3)
 
 
+def test_a_tip_in_an_open_crater_touches_without_a_load_until_it_is_above_the_undisturbed_surface():
+    # The same drop gives back the same work; but the tip still touches on the way from f z to 0, at its last speed.
+    f, v = 0.4, 0.3
+    contact = {}
+    for hollow in (0.0, 1.0):
+        trial = free(damping=0.0, mu_s=0.0, level=1e-5, effects=(effect("plastic-sinkage", share=f, open=hollow),))
+        rows = thrown(trial, [0.0, LENGTH * math.cos(G0) + 1e-4, 0.0, 0.0, -v, 0.0], 0.2)
+        depth = LENGTH * math.cos(G0) - rows[:, 2]
+        assert rows[-1, 5] == pytest.approx(v * math.sqrt(1 - f), rel=1e-3)
+        assert rows[-1, 9] == pytest.approx(f * 0.5 * MASS * v**2, rel=2e-3)
+        contact[hollow] = depth.max()
+    assert contact[1.0] == pytest.approx(contact[0.0], rel=1e-6)
+    system = System(free(effects=(effect("plastic-sinkage", share=f, open=1.0),)))
+    assert system.crater == 0.0
+    elastic, lost, *_ = system.model.contact(system.p, system.s, system.q, 2e-4, 0.1, 0.0, 1e-3, 1e-3)
+    assert elastic == 0.0 and lost == pytest.approx(0.1 * system.trial.damping)
+
+
+def test_adhesion_by_speed_takes_its_force_times_the_way_out_from_a_fast_rebound():
+    # Far above the speed that mobilises it, A acts on the whole way out: the work A z_max a row is lost.
+    A, v = 2.0, 0.3
+    trial = free(damping=0.0, mu_s=0.0, level=1e-5, effects=(effect("adhesion", force=A, reach=1e-6, speed=1e-4),))
+    rows = thrown(trial, [0.0, LENGTH * math.cos(G0) + 1e-4, 0.0, 0.0, -v, 0.0], 0.2)
+    lost = 2 * A * (LENGTH * math.cos(G0) - rows[:, 2].min())
+    assert rows[-1, 9] == pytest.approx(lost, rel=2e-3)
+    assert 0.5 * MASS * (v**2 - rows[-1, 5] ** 2) == pytest.approx(lost, rel=1e-2)
+
+
 def test_adhesion_takes_force_times_the_retreat_from_a_rebound():
     # Mobilised over far less than the retreat: the work A (z_max - reach) a row is lost when the tips break free.
     A, v, reach = 2.0, 0.3, 1e-5

@@ -23,7 +23,7 @@ VALUES = {
     "com-offset": {"x": 0.003, "y": -0.002},
     "slope": {"angle": 0.15},
     "pulley-inertia": {"mass": 0.7},
-    "umbilical": {"stiffness": 0.3, "drag": 0.2, "spring_power": 1.6, "drag_power": 0.8},
+    "umbilical": {"stiffness": 0.3, "drag": 0.2, "spring_power": 1.6, "drag_power": 0.8, "rest": -0.2},
     "tip-radius": {"radius": 0.011},
     "depth-hardening": {"exponent": 1.35, "reference": 2e-3, "bend": 60.0},
     "plastic-sinkage": {"share": 0.25, "bend": 0.6},
@@ -78,7 +78,7 @@ class Derived:
             energy += mb * true * arc * (sp.sqrt(above**2 + d**2) - above)
         if "umbilical" in on:
             power, rate_power = on["umbilical"]["spring_power"] + 1, on["umbilical"]["drag_power"] + 1
-            energy += on["umbilical"]["stiffness"] * sp.Abs(A) ** power / power
+            energy += on["umbilical"]["stiffness"] * sp.Abs(A - on["umbilical"]["rest"]) ** power / power
             D += on["umbilical"]["drag"] * sp.Abs(W) ** rate_power / rate_power
         self.slips, self.loads = {}, {}
         for n in touching:
