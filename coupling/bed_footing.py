@@ -231,7 +231,7 @@ class BedFooting:
 
     def grain_speed(self) -> float:
         """Root of the mean square of the grains' speeds, by mass [m/s]."""
-        grains = self.bed.grains()
+        grains = self.bed.grains(contacts=False)
         return math.sqrt(float(grains["mass"] @ (grains["velocity"] ** 2).sum(axis=1)) / self._mass)
 
     # Where it may start --------------------------------------------------------------------------------------------
@@ -379,13 +379,7 @@ class BedFooting:
 
     def _posed(self) -> list[Pose]:
         """Where the bed has its bodies now."""
-        state = self.bed.state()
-        return [
-            Pose(
-                np.asarray(state["body_position"][body], dtype=float), np.asarray(state["body_turn"][body], dtype=float)
-            )
-            for body in self.bodies
-        ]
+        return [Pose(self.bed.body_position(body), self.bed.body_turn(body)) for body in self.bodies]
 
     def _surface_of(self, member: Member, pose: Pose, points: Vector) -> tuple[Vector, Vector, Vector]:
         """Distance of points to a member placed there, outward normal, curvature: round where a rod has a ball.
@@ -421,7 +415,7 @@ class BedFooting:
         With the velocities half a step ahead of the positions, which the impulses so far have made: what changes it is
         the body, to round-off.
         """
-        grains = self.bed.grains()
+        grains = self.bed.grains(contacts=False)
         ahead = grains["mass"][:, None] * grains["velocity"] + 0.5 * self.time_step * grains["force"]
         return self.copies * (ahead.sum(axis=0) - self.impulse)
 

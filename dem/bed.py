@@ -643,8 +643,11 @@ class Bed:
 
     # ------------------------------------------------------------------ what a user reads
 
-    def grains(self) -> dict[str, np.ndarray]:
+    def grains(self, *, contacts: bool = True) -> dict[str, np.ndarray]:
         """What the grains are doing, in the order of ids.
+
+        Args:
+            contacts: whether to count them (coordination), which takes as long as the rest.
 
         Returns:
             id; position, velocity, spin, force (gravity included), displacement (since the bed was made or
@@ -662,6 +665,7 @@ class Bed:
         origin = e.read("origin")[order].astype(float)
         half = 0.5 * self.time_step
         radius, mass = position[:, 3], velocity[:, 3]
+        counted = {"coordination": self.contact_counts()} if contacts else {}
         return {
             "id": np.arange(self.grain_count),
             "position": position[:, :3],
@@ -670,8 +674,8 @@ class Bed:
             "velocity": velocity[:, :3] + half * force / mass[:, None],
             "spin": spin + half * torque * (2.5 / (mass * radius**2))[:, None],
             "force": force,
-            "coordination": self.contact_counts(),
             "displacement": position[:, :3] - origin,
+            **counted,
         }
 
     def contact_counts(self) -> np.ndarray:
@@ -690,7 +694,7 @@ class Bed:
     @property
     def kinetic_energy(self) -> float:
         """Translation and rotation [J]."""
-        g = self.grains()
+        g = self.grains(contacts=False)
         moving = 0.5 * g["mass"] @ (g["velocity"] ** 2).sum(axis=1)
         turning = 0.2 * (g["mass"] * g["radius"] ** 2) @ (g["spin"] ** 2).sum(axis=1)
         return float(moving + turning)

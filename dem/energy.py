@@ -39,7 +39,7 @@ def bed_energies(bed: Bed, *, bodies: Mapping[int, Gap]) -> dict[str, float]:
         kinetic (translation and rotation, at the time of the positions), potential (of gravity, from z = 0), normal,
         tangential, turning (springs of all contacts, bodies and floor included).
     """
-    grains = bed.grains()
+    grains = bed.grains(contacts=False)
     moving = 0.5 * grains["mass"] @ (grains["velocity"] ** 2).sum(axis=1)
     turning = 0.2 * (grains["mass"] * grains["radius"] ** 2) @ (grains["spin"] ** 2).sum(axis=1)
     height = -(grains["mass"] @ (grains["position"] @ np.array(bed.gravity, dtype=float)))
@@ -160,9 +160,19 @@ def _asleep(bed: Bed, state: Mapping[str, Array]) -> tuple[Array, ...]:
     size = np.array(bed.size[:2])
     d[:, :2] -= size * np.round(d[:, :2] / size)
     n = bed.grain_count
-    share = np.where(np.isin(who * n + owner, owner * n + who), 0.5, 1.0)  # kept by both, or by one
+    share = np.where(_twice(np.minimum(owner, who) * n + np.maximum(owner, who)), 0.5, 1.0)  # kept by both, or by one
     slide, turned = (state[f"sleep_store_{name}"][grains].astype(float) for name in ("slide", "roll"))
     return i, j, d, slide, turned[:, :3], share
+
+
+def _twice(keys: Array) -> Array:
+    """Whether each of these is there more than once."""
+    order = np.argsort(keys)
+    same = np.diff(keys[order]) == 0
+    found = np.zeros(len(keys), dtype=bool)
+    found[order[1:]] = same
+    found[order[:-1]] |= same
+    return found
 
 
 def _near(state: Mapping[str, Array], surfaces: Mapping[int, Gap], law: int) -> Array:

@@ -20,6 +20,7 @@ import numpy as np
 import taichi as ti
 
 from .lists import AWAKE, INDEX_BITS, INDEX_MASK, PERIOD_X, PERIOD_Y, SAME_IMAGE
+from .rows import take_rows
 
 __all__ = ["NO_LEDGER", "OUTSIDE", "PARTS", "TURNED", "Bookkeeping", "Ledger"]
 
@@ -76,8 +77,8 @@ class Ledger:
     def state(self, rows: np.ndarray, near: np.ndarray) -> dict[str, np.ndarray]:
         """All that the book's next step depends on; ``rows``, ``near``: of the lists, those in use."""
         return {
-            "ledger_last": self.last.to_numpy()[rows],
-            "ledger_near_last": self.near_last.to_numpy()[near],
+            "ledger_last": take_rows(self.last, rows),
+            "ledger_near_last": take_rows(self.near_last, near),
             "ledger_taken": self.taken.to_numpy(),
             "ledger_turned": self.turned.to_numpy(),
         }

@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .lists import AWAKE, CHUNKS, INDEX_MASK
+from .rows import take_rows
 from .sleep_kernels import FULL, LEAVING, WOKEN
 
 if TYPE_CHECKING:
@@ -154,7 +155,7 @@ class Sleeper:
         counts += np.bincount(owner[~grains & touches], minlength=n)
         start, end = e.read("pair_start")[: self.awake], e.read("pair_end")[: self.awake]
         rows = np.repeat(end - np.cumsum(end - start), end - start) + np.arange((end - start).sum())
-        pair = e.read("pair")[rows]
+        pair = take_rows(e.pair, rows)
         others = ~pair[pair < 0] & INDEX_MASK
         return np.asarray(counts + np.bincount(ids[others[others >= self.awake]], minlength=n), dtype=np.int32)
 
@@ -171,10 +172,10 @@ class Sleeper:
         counts = np.where(asleep, end - start, 0)
         owner = np.repeat(np.arange(n), counts)
         rows = np.repeat(start, counts) + np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-        who = rest.who.to_numpy()[side][rows]
+        who = take_rows(rest.who, rows, part=side)
         stays = (who < 0) | asleep[np.maximum(who, 0)]
         rows = rows[stays]
-        parts = {"slide": rest.slide.to_numpy()[side][rows], "roll": rest.roll.to_numpy()[side][rows]}
+        parts = {name: take_rows(getattr(rest, name), rows, part=side) for name in ("slide", "roll")}
         return {"owner": owner[stays].astype(np.int32), "who": who[stays], **parts}
 
     def state(self, rows: np.ndarray) -> dict[str, np.ndarray]:
@@ -184,7 +185,7 @@ class Sleeper:
             "rules": np.array(astuple(self.rules), dtype=float),
             "asleep": rest.asleep.to_numpy()[:n],
             "quiet": rest.quiet.to_numpy()[:n],
-            "force": rest.force.to_numpy()[rows],
+            "force": take_rows(rest.force, rows),
             "held": rest.held.to_numpy()[: e.chunk_count],
             "numbers": np.array([self.awake, int(e.count[CHUNKS]), self.bed.grain_steps]),
             "reals": np.array([self.mass, self.slept]),

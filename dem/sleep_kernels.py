@@ -98,10 +98,12 @@ class Sleepers:
         within = x.w + reach
         found = False
         for b in range(1, self.body_count[None]):
-            if self.from_body(b, x.xyz).norm_sqr() < (self.body_extent[b] + within) ** 2:
-                distance, n, curvature, arm = self.nearest(b, x.xyz, within, shapes, True)
-                if distance < within:
-                    found = True
+            beyond = self.body_extent[b] + within
+            if not found and ti.abs(x.z - self.body_position[b].z) < beyond:  # most bodies are far above
+                if self.from_body(b, x.xyz).norm_sqr() < beyond**2:
+                    distance, n, curvature, arm = self.nearest(b, x.xyz, within, shapes, True)
+                    if distance < within:
+                        found = True
         return found
 
     @ti.kernel
@@ -182,11 +184,12 @@ class Sleepers:
             rest.was[k] = rest.asleep[k]
         for i in range(self.count[AWAKE], self.count[GRAINS]):
             if rest.woken[self.id[i]] == 1:
-                ci, cj, ck = self.cell_of(self.position[i])
-                rest.flagged[self.cell_index(ci, cj, ck)] = 1
+                self.flag_around(self.position[i], rest)
         for i in range(self.count[AWAKE], self.count[GRAINS]):
             k = self.id[i]
-            if self.flag_around(self.position[i], rest) or self.close_to_body(i, ti.cast(reach, self.real), shapes):
+            ci, cj, ck = self.cell_of(self.position[i])
+            flagged = rest.flagged[self.cell_index(ci, cj, ck)] == 1
+            if flagged or self.close_to_body(i, ti.cast(reach, self.real), shapes):
                 rest.asleep[k] = 0
                 rest.quiet[k] = 0
         for c in range(self.count[CHUNKS]):
@@ -208,17 +211,14 @@ class Sleepers:
 
     @ti.func
     def flag_around(self, x, rest: ti.template()):
-        """Whether the cell of a place or one around it is flagged."""
+        """Flag the cell of a place and those around it."""
         ci, cj, ck = self.cell_of(x)
-        found = False
         for dk, dj, di in ti.ndrange((-1, 2), (-1, 2), (-1, 2)):
             k = ck + dk
             if k >= 0 and k < self.count[NZ]:
                 i = (ci + di + self.count[NX]) % self.count[NX]
                 j = (cj + dj + self.count[NY]) % self.count[NY]
-                if rest.flagged[self.cell_index(i, j, k)] == 1:
-                    found = True
-        return found
+                rest.flagged[self.cell_index(i, j, k)] = 1
 
     @ti.kernel
     def store_contacts(self, rest: ti.template()):

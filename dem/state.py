@@ -12,6 +12,7 @@ import numpy as np
 
 from .lists import AWAKE, CHUNKS, INDEX_MASK
 from .materials import Material
+from .rows import take_rows
 from .sleep import Sleep, Sleeper
 
 if TYPE_CHECKING:
@@ -52,17 +53,17 @@ def take(bed: Bed) -> dict[str, np.ndarray]:
     start, end = e.read("pair_start"), e.read("pair_end")
     counts = end - start
     rows = np.repeat(start - np.concatenate(([0], np.cumsum(counts)[:-1])), counts) + np.arange(counts.sum())
-    pair = e.read("pair")[rows]
+    pair = take_rows(e.pair, rows)
     touching = rows[pair < 0]
-    state |= {"pair_count": counts, "pair": pair, "slide": e.read("slide")[touching]}
+    state |= {"pair_count": counts, "pair": pair, "slide": take_rows(e.slide, touching)}
     near_end = e.read("near_end")
     near_count = near_end - np.arange(e.chunk_count) * e.near_room
     near = _near_rows(near_count, e.near_room)
     state |= {"near_count": near_count}
     for name in ("near_grain", "near_body", "near_slide", "near_roll"):
-        state[name] = e.read(name)[near]
+        state[name] = take_rows(getattr(e, name), near)
     if e.rolling:
-        state["roll"] = e.read("roll")[touching]
+        state["roll"] = take_rows(e.roll, touching)
     state |= e.shape_state()
     if bed._sleeper is not None:
         state |= bed._sleeper.state(rows)

@@ -131,3 +131,35 @@ def test_what_cannot_be_is_refused(layer):
     )  # fmt: skip
     with pytest.raises(ValueError, match="floor and gravity"):
         bed.let_sleep()
+
+
+def test_one_that_is_woken_wakes_its_cell_and_the_26_around_it_across_the_periodic_sides(layer):
+    """And nobody else; the corner grain's cell has neighbours at the other ends."""
+    bed, state = layer
+    bed.restore(state)
+    bed.move_body(1, position=(0.06, 0.012, 0.5), velocity=(0.0, 0.0, 0.0))
+    bed.let_sleep(Sleep(calm=0.3))
+    bed.advance(1500)
+    asleep = bed.asleep
+    position = bed.grains(contacts=False)["position"]
+    corner = int(np.argmin(np.where(asleep, position.sum(axis=1), np.inf)))
+    assert asleep.mean() > 0.9
+    bed._engine.rest.woken[corner] = 1
+    bed._make_lists()
+    count, box = bed._engine.count.to_numpy()[4:7], bed._engine.box.to_numpy()
+    cells = np.floor((position - [0.0, 0.0, box[2]]) / box[4:7]).astype(int)
+    apart = np.abs(cells - cells[corner])
+    apart[:, :2] = np.minimum(apart[:, :2], count[:2] - apart[:, :2])
+    around = (apart <= 1).all(axis=1)
+    far = np.abs(position[:, 0] - position[corner, 0]) > 0.5 * bed.size[0]
+    assert (around & far & asleep).any()
+    assert np.array_equal(bed.asleep, asleep & ~around)
+    bed.wake()
+
+
+def test_grains_without_their_contacts_are_told_the_same_of_all_else(layer):
+    bed, state = layer
+    bed.restore(state)
+    whole, rest = bed.grains(), bed.grains(contacts=False)
+    assert set(whole) - set(rest) == {"coordination"}
+    assert all(np.array_equal(rest[name], whole[name]) for name in rest)
