@@ -15,7 +15,7 @@ from .bounds import is_strained
 from .colour import Colour
 from .deciding import unscattered, verdict_of
 from .evidence import Hypothesis, excess, held_out_fit, score, signature_matrix
-from .fitting import Fit, Model, Whitener, fit, settled
+from .fitting import Fit, Model, Whitener, by_beginnings, fit, settled
 from .gate import Verdict, held_out_gate, open_gate
 from .jitter import Jitter
 from .lone_beds import lone_finding
@@ -29,6 +29,7 @@ from .renoised import (
     differ,
     doubted,
     jittered,
+    leaves_much,
     lone_scatter_of,
     plain,
     recoloured,
@@ -128,7 +129,12 @@ class _Course:
         own = None
         if not (asked.aside or asked.patient):
             own = partial(all_astray, held_out=self.held_out, seed=asked.seed, recoloured=self._recoloured())
+        begun = self.base
         choice = self._chosen(own_ways=own)
+        if self.base.objective < begun.objective - _ON and not choice.astray:
+            self.first = self._gate_of_base()  # what it left was a branch that the search has found
+            if self.first.passed:
+                return self._nothing()
         if choice.astray:
             self.tell("a trial goes its own way: once more without it", 0.0)
             anew = self._again(aside=choice.astray, looked_at=asked.looked_at)
@@ -197,11 +203,21 @@ class _Course:
         self.base = coloured(base, self.colours)
 
     def _ask_gate(self) -> None:
-        """Whether the base model leaves anything."""
+        """Whether the base model leaves anything; where it is rough and leaves little, once more from the beginnings: a
+        small effect may make up for a branch of the motion that its fit has missed."""
         self.tell("is anything left?", 0.0)
+        self.first = self._gate_of_base()
+        if self.first.passed or not hasattr(self.problem, "follows") or leaves_much(self.base):
+            return
+        other = by_beginnings(self.base)
+        if other is not self.base:
+            self.base = other
+            self.first = self._gate_of_base()
+
+    def _gate_of_base(self) -> Verdict:
         columns, _ = signature_matrix(self.base, self.problem.forms)
         asked = self.asked
-        self.first = open_gate(
+        return open_gate(
             self.base, signatures=columns, seed=asked.seed, refit=asked.thorough,
             draws=_REFITS if asked.thorough else _DRAWS, folder=asked.gates,
             tell=lambda done: self.tell("making the gate's null", done),

@@ -18,8 +18,8 @@ from .replicates import Scatter, find_scatter, groups_of, with_scatter
 from .unrest import Unrest, find_unrest
 
 __all__ = [
-    "calmed", "coloured", "colours_of", "differ", "doubted", "jittered", "lone_scatter_of", "plain", "recoloured",
-    "rescattered", "scatter_apart", "scatter_of", "unrest_of", "whitened_fit",
+    "calmed", "coloured", "colours_of", "differ", "doubted", "jittered", "leaves_much", "lone_scatter_of", "plain",
+    "recoloured", "rescattered", "scatter_apart", "scatter_of", "unrest_of", "whitened_fit",
 ]  # fmt: skip
 
 _MOST_FOR_COLOUR = 2.5
@@ -36,10 +36,14 @@ def whitened_fit(model: Model, *, beginnings: bool = False) -> Fit:
     found = fit(model)
     model.problem.rewhiten(found.values, ())
     found = fit(model, found.values)
-    left = found.chi_square > found.count + _MUCH * math.sqrt(2 * found.count)
-    if beginnings or (left and hasattr(model.problem, "follows")):
+    if beginnings or (leaves_much(found) and hasattr(model.problem, "follows")):
         return by_beginnings(found)
     return found
+
+
+def leaves_much(found: Fit) -> bool:
+    """Whether more is left than a fit's rough landscape makes by itself."""
+    return found.chi_square > found.count + _MUCH * math.sqrt(2 * found.count)
 
 
 def jittered(found: Fit, held_out: tuple[str, ...], known: tuple[Jitter, ...] = ()) -> tuple[Fit, tuple[Jitter, ...]]:
