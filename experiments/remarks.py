@@ -107,13 +107,10 @@ def softening_note(settings: PenetrateSettings, softening: Softening) -> str:
 
 
 def overlap_warning(overlap: float | None, settings: PenetrateSettings, softening: Softening) -> str | None:
-    """That grains overlapped nearly as far as they may, and the modulus that would leave a fifth of it free.
-
-    Hertz: the overlap goes with E to the power -2/3.
-    """
+    """That grains overlapped nearly as far as they may, and the modulus that would leave a fifth of it free."""
     if overlap is None or overlap <= 0.9 * settings.max_overlap:
         return None
-    stiffer = softening.young * (overlap / (0.8 * settings.max_overlap)) ** 1.5
+    stiffer = softening.stiffer(overlap, 0.8 * settings.max_overlap)
     return (
         f"grains overlapped by up to {100 * overlap:.3g} % of a diameter, within a tenth of max_overlap = "
         f"{100 * settings.max_overlap:.3g} %, past which a run fails: young = {stiffer:.2g} Pa (here "

@@ -63,6 +63,10 @@ class Softening:
         """How many times softer than the real grains."""
         return self.real / self.young
 
+    def stiffer(self, overlap: float, wanted: float) -> float:
+        """Young's modulus [Pa] that would bring this overlap to the one wanted (Hertz: F goes with E overlap^1.5)."""
+        return self.young * (overlap / wanted) ** 1.5
+
 
 def bearing_gradient(bulk_density: float, gravity: float, friction: float) -> float:
     """Growth of the pressure under a flat plate going straight down [Pa/m] (3D-RFT, see the module)."""

@@ -109,7 +109,7 @@ def conclude(
             f"numbers are not to be trusted; fewer substeps tell whether it is the coupling"
         )
     if bed.max_overlap > settings.max_overlap:
-        stiffer = softening.young * (bed.max_overlap / settings.max_overlap) ** 1.5
+        stiffer = softening.stiffer(bed.max_overlap, settings.max_overlap)
         result["warnings"].append(
             f"the largest overlap was {100 * bed.max_overlap:.2g} % of a diameter, where max_overlap = "
             f"{settings.max_overlap:g} was meant to hold: young = {stiffer:.2g} Pa or more would keep it"
