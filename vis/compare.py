@@ -19,7 +19,7 @@ from vis.folder import read_folder
 from vis.numbers import short
 from vis.page import Block, Page, Section, Tile, code, figure, listing, table, text, write_page
 from vis.reel import Reel
-from vis.style import BED, GREY, INK, MODEL, styled
+from vis.style import BED, GREY, INK, MODEL, as_it_lies, styled
 from vis.tumble_pictures import draw_reels, moments
 from vis.tumble_series import STATES, state_runs
 
@@ -141,7 +141,7 @@ def _draw_path(columns: Mapping[str, Array], labels: tuple[str, str]) -> Figure:
         path.plot(x - x[0], y - y[0], **style)
         speed.plot(time, np.hypot(columns[f"vx_m_s_{number}"], columns[f"vy_m_s_{number}"]), **style)
         spin.plot(time, columns[f"omega_rad_s_{number}"], **style)
-    path.set_aspect("equal", adjustable="datalim")
+    as_it_lies(path)
     path.set_xlabel("x − x(0) [mm]")
     path.set_ylabel("y − y(0) [mm]")
     speed.set_ylabel("speed of the centre [m/s]")

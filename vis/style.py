@@ -7,14 +7,16 @@ from contextlib import contextmanager
 from typing import Any
 
 import matplotlib as mpl
+from matplotlib.axes import Axes
 
-__all__ = ["BED", "DPI", "GREY", "INK", "MODEL", "styled"]
+__all__ = ["BED", "DPI", "GREY", "INK", "MODEL", "as_it_lies", "styled"]
 
 BED = "#0072B2"  # what the grains do
 MODEL = "#D55E00"  # what the spring-damper does; always dashed as well, for print in grey
 INK = "#222222"
 GREY = "#8a8a8a"
 DPI = 160
+_TOO_LONG = 8.0  # times as long as high: drawn in its true shape such a way is a line
 
 _STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
@@ -55,3 +57,12 @@ def styled() -> Iterator[None]:
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)
         yield
+
+
+def as_it_lies(axis: Axes) -> None:
+    """One scale along and up for the ways drawn in `axis`; where no height would be left of them, it says so."""
+    ways = axis.dataLim
+    if ways.width <= _TOO_LONG * ways.height:
+        axis.set_aspect("equal", adjustable="datalim")
+    else:
+        axis.set_title("heights stretched", fontsize=8.5, fontweight="normal", color=GREY)

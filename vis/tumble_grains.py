@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vis.numbers import short
 from vis.page import Section, figure, table, text
-from vis.style import BED, GREY, INK, MODEL, styled
+from vis.style import BED, GREY, INK, MODEL, as_it_lies, styled
 
 __all__ = ["grains_section"]
 
@@ -147,7 +147,7 @@ def _draw_paths(own: Mapping[str, NDArray[np.float64]], beside: Mapping[str, NDA
         speed.plot(columns["t_s"], np.hypot(columns["vx_m_s"], columns["vy_m_s"]), **style)
     path.set_xlabel("x − x(0) [mm]")
     path.set_ylabel("y − y(0) [mm]")
-    path.set_aspect("equal", adjustable="datalim")
+    as_it_lies(path)
     angle.set_xlabel("time [s]")
     angle.set_ylabel("θ [degrees]")
     speed.set_xlabel("time [s]")

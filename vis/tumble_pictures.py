@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 _MOST_FRAMES = 48
 _STILL = (1920, 1080)
 _FILM = (1280, 720)
+_LONGEST_MAP = 40.0  # length over width of a map that is drawn to scale
 
 
 def make_tumble_pictures(
@@ -130,12 +131,16 @@ def draw_tracks(reel: Reel, file: Path) -> Picture:
         FigureCanvasAgg(drawing)
         above, along = drawing.subplots(2, 1, sharex=True, height_ratios=(1.0, 1.3))
         picture = above.pcolormesh(x, y, change, norm=TwoSlopeNorm(0.0, -most, most), cmap="RdBu", rasterized=True)
-        above.set_aspect("equal")
-        above.set_ylabel("across [mm]")
+        if np.ptp(x) <= _LONGEST_MAP * np.ptp(y):
+            above.set_aspect("equal")
+            above.set_ylabel("across [mm]")
+        else:  # in its true shape it would be a thread
+            above.set_ylabel("across [mm], stretched")
         above.grid(False)
         bar = drawing.colorbar(picture, ax=[above, along], shrink=0.6, extend="both")
         bar.set_label("change of the surface's height [mm]")
-        strip = np.abs(y) <= 0.5e3 * float((reel.result.get("grains") or {}).get("spike_diameter", 0.012))
+        across = 1e3 * float((reel.result.get("grains") or {}).get("spike_diameter", 0.012))
+        strip = np.abs(y) <= 0.5 * across
         for index in np.unique(np.linspace(1, len(reel) - 1, 4).round().astype(int)):
             now = reel.frame(int(index))
             mean = 1e3 * np.asarray(now.maps["surface"].fields["change"], dtype=float)[strip].mean(axis=0)
@@ -143,12 +148,12 @@ def draw_tracks(reel: Reel, file: Path) -> Picture:
         along.axhline(0.0, color=INK, lw=0.8, ls=(0, (5, 4)))
         along.set_xlabel("x from the start of the platform's centre [mm]")
         along.set_ylabel("mean under the spikes [mm]")
-        along.legend(ncols=4, loc="upper left")
+        drawing.legend(handles=along.lines[:-1], loc="outside upper left", ncols=4)
         file.parent.mkdir(parents=True, exist_ok=True)
         drawing.savefig(file, dpi=130)
     caption = (
         "Above: by how much the top of the grains has risen or fallen since the torque began, from above, at the end. "
-        "Below: the same, mean over 12 mm across the spikes' way, at four times."
+        f"Below: the same, mean over {across:.3g} mm across the spikes' way, at four times."
     )
     return Picture(file, "The tracks", caption)
 
