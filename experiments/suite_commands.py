@@ -1,4 +1,4 @@
-"""`hedgebed experiments list` and `run`: the platform's experiments on grains, as named cases that ship."""
+"""`hedgebed experiments list`, `run` and `sinking`: the platform's experiments on grains, as named cases that ship."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from experiments.cli_streams import refusing, say, stdout_to_stderr
+from experiments.footfalls import Footfall, sinking_over
 from experiments.progress import duration
 from experiments.suite import EXPERIMENTS, LONGEST, Case, cases, do_case, estimate, standing
 
@@ -27,6 +28,7 @@ def add_suite_commands(home: App) -> None:
     """Add the commands to ``hedgebed experiments``."""
     home.command(_list, name="list")
     home.command(_run, name="run")
+    home.command(_sinking, name="sinking")
 
 
 def _list(
@@ -106,3 +108,31 @@ def _run(names: _Names = (), /, *, results: _Results = RESULTS, work: _Work = WO
     if failed:
         say(f"without a result: {', '.join(failed)}")
     return 1 if failed else 0
+
+
+def _sinking(names: _Names = (), /, *, results: _Results = RESULTS) -> int:
+    """Say of several tumbles in a row, over the beds whose results are kept, whether the platform goes on sinking.
+
+    Cases that differ only in the seed of their bed are one group, and each group has its verdict.
+    """
+    groups: dict[str, dict[str, list[Footfall]]] = {}
+    with refusing(), stdout_to_stderr():
+        for case in cases(names):
+            kept = results / case.name / "result.json"
+            if not kept.exists():
+                continue
+            falls = json_module.loads(kept.read_text(encoding="utf-8")).get("footfalls")
+            if falls:
+                group = case.name.removesuffix(f"-seed{case.settings.seed}")
+                groups.setdefault(group, {})[case.name] = [Footfall(**fall) for fall in falls]
+    for group, beds in groups.items():
+        for name, falls in beds.items():
+            depths = " ".join(f"{1e3 * fall.deepest:.1f}{'*' if fall.set_down or fall.open else ''}" for fall in falls)
+            print(f"{name}: {depths} mm")
+        found = sinking_over(list(beds.values()))
+        print(f"{group}: {found.verdict if found else 'too few rows came down to tell'}")
+    if not groups:
+        say(f"no case of several tumbles has a result in {results}: `hedgebed experiments run grains3` makes them")
+        return 1
+    print("* set down by the hand, or still going down at the end: left out of the fit")
+    return 0

@@ -134,9 +134,9 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
             progress.message(f"warning: {warning}")
         progress.stage("tumble", total=1.0)
         more: dict[str, Any] = {}
-        rests: dict[str, Any] | None = None
+        besides: dict[str, Any] = {}
         if settings.method == "coupled":
-            trajectory, full, more, rests = _step_through_master(settings, plan, folder, progress)
+            trajectory, full, more, besides = _step_through_master(settings, plan, folder, progress)
         else:
             trajectory, full = _integrate(settings, plan, duration=settings.duration)
         progress.update(1.0)
@@ -148,7 +148,7 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
             from .tumble_steppers import words
 
             result["title"] = words(settings, result["title"])
-            result |= {"tables": [rests]} if rests is not None else {}
+            result |= besides
         if settings.sweep:
             progress.message("the numbers above are those of one trial of the sweep, in its middle or nearest to it")
             progress.stage("sweep")
@@ -163,15 +163,14 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
 
 def _step_through_master(
     settings: TumbleSettings, plan: TumblePlan, folder: RunFolder, progress: Progress
-) -> tuple[Trajectory, float | None, dict[str, Any], dict[str, Any] | None]:
-    """The trial by the master, its series/feet.csv written; what `_integrate` gives, more quantities, a table."""
+) -> tuple[Trajectory, float | None, dict[str, Any], dict[str, Any]]:
+    """The trial by the master, its series/feet.csv written; what `_integrate` gives, `coupled_quantities`' two."""
     from .tumble_coupled import coupled_quantities, coupled_tumble, feet_columns
-    from .tumble_steppers import own_quantities
 
     run = coupled_tumble(settings, plan, duration=settings.duration)
     trajectory = run.run(on_step=lambda run: progress.update(run.fraction))
     folder.write_series("feet", feet_columns(run))
-    return trajectory, run.body.wheel_at_limit, coupled_quantities(run), own_quantities(run)[1]
+    return trajectory, run.body.wheel_at_limit, *coupled_quantities(run)
 
 
 def _add_sweep(result: dict[str, Any], settings: TumbleSettings, folder: RunFolder, model: Path | None) -> None:

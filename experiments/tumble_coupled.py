@@ -58,8 +58,8 @@ def coupled_tumble(settings: TumbleSettings, plan: TumblePlan, *, duration: floa
     )  # fmt: skip
 
 
-def coupled_quantities(run: CoupledTumble) -> dict[str, dict[str, Any]]:
-    """What it has beyond the planar model's numbers."""
+def coupled_quantities(run: CoupledTumble) -> tuple[dict[str, dict[str, Any]], dict[str, Any]]:
+    """What it has beyond the planar model's numbers; and what a row of tumbles adds to the result besides."""
     sinkage, normal = law_feet(run)
     gap = run.columns["given"] - run.columns["taken"]
     found = {
@@ -73,9 +73,10 @@ def coupled_quantities(run: CoupledTumble) -> dict[str, dict[str, Any]]:
             "work that the body gives less what the ground takes, largest, over max(|work of the torque|, W l)",
         ),
     }  # fmt: skip
+    own, more = own_quantities(run, sinkage, normal)
     return {
         name: {"value": value, "std": 0.0, "unit": unit, "note": note} for name, (value, unit, note) in found.items()
-    } | own_quantities(run)[0]
+    } | own, more
 
 
 def feet_columns(run: CoupledTumble) -> dict[str, Any]:

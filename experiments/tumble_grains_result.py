@@ -71,9 +71,9 @@ def conclude(
     bed, books = run.footing.bed, run.master.books  # type: ignore[attr-defined]
     result["title"] = words(settings, f"A tumble on a bed of {plan.surface}: {result['title'].partition(': ')[2]}")
     result["code"] = fingerprint()
-    added, rests = own_quantities(run)
+    added, tables = own_quantities(run, run.feet[:, 3], run.feet[:, 0])
     result["quantities"] |= _own_quantities(run) | added
-    result |= {"tables": [rests]} if rests is not None else {}
+    result |= tables
     if run.losses:
         result["quantities"]["energy_residual"]["note"] += (
             "; also of all together: what the bed holds and what its dashpots, friction and rolling took are measured, "

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from coupling import CoupledTumble, Footing, Landing, TumblesInARow
 from rigid.trial import Trial
 
+from .footfalls import find_footfalls, footfall_quantities, footfall_table
 from .tumble_settings import TumbleSettings
 
 __all__ = ["is_plain", "own_quantities", "stepper_of", "words"]
@@ -40,13 +45,22 @@ def words(settings: TumbleSettings, title: str) -> str:
     return title
 
 
-def own_quantities(run: CoupledTumble) -> tuple[dict[str, dict[str, Any]], dict[str, Any] | None]:
-    """What a row of tumbles or a landing adds to a result: quantities, and a table of the rests."""
+def own_quantities(
+    run: CoupledTumble, sinkage: NDArray[np.float64], load: NDArray[np.float64]
+) -> tuple[dict[str, dict[str, Any]], dict[str, Any]]:
+    """What a row of tumbles or a landing adds to a result: quantities, and (of a row) its tables and footfalls.
+
+    sinkage [m] and load [N] of each row over the run, shape [step, row] both.
+    """
     if isinstance(run, TumblesInARow):
-        return _row(run)
+        quantities, rests = _row(run)
+        falls = find_footfalls(run.columns["time"], sinkage, load)
+        return quantities | footfall_quantities(falls), {
+            "tables": [rests, footfall_table(falls)], "footfalls": [asdict(fall) for fall in falls],
+        }  # fmt: skip
     if isinstance(run, Landing):
-        return _landing(run), None
-    return {}, None
+        return _landing(run), {}
+    return {}, {}
 
 
 def _quantity(value: float | None, unit: str, note: str) -> dict[str, Any]:
@@ -54,8 +68,6 @@ def _quantity(value: float | None, unit: str, note: str) -> dict[str, Any]:
 
 
 def _row(run: TumblesInARow) -> tuple[dict[str, dict[str, Any]], dict[str, Any]]:
-    import numpy as np
-
     rests = run.rests
     done = max(len(rests["time"]) - 1, 0)
     slope = error = None
@@ -87,8 +99,6 @@ def _row(run: TumblesInARow) -> tuple[dict[str, dict[str, Any]], dict[str, Any]]
 
 
 def _landing(run: Landing) -> dict[str, dict[str, Any]]:
-    import numpy as np
-
     rows, states = run.columns, run.states
     touched = next((k for k, state in enumerate(states) if state != "hop"), None)
     left = None

@@ -79,6 +79,9 @@ def write_tumble_report(
     if "sweep" in result:
         swept, _ = read_columns(folder / result["sweep"]["file"])
         page = replace(page, sections=[sweep_section(result, figures, swept), *page.sections])
+    if "footfalls" in result:
+        listed = [table(shown["head"], shown["rows"], title=shown["title"]) for shown in result["tables"]]
+        page = replace(page, sections=[*page.sections[:1], Section("Tumble by tumble", listed), *page.sections[1:]])
     if "grains" in result:
         tables = {name: read_columns(folder / file) for name, file in result["grains"]["series"].items()}
         tables["motion"] = motion, states

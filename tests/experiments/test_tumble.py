@@ -570,3 +570,16 @@ def test_a_landing_says_how_fast_it_came_and_what_it_kept():
     assert value_of("landed", "impact_speed") == pytest.approx(0.05, rel=0.02)
     assert 0.3 < value_of("landed", "restitution") < 1 and 0 < value_of("landed", "energy_kept") < 1
     assert value_of("landed", "energy_residual") < 1e-3
+
+
+def test_a_row_of_tumbles_lists_each_row_that_comes_down(reported):
+    """Result, table and report of two tumbles on the spring-damper; the depths are those of series/feet.csv."""
+    given = ("--surface", "sand", "--rig", "0.0085", "--method", "coupled", "--tumbles", "2", "--duration", "4")
+    assert main(["tumble", *given, "--quiet", "--out", "row"]) == 0
+    found, feet = result_of("row"), read_series(Path("row/series/feet.csv"))
+    deepest = [fall["deepest"] for fall in found["footfalls"]]
+    assert [table["title"] for table in found["tables"]] == ["Where it came to lie", "Rows that came down"]
+    assert len(deepest) >= 3 and max(deepest) == pytest.approx(max(feet[f"sinkage_{row}_m"].max() for row in range(8)))
+    assert [fall["set_down"] for fall in found["footfalls"]] == [True, True] + [False] * (len(deepest) - 2)
+    page = Path("row/report.html").read_text()
+    assert "Tumble by tumble" in page and "Rows that came down" in page
