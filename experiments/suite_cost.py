@@ -11,12 +11,11 @@ from .tumble_settings import TumbleSettings
 
 __all__ = ["Cost", "cost_of_tumble"]
 
-RATES = ((2e4, 9.52e6), (1e5, 7.09e6))
-"""Grain-steps a second on 2 cores, with rolling, by grain count: docs/performance.md, 2026-11-21, a quiet machine."""
+RATES = ((2.8e3, 3.8e6), (2e4, 9.52e6), (1e5, 7.09e6))
+"""Grain-steps a second, with rolling, by the count of grains computed: docs/performance.md, 2026-11-21, a quiet machine
+with 2 cores; the first from `grains3-row-seed1` (2,800 awake of 84,772), where one core does as well as two."""
 BOOK = 1.19
 """Time of a step with the book of what grains lose over one without (docs/coupling.md, 2026-11-22)."""
-SMALL_BED = 2e4
-"""Fewer grains than this do not fill two cores: their rate is taken in proportion down to a tenth of the first's."""
 MACRO_STEP = 5e-3
 """Of the coupling beyond the grains, a macro step [s] (docs/coupling.md, 2026-11-21)."""
 SET_DOWN = 0.4 * 0.05
@@ -108,6 +107,6 @@ def cost_of_tumble(settings: TumbleSettings) -> Cost:
 
 def _rate(grains: float) -> float:
     counts, rates = zip(*RATES, strict=True)
-    if grains < SMALL_BED:
-        return rates[0] * max(0.1, grains / SMALL_BED)
+    if grains < counts[0]:  # what a step costs beside its grains is in proportion more
+        return rates[0] * max(0.1, grains / counts[0])
     return float(np.interp(grains, counts, rates))
