@@ -56,6 +56,9 @@ def summarise(cases: Sequence[Case]) -> dict[str, Any]:
         ),
         "parameters": _parameters(right),
         "held_out_at_most_1_2": _share(right, lambda c: _after(c) <= 1.2),
+        "held_out_at_most_1_2_times_what_the_truth_leaves": _share(
+            [c for c in right if _by_truth(c) is not None], lambda c: _after(c) <= 1.2 * max(_by_truth(c) or 1.0, 1.0)
+        ),
         "median_held_out_after": _median([_after(c) for c in right]),
         "median_gap_closed": _median([_closed(c["before"], c["after"]) for c in right if _gap(c["before"]) > _GAP]),
         "baselines": _baselines(cases),
@@ -70,6 +73,15 @@ def _right(case: Case) -> bool:
 
 def _holds(case: Case) -> bool:
     return case["truth"][0] in {*case["effects"], *case["alternatives"]}
+
+
+def _by_truth(case: Case) -> float | None:
+    """What the truth itself leaves a sample of the held-out trials, with the stated noise, where its maker tells."""
+    left = (case.get("hidden") or {}).get("left")
+    if not left or not case["held_out"]:
+        return None
+    rows = [left[int(trial.lstrip("pd")) - 1] for trial in case["held_out"]]
+    return float(sum(total for total, _ in rows) / max(1, sum(count for _, count in rows)))
 
 
 def _gap(told: dict[str, Any] | None) -> float:

@@ -44,7 +44,9 @@ def make_rig(
     at, over the noise. `trials`: how many; None draws 6 to 21. `law`: the kind of the effect's law (`LAWS`).
 
     The signature is the root mean square of what the effect changes over the noise, weighed with all that K, C and the
-    nuisances that are there may explain within their standard deviations.
+    nuisances that are there may explain within their standard deviations. `Hidden.extra["left"]` has for each trial the
+    chi-square, with the stated noise, that the motion and forces themselves leave of what was recorded, and of how many
+    readings: zeros, jitter and noise louder than stated are in it, and no law can leave less.
     """
     random = np.random.default_rng((seed, 20))
     kind = kind or _draw_kind(random)
@@ -67,12 +69,13 @@ def make_rig(
     elif laws:
         amplitude, made = _amplified(rig, laws, clean, strength)
         measure = _signature([_change(rig, *three) for three in zip(rig.trials, clean, made, strict=True)])
-    campaign = _record(random, rig, made)
+    campaign, left = _record(random, rig, made)
     parameters = {f"{own.name}.{key}": value for own in laws for key, value in own.numbers.items()}
     coloured = rig.persistence["force"] > 0.0
     extra = design | {
         "laws": {own.name: own.kind for own in laws}, "nuisances": rig.wandering, "louder": rig.louder,
         "k": rig.k, "c": rig.c, "drawn": [[t.factor_k, t.factor_c, t.force_zero, t.depth_zero] for t in rig.trials],
+        "left": left,
     }  # fmt: skip
     return campaign, Hidden(effects, outside, parameters | {"amplitude": amplitude}, measure, coloured,
                             len(clean), rig.persistence["depth"], extra)  # fmt: skip
@@ -196,13 +199,17 @@ def _signature(changes: Sequence[tuple[Array, dict[str, Array]]]) -> float:
 # What is written ------------------------------------------------------------------------------------------------------
 
 
-def _record(random: np.random.Generator, rig: Rig, made: Sequence[_Columns]) -> Campaign:
-    trials, recordings = [], {}
+def _record(
+    random: np.random.Generator, rig: Rig, made: Sequence[_Columns]
+) -> tuple[Campaign, list[tuple[float, int]]]:
+    """The campaign, and what the truth leaves of each trial."""
+    trials, recordings, left = [], {}, []
     for number, (trial, data) in enumerate(zip(rig.trials, made, strict=True), 1):
         name = f"{'p' if trial.driven else 'd'}{number:02d}"
         trials.append({"id": name, "mode": "driven" if trial.driven else "drop", "gravity": rig.gravity,
                        "speed": trial.speed, "diameter": trial.size, "data": f"{name}.csv"})  # fmt: skip
         recordings[name, "data"] = _read_off(random, rig, trial, data, gaps=rig.gaps and number % 2 == 0)
+        left.append(_left(rig, trial, data, recordings[name, "data"]))
     shape = str(random.choice(["sphere", "flat", "cone"]))
     tables = PenetrationCampaign.model_validate({
         "format": "hedgehog-campaign/1", "kind": "penetration", "name": "a rig",
@@ -212,7 +219,27 @@ def _record(random: np.random.Generator, rig: Rig, made: Sequence[_Columns]) -> 
         "uncertainty": {"stiffness": rig.doubt[0], "damping": rig.doubt[1]},
         "sensors": {name: {"std": (std,)} for name, std in rig.noise.items()}, "trial": tuple(trials),
     })  # fmt: skip
-    return Campaign(tables, recordings)
+    return Campaign(tables, recordings), left
+
+
+def _left(rig: Rig, trial: Trial, data: _Columns, read: Recording) -> tuple[float, int]:
+    """Chi-square of the readings that count (force; of a drop depth and acceleration) about the truth at the times that
+    stand beside them, with the stated noise, and how many they are."""
+    time = read["t_ms"] / 1e3 if rig.small_units else read["t_s"]
+    total, count = 0.0, 0
+    for name, column, small, factor, usual in (
+        ("depth", "depth", "depth_mm", 1e-3, "depth_m"),
+        ("force", "other", "force_mN", 1e-3, "force_N"),
+        ("accel", "other", "accel_g", 9.80665, "accel_m_s2"),
+    ):
+        label = small if rig.small_units else usual
+        if label not in read.columns or (name == "depth" and trial.driven):
+            continue
+        value = read[label] * (factor if rig.small_units else 1.0)
+        off = (value - np.interp(time, data["time"], data[column]))[time >= 0.0] / rig.noise[name]
+        off = off[np.isfinite(off)]
+        total, count = total + float(off @ off), count + len(off)
+    return total, count
 
 
 def _read_off(random: np.random.Generator, rig: Rig, trial: Trial, data: _Columns, *, gaps: bool) -> Recording:

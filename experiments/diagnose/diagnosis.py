@@ -272,38 +272,93 @@ class _Course:
 
     def _scattered_beside(self, choice: Choice) -> Choice:
         """Where something is left, replicates are compared by what each has of its own."""
-        fits = () if self.asked.restless else (choice.best.fit, choice.base.fit)
-        for kinds, beside in itertools.product(("", "zero_scatter", "force_scatter"), fits):
-            scatter = scatter_apart(beside, self.held_out, kinds=kinds) if not choice.left.passed else Scatter()
-            if scatter.parameters and set(scatter.model_std) != set(self.model_std):
-                self.tell("replicates are found to differ beside what is left: choosing again", 0.0)
-                stands = _explains if kinds == "force_scatter" else partial(_leaves_less, than=choice)
-                choice = self._chosen_with(scatter, stands) or choice
+        if not self._compares(choice):
+            return choice
+        fits, named = (choice.best.fit, choice.base.fit), choice.left.passed
+        for kinds, beside in itertools.product(("", "zero_scatter", "force_scatter"), fits[1:] if named else fits):
+            if choice.left.passed and not named:
+                break
+            scatter = scatter_apart(beside, self.held_out, kinds=kinds)
+            if not scatter.parameters or set(scatter.model_std) == set(self.model_std):
+                continue
+            if named:
+                if other := self._without_name(scatter, choice):
+                    return other
+                continue
+            self.tell("replicates are found to differ beside what is left: choosing again", 0.0)
+            stands = _explains if kinds == "force_scatter" else partial(_leaves_less, than=choice)
+            choice = self._chosen_with(scatter, stands) or choice
         return choice
 
     def _scattered_alone(self, choice: Choice) -> Choice:
-        """Where no trial repeats another, and something is left: whether beds differ without going with anything."""
-        for beside in () if self.asked.restless or choice.left.passed else (choice.best.fit, choice.base.fit):
-            scatter, findings = lone_scatter_of(beside, self.held_out)
+        """Where no trial repeats another, and something is left: whether beds, or zeros, differ without going with
+        anything."""
+        if not self._compares(choice):
+            return choice
+        found: list[tuple[Scatter, Fit]] = []
+        fits, asked = (choice.best.fit, choice.base.fit), getattr(self.problem, "lone_scatter", ())
+        for beside, kinds in itertools.product(fits[1:] if choice.left.passed else fits, asked):
+            scatter, findings = lone_scatter_of(beside, self.held_out, kinds=kinds)
             self.findings += [finding for finding in findings if finding not in self.findings]
-            if not scatter.parameters:
-                continue
+            if scatter.parameters and all(scatter.model_std != other.model_std for other, _ in found):
+                found.append((scatter, rescattered(plain(self.base), scatter)))
+        # Zeros of depth and force are next to the same in a stiff bed: the likeliest is asked first.
+        for scatter, beside in sorted(found, key=lambda one: one[1].objective):
             self.tell("trials are found to differ without a rule: choosing again", 0.0)
-            if other := self._chosen_with(scatter, lambda other: other.left.passed):
+            other = (
+                self._without_name(scatter, choice, beside) if choice.left.passed
+                else self._chosen_with(scatter, _explains, beside)
+            )  # fmt: skip
+            if other:
                 self.findings.append(lone_finding(scatter))
                 return other
         return choice
 
-    def _chosen_with(self, scatter: Scatter, stands: Callable[[Choice], bool]) -> Choice | None:
-        """A choice anew beside `scatter`, kept where it `stands`; else None, and all is as before."""
-        before = self.base
-        self.base = coloured(rescattered(plain(before), scatter), self.colours)
+    def _chosen_with(
+        self, scatter: Scatter, stands: Callable[[Choice], bool], base: Fit | None = None
+    ) -> Choice | None:
+        """A choice anew beside `scatter`, kept where it `stands`; else None, and all is as before. `base`: the base
+        model's fit with it, the noise white, where that is known."""
+        before = self._beside(scatter, base)
         other = self._chosen()
         if stands(other):
             self.model_std = scatter.model_std
             return other
-        self.base = before
+        self.base, self.colours = before
         return None
+
+    def _without_name(self, scatter: Scatter, choice: Choice, base: Fit | None = None) -> Choice | None:
+        """Of a name that explains the fitted trials and not those held out: no name, where the base model beside
+        `scatter` explains both; else None, and all is as before."""
+        before = self._beside(scatter, base)
+        left, held = self._gate_of_base(), self._held_out_gate(self.base)
+        if left.passed and (held is None or held.passed):
+            self.model_std = scatter.model_std
+            nothing = Hypothesis(self.base, score(self.base))
+            return Choice(nothing, nothing, (), choice.table, left)
+        self.base, self.colours = before
+        return None
+
+    def _beside(self, scatter: Scatter, base: Fit | None) -> tuple[Fit, dict[str, Colour]]:
+        """Take `scatter` into the base model; the fit and the colours as they were. With what differs out of the way a
+        colour may show."""
+        before = self.base, self.colours
+        base = base or rescattered(plain(self.base), scatter)
+        self.colours = {**self.colours, **colours_of(base)}
+        self.base = coloured(base, self.colours)
+        return before
+
+    def _compares(self, choice: Choice) -> bool:
+        """Whether trials are to be compared with one another once more (pushes and drops only)."""
+        asked = not self.asked.restless and getattr(self.problem, "by_path", False)
+        return asked and not self._settled(choice)
+
+    def _settled(self, choice: Choice) -> bool:
+        """Whether the best leaves nothing of trials that were fitted and, where it has a name, of those held out."""
+        if not choice.left.passed or not choice.best.effects:
+            return choice.left.passed
+        held = self._held_out_gate(choice.best.fit)
+        return held is None or held.passed
 
     def _timed(self, choice: Choice) -> Choice:
         """Times that jitter, at the slopes of the motion as it is now known."""

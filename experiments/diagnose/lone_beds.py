@@ -34,8 +34,9 @@ _WITHOUT = 0.25
 """Share of the spread that must be left without the farthest trial: else that one is at odds with all others."""
 
 
-def find_lone_scatter(found: Fit) -> tuple[Scatter, list[Finding]]:
-    """The scatter of trials none of which repeats another, asked of those of `found`; and what speaks against it."""
+def find_lone_scatter(found: Fit, kinds: Sequence[str]) -> tuple[Scatter, list[Finding]]:
+    """The scatter of these kinds between trials none of which repeats another, asked of those of `found`; and what
+    speaks against it."""
     problem: Any = found.model.problem
     trials = [trial for trial in problem.trials if trial.id in found.model.trials]
     sets: dict[float, list[str]] = {}
@@ -43,7 +44,7 @@ def find_lone_scatter(found: Fit) -> tuple[Scatter, list[Finding]]:
         sets.setdefault(trial.settings.get(problem.own_base, 0.0), []).append(trial.id)
     if sum(len(ids) - 1 for ids in sets.values()) < _FEWEST - 1 or max(map(len, groups_of(trials).values())) > 1:
         return Scatter(), []
-    scatter = find_scatter(found, kinds=problem.zero_scatter, alone=list(sets.values()))
+    scatter = find_scatter(found, kinds=kinds, alone=list(sets.values()))
     findings = []
     order = {trial.id: float(place) for place, trial in enumerate(trials)}
     settings: dict[str, Mapping[str, float]] = {"order": order}
@@ -52,10 +53,10 @@ def find_lone_scatter(found: Fit) -> tuple[Scatter, list[Finding]]:
     for kind in scatter.model_std:
         own = {id: scatter.values[f"{kind}[{id}]"] for id in order if f"{kind}[{id}]" in scatter.values}
         alike = [[id for id in ids if id in own] for ids in _alike(trials, sets)]
-        kinds = {trial.id: float(trial.condition[0] == trials[0].condition[0]) for trial in trials}
+        modes = {trial.id: float(trial.condition[0] == trials[0].condition[0]) for trial in trials}
         same = [[id for id in ids if id in own] for ids in sets.values()]
         chances = {name: _chance(own, numbers, alike) for name, numbers in settings.items()}
-        chances["kind"] = 0.0 if _explained(own, kinds, same) > _EXPLAINED else _chance(own, kinds, same)
+        chances["kind"] = 0.0 if _explained(own, modes, same) > _EXPLAINED else _chance(own, modes, same)
         for name, numbers in settings.items():
             if max(_explained(own, numbers, compared) for compared in (alike, same)) > _EXPLAINED:
                 chances[name] = 0.0
@@ -77,10 +78,12 @@ def find_lone_scatter(found: Fit) -> tuple[Scatter, list[Finding]]:
 def lone_finding(scatter: Scatter) -> Finding:
     """What is said of it."""
     sizes = [f"{kind} by {size_words(kind, std)}" for kind, std in scatter.model_std.items()]
+    zeros = all(kind.endswith("zero") for kind in scatter.model_std)
+    own = "a zero that is set anew" if zeros else "what a bed has of its own"
     what = (
         f"trials differ beyond the sensors ({', '.join(sizes)}, standard deviation), although none repeats another: "
-        f"with that each is explained from end to end, and it goes with neither speed nor order, as what a bed has of "
-        f"its own does; replicates would show it without a model"
+        f"with that each is explained from end to end, and it goes with neither speed nor order, as {own} does; "
+        f"replicates would show it without a model"
     )
     return Finding(trial="", what=what)
 

@@ -67,11 +67,14 @@ class PenetrationProblem:
     hidden_scatter = ("bed damping",)
     """Kinds of scatter that are asked for only where something is left: they come near to what a speed does."""
     zero_scatter = ("bed", "depth zero")
-    """Kinds that are asked for by themselves where the others do not explain what is left, and where no trial repeats
-    another (`lone_beds`): at one speed a damper and a depth's zero are the same."""
+    """Kinds that are asked for by themselves where the others do not explain what is left: at one speed a damper and a
+    depth's zero are the same."""
     force_scatter = ("force zero",)
     """And after these, of pushes that begin at the surface, where no row reads it: in a stiff bed the two are next to
     the same; it counts where it explains all."""
+    lone_scatter = (("bed", "depth zero"), ("bed", "bed damping"), ("force zero",))
+    """What is asked for, one after the other, where no trial repeats another (`lone_beds`). A bed may differ in K and
+    not in C."""
     special_scatter = ("depth zero", "force zero")
     """Kinds that are not asked for with all others at once."""
     by_path = True

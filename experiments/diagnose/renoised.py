@@ -115,12 +115,13 @@ def scatter_apart(found: Fit, held_out: tuple[str, ...], *, kinds: str = "") -> 
     return scatter_of(found, held_out, apart=True, kinds=asked)
 
 
-def lone_scatter_of(found: Fit, held_out: tuple[str, ...]) -> tuple[Scatter, list[Finding]]:
-    """The same of trials of which none repeats another, and what speaks against it; nothing where one does."""
+def lone_scatter_of(found: Fit, held_out: tuple[str, ...], *, kinds: tuple[str, ...]) -> tuple[Scatter, list[Finding]]:
+    """The same, of these kinds, of trials of which none repeats another, and what speaks against it; nothing where one
+    does."""
     model = replace(found.model, scatter=())
-    if not hasattr(model.problem, "zero_scatter") or any(len(i) > 1 for i in groups_of(model.problem.trials).values()):
+    if any(len(ids) > 1 for ids in groups_of(model.problem.trials).values()):
         return Scatter(), []
-    return find_lone_scatter(fit(model.on((*model.trials, *held_out)), unscattered(found)))
+    return find_lone_scatter(fit(model.on((*model.trials, *held_out)), unscattered(found)), kinds)
 
 
 def unrest_of(found: Fit, held_out: tuple[str, ...]) -> Unrest:

@@ -9,7 +9,7 @@ import pytest
 from penetration_campaigns import campaign_of, driven_trial
 
 import benchmarks.diagnose as bench
-from benchmarks.diagnose_table import show, summarise
+from benchmarks.diagnose_table import _by_truth, show, summarise
 from benchmarks.hidden_penetration import EFFECTS, Hidden, make_hidden
 from experiments.benching import benchmark_options, goes_on
 from experiments.progress import Progress
@@ -156,3 +156,9 @@ def test_the_answer_is_not_in_the_campaign_and_a_seed_gives_the_same_campaign():
     first, second = campaign.recording("001", "data"), again.recording("001", "data")
     assert all(np.array_equal(first[name], second[name]) for name in first.columns)
     assert json.loads(text)["name"] == "made up"
+
+
+def test_what_the_truth_leaves_of_trials_held_out_is_that_of_these_trials():
+    case = {"hidden": {"left": [[10.0, 10], [34.0, 20], [9.0, 10]]}, "held_out": ["p02", "d03"]}
+    assert _by_truth(case) == pytest.approx(43.0 / 30.0)
+    assert _by_truth({"held_out": ["p01"]}) is None  # a maker that does not tell

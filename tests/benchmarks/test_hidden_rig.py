@@ -45,6 +45,26 @@ def test_a_null_holds_nothing_and_what_wanders_is_recorded_as_it_was_drawn():
         assert (max(one.extra["louder"].values()) > 1) == (wandering["loud"] > 0)
 
 
+def test_what_the_truth_leaves_is_the_noise_as_stated_and_what_comes_beside_it():
+    """1 a reading where nothing is wrong; 1.3^2 where all sensors are so much louder; a force zero adds its square."""
+    seen = set()
+    for seed in range(60):
+        told = make_rig(seed, kind="null", trials=6)[1]
+        extra, wandering = told.extra, told.extra["nuisances"]
+        if extra["sensors"]["jitter"] or extra["sensors"]["coarse"] or told.coloured or told.depth_persistence:
+            continue
+        forces = [
+            k for k, (total, count) in enumerate(extra["left"]) if extra["drawn"][k][2] or not wandering["force-zero"]
+        ]
+        for k in forces[: 6 - extra["design"]["drops"]]:
+            zero = extra["drawn"][k][2] / extra["sensors"]["noise"]["force"]
+            total, count = extra["left"][k]
+            expected = extra["louder"]["force"] ** 2 + zero**2
+            assert total / count == pytest.approx(expected, abs=6 * expected * math.sqrt(2 / count))
+            seen.add((zero != 0, extra["louder"]["force"] > 1))
+    assert len(seen) > 2
+
+
 def test_what_no_data_could_tell_is_not_hidden():
     pairs = [set(make_rig(seed, kind="pair", strength=5.0, trials=6)[1].effects) for seed in range(8)]
     assert {"depth-hardening", "layering"} not in pairs and all(len(pair) == 2 for pair in pairs)
