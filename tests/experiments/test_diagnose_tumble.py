@@ -44,6 +44,20 @@ from rigid import STATES, Effect
         ),
         (
             (
+                Effect(id="bearing-drag", parameters={"torque": 0.01, "excess": 0.6, "speed": 0.3}),
+                Effect(id="rig-friction", parameters={"force": 0.05, "excess": 0.4, "speed": 0.01}),
+            ),
+            {
+                "bearing-drag.torque": 0.01,
+                "bearing-drag.excess": 0.6,
+                "bearing-drag.speed": 0.3,
+                "rig-friction.force": 0.05,
+                "rig-friction.excess": 0.4,
+                "rig-friction.speed": 0.01,
+            },
+        ),
+        (
+            (
                 Effect(id="clock-offset", parameters={"offset": 0.013, "drift": 0.004}),
                 Effect(id="camera-scale", parameters={"scale": 1.02, "bend": 0.3}),
             ),
@@ -283,3 +297,17 @@ def test_a_cable_may_hang_wound_up_with_drag_of_any_power_beside():
     assert told["umbilical.rest"] == -0.3 and told["umbilical.drag_power"] == 1.0
     names = [f"umbilical.{name}_change" for name in ("rest", "drag_power")]
     assert {tuple(start[name] > 0 for name in names) for start in form.starts} == set(product((False, True), repeat=2))
+
+
+@pytest.mark.parametrize(("effect", "level"), [("bearing-drag", "torque"), ("rig-friction", "force")])
+def test_dry_friction_may_be_more_near_rest_from_none_at_all(effect, level):
+    forms = tumble_forms(rig=True, sinkage=3e-5, weight=0.88)
+    (form,) = shaped(forms)[f"{effect}:dry"]
+    assert form.name == "dry, more near rest" and form.amplitude == f"{effect}.{level}"
+    plain = {p.name: np.zeros(1) for p in form.parameters} | {form.amplitude: np.array([0.02])}
+    told = form.physical(plain)
+    assert told[f"{effect}.excess"] == 0.0 and told[f"{effect}.{level}"] == 0.02
+    faster = form.physical(plain | {f"{effect}.log_speed": np.array([1.0])})
+    assert faster[f"{effect}.speed"] == pytest.approx(math.e * told[f"{effect}.speed"], rel=1e-12)
+    assert all(start[f"{effect}.excess_change"] > 0 for start in form.starts)
+    assert next(p for p in form.parameters if p.name.endswith("excess_change")).lowest == 0.0
