@@ -3,12 +3,14 @@
 import math
 from dataclasses import replace
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from tumble_campaigns import CONDITIONS, campaign
 
 from experiments.campaign import Campaign, Recording, read_model
+from experiments.diagnose import deciding
 from experiments.diagnose.fitting import Model, Whitener, fit
 from experiments.diagnose.tumble_checks import checked
 from experiments.diagnose.tumble_data import CHANNELS, tumble_data
@@ -335,3 +337,24 @@ def test_dry_friction_may_be_more_near_rest_from_none_at_all(effect, level):
     assert faster[f"{effect}.speed"] == pytest.approx(math.e * told[f"{effect}.speed"], rel=1e-12)
     assert all(start[f"{effect}.excess_change"] > 0 for start in form.starts)
     assert next(p for p in form.parameters if p.name.endswith("excess_change")).lowest == 0.0
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "nothing"),
+    [
+        ((1.01, 0.95), (1.015, 1.04), True),
+        ((1.01, 0.95), (1.005, 1.04), False),  # something is taken away of those that were fitted
+        ((1.01, 1.10), (1.015, 1.04), False),  # or of those held out
+        ((1.10, 0.95), (1.11, 1.04), False),  # more than chance is left
+        ((1.01, 1.50), (1.015, 1.60), False),
+    ],
+)
+def test_a_name_that_takes_nothing_away_of_what_is_noise_is_none(monkeypatch, before, after, nothing):
+    base, best = (
+        SimpleNamespace(model=SimpleNamespace(problem=None, trials=("001",), gap=gap), count=10_000)
+        for gap in (before, after)
+    )
+    monkeypatch.setattr(deciding, "gap_of", lambda problem, model, *rest: deciding.Gap(*model.gap))
+    monkeypatch.setattr(deciding, "values_of_all", lambda found, held_out: {})
+    choice = SimpleNamespace(base=SimpleNamespace(fit=base), best=SimpleNamespace(fit=best))
+    assert deciding.explains_nothing(choice, ("002",)) == nothing
