@@ -13,11 +13,13 @@ from rigid import Effect, Trial
 G = 9.80665
 MASS, INERTIA, LENGTH = 5.3, 0.06, 0.2
 
-# As in the benchmark, but that what moves the start may be larger, and a crater's way back bent.
+# As in the benchmark, but that what moves the start may be larger, a crater's way back bent, dry friction more at rest.
 RANGES = AMPLITUDES | {
     "com-offset": {"x": (-4e-4, 4e-4), "y": (-1e-3, 1e-3)},
     "slope": {"angle": (-0.03, 0.03)},
     "plastic-sinkage": {"share": (0.05, 0.6), "bend": (0.0, 1.5)},
+    "rig-friction": {"force": (0.01, 0.1), "excess": (0.0, 1.0), "speed": (0.005, 0.1)},
+    "bearing-drag": {"torque": (0.002, 0.02), "excess": (0.0, 1.0), "speed": (0.02, 1.0)},
 }
 """Plausible sizes of every effect that acts on the motion."""
 

@@ -19,8 +19,8 @@ from .problem import Problem
 from .search import Choice
 
 __all__ = [
-    "Gap", "certain", "closes", "gap_of", "one_number", "smallest", "unscattered", "values_of_all", "verdict_of",
-    "well_known",
+    "Gap", "certain", "closes", "explains_nothing", "gap_of", "one_number", "smallest", "unscattered", "values_of_all",
+    "verdict_of", "well_known",
 ]  # fmt: skip
 
 _AS_LIKELY = 1.0
@@ -114,6 +114,18 @@ def verdict_of(
         # Where nothing at all is left of the trials that were fitted, all held out but one may part, and late.
         passed = passed or (fits and ask(len(held_out) - 1, share=_LATE) is not None)
     return ("ambiguous" if choice.alternatives else "named") if passed else "unknown"
+
+
+def explains_nothing(choice: Choice, held_out: tuple[str, ...]) -> bool:
+    """Whether a name takes nothing away, of the trials that were fitted or of those held out, where the base model
+    leaves no more than chance, all by the noise as stated: then it has found another of the many narrow valleys that a
+    likelihood of long tumbles has, which the noise's colour makes out to be deep, and no effect."""
+    base, best = choice.base.fit, choice.best.fit
+    problem, trials = base.model.problem, base.model.trials
+    before, after = (gap_of(problem, f.model, values_of_all(f, held_out), trials, held_out) for f in (base, best))
+    if before.fit - 1 > _LOUD * math.sqrt(2 / base.count) or (before.held_out or 0.0) > SMALL:
+        return False
+    return after.fit >= before.fit and (after.held_out or 0.0) >= (before.held_out or 0.0)
 
 
 def _of_form(choice: Choice, held_out: tuple[str, ...]) -> bool:

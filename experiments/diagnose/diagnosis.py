@@ -13,7 +13,7 @@ from typing import Any
 from .astray import allowed
 from .bounds import is_strained
 from .colour import Colour
-from .deciding import unscattered, verdict_of
+from .deciding import explains_nothing, unscattered, verdict_of
 from .evidence import Hypothesis, excess, held_out_fit, score, signature_matrix
 from .fitting import Fit, Model, Whitener, by_beginnings, fit, settled
 from .gate import Verdict, held_out_gate, open_gate
@@ -415,6 +415,8 @@ class _Course:
         asked, held_out = self.asked, self.held_out
         self.tell("verdict", 0.0)
         choice = self._ended(choice)
+        if choice.best.effects and hasattr(self.problem, "follows") and explains_nothing(choice, held_out):
+            return self._nothing(choice.left)
         held = self._held_out_gate(choice.best.fit)
         verdict = verdict_of(choice, held, held_out, asked.seed, set_aside=bool(asked.aside))
         # Where a second name was called for, trials were asked before it.

@@ -105,7 +105,8 @@ TUMBLE = {
                   "motion about the shaft in T",
     "slope": "gravity and wires along (-sin(angle), -cos(angle)) of the surface's axes",
     "tip-radius": "the lowest point of a ball of that radius touches, its centre l - radius from the platform's",
-    "rig-friction": "- force * sign(vertical speed) along the wires",
+    "rig-friction": "- force * (1 + excess * exp(-(v / speed)^2)) * sign(v) along the wires, v the vertical speed; "
+                    "excess 0 where it is not named",
     "pulley-inertia": "mass * (vertical speed)^2 / 2 in T",
     "torque-fade": "the torque times max(0, 1 - (speed_loss * w)^speed_power - (time_loss * t)^time_power), w the "
                    "wheel's speed; powers that are not named are 1",
@@ -123,7 +124,8 @@ TUMBLE = {
                      "1 where it is not named",
     "umbilical": "a torque - stiffness * a * abs(a)^(spring_power - 1) - drag * omega * abs(omega)^(drag_power - 1), "
                  "a = theta - rest, powers 1 and rest 0 where they are not named",
-    "bearing-drag": "a torque - torque * sign(omega)",
+    "bearing-drag": "a torque - torque * (1 + excess * exp(-(omega / speed)^2)) * sign(omega); excess 0 where it is "
+                    "not named",
     "clock-offset": "the IMU's time = (1 + drift) * t + offset",
     "camera-scale": "x and y as seen = (scale + bend * d^2) times the true ones, d the distance from the start",
 }  # fmt: skip

@@ -30,6 +30,8 @@ _THIN = 5
 _GROWING = (0.3, 0.6, 1.0)
 _POOR = 1.1
 """Chi-square per sample beyond which the base model is looked for from more places."""
+_AWAY = (0.0, 1.0, -1.0)
+"""Standard deviations of mu_s from which the base model is fitted once more where it leaves something."""
 _NEAR = 2.0
 """Chi-square per sample up to which the base model's fit is near enough to begin from."""
 _FOLLOWED = 8
@@ -181,9 +183,23 @@ class Guesser:
         if poor(best, _POOR):
             others = [begin(start.values, (1.0,)), begin(drawn(), _GROWING), begin(drawn(), _GROWING)]
             best = min([best, *fitter.fit(others, steps=15)], key=lambda found: found.cost)
+        if poor(best, _POOR):
+            best = min([best, *fitter.fit(self._rubbing(fitter, best, start), steps=15)], key=lambda found: found.cost)
         size = best.cost / sum(len(r) for r in best.residuals)
         self._warm[key] = ({name: best.values[name] for name in SHARED}, max(_POOR, 1.3 * size))
         return best
+
+    def _rubbing(self, fitter: Fitter, found: Fit, start: Start) -> list[Start]:
+        """Starts where this fit ended, but with both coefficients of friction as stated, or nearly so.
+
+        They decide what sticks and what slips: where a trial is on a branch that was not measured they are drawn away
+        to keep it there, for all trials, and what else is known by then finds the measured one without them.
+        """
+        rubs = {name: self.forward.nominal[name] for name in ("mu_s", "mu_d")}
+        places = [{**rubs, "mu_s": rubs["mu_s"] * (1 + z * fitter.sigma["mu_s"])} for z in _AWAY]
+        known = {**start.values, **found.values}
+        return [replace(start, values=known | place, gravity=found.gravity, scan=True, horizons=_GROWING)
+                for place in (places if fitter.sigma["mu_s"] > 0 else places[:1])]  # fmt: skip
 
     def _candidates(
         self, fitter: Fitter, old: Sequence[TumbleForm], forms: Sequence[TumbleForm], start: Start

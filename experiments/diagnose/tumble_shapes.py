@@ -21,7 +21,8 @@ __all__ = ["shaped"]
 
 @dataclass(frozen=True)
 class _Shape:
-    """A number of a term that bends a form: `name` less `plain` is fitted, from 0, with a prior of `std`."""
+    """A number of a term that bends a form: `name` less `plain` is fitted, from 0, with a prior of `std`; `logarithm`:
+    that of it over `plain`."""
 
     name: str
     plain: float
@@ -29,6 +30,29 @@ class _Shape:
     lowest: float
     highest: float
     unit: str = "1"
+    logarithm: bool = False
+    sides: tuple[float, ...] = (-0.7, 0.7)
+    """Where fits begin, in `std`."""
+
+    @property
+    def fitted(self) -> str:
+        """Name of the parameter that is fitted."""
+        effect, _, own = self.name.partition(".")
+        return f"{effect}.log_{own}" if self.logarithm else f"{self.name}_change"
+
+    def physical(self, value: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What the term gets."""
+        return self.plain * np.exp(value) if self.logarithm else self.plain + value
+
+
+def _rubbing(effect: str, speed: float) -> tuple[tuple[_Shape, ...]]:
+    """Dry friction that is more near rest: by which share of its level, and the speed by which that has fallen."""
+    return (
+        (
+            _Shape(f"{effect}.excess", 0.0, 0.5, 0.0, 4.0, sides=(0.7,)),
+            _Shape(f"{effect}.speed", speed, 1.0, -4.0, 4.0, logarithm=True),
+        ),
+    )
 
 
 _POWER = (1.0, 0.4, -0.65, 2.0)
@@ -48,6 +72,8 @@ _SHAPES: Mapping[str, _Shape | tuple[tuple[_Shape, ...], ...]] = {
     "camera-scale:same in x and y": _Shape("camera-scale.bend", 0.0, 0.5, -10.0, 10.0, "1/m2"),
     "adhesion:mobilised": _Shape("adhesion.sharpness", 0.0, 0.7, -1.0, 2.0),
     "adhesion:that friction does not lose": _Shape("adhesion.sharpness", 0.0, 0.7, -1.0, 2.0),
+    "rig-friction:dry": _rubbing("rig-friction", 0.03),
+    "bearing-drag:dry": _rubbing("bearing-drag", 0.2),
 }
 """By the id of the plain form; where there are several ways to bend it, the numbers of each."""
 
@@ -60,8 +86,7 @@ class _Bent:
     shapes: tuple[_Shape, ...]
 
     def __call__(self, values: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
-        bent = {shape.name: shape.plain + np.asarray(values[f"{shape.name}_change"], dtype=float)
-                for shape in self.shapes}  # fmt: skip
+        bent = {shape.name: shape.physical(np.asarray(values[shape.fitted], dtype=float)) for shape in self.shapes}
         return self.form.physical(values) | bent
 
 
@@ -79,18 +104,24 @@ def shaped(forms: tuple[TumbleForm, ...]) -> dict[str, tuple[TumbleForm, ...]]:
 
 def _bent(form: TumbleForm, shapes: tuple[_Shape, ...]) -> TumbleForm:
     bends = tuple(
-        Parameter(name=f"{shape.name}_change", unit=shape.unit, value=0.0, std=shape.std, scale=0.3 * shape.std,
-                  lowest=shape.lowest, highest=shape.highest, step=0.02 * shape.std)
+        Parameter(name=shape.fitted, unit="1" if shape.logarithm else shape.unit, value=0.0, std=shape.std,
+                  scale=0.3 * shape.std, lowest=shape.lowest, highest=shape.highest, step=0.02 * shape.std)
         for shape in shapes
     )  # fmt: skip
     places = [
         {bend.name: side * shape.std for bend, shape, side in zip(bends, shapes, sides, strict=True)}
-        for sides in product((-0.7, 0.7), repeat=len(shapes))
+        for sides in product(*(shape.sides for shape in shapes))
     ]
     starts = tuple({**start, **place} for place in places for start in form.starts or ({},))
-    word = "of any shape" if shapes != (_WOUND,) else "wound up"
-    word = "wound up, of any shape" if len(shapes) > 1 else word
     return replace(
-        form, name=f"{form.name}, {word}", parameters=(*form.parameters, *bends), physical=_Bent(form, shapes),
+        form, name=f"{form.name}, {_word(shapes)}", parameters=(*form.parameters, *bends), physical=_Bent(form, shapes),
         starts=starts,
     )  # fmt: skip
+
+
+def _word(shapes: tuple[_Shape, ...]) -> str:
+    if shapes[0].name.endswith(".excess"):
+        return "more near rest"
+    if shapes[0] is not _WOUND:
+        return "of any shape"
+    return "wound up" if len(shapes) == 1 else "wound up, of any shape"

@@ -1,7 +1,7 @@
 """Effects on the body: the rig's wires and pulleys, the mass off the shaft, the slope, cable, bearing and motor."""
 
 import math
-from math import cos, sin, sqrt
+from math import cos, exp, sin, sqrt
 
 from .term import Parameter, Term
 
@@ -62,14 +62,22 @@ def pulley_mass(s, mass):
     return mass * s.up_x * s.up_x, mass * s.up_x * s.up_y, mass * s.up_y * s.up_y, 0.0, 0.0, 0.0
 
 
-def rig_friction(s, force):
-    """Dry friction of the pulleys' bearings, felt along the wires."""
-    return force + 0.0 * s.vy
+def rig_friction(s, force, excess, speed):
+    """F (1 + a exp(-(v / v_0)^2)), v the vertical speed: dry friction of the pulleys, felt along the wires."""
+    bound = force + 0.0 * s.vy
+    if excess != 0.0:
+        share = (s.up_x * s.vx + s.up_y * s.vy) / speed
+        bound = force * (1.0 + excess * exp(-share * share))
+    return bound
 
 
-def bearing_drag(s, torque):
-    """Dry friction of the shaft's bearings."""
-    return torque + 0.0 * s.omega
+def bearing_drag(s, torque, excess, speed):
+    """T (1 + a exp(-(omega / omega_0)^2)): dry friction of the shaft's bearings."""
+    bound = torque + 0.0 * s.omega
+    if excess != 0.0:
+        share = s.omega / speed
+        bound = torque * (1.0 + excess * exp(-share * share))
+    return bound
 
 
 def umbilical_potential(s, stiffness, spring_power, rest):
@@ -111,6 +119,11 @@ def torque_fade_factor(s, speed_loss, time_loss, speed_power, time_power):
         faded = max(faded, 1e-12) ** time_power
     return max(0.0, 1.0 - lost - faded)
 
+
+_STRIBECK = (
+    "more near rest by Stribeck's curve (as Armstrong-Helouvry, Dupont and Canudas de Wit 1994, Automatica 30:1083, "
+    "tell it)"
+)
 
 BODY_EFFECTS: tuple[Term, ...] = (
     Term(
@@ -158,16 +171,29 @@ BODY_EFFECTS: tuple[Term, ...] = (
     ),
     Term(
         id="rig-friction", summary="pulleys resist vertical motion", acts="virtual work, dry friction", needs_rig=True,
-        parameters=(Parameter(name="force", unit="N", default=0.0, lowest=0.0, summary="the same in both directions"),),
-        source="Coulomb friction of the pulleys' bearings", limits="static and sliding bounds are one; no Stribeck",
+        parameters=(
+            Parameter(name="force", unit="N", default=0.0, lowest=0.0, summary="the same in both directions"),
+            Parameter(name="excess", unit="1", default=0.0, lowest=0.0,
+                      summary="a: what friction at rest has more, over that of fast motion"),
+            Parameter(name="speed", unit="m/s", default=0.03, lowest=0.0, above_lowest=True,
+                      summary="v_0 of exp(-(v / v_0)^2), by which the excess falls"),
+        ),
+        source=f"Coulomb friction of the pulleys' bearings; {_STRIBECK}",
+        limits="the static bound is that of sliding as it starts; none that grows with speed",
         hooks={"vertical_friction": rig_friction},
     ),
     Term(
         id="bearing-drag", summary="constant torque against the rotation", acts="virtual work, dry friction",
-        parameters=(Parameter(name="torque", unit="N m", default=0.0, lowest=0.0,
-                              summary="the same in both directions"),),
-        source="Coulomb friction of the bearings on which the rig's wires hold the shaft",
-        limits="static and sliding bounds are one", hooks={"rotation_friction": bearing_drag},
+        parameters=(
+            Parameter(name="torque", unit="N m", default=0.0, lowest=0.0, summary="the same in both directions"),
+            Parameter(name="excess", unit="1", default=0.0, lowest=0.0,
+                      summary="a: what friction at rest has more, over that of fast rotation"),
+            Parameter(name="speed", unit="rad/s", default=0.2, lowest=0.0, above_lowest=True,
+                      summary="omega_0 of exp(-(omega / omega_0)^2), by which the excess falls"),
+        ),
+        source=f"Coulomb friction of the bearings on which the rig's wires hold the shaft; {_STRIBECK}",
+        limits="the static bound is that of sliding as it starts; none that grows with speed",
+        hooks={"rotation_friction": bearing_drag},
     ),
     Term(
         id="umbilical", summary="the cable pulls or drags on the rotation", acts="V and D",

@@ -3,12 +3,14 @@
 import math
 from dataclasses import replace
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from tumble_campaigns import CONDITIONS, campaign
 
 from experiments.campaign import Campaign, Recording, read_model
+from experiments.diagnose import deciding
 from experiments.diagnose.fitting import Model, Whitener, fit
 from experiments.diagnose.tumble_checks import checked
 from experiments.diagnose.tumble_data import CHANNELS, tumble_data
@@ -40,6 +42,20 @@ from rigid import STATES, Effect
                 "adhesion.force": 0.1,
                 "adhesion.reach": 2e-5,
                 "adhesion.speed": 2e-3,
+            },
+        ),
+        (
+            (
+                Effect(id="bearing-drag", parameters={"torque": 0.01, "excess": 0.6, "speed": 0.3}),
+                Effect(id="rig-friction", parameters={"force": 0.05, "excess": 0.4, "speed": 0.01}),
+            ),
+            {
+                "bearing-drag.torque": 0.01,
+                "bearing-drag.excess": 0.6,
+                "bearing-drag.speed": 0.3,
+                "rig-friction.force": 0.05,
+                "rig-friction.excess": 0.4,
+                "rig-friction.speed": 0.01,
             },
         ),
         (
@@ -202,6 +218,30 @@ def test_a_plain_effect_is_found_where_the_base_model_ends_on_branches_of_its_ow
         assert values[f"com-offset.{name}"] == pytest.approx(value, abs=3e-5)
 
 
+def test_a_trial_on_a_branch_that_was_not_measured_does_not_keep_the_base_model_away_from_the_others():
+    """From the stated numbers the fit ends with mu_s 4.7 sigma off, where trials stick that slipped."""
+    nominal = {"mass": 5.177, "inertia": 0.05967, "stiffness": 4455.0, "damping": 16.42, "mu_s": 0.4725, "mu_d": 0.2786}
+    sigma = {"mass": 0.01, "inertia": 0.05, "stiffness": 0.2, "damping": 0.3, "mu_s": 0.1, "mu_d": 0.1}
+    away = {"mass": -0.73, "inertia": -0.72, "stiffness": -1.91, "damping": -0.19, "mu_s": -0.65, "mu_d": -0.96}
+    light = {"gravity_sim": 0.0834, "counterweight": 5.0897}
+    heavy = {"gravity_sim": 0.2942, "counterweight": 4.8754}
+    conditions = (
+        heavy | {"torque": 0.6932, "torque_until": 0.5},
+        light | {"torque": 0.2025, "torque_until": 0.5},
+        heavy | {"torque": 0.7217},
+        heavy | {"torque": 0.7304},
+        light | {"torque": 0.0769, "torque_until": 0.9},
+        light | {"torque": 0.1673},
+    )
+    made = campaign(seed=1, conditions=conditions, duration=1.6, window=0.008, nominal=nominal, sigma=sigma, away=away)
+    found = make_problem(made)
+    ids = [trial.id for trial in found.trials]
+    base = Guesser(found.forward, ()).guess((), ids, {})
+    (residuals,) = found.evaluate([base], (), ids)
+    assert np.mean(np.concatenate(list(residuals.values())) ** 2) < 1.1
+    assert base["mu_s"] == pytest.approx(nominal["mu_s"] * (1 + away["mu_s"] * sigma["mu_s"]), rel=0.02)
+
+
 def test_the_latent_force_of_a_missing_pendulum_is_that_of_the_wires():
     """In a hop the model has no force along the surface, so what is left is F_x = -m_b g x / L at the measured x."""
     length = 2.2
@@ -283,3 +323,38 @@ def test_a_cable_may_hang_wound_up_with_drag_of_any_power_beside():
     assert told["umbilical.rest"] == -0.3 and told["umbilical.drag_power"] == 1.0
     names = [f"umbilical.{name}_change" for name in ("rest", "drag_power")]
     assert {tuple(start[name] > 0 for name in names) for start in form.starts} == set(product((False, True), repeat=2))
+
+
+@pytest.mark.parametrize(("effect", "level"), [("bearing-drag", "torque"), ("rig-friction", "force")])
+def test_dry_friction_may_be_more_near_rest_from_none_at_all(effect, level):
+    forms = tumble_forms(rig=True, sinkage=3e-5, weight=0.88)
+    (form,) = shaped(forms)[f"{effect}:dry"]
+    assert form.name == "dry, more near rest" and form.amplitude == f"{effect}.{level}"
+    plain = {p.name: np.zeros(1) for p in form.parameters} | {form.amplitude: np.array([0.02])}
+    told = form.physical(plain)
+    assert told[f"{effect}.excess"] == 0.0 and told[f"{effect}.{level}"] == 0.02
+    faster = form.physical(plain | {f"{effect}.log_speed": np.array([1.0])})
+    assert faster[f"{effect}.speed"] == pytest.approx(math.e * told[f"{effect}.speed"], rel=1e-12)
+    assert all(start[f"{effect}.excess_change"] > 0 for start in form.starts)
+    assert next(p for p in form.parameters if p.name.endswith("excess_change")).lowest == 0.0
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "nothing"),
+    [
+        ((1.01, 0.95), (1.015, 1.04), True),
+        ((1.01, 0.95), (1.005, 1.04), False),  # something is taken away of those that were fitted
+        ((1.01, 1.10), (1.015, 1.04), False),  # or of those held out
+        ((1.10, 0.95), (1.11, 1.04), False),  # more than chance is left
+        ((1.01, 1.50), (1.015, 1.60), False),
+    ],
+)
+def test_a_name_that_takes_nothing_away_of_what_is_noise_is_none(monkeypatch, before, after, nothing):
+    base, best = (
+        SimpleNamespace(model=SimpleNamespace(problem=None, trials=("001",), gap=gap), count=10_000)
+        for gap in (before, after)
+    )
+    monkeypatch.setattr(deciding, "gap_of", lambda problem, model, *rest: deciding.Gap(*model.gap))
+    monkeypatch.setattr(deciding, "values_of_all", lambda found, held_out: {})
+    choice = SimpleNamespace(base=SimpleNamespace(fit=base), best=SimpleNamespace(fit=best))
+    assert deciding.explains_nothing(choice, ("002",)) == nothing

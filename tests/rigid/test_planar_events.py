@@ -230,6 +230,49 @@ def test_rig_friction_slows_the_rise_and_the_fall_of_a_hop():
     assert vy[-1] == pytest.approx(-falling * (3.0 - up), rel=1e-6)
 
 
+def test_bearing_drag_that_is_more_near_rest_stops_a_hop_after_the_angle_of_its_closed_form():
+    # J omega d(omega)/d(theta) = -T (1 + a exp(-(omega / w0)^2)), so theta = J w0^2 / 2 T ln((exp(u) + a) / (1 + a)),
+    # u = (omega_0 / w0)^2: Stribeck's curve as in Armstrong-Helouvry et al. 1994, Automatica 30:1083.
+    torque, a, w0 = 0.03, 0.8, 0.15
+    trial = free(effects=(effect("bearing-drag", torque=torque, excess=a, speed=w0),))
+    _, rows = from_pose(trial, [0.0, 0.5, 0.0, 0.0, 0.0, -0.2], 1.0)
+    turned = trial.inertia * w0**2 / (2 * torque) * math.log((math.exp((0.2 / w0) ** 2) + a) / (1 + a))
+    assert rows[-1][6] == 0.0
+    assert rows[-1][3] == pytest.approx(-turned, rel=1e-8)
+    assert turned < 0.2**2 * trial.inertia / (2 * torque)  # less far than with the level alone
+
+
+def test_rig_friction_that_is_more_near_rest_lowers_a_hop_as_its_closed_form_says():
+    # (m + m_b) v dv/dy = -(W + F) (1 + b exp(-(v / v0)^2)), b = F a / (W + F).
+    force, a, v0 = 0.2, 1.5, 0.04
+    trial = in_rig(effects=(effect("rig-friction", force=force, excess=a, speed=v0),))
+    _, rows = from_pose(trial, [0.0, 0.5, 0.0, 0.0, 0.1, 0.0], 3.0)
+    level = trial.weight + force
+    b = force * a / level
+    risen = (MASS + trial.counterweight) * v0**2 / (2 * level) * math.log((math.exp((0.1 / v0) ** 2) + b) / (1 + b))
+    assert rows[:, 2].max() == pytest.approx(0.5 + risen, rel=1e-6)
+
+
+@pytest.mark.parametrize(("excess", "held"), [(0.0, False), (0.2, False), (0.3, True)])
+def test_a_bearing_at_rest_bears_its_level_and_the_excess(excess, held):
+    # It holds 0.05 N m as long as 0.04 (1 + excess) is more.
+    trial = in_rig(0.05, effects=(effect("bearing-drag", torque=0.04, excess=excess, speed=0.05),))
+    run = simulate(trial, duration=2.0, sample_interval=0.1)
+    assert (run.theta == 0.0).all() == held
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_friction_that_has_only_just_begun_to_slide_opposes_the_motion_with_all_its_excess(way):
+    both = (effect("bearing-drag", torque=0.04, excess=0.5), effect("rig-friction", force=0.2, excess=0.5))
+    trial = in_rig(effects=both)
+    modes = Modes(slip=[0] * 8, top=[0.0] * 8, vertical=way, rotation=way)
+    modes.torque_over = True
+    told = System(trial).derivative(0.0, [0.0, 0.5, 0.0, 0.0, way * 1e-9, way * 1e-9, 0.0, 0.0, 0.0], modes)
+    assert told[5] * trial.inertia == pytest.approx(-way * 0.06, rel=1e-9)
+    rises = (MASS + trial.counterweight) * told[4]
+    assert rises == pytest.approx(-trial.weight - way * 0.3, rel=1e-9)
+
+
 def test_pulleys_that_rub_harder_than_the_weight_hold_it_in_the_air():
     trial = in_rig(effects=(effect("rig-friction", force=1.0),))
     _, rows = from_pose(trial, [0.0, 0.5, 0.0, 0.0, 0.1, 0.0], 5.0)
