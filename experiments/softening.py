@@ -67,6 +67,15 @@ class Softening:
         """Young's modulus [Pa] that would bring this overlap to the one wanted (Hertz: F goes with E overlap^1.5)."""
         return self.young * (overlap / wanted) ** 1.5
 
+    def exceeded(self, overlap: float, wanted: float) -> str | None:
+        """A warning that grains overlapped by more than was wanted, with the modulus that would keep it; or None."""
+        if overlap <= wanted:
+            return None
+        return (
+            f"the largest overlap was {100 * overlap:.2g} % of a diameter, where max_overlap = {wanted:g} was meant to "
+            f"hold: young = {self.stiffer(overlap, wanted):.2g} Pa or more would keep it"
+        )
+
 
 def bearing_gradient(bulk_density: float, gravity: float, friction: float) -> float:
     """Growth of the pressure under a flat plate going straight down [Pa/m] (3D-RFT, see the module)."""

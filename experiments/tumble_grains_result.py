@@ -94,7 +94,7 @@ def conclude(
         "surface": float(bed.surface), "young": softening.young, "softer_than_real": softening.factor,
         "time_step": float(bed.time_step), "macro_step": run.master.macro_step,
         "max_overlap": float(bed.max_overlap), "seed": settings.seed, "steps": run.master.count,
-        "spike_diameter": settings.spike_diameter,
+        "spike_diameter": settings.spike_diameter, "spike_clear": settings.spike_clear,
         **_grain_steps(settings, run), "worst_guess": books.worst_guess, "largest_force": books.largest_force,
         "beside": quantities_of(beside),
         "beside_transitions": [
@@ -108,12 +108,8 @@ def conclude(
             f"dissipation_reversal = {made:.2g} is above {MOST_REVERSAL:g}: the bed made energy, so this run's "
             f"numbers are not to be trusted; fewer substeps tell whether it is the coupling"
         )
-    if bed.max_overlap > settings.max_overlap:
-        stiffer = softening.stiffer(bed.max_overlap, settings.max_overlap)
-        result["warnings"].append(
-            f"the largest overlap was {100 * bed.max_overlap:.2g} % of a diameter, where max_overlap = "
-            f"{settings.max_overlap:g} was meant to hold: young = {stiffer:.2g} Pa or more would keep it"
-        )
+    if pressed := softening.exceeded(float(bed.max_overlap), settings.max_overlap):
+        result["warnings"].append(pressed)
     coarsest = settings.grain
     if graded is not None:
         coarsest = coarsest_touched(run, graded, size=settings.bed_size)

@@ -50,6 +50,7 @@ def cube(tmp_path):
         ({"actuator": "brake", "torque": (1.0, 0.0, 0.0)}, "wheel_speed_0 about x = 0 rad/s"),
         ({"actuator": "brake"}, "torque is not given"),
         ({"grain": 0.004}, "grain = 0.004 belongs to ground = 'bed'"),
+        ({"ground": "bed", "sleep_share": 0.4}, "sleep_share = 0.4 is of sleep, which is off"),
         ({"mu_s": 0.1, "mu_d": 0.2}, "mu_d = 0.2 is above mu_s = 0.1"),
         ({"torque": 0.1}, "it must be a list"),
     ],
@@ -173,10 +174,25 @@ def test_on_grains_a_stopped_run_is_taken_up_to_the_same_bits_and_its_books_clos
     assert quantities["sinkage_largest"]["value"] > 1e-3 and quantities["dissipated_friction"]["value"] > 0
     assert quantities["energy_residual"]["value"] < 5e-3 and quantities["momentum_residual"]["value"] < 1e-13
     assert whole["grains"]["beside"]["impact_speed"]["value"] > 0.1
+    assert whole["grains"]["max_overlap"] < 0.2 and not any("largest overlap" in said for said in whole["warnings"])
     frames = sorted(path.name for path in (tmp_path / "whole" / "frames").glob("*_0001.*"))
     parts = ("contact_forces", "grains", "hull", "row_forces", "spikes")
     assert frames == [*(f"tumble_{part}_0001.vtu" for part in parts), "tumble_surface_0001.vti"]
     _check_report(tmp_path / "whole")
+
+
+def test_overlaps_past_the_bound_are_a_warning_in_space_too(tmp_path, monkeypatch, cube):
+    """The bed holds grains to 0.2 of a diameter, the run meant 0.001; Hertz: F goes with E overlap^1.5."""
+    monkeypatch.setattr(spatial, "_prepare", small_bed)
+    monkeypatch.setattr(spatial, "write_report", lambda *_: None)
+    settings = SpatialSettings(
+        surface="sand", ground="bed", platform=cube, gravity=1.0, velocity=(0.0, 0.0, -0.15), duration=0.01,
+        bed_size=(0.14, 0.14, 0.05), grain=0.006, young=1e6, max_overlap=0.001, threads=1, frame_count=0,
+    )  # fmt: skip
+    found = spatial.run(settings, tmp_path / "pressed")
+    overlap = found["grains"]["max_overlap"]
+    said = f"young = {1e6 * (overlap / 0.001) ** 1.5:.2g} Pa or more would keep it"
+    assert overlap > 0.001 and any(said in warning for warning in found["warnings"])
 
 
 def _check_report(folder):
