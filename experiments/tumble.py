@@ -25,7 +25,7 @@ from .tumble_platform import torque_within_limit
 from .tumble_settings import TumbleSettings
 from .tumble_sweep import check_sweep, middle_of_sweep, run_sweep
 from .tumble_trial import TumblePlan, plan_tumble
-from .tumble_words import tumble_sentences
+from .tumble_words import tumble_sentences, unsettled_warning
 from .whole_runs import whole_run
 
 __all__ = ["check", "motion_columns", "quantities_of", "result_of", "resume", "run", "trajectory_columns"]
@@ -135,8 +135,9 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
         progress.stage("tumble", total=1.0)
         more: dict[str, Any] = {}
         rests: dict[str, Any] | None = None
+        unsettled: str | None = None
         if settings.method == "coupled":
-            trajectory, full, more, rests = _step_through_master(settings, plan, folder, progress)
+            trajectory, full, more, rests, unsettled = _step_through_master(settings, plan, folder, progress)
         else:
             trajectory, full = _integrate(settings, plan, duration=settings.duration)
         progress.update(1.0)
@@ -144,6 +145,8 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
         folder.write_series("motion", motion_columns(trajectory))
         result = result_of(settings, plan, trajectory, full)
         result["quantities"] |= more
+        if unsettled is not None:
+            result["warnings"].append(unsettled)
         if settings.method == "coupled":
             from .tumble_steppers import words
 
@@ -163,15 +166,16 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
 
 def _step_through_master(
     settings: TumbleSettings, plan: TumblePlan, folder: RunFolder, progress: Progress
-) -> tuple[Trajectory, float | None, dict[str, Any], dict[str, Any] | None]:
-    """The trial by the master, its series/feet.csv written; what `_integrate` gives, more quantities, a table."""
+) -> tuple[Trajectory, float | None, dict[str, Any], dict[str, Any] | None, str | None]:
+    """The trial by the master, series/feet.csv written: what `_integrate` gives, quantities, a table, a warning."""
     from .tumble_coupled import coupled_quantities, coupled_tumble, feet_columns
     from .tumble_steppers import own_quantities
 
     run = coupled_tumble(settings, plan, duration=settings.duration)
     trajectory = run.run(on_step=lambda run: progress.update(run.fraction))
     folder.write_series("feet", feet_columns(run))
-    return trajectory, run.body.wheel_at_limit, coupled_quantities(run), own_quantities(run)[1]
+    quantities, table = coupled_quantities(run), own_quantities(run)[1]
+    return trajectory, run.body.wheel_at_limit, quantities, table, unsettled_warning(run.master)
 
 
 def _add_sweep(result: dict[str, Any], settings: TumbleSettings, folder: RunFolder, model: Path | None) -> None:

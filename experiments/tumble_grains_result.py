@@ -20,6 +20,7 @@ from .surfaces import find_surface
 from .tumble_settings import TumbleSettings
 from .tumble_steppers import own_quantities, words
 from .tumble_trial import TumblePlan
+from .tumble_words import unsettled_warning
 
 __all__ = ["conclude", "sinkage_start", "write_trajectory"]
 
@@ -82,7 +83,7 @@ def conclude(
     if run.energy_residual > MOST_RESIDUAL:
         result["warnings"].append(
             f"energy_residual = {run.energy_residual:.2g} is above {MOST_RESIDUAL:g}: the books do not close; fewer "
-            "substeps tell whether it is the coupling, stiffer grains (young) whether it is the bed's step"
+            "substeps, or iterations, tell whether it is the coupling, stiffer grains (young) whether the bed's step"
         )
     result["grains"] = {
         "mode": "rig: grains at 1 g" if plan.trial.counterweight > 0 else "flight: grains at the platform's gravity",
@@ -108,6 +109,8 @@ def conclude(
             f"dissipation_reversal = {made:.2g} is above {MOST_REVERSAL:g}: the bed made energy, so this run's "
             f"numbers are not to be trusted; fewer substeps tell whether it is the coupling"
         )
+    if unsettled := unsettled_warning(run.master):
+        result["warnings"].append(unsettled)
     if pressed := softening.exceeded(float(bed.max_overlap), settings.max_overlap):
         result["warnings"].append(pressed)
     coarsest = settings.grain
