@@ -84,6 +84,20 @@ def test_what_cannot_be_is_refused_before_any_work(cube, given, said):
         spatial.check(SpatialSettings(**own | given))
 
 
+def test_the_hand_sets_down_heavy_on_soft_ground_and_what_it_cannot_is_refused_by_name():
+    """The Hedgehog free at 1 m/s2: 5.3 N on four spikes of sand, W / 4 K = 32 mm deep; at the rig's speed in over 3 s."""
+    heavy = {"surface": "sand", "gravity": 1.0, "duration": 0.05}
+    plan = plan_spatial(SpatialSettings(**heavy))
+    run = spatial._on_law(SpatialSettings(**heavy), plan)
+    while not run.placed:
+        run.advance()
+    assert run.columns["sinkage"][0] == pytest.approx(5.3 / (4 * 41.1), rel=0.01)
+    with pytest.raises(ValueError, match=r"bed_size = 0.1 m along x is too short"):
+        spatial.check(SpatialSettings(**heavy, ground="bed", bed_size=(0.1, 0.1, 0.05), grain=0.006))
+    with pytest.raises(ValueError, match=r"fails: the platform did not come to rest .* another lowering_speed"):
+        spatial.check(SpatialSettings(**heavy, ground="bed", lowering_speed=0.01))
+
+
 def test_a_platform_without_spikes_has_no_grains_to_touch():
     settings = SpatialSettings(surface="sand", ground="bed", platform="mascot", gravity=1.0)
     with pytest.raises(ValueError, match="tip_radius of MASCOT"):
