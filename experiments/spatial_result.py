@@ -239,7 +239,7 @@ def _add_grains(
             f"dissipation_reversal = {made:.2g} is above {MOST_REVERSAL:g}: the bed made energy, so this run's "
             f"numbers are not to be trusted; fewer substeps tell whether it is the coupling"
         )
-    if pressed := softening.exceeded(float(bed.max_overlap), settings.max_overlap):
+    if pressed := softening.overlapping(float(bed.max_overlap)):
         warnings.append(pressed)
     across = 2 * plan.trial.platform.tip_radius / settings.grain
     if across < 10:

@@ -111,7 +111,7 @@ def conclude(
         )
     if unsettled := unsettled_warning(run.master):
         result["warnings"].append(unsettled)
-    if pressed := softening.exceeded(float(bed.max_overlap), settings.max_overlap):
+    if pressed := softening.overlapping(float(bed.max_overlap)):
         result["warnings"].append(pressed)
     coarsest = settings.grain
     if graded is not None:
