@@ -156,7 +156,7 @@ def small_bed(*_):
     return bed
 
 
-def test_on_grains_a_stopped_run_is_taken_up_to_the_same_bits_its_books_close_and_large_overlaps_are_told(tmp_path, monkeypatch, cube):
+def test_on_grains_a_stopped_run_goes_on_to_the_same_bits_with_its_books_and_overlaps_told(tmp_path, monkeypatch, cube):
     monkeypatch.setattr(spatial, "_prepare", small_bed)
     monkeypatch.setattr(spatial, "write_report", lambda *_: None)
     settings = SpatialSettings(
