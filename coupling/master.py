@@ -3,8 +3,12 @@
 Over one macro step H the body's twist is held and the footing answers with its mean wrench. The twist is that of the
 step's middle, guessed with a wrench that is extrapolated from the steps before (`extrapolation` 0: the last one, 1: on
 the straight line through the last two, 2: on the parabola through three). With `iterations` above 1 the step is
-repeated, from the footing's saved state, with the wrench that came out, until that changes by less than `tolerance` of
-the largest force met.
+repeated, from the footing's saved state, until the wrench that comes out is the one that went in, within `tolerance` of
+the largest force met. Handing back what came out contracts by K H^2 / 4m, K the contacts' stiffness: no better than the
+explicit step, which is stable up to K H^2 / m = 4, and of no use to a light body. So what goes in is what the
+differences between the times before, or in the step before, say would come out unchanged (interface quasi-Newton with
+an inverse Jacobian from least squares; Degroote et al. 2009, Comput. Struct. 87:793). What is found is the implicit
+midpoint rule, stable at any K H^2 / m.
 
 The books (docs/coupling.md). What the footing takes is its wrench times the twist it saw, what the body gives is the
 wrench times the mean of its rates before and after; the difference is the error of the exchange, of second order in H
@@ -20,12 +24,14 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from .footing import Footing, FootReaction
-from .poses import Pose, Twist, Wrench
+from .poses import Pose, Twist, Vector, Wrench
 
 __all__ = ["Body", "Master", "StepBooks"]
 
 _WEIGHTS = ((1.0,), (2.0, -1.0), (3.0, -3.0, 1.0))
 """Of the last wrenches, the newest first, by order of extrapolation."""
+_MOST_PAIRS = 6
+"""Repeats of a step that the next one is told from: as many as a wrench has components."""
 
 
 @runtime_checkable
@@ -73,10 +79,13 @@ class StepBooks:
     """Largest force of one step [N]."""
     repeats: int = 0
     """Steps of the footing beyond one a macro step."""
+    unsettled: int = 0
+    """Macro steps that were repeated as often as allowed and did not settle."""
 
     def numbers(self) -> list[float]:
         """As they are kept in a state."""
-        return [self.given, self.taken, self.worst_guess, self.largest_force, float(self.repeats)]
+        own = [self.given, self.taken, self.worst_guess, self.largest_force]
+        return [*own, float(self.repeats), float(self.unsettled)]
 
 
 class Master:
@@ -118,6 +127,8 @@ class Master:
         """Macro steps done."""
         self._wrenches: deque[Wrench] = deque([first_guess] if first_guess is not None else [], maxlen=3)
         self._held: Twist | None = None
+        self._learnt: list[tuple[Vector, Vector]] = []
+        """How the wrench that came out changed with the one that went in, when a step was last repeated."""
         self.books = StepBooks()
         self.last: FootReaction | None = None
         """The footing's answer in the last step."""
@@ -144,6 +155,7 @@ class Master:
         expected = self.guess()
         kept = footing.state() if self.iterations > 1 else None
         trial = expected
+        tried: list[tuple[Vector, Vector]] = []
         for turn in range(self.iterations):
             if turn:
                 assert kept is not None
@@ -155,7 +167,13 @@ class Master:
             books.largest_force = max(books.largest_force, _size(wrench))
             if _apart(wrench, trial) <= self.tolerance * books.largest_force:
                 break
-            trial = wrench
+            if self.iterations > 1:
+                tried.append((_row(trial), _row(wrench)))
+                trial = _unpack(_unchanged(tried[-1], _differences(tried) or self._learnt))
+        else:
+            books.unsettled += self.iterations > 1
+        if len(tried) > 1:
+            self._learnt = _differences(tried)
         before = body.twist
         body.advance(dt, held, wrench)
         self._book(held, wrench, before)
@@ -189,14 +207,15 @@ class Master:
 
     def state(self) -> dict[str, Any]:
         """All that the next steps depend on, body and footing included: a flat dict of numpy arrays."""
-        past = [np.concatenate([wrench.force, wrench.torque]) for wrench in self._wrenches]
+        past = [_row(wrench) for wrench in self._wrenches]
         held = self._held
         own: dict[str, Any] = {
             "master.count": np.array(self.count),
             "master.wrenches": np.array(past).reshape(-1, 6),
-            "master.wrench": np.concatenate([self.wrench.force, self.wrench.torque]),
+            "master.wrench": _row(self.wrench),
             "master.held": np.concatenate([held.velocity, held.spin]) if held is not None else np.zeros(0),
             "master.books": np.array(self.books.numbers()),
+            "master.learnt": np.array(self._learnt, dtype=float).reshape(-1, 2, 6),
         }
         own |= {f"body.{key}": value for key, value in self.body.state().items()}
         return own | {f"footing.{key}": value for key, value in self.footing.state().items()}
@@ -209,10 +228,36 @@ class Master:
         self.wrench = _unpack(np.asarray(state["master.wrench"], dtype=float))
         held = np.asarray(state["master.held"], dtype=float)
         self._held = Twist(held[:3].copy(), held[3:].copy()) if held.size else None
-        given, taken, worst, largest, repeats = (float(number) for number in state["master.books"])
-        self.books = StepBooks(given, taken, worst, largest, int(repeats))
+        learnt = np.asarray(state.get("master.learnt", ()), dtype=float).reshape(-1, 2, 6)
+        self._learnt = [(into.copy(), out.copy()) for into, out in learnt]
+        given, taken, worst, largest, *counts = (float(number) for number in state["master.books"])
+        self.books = StepBooks(given, taken, worst, largest, *(int(count) for count in counts))
         for name, part in (("body.", self.body), ("footing.", self.footing)):
             part.restore({key[len(name) :]: value for key, value in state.items() if key.startswith(name)})
+
+
+def _differences(tried: list[tuple[Vector, Vector]]) -> list[tuple[Vector, Vector]]:
+    """Of the pairs (in, out) before the last, as many as tell something, to it."""
+    into, out = tried[-1]
+    return [(before[0] - into, before[1] - out) for before in tried[-1 - _MOST_PAIRS : -1]]
+
+
+def _unchanged(last: tuple[Vector, Vector], known: list[tuple[Vector, Vector]]) -> Vector:
+    """The wrench that would come out as it went in, by the last pair (in, out) and differences of pairs [N, N m]."""
+    into, out = last
+    if not known:
+        return out
+    # Torques over the arm that they have, so that they weigh as forces do.
+    wrenches = np.abs([out, *(change for _, change in known)])
+    force, torque = wrenches[:, :3].max(), wrenches[:, 3:].max()
+    scale = np.repeat([1.0, force / torque if force > 0 and torque > 0 else 1.0], 3)
+    change = np.array([scale * (of_out - of_in) for of_in, of_out in known]).T
+    share = np.linalg.lstsq(change, scale * (into - out), rcond=1e-10)[0]
+    return np.asarray(out + sum(c * of_out for c, (_, of_out) in zip(share, known, strict=True)))
+
+
+def _row(wrench: Wrench) -> Vector:
+    return np.concatenate([wrench.force, wrench.torque])
 
 
 def _unpack(row: np.ndarray) -> Wrench:

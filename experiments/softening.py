@@ -39,6 +39,9 @@ RAIN_OVERLAP = 0.05
 INERTIA = 1.1
 """lambda: dynamic pressure over rho v^2 [1] (Agarwal et al. 2023)."""
 
+SMALL = 0.05
+"""Overlap that grains meant to be hard may have [of a diameter]: the default of `max_overlap`, past which a run fails.
+A run that allows itself more is told so."""
 STIFF, STIFF_CHAIN = 0.01, 7.4
 """Overlap [of a diameter] at and below which a chain of grains carries as much as it does among stiff ones [1]."""
 SOFT = 0.05
@@ -66,6 +69,15 @@ class Softening:
     def stiffer(self, overlap: float, wanted: float) -> float:
         """Young's modulus [Pa] that would bring this overlap to the one wanted (Hertz: F goes with E overlap^1.5)."""
         return self.young * (overlap / wanted) ** 1.5
+
+    def overlapping(self, overlap: float) -> str | None:
+        """A warning that grains overlapped by more than `SMALL`, with the modulus that would keep it; or None."""
+        if overlap <= SMALL:
+            return None
+        return (
+            f"the largest overlap was {100 * overlap:.2g} % of a diameter, as max_overlap allowed, where "
+            f"{100 * SMALL:g} % are small: young = {self.stiffer(overlap, SMALL):.2g} Pa or more would keep it there"
+        )
 
 
 def bearing_gradient(bulk_density: float, gravity: float, friction: float) -> float:

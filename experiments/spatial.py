@@ -39,8 +39,9 @@ from .whole_runs import whole_run
 
 __all__ = ["check", "resume", "run"]
 
-LAW_LOWERING = 0.05
-"""Of the hand on a law, where it is not set [m/s]."""
+LAW_LOWERING, LAW_REST = 0.05, 0.11
+"""Of the hand on a law, where it is not set: its least speed [m/s], and the longest time constant with which a platform
+comes to rest in it, W / (K speed) on all tips that it stands on [s]; on one of four that still is within 3 s."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,14 @@ def check(settings: SpatialSettings) -> None:
     if settings.ground == "bed":
         material = _material(plan)
         spatial_members(plan.trial.platform)
-        _check_bed(settings, plan, _forecast(settings, plan), material)
+        try:
+            forecast = _forecast(settings, plan)
+        except RuntimeError as error:
+            raise ValueError(
+                f"the same trial on the spring-damper, which says how large a bed must be, fails: {error}; "
+                f"another lowering_speed (m/s), or a height or velocity at the start, would do"
+            ) from error
+        _check_bed(settings, plan, forecast, material)
     else:
         _on_law(settings, plan)
 
@@ -119,11 +127,23 @@ def _start(settings: SpatialSettings, platform: Platform) -> dict[str, Any]:
 def _on_law(settings: SpatialSettings, plan: SpatialPlan) -> SpatialRun:
     footing = LawFooting.of_spatial(plan.trial)
     footing.grounds = [replace(ground, time_step=STEP) for ground in footing.grounds]
-    lowering = (settings.lowering_speed or LAW_LOWERING) if settings.in_a_hand else None
+    lowering = (settings.lowering_speed or _law_lowering(plan)) if settings.in_a_hand else None
     start = _start(settings, plan.trial.platform)
     if settings.ground == "bed":  # what stands beside it
         start |= {"substeps": 10, "extrapolation": 0, "iterations": 1}
     return SpatialRun(plan.trial, footing, lowering_speed=lowering, energy_interval=1e-3, **start)
+
+
+def _law_lowering(plan: SpatialPlan) -> float:
+    """Speed of the hand on the spring-damper, where it is not set [m/s]: heavier on softer ground is faster."""
+    carried = _feet(plan) * plan.numbers["stiffness"].value
+    return max(LAW_LOWERING, float(np.linalg.norm(plan.trial.weight)) / (carried * LAW_REST))
+
+
+def _feet(plan: SpatialPlan) -> int:
+    """Spikes that the platform stands on."""
+    stance = plan.trial.platform.stance()
+    return len(stance.row) + len(stance.rear)
 
 
 def _material(plan: SpatialPlan) -> Material:
@@ -196,8 +216,7 @@ def _check_bed(settings: SpatialSettings, plan: SpatialPlan, forecast: Forecast,
 
 def _softness(settings: SpatialSettings, plan: SpatialPlan, forecast: Forecast) -> Softening:
     """The modulus of the grains for this run (`experiments.softening`), or the one that is set."""
-    feet = len(plan.trial.platform.stance().row) + len(plan.trial.platform.stance().rear)
-    load = float(np.linalg.norm(plan.trial.weight)) / feet
+    load = float(np.linalg.norm(plan.trial.weight)) / _feet(plan)
     return soften_material(
         _material(plan), young=settings.young, max_overlap=settings.max_overlap, grain=settings.grain,
         spread=settings.spread, gravity=_grain_gravity(plan), bed_height=settings.bed_size[2],

@@ -20,6 +20,7 @@ from .spatial_settings import SpatialSettings
 from .spatial_trial import SpatialPlan
 from .surfaces import find_surface
 from .tumble_grains_result import MOST_RESIDUAL, PACKING_OFF
+from .tumble_words import unsettled_warning
 
 __all__ = ["conclude", "write_series_of"]
 
@@ -72,8 +73,10 @@ def conclude(
     if run.energy_residual > MOST_RESIDUAL:
         warnings.append(
             f"energy_residual = {run.energy_residual:.2g} is above {MOST_RESIDUAL:g}: the books do not close; fewer "
-            "substeps tell whether it is the coupling, stiffer grains (young) whether it is the bed's step"
+            "substeps, or iterations, tell whether it is the coupling, stiffer grains (young) whether the bed's step"
         )
+    if unsettled := unsettled_warning(run.master):
+        warnings.append(unsettled)
     result: dict[str, Any] = {
         "format": "hedgebed-result/1", "experiment": "tumble spatial", "version": __version__,
         "title": f"{trial.platform.name} in space on {what}{plan.surface}, {stated}", "status": "done",
@@ -236,6 +239,8 @@ def _add_grains(
             f"dissipation_reversal = {made:.2g} is above {MOST_REVERSAL:g}: the bed made energy, so this run's "
             f"numbers are not to be trusted; fewer substeps tell whether it is the coupling"
         )
+    if pressed := softening.overlapping(float(bed.max_overlap)):
+        warnings.append(pressed)
     across = 2 * plan.trial.platform.tip_radius / settings.grain
     if across < 10:
         warnings.append(

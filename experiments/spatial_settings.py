@@ -127,7 +127,7 @@ class SpatialSettings(GrainsSettings):
 
     def _of_a_bed(self) -> str | None:
         if self.ground == "bed":
-            return None
+            return self.sleep_fault()
         both = ("lowering_speed", "substeps", "extrapolation", "iterations", "frame_count", "checkpoint_interval")
         for name, field in GrainsSettings.model_fields.items():
             if name not in both and getattr(self, name) != field.default:

@@ -25,7 +25,7 @@ from .tumble_platform import torque_within_limit
 from .tumble_settings import TumbleSettings
 from .tumble_sweep import check_sweep, middle_of_sweep, run_sweep
 from .tumble_trial import TumblePlan, plan_tumble
-from .tumble_words import tumble_sentences
+from .tumble_words import tumble_sentences, unsettled_warning
 from .whole_runs import whole_run
 
 __all__ = ["check", "motion_columns", "quantities_of", "result_of", "resume", "run", "trajectory_columns"]
@@ -135,8 +135,9 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
         progress.stage("tumble", total=1.0)
         more: dict[str, Any] = {}
         besides: dict[str, Any] = {}
+        unsettled: str | None = None
         if settings.method == "coupled":
-            trajectory, full, more, besides = _step_through_master(settings, plan, folder, progress)
+            trajectory, full, more, besides, unsettled = _step_through_master(settings, plan, folder, progress)
         else:
             trajectory, full = _integrate(settings, plan, duration=settings.duration)
         progress.update(1.0)
@@ -144,6 +145,8 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
         folder.write_series("motion", motion_columns(trajectory))
         result = result_of(settings, plan, trajectory, full)
         result["quantities"] |= more
+        if unsettled is not None:
+            result["warnings"].append(unsettled)
         if settings.method == "coupled":
             from .tumble_steppers import words
 
@@ -163,14 +166,15 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
 
 def _step_through_master(
     settings: TumbleSettings, plan: TumblePlan, folder: RunFolder, progress: Progress
-) -> tuple[Trajectory, float | None, dict[str, Any], dict[str, Any]]:
-    """The trial by the master, its series/feet.csv written; what `_integrate` gives, `coupled_quantities`' two."""
+) -> tuple[Trajectory, float | None, dict[str, Any], dict[str, Any], str | None]:
+    """The trial by the master, series/feet.csv written: `_integrate`'s, `coupled_quantities`' two, a warning."""
     from .tumble_coupled import coupled_quantities, coupled_tumble, feet_columns
 
     run = coupled_tumble(settings, plan, duration=settings.duration)
     trajectory = run.run(on_step=lambda run: progress.update(run.fraction))
     folder.write_series("feet", feet_columns(run))
-    return trajectory, run.body.wheel_at_limit, *coupled_quantities(run)
+    quantities, besides = coupled_quantities(run)
+    return trajectory, run.body.wheel_at_limit, quantities, besides, unsettled_warning(run.master)
 
 
 def _add_sweep(result: dict[str, Any], settings: TumbleSettings, folder: RunFolder, model: Path | None) -> None:

@@ -60,6 +60,14 @@ class GrainsSettings(StrictSettings):
     threads: int | None = Field(None, ge=1, description="On a bed: threads; all cores if not given.")
     cache: bool = Field(True, description="On a bed: whether prepared beds are kept and used again.")
 
+    def sleep_fault(self) -> str | None:
+        """A rule of sleep that is given where nothing sleeps, in words."""
+        for key in ("sleep_force", "sleep_share"):
+            value = getattr(self, key)
+            if not self.sleep and value != GrainsSettings.model_fields[key].default:
+                return f"{key} = {value:g} is of sleep, which is off: with sleep it would do, or without it"
+        return None
+
 
 class TumbleBedSettings(GrainsSettings):
     """The same of a tumble in the plane, whose bed is a slice as wide as one spike has for itself."""

@@ -20,6 +20,7 @@ from .surfaces import find_surface
 from .tumble_settings import TumbleSettings
 from .tumble_steppers import own_quantities, words
 from .tumble_trial import TumblePlan
+from .tumble_words import unsettled_warning
 
 __all__ = ["conclude", "sinkage_start", "write_trajectory"]
 
@@ -82,7 +83,7 @@ def conclude(
     if run.energy_residual > MOST_RESIDUAL:
         result["warnings"].append(
             f"energy_residual = {run.energy_residual:.2g} is above {MOST_RESIDUAL:g}: the books do not close; fewer "
-            "substeps tell whether it is the coupling, stiffer grains (young) whether it is the bed's step"
+            "substeps, or iterations, tell whether it is the coupling, stiffer grains (young) whether the bed's step"
         )
     result["grains"] = {
         "mode": "rig: grains at 1 g" if plan.trial.counterweight > 0 else "flight: grains at the platform's gravity",
@@ -94,7 +95,7 @@ def conclude(
         "surface": float(bed.surface), "young": softening.young, "softer_than_real": softening.factor,
         "time_step": float(bed.time_step), "macro_step": run.master.macro_step,
         "max_overlap": float(bed.max_overlap), "seed": settings.seed, "steps": run.master.count,
-        "spike_diameter": settings.spike_diameter,
+        "spike_diameter": settings.spike_diameter, "spike_clear": settings.spike_clear,
         **_grain_steps(settings, run), "worst_guess": books.worst_guess, "largest_force": books.largest_force,
         "beside": quantities_of(beside),
         "beside_transitions": [
@@ -108,12 +109,10 @@ def conclude(
             f"dissipation_reversal = {made:.2g} is above {MOST_REVERSAL:g}: the bed made energy, so this run's "
             f"numbers are not to be trusted; fewer substeps tell whether it is the coupling"
         )
-    if bed.max_overlap > settings.max_overlap:
-        stiffer = softening.stiffer(bed.max_overlap, settings.max_overlap)
-        result["warnings"].append(
-            f"the largest overlap was {100 * bed.max_overlap:.2g} % of a diameter, where max_overlap = "
-            f"{settings.max_overlap:g} was meant to hold: young = {stiffer:.2g} Pa or more would keep it"
-        )
+    if unsettled := unsettled_warning(run.master):
+        result["warnings"].append(unsettled)
+    if pressed := softening.overlapping(float(bed.max_overlap)):
+        result["warnings"].append(pressed)
     coarsest = settings.grain
     if graded is not None:
         coarsest = coarsest_touched(run, graded, size=settings.bed_size)

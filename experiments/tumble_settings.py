@@ -188,6 +188,8 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
         for key in ("effects", "sweep", "model"):
             if getattr(self, key):
                 return f"{key} is given with ground = 'bed': on grains there is the base model alone, without it"
+        if fault := self.sleep_fault():
+            return fault
         if self.settle_gravity is not None and (fault := self._settled_under()):
             return fault
         if self.method == "paper":

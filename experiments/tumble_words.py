@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from rigid.trajectory import Trajectory
 
-__all__ = ["MOST", "tumble_sentences"]
+if TYPE_CHECKING:
+    from coupling import Master
+
+__all__ = ["MOST", "tumble_sentences", "unsettled_warning"]
 
 MOST = 8
 """Changes of state that are told one by one."""
@@ -27,6 +31,17 @@ def tumble_sentences(trajectory: Trajectory) -> list[str]:
         state = [name for time, name, _ in trajectory.transitions if time < when or time == 0][-1]
         said.append(f"Fastest at {when:.4g} s ({state}): {trajectory.max_speed:.4g} m/s.")
     return said
+
+
+def unsettled_warning(master: Master) -> str | None:
+    """That macro steps were iterated as often as allowed without coming to an end, where some were."""
+    many = master.books.unsettled
+    if not many:
+        return None
+    return (
+        f"{many} of {master.count} macro steps did not settle in iterations = {master.iterations}: more of them, or "
+        f"fewer substeps, would do"
+    )
 
 
 def _does_not_tip(trajectory: Trajectory) -> list[str]:

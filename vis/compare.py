@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -123,7 +124,8 @@ def _plans(
              "Means over 5 ms, of all rows together, as the platform's acceleration has them.",
              _draw_forces(result, columns, labels)),
             ("energy", "Energy books", "Work of the torque; what was dissipated, in the ground and in friction; and "
-             "what is left over: energy gained less the work plus what was dissipated.",
+             "what is left over: energy gained less the work plus what was dissipated; on grains that is platform and "
+             "exchange only, since there what was dissipated is what the bed took less what it holds more.",
              _draw_energy(columns, labels)),
         ]  # fmt: skip
 
@@ -245,7 +247,7 @@ def _side_by_side(
 ) -> list[Block]:
     """Stills of both at the same moments, and the film."""
     folders = [(home / run["folder"]).resolve() for run in result["runs"]]
-    reels = [Reel.open(folder) for folder in folders]
+    reels = _alike([Reel.open(folder) for folder in folders])
     stills = [
         (home / "figures" / f"seen-{name}.png", f"Both {words}", time,
          "; ".join(f"{label}: {reel.line(reel.nearest(time))}" for label, reel in zip(labels, reels, strict=True)))
@@ -257,6 +259,17 @@ def _side_by_side(
         shown = drawn.animation
         blocks.insert(0, figure(shown.file, title=shown.title, caption=shown.caption, show_file=True))
     return [*blocks, *(text(note, small=True) for note in drawn.notes)]
+
+
+def _alike(reels: list[Reel]) -> list[Reel]:
+    """A law knows points only: beside a run on grains of spikes as long its platform is drawn with that one's."""
+    known = [reel for reel in reels if reel.frames is not None]
+    return [
+        replace(reel, like=known[0].spikes)
+        if reel.frames is None and known and known[0].number("spike_length") == reel.number("spike_length")
+        else reel
+        for reel in reels
+    ]
 
 
 # Penetrations ---------------------------------------------------------------------------------------------------------

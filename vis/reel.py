@@ -24,8 +24,8 @@ Array = NDArray[np.float64]
 NAME = "tumble"
 """Of the frames in a run folder of a tumble on grains."""
 _SPIKE, _CLEAR, _WIDE = 0.012, 0.04, 0.06
-"""Of the drawn platform: diameter and length of a spike, and on a law, which sees points only, width of the hull, all
-of spikes that end 0.2 m from the centre [m]."""
+"""Of the platform on a law, which sees points only: diameter and length of a spike, width of the hull as they are
+drawn, all of spikes that end 0.2 m from the centre [m]."""
 _BLOCK = 0.08
 """Depth of the ground that is drawn where there are no grains [m]."""
 
@@ -41,6 +41,7 @@ class Reel:
         states: Its states, a word a row.
         times: When there is a picture [s], increasing.
         frames: Its frames; None: the ground is a law.
+        like: What `spikes` is where the folder does not say, as on a law: of the run that it stands beside.
     """
 
     folder: Path
@@ -49,9 +50,10 @@ class Reel:
     states: NDArray[np.str_]
     times: Array
     frames: Frames | None
+    like: tuple[float, float] | None = None
 
     @classmethod
-    def open(cls, folder: str | Path, *, count: int = 500) -> Reel:
+    def open(cls, folder: str | Path, *, count: int = 500, like: tuple[float, float] | None = None) -> Reel:
         """Of the tumble in a run folder; on a law with `count` pictures to choose from.
 
         Raises:
@@ -62,9 +64,9 @@ class Reel:
         series, states = read_columns(home / "trajectory.csv")
         if NAME in frame_names(home):
             frames = read_frames(home, NAME)
-            return cls(home, result, series, states, np.asarray(frames.times), frames)
+            return cls(home, result, series, states, np.asarray(frames.times), frames, like)
         end = float(series["t_s"][-1])
-        return cls(home, result, series, states, np.linspace(0.0, end, max(2, count)), None)
+        return cls(home, result, series, states, np.linspace(0.0, end, max(2, count)), None, like)
 
     def __len__(self) -> int:
         return len(self.times)
@@ -94,6 +96,15 @@ class Reel:
     def ground(self) -> str:
         """What it stands on, in words."""
         return "bed of grains" if self.frames is not None else str(self.result.get("ground", "law"))
+
+    @cached_property
+    def spikes(self) -> tuple[float, float]:
+        """Diameter of a spike, and how far it stands out of the hull [m]."""
+        told = self.result.get("grains") or {}
+        if "spike_diameter" in told:
+            return float(told["spike_diameter"]), float(told.get("spike_clear", _CLEAR))
+        scale = self.number("spike_length") / 0.2
+        return self.like if self.like is not None else (_SPIKE * scale, _CLEAR * scale)
 
     # Where things are -------------------------------------------------------------------------------------------------
 
@@ -173,7 +184,7 @@ class Reel:
     def _meshes(self) -> dict[str, tuple[Array, NDArray[np.int64]]]:
         """Spikes and hull in body axes."""
         length, count = self.number("spike_length"), int(self.result.get("spike_count", 8))
-        thick, clear = _SPIKE * length / 0.2, _CLEAR * length / 0.2
+        thick, clear = self.spikes
         points, faces = spike_mesh("sphere", diameter=thick, length=clear + 0.5 * thick, segments=24)
         parts, triangles = [], []
         for row in range(count):

@@ -5,7 +5,7 @@ them the states over time with a cursor. `python -m vis.tumble_film <job.json>` 
 its own, as `vis.render` does for spikes.
 
     {"runs": [folder...], "labels": [...] or null, "by", "stills": [{"file", "time", "size"}...],
-     "film": {"file", "times": [...], "size"} or null}
+     "film": {"file", "times": [...], "size"} or null, "spikes": [[diameter, length out of the hull] or null...]}
 """
 
 from __future__ import annotations
@@ -256,7 +256,11 @@ def _round_length(length: float) -> float:
 
 def run_film_job(job: dict[str, Any], *, opengl: bool, step: Callable[[], None] = lambda: None) -> None:
     """Draw every picture of a job (see the module); `step` is called after each."""
-    reels = [Reel.open(folder) for folder in job["runs"]]
+    spikes = job.get("spikes") or [None] * len(job["runs"])
+    reels = [
+        Reel.open(folder, like=None if like is None else (float(like[0]), float(like[1])))
+        for folder, like in zip(job["runs"], spikes, strict=True)
+    ]
     draw_job(
         job, lambda size: Sheet(reels, size, by=job["by"], opengl=opengl, labels=job.get("labels")), moment="time",
         moments="times", step=step,

@@ -171,7 +171,7 @@ def _draw_feet(feet: Mapping[str, NDArray[np.float64]]) -> Figure:
         colour = _ROWS[row % len(_ROWS)]
         force.plot(time, np.convolve(normal, kernel, mode="same") / held, color=colour, lw=1.0)
         depth.plot(time, np.where(sinkage > 0, sinkage, np.nan), color=colour, lw=1.4, label=f"row {row}")
-    force.set_ylabel("N of a row [N]")
+    force.set_ylabel("upward force [N]")
     depth.set_ylabel("sinkage [mm]")
     depth.set_xlabel("time [s]")
     depth.invert_yaxis()

@@ -62,14 +62,37 @@ def make_tumble_pictures(
 
 
 def moments(reels: Sequence[Reel]) -> list[tuple[str, str, float]]:
-    """Name, words and time [s] of the stills: the start, the middle of the way of the first run's angle, the end."""
-    first = reels[0]
+    """Name, words and time [s] of the stills: the start, the middle of the way of the first run's angle, the end.
+
+    Times at which the run with the fewest pictures has one, so that two runs are shown at the same.
+    """
+    first, coarse = reels[0], _coarsest(reels)
     end = min(float(reel.series["t_s"][-1]) for reel in reels)
     theta, at = first.series["theta_rad"], first.series["t_s"]
     turned = np.abs(theta - theta[0])
     half = float(at[int(np.argmax(turned >= 0.5 * turned.max()))])
-    return [("start", "when the torque begins", 0.0), ("half", "half way round", min(half, end)),
-            ("end", "at the end", end)]  # fmt: skip
+    times = [float(coarse.times[coarse.nearest(time)]) for time in (0.0, min(half, end), end)]
+    words = (("start", "when the torque begins"), ("half", "half way round"), ("end", "at the end"))
+    return [(*named, time) for named, time in zip(words, times, strict=True)]
+
+
+def _coarsest(reels: Sequence[Reel]) -> Reel:
+    """The run with the fewest pictures."""
+    return min(reels, key=len)
+
+
+def _film_times(reels: Sequence[Reel]) -> Array:
+    """Evenly over the longest run, no two of them with the same picture of every run on grains [s]."""
+    end = max(float(reel.times[-1]) for reel in reels)
+    on_grains = [reel for reel in reels if reel.frames is not None]
+    count = min(_MOST_FRAMES, max(len(reel) for reel in on_grains or reels))
+    times = np.linspace(0.0, end, count)
+    finest = max(on_grains, key=len) if on_grains else None
+    if finest is None:
+        return times
+    # The finest run's own times, so that a law beside it is drawn when the grains are; a longer law goes on alone.
+    own = [float(finest.times[finest.nearest(time)]) if time <= finest.times[-1] else float(time) for time in times]
+    return np.unique(own)
 
 
 def draw_reels(
@@ -82,13 +105,13 @@ def draw_reels(
     progress: Callable[[float], None] | None = None,
 ) -> Pictures:
     """Stills (file, words, time [s], caption) and film of one or two runs, by OpenGL in a child process or flat."""
-    longest = max(reels, key=lambda reel: float(reel.times[-1]))
-    count = min(_MOST_FRAMES, max(len(reel) for reel in reels))
-    times = np.linspace(0.0, float(longest.times[-1]), count)
+    times = _film_times(reels)
+    count = len(times)
     job: dict[str, Any] = {
         "runs": [str(reel.folder) for reel in reels], "labels": list(labels) if labels else None, "by": by,
         "stills": [{"file": str(file), "time": time, "size": list(_STILL)} for file, _, time, _ in stills],
         "film": {"file": str(film), "times": times.tolist(), "size": list(_FILM)} if film else None,
+        "spikes": [list(reel.spikes) for reel in reels],
     }  # fmt: skip
     pictures = [Picture(file, words[:1].upper() + words[1:], caption + ".") for file, words, _, caption in stills]
     moving = None
@@ -139,8 +162,8 @@ def draw_tracks(reel: Reel, file: Path) -> Picture:
         above.grid(False)
         bar = drawing.colorbar(picture, ax=[above, along], shrink=0.6, extend="both")
         bar.set_label("change of the surface's height [mm]")
-        across = 1e3 * float((reel.result.get("grains") or {}).get("spike_diameter", 0.012))
-        strip = np.abs(y) <= 0.5 * across
+        wide = max(reel.spikes[0], 2.0 * float(grid.spacing[1]))  # of the strip [m]: two columns of the map at least
+        strip = np.abs(y) <= 0.5e3 * wide
         for index in np.unique(np.linspace(1, len(reel) - 1, 4).round().astype(int)):
             now = reel.frame(int(index))
             mean = 1e3 * np.asarray(now.maps["surface"].fields["change"], dtype=float)[strip].mean(axis=0)
@@ -153,7 +176,7 @@ def draw_tracks(reel: Reel, file: Path) -> Picture:
         drawing.savefig(file, dpi=130)
     caption = (
         "Above: by how much the top of the grains has risen or fallen since the torque began, from above, at the end. "
-        f"Below: the same, mean over {across:.3g} mm across the spikes' way, at four times."
+        f"Below: the same, mean over {1e3 * wide:.3g} mm across the spikes' way, at four times."
     )
     return Picture(file, "The tracks", caption)
 

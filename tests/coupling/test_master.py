@@ -9,6 +9,7 @@ import pytest
 from coupling import MOST_REVERSAL, CoupledTumble, LawFooting, Master, PlanarBody
 from coupling.footing import row_tips
 from coupling.poses import Wrench
+from experiments.tumble_words import unsettled_warning
 from rigid import Effect, SpringDamper, Trial, simulate
 from rigid.reaction import Contact, Reaction
 
@@ -77,6 +78,39 @@ def test_iterated_steps_leave_nothing_between_what_is_given_and_what_is_taken():
     explicit, _ = coupled(trial, 2e-3, 0.5)
     assert found.energy_residual < 1e-11 < 1e-9 < explicit.trajectory().energy_residual
     assert run.master.books.repeats > 0
+
+
+def test_a_light_body_on_a_stiff_spring_is_iterated_to_the_implicit_midpoint_where_the_explicit_step_flies_off():
+    """K H^2 / m = 5, past the explicit 4: z turns by 2 atan(omega H / 2) a step, its amplitude stays, to round-off."""
+    mass, stiffness, steps = 1.0, 100.0, 200
+    step = math.sqrt(5.0 * mass / (2 * stiffness))  # two rows carry it
+    omega, swing = math.sqrt(2 * stiffness / mass), 0.2 * mass / (2 * stiffness)
+    trial = Trial(
+        mass=mass, inertia=0.02, spike_length=0.2, gravity_sim=1.0, mu_s=0.6, stiffness=stiffness, damping=0.0,
+    )  # fmt: skip
+    heights, run = {}, None
+    for iterations in (1, 8):
+        footing = LawFooting.of_trial(trial)
+        footing.grounds = [replace(ground, time_step=step) for ground in footing.grounds]
+        run = CoupledTumble(trial, footing, duration=steps * step, substeps=1, iterations=iterations)
+        run.body.rates[1] = swing * omega
+        run.run()
+        heights[iterations] = run.columns["y"] - run.columns["y"][0]
+    turned = 2 * math.atan(0.5 * omega * step) * np.arange(len(heights[8]))
+    assert np.abs(heights[8] - swing * np.sin(turned)).max() < 1e-6 * swing
+    assert run.master.books.unsettled == 0 and run.master.books.repeats < 1.1 * steps  # the step before taught it
+    assert np.abs(heights[1]).max() > 100 * swing
+
+
+def test_steps_that_do_not_settle_are_counted():
+    trial = Trial(**RIG, **CASES["sand"])
+    run, _ = coupled(trial, 2e-3, 0.1, iterations=2)
+    assert 0 < run.master.books.unsettled <= run.master.count
+    assert unsettled_warning(run.master) == (
+        f"{run.master.books.unsettled} of {run.master.count} macro steps did not settle in iterations = 2: more of "
+        "them, or fewer substeps, would do"
+    )
+    assert unsettled_warning(coupled(trial, 2e-3, 0.1)[0].master) is None
 
 
 @pytest.mark.parametrize("name", list(CASES))

@@ -50,6 +50,7 @@ def cube(tmp_path):
         ({"actuator": "brake", "torque": (1.0, 0.0, 0.0)}, "wheel_speed_0 about x = 0 rad/s"),
         ({"actuator": "brake"}, "torque is not given"),
         ({"grain": 0.004}, "grain = 0.004 belongs to ground = 'bed'"),
+        ({"ground": "bed", "sleep_share": 0.4}, "sleep_share = 0.4 is of sleep, which is off"),
         ({"mu_s": 0.1, "mu_d": 0.2}, "mu_d = 0.2 is above mu_s = 0.1"),
         ({"torque": 0.1}, "it must be a list"),
     ],
@@ -81,6 +82,20 @@ def test_what_cannot_be_is_refused_before_any_work(cube, given, said):
         del own["gravity"]
     with pytest.raises(ValueError, match=said):
         spatial.check(SpatialSettings(**own | given))
+
+
+def test_the_hand_sets_down_heavy_on_soft_ground_and_what_it_cannot_is_refused_by_name():
+    """The Hedgehog free at 1 m/s2: 5.3 N on four spikes of sand, W / 4 K = 32 mm deep; at the rig's speed too late."""
+    heavy = {"surface": "sand", "gravity": 1.0, "duration": 0.05}
+    plan = plan_spatial(SpatialSettings(**heavy))
+    run = spatial._on_law(SpatialSettings(**heavy), plan)
+    while not run.placed:
+        run.advance()
+    assert run.columns["sinkage"][0] == pytest.approx(5.3 / (4 * 41.1), rel=0.01)
+    with pytest.raises(ValueError, match=r"bed_size = 0.1 m along x is too short"):
+        spatial.check(SpatialSettings(**heavy, ground="bed", bed_size=(0.1, 0.1, 0.05), grain=0.006))
+    with pytest.raises(ValueError, match=r"fails: the platform did not come to rest .* another lowering_speed"):
+        spatial.check(SpatialSettings(**heavy, ground="bed", lowering_speed=0.01))
 
 
 def test_a_platform_without_spikes_has_no_grains_to_touch():
@@ -141,7 +156,7 @@ def small_bed(*_):
     return bed
 
 
-def test_on_grains_a_stopped_run_is_taken_up_to_the_same_bits_and_its_books_close(tmp_path, monkeypatch, cube):
+def test_on_grains_a_stopped_run_goes_on_to_the_same_bits_with_its_books_and_overlaps_told(tmp_path, monkeypatch, cube):
     monkeypatch.setattr(spatial, "_prepare", small_bed)
     monkeypatch.setattr(spatial, "write_report", lambda *_: None)
     settings = SpatialSettings(
@@ -173,10 +188,18 @@ def test_on_grains_a_stopped_run_is_taken_up_to_the_same_bits_and_its_books_clos
     assert quantities["sinkage_largest"]["value"] > 1e-3 and quantities["dissipated_friction"]["value"] > 0
     assert quantities["energy_residual"]["value"] < 5e-3 and quantities["momentum_residual"]["value"] < 1e-13
     assert whole["grains"]["beside"]["impact_speed"]["value"] > 0.1
+    _check_overlaps(whole, settings)
     frames = sorted(path.name for path in (tmp_path / "whole" / "frames").glob("*_0001.*"))
     parts = ("contact_forces", "grains", "hull", "row_forces", "spikes")
     assert frames == [*(f"tumble_{part}_0001.vtu" for part in parts), "tumble_surface_0001.vti"]
     _check_report(tmp_path / "whole")
+
+
+def _check_overlaps(result, settings):
+    """The run allows itself 0.2 of a diameter; past 0.05 it says which modulus would keep that: F ~ E overlap^1.5."""
+    overlap = result["grains"]["max_overlap"]
+    said = f"young = {settings.young * (overlap / 0.05) ** 1.5:.2g} Pa or more would keep it there"
+    assert overlap > 0.05 and any(said in warning for warning in result["warnings"])
 
 
 def _check_report(folder):

@@ -66,6 +66,8 @@ def test_a_bed_that_will_not_do_is_refused_before_any_work(given, said):
         {"campaign": "made"},
         {"ground_parameters": ("stiffness=3",)},
         {"ground": "spring-damper", "grain": 0.004},
+        {"sleep_force": 2.0},
+        {"ground": "spring-damper", "sleep_share": 0.4},
     ],
 )
 def test_what_does_not_go_with_grains_is_refused_by_name(given):

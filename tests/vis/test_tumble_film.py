@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from vis.compare import _alike
 from vis.frames import FrameWriter
 from vis.meshes import spike_mesh
 from vis.reel import Reel
 from vis.stage import Eye
 from vis.tracks import height_map
 from vis.tumble_film import Sheet, run_film_job
-from vis.tumble_pictures import draw_tracks
+from vis.tumble_pictures import _film_times, draw_tracks, moments
 
 LENGTH, SIZE = 0.04, (0.12, 0.03)
 
@@ -76,6 +77,41 @@ def test_the_camera_follows_and_the_scale_stays_put(folder):
     sheet.draw(0.0)
     sheet.draw(1.0)
     assert sheet.norm.vmax == 2.0
+
+
+def widths_and_reach(points):
+    """Extent across and distance of the farthest point from the axis of spikes about (0, 0, 0) [m]."""
+    return np.ptp(points[:, 1]), np.hypot(points[:, 0], points[:, 2]).max()
+
+
+def test_spikes_and_hull_are_drawn_as_thick_and_long_as_the_run_has_them(folder, tmp_path_factory):
+    """8 mm thick, 15 mm out of the hull: on grains as its result says; on a law beside it like them, else 12 in 200."""
+    told = json.loads((folder / "result.json").read_text()) | {"grains": {"spike_diameter": 8e-3, "spike_clear": 0.015}}
+    (folder / "result.json").write_text(json.dumps(told))
+    law = tmp_path_factory.mktemp("law")
+    (law / "trajectory.csv").write_bytes((folder / "trajectory.csv").read_bytes())
+    (law / "result.json").write_text(json.dumps({key: value for key, value in told.items() if key != "grains"}))
+    grains, alone = Reel.open(folder), Reel.open(law)
+    beside = _alike([grains, alone])[1]
+    assert grains.spikes == beside.spikes == (8e-3, 0.015)
+    assert alone.spikes == pytest.approx((0.0024, 0.008))
+    for reel, thick, clear in ((beside, 8e-3, 0.015), (alone, 0.0024, 0.008)):
+        across, _ = widths_and_reach(reel._meshes["spikes"][0])
+        assert across == pytest.approx(thick, rel=0.02)
+        assert widths_and_reach(reel._meshes["hull"][0])[1] == pytest.approx(LENGTH - clear)
+    assert widths_and_reach(grains._meshes["hull"][0])[1] == pytest.approx(LENGTH - 0.015)
+
+
+def test_two_runs_are_pictured_at_the_times_of_the_one_with_frames(folder, tmp_path_factory):
+    """Frames every 0.1 s, a law at any time: stills and film of both show the same instants."""
+    law = tmp_path_factory.mktemp("law")
+    for name in ("trajectory.csv", "result.json"):
+        (law / name).write_bytes((folder / name).read_bytes())
+    reels = [Reel.open(folder), Reel.open(law)]
+    for time in (*(moment[2] for moment in moments(reels)), *_film_times(reels)):
+        assert reels[0].times[reels[0].nearest(time)] == pytest.approx(time, abs=1e-12)
+        assert reels[1].times[reels[1].nearest(time)] == pytest.approx(time, abs=1.1e-3)
+    assert len(_film_times(reels)) == 11 and len(_film_times(reels[1:])) == 48
 
 
 def test_stills_film_and_tracks_are_drawn_without_opengl(folder):
