@@ -17,7 +17,7 @@ from experiments.campaign.tables import PenetrationTrial
 from .colour import Colour, colour_of
 from .noise_words import together
 from .penetration_depth import SmoothDepth, smooth_depth
-from .penetration_drive import Holds
+from .penetration_drive import Holds, Weights
 from .problem import Array, Finding, TrialInfo
 from .replicates import parted
 from .stuck import clipped, cut_rows, stuck_rows
@@ -34,6 +34,8 @@ _SMOOTH, _ROUGH = 1.7, 3.0
 """Chi-square a row up to which a polynomial goes through both sides of a gap, and beyond which it does not."""
 _LOUDER = 1.2
 """Power of a depth sensor's slow noise, over what is stated, from which on its pushes are smoothed once more."""
+_AS_TAKEN = 3.0
+"""Standard errors within which what is left is what it was taken for."""
 _OF_MEDIAN = 1.8
 """Relative standard error of a median of n absolute third differences, times the root of n: 1.17 of independent normal
 numbers, and sqrt(1 + 2 (0.75^2 + 0.3^2 + 0.05^2)) for those of neighbours."""
@@ -171,7 +173,21 @@ def _recoloured(
             colour = louder
         if colour is not None:
             colours |= {trial.info.id: colour for trial in alike}
-    return [_again(campaign, trial, colours) if trial.info.id in anew else trial for trial in trials], colours
+    found = {t.info.id: _again(campaign, t, colours) if t.info.id in anew else t for t in trials}
+    for rate, alike in rates.items():
+        if any(trial.info.id in colours for trial in alike) or not colours:
+            continue
+        # Few rows tell little of it, least of all where a curve has followed the noise: as at the rate next to it, then,
+        # unless what is left is not that.
+        near = min((r for r in rates if rates[r][0].info.id in colours), key=lambda r: abs(r - rate))
+        said = colours[rates[near][0].info.id]
+        own = [_again(campaign, trial, {trial.info.id: said}) for trial in alike]
+        left = [(trial.depth - trial.smooth.depth) / std / said.std for trial in own if trial.smooth is not None]
+        rows = np.concatenate([Weights(np.ones(len(one)), said.persistence)(one) for one in left])
+        if abs(float((rows**2).mean()) - 1) < _AS_TAKEN * np.sqrt(2 / len(rows)):
+            colours |= {trial.info.id: said for trial in alike}
+            found |= {trial.info.id: trial for trial in own}
+    return [found[trial.info.id] for trial in trials], colours
 
 
 def _again(campaign: Campaign, trial: Prepared, colours: Mapping[str, Colour], alike: Holds = ()) -> Prepared:

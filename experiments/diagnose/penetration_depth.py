@@ -26,6 +26,8 @@ _GENTLE = 3  # intervals of a cubic spline that is always let free
 _ROUND = (0.008, 0.02, 0.032, 0.05)  # of the record, about a kink
 _KINKED_INTERVALS = 2  # finer splines need no kinks, and the search is dear
 _KINK_GRID = 160
+_APART = 3.0
+"""Rows between two kinks: of a speed that lasts less they tell nothing, and a row that is far off would make one."""
 _DRIVEN = 24
 """Rows from which on levels and ramps are looked for."""
 _FINER = (1, 3)
@@ -129,13 +131,26 @@ def _curve(
             if enough == 3:
                 break
     assert best is not None
-    if drive is None or best[0] < drive.criterion(n):
+    if drive is None or _less(best[0], best[1].shape[1], drive, n, limit):
         *columns, intervals = _enlarged(u, *best[1:])
         ways = (columns[0], columns[1])
         return np.zeros(n), np.zeros(n), ways, ways, intervals
     linear = 1 + len(drive.levels) - sum(drive.resting)  # a ramp is moved by no more than its fit has found
     depths, speeds = (columns[:, :linear] for columns in drive.changes(u))
     return *drive.curve(u), (depths, speeds), drive.softened(u, weigh).changes(u), _BENDS
+
+
+def _less(score: float, count: int, drive: Drive, n: int, limit: float) -> bool:
+    """Whether a curve of `count` columns describes the rows better than a drive, by the criterion.
+
+    Where neither comes down to the noise, that may be louder than stated: then both are judged with the noise that they
+    themselves leave (n log of the mean square in place of the sum), or rows that are far off would have their own kinks.
+    """
+    chi_square = score - float(np.log(n)) * count
+    if min(chi_square, drive.chi_square) < limit:
+        return score < drive.criterion(n)
+    own, other = (n * float(np.log(one / n)) for one in (chi_square, drive.chi_square))
+    return own + float(np.log(n)) * (count - drive.count) < other
 
 
 def _shrunk(basis: Array, fixed: int, depth: Array, std: float, weigh: Weights) -> tuple[float, Array, Array]:
@@ -231,9 +246,9 @@ def _with_kinks(
     for _ in range(min(most, n // 6)):
         if rest @ rest < n + 3 * np.sqrt(2 * n):  # nothing left that a kink could explain
             break
-        place, power = _best_kink(u, q, rest, grid, weigh)
+        place, power = _best_kink(u, q, rest, _apart(grid, places, n), weigh)
         fine = place + np.linspace(-1.2, 1.2, 41) / _KINK_GRID
-        place, power = _best_kink(u, q, rest, fine[(fine > 0) & (fine < 1)], weigh, (power,))
+        place, power = _best_kink(u, q, rest, _apart(fine[(fine > 0) & (fine < 1)], places, n), weigh, (power,))
         after = np.maximum(u - place, 0.0)
         trial = np.column_stack([basis, after**power])
         column = weigh(trial[:, -1])
@@ -247,6 +262,11 @@ def _with_kinks(
         places.append(place)
         slopes = np.column_stack([slopes, (u > place).astype(float) if power == 1 else 2 * after])
     return score, basis, slopes, places
+
+
+def _apart(grid: Array, places: list[float], n: int) -> Array:
+    """Of the places in `grid` those that are some rows from each of the kinks there are."""
+    return grid[(np.abs(grid[:, None] - np.array(places)) >= _APART / n).all(axis=1)]
 
 
 def _best_kink(
