@@ -805,6 +805,45 @@ class Bed:
         state.adopt(bed, values, keep=keep)
         return bed
 
+    def repeated(self, times: int) -> Bed:
+        """A bed `times` as long: this one laid end to end along x, where it is periodic, with its contacts' history.
+
+        So it is as much at rest as this one, and has the same surface and packing fraction. Copy k of grain i has id
+        i + k grain_count. Its clock begins at 0; sleepers wake, and books of losses are not gone on with.
+
+        Args:
+            times: how often [1]; with 1 it is a copy.
+
+        Raises:
+            ValueError: `times` that is no whole number of 1 or more; a bed with bodies beside its floor.
+        """
+        self._check_valid()
+        if isinstance(times, bool) or int(times) != times or times < 1:
+            raise ValueError(f"times = {times} must be a whole number, 1 or more")
+        bodies = int(self._engine.body_count[None]) - int(self._has_floor)
+        if bodies:
+            raise ValueError(f"{bodies} bodies beside the floor: a bed is repeated without them, each is in one place")
+        self.wake()
+        times = int(times)
+        values = state.laid_end_to_end(self.state(), times, period=self.size[0])
+        own = {
+            "size": (times * self.size[0], *self.size[1:]), "gravity": self.gravity, "time_step": self.time_step,
+            "max_overlap": self.overlap_limit,
+        }  # fmt: skip
+        bed = Bed(
+            self._settings | own,
+            values["position"][:, 3].astype(float),
+            precision=self._runtime.precision,
+            arch=self._runtime.arch,
+            threads=self._runtime.threads,
+        )
+        state.adopt(bed, values)
+        bed.steps = 0
+        bed.material = self.material
+        bed.recipe = self.recipe | {"repeats": times} if self.recipe else {}
+        bed.surface, bed.packing_fraction = self.surface, self.packing_fraction
+        return bed
+
     def _fill(self, positions, velocities, spins, radii, mass) -> None:
         e = self._engine
         dtype = self._runtime.dtype

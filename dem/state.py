@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .lists import AWAKE, CHUNKS, INDEX_MASK
+from .lists import AWAKE, CHUNKS, INDEX_BITS, INDEX_MASK
 from .materials import Material
 from .rows import take_rows
 from .sleep import Sleep, Sleeper
@@ -18,7 +18,7 @@ from .sleep import Sleep, Sleeper
 if TYPE_CHECKING:
     from .bed import Bed
 
-__all__ = ["STATE_FORMAT", "adopt", "put_back", "read_file", "take", "write_file"]
+__all__ = ["STATE_FORMAT", "adopt", "laid_end_to_end", "put_back", "read_file", "take", "write_file"]
 
 STATE_FORMAT = "hedgebed-bed/3"
 # Before there was cohesion, and before contacts remembered their last step; these files can still be read.
@@ -260,6 +260,35 @@ def adopt(bed: Bed, state: dict[str, np.ndarray], *, keep: np.ndarray | None = N
     for name in ("force", "torque"):
         e.write(name, np.where(lost[row, None], e.read(name), state[name][row].astype(dtype)))
     bed.measure_surface()
+
+
+def laid_end_to_end(state: dict[str, np.ndarray], times: int, *, period: float) -> dict[str, np.ndarray]:
+    """The grains and contacts of a state `times` over along x, one `period` [m] apart, for ``adopt``; bodies once.
+
+    A contact across the ends of the period becomes one of a copy with the next, and across the ends of the whole.
+    """
+    count = len(state["id"])
+    copy = np.repeat(np.arange(times), count)
+    found = dict(state)
+    for name in ("position", "velocity", "spin", "force", "torque", "origin"):
+        found[name] = np.tile(state[name], (times, 1))
+    for name in ("position", "origin"):
+        found[name][:, 0] += (period * copy).astype(found[name].dtype)
+    found["id"] = np.tile(state["id"], times) + count * copy
+    # Those that touch, which alone have a history.
+    touches = state["pair"] < 0
+    first = np.repeat(np.arange(count), state["pair_count"])[touches]
+    bits = ~state["pair"][touches].astype(np.int64)
+    ahead = 1 - (bits >> INDEX_BITS) % 3  # periods from the copy of the first to that of the second
+    found["pair_count"] = np.tile(np.bincount(first, minlength=count), times)
+    pair = [~((bits & INDEX_MASK) + count * ((k + ahead) % times)) for k in range(times)]
+    found["pair"] = np.concatenate(pair)
+    found["near_grain"] = np.concatenate([state["near_grain"].astype(np.int64) + count * k for k in range(times)])
+    found["near_body"] = np.tile(state["near_body"], times)
+    for name in ("slide", "roll", "near_slide", "near_roll"):
+        if name in state:
+            found[name] = np.tile(state[name], (times, 1))
+    return found
 
 
 def _chunk_starts(grain_count: int, chunk_count: int) -> np.ndarray:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coupling import CoupledTumble
 from dem.graded import THROAT, Graded
@@ -14,7 +15,7 @@ from dem.grading import MOST_DRAINED, MOST_STRAYED
 from dem.laboratory import Prepared
 from rigid.trajectory import Trajectory
 
-__all__ = ["coarsest_touched", "grading_told", "graded_under", "places_touched"]
+__all__ = ["coarsest_touched", "grading_told", "graded_under", "places_touched", "tips_in_ground"]
 
 
 def grading_told(prepared: Prepared) -> dict[str, Any]:
@@ -157,9 +158,14 @@ def coarsest_touched(run: CoupledTumble, graded: Graded, *, size: Sequence[float
         size: of the bed, both widths and the depth [m].
     """
     footing: Any = run.footing
+    x, depth = tips_in_ground(run)
+    return float(graded.diameter(footing.origin[0] + x, footing.origin[2] - depth, size).max(initial=graded.fine))
+
+
+def tips_in_ground(run: CoupledTumble) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where tips of a tumble were below the surface: along the motion from its start, and how deep [m], shape [n]."""
     trial, rows, depth = run.trial, run.columns, run.feet[:, 3]
     half = math.pi / trial.spike_count
     angles = rows["theta"][:, None] + half + 2 * half * np.arange(trial.spike_count)
-    x = footing.origin[0] + rows["x"][:, None] - trial.spike_length * np.sin(angles)
-    within = depth > 0
-    return float(graded.diameter(x[within], footing.origin[2] - depth[within], size).max(initial=graded.fine))
+    x = rows["x"][:, None] - trial.spike_length * np.sin(angles)
+    return x[depth > 0], depth[depth > 0]

@@ -38,6 +38,7 @@ class Cost:
     """An estimate."""
 
     grains: float
+    """Of the whole bed."""
     time_step: float
     """[s]"""
     bed_seconds: float
@@ -98,8 +99,9 @@ def cost_of_tumble(settings: TumbleSettings) -> Cost:
     computed = grains
     if settings.sleep and settings.actuator == "motor":
         computed = min(grains, AWAKE * settings.bed_size[1] / settings.grain**3)
+    prepared = grains / settings.bed_repeats
     return Cost(
-        grains=grains, time_step=step, bed_seconds=FALL_TIMES * fall / step * grains / _rate(grains),
+        grains=grains, time_step=step, bed_seconds=FALL_TIMES * fall / step * prepared / _rate(prepared),
         run_seconds=BOOK * steps * computed / _rate(computed) + steps / settings.substeps * MACRO_STEP,
         grain_steps=steps * computed,
     )  # fmt: skip

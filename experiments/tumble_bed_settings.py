@@ -76,6 +76,9 @@ class TumbleBedSettings(GrainsSettings):
         (0.5, 0.06, 0.046),
         description="On a bed: its length along the motion, its width for one spike (both periodic) and its depth [m].",
     )
+    bed_repeats: int = Field(
+        1, ge=1, le=100, description="On a bed: how often the prepared bed is laid end to end along the motion [1]."
+    )
     coarse: Positive | None = Field(
         None,
         description="On a bed: graded: `grain` is the mean diameter under the expected footprints, this the largest "
@@ -114,6 +117,11 @@ class TumbleBedSettings(GrainsSettings):
     drop_along: float = Field(0.0, allow_inf_nan=False, description="Of a landing: speed along the surface [m/s].")
     drop_spin: float = Field(0.0, allow_inf_nan=False, description="Of a landing: spin, clockwise [rad/s].")
     drop_theta: float = Field(0.0, allow_inf_nan=False, description="Of a landing: theta at the first touch [rad].")
+
+    @property
+    def bed_length(self) -> float:
+        """Of the whole bed along the motion [m]; bed_size is that of the piece which is prepared."""
+        return self.bed_repeats * self.bed_size[0]
 
     def bed_settings_given(self) -> list[str]:
         """Names of those of these settings that are not at their defaults."""

@@ -99,6 +99,9 @@ def tumble_on_grains(settings: TumbleSettings, folder: RunFolder, progress: Prog
         progress.plan({"bed": 1.0, "tumble": step_time}, seconds={"report": 10.0})
         try:
             bed = _prepare(settings, plan, forecast, softening, progress)
+            if settings.bed_repeats > 1:
+                bed = bed.repeated(settings.bed_repeats)
+                progress.message(_repeated_told(settings, forecast, bed))
         except RuntimeError as error:
             raise RuntimeError(f"the bed could not be prepared: {error}; change young, max_overlap or seed") from error
         run = _stepper(settings, plan, bed, forecast)
@@ -212,12 +215,16 @@ def _in_flight(settings: TumbleSettings, plan: TumblePlan, law: Forecast) -> For
 
 
 def _check_bed(settings: TumbleSettings, forecast: Forecast, material: Material) -> None:
-    spike, (length, width, depth) = settings.spike_diameter, settings.bed_size
+    spike, (piece, width, depth) = settings.spike_diameter, settings.bed_size
+    length, repeats = settings.bed_length, settings.bed_repeats
     margin = MARGIN * spike
     need = forecast.ahead - forecast.behind + 2 * margin
     if length < need:
+        said = f"bed_size = {piece:g} m along the motion"
+        if repeats > 1:
+            said += f" with bed_repeats = {repeats}, {length:g} m in all,"
         raise ValueError(
-            f"bed_size = {length:g} m along the motion is too short: {forecast.on} tips come down from "
+            f"{said} is too short: {forecast.on} tips come down from "
             f"{forecast.behind:.3g} to {forecast.ahead:.3g} m of the start within duration = {settings.duration:g} s, "
             f"so with {margin:g} m to spare at both ends {math.ceil(100 * need) / 100:g} m or a shorter one would do"
         )
@@ -236,6 +243,11 @@ def _check_bed(settings: TumbleSettings, forecast: Forecast, material: Material)
             f"place = {settings.place:g} m with coarse = {settings.coarse:g} m: a graded bed is fine in its middle, "
             f"where the platform must stand; place = 0 or another seed would do"
         )
+    if repeats > 1 and settings.coarse is not None:
+        raise ValueError(
+            f"bed_repeats = {repeats} with coarse = {settings.coarse:g} m: a graded bed is fine under footprints, "
+            f"which are not the same in every copy; one of them would do"
+        )
     if settings.bed_stages is not None:
         check_bed_stages(
             settings.bed_stages, material, size=settings.bed_size, grain=settings.grain, spread=settings.spread
@@ -251,9 +263,9 @@ def _check_bed(settings: TumbleSettings, forecast: Forecast, material: Material)
 
 
 def _count(settings: TumbleSettings, forecast: Forecast) -> float:
-    """About how many grains there will be. Raises ValueError for sizes by place that do not fit the bed."""
+    """About how many grains the whole bed will have. Raises ValueError for sizes by place that do not fit it."""
     graded = _graded(settings, forecast)
-    count = expected_grain_count(settings.bed_size, settings.grain, settings.spread)
+    count = settings.bed_repeats * expected_grain_count(settings.bed_size, settings.grain, settings.spread)
     if graded is None:
         return count
     graded.check(settings.bed_size)
@@ -262,7 +274,7 @@ def _count(settings: TumbleSettings, forecast: Forecast) -> float:
 
 def _origin(settings: TumbleSettings, forecast: Forecast) -> float:
     """x in the bed of the platform's start [m]: the footprints expected lie in the middle, or `place` from there."""
-    return settings.place + 0.5 * settings.bed_size[0] - 0.5 * (forecast.behind + forecast.ahead)
+    return settings.place + 0.5 * settings.bed_length - 0.5 * (forecast.behind + forecast.ahead)
 
 
 def _graded(settings: TumbleSettings, forecast: Forecast) -> Graded | None:
@@ -314,6 +326,14 @@ def _prepare(
                 _material(plan), settings.bed_stages, **options, progress=progress, asked_to_stop=asked_to_stop
             )
         return Bed.prepare(_material(plan), **options, progress=BedProgress(progress, "bed", asked_to_stop))
+
+
+def _repeated_told(settings: TumbleSettings, forecast: Forecast, bed: Bed) -> str:
+    piece, way = settings.bed_size[0], forecast.ahead - forecast.behind + settings.spike_diameter
+    said = f"bed laid end to end {settings.bed_repeats} times: {bed.grain_count} grains, the same every {piece:g} m"
+    if way <= piece:
+        return said
+    return f"warning: {said}; {forecast.on} tips come down over {way:.3g} m, so they meet the same sand again"
 
 
 def _members(settings: TumbleSettings, plan: TumblePlan) -> list[Any]:

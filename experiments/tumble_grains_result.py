@@ -13,7 +13,7 @@ from dem.materials import caveat
 from dem.prepare import fingerprint
 from rigid.trajectory import Trajectory
 
-from .bed_graded import coarsest_touched
+from .bed_graded import coarsest_touched, tips_in_ground
 from .runfolder import RunFolder, write_series
 from .softening import Softening
 from .surfaces import find_surface
@@ -95,6 +95,7 @@ def conclude(
         "surface": float(bed.surface), "young": softening.young, "softer_than_real": softening.factor,
         "time_step": float(bed.time_step), "macro_step": run.master.macro_step,
         "max_overlap": float(bed.max_overlap), "seed": settings.seed, "steps": run.master.count,
+        "repeats": settings.bed_repeats, "piece_length": settings.bed_size[0],
         "spike_diameter": settings.spike_diameter, "spike_clear": settings.spike_clear,
         **_grain_steps(settings, run), "worst_guess": books.worst_guess, "largest_force": books.largest_force,
         "beside": quantities_of(beside),
@@ -113,6 +114,8 @@ def conclude(
         result["warnings"].append(unsettled)
     if pressed := softening.overlapping(float(bed.max_overlap)):
         result["warnings"].append(pressed)
+    if met_again := _same_sand_again(settings, run):
+        result["warnings"].append(met_again)
     coarsest = settings.grain
     if graded is not None:
         coarsest = coarsest_touched(run, graded, size=settings.bed_size)
@@ -151,6 +154,19 @@ def conclude(
 def sinkage_start(run: CoupledTumble) -> float:
     """Mean depth of the two rows that it stands on when the torque begins [m]."""
     return float(run.feet[0, 3, [0, -1]].mean())
+
+
+def _same_sand_again(settings: TumbleSettings, run: CoupledTumble) -> str | None:
+    """Where the platform's way on a bed of copies is longer than one of them, in words."""
+    piece, spike = settings.bed_size[0], settings.spike_diameter
+    x, _ = tips_in_ground(run)
+    way = float(np.ptp(x)) + spike if len(x) else 0.0
+    if settings.bed_repeats == 1 or way <= piece:
+        return None
+    return (
+        f"bed_repeats = {settings.bed_repeats}: the bed has the same grains every {piece:g} m, and tips came down over "
+        f"{way:.3g} m, so the platform met the same sand again; what it did there is no new sample of the bed"
+    )
 
 
 def _grain_steps(settings: TumbleSettings, run: CoupledTumble) -> dict[str, Any]:

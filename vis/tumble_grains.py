@@ -46,6 +46,11 @@ def grains_section(result: Mapping[str, Any], figures: Path, tables: Mapping[str
         f"in one of the platform; largest overlap {short(100 * grains['max_overlap'], 2)} %. "
         f"One spike stands for its row of two."
     )
+    if (repeats := grains.get("repeats", 1)) > 1:
+        facts += (
+            f" The bed is a piece of {short(grains['piece_length'], 3)} m laid end to end {repeats} times: the same "
+            "grains lie in every copy."
+        )
     blocks = [
         figure(
             figures / "beside.png", title="Grains and spring-damper",

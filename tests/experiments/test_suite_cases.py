@@ -20,7 +20,7 @@ def test_every_case_of_every_experiment_is_valid_and_found_by_its_name():
     assert all(case.settings.ground == "bed" for case in found)
     assert find_case(Path(found[0].name), CASES) == found[0].path
     counts = {number: sum(case.experiment == number for case in found) for number in suite.EXPERIMENTS}
-    assert counts == {1: 30, 2: 6, 3: 6, 4: 4, 5: 6, 6: 16}
+    assert counts == {1: 31, 2: 6, 3: 6, 4: 4, 5: 6, 6: 16}
 
 
 def test_no_case_that_ships_is_refused():
@@ -41,10 +41,20 @@ def test_cases_that_can_share_a_bed_do():
         (("grains3-look",), 3), (("grains6-trial",), 2), (("grains6-coarse", "grains1-coarse-sand"), 2),
         (("grains1-coarse-jsc1a",), 1),
         (("grains2-flight-1e-2-brake", "grains2-flight-1e-4-brake", "grains2-flight-1e-6-brake"), 1),
+        (("grains1-sand-0.0085-0.22", "grains1-long-sand"), 1),
     ):  # fmt: skip
         found = beds(*names)
         assert len(found) == len({bed[-1] for bed in found}) == seeds
         assert not any(None in bed for bed in found)
+
+
+def test_a_bed_laid_end_to_end_costs_what_one_piece_of_it_does():
+    """Its preparation, and with sleep the run too: as many grains are awake; there are three times as many."""
+    piece, long = (suite.estimate(case) for case in suite.cases(("grains1-sand-0.0085-0.22", "grains1-long-sand")))
+    if piece.grains > long.grains:
+        piece, long = long, piece
+    assert long.grains == pytest.approx(3 * piece.grains)
+    assert (long.bed_seconds, long.run_seconds) == pytest.approx((piece.bed_seconds, piece.run_seconds))
 
 
 @pytest.fixture

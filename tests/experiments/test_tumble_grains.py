@@ -50,6 +50,15 @@ def on_bed(**more):
         ({"bed_stages": ("rain:dry", "stick", "level")}, r"bed_stages: .* these grains do not stick anyway"),
         ({"bed_stages": ("rain", "compact:0.6")}, r"bed_stages ends with 'compact:0.6': 'level' last"),
         ({"bed_stages": ("rain", "cut:0.1", "level")}, r"bed_stages: .* would undo it"),
+        (
+            {"bed_size": (0.1, 0.06, 0.046), "bed_repeats": 2},
+            r"bed_size = 0.1 m along the motion with bed_repeats = 2, 0.2 m in all, is too short: .* 0.28 m or",
+        ),
+        (
+            {"bed_repeats": 2, "coarse": 0.006, "grain": 0.0024, "bed_size": (0.4, 0.036, 0.046)},
+            r"bed_repeats = 2 with coarse = 0.006 m: .* one of them would do",
+        ),
+        ({"bed_repeats": 99, "grain": 0.002}, r"makes about .* or a smaller bed would do"),
         ({"bed_stages": ("rain", "tilt:5")}, r"bed_stages has 'tilt:5': a platform needs a level bed"),
     ],
 )
@@ -68,6 +77,10 @@ def test_a_bed_that_will_not_do_is_refused_before_any_work(given, said):
         {"ground": "spring-damper", "grain": 0.004},
         {"sleep_force": 2.0},
         {"ground": "spring-damper", "sleep_share": 0.4},
+        {"bed_repeats": 0},
+        {"bed_repeats": 1.5},
+        {"bed_repeats": -1},
+        {"ground": "spring-damper", "bed_repeats": 2},
     ],
 )
 def test_what_does_not_go_with_grains_is_refused_by_name(given):
@@ -75,12 +88,22 @@ def test_what_does_not_go_with_grains_is_refused_by_name(given):
         on_bed(**given)
 
 
-def small_bed(*_):
+def test_the_whole_of_a_bed_laid_end_to_end_counts_for_the_forecast():
+    """0.28 m would do, says the refusal of 0.2 m: so do two pieces of 0.14 m; the footprints lie in their middle."""
+    settings = on_bed(bed_size=(0.14, 0.06, 0.046), bed_repeats=2)
+    tumble.check(settings)
+    whole = on_bed(bed_size=(0.28, 0.06, 0.046))
+    forecast = tumble_grains._forecast(settings, tumble_grains._plan(settings))
+    assert tumble_grains._origin(settings, forecast) == pytest.approx(tumble_grains._origin(whole, forecast))
+    assert tumble_grains._count(settings, forecast) == pytest.approx(tumble_grains._count(whole, forecast))
+
+
+def small_bed(settings, *_):
     """Two layers of large grains, almost at rest."""
     from dem import Bed
     from dem.materials import SAND
 
-    d, rows, columns = 6e-3, 32, 6
+    d, rows, columns = 6e-3, 32 // settings.bed_repeats, 6
     low = [((i + 0.5) * d, (j + 0.5) * d, 0.5 * d) for i in range(rows) for j in range(columns)]
     high = [((i + 1.0) * d, (j + 1.0) * d, 0.5 * d + d * math.sqrt(0.5)) for i in range(rows) for j in range(columns)]
     bed = Bed.from_grains(
@@ -161,10 +184,13 @@ def test_a_landing_that_lets_go_of_the_sand_on_its_way_down_has_not_rebounded():
 
 
 @pytest.mark.slow
-def test_a_run_stopped_by_ctrl_c_is_taken_up_again_to_the_same_numbers(tmp_path, monkeypatch):
+@pytest.mark.parametrize("repeats", [1, 4])
+def test_a_run_stopped_by_ctrl_c_is_taken_up_again_to_the_same_numbers(repeats, tmp_path, monkeypatch):
+    """On one bed, and on a piece laid end to end, of which the platform meets more than one copy."""
     monkeypatch.setattr(tumble_grains, "_prepare", small_bed)
     monkeypatch.setattr(tumble_grains, "write_report", lambda *_: None)
-    settings = TumbleSettings(**SMALL, sleep=True)
+    size = (SMALL["bed_size"][0] / repeats, *SMALL["bed_size"][1:])
+    settings = TumbleSettings(**SMALL | {"bed_size": size}, sleep=True, bed_repeats=repeats)
     whole = tumble.run(settings, tmp_path / "whole")
     calls = 0
 
@@ -189,6 +215,8 @@ def test_a_run_stopped_by_ctrl_c_is_taken_up_again_to_the_same_numbers(tmp_path,
     assert whole["quantities"]["momentum_residual"]["value"] < 1e-12
     assert whole["quantities"]["angular_momentum_residual"]["value"] < 1e-4 * settings.torque * settings.duration
     grains = whole["grains"]
+    assert (grains["repeats"], grains["grain_count"]) == (repeats, 384)
+    assert any("met the same sand again" in said for said in whole["warnings"]) == (repeats > 1)
     assert grains["grain_steps"] == pytest.approx(grains["awake_share"] * grains["grain_steps_all_awake"])
     assert 0 < grains["awake_share"] < 0.9 and grains["lowering_time"] > 0
     assert whole["method"] == "coupled" and whole["ground"] == "bed"
