@@ -177,8 +177,8 @@ def _recoloured(
     for rate, alike in rates.items():
         if any(trial.info.id in colours for trial in alike) or not colours:
             continue
-        # Few rows tell little of it, least of all where a curve has followed the noise: as at the rate next to it, then,
-        # unless what is left is not that.
+        # Few rows tell little of it, least of all where a curve has followed the noise: then as at the rate next to
+        # it, unless what is left is not that.
         near = min((r for r in rates if rates[r][0].info.id in colours), key=lambda r: abs(r - rate))
         said = colours[rates[near][0].info.id]
         own = [_again(campaign, trial, {trial.info.id: said}) for trial in alike]

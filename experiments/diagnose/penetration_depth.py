@@ -144,7 +144,7 @@ def _less(score: float, count: int, drive: Drive, n: int, limit: float) -> bool:
     """Whether a curve of `count` columns describes the rows better than a drive, by the criterion.
 
     Where neither comes down to the noise, that may be louder than stated: then both are judged with the noise that they
-    themselves leave (n log of the mean square in place of the sum), or rows that are far off would have their own kinks.
+    themselves leave (n log of the mean square in place of the sum), or rows that are far off would have own kinks.
     """
     chi_square = score - float(np.log(n)) * count
     if min(chi_square, drive.chi_square) < limit:
