@@ -186,7 +186,7 @@ def test_a_landing_that_lets_go_of_the_sand_on_its_way_down_has_not_rebounded():
 @pytest.mark.slow
 @pytest.mark.parametrize("repeats", [1, 4])
 def test_a_run_stopped_by_ctrl_c_is_taken_up_again_to_the_same_numbers(repeats, tmp_path, monkeypatch):
-    """On one bed, and on a piece laid end to end, of which the platform meets more than one copy."""
+    """On one bed, and on a piece laid end to end four times."""
     monkeypatch.setattr(tumble_grains, "_prepare", small_bed)
     monkeypatch.setattr(tumble_grains, "write_report", lambda *_: None)
     size = (SMALL["bed_size"][0] / repeats, *SMALL["bed_size"][1:])
@@ -216,7 +216,6 @@ def test_a_run_stopped_by_ctrl_c_is_taken_up_again_to_the_same_numbers(repeats, 
     assert whole["quantities"]["angular_momentum_residual"]["value"] < 1e-4 * settings.torque * settings.duration
     grains = whole["grains"]
     assert (grains["repeats"], grains["grain_count"]) == (repeats, 384)
-    assert any("met the same sand again" in said for said in whole["warnings"]) == (repeats > 1)
     assert grains["grain_steps"] == pytest.approx(grains["awake_share"] * grains["grain_steps_all_awake"])
     assert 0 < grains["awake_share"] < 0.9 and grains["lowering_time"] > 0
     assert whole["method"] == "coupled" and whole["ground"] == "bed"
@@ -224,6 +223,15 @@ def test_a_run_stopped_by_ctrl_c_is_taken_up_again_to_the_same_numbers(repeats, 
     rows = (tmp_path / "whole" / "trajectory.csv").read_text().count("\n") - 1
     assert rows >= 1000 * settings.duration
     _check_report(tmp_path / "whole", whole)
+
+
+@pytest.mark.parametrize(("repeats", "tips", "said"), [(3, 0.62, True), (3, 0.55, False), (1, 0.62, False)])
+def test_tips_that_come_down_over_more_than_one_copy_are_said_to_meet_the_same_sand(repeats, tips, said, monkeypatch):
+    """Over 0.62 m and a spike's 12 mm on copies of 0.6 m; where there is one piece it is the whole bed."""
+    monkeypatch.setattr(tumble_grains_result, "tips_in_ground", lambda run: (np.array([-0.1, tips - 0.1]), None))
+    settings = SimpleNamespace(bed_size=(0.6, 0.036, 0.06), bed_repeats=repeats, spike_diameter=0.012)
+    warning = tumble_grains_result._same_sand_again(settings, None)
+    assert (warning is not None and "the same grains every 0.6 m" in warning) == said
 
 
 def _check_report(folder, result):
