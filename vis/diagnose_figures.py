@@ -265,7 +265,7 @@ def draw_evidence(said: Mapping[str, Any]) -> Figure | None:
     axis.barh(places, [score[name] for name in names], color=[colours[n] for n in names], height=0.66)
     most = max(*(score[name] for name in names), 1.0)
     for place, name in enumerate(names):
-        axis.annotate(f"{score[name]:.1f}" if abs(score[name]) < 10 else f"{score[name]:.0f}",
+        axis.annotate(f"{score[name]:z.1f}" if abs(score[name]) < 10 else f"{score[name]:.0f}",
                       (max(score[name], 0.0), place), xytext=(3, 0), textcoords="offset points", va="center",
                       fontsize=7.5, color=INK)  # fmt: skip
     axis.set_xlim(
