@@ -117,7 +117,10 @@ def _page(result: Mapping[str, Any], blocks: Sequence[Any]) -> Page:
         sections=[
             Section("", list(blocks) or [text("There is nothing to draw.")]),
             Section("Numbers", [table(("quantity", "value", "note"), rows, words=True)]),
-            Section("To do this again", [code("hedgebed penetrate run.toml")]),
+            Section(
+                "To do this again",
+                [text("From where it was started:"), code("hedgebed penetrate THIS_FOLDER/run.toml")],
+            ),
         ],
     )
 

@@ -101,8 +101,10 @@ def _page(said: Mapping[str, Any], result: Mapping[str, Any], drawn: Mapping[str
         Section("The next experiment", [text(said["next_experiment"])] if said.get("next_experiment") else []),
         Section("Numbers", _numbers(said)),
         Section("What was found in the recordings", _findings(said)),
-        Section("To do this again", [text(f"With hedgebed {result['version']}, in this folder:"),
-                                     code("hedgebed diagnose run.toml")]),
+        Section("To do this again", [
+            text(f"With hedgebed {result['version']}, where it was started from (the campaign's path is as given):"),
+            code("hedgebed diagnose THIS_FOLDER/run.toml"),
+        ]),
     ]  # fmt: skip
     held = ", ".join(gap["held_out_trials"]) or "none"
     return Page(
