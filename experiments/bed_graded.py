@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,6 +13,9 @@ from dem.graded import THROAT, Graded
 from dem.grading import MOST_DRAINED, MOST_STRAYED
 from dem.laboratory import Prepared
 from rigid.trajectory import Trajectory
+
+from .spells import spells
+from .tips import tip_angles
 
 __all__ = ["coarsest_touched", "grading_told", "graded_under", "places_touched", "tips_in_ground"]
 
@@ -93,16 +95,12 @@ def places_touched(trajectory: Trajectory, *, reach: float) -> list[tuple[float,
         (from, to) of each stretch [m], ascending, none meeting another.
     """
     trial = trajectory.trial
-    half = math.pi / trial.spike_count
-    angles = trajectory.theta[:, None] + half + 2 * half * np.arange(trial.spike_count)
+    angles = tip_angles(trial, trajectory.theta)
     x = trajectory.x[:, None] - trial.spike_length * np.sin(angles)
     height = trajectory.y[:, None] - trial.spike_length * np.cos(angles)
     low, stretches = height < reach, []
     for tip in range(trial.spike_count):
-        ends = np.flatnonzero(np.diff(np.concatenate(([0], low[:, tip].astype(int), [0]))))
-        stretches += [
-            (float(x[a:b, tip].min()), float(x[a:b, tip].max())) for a, b in zip(*[iter(ends)] * 2, strict=True)
-        ]
+        stretches += [(float(x[a:b, tip].min()), float(x[a:b, tip].max())) for a, b in spells(low[:, tip])]
     return merged(stretches)
 
 
@@ -165,7 +163,5 @@ def coarsest_touched(run: CoupledTumble, graded: Graded, *, size: Sequence[float
 def tips_in_ground(run: CoupledTumble) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Where tips of a tumble were below the surface: along the motion from its start, and how deep [m], shape [n]."""
     trial, rows, depth = run.trial, run.columns, run.feet[:, 3]
-    half = math.pi / trial.spike_count
-    angles = rows["theta"][:, None] + half + 2 * half * np.arange(trial.spike_count)
-    x = rows["x"][:, None] - trial.spike_length * np.sin(angles)
+    x = rows["x"][:, None] - trial.spike_length * np.sin(tip_angles(trial, rows["theta"]))
     return x[depth > 0], depth[depth > 0]

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from .spells import spells
+
 __all__ = ["Footfall", "Sinking", "find_footfalls", "footfall_quantities", "footfall_table", "sinking_over"]
 
 GRAZE = 1e-3
@@ -30,6 +32,11 @@ class Footfall:
     load: float
     set_down: bool
     open: bool
+
+    @property
+    def counts(self) -> bool:
+        """Whether it went in by itself and as deep as it goes."""
+        return not self.set_down and not self.open
 
 
 @dataclass(frozen=True)
@@ -71,15 +78,13 @@ def find_footfalls(
     """
     found = []
     for row in range(sinkage.shape[1]):
-        within = np.concatenate([[False], sinkage[:, row] > 0, [False]])
-        begins, ends = np.flatnonzero(within[1:] & ~within[:-1]), np.flatnonzero(~within[1:] & within[:-1])
-        for begin, end in zip(begins, ends, strict=True):
+        for begin, end in spells(sinkage[:, row] > 0):
             depth = sinkage[begin:end, row]
             if depth.max() < GRAZE:
                 continue
             still = bool(end == len(time) and depth.argmax() == len(depth) - 1)
             most = float(load[begin:end, row].max())
-            found.append(Footfall(row, float(time[begin]), float(depth.max()), most, bool(begin == 0), still))
+            found.append(Footfall(row, float(time[begin]), float(depth.max()), most, begin == 0, still))
     return sorted(found, key=lambda fall: (fall.time, fall.row))
 
 
@@ -93,7 +98,7 @@ def sinking_over(beds: Sequence[Sequence[Footfall]]) -> Sinking | None:
     depths: list[NDArray[np.float64]] = []
     means = []
     for falls in beds:
-        own = [(k, fall.deepest) for k, fall in enumerate(falls) if not fall.set_down and not fall.open]
+        own = [(k, fall.deepest) for k, fall in enumerate(falls) if fall.counts]
         if len(own) < 2:
             continue
         number, depth = np.array(own).T

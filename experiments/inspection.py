@@ -25,6 +25,7 @@ from .progress import Progress
 from .replicas import Condition, condition_of, condition_words, odd_replicates
 from .reporting import write_report
 from .runfolder import RunFolder
+from .spells import spells
 from .whole_runs import whole_run
 
 __all__ = ["check", "find_faults", "resume", "run", "unnamed_files"]
@@ -114,8 +115,7 @@ def _facts(recording: Recording) -> dict[str, Any]:
     empty = np.zeros(len(time), dtype=bool)
     for name, values in recording.columns.items():
         empty |= np.isnan(values) if name != "t_s" else False
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], empty.astype(int), [0]])))
-    gaps += [(float(time[low]), float(time[high - 1])) for low, high in zip(edges[::2], edges[1::2], strict=True)]
+    gaps += [(float(time[low]), float(time[high - 1])) for low, high in spells(empty)]
     return {
         "rows": len(time),
         "rate": 1 / usual if usual > 0 else None,

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from coupling import MOST_REVERSAL, BedFooting, SpatialRun
+from coupling import BedFooting, SpatialRun
 from dem.materials import caveat
 from dem.prepare import fingerprint
 from hedgebed import __version__
@@ -19,8 +19,8 @@ from .softening import Softening
 from .spatial_settings import SpatialSettings
 from .spatial_trial import SpatialPlan
 from .surfaces import find_surface
-from .tumble_grains_result import MOST_RESIDUAL, PACKING_OFF
-from .tumble_words import unsettled_warning
+from .tumble_grains_result import PACKING_OFF
+from .tumble_words import residual_warning, reversal_warning, unsettled_warning
 
 __all__ = ["conclude", "write_series_of"]
 
@@ -70,11 +70,8 @@ def conclude(
     stated = f"rig at {gravity:.4g} m/s2" if trial.counterweight > 0 else f"free at {gravity:.4g} m/s2"
     what = "bed of " if settings.ground == "bed" else ""
     warnings = list(plan.warnings)
-    if run.energy_residual > MOST_RESIDUAL:
-        warnings.append(
-            f"energy_residual = {run.energy_residual:.2g} is above {MOST_RESIDUAL:g}: the books do not close; fewer "
-            "substeps, or iterations, tell whether it is the coupling, stiffer grains (young) whether the bed's step"
-        )
+    if open_books := residual_warning(run.energy_residual):
+        warnings.append(open_books)
     if unsettled := unsettled_warning(run.master):
         warnings.append(unsettled)
     result: dict[str, Any] = {
@@ -233,12 +230,9 @@ def _add_grains(
         "origin": [float(number) for number in run.footing.origin],  # type: ignore[attr-defined]
         "beside": quantities_of(beside),
     }  # fmt: skip
-    warnings, made = result["warnings"], run.dissipation_reversal
-    if made > MOST_REVERSAL:
-        warnings.append(
-            f"dissipation_reversal = {made:.2g} is above {MOST_REVERSAL:g}: the bed made energy, so this run's "
-            f"numbers are not to be trusted; fewer substeps tell whether it is the coupling"
-        )
+    warnings = result["warnings"]
+    if reversed_ := reversal_warning(run.dissipation_reversal):
+        warnings.append(reversed_)
     if pressed := softening.overlapping(float(bed.max_overlap)):
         warnings.append(pressed)
     across = 2 * plan.trial.platform.tip_radius / settings.grain

@@ -127,7 +127,7 @@ def _sinking(names: _Names = (), /, *, results: _Results = RESULTS) -> int:
                 groups.setdefault(group, {})[case.name] = [Footfall(**fall) for fall in falls]
     for group, beds in groups.items():
         for name, falls in beds.items():
-            depths = " ".join(f"{1e3 * fall.deepest:.1f}{'*' if fall.set_down or fall.open else ''}" for fall in falls)
+            depths = " ".join(f"{1e3 * fall.deepest:.1f}{'' if fall.counts else '*'}" for fall in falls)
             print(f"{name}: {depths} mm")
         found = sinking_over(list(beds.values()))
         print(f"{group}: {found.verdict if found else 'too few rows came down to tell'}")

@@ -13,6 +13,7 @@ import numpy as np
 
 from coupling import CoupledTumble, LawFooting
 
+from .tips import tip_angles
 from .tumble_settings import TumbleSettings
 from .tumble_steppers import own_quantities, stepper_of
 from .tumble_trial import TumblePlan
@@ -100,8 +101,7 @@ def law_feet(run: CoupledTumble) -> tuple[np.ndarray, np.ndarray]:
     The load is the mean over the step before; at the start, before any, it is what the spring carries at rest.
     """
     rows, trial = run.columns, run.trial
-    half = np.pi / trial.spike_count
-    angles = rows["theta"][:, None] + half + 2 * half * np.arange(trial.spike_count)
+    angles = tip_angles(trial, rows["theta"])
     sinkage = np.maximum(0.0, trial.spike_length * np.cos(angles) - rows["y"][:, None])
     normal = run.feet[:, 0].copy()
     normal[0] = trial.stiffness * sinkage[0]

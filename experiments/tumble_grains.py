@@ -32,6 +32,7 @@ from .settings import expected_grain_count
 from .softening import Softening, soften_material
 from .stopping import held_back
 from .surfaces import find_surface, surface_names
+from .tips import tip_angles
 from .tumble_bed_settings import TumbleBedSettings
 from .tumble_flight import lies_in_flight
 from .tumble_grains_frames import TumbleFrames
@@ -181,8 +182,7 @@ def _forecast(settings: TumbleSettings, plan: TumblePlan) -> Forecast:
             max_wheel_speed=plan.max_wheel_speed,
         )  # fmt: skip
         found, trial, full = run.run(), plan.trial, run.body.wheel_at_limit
-    half = math.pi / trial.spike_count
-    angles = found.theta[:, None] + half + 2 * half * np.arange(trial.spike_count)
+    angles = tip_angles(trial, found.theta)
     tips_x = found.x[:, None] - trial.spike_length * np.sin(angles)
     depth = trial.spike_length * np.cos(angles) - found.y[:, None]
     near = depth > -0.5 * settings.spike_diameter

@@ -20,12 +20,10 @@ from .surfaces import find_surface
 from .tumble_settings import TumbleSettings
 from .tumble_steppers import own_quantities, words
 from .tumble_trial import TumblePlan
-from .tumble_words import unsettled_warning
+from .tumble_words import residual_warning, reversal_warning, unsettled_warning
 
 __all__ = ["conclude", "sinkage_start", "write_trajectory"]
 
-MOST_RESIDUAL = 0.01
-"""A larger energy_residual is worth a warning [1]."""
 PACKING_OFF = 0.02
 """A bed whose packing differs by more from that at which its grains were calibrated is worth a warning [1]."""
 
@@ -80,11 +78,8 @@ def conclude(
             "; also of all together: what the bed holds and what its dashpots, friction and rolling took are measured, "
             f"every {1e3 * run.energy_interval:g} ms (series/bed.csv)"
         )
-    if run.energy_residual > MOST_RESIDUAL:
-        result["warnings"].append(
-            f"energy_residual = {run.energy_residual:.2g} is above {MOST_RESIDUAL:g}: the books do not close; fewer "
-            "substeps, or iterations, tell whether it is the coupling, stiffer grains (young) whether the bed's step"
-        )
+    if open_books := residual_warning(run.energy_residual):
+        result["warnings"].append(open_books)
     result["grains"] = {
         "mode": "rig: grains at 1 g" if plan.trial.counterweight > 0 else "flight: grains at the platform's gravity",
         "series": {
@@ -104,12 +99,8 @@ def conclude(
             for t, state, theta in beside.transitions
         ],
     }  # fmt: skip
-    made = run.dissipation_reversal
-    if made > MOST_REVERSAL:
-        result["warnings"].append(
-            f"dissipation_reversal = {made:.2g} is above {MOST_REVERSAL:g}: the bed made energy, so this run's "
-            f"numbers are not to be trusted; fewer substeps tell whether it is the coupling"
-        )
+    if reversed_ := reversal_warning(run.dissipation_reversal):
+        result["warnings"].append(reversed_)
     if unsettled := unsettled_warning(run.master):
         result["warnings"].append(unsettled)
     if pressed := softening.overlapping(float(bed.max_overlap)):
@@ -158,10 +149,12 @@ def sinkage_start(run: CoupledTumble) -> float:
 
 def _same_sand_again(settings: TumbleSettings, run: CoupledTumble) -> str | None:
     """Where the platform's way on a bed of copies is longer than one of them, in words."""
+    if settings.bed_repeats == 1:
+        return None
     piece, spike = settings.bed_size[0], settings.spike_diameter
     x, _ = tips_in_ground(run)
     way = float(np.ptp(x)) + spike if len(x) else 0.0
-    if settings.bed_repeats == 1 or way <= piece:
+    if way <= piece:
         return None
     return (
         f"bed_repeats = {settings.bed_repeats}: the bed has the same grains every {piece:g} m, and tips came down over "

@@ -10,10 +10,12 @@ from rigid.trajectory import Trajectory
 if TYPE_CHECKING:
     from coupling import Master
 
-__all__ = ["MOST", "tumble_sentences", "unsettled_warning"]
+__all__ = ["MOST", "residual_warning", "reversal_warning", "tumble_sentences", "unsettled_warning"]
 
 MOST = 8
 """Changes of state that are told one by one."""
+MOST_RESIDUAL = 0.01
+"""A larger energy_residual is worth a warning [1]."""
 
 
 def tumble_sentences(trajectory: Trajectory) -> list[str]:
@@ -31,6 +33,28 @@ def tumble_sentences(trajectory: Trajectory) -> list[str]:
         state = [name for time, name, _ in trajectory.transitions if time < when or time == 0][-1]
         said.append(f"Fastest at {when:.4g} s ({state}): {trajectory.max_speed:.4g} m/s.")
     return said
+
+
+def residual_warning(residual: float) -> str | None:
+    """That the books of energy do not close, where `energy_residual` is too large."""
+    if residual <= MOST_RESIDUAL:
+        return None
+    return (
+        f"energy_residual = {residual:.2g} is above {MOST_RESIDUAL:g}: the books do not close; fewer "
+        "substeps, or iterations, tell whether it is the coupling, stiffer grains (young) whether the bed's step"
+    )
+
+
+def reversal_warning(made: float) -> str | None:
+    """That the bed made energy, where `dissipation_reversal` is too large."""
+    from coupling import MOST_REVERSAL
+
+    if made <= MOST_REVERSAL:
+        return None
+    return (
+        f"dissipation_reversal = {made:.2g} is above {MOST_REVERSAL:g}: the bed made energy, so this run's "
+        f"numbers are not to be trusted; fewer substeps tell whether it is the coupling"
+    )
 
 
 def unsettled_warning(master: Master) -> str | None:
