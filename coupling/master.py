@@ -10,6 +10,12 @@ differences between the times before, or in the step before, say would come out 
 an inverse Jacobian from least squares; Degroote et al. 2009, Comput. Struct. 87:793). What is found is the implicit
 midpoint rule, stable at any K H^2 / m.
 
+Either side may be sub-cycled: the footing takes `substeps` of its own steps in H, the body `body_steps` of its own. The
+wrench is exchanged once all the same. With the guess the body goes through its steps H / body_steps, the footing under
+each with the twist held over it; then the body goes through them once more, from where it was and along the same
+twists, with what the footing answered to each. So what the body does by itself within H (it nutates, its wheels run
+up) is followed at H / body_steps; the bound on K H^2 / m stays.
+
 The books (docs/coupling.md). What the footing takes is its wrench times the twist it saw, what the body gives is the
 wrench times the mean of its rates before and after; the difference is the error of the exchange, of second order in H
 (Sadjina et al. 2016, Eng. Comput. 33:607, call it the residual of a power bond).
@@ -18,10 +24,12 @@ wrench times the mean of its rates before and after; the difference is the error
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
+
+from rigid.reaction import Contact
 
 from .footing import Footing, FootReaction
 from .poses import Pose, Twist, Vector, Wrench
@@ -88,12 +96,25 @@ class StepBooks:
         return [*own, float(self.repeats), float(self.unsettled)]
 
 
+@dataclass(slots=True)
+class _Piece:
+    """One of the body's steps in a macro step."""
+
+    held: Twist
+    reaction: FootReaction
+    wrench: Wrench = field(default_factory=Wrench.none)
+    before: Twist = field(default_factory=lambda: Twist(np.zeros(3), np.zeros(3)))
+    """Of the body, before the step and"""
+    after: Twist = field(default_factory=lambda: Twist(np.zeros(3), np.zeros(3)))
+
+
 class Master:
     """`body` and `footing`, in macro steps of `substeps` of the footing's own steps.
 
     Parameters
     ----------
     substeps : of the footing in a macro step [1].
+    body_steps : of the body in a macro step [1]; `substeps` is a whole multiple of it.
     extrapolation : order of the guess at the next wrench, 0 to 2.
     iterations : how often a macro step is computed at most; 1: explicit.
     tolerance : change of the force between two iterations that ends them, over the largest force so far [1].
@@ -108,20 +129,26 @@ class Master:
         footing: Footing,
         *,
         substeps: int = 10,
+        body_steps: int = 1,
         extrapolation: int = 0,
         iterations: int = 1,
         tolerance: float = 1e-9,
         first_guess: Wrench | None = None,
     ) -> None:
-        for key, value in {"substeps": substeps, "iterations": iterations}.items():
+        for key, value in {"substeps": substeps, "body_steps": body_steps, "iterations": iterations}.items():
             if isinstance(value, bool) or not isinstance(value, int) or value < 1:
                 raise ValueError(f"{key} is {value!r}: it must be a whole number of 1 or more")
+        if substeps % body_steps:
+            raise ValueError(
+                f"body_steps is {body_steps}: it must divide substeps = {substeps}, to hold whole steps of the ground"
+            )
         if extrapolation not in (0, 1, 2):
             raise ValueError(f"extrapolation is {extrapolation!r}: it must be 0, 1 or 2")
         if not tolerance > 0:
             raise ValueError(f"tolerance is {tolerance!r}: it must be above 0")
         self.body, self.footing = body, footing
         self.macro_step = substeps * footing.time_step
+        self.body_steps = body_steps
         self.extrapolation, self.iterations, self.tolerance = extrapolation, iterations, tolerance
         self.count = 0
         """Macro steps done."""
@@ -133,7 +160,7 @@ class Master:
         self.last: FootReaction | None = None
         """The footing's answer in the last step."""
         self.wrench = Wrench.none()
-        """The whole wrench of the last step, friction included."""
+        """The whole wrench of the body's last step, friction included."""
 
     def open_books(self) -> None:
         """Count from here."""
@@ -150,20 +177,21 @@ class Master:
         return Wrench(np.asarray(force), np.asarray(torque))
 
     def step(self) -> FootReaction:
-        """One macro step; the footing's answer."""
-        body, footing, dt, books = self.body, self.footing, self.macro_step, self.books
+        """One macro step; the footing's answer, its mean over the step."""
+        footing, books = self.footing, self.books
         expected = self.guess()
-        kept = footing.state() if self.iterations > 1 else None
+        before = self.body.state() if self.iterations > 1 or self.body_steps > 1 else {}
+        kept = footing.state() if self.iterations > 1 else {}
         trial = expected
         tried: list[tuple[Vector, Vector]] = []
         for turn in range(self.iterations):
             if turn:
-                assert kept is not None
                 footing.restore(kept)
+                self.body.restore(before)
                 books.repeats += 1
-            held = body.predict(dt, trial, footing.lag)
-            reaction = footing.step(body.pose, held, dt)
-            wrench = body.resolve(dt, held, reaction)
+            pieces = self._answered(trial, before)
+            self._take(pieces, trial)
+            wrench = _mean_wrench([piece.wrench for piece in pieces])
             books.largest_force = max(books.largest_force, _size(wrench))
             if _apart(wrench, trial) <= self.tolerance * books.largest_force:
                 break
@@ -174,23 +202,48 @@ class Master:
             books.unsettled += self.iterations > 1
         if len(tried) > 1:
             self._learnt = _differences(tried)
-        before = body.twist
-        body.advance(dt, held, wrench)
-        self._book(held, wrench, before)
+        for piece in pieces:
+            self._book(piece)
         books.worst_guess = max(books.worst_guess, _apart(wrench, expected))
         self._wrenches.appendleft(wrench)
-        self._held, self.wrench, self.last = held, wrench, reaction
+        self.last = _joined([piece.reaction for piece in pieces])
         self.count += 1
-        return reaction
+        return self.last
 
-    def _book(self, held: Twist, wrench: Wrench, before: Twist) -> None:
-        dt, lag = self.macro_step, self.footing.lag
-        self.books.given -= dt * wrench.power(_mean(before, self.body.twist))
-        self.books.taken -= dt * wrench.power(held)
+    def _answered(self, guess: Wrench, before: dict[str, Any]) -> list[_Piece]:
+        """The body's steps under the guess, and the footing's answers to them; the body is back where it was."""
+        body, footing, dt = self.body, self.footing, self.macro_step / self.body_steps
+        pieces: list[_Piece] = []
+        for _ in range(self.body_steps):
+            if pieces:
+                body.resolve(dt, pieces[-1].held, pieces[-1].reaction)
+                body.advance(dt, pieces[-1].held, guess)
+            held = body.predict(dt, guess, footing.lag)
+            pieces.append(_Piece(held, footing.step(body.pose, held, dt)))
+        if len(pieces) > 1:
+            body.restore(before)
+        return pieces
+
+    def _take(self, pieces: list[_Piece], guess: Wrench) -> None:
+        """The body goes along the twists held, with what was answered to each."""
+        body, dt = self.body, self.macro_step / self.body_steps
+        for piece in pieces:
+            if len(pieces) > 1:
+                body.predict(dt, guess, self.footing.lag)  # for the torque of this step alone
+            piece.wrench = body.resolve(dt, piece.held, piece.reaction)
+            piece.before = body.twist
+            body.advance(dt, piece.held, piece.wrench)
+            piece.after = body.twist
+
+    def _book(self, piece: _Piece) -> None:
+        dt, lag, wrench = self.macro_step / self.body_steps, self.footing.lag, piece.wrench
+        self.books.given -= dt * wrench.power(_mean(piece.before, piece.after))
+        self.books.taken -= dt * wrench.power(piece.held)
         if lag and self._held is not None:
             # The last force of the step before was met by grains half with its twist, half with the one now held.
-            change = Twist(held.velocity - self._held.velocity, held.spin - self._held.spin)
+            change = Twist(piece.held.velocity - self._held.velocity, piece.held.spin - self._held.spin)
             self.books.taken -= 0.5 * lag * self.wrench.power(change)
+        self._held, self.wrench = piece.held, wrench
 
     def exchanged(self) -> tuple[float, float]:
         """Work on the footing up to the time of the pose [J], as the body sees it and as the footing sees it.
@@ -262,6 +315,29 @@ def _row(wrench: Wrench) -> Vector:
 
 def _unpack(row: np.ndarray) -> Wrench:
     return Wrench(row[:3].copy(), row[3:].copy())
+
+
+def _mean_wrench(wrenches: list[Wrench]) -> Wrench:
+    if len(wrenches) == 1:
+        return wrenches[0]
+    return _unpack(np.mean([_row(wrench) for wrench in wrenches], axis=0))
+
+
+def _joined(reactions: list[FootReaction]) -> FootReaction:
+    """The answers to the body's steps as one: mean forces, each row where it touched last, sinkage at the end."""
+    if len(reactions) == 1:
+        return reactions[0]
+    share = 1 / len(reactions)
+    contacts: dict[int, Contact] = {}
+    for reaction in reactions:
+        for row, contact in reaction.contacts.items():
+            kept = contacts.get(row)
+            along = None if contact.tangential_force is None else share * contact.tangential_force
+            if kept is not None and along is not None and kept.tangential_force is not None:
+                along = along + kept.tangential_force
+            load = share * contact.normal_force + (kept.normal_force if kept is not None else 0.0)
+            contacts[row] = replace(contact, normal_force=load, tangential_force=along)
+    return FootReaction(_mean_wrench([reaction.wrench for reaction in reactions]), contacts, reactions[-1].sinkage)
 
 
 def _mean(one: Twist, other: Twist) -> Twist:

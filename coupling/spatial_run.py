@@ -42,7 +42,7 @@ class SpatialRun(Followed):
         lowest tips at the surface, on a bed lifted until it is clear of the grains.
     quaternion, velocity, angular_velocity : as `SpatialBody` has them; a platform in a hand starts at rest.
     lowering_speed : of a hand that sets it down before time begins [m/s]; None: no hand.
-    substeps, extrapolation, iterations : as `Master` has them.
+    substeps, body_steps, extrapolation, iterations : as `Master` has them.
     energy_interval : between measurements of what the footing holds [s].
 
     Raises ValueError for a start in overlap with grains, and for what `Master` and `SpatialBody` refuse.
@@ -60,6 +60,7 @@ class SpatialRun(Followed):
         angular_velocity: Sequence[float] = (0.0, 0.0, 0.0),
         lowering_speed: float | None = None,
         substeps: int = 10,
+        body_steps: int = 1,
         extrapolation: int = 0,
         iterations: int = 1,
         energy_interval: float = 0.02,
@@ -88,8 +89,8 @@ class SpatialRun(Followed):
         elif isinstance(footing, LawFooting):
             footing.place(self.body.pose)
         self.master = Master(
-            self.body, footing, substeps=substeps, extrapolation=extrapolation, iterations=iterations,
-            first_guess=Wrench.none(),
+            self.body, footing, substeps=substeps, body_steps=body_steps, extrapolation=extrapolation,
+            iterations=iterations, first_guess=Wrench.none(),
         )  # fmt: skip
         self._every = max(1, round(energy_interval / self.master.macro_step))
         self.lowering_speed = lowering_speed

@@ -52,7 +52,7 @@ class CoupledTumble(Followed):
 
     Parameters
     ----------
-    substeps, extrapolation, iterations : as `Master` has them.
+    substeps, body_steps, extrapolation, iterations : as `Master` has them.
     tip_radius : of the balls that its spikes end with [m]; 0 for a surface law.
     lowering_speed : of the hand [m/s]; None: no hand, the platform starts at `height`.
     height : of the centre at the start [m]; None: on a law where the law carries it, on a bed just clear of the grains.
@@ -71,6 +71,7 @@ class CoupledTumble(Followed):
         *,
         duration: float,
         substeps: int = 10,
+        body_steps: int = 1,
         extrapolation: int = 0,
         iterations: int = 1,
         tip_radius: float = 0.0,
@@ -109,8 +110,8 @@ class CoupledTumble(Followed):
         rests = lowering_speed is None and height is None
         weight = Wrench(np.array([0.0, 0.0, trial.weight if rests else 0.0]), np.zeros(3))
         self.master = Master(
-            self.body, footing, substeps=substeps, extrapolation=extrapolation, iterations=iterations,
-            first_guess=weight,
+            self.body, footing, substeps=substeps, body_steps=body_steps, extrapolation=extrapolation,
+            iterations=iterations, first_guess=weight,
         )  # fmt: skip
         rows = trial.spike_count
         self.reader = ContactReader(

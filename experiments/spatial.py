@@ -119,8 +119,8 @@ def _start(settings: SpatialSettings, platform: Platform) -> dict[str, Any]:
         lowest = float(((platform.tips - platform.centre_of_mass) @ to_matrix(turn)[2]).min())
         start["position"] = (0.0, 0.0, settings.height - lowest)
     return start | {
-        "duration": settings.duration, "substeps": settings.substeps, "extrapolation": settings.extrapolation,
-        "iterations": settings.iterations,
+        "duration": settings.duration, "substeps": settings.substeps, "body_steps": settings.body_steps,
+        "extrapolation": settings.extrapolation, "iterations": settings.iterations,
     }  # fmt: skip
 
 
@@ -130,7 +130,7 @@ def _on_law(settings: SpatialSettings, plan: SpatialPlan) -> SpatialRun:
     lowering = (settings.lowering_speed or _law_lowering(plan)) if settings.in_a_hand else None
     start = _start(settings, plan.trial.platform)
     if settings.ground == "bed":  # what stands beside it
-        start |= {"substeps": 10, "extrapolation": 0, "iterations": 1}
+        start |= {"substeps": 10, "body_steps": 1, "extrapolation": 0, "iterations": 1}
     return SpatialRun(plan.trial, footing, lowering_speed=lowering, energy_interval=1e-3, **start)
 
 

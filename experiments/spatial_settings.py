@@ -126,9 +126,14 @@ class SpatialSettings(GrainsSettings):
         return None
 
     def _of_a_bed(self) -> str | None:
+        if fault := self.stepping_fault():
+            return fault
         if self.ground == "bed":
             return self.sleep_fault()
-        both = ("lowering_speed", "substeps", "extrapolation", "iterations", "frame_count", "checkpoint_interval")
+        both = (
+            "lowering_speed", "substeps", "body_steps", "extrapolation", "iterations", "frame_count",
+            "checkpoint_interval",
+        )  # fmt: skip
         for name, field in GrainsSettings.model_fields.items():
             if name not in both and getattr(self, name) != field.default:
                 return f"{name} = {getattr(self, name)} belongs to ground = 'bed'"

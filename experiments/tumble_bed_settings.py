@@ -15,8 +15,8 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 OF_THE_MASTER = (
-    "substeps", "extrapolation", "iterations", "tumbles", "tumble_turn", "drop_speed", "drop_along", "drop_spin",
-    "drop_theta",
+    "substeps", "body_steps", "extrapolation", "iterations", "tumbles", "tumble_turn", "drop_speed", "drop_along",
+    "drop_spin", "drop_theta",
 )  # fmt: skip
 """Those that ``method = "coupled"`` takes on the spring-damper too."""
 
@@ -40,7 +40,17 @@ class GrainsSettings(StrictSettings):
         None, description="On a bed: speed at which the platform is set down [m/s]; sqrt(g grain) if not given."
     )
     substeps: int = Field(
-        10, ge=1, le=200, description="On a bed, or coupled: steps of the ground in one of the platform [1]."
+        10,
+        ge=1,
+        le=200,
+        description="On a bed, or coupled: steps of the ground from one exchange of forces to the next [1].",
+    )
+    body_steps: int = Field(
+        1,
+        ge=1,
+        le=200,
+        description="On a bed, or coupled: steps of the platform from one exchange of forces to the next; it "
+        "divides substeps [1].",
     )
     extrapolation: int = Field(
         0, ge=0, le=2, description="On a bed, or coupled: order of the guess at the next force [1]."
@@ -59,6 +69,15 @@ class GrainsSettings(StrictSettings):
     checkpoint_interval: Positive = Field(60.0, description="On a bed: time between checkpoints [s].")
     threads: int | None = Field(None, ge=1, description="On a bed: threads; all cores if not given.")
     cache: bool = Field(True, description="On a bed: whether prepared beds are kept and used again.")
+
+    def stepping_fault(self) -> str | None:
+        """Steps that do not go into one another, in words."""
+        if self.substeps % self.body_steps:
+            return (
+                f"body_steps = {self.body_steps} does not divide substeps = {self.substeps}: each step of the platform "
+                f"is whole steps of the ground, so a divisor of it would do"
+            )
+        return None
 
     def sleep_fault(self) -> str | None:
         """A rule of sleep that is given where nothing sleeps, in words."""

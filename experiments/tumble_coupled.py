@@ -54,8 +54,8 @@ def coupled_tumble(settings: TumbleSettings, plan: TumblePlan, *, duration: floa
     footing.grounds = [replace(ground, time_step=STEP) for ground in footing.grounds]
     return stepper_of(
         settings, plan.trial, footing, duration=duration, substeps=settings.substeps,
-        extrapolation=settings.extrapolation, iterations=settings.iterations, max_wheel_speed=plan.max_wheel_speed,
-        energy_interval=1e-3,
+        body_steps=settings.body_steps, extrapolation=settings.extrapolation, iterations=settings.iterations,
+        max_wheel_speed=plan.max_wheel_speed, energy_interval=1e-3,
     )  # fmt: skip
 
 

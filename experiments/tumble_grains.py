@@ -364,8 +364,9 @@ def _stepper(settings: TumbleSettings, plan: TumblePlan, bed: Bed, forecast: For
     lowered = {"lower_gravity": True} if settings.settle_gravity is not None else {}
     return stepper_of(
         settings, plan.trial, footing, **lowered, duration=settings.duration, substeps=settings.substeps,
-        extrapolation=settings.extrapolation, iterations=settings.iterations, tip_radius=0.5 * settings.spike_diameter,
-        lowering_speed=_lowering_speed(settings, plan), max_wheel_speed=plan.max_wheel_speed,
+        body_steps=settings.body_steps, extrapolation=settings.extrapolation, iterations=settings.iterations,
+        tip_radius=0.5 * settings.spike_diameter, lowering_speed=_lowering_speed(settings, plan),
+        max_wheel_speed=plan.max_wheel_speed,
     )  # fmt: skip
 
 

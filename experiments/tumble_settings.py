@@ -168,7 +168,9 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
 
     def _on_grains(self) -> str | None:
         given = self.bed_settings_given()
-        if (self.ground == "bed" or self.method == "coupled") and (fault := self._row_or_landing()):
+        if (self.ground == "bed" or self.method == "coupled") and (
+            fault := self._row_or_landing() or self.stepping_fault()
+        ):
             return fault
         if self.method == "coupled" and self.ground != "bed":
             given = [name for name in given if name not in OF_THE_MASTER]
