@@ -525,6 +525,11 @@ class Bed:
     # ------------------------------------------------------------------ time
 
     @property
+    def height(self) -> float:
+        """Top of the box [m]: a grain above it is lost."""
+        return float(self._settings["height"])
+
+    @property
     def time(self) -> float:
         """Time since the bed was made [s]."""
         return self.steps * self.time_step
@@ -805,7 +810,7 @@ class Bed:
         state.adopt(bed, values, keep=keep)
         return bed
 
-    def repeated(self, times: int) -> Bed:
+    def repeated(self, times: int, *, height: float | None = None) -> Bed:
         """A bed `times` as long: this one laid end to end along x, where it is periodic, with its contacts' history.
 
         So it is as much at rest as this one, and has the same surface and packing fraction. Copy k of grain i has id
@@ -813,13 +818,17 @@ class Bed:
 
         Args:
             times: how often [1]; with 1 it is a copy.
+            height: top of the box [m], above which a grain is lost; this bed's where that is higher, or when None.
 
         Raises:
-            ValueError: `times` that is no whole number of 1 or more; a bed with bodies beside its floor.
+            ValueError: `times` that is no whole number of 1 or more; a height that is no length; a bed with bodies
+                beside its floor.
         """
         self._check_valid()
         if isinstance(times, bool) or int(times) != times or times < 1:
             raise ValueError(f"times = {times} must be a whole number, 1 or more")
+        if height is not None and not 0 < height < math.inf:
+            raise ValueError(f"height = {height} must be a length [m]")
         bodies = int(self._engine.body_count[None]) - int(self._has_floor)
         if bodies:
             raise ValueError(f"{bodies} bodies beside the floor: a bed is repeated without them, each is in one place")
@@ -828,7 +837,7 @@ class Bed:
         values = state.laid_end_to_end(self.state(), times, period=self.size[0])
         own = {
             "size": (times * self.size[0], *self.size[1:]), "gravity": self.gravity, "time_step": self.time_step,
-            "max_overlap": self.overlap_limit,
+            "max_overlap": self.overlap_limit, "height": max(self.height, height or 0.0),
         }  # fmt: skip
         bed = Bed(
             self._settings | own,

@@ -48,6 +48,8 @@ COPIES = 2.0
 """Spikes in a row: the bed holds one of them and the sand that it has for itself."""
 MARGIN = 3.0
 """Sand beyond the outermost footprint, over a spike's diameter [1]."""
+THROW = 2.0
+"""Speed of a grain that a spike throws up, over the spike's [1]: an elastic ball has twice the wall's."""
 RAIN = 2.5
 """Height of the loose column that a bed is rained from, over the bed's depth [1]."""
 TOUCH = 1e-3
@@ -100,8 +102,8 @@ def tumble_on_grains(settings: TumbleSettings, folder: RunFolder, progress: Prog
         progress.plan({"bed": 1.0, "tumble": step_time}, seconds={"report": 10.0})
         try:
             bed = _prepare(settings, plan, forecast, softening, progress)
+            bed = _laid_out(settings, plan, forecast, bed)
             if settings.bed_repeats > 1:
-                bed = bed.repeated(settings.bed_repeats)
                 progress.message(_repeated_told(settings, forecast, bed))
         except RuntimeError as error:
             raise RuntimeError(f"the bed could not be prepared: {error}; change young, max_overlap or seed") from error
@@ -212,6 +214,20 @@ def _in_flight(settings: TumbleSettings, plan: TumblePlan, law: Forecast) -> For
         fastest=max(law.fastest, lying.fastest), sunk=lying.sunk, margin=1.5 if landing else 1.0,
         on="on the spring-damper, or turning where it lies on its hull," if lying.on_hull else law.on,
     )  # fmt: skip
+
+
+def _laid_out(settings: TumbleSettings, plan: TumblePlan, forecast: Forecast, bed: Bed) -> Bed:
+    """The prepared bed as often as it is to be repeated, in a box as high as its sand may be thrown."""
+    top = bed.surface + _thrown(settings, plan, forecast)
+    return bed.repeated(settings.bed_repeats, height=top) if settings.bed_repeats > 1 or top > bed.height else bed
+
+
+def _thrown(settings: TumbleSettings, plan: TumblePlan, forecast: Forecast) -> float:
+    """How high over the surface grains are followed [m]: thrown at THROW times the fastest tip's speed.
+
+    No higher than the bed is long: at a small gravity what leaves is not back while a run lasts, and ends it.
+    """
+    return min((THROW * forecast.fastest) ** 2 / (2 * _grain_gravity(plan.trial)), settings.bed_size[0])
 
 
 def _check_bed(settings: TumbleSettings, forecast: Forecast, material: Material) -> None:

@@ -125,11 +125,34 @@ def test_copies_that_nothing_reaches_sleep(pair):
     assert long.reaction(ball)[0][2] > 5 * long.weight / long.grain_count
 
 
+def test_in_a_higher_box_the_grains_are_as_they_were_and_what_flies_up_comes_back(pair):
+    piece, _ = pair
+    higher = piece.repeated(1, height=0.2)
+    assert (piece.height, higher.height) == (0.07, 0.2) and piece.repeated(1, height=0.01).height == 0.07
+    own, found = piece.grains(), higher.grains()
+    for name in ("position", "velocity", "spin"):
+        assert (own[name] == found[name]).all(), name
+    assert len(contacts(higher)) == len(contacts(piece))
+    # One of the top layer is kicked to well over the first box.
+    state = higher.state()
+    top = int(state["position"][:, 2].argmax())
+    state["velocity"][top, :3] = [0.0, 0.0, 1.5]
+    higher.restore(state)
+    fly = round(0.15 / higher.time_step)
+    higher.advance(fly)
+    peak = higher.grains()["position"][:, 2].max()
+    assert peak > 0.1  # v^2 / 2 g = 115 mm over where it lay
+    higher.advance(fly)
+    assert higher.grains()["position"][:, 2].max() < 0.05
+
+
 def test_what_cannot_be_repeated_is_refused_by_name(pair):
     piece, _ = pair
     for times in (0, -1, 1.5, True):
         with pytest.raises(ValueError, match=f"times = {times} must be a whole number, 1 or more"):
             piece.repeated(times)
+    with pytest.raises(ValueError, match="height = inf must be a length"):
+        piece.repeated(1, height=float("inf"))
     piece.add_body(Ball(radius=5e-3), position=(0.02, 0.012, 0.03))
     with pytest.raises(ValueError, match="1 bodies beside the floor: a bed is repeated without them"):
         piece.repeated(2)

@@ -98,6 +98,23 @@ def test_the_whole_of_a_bed_laid_end_to_end_counts_for_the_forecast():
     assert tumble_grains._count(settings, forecast) == pytest.approx(tumble_grains._count(whole, forecast))
 
 
+def test_the_box_over_the_sand_is_as_high_as_a_brake_may_throw_it():
+    """v^2 / 2 g at twice the speed of the spring-damper's fastest tip; a slow motor's sand stays in its box."""
+    made = []
+    bed = SimpleNamespace(
+        surface=0.06, height=0.16, repeated=lambda times, height: made.append((times, height)) or "up"
+    )
+    brake = on_bed(torque=6.0, actuator="brake", wheel_speed_0=300.0, duration=0.6)
+    plan = tumble_grains._plan(brake)
+    forecast = tumble_grains._forecast(brake, plan)
+    assert 1.0 < forecast.fastest < 0.2 * 0.0012 * 300 / 0.06 * 1.2  # the wheel's momentum, on the whole of l
+    assert tumble_grains._laid_out(brake, plan, forecast, bed) == "up"
+    assert made == [(1, pytest.approx(0.06 + (2 * forecast.fastest) ** 2 / (2 * 9.80665)))]
+    motor = on_bed(torque=0.125)
+    plan = tumble_grains._plan(motor)
+    assert tumble_grains._laid_out(motor, plan, tumble_grains._forecast(motor, plan), bed) is bed
+
+
 def small_bed(settings, *_):
     """Two layers of large grains, almost at rest."""
     from dem import Bed
@@ -158,7 +175,7 @@ def test_a_run_that_leaves_the_bed_says_where_and_keeps_its_state_and_series(tmp
         footing.step = step
         return CoupledTumble(plan.trial, footing, duration=settings.duration)
 
-    monkeypatch.setattr(tumble_grains, "_prepare", lambda *_: None)
+    monkeypatch.setattr(tumble_grains, "_prepare", lambda *_: SimpleNamespace(surface=0.0, height=1.0))
     monkeypatch.setattr(tumble_grains, "_stepper", stepper)
     out = tmp_path / "left"
     given = ("--surface", "sand", "--ground", "bed", "--bed-size", "0.4", "0.06", "0.046", "--frame-count", "0")
