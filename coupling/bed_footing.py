@@ -432,6 +432,16 @@ class BedFooting:
         about_bed = found["grains"] - others
         return np.asarray(self.copies * about_bed - np.cross(self.origin, self.momentum()))
 
+    def hold(self) -> Any:
+        """See `Footing.hold`: the bed's where it lies, on a GPU without its leaving it."""
+        return self.bed.hold(), self.impulse.copy(), list(self._used), self.grain_steps
+
+    def take_back(self, held: Any) -> None:
+        """Go back to what `hold` gave last. Raises ValueError for another."""
+        bed, impulse, used, self.grain_steps = held
+        self.bed.take_back(bed)
+        self.impulse, self._used = impulse.copy(), list(used)
+
     def state(self) -> dict[str, Any]:
         """The bed's, which contains the bodies and their contacts."""
         return {f"bed.{key}": value for key, value in self.bed.state().items()} | {

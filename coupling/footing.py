@@ -67,6 +67,12 @@ class Footing(Protocol):
     def energies(self) -> dict[str, float]:
         """What it holds now [J]: name -> energy."""
 
+    def hold(self) -> Any:
+        """What `take_back` brings back, of a step that may be repeated: the last that was held, and no other."""
+
+    def take_back(self, held: Any) -> None:
+        """Go back to what `hold` gave last."""
+
     def state(self) -> dict[str, Any]:
         """Everything that the next steps depend on: a flat dict of numpy arrays."""
 
@@ -166,6 +172,14 @@ class LawFooting:
         """In the springs under the tips [J]."""
         held = [ground.stored(depth) for ground, depth in zip(self.grounds, self._depths, strict=True) if depth > 0]
         return {"springs": float(sum(held))}
+
+    def hold(self) -> Any:
+        """See `Footing.hold`."""
+        return self.state()
+
+    def take_back(self, held: Any) -> None:
+        """Go back to what `hold` gave."""
+        self.restore(held)
 
     def state(self) -> dict[str, Any]:
         """Depths of the tips, and what the laws remember."""

@@ -181,12 +181,12 @@ class Master:
         footing, books = self.footing, self.books
         expected = self.guess()
         before = self.body.state() if self.iterations > 1 or self.body_steps > 1 else {}
-        kept = footing.state() if self.iterations > 1 else {}
+        kept = footing.hold() if self.iterations > 1 else None
         trial = expected
         tried: list[tuple[Vector, Vector]] = []
         for turn in range(self.iterations):
             if turn:
-                footing.restore(kept)
+                footing.take_back(kept)
                 self.body.restore(before)
                 books.repeats += 1
             pieces = self._answered(trial, before)

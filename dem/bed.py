@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from . import runtime, state
+from . import holding, runtime, state
 from .cohesion import COHESIONS, jkr_range
 from .contact import effective_moduli, pair_parameters
 from .engine import MOST_PRIMITIVES, take_engine
+from .holding import Held
 from .ledger import PARTS, TURNED
 from .lists import MOST_BODIES
 from .materials import Facing, Material
@@ -464,12 +465,8 @@ class Bed:
 
     def _tally(self) -> tuple[np.ndarray, float]:
         """Sums over the chunks of what grains did to the bodies, shape [body, 6]; the largest overlap."""
-        e = self._engine
-        if e.gpu:
-            # cumsum adds in order whatever numpy's blocking, so the bits do not depend on it.
-            return np.cumsum(e.read("pushes").astype(float), axis=0)[-1], self.max_overlap
         rows = np.zeros((MOST_BODIES + 1, 6))
-        e.tally(rows)
+        self._engine.tally(rows)
         return rows[:-1], float(rows[-1, 0])
 
     # ------------------------------------------------------------------ the book of what is lost
@@ -762,6 +759,23 @@ class Bed:
         """
         self._check_valid()
         state.put_back(self, values)
+
+    def hold(self) -> Held:
+        """Keep what the next steps depend on for ``take_back``, where the bed lies: on a GPU nothing is read.
+
+        One state is held at a time; the first one takes as much memory again as grains and lists do.
+        """
+        self._check_valid()
+        return holding.hold(self)
+
+    def take_back(self, held: Held) -> None:
+        """Go back to the state that was held last, to the bit; as often as one likes.
+
+        Raises:
+            ValueError: another has been held since, or sleep or the book of losses has begun or ended.
+        """
+        self._check_valid()
+        holding.take_back(self, held)
 
     def save(self, path: str | Path) -> Path:
         """Write the bed to one file (.npz), whole or not at all. Returns the path."""

@@ -63,6 +63,7 @@ AWAKE_SHARE = 0.64
 # Looks at a counter, per grain of a chunk, before a thread gives up waiting: some milliseconds.
 PATIENCE = 100
 MOST_PRIMITIVES = 64
+TALLY_BLOCKS = 256
 
 _free: dict[tuple, list] = {}
 
@@ -253,6 +254,9 @@ class Engine(Lists, Shapes, Sleepers, Bookkeeping):
         # Per chunk.
         self.overlap = ti.field(real, chunk_capacity)
         self.pushes = F(6, real, (chunk_capacity, MOST_BODIES))
+        if gpu:  # sums over blocks of chunks, so that nothing of the bed's size is summed by one thread or read
+            self.block_pushes = F(6, ti.f64, (TALLY_BLOCKS, MOST_BODIES))
+            self.block_overlap = ti.field(ti.f64, TALLY_BLOCKS)
         # Bodies. The velocity is held by the host; the engine moves and turns the body.
         self.body_count = ti.field(ti.i32, ())
         self.body_position = F(3, real, MOST_BODIES)
@@ -271,6 +275,7 @@ class Engine(Lists, Shapes, Sleepers, Bookkeeping):
         self._meshes = []
         self.rest: Any = EVERYONE  # the table of those that sleep, likewise
         self._kept_rest: Rest | None = None
+        self.held: Any = None  # what `dem.holding` copied last
         self.ledger: Any = NO_LEDGER  # the table of the book of dissipation, likewise
         self._kept_ledger: Ledger | None = None
         self.grain_pair = F(PAIR_WIDTH, real, ())
@@ -304,6 +309,7 @@ class Engine(Lists, Shapes, Sleepers, Bookkeeping):
         self.problem[None] = [0, 0]
         self.clear_pushes()
         self.clear_shapes()
+        self.held = None
         self.rest = EVERYONE
         self.ledger = NO_LEDGER
 
@@ -737,22 +743,50 @@ class Engine(Lists, Shapes, Sleepers, Bookkeeping):
     def tally(self, rows: ti.types.ndarray(dtype=ti.f64, ndim=2)):
         """Sums over the chunks, in their order: of what grains do to each body; and the largest overlap, or NaN.
 
-        A row of six for each body, and one more whose first number is the overlap.
+        A row of six for each body, and one more whose first number is the overlap. On a GPU, where a chunk is a grain,
+        over blocks of chunks first: what the host gets is as small as from a CPU.
         """
-        for b in range(MOST_BODIES + 1):
-            if b < MOST_BODIES:
-                for k in ti.static(range(6)):
-                    total = ti.cast(0.0, ti.f64)
-                    for c in range(self.count[ALL_CHUNKS]):
-                        total += ti.cast(self.pushes[c, b][k], ti.f64)
-                    rows[b, k] = total
-            else:
-                largest = ti.cast(0.0, ti.f64)
-                for c in range(self.count[ALL_CHUNKS]):
-                    overlap = ti.cast(self.overlap[c], ti.f64)
-                    if not (overlap <= largest) and largest == largest:
-                        largest = overlap
-                rows[b, 0] = largest
+        if ti.static(self.gpu):
+            for block, b in ti.ndrange(TALLY_BLOCKS, MOST_BODIES + 1):
+                size = (self.count[ALL_CHUNKS] + TALLY_BLOCKS - 1) // TALLY_BLOCKS
+                first = block * size
+                end = ti.min(first + size, self.count[ALL_CHUNKS])
+                if b == MOST_BODIES:
+                    self.block_overlap[block] = self.largest_overlap(self.overlap, first, end)
+                elif b < self.body_count[None]:
+                    self.block_pushes[block, b] = self.sum_of_pushes(self.pushes, b, first, end)
+                else:
+                    self.block_pushes[block, b] = ti.Vector.zero(ti.f64, 6)
+            for b in range(MOST_BODIES + 1):
+                self.put_tally(rows, b, self.block_pushes, self.block_overlap, TALLY_BLOCKS)
+        else:
+            for b in range(MOST_BODIES + 1):
+                self.put_tally(rows, b, self.pushes, self.overlap, self.count[ALL_CHUNKS])
+
+    @ti.func
+    def put_tally(self, rows: ti.template(), b, pushes: ti.template(), overlaps: ti.template(), parts):
+        if b < MOST_BODIES:
+            total = self.sum_of_pushes(pushes, b, 0, parts)
+            for k in ti.static(range(6)):
+                rows[b, k] = total[k]
+        else:
+            rows[b, 0] = self.largest_overlap(overlaps, 0, parts)
+
+    @ti.func
+    def sum_of_pushes(self, pushes: ti.template(), b, first, end):
+        total = ti.Vector.zero(ti.f64, 6)
+        for c in range(first, end):
+            total += ti.cast(pushes[c, b], ti.f64)
+        return total
+
+    @ti.func
+    def largest_overlap(self, overlaps: ti.template(), first, end):
+        largest = ti.cast(0.0, ti.f64)
+        for c in range(first, end):
+            overlap = ti.cast(overlaps[c], ti.f64)
+            if not (overlap <= largest) and largest == largest:
+                largest = overlap
+        return largest
 
     @ti.kernel
     def mark_origin(self):

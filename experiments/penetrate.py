@@ -27,7 +27,7 @@ from .bed_progress import BedProgress
 from .findings import Findings, bed_entry, bed_quantities
 from .kept_material import MATERIAL_COPY, keep_material
 from .kept_runs import read_run, write_run
-from .memory import cores_there, memory_there
+from .memory import memory_there
 from .penetrate_plan import RAIN, PenetratePlan
 from .progress import Progress
 from .reference import compare_with, read_reference
@@ -39,6 +39,7 @@ from .settings import PenetrateSettings, expected_grain_count
 from .softening import Softening, bearing_gradient, drop_depth, soften_material
 from .stopping import held_back
 from .units import Unit, deepest, expected_time, make_run, make_spike, plan_units, share_done, shown_units
+from .where import check_where
 
 __all__ = ["check", "choose_softness", "fingerprint", "resume", "run"]
 
@@ -84,7 +85,7 @@ def check(settings: PenetrateSettings) -> None:
         if seeds and not speeds:
             raise ValueError("other_speeds is empty: at least one speed would do, so that every seed has a fit")
     _check_grain_count(settings)
-    _check_arch(settings)
+    check_where(arch=settings.arch, threads=settings.threads, precision=settings.precision)
     _check_young(settings)
     _check_reach(settings)
     step = bed_step(settings, choose_softness(settings).young)
@@ -110,22 +111,6 @@ def _check_grain_count(settings: PenetrateSettings) -> None:
             f"grain = {settings.grain:g} m makes about {count:.3g} grains: at most {MOST_GRAINS} can be counted, so "
             f"grains of {settings.grain * (count / MOST_GRAINS) ** (1 / 3):.2g} m or a smaller bed_size would do"
         )
-
-
-def _check_arch(settings: PenetrateSettings) -> None:
-    """Start what is not on every machine, so that it is missed before there is a folder."""
-    cores = cores_there()
-    if settings.threads is not None and settings.threads > cores:
-        raise ValueError(f"threads = {settings.threads} is more than the cores there are: at most {cores} would do")
-    if settings.arch == "cpu":
-        return
-    from dem import runtime
-
-    try:
-        runtime.start(arch=settings.arch, threads=settings.threads, precision=settings.precision)
-    except RuntimeError as error:
-        said = " ".join(str(error).split())
-        raise ValueError(said if "arch" in said else f"arch = {settings.arch!r} does not run here: {said}") from None
 
 
 def _check_young(settings: PenetrateSettings) -> None:

@@ -35,6 +35,7 @@ from .stopping import held_back
 from .surfaces import find_surface, surface_names
 from .tumble_coupled import STEP
 from .tumble_grains import MARGIN, MOST_GRAINS, RAIN, TOUCH
+from .where import check_where
 from .whole_runs import whole_run
 
 __all__ = ["check", "resume", "run"]
@@ -64,6 +65,7 @@ def check(settings: SpatialSettings) -> None:
     if settings.ground == "bed":
         material = _material(plan)
         spatial_members(plan.trial.platform)
+        check_where(arch=settings.arch, threads=settings.threads)
         try:
             forecast = _forecast(settings, plan)
         except RuntimeError as error:
@@ -231,7 +233,7 @@ def _prepare(settings: SpatialSettings, plan: SpatialPlan, softening: Softening,
             return Bed.prepare(
                 _material(plan), size=settings.bed_size, grain=settings.grain, spread=settings.spread,
                 gravity=_grain_gravity(plan), seed=settings.seed, young=softening.young,
-                max_overlap=settings.max_overlap, threads=settings.threads, cache=settings.cache,
+                max_overlap=settings.max_overlap, arch=settings.arch, threads=settings.threads, cache=settings.cache,
                 progress=BedProgress(progress, "bed", asked_to_stop),
             )  # fmt: skip
     except RuntimeError as error:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -67,6 +67,7 @@ class GrainsSettings(StrictSettings):
     sleep_share: Positive = Field(0.5, description="Of sleep: the least of it over the force itself [1].")
     frame_count: int = Field(30, ge=0, le=1000, description="On a bed: frames for ParaView; 0: none.")
     checkpoint_interval: Positive = Field(60.0, description="On a bed: time between checkpoints [s].")
+    arch: Literal["cpu", "cuda"] = Field("cpu", description="On a bed: where it is computed.")
     threads: int | None = Field(None, ge=1, description="On a bed: threads; all cores if not given.")
     cache: bool = Field(True, description="On a bed: whether prepared beds are kept and used again.")
 
@@ -85,6 +86,8 @@ class GrainsSettings(StrictSettings):
             value = getattr(self, key)
             if not self.sleep and value != GrainsSettings.model_fields[key].default:
                 return f"{key} = {value:g} is of sleep, which is off: with sleep it would do, or without it"
+        if self.sleep and self.arch != "cpu":
+            return f"sleep with arch = {self.arch!r}: grains sleep on a CPU only so far; one of them would do"
         return None
 
 

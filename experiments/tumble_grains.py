@@ -41,6 +41,7 @@ from .tumble_platform import torque_within_limit
 from .tumble_settings import TumbleSettings
 from .tumble_steppers import is_plain, stepper_of
 from .tumble_trial import TumblePlan, plan_tumble
+from .where import check_where
 
 __all__ = ["Forecast", "check_on_grains", "tumble_on_grains"]
 
@@ -87,6 +88,7 @@ def check_on_grains(settings: TumbleSettings) -> None:
     plan = _plan(settings)
     material = _material(plan)
     _members(settings, plan)
+    check_where(arch=settings.arch, threads=settings.threads)
     _check_bed(settings, _forecast(settings, plan), material)
 
 
@@ -333,6 +335,7 @@ def _prepare(
         "seed": settings.seed,
         "young": softening.young,
         "max_overlap": settings.max_overlap,
+        "arch": settings.arch,
         "threads": settings.threads,
         "cache": settings.cache,
     }

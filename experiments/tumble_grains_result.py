@@ -89,7 +89,7 @@ def conclude(
         "grain_count": int(bed.grain_count), "packing_fraction": float(bed.packing_fraction),
         "surface": float(bed.surface), "young": softening.young, "softer_than_real": softening.factor,
         "time_step": float(bed.time_step), "macro_step": run.master.macro_step,
-        "max_overlap": float(bed.max_overlap), "seed": settings.seed, "steps": run.master.count,
+        "max_overlap": float(bed.max_overlap), "seed": settings.seed, "arch": settings.arch, "steps": run.master.count,
         "repeats": settings.bed_repeats, "piece_length": settings.bed_size[0],
         "spike_diameter": settings.spike_diameter, "spike_clear": settings.spike_clear,
         **_grain_steps(settings, run), "worst_guess": books.worst_guess, "largest_force": books.largest_force,

@@ -120,6 +120,26 @@ def test_the_bits_depend_on_neither_threads_nor_cuts_nor_where_it_goes_on(tmp_pa
     assert falling_bed.digest(again) == digests[400]
 
 
+def test_a_held_state_is_taken_back_with_its_sleepers_to_the_same_bits(layer):
+    def bits():
+        return {name: values.tobytes() for name, values in bed.state().items()} | {"computed": bed.grain_steps}
+
+    bed, state = layer
+    bed.restore(state)
+    bed.let_sleep(Sleep(calm=0.3))
+    bed.advance(200)
+    awake = bed.awake_count
+    held, then = bed.hold(), bits()
+    bed.advance(500)
+    after = bits()
+    assert bed.awake_count < awake
+    for _ in range(2):
+        bed.take_back(held)
+        assert bits() == then
+        bed.advance(500)
+        assert bits() == after
+
+
 def test_what_cannot_be_is_refused(layer):
     with pytest.raises(ValueError, match=r"waking_speed = 0.001 must be above speed = 0.005"):
         Sleep(waking_speed=1e-3)

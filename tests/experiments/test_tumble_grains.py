@@ -80,6 +80,8 @@ def test_a_bed_that_will_not_do_is_refused_before_any_work(given, said):
         {"bed_repeats": 0},
         {"bed_repeats": 1.5},
         {"bed_repeats": -1},
+        {"sleep": True, "arch": "cuda"},
+        {"ground": "spring-damper", "arch": "cuda"},
         {"ground": "spring-damper", "bed_repeats": 2},
     ],
 )

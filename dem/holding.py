@@ -1,0 +1,71 @@
+"""A bed held for a moment: all that its next steps depend on, copied and put back where it lies, on the device.
+
+``Bed.state`` gives the same as arrays of the host, packed, for files; a step of a coupling that is repeated wants it
+often, and on a GPU without the bed leaving the device.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import taichi as ti
+
+if TYPE_CHECKING:
+    from .bed import Bed
+
+__all__ = ["Held", "hold", "take_back"]
+
+# What lists are made with, and what a step makes anew: nothing of it is read before it is written.
+_SCRATCH = ("old_", "cell_", "block_", "came_from", "key", "near_first", "touching", "rank", "ticket", "problem")
+_NUMBERS = ("steps", "list_count", "grain_steps", "_since_lists", "_reaction_steps", "_skin", "_tallied")
+_SLEEPERS_NUMBERS = ("awake", "mass", "slept", "leaving")
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """What ``Bed.hold`` gave; a bed has room for one, so the next one ends it."""
+
+    tables: tuple[Any, ...]
+    """The engine, those that sleep, the book: whose fields were copied."""
+    numbers: dict[str, Any]
+    sleeper: dict[str, Any] | None
+
+
+def hold(bed: Bed) -> Held:
+    """Copy it. Room of the bed's own size is taken the first time, and kept."""
+    e = bed._engine
+    held = Held(
+        tables=(e, *(table for table in (e.rest, e.ledger) if table.on)),
+        numbers={name: getattr(bed, name) for name in _NUMBERS},
+        sleeper=None if bed._sleeper is None else {name: getattr(bed._sleeper, name) for name in _SLEEPERS_NUMBERS},
+    )
+    for table in held.tables:
+        for name, twin in _twins(table).items():
+            twin.copy_from(getattr(table, name))
+    e.held = held
+    return held
+
+
+def take_back(bed: Bed, held: Held) -> None:
+    """Bring the bed back. Raises ValueError for what is not the last that was held, or where sleep or book changed."""
+    e = bed._engine
+    if e.held is not held or held.tables != (e, *(table for table in (e.rest, e.ledger) if table.on)):
+        raise ValueError("this bed holds another state by now: only the last one that was held can be taken back")
+    for table in held.tables:
+        for name, twin in _twins(table).items():
+            getattr(table, name).copy_from(twin)
+    for name, value in held.numbers.items():
+        setattr(bed, name, value)
+    for name, value in (held.sleeper or {}).items():
+        setattr(bed._sleeper, name, value)
+
+
+def _twins(table: Any) -> dict[str, Any]:
+    """A field beside each of a table's, of its shape; as many as there are by now."""
+    twins: dict[str, Any] = table.__dict__.setdefault("twins", {})
+    for name, field in list(vars(table).items()):
+        if isinstance(field, ti.Field) and not name.startswith(_SCRATCH) and name not in twins:
+            kind = ti.Vector.field(field.n, field.dtype, field.shape) if isinstance(field, ti.MatrixField) else None
+            twins[name] = kind if kind is not None else ti.field(field.dtype, field.shape)
+    return twins

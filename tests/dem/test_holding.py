@@ -1,0 +1,47 @@
+"""A state held where the bed lies: taken back to the bit, with the book of losses, in a CPU's layout and in a GPU's.
+
+Of a bed whose grains sleep `test_sleep` shows it.
+"""
+
+import cloud
+import pytest
+
+
+def made(layout, engines):
+    """The cloud and its ball after fifty steps."""
+    if layout == "a chunk a grain":
+        engines.overrides = {"gpu": True, "neighbours_per_grain": 30}
+    bed = cloud.make(ball=True)
+    bed.keep_book()
+    bed.advance(50)
+    return bed
+
+
+def bits(bed):
+    return {name: values.tobytes() for name, values in bed.state().items()} | {"computed": bed.grain_steps}
+
+
+@pytest.mark.parametrize("layout", ["chunks", "a chunk a grain"])
+def test_a_bed_goes_on_from_what_it_held_to_the_same_bits_as_often_as_one_likes(layout, engines):
+    bed = made(layout, engines)
+    held, then = bed.hold(), bits(bed)
+    lists = bed.list_count
+    bed.advance(200)
+    after, push = bits(bed), bed.reactions()
+    assert bed.list_count > lists and after != then  # new lists in between
+    for _ in range(2):
+        bed.take_back(held)
+        assert bits(bed) == then
+        bed.advance(200)
+        assert bits(bed) == after and (bed.reactions() == push).all()
+
+
+def test_only_the_last_state_held_is_taken_back_and_none_across_a_change_of_sleep_or_book(engines):
+    bed = made("chunks", engines)
+    first, second = bed.hold(), bed.hold()
+    with pytest.raises(ValueError, match="only the last one that was held can be taken back"):
+        bed.take_back(first)
+    bed.take_back(second)
+    bed.let_sleep()
+    with pytest.raises(ValueError, match="only the last one that was held can be taken back"):
+        bed.take_back(second)
