@@ -92,14 +92,16 @@ class SpatialRun(Followed):
             self.body, footing, substeps=substeps, body_steps=body_steps, extrapolation=extrapolation,
             iterations=iterations, first_guess=Wrench.none(),
         )  # fmt: skip
+        self._extrapolation = extrapolation
         self._every = max(1, round(energy_interval / self.master.macro_step))
         self.lowering_speed = lowering_speed
         self.placed = lowering_speed is None
         """Whether the hand has let go."""
         self._rows: list[list[float]] = []
         self._not_begun()
+        self._order()
         if lowering_speed is not None:
-            self.body.take_in_hand(lowering_speed)
+            self.body.take_in_hand(lowering_speed, step=self.master.macro_step)
         else:
             self.body.start(footing.lag)
             self._begin()
@@ -199,3 +201,4 @@ class SpatialRun(Followed):
         self._rows = np.asarray(state["run.rows"]).tolist()
         self._restore_books(state)
         self.master.restore(state)
+        self._order()

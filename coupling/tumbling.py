@@ -114,6 +114,7 @@ class CoupledTumble(Followed):
             iterations=iterations, first_guess=weight,
         )  # fmt: skip
         rows = trial.spike_count
+        self._extrapolation = extrapolation
         self.reader = ContactReader(
             rows, weight=trial.weight, mu_d=trial.sliding_friction, macro_step=self.master.macro_step
         )
@@ -126,6 +127,7 @@ class CoupledTumble(Followed):
         self._states: list[int] = []
         self._feet: list[np.ndarray] = []
         self._not_begun()
+        self._order()
         if self.placed:
             self.body.touching = rests
             self._begin()
@@ -135,7 +137,7 @@ class CoupledTumble(Followed):
                 self.pace = pace_under(footing.gravity)
             if self.lowered is not None:
                 self.body.trial = replace(trial, gravity_sim=self.lowered.now)
-            self.body.take_in_hand(lowering_speed, pace=self.pace)
+            self.body.take_in_hand(lowering_speed, pace=self.pace, step=self.master.macro_step)
 
     _free, _turns = (0, 2), (1,)
 
@@ -363,6 +365,7 @@ class CoupledTumble(Followed):
         self._restore_books(state)
         self.reader.restore({key[7:]: value for key, value in state.items() if key.startswith("reader.")})
         self.master.restore(state)
+        self._order()
 
 
 def _sinkage(footing: LawFooting, load: float) -> float:
