@@ -77,7 +77,7 @@ def read_moved(folder: Path, result: Mapping[str, Any]) -> MovedInSpace:
                 f"{_again(folder)}"
             )
     path, motion, feet = found.values()
-    spikes = tuple(name.split("_")[1] for name in feet if name.startswith("sinkage_"))
+    spikes = tuple(name.split("_")[1] for name in feet if name.startswith("normal_"))
     return MovedInSpace(path, motion, feet, float(result["trial"]["weight"]["value"]), spikes)
 
 
@@ -95,12 +95,13 @@ def compared_columns(first: MovedInSpace, second: MovedInSpace) -> dict[str, Any
         attitudes.append(turns)
         columns |= {f"{name}_{number}": turns[:, k] for k, name in enumerate(QUATERNION)}
         columns[f"turn_rad_{number}"] = angle_between(turns, turns[:1])
+        depths = [np.zeros(len(time))]
         for spike in one.spikes:
-            columns[f"sinkage_{spike}_m_{number}"] = np.interp(time, one.time, one.feet[f"sinkage_{spike}_m"])
             columns[f"load_{spike}_N_{number}"] = mean_over(time, one.time, one.feet[f"normal_{spike}_N"])
-        columns[f"sinkage_m_{number}"] = np.max(
-            [np.zeros(len(time)), *(columns[f"sinkage_{spike}_m_{number}"] for spike in one.spikes)], axis=0
-        )
+            if f"sinkage_{spike}_m" in one.feet:  # the hull's is not told
+                depths.append(np.interp(time, one.time, one.feet[f"sinkage_{spike}_m"]))
+                columns[f"sinkage_{spike}_m_{number}"] = depths[-1]
+        columns[f"sinkage_m_{number}"] = np.max(depths, axis=0)
         for name, own in FORCES.items():
             columns[f"{name}_{number}"] = mean_over(time, one.motion["t_s"], one.motion[own])
         for name in ENERGIES:

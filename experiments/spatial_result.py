@@ -72,14 +72,16 @@ def path_columns(run: SpatialRun) -> dict[str, Any]:
 def feet_columns(run: SpatialRun) -> dict[str, Any]:
     """The columns of series/feet.csv: force, slip and depth of the spikes that came down, and of the hull if it did.
 
-    Those that never did are left out; so is friction on a law, which says only how large it may be.
+    Those that never did are left out; so are the hull's depth, which no footing tells, and friction on a law, which
+    says only how large it may be.
     """
     columns: dict[str, Any] = {"t_s": run.columns["time"]}
     feet, hull = run.feet, len(run.trial.platform.tips)
     for spike in np.flatnonzero(feet.any(axis=(0, 1))):
         name = "hull" if spike == hull else str(spike)
         for k, (what, unit) in enumerate(FEET):
-            if run.footing.gives_friction or not what.startswith("along"):
+            told = name != "hull" if what == "sinkage" else run.footing.gives_friction or not what.startswith("along")
+            if told:
                 columns[f"{what}_{name}_{unit}"] = feet[:, k, spike]
     return columns
 

@@ -106,7 +106,7 @@ def test_grains_and_spring_damper_stand_side_by_side_in_curves_and_flat_pictures
     columns = read_series(out / "series" / "compared.csv")
     for number, name in ((1, "bed"), (2, "law")):
         feet = read_series(runs / name / "series" / "feet.csv")
-        told = {column.split("_")[1] for column in feet if column.startswith("sinkage_")}
+        told = {column.split("_")[1] for column in feet if column.startswith("normal_")}
         assert told == {column.split("_")[1] for column in columns if re.fullmatch(rf"load_\w+_N_{number}", column)}
         # All spikes together are the force upwards; of the books nothing is lost on the way.
         loads = sum(columns[f"load_{spike}_N_{number}"] for spike in told)
