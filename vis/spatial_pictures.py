@@ -48,7 +48,7 @@ def draw_in_space(
     names = ("start", "middle", "end") if len(moments) == 3 else ("start", "end")
     stills = [(home / "figures" / f"{stem}-{name}.png", name, time) for name, time in zip(names, moments, strict=False)]
     chosen = np.unique(np.linspace(0, len(fine) - 1, min(_MOST_FRAMES, len(fine))).round().astype(int))
-    later = [float(times[-1]) for times in every if times[-1] > fine[-1]]  # a longer run goes on alone
+    later = sorted({float(time) for times in every for time in times if time > fine[-1]})  # a longer run goes on alone
     times = [*fine[chosen].tolist(), *later]
     job: dict[str, Any] = {
         "runs": [str(folder) for folder in folders], "labels": list(labels) if labels else None, "by": by,
