@@ -75,10 +75,10 @@ def follow(
         folder.save_checkpoint(f"{CHECKPOINT}.failed", run.state())
         if run.placed:
             write_series()
-        kept = f"the state is in checkpoint/{CHECKPOINT}.failed.npz"
+        left = f"the state is in checkpoint/{CHECKPOINT}.failed.npz"
         if run.placed:
-            kept += ", what was before it in trajectory.csv and series/"
-        raise RuntimeError(f"at {run.time:.4g} s: {error}; {_would_do(error)}; {kept}") from error
+            left += ", what was before it in trajectory.csv and series/"
+        raise RuntimeError(f"at {run.time:.4g} s: {error}; {_would_do(error)}; {left}") from error
     folder.save_checkpoint(CHECKPOINT, run.state())
     return found
 
