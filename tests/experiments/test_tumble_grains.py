@@ -45,7 +45,7 @@ def on_bed(**more):
             {"coarse": 0.007, "grain": 0.0024, "bed_size": (0.4, 0.036, 0.046)},
             r"coarse = 0.007 m makes grains of .* coarse = 0.006 m would do",
         ),
-        ({"surface": "steel"}, r"surface = 'steel' has no grains .* sand, jsc1a would do"),
+        ({"surface": "steel"}, r"surface = 'steel' has no grains .* sand, sand-calibrated, jsc1a would do"),
         ({"spike_clear": 0.01}, r"spike_diameter = 0.012 m, spike_clear = 0.01 m"),
         ({"bed_stages": ("rain:dry", "stick", "level")}, r"bed_stages: .* these grains do not stick anyway"),
         ({"bed_stages": ("rain", "compact:0.6")}, r"bed_stages ends with 'compact:0.6': 'level' last"),
