@@ -587,8 +587,18 @@ def test_a_row_of_tumbles_lists_each_row_that_comes_down(reported):
     assert main(["tumble", *given, "--quiet", "--out", "row"]) == 0
     found, feet = result_of("row"), read_series(Path("row/series/feet.csv"))
     deepest = [fall["deepest"] for fall in found["footfalls"]]
-    assert [table["title"] for table in found["tables"]] == ["Where it came to lie", "Rows that came down"]
+    assert [table["title"] for table in found["tables"]] == ["Where it was after each tumble", "Rows that came down"]
     assert len(deepest) >= 3 and max(deepest) == pytest.approx(max(feet[f"sinkage_{row}_m"].max() for row in range(8)))
     assert [fall["set_down"] for fall in found["footfalls"]] == [True, True] + [False] * (len(deepest) - 2)
     page = Path("row/report.html").read_text()
     assert "Tumble by tumble" in page and "Rows that came down" in page
+    # The torques that ended, and those after which it lay, are the table's; a warning names the others.
+    rests = found["tables"][0]["rows"][1:]
+    lay = [row[-1] == "yes" for row in rests]
+    assert value_of("row", "tumbles_at_rest") == sum(lay) and value_of("row", "tumbles_done") in (
+        len(lay),
+        len(lay) + 1,
+    )
+    warned = " ".join(found["warnings"])
+    assert ("had not come to lie" in warned) == (not all(lay))
+    assert ("the run was over before" in warned) == (value_of("row", "tumbles_done") > len(lay))
