@@ -199,7 +199,7 @@ def _own_quantities(run: CoupledTumble) -> dict[str, dict[str, Any]]:
         "angular_momentum_residual": (
             float(run.samples["angular_momentum_error"].max()), "N m s",
             "likewise about the tumble's axis, less the moments of weight, wires, floor and wheel, of what crosses the "
-            "bed's periodic ends and of sleepers; the exchange is of second order in the macro step",
+            "bed's periodic ends and of sleepers; what the exchange leaves is of first order in the bed's step",
         ),
     }  # fmt: skip
     notes = {
