@@ -3,6 +3,7 @@
 import json
 import math
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,34 +13,23 @@ from experiments.cli import main
 from experiments.runfolder import RunFolder
 from experiments.spatial_settings import SpatialSettings
 from experiments.spatial_trial import plan_spatial
+from rigid import find_platform
 from vis.tumble_series import read_columns
 
-CUBE = """
-format = "hedgebed-platform/1"
-name = "cube"
-[body]
-mass = 0.1
-inertia = [1.2e-5, 1.2e-5, 1.2e-5]
-[hull]
-shape = "box"
-size = [0.03, 0.03, 0.03]
-[spikes]
-clear = 0.01
-diameter = 0.008
-[wheels]
-inertia = 1e-6
-max_speed = 1000.0
-motor_torque = 0.02
-axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
-"""
+CUBE = Path(__file__).parents[2] / "experiments/examples/platform-cube/cube.toml"
 
 
 @pytest.fixture
-def cube(tmp_path):
-    """A cube of 30 mm on eight spikes, with wheels about x and y, as a file."""
-    path = tmp_path / "cube.toml"
-    path.write_text(CUBE)
-    return str(path)
+def cube():
+    """The cube that ships: 30 mm, eight spikes, wheels about x and y."""
+    return str(CUBE)
+
+
+def test_the_cube_that_ships_loads_and_is_what_the_documentation_runs():
+    platform = find_platform(CUBE)
+    assert platform.tips.shape == (8, 3) and platform.inertia[0, 0] == 1.2e-5
+    assert np.abs(platform.tips) == pytest.approx(np.full((8, 3), 0.015))  # 30 mm across the tips
+    assert str(CUBE.relative_to(CUBE.parents[3])) in (CUBE.parents[3] / "docs/coupling.md").read_text()
 
 
 @pytest.mark.parametrize(
