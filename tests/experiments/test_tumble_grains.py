@@ -15,6 +15,7 @@ from experiments.cli import main
 from experiments.runfolder import RunFolder
 from experiments.softening import Softening
 from experiments.tumble_settings import TumbleSettings
+from rigid import Trial
 
 SMALL = {
     "surface": "sand", "ground": "bed", "mass": 0.3, "inertia": 2e-4, "spike_length": 0.04, "wheel_inertia": 1e-5,
@@ -197,7 +198,7 @@ def test_a_landing_that_lets_go_of_the_sand_on_its_way_down_has_not_rebounded():
     for end, share in ((6, 0.4), (4, None)):
         rows = {"time": np.arange(end), "vx": 0 * speeds[:end], "vy": speeds[:end], "omega": 0 * speeds[:end]}
         rows["kinetic_energy"] = speeds[:end] ** 2
-        run = SimpleNamespace(columns=rows, states=states[:end], trial=SimpleNamespace(spike_length=0.2))
+        run = SimpleNamespace(columns=rows, states=states[:end], trial=Trial(gravity_sim=9.80665, spike_length=0.2))
         found = tumble_steppers._landing(run)["restitution"]["value"]
         assert found == (share and pytest.approx(share))
 
