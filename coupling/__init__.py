@@ -10,7 +10,7 @@ from .planar_body import PlanarBody
 from .spatial_body import SpatialBody
 from .spatial_run import SpatialRun
 from .trajectory import Penetration
-from .tumbles import Landing, TumblesInARow
+from .tumbles import Landing, Rest, TumblesInARow
 from .tumbling import MOST_REVERSAL, CoupledTumble
 
 __all__ = [
@@ -29,6 +29,7 @@ __all__ = [
     "Master",
     "Penetration",
     "PlanarBody",
+    "Rest",
     "Run",
     "SetDown",
     "SpatialBody",

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,9 +20,10 @@ from rigid.trial import Trial
 
 from .bed_footing import BedFooting
 from .footing import Footing, LawFooting
+from .lowered_gravity import pace_under
 from .tumbling import CoupledTumble
 
-__all__ = ["Landing", "TumblesInARow"]
+__all__ = ["Landing", "Rest", "TumblesInARow"]
 
 REST_SPEED = 2e-3
 """A platform whose centre and tips are slower is at rest [m/s]: the speed above which a row is said to slide."""
@@ -30,6 +31,25 @@ REST_LASTS = 0.1
 """For how long [s]."""
 LONGEST_WAIT = 3.0
 """After the torque's end the next begins at the latest [s], at rest or not, which is noted."""
+
+
+class Rest(NamedTuple):
+    """What counts as lying at rest, and how long it is waited for."""
+
+    speed: float
+    """Centre and tips are slower [m/s],"""
+    lasts: float
+    """for this long [s]."""
+    longest_wait: float
+    """[s]"""
+
+    @classmethod
+    def of(cls, trial: Trial) -> Rest:
+        """Those above in the rig and at 1 g; in flight speeds go as sqrt(g), times as its inverse: lengths stay."""
+        pace = 1.0 if trial.counterweight > 0 else pace_under(trial.gravity_sim)
+        return cls(REST_SPEED / pace, REST_LASTS * pace, LONGEST_WAIT * pace)
+
+
 NOTED = ("time", "x", "y", "theta", "sinkage", "deepest", "at_rest", "rows_turned")
 """Of `TumblesInARow.rests`: when and where [s, m, m, rad]; mean depth of the rows that carry, and the largest of any
 since the rest before [m]; whether it was at rest; rows turned by since then."""
@@ -47,6 +67,7 @@ class TumblesInARow(CoupledTumble):
         if trial.actuator == "brake":
             raise ValueError("tumbles in a row need a motor: a brake stops its wheel in the first")
         self.tumbles, self.turn = tumbles, turn
+        self.rest = Rest.of(trial)
         self._rests: list[list[float]] = []
         self._on, self._from, self._quiet_since, self._ended, self._seen = True, 0.0, 0.0, 0.0, 0
         self.tip_radius = float(options.get("tip_radius", 0.0))
@@ -62,6 +83,12 @@ class TumblesInARow(CoupledTumble):
         """Where it lay before the first tumble and after each, by NOTED: arrays of shape [rest]."""
         table = np.array(self._rests, dtype=float).reshape(-1, len(NOTED))
         return dict(zip(NOTED, table.T, strict=True))
+
+    @property
+    def ended(self) -> int:
+        """How many torques have ended, that of a tumble which nothing was noted of yet included."""
+        noted = max(len(self._rests) - 1, 0)
+        return noted + (not self._on and noted < self.tumbles)
 
     def advance(self) -> None:
         """One macro step, and what follows from where the platform is then."""
@@ -80,10 +107,10 @@ class TumblesInARow(CoupledTumble):
             return
         fastest = max(math.hypot(*body.rates[:2]), abs(body.rates[2]) * self.trial.spike_length)
         touches = self.master.last is not None and bool(self.master.last.contacts)
-        if fastest > REST_SPEED or not touches:
+        if fastest > self.rest.speed or not touches:
             self._quiet_since = body.time
-        rests = body.time - self._quiet_since >= REST_LASTS
-        if rests or (body.time - self._ended >= LONGEST_WAIT and touches):
+        rests = body.time - self._quiet_since >= self.rest.lasts
+        if rests or (body.time - self._ended >= self.rest.longest_wait and touches):
             self._note(at_rest=rests)
             self._from = float(body.place[2])
             if len(self._rests) <= self.tumbles:

@@ -21,7 +21,9 @@ class PlatformSettings(StrictSettings):
     """What gives way under the spikes, and the platform above them."""
 
     # The surface
-    surface: str | None = Field(None, description="Material: steel, brick, sand or jsc1a; brick if not given.")
+    surface: str | None = Field(
+        None, description="Material: steel, brick, sand, sand-calibrated or jsc1a; brick if not given."
+    )
     stiffness: Positive | None = Field(
         None, description="K of a row of spikes [N/m]; the surface's if not given (brick: 1.5e4)."
     )

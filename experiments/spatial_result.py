@@ -180,7 +180,7 @@ def quantities_of(run: SpatialRun) -> dict[str, dict[str, Any]]:
         found["angular_momentum_residual"] = (
             float(run.samples["angular_momentum_error"].max()), "N m s",
             "likewise about the start, less the moments of weight, wires and floor, of what crosses the bed's periodic "
-            "sides and of sleepers; the exchange is of second order in the macro step",
+            "sides and of sleepers; what the exchange leaves is of first order in the bed's step",
         )  # fmt: skip
         for name, values in run.losses.items():
             found[f"dissipated_{name}"] = (float(values[-1]), "J", "by the grains, measured, at the end")

@@ -135,9 +135,9 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
         progress.stage("tumble", total=1.0)
         more: dict[str, Any] = {}
         besides: dict[str, Any] = {}
-        unsettled: str | None = None
+        warnings: list[str] = []
         if settings.method == "coupled":
-            trajectory, full, more, besides, unsettled = _step_through_master(settings, plan, folder, progress)
+            trajectory, full, more, besides, warnings = _step_through_master(settings, plan, folder, progress)
         else:
             trajectory, full = _integrate(settings, plan, duration=settings.duration)
         progress.update(1.0)
@@ -145,8 +145,7 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
         folder.write_series("motion", motion_columns(trajectory))
         result = result_of(settings, plan, trajectory, full)
         result["quantities"] |= more
-        if unsettled is not None:
-            result["warnings"].append(unsettled)
+        result["warnings"] += warnings
         if settings.method == "coupled":
             from .tumble_steppers import words
 
@@ -166,15 +165,17 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
 
 def _step_through_master(
     settings: TumbleSettings, plan: TumblePlan, folder: RunFolder, progress: Progress
-) -> tuple[Trajectory, float | None, dict[str, Any], dict[str, Any], str | None]:
-    """The trial by the master, series/feet.csv written: `_integrate`'s, `coupled_quantities`' two, a warning."""
+) -> tuple[Trajectory, float | None, dict[str, Any], dict[str, Any], list[str]]:
+    """The trial by the master, series/feet.csv written: `_integrate`'s, `coupled_quantities`' two, its warnings."""
     from .tumble_coupled import coupled_quantities, coupled_tumble, feet_columns
+    from .tumble_steppers import own_warning
 
     run = coupled_tumble(settings, plan, duration=settings.duration)
     trajectory = run.run(on_step=lambda run: progress.update(run.fraction))
     folder.write_series("feet", feet_columns(run))
     quantities, besides = coupled_quantities(run)
-    return trajectory, run.body.wheel_at_limit, quantities, besides, unsettled_warning(run.master)
+    warnings = [said for said in (unsettled_warning(run.master), own_warning(run)) if said]
+    return trajectory, run.body.wheel_at_limit, quantities, besides, warnings
 
 
 def _add_sweep(result: dict[str, Any], settings: TumbleSettings, folder: RunFolder, model: Path | None) -> None:

@@ -18,7 +18,7 @@ from .runfolder import RunFolder, write_series
 from .softening import Softening
 from .surfaces import find_surface
 from .tumble_settings import TumbleSettings
-from .tumble_steppers import own_quantities, words
+from .tumble_steppers import own_quantities, own_warning, words
 from .tumble_trial import TumblePlan
 from .tumble_words import residual_warning, reversal_warning, unsettled_warning
 
@@ -101,8 +101,7 @@ def conclude(
     }  # fmt: skip
     if reversed_ := reversal_warning(run.dissipation_reversal):
         result["warnings"].append(reversed_)
-    if unsettled := unsettled_warning(run.master):
-        result["warnings"].append(unsettled)
+    result["warnings"] += [said for said in (unsettled_warning(run.master), own_warning(run)) if said]
     if pressed := softening.overlapping(float(bed.max_overlap)):
         result["warnings"].append(pressed)
     if met_again := _same_sand_again(settings, run):
@@ -200,7 +199,7 @@ def _own_quantities(run: CoupledTumble) -> dict[str, dict[str, Any]]:
         "angular_momentum_residual": (
             float(run.samples["angular_momentum_error"].max()), "N m s",
             "likewise about the tumble's axis, less the moments of weight, wires, floor and wheel, of what crosses the "
-            "bed's periodic ends and of sleepers; the exchange is of second order in the macro step",
+            "bed's periodic ends and of sleepers; what the exchange leaves is of first order in the bed's step",
         ),
     }  # fmt: skip
     notes = {

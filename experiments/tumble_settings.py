@@ -25,7 +25,8 @@ class TrialSettings(PlatformSettings):
 
     # The surface
     surface: str | None = Field(
-        None, description="Material: steel, brick, sand or jsc1a; of the model, else brick, if not given."
+        None,
+        description="Material: steel, brick, sand, sand-calibrated or jsc1a; of the model, else brick, if not given.",
     )
     ground: str = Field(
         "spring-damper",

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coupling import CoupledTumble, Footing, Landing, TumblesInARow
+from coupling import CoupledTumble, Footing, Landing, Rest, TumblesInARow
 from rigid.trial import Trial
 
 from .footfalls import find_footfalls, footfall_quantities, footfall_table
 from .tumble_settings import TumbleSettings
 
-__all__ = ["is_plain", "own_quantities", "stepper_of", "words"]
+__all__ = ["is_plain", "own_quantities", "own_warning", "stepper_of", "words"]
 
 
 def is_plain(settings: TumbleSettings) -> bool:
@@ -77,13 +78,17 @@ def _row(run: TumblesInARow) -> tuple[dict[str, dict[str, Any]], dict[str, Any]]
     if done >= 3:
         left = sinkage - np.polyval(np.polyfit(number, sinkage, 1), number)
         error = float(np.sqrt((left @ left) / (done - 2) / ((number - number.mean()) ** 2).sum()))
+    noted = "when it lay, or the wait for that was over (tumbles_at_rest)"
     added = {
-        "tumbles_done": _quantity(float(done), "1", "that came to lie, of those asked for"),
-        "sinkage_per_tumble": _quantity(slope, "m", "slope of the sinkage at rest over the tumbles; null below two")
+        "tumbles_done": _quantity(float(run.ended), "1", "whose torque ended, of those asked for"),
+        "tumbles_at_rest": _quantity(float(rests["at_rest"][1:].sum()), "1", "that came to lie, of tumbles_done"),
+        "sinkage_per_tumble": _quantity(
+            slope, "m", f"slope over the tumbles of the rows' mean sinkage {noted}; null below two"
+        )
         | {"std": error},
         "sinkage_last": _quantity(
             float(rests["sinkage"][-1]) if len(rests["sinkage"]) else None, "m",
-            "mean of the rows that carry, at the last rest",
+            f"mean of the rows that carry, the last time {noted}",
         ),
     }  # fmt: skip
     head = ["after tumble", "time [s]", "rows", "x [mm]", "sinkage [mm]", "deepest [mm]", "at rest"]
@@ -95,7 +100,30 @@ def _row(run: TumblesInARow) -> tuple[dict[str, dict[str, Any]], dict[str, Any]]
         ]
         for k in range(len(rests["time"]))
     ]  # fmt: skip
-    return added, {"title": "Where it came to lie", "head": head, "rows": shown}
+    return added, {"title": "Where it was after each tumble", "head": head, "rows": shown}
+
+
+def own_warning(run: CoupledTumble) -> str | None:
+    """Which tumbles of a row ended without the platform at rest, in words; None where there are none."""
+    if not isinstance(run, TumblesInARow):
+        return None
+    return _unrested(run.rests["at_rest"][1:].tolist(), ended=run.ended, asked=run.tumbles, rest=run.rest)
+
+
+def _unrested(at_rest: Sequence[float], *, ended: int, asked: int, rest: Rest) -> str | None:
+    moving = [str(k) for k, lay in enumerate(at_rest, start=1) if not lay]
+    said = []
+    if moving:
+        said.append(
+            f"after {'tumble' if len(moving) == 1 else 'tumbles'} {', '.join(moving)} the platform had not come to lie "
+            f"{rest.longest_wait:.3g} s after the torque's end (slower than {1e3 * rest.speed:.3g} mm/s for "
+            f"{rest.lasts:.3g} s), so its sinkage is that of then, not at rest"
+        )
+    if ended > len(at_rest):
+        said.append(f"the run was over before it lay after tumble {ended}")
+    if ended < asked:
+        said.append(f"of {asked} tumbles asked for {ended} ended within the run")
+    return "; ".join(said) or None
 
 
 def _landing(run: Landing) -> dict[str, dict[str, Any]]:
@@ -107,7 +135,8 @@ def _landing(run: Landing) -> dict[str, dict[str, Any]]:
         left = next((k for k in range(touched, len(states)) if states[k] == "hop" and rows["vy"][k] > 0), None)
     came = float(-rows["vy"][touched]) if touched is not None else None
     speed = np.maximum(np.hypot(rows["vx"], rows["vy"]), np.abs(rows["omega"]) * run.trial.spike_length)
-    moving = np.flatnonzero(speed > 2e-3)
+    slow = Rest.of(run.trial).speed
+    moving = np.flatnonzero(speed > slow)
     settled = None if not len(moving) or moving[-1] == len(speed) - 1 else float(rows["time"][moving[-1] + 1])
     share = None if left is None or not came else float(rows["vy"][left]) / came
     energy = rows["kinetic_energy"]
@@ -117,6 +146,6 @@ def _landing(run: Landing) -> dict[str, dict[str, Any]]:
         "restitution": _quantity(share, "1", "upward speed where it first leaves the ground again over impact_speed"),
         "energy_kept": _quantity(kept, "1", "kinetic energy there over that at the first touch"),
         "settling_time": _quantity(
-            settled, "s", "from where centre and tips stay slower than 2 mm/s; null: they do not"
+            settled, "s", f"from where centre and tips stay slower than {1e3 * slow:.3g} mm/s; null: they do not"
         ),
     }

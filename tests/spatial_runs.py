@@ -1,30 +1,14 @@
 """A small platform in space and a small bed under it, for tests of runs in space."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 
 __all__ = ["CUBE", "small_bed"]
 
-CUBE = """
-format = "hedgebed-platform/1"
-name = "cube"
-[body]
-mass = 0.1
-inertia = [1.2e-5, 1.2e-5, 1.2e-5]
-[hull]
-shape = "box"
-size = [0.03, 0.03, 0.03]
-[spikes]
-clear = 0.01
-diameter = 0.008
-[wheels]
-inertia = 1e-6
-max_speed = 1000.0
-motor_torque = 0.02
-axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
-"""
-"""A cube of 30 mm on eight spikes, with wheels about x and y: a platform's file."""
+CUBE = Path(__file__).parents[1] / "experiments/examples/platform-cube/cube.toml"
+"""A cube on eight spikes, 30 mm across, with wheels about x and y, that ships."""
 
 
 def small_bed(*_):

@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from coupling import BedFooting, Landing, LawFooting, TumblesInARow, platform_members
+from coupling import BedFooting, Landing, LawFooting, Rest, TumblesInARow, platform_members
 from dem import Bed
 from dem.materials import SAND
+from experiments.tumble_steppers import own_warning
 from rigid import Trial
 
 RIG = {"gravity_sim": 0.3, "counterweight": 0.28}
@@ -39,6 +40,37 @@ def test_a_tumble_follows_the_other_when_the_platform_lies_and_goes_on_from_a_ch
     other.run()
     assert np.array_equal(run.body.place, other.body.place) and run.body.torque_work == other.body.torque_work
     assert np.array_equal(run.rests["time"], other.rests["time"])
+
+
+def test_rest_goes_with_gravity_in_flight_and_not_in_the_rig():
+    """Froude: speeds go as sqrt(g) and times as 1 / sqrt(g), so that speed times wait and speed^2 / g stay."""
+    rig, earth = Rest.of(Trial(**RIG, **SMALL)), Rest.of(Trial(gravity_sim=9.80665, **SMALL))
+    assert rig == earth == (2e-3, 0.1, 3.0)  # to the bit: results of rows in the rig are kept
+    for g in (9.80665e-2, 9.80665e-6):
+        small = Rest.of(Trial(gravity_sim=g, **SMALL))
+        assert small.speed**2 / g == pytest.approx(earth.speed**2 / 9.80665)
+        assert small.speed * small.longest_wait == pytest.approx(earth.speed * earth.longest_wait)
+        assert small.speed * small.lasts == pytest.approx(earth.speed * earth.lasts)
+
+
+def test_a_row_that_gets_no_time_to_lie_says_so():
+    """How many torques ended and after how many it lay are two numbers; a warning tells the others apart."""
+    run = row()
+    run.rest = run.rest._replace(speed=1e-9, longest_wait=0.4)
+    run.run()
+    assert run.ended == 2 and run.rests["at_rest"].tolist() == [1.0, 0.0, 0.0]
+    said = own_warning(run)
+    assert said is not None and said.startswith("after tumbles 1, 2 the platform had not come to lie 0.4 s after")
+    short = row()
+    while not short.ended:
+        short.advance()
+    assert len(short.rests["time"]) == 1
+    assert own_warning(short) == (
+        "the run was over before it lay after tumble 1; of 2 tumbles asked for 1 ended within the run"
+    )
+    whole = row()
+    whole.run()
+    assert whole.ended == 2 and own_warning(whole) is None
 
 
 def test_a_landing_falls_on_as_it_came_and_bounces_off_a_spring():

@@ -25,7 +25,7 @@ THROWN = {
 def runs(tmp_path_factory):
     """One cube thrown onto the spring-damper and onto a small bed; it as moved by a known amount; a planar tumble."""
     home = tmp_path_factory.mktemp("runs")
-    (home / "cube.toml").write_text(CUBE)
+    (home / "cube.toml").write_text(CUBE.read_text())
     thrown = THROWN | {"platform": str(home / "cube.toml")}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(spatial, "write_report", lambda *_: None)

@@ -13,15 +13,21 @@ from experiments.cli import main
 from experiments.runfolder import RunFolder, read_series
 from experiments.spatial_settings import SpatialSettings
 from experiments.spatial_trial import plan_spatial
+from rigid import find_platform
 from vis.tumble_series import read_columns
 
 
 @pytest.fixture
-def cube(tmp_path):
-    """A cube of 30 mm on eight spikes, with wheels about x and y, as a file."""
-    path = tmp_path / "cube.toml"
-    path.write_text(CUBE)
-    return str(path)
+def cube():
+    """The cube that ships: 30 mm, eight spikes, wheels about x and y."""
+    return str(CUBE)
+
+
+def test_the_cube_that_ships_loads_and_is_what_the_documentation_runs():
+    platform = find_platform(CUBE)
+    assert platform.tips.shape == (8, 3) and platform.inertia[0, 0] == 1.2e-5
+    assert np.abs(platform.tips) == pytest.approx(np.full((8, 3), 0.015))  # 30 mm across the tips
+    assert str(CUBE.relative_to(CUBE.parents[3])) in (CUBE.parents[3] / "docs/coupling.md").read_text()
 
 
 @pytest.mark.parametrize(
@@ -48,7 +54,7 @@ def test_what_does_not_go_together_is_refused_by_name(given, said):
         ({"torque": (0.0, 0.0, 0.01)}, "has no wheel about z"),
         ({"torque": (0.03, 0.0, 0.0)}, "about x: torque is 0.03 N m: the motor gives at most 0.02"),
         ({"rig": 1.0}, "rig = 1 .* is not below the local gravity"),
-        ({"surface": "steel", "ground": "bed"}, "surface = 'steel' has no grains .* sand, jsc1a would do"),
+        ({"surface": "steel", "ground": "bed"}, "surface = 'steel' has no grains .* sand, .*, jsc1a would do"),
         (
             {"bed_size": (0.07, 0.2, 0.05)},
             r"bed_size = 0.07 m along x is too short: .* 0.\d+ m or a shorter one would do",

@@ -338,6 +338,15 @@ def test_the_sand_is_twice_the_spike_that_was_computed_grain_by_grain():
     assert told == [f"{number:.{len(text.partition('.')[2])}f}" for number, text in zip(spikes, told, strict=True)]
 
 
+def test_the_calibrated_sand_is_twice_its_spike_and_takes_its_grains():
+    sand = find_surface("sand-calibrated")
+    kept = Path(__file__).parents[2] / "docs/results/penetrate-small-sand-calibrated/result.json"
+    found = json.loads(kept.read_text())["quantities"]
+    assert sand.stiffness == pytest.approx(2 * found["stiffness"]["value"], rel=1e-3)
+    assert sand.damping == pytest.approx(2 * found["damping"]["value"], rel=1e-3)
+    assert sand.grains == "sand-calibrated"
+
+
 def test_another_law_takes_its_parameters_of_one_spike():
     given = ("dissipation=0.1", "exponent=1.4")
     plan = plan_tumble(TumbleSettings(ground="hunt-crossley", ground_parameters=given))
@@ -437,7 +446,7 @@ def test_a_term_of_ones_own_runs_from_a_file_beside_the_model():
         (["--effects", "com-offset.x=0.01"], ["tips over", "com-offset.x up to 1.29 mm would do"]),
         (["--mu-d", "0.6"], ["mu_d = 0.6 is above mu_s = 0.5 (surface brick)"]),
         (["--mu-s", "0.2", "--mu-d", "0.3"], ["mu_d = 0.3", "mu_s = 0.2"]),
-        (["--surface", "snow"], ["surface = 'snow'", "steel, brick, sand, jsc1a"]),
+        (["--surface", "snow"], ["surface = 'snow'", "steel, brick, sand, sand-calibrated, jsc1a"]),
         (["--ground", "moon"], ["ground = 'moon'", "spring-damper"]),
         (["--ground", "power", "--stiffness", "100"], ["stiffness = 100", "ground_parameters"]),
         (["--ground", "power", "--ground-parameters", "n=2"], ["n is no parameter of power", "exponent"]),
@@ -578,8 +587,18 @@ def test_a_row_of_tumbles_lists_each_row_that_comes_down(reported):
     assert main(["tumble", *given, "--quiet", "--out", "row"]) == 0
     found, feet = result_of("row"), read_series(Path("row/series/feet.csv"))
     deepest = [fall["deepest"] for fall in found["footfalls"]]
-    assert [table["title"] for table in found["tables"]] == ["Where it came to lie", "Rows that came down"]
+    assert [table["title"] for table in found["tables"]] == ["Where it was after each tumble", "Rows that came down"]
     assert len(deepest) >= 3 and max(deepest) == pytest.approx(max(feet[f"sinkage_{row}_m"].max() for row in range(8)))
     assert [fall["set_down"] for fall in found["footfalls"]] == [True, True] + [False] * (len(deepest) - 2)
     page = Path("row/report.html").read_text()
     assert "Tumble by tumble" in page and "Rows that came down" in page
+    # The torques that ended, and those after which it lay, are the table's; a warning names the others.
+    rests = found["tables"][0]["rows"][1:]
+    lay = [row[-1] == "yes" for row in rests]
+    assert value_of("row", "tumbles_at_rest") == sum(lay) and value_of("row", "tumbles_done") in (
+        len(lay),
+        len(lay) + 1,
+    )
+    warned = " ".join(found["warnings"])
+    assert ("had not come to lie" in warned) == (not all(lay))
+    assert ("the run was over before" in warned) == (value_of("row", "tumbles_done") > len(lay))

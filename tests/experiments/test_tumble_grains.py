@@ -15,6 +15,7 @@ from experiments.cli import main
 from experiments.runfolder import RunFolder
 from experiments.softening import Softening
 from experiments.tumble_settings import TumbleSettings
+from rigid import Trial
 
 SMALL = {
     "surface": "sand", "ground": "bed", "mass": 0.3, "inertia": 2e-4, "spike_length": 0.04, "wheel_inertia": 1e-5,
@@ -48,7 +49,7 @@ def on_bed(**more):
             {"coarse": 0.007, "grain": 0.0024, "bed_size": (0.4, 0.036, 0.046)},
             r"coarse = 0.007 m makes grains of .* coarse = 0.006 m would do",
         ),
-        ({"surface": "steel"}, r"surface = 'steel' has no grains .* sand, jsc1a would do"),
+        ({"surface": "steel"}, r"surface = 'steel' has no grains .* sand, sand-calibrated, jsc1a would do"),
         ({"spike_clear": 0.01}, r"spike_diameter = 0.012 m, spike_clear = 0.01 m"),
         ({"bed_stages": ("rain:dry", "stick", "level")}, r"bed_stages: .* these grains do not stick anyway"),
         ({"bed_stages": ("rain", "compact:0.6")}, r"bed_stages ends with 'compact:0.6': 'level' last"),
@@ -229,7 +230,7 @@ def test_a_landing_that_lets_go_of_the_sand_on_its_way_down_has_not_rebounded():
     for end, share in ((6, 0.4), (4, None)):
         rows = {"time": np.arange(end), "vx": 0 * speeds[:end], "vy": speeds[:end], "omega": 0 * speeds[:end]}
         rows["kinetic_energy"] = speeds[:end] ** 2
-        run = SimpleNamespace(columns=rows, states=states[:end], trial=SimpleNamespace(spike_length=0.2))
+        run = SimpleNamespace(columns=rows, states=states[:end], trial=Trial(gravity_sim=9.80665, spike_length=0.2))
         found = tumble_steppers._landing(run)["restitution"]["value"]
         assert found == (share and pytest.approx(share))
 
