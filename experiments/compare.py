@@ -16,6 +16,7 @@ from hedgebed import __version__
 
 from .compare_settings import CompareSettings
 from .compare_tumbles import Moved, compared_columns, gaps, read_moved, told_apart
+from .kept_results import PATH_AND_MOTION, require_files
 from .progress import Progress
 from .reporting import write_report
 from .runfolder import RunFolder, read_json
@@ -51,6 +52,8 @@ def _finished(path: str) -> RunFolder:
         raise ValueError(
             f"runs: {path!r} has no result yet ({status}): `hedgebed resume {path}` finishes it where it can be"
         )
+    if folder.command == "tumble":
+        require_files(folder, PATH_AND_MOTION, key="runs")
     return folder
 
 
