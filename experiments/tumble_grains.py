@@ -256,6 +256,11 @@ def _check_bed(settings: TumbleSettings, forecast: Forecast, material: Material)
             f"bed_size = {depth:g} m deep is too shallow: {forecast.on} a tip goes {forecast.deepest:.2g} m "
             f"deep, so with two spikes' diameters below it {least:.2g} m would do"
         )
+    if abs(settings.place) > 0.5 * length:
+        raise ValueError(
+            f"place = {settings.place:g} m is off the bed, {length:g} m long in all: -{0.5 * length:g} to "
+            f"{0.5 * length:g} m from its middle would do"
+        )
     if settings.place and settings.coarse is not None:
         raise ValueError(
             f"place = {settings.place:g} m with coarse = {settings.coarse:g} m: a graded bed is fine in its middle, "

@@ -41,6 +41,8 @@ def on_bed(**more):
             {"coarse": 0.006, "grain": 0.0024, "place": 0.1, "bed_size": (0.4, 0.036, 0.046)},
             r"place = 0.1 m with coarse = 0.006 m: .* place = 0 or another seed would do",
         ),
+        ({"place": 5.0, "bed_size": (0.3, 0.06, 0.046)}, r"place = 5 m is off the bed, .* -0.15 to 0.15 m .* would do"),
+        ({"place": -0.31, "bed_size": (0.3, 0.06, 0.046), "bed_repeats": 2}, r"off the bed, 0.6 m long in all"),
         (
             {"coarse": 0.007, "grain": 0.0024, "bed_size": (0.4, 0.036, 0.046)},
             r"coarse = 0.007 m makes grains of .* coarse = 0.006 m would do",
