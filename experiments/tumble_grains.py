@@ -23,7 +23,7 @@ from rigid.trial import Trial
 
 from .bed_graded import graded_under
 from .bed_progress import BedProgress
-from .bed_staged import check_bed_stages, staged_bed
+from .bed_staged import check_bed_stages, packing_warning, staged_bed
 from .following import CHECKPOINT, follow
 from .progress import Progress
 from .reporting import write_report
@@ -96,7 +96,9 @@ def tumble_on_grains(settings: TumbleSettings, folder: RunFolder, progress: Prog
     """Carry it out in `folder`, from its checkpoint where there is one; the result."""
     with folder.lock():
         plan = _plan(settings)
-        for sentence in (*_sentences(settings, plan), *(f"warning: {warning}" for warning in plan.warnings)):
+        unlike = packing_warning(find_surface(plan.surface), _material(plan), settings.bed_stages)
+        warnings = [*plan.warnings, *([unlike] if unlike else [])]
+        for sentence in (*_sentences(settings, plan), *(f"warning: {warning}" for warning in warnings)):
             progress.message(sentence)
         forecast = _forecast(settings, plan)
         softening = _softness(settings, plan, forecast)

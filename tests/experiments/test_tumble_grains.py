@@ -12,6 +12,7 @@ from coupling import CoupledTumble, LawFooting, LeftTheBedError
 from dem import SAND
 from experiments import following, tumble, tumble_grains, tumble_grains_result, tumble_steppers
 from experiments.cli import main
+from experiments.progress import Progress
 from experiments.runfolder import RunFolder
 from experiments.softening import Softening
 from experiments.tumble_settings import TumbleSettings
@@ -134,6 +135,34 @@ def small_bed(settings, *_):
     bed.advance(1000)
     bed.surface = float((bed.grains()["position"][:, 2] + 0.5 * d).max())
     return bed
+
+
+def test_jsc1a_without_stages_is_told_before_the_bed_is_made_which_would_do(tmp_path, monkeypatch):
+    """Its grains were calibrated at 0.57: the stages named are those of the cases that ship, and a bed can go through
+    them; with them, and for sand, whose grains belong to no packing, nothing is said."""
+
+    class ReachedError(Exception):
+        pass
+
+    def prepare(*_):
+        raise ReachedError
+
+    monkeypatch.setattr(tumble_grains, "_prepare", prepare)
+    shipped = ("rain:dry", "compact:0.57", "stick", "level")
+    told = {}
+    for name, given in (
+        ("plain", {"surface": "jsc1a"}), ("staged", {"surface": "jsc1a", "bed_stages": shipped}), ("sand", {}),
+    ):  # fmt: skip
+        settings = on_bed(bed_size=(0.4, 0.06, 0.061), **given)
+        tumble.check(settings)
+        progress, told[name] = Progress(), []
+        monkeypatch.setattr(progress, "message", told[name].append)
+        with pytest.raises(ReachedError):
+            tumble_grains.tumble_on_grains(settings, RunFolder.create(tmp_path / name, "tumble", settings), progress)
+    (said,) = (text for text in told["plain"] if "bed_stages the bed is" in text)
+    assert said.startswith("warning: ") and "packed at 0.57" in said and "will not be jsc1a" in said
+    assert f"--bed-stages {' '.join(shipped)} would do" in said
+    assert not any("bed_stages the bed is" in text for name in ("staged", "sand") for text in told[name])
 
 
 @pytest.mark.parametrize("false", [False, True])
