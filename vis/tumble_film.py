@@ -219,7 +219,8 @@ class Sheet:
         axis.set_xlabel("time [s]", labelpad=1)
         there = [name for name in STATES if any(name in reel.states for reel in self.reels)]
         for place, name in enumerate(there):
-            sheet.text(0.885, 0.125 - 0.027 * place, f"■ {name}", color=STATES[name], fontsize=10)
+            sheet.text(0.885, 0.125 - 0.027 * place, "■", color=STATES[name], fontsize=10)
+            sheet.text(0.898, 0.125 - 0.027 * place, name, fontsize=10)
 
     def _bar(self, sheet: Figure) -> None:
         axis = sheet.add_axes((0.925, 0.27, 0.012, 0.5))
