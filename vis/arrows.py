@@ -54,7 +54,7 @@ def _inside(foot: NDArray[np.float64], head: NDArray[np.float64]) -> tuple[float
 
 
 def _say(axis: Any, end: NDArray[np.float64], words: str) -> None:
-    """Words beside the end of an arrow, towards the middle, below the corner that holds the weight's."""
-    x, y = float(end[0]), float(np.clip(end[1], 0.06, 0.87))
-    aside, side = (0.02, "left") if x < 0.6 else (-0.02, "right")
+    """Words beside the end of an arrow and over its shaft, towards the middle; below the corner of the weight's."""
+    x, y = float(end[0]), float(np.clip(end[1] + 0.05, 0.06, 0.96 if end[0] > 0.4 else 0.87))
+    aside, side = (0.03, "left") if x < 0.6 else (-0.03, "right")
     axis.text(x + aside, y, words, fontsize=10, ha=side, va="center", color=INK, bbox=HALO)
