@@ -109,3 +109,14 @@ def test_a_kept_result_is_refused_with_what_it_lacks_and_no_lock_is_left(runs, t
         assert "has no series/motion.csv; a kept result holds run.toml, result.json, trajectory.csv alone: " in said
         assert f"`hedgebed tumble {kept / 'run.toml'}` computes it again" in said
         assert len(list(kept.iterdir())) == 3 and not (tmp_path / "out").exists()
+
+
+def test_resuming_a_kept_result_shows_it_and_computes_and_writes_nothing(runs, tmp_path, capsys):
+    kept = tmp_path / "kept"
+    kept.mkdir()
+    for name in ("run.toml", "result.json", "trajectory.csv"):
+        (kept / name).write_bytes((runs / "sand" / name).read_bytes())
+    before = {path.name: path.read_bytes() for path in kept.iterdir()}
+    assert main(["resume", str(kept), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == json.loads((runs / "sand" / "result.json").read_text())
+    assert {path.name: path.read_bytes() for path in kept.iterdir()} == before
