@@ -76,6 +76,7 @@ def staged_bed(
     seed: int,
     young: float,
     max_overlap: float,
+    arch: str,
     threads: int | None,
     cache: bool,
     progress: Progress,
@@ -88,7 +89,7 @@ def staged_bed(
     try:
         prepared = prepare_as(
             material, stages=stages, size=size, grain=grain, spread=spread, gravity=gravity, seed=seed, young=young,
-            max_overlap=max_overlap, threads=threads, cache=cache,
+            max_overlap=max_overlap, arch=arch, threads=threads, cache=cache,
             progress=_OneStage(progress, "bed", len(stages), asked_to_stop),
         )  # fmt: skip
     except ValueError as error:  # found while it was prepared, as a packing that cannot be reached

@@ -304,7 +304,6 @@ def test_stages_of_a_bed_reach_the_laboratory_and_its_cache(monkeypatch):
     from dem.laboratory import Prepared
     from dem.materials import material
     from experiments import bed_staged
-    from experiments.progress import Progress
 
     asked, bed = [], SimpleNamespace()
 
@@ -319,9 +318,34 @@ def test_stages_of_a_bed_reach_the_laboratory_and_its_cache(monkeypatch):
     monkeypatch.setattr(bed_staged, "prepare_as", prepare_as)
     options = {
         "size": (0.04, 0.04, 0.03), "grain": 0.005, "spread": 0.15, "gravity": 9.81, "seed": 1, "young": 1e6,
-        "max_overlap": 0.1, "threads": 1, "cache": True, "progress": Progress(), "asked_to_stop": lambda: False,
+        "max_overlap": 0.1, "arch": "cpu", "threads": 1, "cache": True, "progress": Progress(),
+        "asked_to_stop": lambda: False,
     }  # fmt: skip
     assert bed_staged.staged_bed(material("sand"), ("rain", "fluff", "level"), **options) is bed
     assert asked == [(("rain", "fluff", "level"), True)]
     with pytest.raises(RuntimeError, match=r"packing = 0\.6 cannot be reached"):
         bed_staged.staged_bed(material("sand"), ("rain", "compact:0.6", "level"), **options)
+
+
+def test_a_tumble_with_stages_asks_the_laboratory_for_a_bed_with_all_it_was_told(monkeypatch):
+    """jsc1a as its cases have it: what the tumble hands on, the laboratory takes (it ended in a TypeError)."""
+    import inspect
+
+    from dem.laboratory import prepare_as as laboratory
+    from experiments import bed_staged
+
+    asked, bed = {}, SimpleNamespace()
+
+    def prepare_as(*given, **options):
+        asked.update(inspect.signature(laboratory).bind(*given, **options).arguments)
+        return SimpleNamespace(bed=bed)
+
+    monkeypatch.setattr(bed_staged, "prepare_as", prepare_as)
+    stages = ("rain:dry", "compact:0.57", "stick", "level")
+    settings = on_bed(surface="jsc1a", bed_size=(0.4, 0.06, 0.061), bed_stages=stages, threads=1, seed=7)
+    plan = tumble_grains._plan(settings)
+    forecast = tumble_grains._forecast(settings, plan)
+    softening = tumble_grains._softness(settings, plan, forecast)
+    assert tumble_grains._prepare(settings, plan, forecast, softening, Progress()) is bed
+    assert asked["stages"] == stages and asked["seed"] == 7 and asked["young"] == softening.young
+    assert (asked["arch"], asked["threads"], asked["gravity"]) == ("cpu", 1, pytest.approx(9.80665))
