@@ -33,7 +33,14 @@ AWAY = 100.0
 
 
 class LeftTheBedError(RuntimeError):
-    """The body came down where there is no bed, or down to its floor."""
+    """The body came down where there is no bed, or down to its floor.
+
+    `lacking`: how much bed it would have taken on that side [m]; 0 where it is depth that lacks.
+    """
+
+    def __init__(self, said: str, *, lacking: float = 0.0) -> None:
+        super().__init__(said)
+        self.lacking = lacking
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -326,7 +333,8 @@ class BedFooting:
                 size = f"{length:g} m {'wide' if axis else 'long'}"
                 raise LeftTheBedError(
                     f"{what} came down {off:.3g} m {way} the bed, which is {size}, at {'xy'[axis]} = "
-                    f"{float(end[axis]):.4g} m from the start"
+                    f"{float(end[axis]):.4g} m from the start",
+                    lacking=off + 2 * member.radius,
                 )
         if member.row != HULL and lowest + self.origin[2] < member.radius:
             raise LeftTheBedError(

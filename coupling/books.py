@@ -113,10 +113,26 @@ class Books:
         return energy - energy[0] - rows["torque_work"] + rows["taken"] - rows["taken"][0]
 
     @property
+    def _stored(self) -> Vector:
+        """What the footing holds [J], at each time of `samples`."""
+        samples = self.samples
+        return np.asarray(np.sum([samples[name] for name in self.energy_names], axis=0))
+
+    @property
+    def stored_by_row(self) -> Vector:
+        """What the footing holds at every row [J], between two samples in proportion."""
+        return np.interp(self.columns["time"], self.samples["time"], self._stored)
+
+    @property
+    def dissipated_by_row(self) -> Vector:
+        """What the footing took less what it holds more than at the start [J], at every row."""
+        taken, stored = self.columns["taken"], self.stored_by_row
+        return np.asarray(taken - taken[0] - (stored - stored[0]))
+
+    @property
     def dissipated(self) -> Vector:
         """What the footing took less what it holds more than at the start [J], at each time of `samples`."""
-        rows, samples = self.columns, self.samples
-        held = np.sum([samples[name] for name in self.energy_names], axis=0)
+        rows, samples, held = self.columns, self.samples, self._stored
         taken = rows["taken"][np.searchsorted(rows["time"], samples["time"])]
         return np.asarray(taken - taken[0] - (held - held[0]))
 

@@ -1,25 +1,34 @@
 """Pivot, slip or hop, read off the forces of grains by stated rules, so that it compares with the planar model's.
 
-Over a window of 5 ms the means of each row's normal force N, of its horizontal force F and of the horizontal speed u of
-its lowest material point are taken. A row
+Over a window of 5 ms the means of each row's normal force N, of its horizontal force F and of the horizontal velocity u
+of its lowest material point are taken. In the plane of motion F and u have one component and a row is one of spikes
+side by side; in space they have two and a row is a single spike. A row
 
 - *touches* while the force on it, N and F together, is above 1 % of the weight on the surface: sand pushes a spike that
   is in it sideways where nothing bears it any more;
-- *slides* while |F| is at least mu_d N, F is against u and |u| is above 2 mm/s; what touches and does not slide sticks.
-  mu_d is the surface's, as the spring-damper has it.
+- *slides* while |F| is at least mu_d N, F is against u (F . u < 0) and |u| is above 2 mm/s; what touches and does not
+  slide sticks. mu_d is the surface's, as the spring-damper has it.
 
-Then as in the planar model: hop (none touches), slip (all that touch slide), pivot (one sticks), stand (more do).
-A grain's knocks are shorter than the window and a torque's changes longer. Changes come late by half the window.
+Then as in the planar model: hop (none touches), slip (all that touch slide), pivot (one sticks), stand (more do). A row
+of spikes side by side is a line about which the platform can turn; so in space it is a pivot while those that stick
+lie in one line, and it stands on three that do not. A grain's knocks are shorter than the window and a torque's
+changes longer. Changes come late by half the window.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CREEP", "TOUCH_SHARE", "WINDOW", "ContactReader", "state_of"]
+from .footing import FootReaction
+from .poses import Twist, Vector
+
+__all__ = [
+    "CREEP", "LINE", "TOUCH_SHARE", "WINDOW", "ContactReader", "changes_of", "feet_of", "in_a_line", "state_of",
+]  # fmt: skip
 
 WINDOW = 5e-3
 """Over which forces and speeds are averaged [s]."""
@@ -27,35 +36,103 @@ TOUCH_SHARE = 0.01
 """Force on a row that touches, over the weight [1]."""
 CREEP = 2e-3
 """Horizontal speed up to which a row counts as held [m/s]."""
+LINE = 0.05
+"""Spikes lie in a line where none is farther off than this, over the largest distance of any from the centre [1]."""
 
 Array = NDArray[np.float64]
 
 
-def state_of(touching: NDArray[np.bool_], sliding: NDArray[np.bool_]) -> str:
-    """The planar model's state of these rows."""
+def state_of(touching: NDArray[np.bool_], sliding: NDArray[np.bool_], places: Array | None = None) -> str:
+    """The planar model's state of these rows.
+
+    `places` : of single spikes in space [m], shape [row, 3]; None: each row is a line across the motion.
+    """
     if not touching.any():
         return "hop"
-    sticking = int((touching & ~sliding).sum())
-    return "slip" if sticking == 0 else "pivot" if sticking == 1 else "stand"
+    held = touching & ~sliding
+    if not held.any():
+        return "slip"
+    if places is None:
+        return "pivot" if int(held.sum()) == 1 else "stand"
+    return "pivot" if in_a_line(places[held], LINE * float(np.linalg.norm(places, axis=1).max())) else "stand"
+
+
+def in_a_line(places: Array, within: float) -> bool:
+    """Whether points [m], shape [n, 3], lie within this distance [m] of one line: a body held there can turn."""
+    if len(places) < 3:
+        return True
+    away = places - places.mean(axis=0)
+    axes = np.linalg.svd(away, full_matrices=False)[2]
+    return bool(np.linalg.norm(away @ axes[1:].T, axis=1).max() <= within)
+
+
+def feet_of(reaction: FootReaction | None, centre: Vector, twist: Twist, count: int, *, hull: bool = False) -> Array:
+    """What each row feels: N [N], F along x and y [N], u along x and y [m/s], depth [m]; shape [6, row].
+
+    Parameters
+    ----------
+    reaction : of the step before; None before the first.
+    centre, twist : where the body's origin was in the step's middle [m], and how it moves at its end.
+    count : of the rows; `hull`: whether one more, the last, is what is no spike.
+    """
+    feet = np.zeros((6, count + hull))
+    if reaction is None:
+        return feet
+    velocity, spin = twist.velocity, twist.spin
+    for row, contact in reaction.contacts.items():
+        if row < 0 and not hull:
+            continue
+        along = contact.tangential_force
+        feet[0, row] = contact.normal_force
+        if along is not None:
+            feet[1:3, row] = along[:2]
+        x, y, z = contact.point - centre
+        feet[3:5, row] = velocity[0] + (spin[1] * z - spin[2] * y), velocity[1] + (spin[2] * x - spin[0] * z)
+    for row, depth in reaction.sinkage.items():
+        feet[5, row] = depth
+    return feet
+
+
+def changes_of(
+    times: Iterable[float], states: Iterable[str], angles: Iterable[float]
+) -> tuple[tuple[float, str, float], ...]:
+    """(time [s], state entered, angle [rad]) where the state changes; the first is the one it begins with."""
+    found: list[tuple[float, str, float]] = []
+    for time, state, angle in zip(times, states, angles, strict=True):
+        if not found or state != found[-1][1]:
+            found.append((float(time), state, float(angle)))
+    return tuple(found)
 
 
 class ContactReader:
-    """Follows the rows' forces in steps of `macro_step` [s]; `weight` [N] on the surface, `mu_d` [1]."""
+    """Follows the rows' forces in steps of `macro_step` [s]; `weight` [N] on the surface, `mu_d` [1].
 
-    def __init__(self, rows: int, *, weight: float, mu_d: float, macro_step: float) -> None:
-        self.weight, self.mu_d = weight, mu_d
-        self._ring = np.zeros((max(1, round(WINDOW / macro_step)), 3, rows))
+    In space `places` says where its spikes are about the centre of mass, in body axes [m], shape [row, 3].
+    """
+
+    def __init__(
+        self, rows: int, *, weight: float, mu_d: float, macro_step: float, places: Array | None = None
+    ) -> None:
+        self.weight, self.mu_d, self.places = weight, mu_d, places
+        self._axes = 1 if places is None else 2
+        self._ring = np.zeros((max(1, round(WINDOW / macro_step)), 1 + 2 * self._axes, rows))
         self._filled = 0
 
     def see(self, normal: Array, along: Array, slip: Array) -> str:
-        """The state after one more step of normal and horizontal forces [N] and slip speeds [m/s] of the rows."""
+        """The state after one more step of normal and horizontal forces [N] and slip velocities [m/s] of the rows.
+
+        Horizontal ones of shape [row] in the plane, [2, row] in space.
+        """
+        axes = self._axes
         self._ring = np.roll(self._ring, 1, axis=0)
-        self._ring[0] = normal, along, slip
+        self._ring[0] = np.vstack([normal, along, slip])
         self._filled = min(self._filled + 1, len(self._ring))
-        n, f, u = self._ring[: self._filled].mean(axis=0)
-        touching = np.hypot(n, f) > TOUCH_SHARE * self.weight
-        sliding = (abs(f) >= self.mu_d * n) & (f * u < 0) & (abs(u) > CREEP)
-        return state_of(touching, sliding)
+        mean = self._ring[: self._filled].mean(axis=0)
+        n, f, u = mean[0], mean[1 : 1 + axes], mean[1 + axes :]
+        force, speed = np.abs(np.hypot.reduce(f)), np.abs(np.hypot.reduce(u))
+        touching = np.hypot(n, force) > TOUCH_SHARE * self.weight
+        sliding = (force >= self.mu_d * n) & ((f * u).sum(axis=0) < 0) & (speed > CREEP)
+        return state_of(touching, sliding, self.places)
 
     def state(self) -> dict[str, Any]:
         """What the next answers depend on."""

@@ -31,6 +31,7 @@ class Followed(Books):
     lowering_speed: float | None
     placed: bool
     """Whether the hand has let go."""
+    _extrapolation: int
     pace = 1.0
     """The hand's times over those on grains at 1 g (`lowered_gravity.pace_under`) [1]."""
 
@@ -62,6 +63,10 @@ class Followed(Books):
     def _hand_time(self) -> float:
         """How long setting down was guessed to take [s]; 0 without a hand."""
         return self.pace * REST_TIME + PLACING_WAY / self.lowering_speed if self.lowering_speed is not None else 0.0
+
+    def _order(self) -> None:
+        """In the hand, where the body is light, the guess at the next force is the last one, whatever is asked for."""
+        self.master.extrapolation = self._extrapolation if self.placed else 0
 
     def advance(self) -> None:
         """One macro step; nothing once it is done."""
@@ -122,4 +127,5 @@ class Followed(Books):
         """It lies where it was set down: the hand lets go."""
         self.body.let_go()
         self.placed = True
+        self._order()
         self._begin()

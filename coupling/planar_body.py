@@ -29,10 +29,12 @@ from rigid.trial import Trial
 from .footing import FootReaction
 from .poses import Pose, Twist, Vector, Wrench
 
-__all__ = ["HAND_TIME", "PlanarBody"]
+__all__ = ["HAND_STEP", "HAND_TIME", "PlanarBody", "hand_time"]
 
 HAND_TIME = 0.002
 """Mass over drag of a body that a hand sets down [s], as in `coupling.SetDown`."""
+HAND_STEP = 4e-4
+"""Macro step up to which that mass bears it [s]; beyond, mass goes with the square of the step, as K H^2 / m does."""
 _OPEN = 9
 """Mode of a row that does not touch."""
 
@@ -71,15 +73,16 @@ class PlanarBody:
         self._drag = np.zeros(3)
         self.held_by_hand = False
 
-    def take_in_hand(self, lowering_speed: float, *, pace: float = 1.0) -> None:
+    def take_in_hand(self, lowering_speed: float, *, pace: float = 1.0, step: float = 0.0) -> None:
         """From here on a hand lowers it: c = W / lowering_speed [m/s] resists, and what is felt has the mass 2 ms c.
 
         The same in all directions, and about the axis with l^2: it sinks until the ground carries it, and cannot bounce
-        on a ground softer than W / (8 ms lowering_speed). The torque waits. `pace` times 2 ms where all is slower.
+        on a ground softer than W / (8 ms lowering_speed). The torque waits. `pace` times 2 ms where all is slower; more
+        where `step`, the macro step [s], is long (`hand_time`).
         """
         scale = np.array([1.0, 1.0, self.trial.spike_length**2])
         drag = self.trial.weight / lowering_speed
-        self.inertia, self._drag = pace * HAND_TIME * drag * scale, drag * scale
+        self.inertia, self._drag = hand_time(step, pace) * drag * scale, drag * scale
         self.held_by_hand = True
 
     def let_go(self) -> None:
@@ -215,6 +218,12 @@ class PlanarBody:
             self._until_limit = until
         left = min(left, until)
         return trial.torque * min(1.0, max(0.0, left / dt))
+
+
+def hand_time(step: float, pace: float = 1.0) -> float:
+    """Mass over drag of a body in a hand [s] whose forces are exchanged every `step` [s], where all is `pace` times
+    slower than at 1 g."""
+    return pace * HAND_TIME * max(1.0, step / (pace * HAND_STEP)) ** 2
 
 
 class _Friction:

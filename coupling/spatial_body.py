@@ -26,7 +26,7 @@ from rigid.quaternions import to_matrix
 from rigid.spatial import SpatialTrial
 
 from .footing import FootReaction
-from .planar_body import HAND_TIME
+from .planar_body import hand_time
 from .poses import Pose, Twist, Vector, Wrench, moved
 from .spatial_friction import SpatialFriction
 
@@ -98,13 +98,13 @@ class SpatialBody:
         self._drag = np.zeros(2)
         self.held_by_hand = False
 
-    def take_in_hand(self, lowering_speed: float) -> None:
+    def take_in_hand(self, lowering_speed: float, *, step: float = 0.0) -> None:
         """From here on a hand lowers it at `lowering_speed` [m/s], as `PlanarBody.take_in_hand` says. Torques wait."""
         weight, reach = float(np.linalg.norm(self.trial.weight)), self.trial.platform.reach
         drag = weight / lowering_speed
         velocity, spin = self.twist.velocity, self.twist.spin
-        self._masses = HAND_TIME * drag * np.ones(3)
-        self._inertia = HAND_TIME * drag * reach**2 * np.eye(3)
+        time = hand_time(step)
+        self._masses, self._inertia = time * drag * np.ones(3), time * drag * reach**2 * np.eye(3)
         self._drag = np.array([drag, drag * reach**2])
         self.held_by_hand = True
         self.momentum, self.angular_momentum = self._masses * velocity, self._spin_to_momentum(spin)

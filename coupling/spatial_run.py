@@ -12,10 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from rigid.quaternions import to_matrix
+from rigid.quaternions import angle_between, to_matrix
 from rigid.spatial import SpatialTrial
+from rigid.trajectory import STATES, Transition
 
 from .bed_footing import BedFooting
+from .contact_state import ContactReader, changes_of, feet_of, state_of
 from .followed import Followed
 from .footing import Footing, FootReaction, LawFooting
 from .master import Master
@@ -31,6 +33,8 @@ COLUMNS = (
 """Of a row: centre of mass [m], quaternion, velocity [m/s] and spin [rad/s] in world axes, absolute speeds of the
 wheels [rad/s], energies and works [J] as the planar rows have them, the footing's force [N], how many members touch,
 the deepest spike's depth [m]."""
+FEET = 6
+"""Numbers of a spike (`contact_state.feet_of`); of those that have none a step keeps nothing."""
 
 
 class SpatialRun(Followed):
@@ -92,14 +96,23 @@ class SpatialRun(Followed):
             self.body, footing, substeps=substeps, body_steps=body_steps, extrapolation=extrapolation,
             iterations=iterations, first_guess=Wrench.none(),
         )  # fmt: skip
+        self._extrapolation = extrapolation
+        self._places = np.vstack([tips, -trial.platform.centre_of_mass])  # the hull last
+        self.reader = ContactReader(
+            len(self._places), weight=self._weight, mu_d=trial.sliding_friction, macro_step=self.master.macro_step,
+            places=self._places,
+        )  # fmt: skip
         self._every = max(1, round(energy_interval / self.master.macro_step))
         self.lowering_speed = lowering_speed
         self.placed = lowering_speed is None
         """Whether the hand has let go."""
         self._rows: list[list[float]] = []
+        self._states: list[int] = []
+        self._feet: list[Vector] = []
         self._not_begun()
+        self._order()
         if lowering_speed is not None:
-            self.body.take_in_hand(lowering_speed)
+            self.body.take_in_hand(lowering_speed, step=self.master.macro_step)
         else:
             self.body.start(footing.lag)
             self._begin()
@@ -158,6 +171,22 @@ class SpatialRun(Followed):
                 *self.master.wrench.force, touching, deepest,
             ]
         )  # fmt: skip
+        centre = body.place - 0.5 * self.master.macro_step * twist.velocity
+        feet = feet_of(reaction, centre, twist, len(self._places) - 1, hull=True)
+        there = np.flatnonzero(feet.any(axis=0))
+        self._feet.append(np.column_stack([np.full(len(there), len(self._rows) - 1.0), there, feet[:, there].T]))
+        if self.footing.gives_friction:
+            state = self.reader.see(feet[0], feet[1:3], feet[3:5])
+        else:
+            state = self._law_state()
+        self._states.append(STATES.index(state))
+
+    def _law_state(self) -> str:
+        """By the tips that stick and slide under their Coulomb bounds."""
+        places, body = self._places, self.body
+        sliding = np.isin(np.arange(len(places)), list(body.sliding))
+        touching = sliding | np.isin(np.arange(len(places)), list(body.sticking))
+        return state_of(touching, sliding, places)
 
     @property
     def _turning(self) -> Vector:
@@ -176,6 +205,39 @@ class SpatialRun(Followed):
         return dict(zip(COLUMNS, np.array(self._rows, dtype=float).reshape(-1, len(COLUMNS)).T, strict=True))
 
     @property
+    def feet(self) -> Vector:
+        """What each spike feels at every row (`contact_state.feet_of`), the hull as the last; shape [step, 6, spike].
+
+        Friction is 0 where a surface law says only how large it may be.
+        """
+        dense = np.zeros((len(self._rows), FEET, len(self._places)))
+        kept = self._feet_table
+        dense[kept[:, 0].astype(int), :, kept[:, 1].astype(int)] = kept[:, 2:]
+        return dense
+
+    @property
+    def _feet_table(self) -> Vector:
+        """Row, spike and its numbers, of those that have any."""
+        return np.concatenate([np.zeros((0, 2 + FEET)), *self._feet])
+
+    @property
+    def states(self) -> list[str]:
+        """The state at every row: of `coupling.contact_state` on grains, on a law by who sticks and who slides."""
+        return [STATES[code] for code in self._states]
+
+    @property
+    def turned(self) -> Vector:
+        """Angle of the one turn from the start, at every row [rad], at most pi."""
+        rows = self.columns
+        turns = np.column_stack([rows[f"q{k}"] for k in range(4)])
+        return angle_between(turns, turns[:1])
+
+    @property
+    def transitions(self) -> tuple[Transition, ...]:
+        """Every change of state: (time [s], state entered, `turned` [rad]); the first is the state at the start."""
+        return changes_of(self.columns["time"], self.states, self.turned)
+
+    @property
     def energy_scale(self) -> float:
         """max(|work of the torques|, W reach, the kinetic energy at the start) [J], which residuals are relative to."""
         rows = self.columns
@@ -188,7 +250,10 @@ class SpatialRun(Followed):
             "run.counts": np.array([self.placed, self.placing_steps, self._frames], dtype=np.int64),
             "run.settling": np.array(self._settling, dtype=float).reshape(-1, 12),
             "run.rows": np.array(self._rows, dtype=float).reshape(-1, len(COLUMNS)),
+            "run.states": np.array(self._states, dtype=np.int8),
+            "run.feet": self._feet_table,
         }
+        own |= {f"reader.{key}": value for key, value in self.reader.state().items()}
         return own | self._books_state() | self.master.state()
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -197,5 +262,9 @@ class SpatialRun(Followed):
         self.placed = bool(placed)
         self._settling = [row.copy() for row in np.asarray(state["run.settling"], dtype=float)]
         self._rows = np.asarray(state["run.rows"]).tolist()
+        self._states = [int(code) for code in state["run.states"]]
+        self._feet = [np.array(state["run.feet"], dtype=float)]
+        self.reader.restore({key[7:]: value for key, value in state.items() if key.startswith("reader.")})
         self._restore_books(state)
         self.master.restore(state)
+        self._order()

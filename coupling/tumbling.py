@@ -19,7 +19,7 @@ from rigid.trajectory import STATES, Tally, Trajectory, Transition
 from rigid.trial import Trial
 
 from .bed_footing import BedFooting
-from .contact_state import ContactReader, state_of
+from .contact_state import ContactReader, changes_of, feet_of, state_of
 from .followed import REST_TIME, Followed
 from .footing import Footing, FootReaction, LawFooting
 from .lowered_gravity import LoweredGravity, pace_under
@@ -114,6 +114,7 @@ class CoupledTumble(Followed):
             iterations=iterations, first_guess=weight,
         )  # fmt: skip
         rows = trial.spike_count
+        self._extrapolation = extrapolation
         self.reader = ContactReader(
             rows, weight=trial.weight, mu_d=trial.sliding_friction, macro_step=self.master.macro_step
         )
@@ -126,6 +127,7 @@ class CoupledTumble(Followed):
         self._states: list[int] = []
         self._feet: list[np.ndarray] = []
         self._not_begun()
+        self._order()
         if self.placed:
             self.body.touching = rests
             self._begin()
@@ -135,7 +137,7 @@ class CoupledTumble(Followed):
                 self.pace = pace_under(footing.gravity)
             if self.lowered is not None:
                 self.body.trial = replace(trial, gravity_sim=self.lowered.now)
-            self.body.take_in_hand(lowering_speed, pace=self.pace)
+            self.body.take_in_hand(lowering_speed, pace=self.pace, step=self.master.macro_step)
 
     _free, _turns = (0, 2), (1,)
 
@@ -237,20 +239,9 @@ class CoupledTumble(Followed):
                 body.potential_energy, body.torque_work, given, taken,
             ]
         )  # fmt: skip
-        count = self.trial.spike_count
-        feet = np.zeros((4, count))
-        if reaction is not None:
-            centre = body.place[:2] - 0.5 * master.macro_step * rates[:2]
-            for row, contact in reaction.contacts.items():
-                if row < 0:
-                    continue
-                h = centre[1] - contact.point[2]
-                along = contact.tangential_force
-                feet[0, row] = contact.normal_force
-                feet[1, row] = along[0] if along is not None else 0.0
-                feet[2, row] = rates[0] - rates[2] * h
-            for row, depth in reaction.sinkage.items():
-                feet[3, row] = depth
+        now = body.twist_now(lag)
+        centre = body.pose.position - 0.5 * master.macro_step * now.velocity
+        feet = feet_of(reaction, centre, now, self.trial.spike_count)[[0, 1, 3, 5]]
         self._feet.append(feet)
         if self.footing.gives_friction:
             state = self.reader.see(feet[0], feet[1], feet[2])
@@ -300,7 +291,7 @@ class CoupledTumble(Followed):
         `dissipated` is what the footing took less what it holds more than at the start, at every row; of a bed that is
         measured as well, at the times of `samples` (`losses`).
         """
-        rows, samples = self.columns, self.samples
+        rows = self.columns
         tally = Tally(self.trial, rows["x"][0], rows["y"][0], 0.0)
         for k in range(len(rows["time"])):
             away = tally.distance(rows["x"][k], rows["y"][k])
@@ -309,15 +300,13 @@ class CoupledTumble(Followed):
                 share = (0.01 - near) / (away - near)
                 tally.launch(*(rows[c][k - 1] + share * (rows[c][k] - rows[c][k - 1]) for c in ("x", "y")))
             tally.see(rows["time"][k], rows["vx"][k], rows["vy"][k], rows["omega"][k], 0.0, rows["torque_work"][k], 0.0)
-        held = np.sum([samples[name] for name in self.energy_names], axis=0)
-        stored = np.interp(rows["time"], samples["time"], held)
         shared = {name: rows[name] for name in COLUMNS[:14]}
         return Trajectory(
             trial=self.trial,
             method="coupled",
             state=np.array(self._states, dtype=np.int8),
-            stored_energy=stored,
-            dissipated=rows["taken"] - rows["taken"][0] - (stored - stored[0]),
+            stored_energy=self.stored_by_row,
+            dissipated=self.dissipated_by_row,
             transitions=self._transitions(),
             trajectory_angle=tally.angle,
             max_speed=tally.max_speed,
@@ -329,11 +318,7 @@ class CoupledTumble(Followed):
         )
 
     def _transitions(self) -> tuple[Transition, ...]:
-        found: list[Transition] = []
-        for row, code in zip(self._rows, self._states, strict=True):
-            if not found or STATES[code] != found[-1][1]:
-                found.append((row[0], STATES[code], row[3]))
-        return tuple(found)
+        return changes_of((row[0] for row in self._rows), self.states, (row[3] for row in self._rows))
 
     def state(self) -> dict[str, Any]:
         """All that the rest of the run depends on: a flat dict of numpy arrays."""
@@ -363,6 +348,7 @@ class CoupledTumble(Followed):
         self._restore_books(state)
         self.reader.restore({key[7:]: value for key, value in state.items() if key.startswith("reader.")})
         self.master.restore(state)
+        self._order()
 
 
 def _sinkage(footing: LawFooting, load: float) -> float:

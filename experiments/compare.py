@@ -1,7 +1,8 @@
 """`hedgebed compare`: two finished runs in one report, their numbers with differences, what they did over time.
 
-Differences are the second less the first. Of tumbles series/compared.csv holds both on one grid of time; what they
-stood on does not matter, nor does who stepped them. Of penetrations numbers are compared, and the drives both have.
+Differences are the second less the first. Of tumbles, two in the plane or two in space, series/compared.csv holds both
+on one grid of time; what they stood on does not matter, nor does who stepped them. Of penetrations numbers are
+compared, and the drives both have.
 """
 
 from __future__ import annotations
@@ -14,18 +15,24 @@ from typing import Any
 
 from hedgebed import __version__
 
+from . import compare_spatial, compare_tumbles
 from .compare_settings import CompareSettings
-from .compare_tumbles import Moved, compared_columns, gaps, read_moved, told_apart
 from .kept_results import PATH_AND_MOTION, require_files
 from .progress import Progress
 from .reporting import write_report
 from .runfolder import RunFolder, read_json
-from .tumble_bed_settings import OF_THE_MASTER, TumbleBedSettings
+from .spatial_settings import ON_ANY_GROUND
+from .tumble_bed_settings import OF_THE_MASTER, GrainsSettings, TumbleBedSettings
 from .whole_runs import whole_run
 
 __all__ = ["check", "resume", "run"]
 
-KINDS = ("tumble", "penetrate")
+IN_THE_PLANE, IN_SPACE = "tumble", "tumble spatial"
+KINDS = (IN_THE_PLANE, IN_SPACE, "penetrate")
+OF_A_BED: dict[str, tuple[type[GrainsSettings], tuple[str, ...]]] = {
+    IN_THE_PLANE: (TumbleBedSettings, OF_THE_MASTER), IN_SPACE: (GrainsSettings, ON_ANY_GROUND),
+}  # fmt: skip
+"""Settings that are of a bed of grains, and those among them that other grounds take too."""
 
 
 def check(settings: CompareSettings) -> None:
@@ -33,11 +40,20 @@ def check(settings: CompareSettings) -> None:
     first, second = (_finished(path) for path in settings.runs)
     if first.path.resolve() == second.path.resolve():
         raise ValueError(f"runs = {settings.runs[0]!r} twice: a run does not differ from itself, another would do")
+    if {first.command, second.command} == {IN_THE_PLANE, IN_SPACE}:
+        raise ValueError(
+            f"runs: {settings.runs[0]!r} is of {first.command} and {settings.runs[1]!r} of {second.command}: in the "
+            f"plane a platform has one angle and rows of spikes, in space an attitude and spikes by themselves; two in "
+            f"the plane or two in space would do"
+        )
     if first.command != second.command:
         raise ValueError(
             f"runs: {settings.runs[0]!r} is of {first.command} and {settings.runs[1]!r} of {second.command}: two of "
             f"one kind would do"
         )
+    if first.command == IN_SPACE:  # an older folder lacks series: said before anything is written
+        for one in (first, second):
+            compare_spatial.read_moved(one.path, read_json(one.path / "result.json"))
 
 
 def _finished(path: str) -> RunFolder:
@@ -45,14 +61,14 @@ def _finished(path: str) -> RunFolder:
     if folder.command not in KINDS:
         raise ValueError(
             f"runs: {path!r} is of {folder.command}, of which there is nothing to compare over time: runs of "
-            f"{' or of '.join(KINDS)} would do"
+            f"{', '.join(KINDS[:-1])} or {KINDS[-1]} would do"
         )
     if not (folder.path / "result.json").exists():
         status = folder.status or "not finished"
         raise ValueError(
             f"runs: {path!r} has no result yet ({status}): `hedgebed resume {path}` finishes it where it can be"
         )
-    if folder.command == "tumble":
+    if folder.command == IN_THE_PLANE:
         require_files(folder, PATH_AND_MOTION, key="runs")
     return folder
 
@@ -71,15 +87,14 @@ def _carry_out(settings: CompareSettings, folder: RunFolder, progress: Progress)
             ],
             "quantities": {}, "departures": {"sentences": []},
             "compared": _compared(results), "differs": _differs(first, second, results),
-            "colour": settings.colour, "pictures": settings.pictures and first.command == "tumble",
+            "colour": settings.colour, "pictures": settings.pictures and first.command != "penetrate",
             "warnings": [
                 f"{label}: {warning}" for label, one in zip(labels, results, strict=True) for warning in one["warnings"]
             ],
         }  # fmt: skip
-        if first.command == "tumble":
+        if first.command != "penetrate":
             progress.stage("series", total=1.0)
-            moved = [read_moved(one.path, one_result) for one, one_result in zip((first, second), results, strict=True)]
-            _add_motion(result, moved, labels, folder)
+            _add_motion(result, (first, second), results, labels, folder)
         result["tables"] = [
             _table(f"Numbers of both, and {labels[1]} less {labels[0]}", labels, result["compared"]),
             *([_differing(labels, result["differs"])] if result["differs"] else []),
@@ -90,15 +105,26 @@ def _carry_out(settings: CompareSettings, folder: RunFolder, progress: Progress)
     return result
 
 
-def _add_motion(result: dict[str, Any], moved: list[Moved], labels: tuple[str, str], folder: RunFolder) -> None:
+def _add_motion(
+    result: dict[str, Any],
+    runs: tuple[RunFolder, RunFolder],
+    results: list[dict[str, Any]],
+    labels: tuple[str, str],
+    folder: RunFolder,
+) -> None:
     """series/compared.csv, the gaps between both as quantities, and sentences."""
-    columns = compared_columns(moved[0], moved[1])
+    module: Any = compare_spatial if result["kind"] == IN_SPACE else compare_tumbles
+    moved = [module.read_moved(one.path, found) for one, found in zip(runs, results, strict=True)]
+    columns = module.compared_columns(*moved)
     folder.write_series("compared", columns)
     result["series"] = "series/compared.csv"
-    result["spike_count"] = min(one.count for one in moved)
+    if result["kind"] == IN_SPACE:
+        result["spikes"] = list(dict.fromkeys(spike for one in moved for spike in one.spikes))
+    else:
+        result["spike_count"] = min(one.count for one in moved)
     result["weights"] = [one.weight for one in moved]
-    result["quantities"] = gaps(columns)
-    result["departures"]["sentences"] = told_apart(columns, labels, moved)
+    result["quantities"] = module.gaps(columns)
+    result["departures"]["sentences"] = module.told_apart(columns, labels, moved)
     result["warnings"] += [f"{label}: {note}" for label, one in zip(labels, moved, strict=True) for note in one.notes]
 
 
@@ -157,11 +183,11 @@ def _differs(first: RunFolder, second: RunFolder, results: list[dict[str, Any]])
 
 def _used(folder: RunFolder, key: str, result: Mapping[str, Any]) -> Any:
     """A setting as it took part in a run; "" where it is of the bed, and there was none."""
-    if folder.command == "tumble":
-        if key == "method":
-            return result["method"]
-        if result["ground"] != "bed" and key in TumbleBedSettings.model_fields and key not in OF_THE_MASTER:
-            return ""
+    if folder.command == IN_THE_PLANE and key == "method":
+        return result["method"]
+    bed, others = OF_A_BED.get(folder.command, (None, ()))
+    if bed is not None and result["ground"] != "bed" and key in bed.model_fields and key not in others:
+        return ""
     return folder.settings.get(key)
 
 

@@ -14,7 +14,9 @@ __all__ = ["CompareSettings"]
 class CompareSettings(StrictSettings):
     """Two finished runs side by side: numbers with their differences, curves, pictures."""
 
-    runs: tuple[str, str] = Field(description="Folders of two finished runs, both of tumble or both of penetrate.")
+    runs: tuple[str, str] = Field(
+        description="Folders of two finished runs of one kind: tumble, tumble spatial or penetrate."
+    )
     colour: Literal["displacement", "speed", "force", "coordination"] = Field(
         "displacement", description="What grains are coloured by in pictures."
     )

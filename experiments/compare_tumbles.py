@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,10 @@ from numpy.typing import NDArray
 
 from .runfolder import read_series
 
-__all__ = ["Moved", "compared_columns", "gaps", "read_moved", "told_apart"]
+__all__ = [
+    "ENERGIES", "Moved", "as_quantities", "compared_columns", "deepest", "gap_entries", "gaps", "lasting", "mean_over",
+    "on_one_grid", "read_moved", "same_state", "told_apart",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 INTERVAL = 1e-3
@@ -88,28 +91,36 @@ def read_moved(folder: Path, result: Mapping[str, Any]) -> Moved:
 
 def compared_columns(first: Moved, second: Moved) -> dict[str, Any]:
     """Both on one grid, `_1` and `_2`: as long as both last; forces are means over 5 ms."""
-    end = float(min(first.time[-1], second.time[-1]))
-    step = max(INTERVAL, end / MOST_ROWS)
-    time: Array = np.asarray(np.arange(math.floor(end / step + 1e-9) + 1) * step, dtype=float)
-    columns: dict[str, Any] = {"t_s": time}
+    columns = on_one_grid(first.series, second.series, CHANNELS)
+    time = columns["t_s"]
     for number, one in enumerate((first, second), 1):
-        for name in CHANNELS:
-            columns[f"{name}_{number}"] = np.interp(time, one.time, one.series[name])
-        nearest = np.clip(np.searchsorted(one.time, time, side="right") - 1, 0, len(one.time) - 1)
-        columns[f"state_{number}"] = np.asarray(one.series["state"])[nearest]
         for row in range(one.count):
             columns[f"sinkage_{row}_m_{number}"] = np.interp(time, one.time, one.sinkage[:, row])
             if one.load is not None:
-                columns[f"load_{row}_N_{number}"] = _mean(time, one.time, one.load[:, row])
+                columns[f"load_{row}_N_{number}"] = mean_over(time, one.time, one.load[:, row])
         for name, values in (("lift_N", one.lift), ("push_N", one.push)):
             if values is not None:
-                columns[f"{name}_{number}"] = _mean(time, one.time, values)
+                columns[f"{name}_{number}"] = mean_over(time, one.time, values)
         for name in ENERGIES:
             columns[f"{name}_{number}"] = np.interp(time, one.motion["t_s"], one.motion[name])
     return columns
 
 
-def _mean(at: Array, time: Array, values: Array) -> Array:
+def on_one_grid(first: Mapping[str, Array], second: Mapping[str, Array], channels: Sequence[str]) -> dict[str, Any]:
+    """`t_s` as long as both trajectories last, their channels `_1` and `_2` there, and the state that each is in."""
+    end = float(min(first["t_s"][-1], second["t_s"][-1]))
+    step = max(INTERVAL, end / MOST_ROWS)
+    time: Array = np.asarray(np.arange(math.floor(end / step + 1e-9) + 1) * step, dtype=float)
+    columns: dict[str, Any] = {"t_s": time}
+    for number, one in enumerate((first, second), 1):
+        for name in channels:
+            columns[f"{name}_{number}"] = np.interp(time, one["t_s"], one[name])
+        nearest = np.clip(np.searchsorted(one["t_s"], time, side="right") - 1, 0, len(one["t_s"]) - 1)
+        columns[f"state_{number}"] = np.asarray(one["state"])[nearest]
+    return columns
+
+
+def mean_over(at: Array, time: Array, values: Array) -> Array:
     """Mean over WINDOW about each time, by the trapezoidal rule; over what there is of it at the ends."""
     whole = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(time) * (values[1:] + values[:-1]))])
     low, high = np.maximum(at - 0.5 * WINDOW, time[0]), np.minimum(at + 0.5 * WINDOW, time[-1])
@@ -118,17 +129,37 @@ def _mean(at: Array, time: Array, values: Array) -> Array:
 
 def gaps(columns: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """How far the two went apart, as quantities of a result."""
+    found = gap_entries(columns, (("x", "m"), ("y", "m"), ("theta", "rad")))
+    found["same_state"] = same_state(columns)
+    depths = [deepest(columns, number) for number in (1, 2)]
+    found["gap_sinkage"] = (depths[1] - depths[0], "m", "of the deepest row, each at its own time; second less first")
+    return as_quantities(found)
+
+
+Entries = dict[str, tuple[float, str, str]]
+"""Name -> value, unit and note of a quantity."""
+
+
+def gap_entries(columns: Mapping[str, Any], channels: Sequence[tuple[str, str]]) -> Entries:
+    """Largest difference of each channel (name and unit), and that at the end."""
     time = columns["t_s"]
-    found: dict[str, tuple[float, str, str]] = {}
-    for name, unit in (("x", "m"), ("y", "m"), ("theta", "rad")):
+    found: Entries = {}
+    for name, unit in channels:
         away = _away(columns, name, unit)
         at = int(np.argmax(np.abs(away)))
         found[f"gap_{name}"] = (float(np.abs(away[at])), unit, f"largest over time, at {time[at]:.4g} s")
         found[f"gap_{name}_end"] = (float(away[-1]), unit, f"second less first at {time[-1]:.4g} s")
+    return found
+
+
+def same_state(columns: Mapping[str, Any]) -> tuple[float, str, str]:
+    """Share of the time in which both are in the same state."""
     same = np.asarray(columns["state_1"]) == np.asarray(columns["state_2"])
-    found["same_state"] = (float(same.mean()), "1", "share of the time in which both are in the same state")
-    deepest = [_deepest(columns, number) for number in (1, 2)]
-    found["gap_sinkage"] = (deepest[1] - deepest[0], "m", "of the deepest row, each at its own time; second less first")
+    return float(same.mean()), "1", "share of the time in which both are in the same state"
+
+
+def as_quantities(found: Entries) -> dict[str, dict[str, Any]]:
+    """As a result has them."""
     return {
         name: {"value": value, "std": 0.0, "unit": unit, "note": note} for name, (value, unit, note) in found.items()
     }
@@ -141,7 +172,8 @@ def _away(columns: Mapping[str, Any], name: str, unit: str) -> Array:
     return other - one - start
 
 
-def _deepest(columns: Mapping[str, Any], number: int) -> float:
+def deepest(columns: Mapping[str, Any], number: int) -> float:
+    """Largest sinkage of any row of the one run [m]."""
     rows = [values for name, values in columns.items() if name.startswith("sinkage_") and name.endswith(f"_{number}")]
     return float(np.max(rows))
 
@@ -162,10 +194,15 @@ def told_apart(columns: Mapping[str, Any], labels: tuple[str, str], moved: list[
         f"On the way at most {1e3 * said('gap_x'):.3g} mm along, {1e3 * said('gap_y'):.3g} mm in height and "
         f"{math.degrees(said('gap_theta')):.3g} degrees apart; in the same state {100 * said('same_state'):.0f} % of "
         f"the time.",
-        f"The deepest row goes {1e3 * _deepest(columns, 1):.3g} mm deep on {labels[0]}, "
-        f"{1e3 * _deepest(columns, 2):.3g} mm on {labels[1]}.",
+        f"The deepest row goes {1e3 * deepest(columns, 1):.3g} mm deep on {labels[0]}, "
+        f"{1e3 * deepest(columns, 2):.3g} mm on {labels[1]}.",
     ]
-    lasts = [float(one.time[-1]) for one in moved]
-    if abs(lasts[0] - lasts[1]) > 2e-3:
-        sentences.append(f"They last {lasts[0]:.4g} and {lasts[1]:.4g} s: compared as long as both do.")
-    return sentences
+    return [*sentences, *lasting([one.time for one in moved])]
+
+
+def lasting(times: Sequence[Array]) -> list[str]:
+    """That one lasts longer, where it does."""
+    lasts = [float(time[-1]) for time in times]
+    if abs(lasts[0] - lasts[1]) <= 2e-3:
+        return []
+    return [f"They last {lasts[0]:.4g} and {lasts[1]:.4g} s: compared as long as both do."]

@@ -6,6 +6,9 @@ import time
 from collections.abc import Callable
 from typing import Any, Protocol
 
+from coupling import LeftTheBedError
+from dem import BedFailure
+
 from .progress import Progress
 from .runfolder import RunFolder
 from .stopping import held_back
@@ -72,9 +75,22 @@ def follow(
         folder.save_checkpoint(f"{CHECKPOINT}.failed", run.state())
         if run.placed:
             write_series()
-        raise RuntimeError(
-            f"at {run.time:.4g} s: {error}; a longer or deeper bed_size, a shorter duration or another young would do; "
-            f"the state is in checkpoint/{CHECKPOINT}.failed.npz"
-        ) from error
+        left = f"the state is in checkpoint/{CHECKPOINT}.failed.npz"
+        if run.placed:
+            left += ", what was before it in trajectory.csv and series/"
+        raise RuntimeError(f"at {run.time:.4g} s: {error}; {_would_do(error)}; {left}") from error
     folder.save_checkpoint(CHECKPOINT, run.state())
     return found
+
+
+def _would_do(error: RuntimeError) -> str:
+    if isinstance(error, LeftTheBedError) and error.lacking:
+        return (
+            f"a bed_size longer by {2 * error.lacking:.2g} m, half of it at either end, would have held it until then, "
+            f"one laid end to end (bed_repeats) for longer; or a shorter duration would do"
+        )
+    if isinstance(error, LeftTheBedError):
+        return "a deeper bed_size, or a shorter duration, would do"
+    if isinstance(error, BedFailure):
+        return "fewer substeps tell whether it is the coupling, stiffer grains (young) whether it is the bed"
+    return "a longer or deeper bed_size, a shorter duration or another young would do"

@@ -20,7 +20,7 @@ from .spatial_settings import SpatialSettings
 from .spatial_trial import SpatialPlan
 from .surfaces import find_surface
 from .tumble_grains_result import PACKING_OFF
-from .tumble_words import residual_warning, reversal_warning, unsettled_warning
+from .tumble_words import residual_warning, reversal_warning, unsettled_warning, way_through
 
 __all__ = ["conclude", "write_series_of"]
 
@@ -32,19 +32,26 @@ UNITS = {
     "time": "t_s", "vx": "vx_m_s", "vy": "vy_m_s", "vz": "vz_m_s", "wx": "wx_rad_s", "wy": "wy_rad_s",
     "wz": "wz_rad_s", "wheel_x": "wheel_x_rad_s", "wheel_y": "wheel_y_rad_s", "wheel_z": "wheel_z_rad_s",
     "kinetic_energy": "kinetic_J", "potential_energy": "potential_J", "torque_work": "torque_work_J",
+    "stored_energy": "stored_J", "energy": "energy_J", "dissipated": "dissipated_J",
     "given": "given_J", "taken": "taken_J", "fx": "fx_N", "fy": "fy_N", "fz": "fz_N", "sinkage": "sinkage_m",
     "x": "x_m", "y": "y_m", "z": "z_m",
 }  # fmt: skip
 OF_THE_PATH = ("time", "x", "y", "z", "q0", "q1", "q2", "q3", "vx", "vy", "vz", "wx", "wy", "wz", "touching")
+FEET = ("normal", "N"), ("along_x", "N"), ("along_y", "N"), ("slip_x", "m_s"), ("slip_y", "m_s"), ("sinkage", "m")
+"""Of each spike in series/feet.csv, as `SpatialRun.feet` has them."""
 
 
 def write_series_of(folder: Path, run: SpatialRun) -> None:
     """trajectory.csv and the series of a run, as far as it has come."""
-    rows = run.columns
     (folder / "series").mkdir(exist_ok=True)
-    write_series(folder / "trajectory.csv", {UNITS.get(name, name): rows[name] for name in OF_THE_PATH})
+    write_series(folder / "trajectory.csv", path_columns(run))
+    rows = run.columns
+    stored = run.stored_by_row
+    rows |= {"stored_energy": stored, "energy": rows["kinetic_energy"] + rows["potential_energy"] + stored}
+    rows["dissipated"] = run.dissipated_by_row
     rest = {UNITS.get(name, name): values for name, values in rows.items() if name not in OF_THE_PATH[1:]}
     write_series(folder / "series" / "motion.csv", rest)
+    write_series(folder / "series" / "feet.csv", feet_columns(run))
     if isinstance(run.footing, BedFooting):
         samples = run.samples
         for name, values in run.losses.items():
@@ -53,6 +60,30 @@ def write_series_of(folder: Path, run: SpatialRun) -> None:
         units["angular_momentum_error"] = "angular_momentum_error_N_m_s"
         named = {units.get(name, f"{name}_J"): values for name, values in samples.items()}
         write_series(folder / "series" / "bed.csv", named)
+
+
+def path_columns(run: SpatialRun) -> dict[str, Any]:
+    """The columns of trajectory.csv."""
+    rows = run.columns
+    path = {UNITS.get(name, name): rows[name] for name in OF_THE_PATH}
+    return path | {"turn_rad": run.turned, "state": np.array(run.states)}
+
+
+def feet_columns(run: SpatialRun) -> dict[str, Any]:
+    """The columns of series/feet.csv: force, slip and depth of the spikes that came down, and of the hull if it did.
+
+    Those that never did are left out; so are the hull's depth, which no footing tells, and friction on a law, which
+    says only how large it may be.
+    """
+    columns: dict[str, Any] = {"t_s": run.columns["time"]}
+    feet, hull = run.feet, len(run.trial.platform.tips)
+    for spike in np.flatnonzero(feet.any(axis=(0, 1))):
+        name = "hull" if spike == hull else str(spike)
+        for k, (what, unit) in enumerate(FEET):
+            told = name != "hull" if what == "sinkage" else run.footing.gives_friction or not what.startswith("along")
+            if told:
+                columns[f"{what}_{name}_{unit}"] = feet[:, k, spike]
+    return columns
 
 
 def conclude(
@@ -83,13 +114,20 @@ def conclude(
             for name, number in plan.numbers.items()
         } | {"weight": {"value": float(np.linalg.norm(trial.weight)), "unit": "N", "origin": "(m + m_b) g_sim"}},
         "surface": plan.surface, "ground": settings.ground, "actuator": settings.actuator,
-        "duration": settings.duration, "warnings": warnings,
+        "duration": settings.duration, "spike_count": len(trial.platform.tips),
+        "transitions": passages(run), "warnings": warnings,
         "macro_step": run.master.macro_step, "steps": run.master.count,
         "lowering_time": run.placing_steps * run.master.macro_step,
     }  # fmt: skip
     if softening is not None and beside is not None:
+        write_series(folder / "series" / "spring-damper.csv", path_columns(beside))
         _add_grains(result, settings, plan, run, beside, softening)
     return result
+
+
+def passages(run: SpatialRun) -> list[dict[str, Any]]:
+    """The changes of state, as result.json holds them: `turn` is the angle of the one turn from the start."""
+    return [{"time": time, "state": state, "turn": turn} for time, state, turn in run.transitions]
 
 
 def quantities_of(run: SpatialRun) -> dict[str, dict[str, Any]]:
@@ -111,13 +149,14 @@ def quantities_of(run: SpatialRun) -> dict[str, dict[str, Any]]:
         "max_speed": (float(speed.max()), "m/s", "of the centre of mass"),
         "max_angular_velocity": (float(spin.max()), "rad/s", ""),
         "largest_turn": (
-            float(2 * np.arccos(np.clip(np.abs(turns @ turns[0]), 0.0, 1.0)).max()), "rad",
-            "angle of the one turn from the start, largest, at most pi",
+            float(run.turned.max()), "rad", "angle of the one turn from the start, largest, at most pi",
         ),
         "tilt_end": (math.acos(min(1.0, max(-1.0, up))), "rad", "of its own z from the vertical at the end"),
         **_landing(run),
+        **_first_entries(run),
         "sinkage_start": (float(rows["sinkage"][0]), "m", "of the deepest spike when time begins"),
         "sinkage_largest": (float(rows["sinkage"].max()), "m", "of any spike"),
+        "largest_spike_force": (float(run.feet[:, 0].max()), "N", "upwards, on one spike, mean of one macro step"),
         "largest_force": (float(force.max()), "N", "of the ground on the platform, mean of one macro step"),
         "energy_residual": (
             run.energy_residual, "1",
@@ -149,6 +188,17 @@ def quantities_of(run: SpatialRun) -> dict[str, dict[str, Any]]:
         name: {"value": value, "std": None, "unit": unit} | ({"note": note} if note else {})
         for name, (value, unit, note) in found.items()
     }
+
+
+def _first_entries(run: SpatialRun) -> dict[str, tuple[float | None, str, str]]:
+    """When and how far turned it first slips and hops, by its states; what starts in flight has not hopped yet."""
+    found: dict[str, tuple[float | None, str, str]] = {}
+    for state, way in (("slip", run.transitions), ("hop", run.transitions[1:])):
+        time, turn = next(((time, turn) for time, name, turn in way if name == state), (None, None))
+        note = "first entry by the states; null if there is none"
+        found[f"transition_time_{state}"] = (time, "s", note)
+        found[f"transition_angle_{state}"] = (turn, "rad", "angle of the one turn from the start there")
+    return found
 
 
 def _landing(run: SpatialRun) -> dict[str, tuple[float | None, str, str]]:
@@ -200,6 +250,7 @@ def _sentences(run: SpatialRun) -> list[str]:
         said.append("It touches nothing in this time.")
     elif touch > 0:
         said.append(f"It comes down at {touch:.4g} s, its centre at {landing['impact_speed'][0]:.3g} m/s.")
+    said.append(way_through(run.transitions))
     if hop is not None:
         said.append(f"Nothing touches from {hop:.4g} s on, for a while at least.")
     if rest:
@@ -228,7 +279,7 @@ def _add_grains(
         "time_step": float(bed.time_step), "max_overlap": float(bed.max_overlap), "seed": settings.seed,
         "sleep": settings.sleep, "grain_steps": float(done[-1] - done[0]), "grain_steps_all_awake": float(whole),
         "origin": [float(number) for number in run.footing.origin],  # type: ignore[attr-defined]
-        "beside": quantities_of(beside),
+        "beside": quantities_of(beside), "beside_transitions": passages(beside),
     }  # fmt: skip
     warnings = result["warnings"]
     if reversed_ := reversal_warning(run.dissipation_reversal):

@@ -9,11 +9,15 @@ from pydantic import Field, model_validator
 from .platform_settings import NotNegative, Positive
 from .tumble_bed_settings import GrainsSettings
 
-__all__ = ["SpatialSettings"]
+__all__ = ["ON_ANY_GROUND", "SpatialSettings"]
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Vector = tuple[Finite, Finite, Finite]
 ZERO = (0.0, 0.0, 0.0)
+ON_ANY_GROUND = (
+    "lowering_speed", "substeps", "body_steps", "extrapolation", "iterations", "frame_count", "checkpoint_interval",
+)  # fmt: skip
+"""Of `GrainsSettings`, those that the spring-damper takes too."""
 
 
 class SpatialSettings(GrainsSettings):
@@ -130,11 +134,7 @@ class SpatialSettings(GrainsSettings):
             return fault
         if self.ground == "bed":
             return self.sleep_fault()
-        both = (
-            "lowering_speed", "substeps", "body_steps", "extrapolation", "iterations", "frame_count",
-            "checkpoint_interval",
-        )  # fmt: skip
         for name, field in GrainsSettings.model_fields.items():
-            if name not in both and getattr(self, name) != field.default:
+            if name not in ON_ANY_GROUND and getattr(self, name) != field.default:
                 return f"{name} = {getattr(self, name)} belongs to ground = 'bed'"
         return None

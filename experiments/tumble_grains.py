@@ -49,6 +49,8 @@ COPIES = 2.0
 """Spikes in a row: the bed holds one of them and the sand that it has for itself."""
 MARGIN = 3.0
 """Sand beyond the outermost footprint, over a spike's diameter [1]."""
+ROLLED = {"motor": 0.8, "brake": 0.4}
+"""Way on grains over that of rolling without slip or loss: 0.64 to 0.78 and 0.3 were met (docs/experiments.md) [1]."""
 THROW = 2.0
 """Speed of a grain that a spike throws up, over the spike's [1]: an elastic ball has twice the wall's."""
 RAIN = 2.5
@@ -77,6 +79,8 @@ class Forecast:
     """Largest speed of a tip in the ground [m/s]."""
     sunk: float
     """Depth of the tips that it stands on before it moves [m]."""
+    farthest: float
+    """Where tips may come down on grains, which hold a row and the torque with it as long as it acts [m]."""
     margin: float = 1.5
     """What grains may do beyond it: depth and speed for which their modulus is chosen, over these [1]."""
     on: str = "on the spring-damper"
@@ -101,6 +105,8 @@ def tumble_on_grains(settings: TumbleSettings, folder: RunFolder, progress: Prog
         for sentence in (*_sentences(settings, plan), *(f"warning: {warning}" for warning in warnings)):
             progress.message(sentence)
         forecast = _forecast(settings, plan)
+        if told := _may_leave(settings, forecast):
+            progress.message(f"warning: {told}")
         softening = _softness(settings, plan, forecast)
         step_time = settings.duration + 0.3  # with the setting down
         progress.plan({"bed": 1.0, "tumble": step_time}, seconds={"report": 10.0})
@@ -199,8 +205,26 @@ def _forecast(settings: TumbleSettings, plan: TumblePlan) -> Forecast:
     forecast = Forecast(
         found, full, float(tips_x[near].min()), float(tips_x[near].max()), float(depth.max()),
         float(speed[near].max()), sunk=float(depth[0].max()),
+        farthest=max(float(tips_x[near].max()), _rolled(settings, plan, float(depth.max()))),
     )  # fmt: skip
     return forecast if trial.counterweight > 0 else _in_flight(settings, plan, forecast)
+
+
+def _rolled(settings: TumbleSettings, plan: TumblePlan, deepest: float) -> float:
+    """Where the tip ahead of the next row touches, rolled on l cos(pi / n) for ROLLED of the way [m]; 0 of no tumble.
+
+    On springs a row lets go, and the torque ends with it; sand holds one all the time.
+    """
+    trial = plan.trial
+    if not is_plain(settings):
+        return 0.0
+    high = trial.spike_length * math.cos(math.pi / trial.spike_count)
+    gained = trial.torque * high / (trial.inertia + trial.mass * high**2)
+    brake = trial.actuator == "brake"
+    room = trial.wheel_speed_0 if brake else plan.max_wheel_speed - trial.wheel_speed_0
+    acts = min(settings.duration, trial.torque_until, room * trial.wheel_inertia / max(trial.torque, 1e-12))
+    way = gained * acts * (settings.duration - 0.5 * acts)
+    return ROLLED[trial.actuator] * way + math.sqrt(max(trial.spike_length**2 - (high - 1.5 * deepest) ** 2, 0.0))
 
 
 def _in_flight(settings: TumbleSettings, plan: TumblePlan, law: Forecast) -> Forecast:
@@ -239,14 +263,16 @@ def _check_bed(settings: TumbleSettings, forecast: Forecast, material: Material)
     length, repeats = settings.bed_length, settings.bed_repeats
     margin = MARGIN * spike
     need = forecast.ahead - forecast.behind + 2 * margin
+    on_grains = max(need, _length_on_grains(forecast, margin))
     if length < need:
         said = f"bed_size = {piece:g} m along the motion"
         if repeats > 1:
             said += f" with bed_repeats = {repeats}, {length:g} m in all,"
         raise ValueError(
-            f"{said} is too short: {forecast.on} tips come down from "
-            f"{forecast.behind:.3g} to {forecast.ahead:.3g} m of the start within duration = {settings.duration:g} s, "
-            f"so with {margin:g} m to spare at both ends {math.ceil(100 * need) / 100:g} m or a shorter one would do"
+            f"{said} is too short: {forecast.on} tips come down from {forecast.behind:.3g} to {forecast.ahead:.3g} m "
+            f"of the start within duration = {settings.duration:g} s, which takes {math.ceil(100 * need) / 100:g} m "
+            f"with {margin:g} m to spare at both ends; on grains it may go farther: "
+            f"{math.ceil(100 * on_grains) / 100:g} m would do, or a shorter duration"
         )
     if width < 3 * spike * (1 - 1e-9):
         raise ValueError(
@@ -285,6 +311,25 @@ def _check_bed(settings: TumbleSettings, forecast: Forecast, material: Material)
         raise ValueError(
             f"grain = {settings.grain:g} m makes about {count:.3g} grains: {larger:.2g} m or a smaller bed would do"
         )
+
+
+def _length_on_grains(forecast: Forecast, margin: float) -> float:
+    """Of a bed whose footprints expected lie in its middle, with room for the farthest that there may be [m]."""
+    return 2 * (forecast.farthest + margin) - forecast.behind - forecast.ahead
+
+
+def _may_leave(settings: TumbleSettings, forecast: Forecast) -> str | None:
+    """That tips may come down beyond the bed before the end, in words; None where they cannot."""
+    ahead = settings.bed_length - _origin(settings, forecast)
+    if ahead >= forecast.farthest + 0.5 * settings.spike_diameter:
+        return None
+    long = _length_on_grains(forecast, MARGIN * settings.spike_diameter)
+    return (
+        f"sand holds a row, and the torque with it, where the spring-damper lets go: tips may come down "
+        f"{forecast.farthest:.3g} m ahead of the start within duration = {settings.duration:g} s, and the bed reaches "
+        f"{ahead:.3g} m; a run that leaves it ends there. bed_repeats = {math.ceil(long / settings.bed_size[0])}, or a "
+        f"shorter duration, would make sure"
+    )
 
 
 def _count(settings: TumbleSettings, forecast: Forecast) -> float:

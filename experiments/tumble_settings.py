@@ -6,7 +6,7 @@ A number that is not given comes from `model` where there is one, else from the 
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -18,6 +18,9 @@ from .sweep_ranges import parse_sweep
 from .tumble_bed_settings import OF_THE_MASTER, TumbleBedSettings
 
 __all__ = ["TrialSettings", "TumbleSettings"]
+
+ON_GRAINS = 1.1
+"""A tumble of the Hedgehog in the rig comes down on its next row by then; what lasts longer costs by the hour [s]."""
 
 
 class TrialSettings(PlatformSettings):
@@ -58,7 +61,11 @@ class TrialSettings(PlatformSettings):
 
     # How long
     torque_until: NotNegative | None = Field(None, description="End of the torque [s]; it does not end if not given.")
-    duration: Positive = Field(3.0, le=3600, description="How long the trial lasts [s].")
+    duration: Positive = Field(
+        3.0,
+        le=3600,
+        description=f"How long the trial lasts [s]; {ON_GRAINS:g} of a tumble on a bed in the rig, if not given.",
+    )
 
     @model_validator(mode="after")
     def _surface_fits_together(self) -> Self:
@@ -133,6 +140,14 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
     campaign_trials: int = Field(8, ge=1, le=999, description="Trials of the campaign [1].")
     campaign_seed: int = Field(1, ge=0, lt=2**31, description="Seed of what is true and of the noise.")
     campaign_noise: Positive = Field(1.0, description="Noise of the sensors over that of `hedgebed campaign` [1].")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _as_long_as_grains_allow(cls, given: Any) -> Any:
+        others = ("duration", "gravity", "drop_speed")
+        if not isinstance(given, dict) or given.get("ground") != "bed" or given.get("tumbles", 1) != 1:
+            return given
+        return given if any(given.get(key) is not None for key in others) else given | {"duration": ON_GRAINS}
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:

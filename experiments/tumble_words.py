@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from rigid.trajectory import Trajectory
+from rigid.trajectory import Trajectory, Transition
 
 if TYPE_CHECKING:
     from coupling import Master
 
-__all__ = ["MOST", "residual_warning", "reversal_warning", "tumble_sentences", "unsettled_warning"]
+__all__ = ["MOST", "residual_warning", "reversal_warning", "tumble_sentences", "unsettled_warning", "way_through"]
 
 MOST = 8
 """Changes of state that are told one by one."""
@@ -20,19 +21,24 @@ MOST_RESIDUAL = 0.01
 
 def tumble_sentences(trajectory: Trajectory) -> list[str]:
     """The states in their order, each with when and at which angle it was entered; and when the centre was fastest."""
-    told = [
-        f"{state} at {time:.4g} s, {_degrees(theta)}" if time > 0 else f"{state} at once"
-        for time, state, theta in trajectory.transitions[:MOST]
-    ]
-    more = len(trajectory.transitions) - MOST
-    rest = f" -> {more} more change{'s' if more > 1 else ''} of state (in result.json)" if more > 0 else ""
-    said = [f"{' -> '.join(told)}{rest}."]
+    said = [way_through(trajectory.transitions)]
     said += _does_not_tip(trajectory)
     if trajectory.max_speed > 0:
         when = trajectory.time_of_max_speed
         state = [name for time, name, _ in trajectory.transitions if time < when or time == 0][-1]
         said.append(f"Fastest at {when:.4g} s ({state}): {trajectory.max_speed:.4g} m/s.")
     return said
+
+
+def way_through(transitions: Sequence[Transition]) -> str:
+    """The states in their order, each with when and at which angle it was entered; the first few of them."""
+    told = [
+        f"{state} at {time:.4g} s, {_degrees(angle)}" if time > 0 else f"{state} at once"
+        for time, state, angle in transitions[:MOST]
+    ]
+    more = len(transitions) - MOST
+    rest = f" -> {more} more change{'s' if more > 1 else ''} of state (in result.json)" if more > 0 else ""
+    return f"{' -> '.join(told)}{rest}."
 
 
 def residual_warning(residual: float) -> str | None:

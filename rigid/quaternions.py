@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["from_turn", "multiply", "rate", "to_matrix"]
+__all__ = ["angle_between", "from_turn", "multiply", "rate", "to_matrix"]
 
 Array = NDArray[np.float64]
 
@@ -50,3 +50,14 @@ def from_turn(turn: ArrayLike) -> Array:
     angle = float(np.linalg.norm(v))
     share = 0.5 * float(np.sinc(0.5 * angle / math.pi))
     return np.concatenate([[math.cos(0.5 * angle)], share * v])
+
+
+def angle_between(a: ArrayLike, b: ArrayLike) -> Array:
+    """Angle of the one turn that leads from `a` to `b` [rad], 0 to pi, shape [n]; unit, shape [n, 4] both.
+
+    2 atan2(|a - b|, |a + b|) of the two signs that lie nearer: small angles keep their digits (Kahan 2006, "How futile
+    are mindless assessments of roundoff", section 12).
+    """
+    first, second = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
+    apart, along = np.linalg.norm(first - second, axis=-1), np.linalg.norm(first + second, axis=-1)
+    return np.asarray(4.0 * np.arctan2(np.minimum(apart, along), np.maximum(apart, along)))

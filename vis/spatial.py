@@ -14,18 +14,19 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from vis.canvas import COLOURS
-from vis.frames import frame_names, read_frames
+from vis.frames import frame_names
 from vis.numbers import quantity
 from vis.page import Block, Page, Section, Tile, code, figure, listing, table, text, write_page
-from vis.pictures import Picture, Pictures, opengl_available, render_apart
-from vis.spatial_film import NAME, run_spatial_job
+from vis.pictures import Pictures
+from vis.spatial_film import NAME
+from vis.spatial_pictures import ARROWS, draw_in_space
+from vis.state_figures import draw_bands, draw_states, passages
 from vis.style import BED, GREY, INK, MODEL, styled
 from vis.tumble_series import read_columns
 
 __all__ = ["write_spatial_report"]
 
 Array = NDArray[np.float64]
-_MOST_FRAMES = 48
 _AXES = (("x", BED), ("y", "#009E73"), ("z", MODEL))
 
 
@@ -53,7 +54,8 @@ def write_spatial_report(
     tell = progress if progress is not None else lambda done: None
     home = Path(folder)
     result = json.loads((home / "result.json").read_text(encoding="utf-8"))
-    path, motion = read_columns(home / "trajectory.csv")[0], read_columns(home / "series" / "motion.csv")[0]
+    path, states = read_columns(home / "trajectory.csv")
+    motion = read_columns(home / "series" / "motion.csv")[0]
     figures = home / "figures"
     figures.mkdir(exist_ok=True)
     blocks = []
@@ -68,14 +70,43 @@ def write_spatial_report(
         with styled():
             draw(path, motion).savefig(figures / f"{name}.png", dpi=130)
         blocks.append(figure(figures / f"{name}.png", title=title, caption=caption))
+    if len(states):  # an older folder has none
+        blocks[1:1] = _states(home, path, states)
     tell(0.2)
     seen: list[Section] = []
     if pictures and NAME in frame_names(home):
-        drawn = _pictures(home, by=colour, film=film, progress=lambda done: tell(0.2 + 0.75 * done))
+        drawn = draw_in_space(
+            [home], home, stem="space", by=colour, film=film, progress=lambda done: tell(0.2 + 0.75 * done)
+        )
         seen = [_seen(drawn)]
     report = write_page(home / "report.html", _page(result, blocks, seen, len(path["t_s"])))
     tell(1.0)
     return report
+
+
+def _states(home: Path, path: Mapping[str, Array], states: NDArray[np.str_]) -> list[Block]:
+    """The states over time and turn, and on grains those of the spring-damper beside them."""
+    turn, label = np.degrees(path["turn_rad"]), "turn from the start [degrees]"
+    drawings = [(
+        "states", "Pivot, slip, hop", "Left: the angle of the one turn from the start, at most 180 degrees. Right: "
+        "state against it: stand (three spikes stick that are not in a line), pivot (those that stick lie in one line, "
+        "or one does), slip (all that touch slide), hop (none touches).",
+        draw_states(path["t_s"], turn, states, label=label),
+    )]  # fmt: skip
+    beside = home / "series" / "spring-damper.csv"
+    if beside.exists():
+        other, others = read_columns(beside)
+        runs = [(path["t_s"], turn, states), (other["t_s"], np.degrees(other["turn_rad"]), others)]
+        with styled():
+            bands = draw_bands(runs, ("grains", "spring-damper"), label=label)
+        caption = "The same trial on both: above the turn, below the states."
+        drawings.append(("beside", "Grains and spring-damper", caption, bands))
+    blocks = []
+    for name, title, caption, drawing in drawings:
+        with styled():
+            drawing.savefig(home / "figures" / f"{name}.png", dpi=130)
+        blocks.append(figure(home / "figures" / f"{name}.png", title=title, caption=caption))
+    return blocks
 
 
 # Figures --------------------------------------------------------------------------------------------------------------
@@ -154,50 +185,11 @@ def _draw_energy(path: Mapping[str, Array], motion: Mapping[str, Array]) -> Figu
 # Pictures -------------------------------------------------------------------------------------------------------------
 
 
-def _pictures(home: Path, *, by: str, film: bool, progress: Callable[[float], None]) -> Pictures:
-    """Stills at the start, in the middle and at the end, and the film; by OpenGL in a child process or flat."""
-    count = len(read_frames(home, NAME))
-    chosen = dict.fromkeys((0, count // 2, count - 1))
-    names = dict(zip((0, count // 2, count - 1), ("start", "middle", "end"), strict=True))
-    stills = [(home / "figures" / f"space-{names[index]}.png", index) for index in chosen]
-    indices = np.unique(np.linspace(0, count - 1, min(_MOST_FRAMES, count)).round().astype(int)).tolist()
-    job: dict[str, Any] = {
-        "folder": str(home), "by": by,
-        "stills": [{"file": str(file), "index": index, "size": [1600, 1000]} for file, index in stills],
-        "film": {"file": str(home / "film.gif"), "indices": indices, "size": [960, 600]} if film else None,
-    }  # fmt: skip
-    drawn = [Picture(file, f"At the {names[index]}", "The whole platform, seen along y from above.")
-             for file, index in stills]  # fmt: skip
-    moving = None
-    if film:
-        caption = f"{len(indices)} pictures; the camera follows, the colours keep their scale."
-        moving = Picture(home / "film.gif", "The film", caption)
-    total, done = len(stills) + (len(indices) if film else 0), 0
-
-    def step() -> None:
-        nonlocal done
-        done += 1
-        progress(min(1.0, done / max(total, 1)))
-
-    notes: list[str] = []
-    if opengl_available():
-        failure = render_apart(job, 120.0, step, module="vis.spatial_film")
-        if failure is None:
-            return Pictures(drawn, moving, "opengl", notes)
-        notes.append(f"Rendering with OpenGL failed ({failure}); flat pictures stand in.")
-        done = 0
-    else:
-        notes.append("This machine has no OpenGL for off-screen pictures; flat ones stand in for them.")
-    run_spatial_job(job, opengl=False, step=step)
-    return Pictures(drawn, moving, "sections", notes)
-
-
 def _seen(drawn: Pictures) -> Section:
     film = [drawn.animation] if drawn.animation is not None else []
     blocks = [figure(one.file, title=one.title, caption=one.caption, show_file=one in film)
               for one in (*film, *drawn.stills)]  # fmt: skip
-    arrows = "Red arrows: the force on a spike, as long as its size; on the spring-damper without friction."
-    return Section("Seen", [*blocks, text(arrows, small=True), *(text(note) for note in drawn.notes)])
+    return Section("Seen", [*blocks, text(ARROWS, small=True), *(text(note) for note in drawn.notes)])
 
 
 # The page -------------------------------------------------------------------------------------------------------------
@@ -222,7 +214,7 @@ def _page(result: Mapping[str, Any], drawn: list[Block], seen: list[Section], ro
          entry.get("note", ""))
         for name, entry in quantities.items()
     ]  # fmt: skip
-    facts = []
+    facts, told = [], result.get("transitions")  # an older folder has none
     if "grains" in result:
         grains = result["grains"]
         facts = [text(
@@ -238,6 +230,7 @@ def _page(result: Mapping[str, Any], drawn: list[Block], seen: list[Section], ro
         sections=[
             Section("", [listing(result["departures"]["sentences"]), *drawn, *facts]),
             *seen,
+            *([Section("Transitions", passages(told, angle="turn", label="turn [degrees]"))] if told else []),
             Section("The trial", [table(("number", "value", "unit", "where from"), numbers, words=True)]),
             Section("Every number of the result", [table(head, every, words=True)]),
             Section("To do this again", [

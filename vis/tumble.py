@@ -9,10 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
@@ -21,6 +18,7 @@ from PIL import Image, ImageDraw
 from vis.numbers import quantity, short
 from vis.page import Block, Page, Section, Tile, code, figure, table, text, write_page
 from vis.pictures import Pictures
+from vis.state_figures import by_state, draw_states, legend_of_states, panels, passages
 from vis.style import BED, GREY, INK, MODEL, styled
 from vis.tumble_grains import grains_section
 from vis.tumble_series import STATES, read_columns, state_runs
@@ -30,10 +28,7 @@ __all__ = ["STATES", "read_columns", "state_runs", "write_tumble_report"]
 
 Array = NDArray[np.float64]
 
-_WIDTH = 8.6
 _DPI = 130
-_MOST_STEPS = 60
-"""Changes of state that are joined by a line; more would paint the panel grey."""
 _FOLLOWED = 1.2
 """How far from its start the animation follows the centre [m]."""
 _JOULES = (("mJ", 1.0), ("µJ", 1e3), ("nJ", 1e6), ("pJ", 1e9), ("fJ", 1e12))
@@ -113,30 +108,6 @@ def _seen(drawn: Pictures) -> Section:
 Drawn = tuple[str, str, str, Figure]
 
 
-def _panels(
-    count: int, height: float, *, widths: tuple[float, ...] | None = None, right: float = 0.985
-) -> tuple[Figure, list[Axes]]:
-    """Panels side by side, placed by hand: a layout engine would take as long as all the rest."""
-    with mpl.rc_context({"figure.constrained_layout.use": False}):
-        drawing = Figure(figsize=(_WIDTH, height))
-    FigureCanvasAgg(drawing)
-    axes = drawing.subplots(1, count, width_ratios=widths)
-    drawing.subplots_adjust(left=0.09, right=right, bottom=0.5 / height, top=1 - 0.38 / height, wspace=0.23)
-    return drawing, list(np.atleast_1d(axes))
-
-
-def _legend_of_states(drawing: Figure, states: NDArray[np.str_], more: tuple[Line2D, ...] = ()) -> None:
-    there = [name for name in STATES if name in states]
-    handles = [Line2D([], [], color=STATES[name], lw=3, label=name) for name in there]
-    drawing.legend(handles=[*handles, *more], loc="upper left", bbox_to_anchor=(0.075, 1.0), ncols=8)
-
-
-def _by_state(axis: Axes, x: Array, y: Array, states: NDArray[np.str_], **style: Any) -> None:
-    """A line in the colours of the states, without gaps between them."""
-    for low, high, name in state_runs(states):
-        axis.plot(x[low : high + 1], y[low : high + 1], color=STATES.get(name, INK), **style)
-
-
 def _draw_trajectory(
     result: Mapping[str, Any], numbers: Mapping[str, Array], states: NDArray[np.str_], motion: Mapping[str, Array]
 ) -> Drawn:
@@ -146,8 +117,8 @@ def _draw_trajectory(
     x, y = scale * numbers["x_m"], scale * numbers["y_m"]
     angle = _value(result, "trajectory_angle")
     with styled():
-        drawing, (path, rates) = _panels(2, 3.5, widths=(1.25, 1.0), right=0.925)
-        _by_state(path, x, y, states, lw=2.4, solid_capstyle="round")
+        drawing, (path, rates) = panels(2, 3.5, widths=(1.25, 1.0), right=0.925)
+        by_state(path, x, y, states, lw=2.4, solid_capstyle="round")
         path.plot(x[:1], y[:1], "o", color=INK, ms=4)
         more: tuple[Line2D, ...] = ()
         if angle is not None:
@@ -173,7 +144,7 @@ def _draw_trajectory(
         path.set_xlabel(f"x of the centre [{unit}]")
         path.set_ylabel(f"y of the centre above the surface [{unit}]")
         speed = np.hypot(numbers["vx_m_s"], numbers["vy_m_s"])
-        _by_state(rates, time, speed, states, lw=1.8)
+        by_state(rates, time, speed, states, lw=1.8)
         rates.set_xlabel("time [s]")
         rates.set_ylabel("speed of the centre [m/s]")
         rates.set_ylim(bottom=0.0)
@@ -184,7 +155,7 @@ def _draw_trajectory(
             axis.ticklabel_format(axis="y", scilimits=(-2, 4))
         other.grid(False)
         other.spines["right"].set_visible(True)
-        _legend_of_states(drawing, states, more)
+        legend_of_states(drawing, states, more)
     caption = (
         "Left: path of the geometric centre in proportion, coloured by state, from the dot on. Right: speed of the "
         "centre, and angular velocity (dotted)."
@@ -195,29 +166,7 @@ def _draw_trajectory(
 def _draw_states(
     result: Mapping[str, Any], numbers: Mapping[str, Array], states: NDArray[np.str_], motion: Mapping[str, Array]
 ) -> Drawn:
-    time, theta = numbers["t_s"], np.degrees(numbers["theta_rad"])
-    order = list(STATES)
-    with styled():
-        drawing, (over_time, over_angle) = _panels(2, 3.0)
-        _by_state(over_time, time, theta, states, lw=2.4)
-        over_time.set_xlabel("time [s]")
-        over_time.set_ylabel("θ [degrees]")
-        stretches = state_runs(states)
-        for low, high, name in stretches:
-            last = min(high, len(theta) - 1)
-            row = order.index(name) if name in order else 0
-            here, colour = theta[low : last + 1], STATES.get(name, INK)
-            over_angle.plot(here, np.full(len(here), row), color=colour, lw=6, solid_capstyle="butt")
-            if np.ptp(here) <= 0.01 * np.ptp(theta):  # too short to be seen
-                over_angle.plot(here[:1], [row], "s", color=colour, ms=5)
-            if len(stretches) <= _MOST_STEPS and last < len(theta) - 1 and str(states[last]) in order:
-                there = [row, order.index(str(states[last]))]
-                over_angle.plot([theta[last]] * 2, there, color=GREY, lw=0.7)
-        over_angle.set_yticks(range(len(order)), order)
-        over_angle.set_ylim(-0.5, len(order) - 0.5)
-        over_angle.set_xlabel("θ [degrees]")
-        over_angle.locator_params(axis="x", nbins=6)
-        _legend_of_states(drawing, states)
+    drawing = draw_states(numbers["t_s"], np.degrees(numbers["theta_rad"]), states)
     caption = (
         "Left: the angle over time. Right: state against angle, as in Figure 6 of the paper: stand (two or more spikes "
         "stick), pivot (one sticks), slip (all that touch slide), hop (none touches)."
@@ -232,7 +181,7 @@ def _draw_energy(
     gained = 1e3 * (motion["energy_J"] - motion["energy_J"][0])
     work, lost = 1e3 * motion["torque_work_J"], 1e3 * motion["dissipated_J"]
     with styled():
-        drawing, (book, rest) = _panels(2, 3.0)
+        drawing, (book, rest) = panels(2, 3.0)
         book.plot(time, work, color=BED, label="work of the torque")
         book.plot(time, gained, color=MODEL, ls=(0, (4, 2)), label="energy gained")
         book.plot(time, lost, color=GREY, ls=(0, (1, 1.2)), label="dissipated")
@@ -333,11 +282,6 @@ def _page(folder: Path, result: Mapping[str, Any], drawn: list[Block], moving: P
         (name, f"{entry['value']:.6g}" if entry["value"] is not None else "–", _unit(entry["unit"]), entry["origin"])
         for name, entry in result["trial"].items()
     ]
-    passages = [
-        (f"{entry['time']:.6g}", entry["state"], f"{math.degrees(entry['theta']):.4g}")
-        for entry in result["transitions"][:60]
-    ]
-    beyond = len(result["transitions"]) - len(passages)
     effects = [
         f"{effect['id']} ({', '.join(f'{key} = {value:g}' for key, value in effect['parameters'].items())})"
         for effect in result["effects"]
@@ -364,10 +308,6 @@ def _page(folder: Path, result: Mapping[str, Any], drawn: list[Block], moving: P
         ],
         words=True,
     )
-    passage_blocks = [
-        table(("time [s]", "state", "θ [degrees]"), passages),
-        *([text(f"And {beyond} more, in result.json.", small=True)] if beyond > 0 else []),
-    ]
     return Page(
         title=str(result["title"]),
         lead=[f"hedgebed {result['version']}", "tumble", f"{result['duration']:g} s", f"{row_count} rows"],
@@ -375,7 +315,7 @@ def _page(folder: Path, result: Mapping[str, Any], drawn: list[Block], moving: P
         warnings=[str(warning)[:1].upper() + str(warning)[1:] for warning in result["warnings"]],
         sections=[
             Section("", [drawn[0], drawn[1], animation]),
-            Section("Transitions", passage_blocks),
+            Section("Transitions", passages(result["transitions"], angle="theta", label="θ [degrees]")),
             Section("Energy", [drawn[2]]),
             Section("The trial", settled),
             Section("Every number of the result", [every]),

@@ -30,8 +30,8 @@ from vis.jobs import draw_job, job_of
 from vis.numbers import quote
 from vis.reel import Reel
 from vis.stage import Eye, FlatStage, Stage
+from vis.state_figures import state_strip
 from vis.style import INK, styled
-from vis.tumble_series import STATES, state_runs
 
 __all__ = ["Sheet", "main", "run_film_job"]
 
@@ -116,7 +116,8 @@ class Sheet:
                 title = str(reel.result["title"]) if len(self.reels) == 1 else self.labels[number]
                 sheet.text(left, 0.975, title, fontsize=15, fontweight="bold", va="top")
                 sheet.text(left, 0.93, reel.line(index), fontsize=13, va="top", color="#444444")
-            self._states(sheet, time)
+            runs = [{"t_s": reel.series["t_s"], "state": reel.states} for reel in self.reels]
+            state_strip(sheet, runs, self.labels, time)
             if any(reel.frames is not None for reel in self.reels):
                 self._bar(sheet)
             canvas.draw()
@@ -200,27 +201,6 @@ class Sheet:
             draw_force(axis, ends[0], ends[1], float(np.linalg.norm(force)))
         axis.annotate("", (0.035, 0.97), (0.035, 0.97 - _ARROW), arrowprops=FORCE)
         axis.text(0.055, 0.96, f"weight, {quote(self.weight, unit='N')}", fontsize=10, va="top", bbox=HALO)
-
-    def _states(self, sheet: Figure, time: float) -> None:
-        """The states of the runs over time, a cursor at `time`."""
-        count = len(self.reels)
-        axis = sheet.add_axes((0.09, 0.055, 0.78, 0.045 + 0.02 * count))
-        end = max(float(reel.series["t_s"][-1]) for reel in self.reels)
-        for number, reel in enumerate(self.reels):
-            at = reel.series["t_s"]
-            for low, high, name in state_runs(reel.states):
-                last = at[min(high, len(at) - 1)]
-                axis.barh(count - 1 - number, last - at[low], left=at[low], height=0.8, color=STATES.get(name, INK))
-        axis.axvline(time, color=INK, lw=2.0)
-        axis.set_xlim(0.0, end)
-        axis.set_ylim(-0.5, count - 0.5)
-        axis.set_yticks(range(count), self.labels[::-1] if count > 1 else [""])
-        axis.grid(False)
-        axis.set_xlabel("time [s]", labelpad=1)
-        there = [name for name in STATES if any(name in reel.states for reel in self.reels)]
-        for place, name in enumerate(there):
-            sheet.text(0.885, 0.125 - 0.027 * place, "■", color=STATES[name], fontsize=10)
-            sheet.text(0.898, 0.125 - 0.027 * place, name, fontsize=10)
 
     def _bar(self, sheet: Figure) -> None:
         axis = sheet.add_axes((0.925, 0.27, 0.012, 0.5))

@@ -238,3 +238,25 @@ def test_what_cannot_be_is_refused_by_name():
         PlanarBody(Trial(**RIG, effects=(Effect(id="pendulum", parameters={"length": 2.2}),)), z=0.2)
     with pytest.raises(ValueError, match="grounds has 1 entries: there are 8"):
         LawFooting(row_tips(0.2, 8), footing.grounds[:1])
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_a_hand_sets_down_on_stiff_ground_in_long_steps_whatever_the_order_of_the_guess(order):
+    """Brick in steps of 1 ms: at rest on W / 2 K a row when it lets go, and for 30 ms after; then the order is kept."""
+    trial = Trial(**RIG, **(CASES["brick"] | {"torque": 0.0}))
+    footing = LawFooting.of_trial(trial)
+    substeps = round(1e-3 / footing.time_step)
+    run = CoupledTumble(
+        trial, footing, duration=0.03, substeps=substeps, extrapolation=order, lowering_speed=0.05, height=0.186
+    )
+    while not run.placed:
+        run.advance()
+        assert run.placing_steps < 3000
+    loads = [float(run.master.wrench.force[2])]
+    assert run.master.extrapolation == order
+    while not run.done:
+        run.advance()
+        loads.append(float(run.master.wrench.force[2]))
+    assert np.abs(np.array(loads) - trial.weight).max() < 0.01 * trial.weight
+    depth = 0.2 * math.cos(math.pi / 8) - float(run.body.place[1])
+    assert depth == pytest.approx(0.5 * trial.weight / trial.stiffness, rel=0.01)

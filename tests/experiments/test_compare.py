@@ -64,7 +64,8 @@ def test_the_loads_on_the_rows_are_the_force_that_lifts_the_platform(runs):
         (("begun",), "has no result yet"),
         (
             ("hop",),
-            "is of hop, of which there is nothing to compare over time: runs of tumble or of penetrate would do",
+            "is of hop, of which there is nothing to compare over time: runs of tumble, tumble spatial or penetrate "
+            "would do",
         ),
         (("spike",), "is of tumble and .* of penetrate: two of one kind would do"),
     ],

@@ -6,32 +6,14 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from spatial_runs import CUBE, small_bed
 
 from experiments import following, spatial
 from experiments.cli import main
-from experiments.runfolder import RunFolder
+from experiments.runfolder import RunFolder, read_series
 from experiments.spatial_settings import SpatialSettings
 from experiments.spatial_trial import plan_spatial
 from vis.tumble_series import read_columns
-
-CUBE = """
-format = "hedgebed-platform/1"
-name = "cube"
-[body]
-mass = 0.1
-inertia = [1.2e-5, 1.2e-5, 1.2e-5]
-[hull]
-shape = "box"
-size = [0.03, 0.03, 0.03]
-[spikes]
-clear = 0.01
-diameter = 0.008
-[wheels]
-inertia = 1e-6
-max_speed = 1000.0
-motor_torque = 0.02
-axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
-"""
 
 
 @pytest.fixture
@@ -117,7 +99,7 @@ def test_set_down_by_the_hand_on_the_spring_damper_it_stands_as_deep_as_its_load
     assert quantities["energy_residual"]["value"] < 1e-5
     path = read_columns(out / "trajectory.csv")[0]
     assert path["wx_rad_s"][-1] > 0.01 and path["wy_rad_s"][-1] > 0.01
-    assert path["touching"][0] == 4
+    assert path["touching"][0] == 4 and result["transitions"][0] == {"time": 0.0, "state": "stand", "turn": 0.0}
     motion = read_columns(out / "series" / "motion.csv")[0]
     inertia = 1.2e-3
     assert motion["wheel_x_rad_s"][-1] == pytest.approx(-0.05 * 0.1 / inertia, rel=1e-6)
@@ -136,24 +118,6 @@ def test_a_drop_tells_its_impact_and_a_hop(tmp_path, monkeypatch, cube):
     assert quantities["first_touch"]["value"] == pytest.approx(speed, abs=1e-3)
     assert quantities["impact_speed"]["value"] == pytest.approx(speed, rel=0.02)
     assert quantities["restitution"]["value"] == pytest.approx(1.0, abs=0.02)
-
-
-def small_bed(*_):
-    """Two layers of large grains, almost at rest."""
-    from dem import Bed
-    from dem.materials import SAND
-
-    d, rows = 6e-3, 20
-    low = [((i + 0.5) * d, (j + 0.5) * d, 0.5 * d) for i in range(rows) for j in range(rows)]
-    high = [((i + 1.0) * d, (j + 1.0) * d, 0.5 * d + d * math.sqrt(0.5)) for i in range(rows) for j in range(rows)]
-    positions = np.array(low + high) % [rows * d, rows * d, 1.0]
-    bed = Bed.from_grains(
-        SAND, positions=positions, radii=np.full(len(positions), 0.5 * d), young=1e6, max_overlap=0.2,
-        size=(rows * d, rows * d, 0.05), height=0.3, threads=1, gravity=1.0,
-    )  # fmt: skip
-    bed.advance(200)
-    bed.surface = float((bed.grains()["position"][:, 2] + 0.5 * d).max())
-    return bed
 
 
 def test_on_grains_a_stopped_run_goes_on_to_the_same_bits_with_its_books_and_overlaps_told(tmp_path, monkeypatch, cube):
@@ -182,13 +146,15 @@ def test_on_grains_a_stopped_run_goes_on_to_the_same_bits_with_its_books_and_ove
     assert RunFolder.open(tmp_path / "broken").load_checkpoint("tumble") is not None
     again = spatial.resume(tmp_path / "broken")
     assert again["quantities"] == whole["quantities"]
-    for name in ("trajectory.csv", "series/bed.csv", "series/motion.csv", "frames/tumble.pvd"):
+    assert again["transitions"] == whole["transitions"]
+    for name in ("trajectory.csv", "series/bed.csv", "series/motion.csv", "series/feet.csv", "frames/tumble.pvd"):
         assert (tmp_path / "broken" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
     quantities = whole["quantities"]
     assert quantities["sinkage_largest"]["value"] > 1e-3 and quantities["dissipated_friction"]["value"] > 0
     assert quantities["energy_residual"]["value"] < 5e-3 and quantities["momentum_residual"]["value"] < 1e-13
     assert whole["grains"]["beside"]["impact_speed"]["value"] > 0.1
     _check_overlaps(whole, settings)
+    _check_feet(tmp_path / "whole", whole)
     frames = sorted(path.name for path in (tmp_path / "whole" / "frames").glob("*_0001.*"))
     parts = ("contact_forces", "grains", "hull", "row_forces", "spikes")
     assert frames == [*(f"tumble_{part}_0001.vtu" for part in parts), "tumble_surface_0001.vti"]
@@ -202,22 +168,46 @@ def _check_overlaps(result, settings):
     assert overlap > 0.05 and any(said in warning for warning in result["warnings"])
 
 
+def _check_feet(folder, result):
+    """The spikes' forces are the whole force; what never came down has no columns; the states are told everywhere."""
+    feet = read_series(folder / "series" / "feet.csv")
+    motion, path = (read_series(folder / name) for name in ("series/motion.csv", "trajectory.csv"))
+    came_down = {name.split("_")[1] for name in feet if name.startswith("normal_")}
+    assert came_down and came_down < {str(spike) for spike in range(8)} | {"hull"}
+    for what, whole in (("normal_{}_N", "fz_N"), ("along_x_{}_N", "fx_N"), ("along_y_{}_N", "fy_N")):
+        told = sum(feet[what.format(spike)] for spike in came_down)
+        # What is below the least force that counts as touching is left out: 0.1 % of 0.1 N a spike.
+        assert np.abs(told - motion[whole]).max() < 9 * 1e-3 * 0.1
+    deepest = np.max([feet[f"sinkage_{spike}_m"] for spike in came_down - {"hull"}], axis=0)
+    assert "sinkage_hull_m" not in feet
+    assert deepest == pytest.approx(motion["sinkage_m"], abs=1e-15)
+    assert path["state"][0] == "hop" and set(path["state"]) > {"hop"}
+    entries = result["transitions"]
+    assert entries[0] == {"time": 0.0, "state": "hop", "turn": 0.0} and len(entries) > 1
+    row = int(np.flatnonzero(path["t_s"] == entries[1]["time"])[0])
+    assert path["state"][row] == entries[1]["state"] != path["state"][row - 1]
+    assert path["turn_rad"][row] == entries[1]["turn"]
+    assert any("hop at once -> " in sentence for sentence in result["departures"]["sentences"])
+    assert result["grains"]["beside_transitions"][0]["state"] == "hop"
+
+
 def _check_report(folder):
     """Every plot is there and the page says both grounds' numbers, without pictures."""
     from vis.spatial import write_spatial_report
 
     page = write_spatial_report(folder, pictures=False).read_text()
     assert "spring-damper" in page and "cube in space on bed of sand" in page
-    assert all((folder / "figures" / f"{name}.png").stat().st_size > 5000 for name in ("path", "turning", "energy"))
+    names = ("path", "states", "beside", "energy")
+    assert all((folder / "figures" / f"{name}.png").stat().st_size > 5000 for name in names)
 
 
 def test_the_flat_pictures_are_drawn_where_there_is_no_opengl(tmp_path, monkeypatch, cube):
-    from vis import spatial as report
+    from vis.spatial import write_spatial_report
 
     monkeypatch.setattr(spatial, "write_report", lambda *_: None)
-    monkeypatch.setattr(report, "opengl_available", lambda: False)
+    monkeypatch.setenv("HEDGEBED_NO_OPENGL", "1")
     settings = SpatialSettings(platform=cube, gravity=1.0, height=1e-3, duration=0.02, frame_count=2)
     spatial.run(settings, tmp_path / "law")
-    page = report.write_spatial_report(tmp_path / "law").read_text()
-    assert "no OpenGL" in page
+    page = write_spatial_report(tmp_path / "law").read_text()
+    assert "no OpenGL" in page and "Pivot, slip, hop" in page and "Transitions" in page
     assert (tmp_path / "law" / "film.gif").exists() and (tmp_path / "law" / "figures" / "space-end.png").exists()

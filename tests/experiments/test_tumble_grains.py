@@ -32,7 +32,10 @@ def on_bed(**more):
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"bed_size": (0.2, 0.06, 0.046)}, r"bed_size = 0.2 m along the motion .* 0.28 m or a shorter one would do"),
+        (
+            {"bed_size": (0.2, 0.06, 0.046)},
+            r"bed_size = 0.2 m along the motion .* takes 0.28 m .* 0.42 m would do, or a shorter duration",
+        ),
         ({"bed_size": (0.4, 0.03, 0.046)}, r"bed_size = 0.03 m across .* 0.036 m would do"),
         ({"bed_size": (0.4, 0.06, 0.03)}, r"bed_size = 0.03 m deep .* 0.043 m would do"),
         ({"grain": 0.013}, r"grain = 0.013 m is larger than the spike: at most 0.012 m would do"),
@@ -55,7 +58,7 @@ def on_bed(**more):
         ({"bed_stages": ("rain", "cut:0.1", "level")}, r"bed_stages: .* would undo it"),
         (
             {"bed_size": (0.1, 0.06, 0.046), "bed_repeats": 2},
-            r"bed_size = 0.1 m along the motion with bed_repeats = 2, 0.2 m in all, is too short: .* 0.28 m or",
+            r"bed_size = 0.1 m along the motion with bed_repeats = 2, 0.2 m in all, is too short: .* 0.42 m would do",
         ),
         (
             {"bed_repeats": 2, "coarse": 0.006, "grain": 0.0024, "bed_size": (0.4, 0.036, 0.046)},
@@ -94,7 +97,7 @@ def test_what_does_not_go_with_grains_is_refused_by_name(given):
 
 
 def test_the_whole_of_a_bed_laid_end_to_end_counts_for_the_forecast():
-    """0.28 m would do, says the refusal of 0.2 m: so do two pieces of 0.14 m; the footprints lie in their middle."""
+    """It takes 0.28 m, says the refusal of 0.2 m: so do two pieces of 0.14 m; the footprints lie in their middle."""
     settings = on_bed(bed_size=(0.14, 0.06, 0.046), bed_repeats=2)
     tumble.check(settings)
     whole = on_bed(bed_size=(0.28, 0.06, 0.046))
@@ -118,6 +121,35 @@ def test_the_box_over_the_sand_is_as_high_as_a_brake_may_throw_it():
     motor = on_bed(torque=0.125)
     plan = tumble_grains._plan(motor)
     assert tumble_grains._laid_out(motor, plan, tumble_grains._forecast(motor, plan), bed) is bed
+
+
+def test_the_length_that_a_refusal_names_holds_the_way_that_tumbles_on_grains_have_gone():
+    """0.22 N m for 2 s: 263 mm on 2.4 mm grains (docs/results/grains1-sand-0.0085-0.22), on springs 101."""
+    with pytest.raises(ValueError, match=r"m would do, or a shorter duration") as refused:
+        tumble.check(on_bed(bed_size=(0.3, 0.06, 0.046), duration=2.0))
+    named = float(str(refused.value).rsplit(" m would do", 1)[0].rsplit(" ", 1)[1])
+    wide = on_bed(bed_size=(named, 0.06, 0.046), duration=2.0)
+    tumble.check(wide)
+    forecast = tumble_grains._forecast(wide, tumble_grains._plan(wide))
+    assert tumble_grains._may_leave(wide, forecast) is None
+    assert named - tumble_grains._origin(wide, forecast) > 0.263 + 0.1
+    short = on_bed(bed_size=(0.4, 0.06, 0.046), duration=2.0)
+    tumble.check(short)
+    assert "bed_repeats = 2, or a shorter duration" in tumble_grains._may_leave(short, forecast)
+
+
+def test_a_tumble_on_grains_with_nothing_but_its_torque_given_stays_on_its_bed():
+    """`hedgebed tumble --surface sand --ground bed --rig 0.0085 --torque 0.22`: 1.1 s, where planar tumbles have 3."""
+    given = {"surface": "sand", "rig": 0.0085, "torque": 0.22}
+    settings = TumbleSettings(**given, ground="bed")
+    assert (settings.duration, TumbleSettings(**given).duration) == (1.1, 3.0)
+    assert TumbleSettings(**given, ground="bed", tumbles=2).duration == 3.0
+    assert TumbleSettings(surface="sand", ground="bed", gravity=1e-2).duration == 3.0
+    tumble.check(settings)
+    forecast = tumble_grains._forecast(settings, tumble_grains._plan(settings))
+    assert tumble_grains._may_leave(settings, forecast) is None
+    # A tip may come down as far ahead as a torque that acts all the time rolls it, less what sand takes.
+    assert forecast.farthest > 0.0788 + 0.077  # what grains did in 1.1 s, and the next row ahead of the centre
 
 
 def small_bed(settings, *_):
@@ -202,7 +234,7 @@ def test_a_run_that_leaves_the_bed_says_where_and_keeps_its_state_and_series(tmp
             nonlocal count
             count += 1
             if count > 50:
-                raise LeftTheBedError("spike 7 came down 0.01 m ahead of the bed, which is 0.4 m long")
+                raise LeftTheBedError("spike 7 came down 0.01 m ahead of the bed, which is 0.4 m long", lacking=0.02)
             return plain(*given)
 
         footing.step = step
@@ -214,7 +246,7 @@ def test_a_run_that_leaves_the_bed_says_where_and_keeps_its_state_and_series(tmp
     given = ("--surface", "sand", "--ground", "bed", "--bed-size", "0.4", "0.06", "0.046", "--frame-count", "0")
     assert main(["tumble", *given, "--duration", "0.3", "--quiet", "--out", str(out)]) == 1
     said = capsys.readouterr().err.replace("\n", " ")
-    assert "at 0.05 s: spike 7 came down 0.01 m ahead of the bed" in said and "a longer or deeper bed_size" in said
+    assert "at 0.05 s: spike 7 came down 0.01 m ahead of the bed" in said and "a bed_size longer by 0.04 m" in said
     assert json.loads((out / "status.json").read_text())["status"] == "failed"
     state = RunFolder.open(out).load_checkpoint("tumble.failed")
     assert state is not None and state["master.count"] == 50
