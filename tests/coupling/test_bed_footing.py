@@ -185,12 +185,12 @@ SMALL = {
 }  # fmt: skip
 
 
-def small(bed, *, torque=0.0, start=0.06, duration=0.05, **options):
+def small(bed, *, torque=0.0, start=0.06, duration=0.05, substeps=8, **options):
     trial = Trial(**SMALL, torque=torque)
     members = platform_members(spike_length=0.04, count=8, diameter=8e-3, clear=0.015, hull_radius=0.02, width=0.036)
     footing = BedFooting(bed, members, origin=(start, 0.018), copies=2.0, touch=1e-3 * trial.weight, friction=0.5)
     return CoupledTumble(
-        trial, footing, duration=duration, substeps=8, tip_radius=4e-3,
+        trial, footing, duration=duration, substeps=substeps, tip_radius=4e-3,
         **({"lowering_speed": 0.04, "energy_interval": 0.01} | options),
     )  # fmt: skip
 
@@ -233,6 +233,20 @@ def test_a_tumble_on_grains_closes_its_books_and_goes_on_from_a_checkpoint_to_th
     for name in ("x", "y", "theta", "omega", "stored_energy", "dissipated", "state", "energy_residual"):
         assert np.array_equal(getattr(found, name), getattr(again, name)), name
     assert np.array_equal(run.losses["friction"], other.losses["friction"])
+
+
+def test_the_residual_of_the_exchange_with_grains_falls_as_the_square_of_the_macro_step():
+    """A tumble over the layer, from where the hand lets go: 16 of the bed's steps in one against 4."""
+    torque = 4 * 0.58 * 0.3 * 0.04 * math.sin(math.pi / 8)
+    bed = layer()
+    kept, gaps = bed.state(), []
+    for substeps in (16, 4):
+        bed.restore(kept)
+        run = small(bed, torque=torque, duration=0.06, substeps=substeps)
+        found = run.run()
+        assert found.energy_residual < 1e-4
+        gaps.append(abs(run.master.books.given - run.master.books.taken))
+    assert math.log(gaps[0] / gaps[1], 4) > 1.5
 
 
 def test_a_start_in_overlap_is_refused_with_the_height_that_would_do():
