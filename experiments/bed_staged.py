@@ -11,8 +11,9 @@ from dem.recipe import check_stages, parse_stage
 from dem.sizes import sizes_of
 
 from .progress import Progress
+from .surfaces import Surface
 
-__all__ = ["check_bed_stages", "staged_bed"]
+__all__ = ["check_bed_stages", "packing_warning", "staged_bed"]
 
 
 def check_bed_stages(
@@ -30,6 +31,22 @@ def check_bed_stages(
         raise ValueError(f"bed_stages has {spoilt[0]!r}: a platform needs a level bed; leave it out")
     if plan[-1].name != "level":
         raise ValueError(f"bed_stages ends with {str(plan[-1])!r}: 'level' last gives the bed the depth of bed_size")
+
+
+def packing_warning(surface: Surface, material: Material, stages: Sequence[str] | None) -> str | None:
+    """That a bed without `stages` will not have the packing its grains were calibrated at, and which stages would do.
+
+    None where stages are given, or that packing is not known. `material` is that of the surface's grains.
+    """
+    if stages is not None or surface.packing is None:
+        return None
+    compact = f"compact:{surface.packing:g}"
+    would_do = f"rain {compact} level" if material.cohesion == "none" else f"rain:dry {compact} stick level"
+    return (
+        f"without bed_stages the bed is rained and levelled, not packed at {surface.packing:g} as its grains "
+        f"({surface.grains}) were in their calibration: what it shows will not be {surface.name}; "
+        f"--bed-stages {would_do} would do"
+    )
 
 
 class _OneStage:
@@ -59,6 +76,7 @@ def staged_bed(
     seed: int,
     young: float,
     max_overlap: float,
+    arch: str,
     threads: int | None,
     cache: bool,
     progress: Progress,
@@ -71,7 +89,7 @@ def staged_bed(
     try:
         prepared = prepare_as(
             material, stages=stages, size=size, grain=grain, spread=spread, gravity=gravity, seed=seed, young=young,
-            max_overlap=max_overlap, threads=threads, cache=cache,
+            max_overlap=max_overlap, arch=arch, threads=threads, cache=cache,
             progress=_OneStage(progress, "bed", len(stages), asked_to_stop),
         )  # fmt: skip
     except ValueError as error:  # found while it was prepared, as a packing that cannot be reached

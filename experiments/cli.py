@@ -155,10 +155,12 @@ def _resume(
     with refusing():
         run = RunFolder.open(folder)
         experiment = find_experiment(run.command)
-        settings_from(experiment.settings_class(), [Layer(str(folder / "run.toml"), run.settings)])
-        with run.lock():
-            pass
-    if run.status == "done" and (folder / "result.json").exists():
+        kept = run.status is None and (folder / "result.json").exists()  # as docs/results has them: not to be written
+        if not kept:
+            settings_from(experiment.settings_class(), [Layer(str(folder / "run.toml"), run.settings)])
+            with run.lock():
+                pass
+    if kept or (run.status == "done" and (folder / "result.json").exists()):
         say(f"the run in {folder} is done")
         redraw_old_report(run, quiet=quiet)
         return show_folder(run, as_json=json, verbose=verbose)

@@ -17,6 +17,7 @@ from hedgebed import __version__
 
 from . import compare_spatial, compare_tumbles
 from .compare_settings import CompareSettings
+from .kept_results import PATH_AND_MOTION, require_files
 from .progress import Progress
 from .reporting import write_report
 from .runfolder import RunFolder, read_json
@@ -67,6 +68,8 @@ def _finished(path: str) -> RunFolder:
         raise ValueError(
             f"runs: {path!r} has no result yet ({status}): `hedgebed resume {path}` finishes it where it can be"
         )
+    if folder.command == IN_THE_PLANE:
+        require_files(folder, PATH_AND_MOTION, key="runs")
     return folder
 
 

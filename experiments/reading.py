@@ -19,6 +19,9 @@ from experiments.strict import may_be_empty
 
 __all__ = ["Layer", "find_case", "nearest", "option", "read_case", "settings_from"]
 
+_NEAR = 4
+"""Names that are told at most of those that are spelt like one there is not."""
+
 
 @dataclass(frozen=True)
 class Layer:
@@ -47,7 +50,7 @@ def nearest(word: str, words: Iterable[str]) -> str:
 def find_case(given: Path, shipped: Path) -> Path:
     """The case file that `given` means: a path, or the name of one in the folder `shipped`.
 
-    Raises ValueError naming those that ship.
+    Raises ValueError naming those that ship and are spelt like it, or where none is, those of the folder itself.
     """
     if given.is_file():
         return given
@@ -56,7 +59,12 @@ def find_case(given: Path, shipped: Path) -> Path:
             if named.is_file():
                 return named
     names = sorted(path.stem for path in shipped.glob("*.toml"))
-    also = f"; the cases that ship are {', '.join(names)}" if names else ""
+    below = sorted(path.stem for path in shipped.glob("*/*.toml"))
+    if close := get_close_matches(given.name.removesuffix(".toml"), [*names, *below], n=_NEAR):
+        also = f"; cases of names near it that ship are {', '.join(close)}"
+    else:
+        also = f"; the cases that ship are {', '.join(names)}" if names else ""
+        also += f", and {len(below)} that `hedgebed experiments list` names" if below else ""
     raise ValueError(f"case = {str(given)!r} is no file: give the path of a TOML file{also}")
 
 

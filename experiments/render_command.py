@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from experiments.cli_streams import refusing, say, stdout_to_stderr
+from experiments.kept_results import drawn_from, require_files
 from experiments.progress import make_progress
 from experiments.runfolder import RunFolder
 
@@ -34,6 +35,8 @@ def render(
             raise ValueError(
                 f"run = {str(run)!r} has no result yet: `hedgebed resume {run}` finishes it where it can be"
             )
+        if folder.command in ("tumble", "tumble spatial"):
+            require_files(folder, drawn_from(folder), key="run")
         with folder.lock():
             pass
     with folder.lock(), stdout_to_stderr(), make_progress(quiet=quiet) as progress:

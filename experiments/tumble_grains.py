@@ -23,7 +23,7 @@ from rigid.trial import Trial
 
 from .bed_graded import graded_under
 from .bed_progress import BedProgress
-from .bed_staged import check_bed_stages, staged_bed
+from .bed_staged import check_bed_stages, packing_warning, staged_bed
 from .following import CHECKPOINT, follow
 from .progress import Progress
 from .reporting import write_report
@@ -100,7 +100,9 @@ def tumble_on_grains(settings: TumbleSettings, folder: RunFolder, progress: Prog
     """Carry it out in `folder`, from its checkpoint where there is one; the result."""
     with folder.lock():
         plan = _plan(settings)
-        for sentence in (*_sentences(settings, plan), *(f"warning: {warning}" for warning in plan.warnings)):
+        unlike = packing_warning(find_surface(plan.surface), _material(plan), settings.bed_stages)
+        warnings = [*plan.warnings, *([unlike] if unlike else [])]
+        for sentence in (*_sentences(settings, plan), *(f"warning: {warning}" for warning in warnings)):
             progress.message(sentence)
         forecast = _forecast(settings, plan)
         if told := _may_leave(settings, forecast):
@@ -281,6 +283,11 @@ def _check_bed(settings: TumbleSettings, forecast: Forecast, material: Material)
         raise ValueError(
             f"bed_size = {depth:g} m deep is too shallow: {forecast.on} a tip goes {forecast.deepest:.2g} m "
             f"deep, so with two spikes' diameters below it {least:.2g} m would do"
+        )
+    if abs(settings.place) > 0.5 * length:
+        raise ValueError(
+            f"place = {settings.place:g} m is off the bed, {length:g} m long in all: -{0.5 * length:g} to "
+            f"{0.5 * length:g} m from its middle would do"
         )
     if settings.place and settings.coarse is not None:
         raise ValueError(

@@ -29,6 +29,7 @@ from .campaign.tables import (
     WheelTable,
 )
 from .campaign_settings import CampaignSettings
+from .kept_results import PATH_AND_MOTION, require_files
 from .run_campaign import check_target
 from .runfolder import RunFolder, read_series
 from .strict import StrictSettings
@@ -125,6 +126,7 @@ def _finished(folder: Path) -> dict[str, Any]:
         raise ValueError(f"{str(folder)!r} is a run of {kept.command}: one of tumble would do")
     if not (folder / "result.json").exists():
         raise ValueError(f"{str(folder)!r} has no result yet: `hedgebed resume {folder}` finishes it where it can be")
+    require_files(kept, PATH_AND_MOTION, key="run")
     result = kept.read_result()
     if result["effects"]:
         named = ", ".join(effect["id"] for effect in result["effects"])

@@ -10,7 +10,10 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from rigid.laws import GROUNDS
+
 from .platform_settings import NotNegative, PlatformSettings, Positive
+from .reading import nearest
 from .sweep_ranges import parse_sweep
 from .tumble_bed_settings import OF_THE_MASTER, TumbleBedSettings
 
@@ -149,10 +152,17 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
-        for finding in (self._sweep(), self._gravity(), self._actuation(), self._on_grains()):
+        for finding in (self._known_ground(), self._sweep(), self._gravity(), self._actuation(), self._on_grains()):
             if finding:
                 raise ValueError(finding)
         return self
+
+    def _known_ground(self) -> str | None:
+        grounds = [*GROUNDS, "bed"]
+        if self.ground in grounds:
+            return None
+        known = nearest(self.ground, grounds)
+        return f"ground = {self.ground!r} is no ground; {known}{'' if known.endswith('?') else ' (of grains)'}"
 
     def _sweep(self) -> str | None:
         for key in self._swept():

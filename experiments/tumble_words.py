@@ -46,8 +46,8 @@ def residual_warning(residual: float) -> str | None:
     if residual <= MOST_RESIDUAL:
         return None
     return (
-        f"energy_residual = {residual:.2g} is above {MOST_RESIDUAL:g}: the books do not close; fewer "
-        "substeps, or iterations, tell whether it is the coupling, stiffer grains (young) whether the bed's step"
+        f"energy_residual = {_above(residual, MOST_RESIDUAL)} is above {MOST_RESIDUAL:g}: the books do not close; "
+        "fewer substeps, or iterations, tell whether it is the coupling, stiffer grains (young) whether the bed's step"
     )
 
 
@@ -58,8 +58,8 @@ def reversal_warning(made: float) -> str | None:
     if made <= MOST_REVERSAL:
         return None
     return (
-        f"dissipation_reversal = {made:.2g} is above {MOST_REVERSAL:g}: the bed made energy, so this run's "
-        f"numbers are not to be trusted; fewer substeps tell whether it is the coupling"
+        f"dissipation_reversal = {_above(made, MOST_REVERSAL)} is above {MOST_REVERSAL:g}: the bed made energy, so "
+        f"this run's numbers are not to be trusted; fewer substeps tell whether it is the coupling"
     )
 
 
@@ -72,6 +72,12 @@ def unsettled_warning(master: Master) -> str | None:
         f"{many} of {master.count} macro steps did not settle in iterations = {master.iterations}: more of them, or "
         f"fewer substeps, would do"
     )
+
+
+def _above(value: float, limit: float) -> str:
+    """A value with as many digits, two at least, as show that it is above the limit."""
+    texts = (f"{value:.{digits}g}" for digits in range(2, 18))
+    return next((text for text in texts if float(text) > limit), f"{value:g}")
 
 
 def _does_not_tip(trajectory: Trajectory) -> list[str]:

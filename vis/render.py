@@ -20,14 +20,20 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, ImageColor
 
+from vis.arrows import FORCE
 from vis.canvas import Caption, ColourScale, Page, colour_values, colourmap
 from vis.frames import read_frames
+from vis.tumble_series import STATES
 
 __all__ = ["main", "replace_file", "run_job", "write_gif", "write_png"]
 
 _GIF_LIMIT = 5_500_000  # bytes
+_KEPT = tuple(ImageColor.getrgb(colour)[:3] for colour in ("#ffffff", *STATES.values(), str(FORCE["color"])))
+"""Colours that no film may change for one near it, as rare as they are: a legend's would come out alike."""
+_ROOM = 256 - len(_KEPT)
+"""Left of a film's palette for all others."""
 
 
 def run_job(job: dict[str, Any], *, opengl: bool, step: Callable[[], None] = lambda: None) -> None:
@@ -106,17 +112,19 @@ def write_gif(path: Path, images: list[NDArray[np.uint8]], *, frame_ms: int = 80
 
 
 def _palette(image: Image.Image) -> Image.Image:
-    """An image with the 256 colours that serve this one best; white is among them, as white."""
-    colours = image.quantize(colors=255, method=Image.Quantize.MEDIANCUT).getpalette() or []
+    """An image with the 256 colours that serve this one best, those of `_KEPT` last, as they are."""
+    colours = (image.quantize(colors=_ROOM, method=Image.Quantize.MEDIANCUT).getpalette() or [])[: 3 * _ROOM]
+    kept = [part for colour in _KEPT for part in colour]
     palette = Image.new("P", (1, 1))
-    palette.putpalette([*colours[: 3 * 255], *[255] * (3 * 256 - min(len(colours), 3 * 255))])
+    palette.putpalette([*colours, *[255] * (3 * _ROOM - len(colours)), *kept])
     return palette
 
 
 def _indexed(image: NDArray[np.uint8], palette: Image.Image) -> Image.Image:
     page = Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.NONE)
     index = np.asarray(page).copy()
-    index[(image == 255).all(axis=2)] = 255  # Pillow's search is coarse: white would come out as a light grey
+    for place, colour in enumerate(_KEPT, _ROOM):  # Pillow's search is coarse: white would come out as a light grey
+        index[(image == colour).all(axis=2)] = place
     exact = Image.frombytes("P", page.size, index.tobytes())
     exact.putpalette(palette.getpalette() or [])
     return exact

@@ -22,6 +22,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from vis.arrows import FORCE, HALO, draw_force
 from vis.canvas import COLOURS, colour_values, colourmap, nice_above
 from vis.frames import Frame, Frames, read_frames
 from vis.jobs import draw_job, job_of
@@ -124,11 +125,9 @@ class Scene:
         points, fields = frame.clouds.get("row_forces", (np.zeros((0, 3)), {}))
         for point, force in zip(points, fields.get("force", np.zeros((0, 3))), strict=True):
             ends = self.stage.place(np.array([point, point + long * np.asarray(force, dtype=float)]), focus)
-            if np.linalg.norm(ends[1] - ends[0]) > 0.005:
-                axis.annotate("", ends[1], ends[0], arrowprops=_FORCE, annotation_clip=True)
-        axis.annotate("", (0.025, 0.97), (0.025, 0.97 - _ARROW), arrowprops=_FORCE)
-        halo = {"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.5}
-        axis.text(0.04, 0.96, f"weight, {quote(weight, unit='N')}", fontsize=10, va="top", color=INK, bbox=halo)
+            draw_force(axis, ends[0], ends[1], float(np.linalg.norm(force)))
+        axis.annotate("", (0.025, 0.97), (0.025, 0.97 - _ARROW), arrowprops=FORCE)
+        axis.text(0.04, 0.96, f"weight, {quote(weight, unit='N')}", fontsize=10, va="top", color=INK, bbox=HALO)
 
     def close(self) -> None:
         """Free the window."""
@@ -201,11 +200,6 @@ class View:
         if not len(frame.grains["position"]):
             return np.zeros((0, 4))
         return np.asarray(self.map(self.norm(colour_values(frame.grains, self.by))))
-
-
-_FORCE = {
-    "arrowstyle": "-|>,head_width=0.28,head_length=0.55", "color": "#B00020", "lw": 2.2, "shrinkA": 0, "shrinkB": 0,
-}  # fmt: skip
 
 
 def _centre(frame: Frame) -> NDArray[np.float64]:

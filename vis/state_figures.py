@@ -134,7 +134,8 @@ def state_strip(drawing: Figure, runs: Sequence[Mapping[str, Any]], labels: Sequ
     axis.set_xlabel("time [s]", labelpad=1)
     there = [name for name in STATES if any(name in run["state"] for run in runs)]
     for place, name in enumerate(there):
-        drawing.text(0.885, 0.125 - 0.027 * place, f"■ {name}", color=STATES[name], fontsize=10)
+        drawing.text(0.885, 0.125 - 0.027 * place, "■", color=STATES[name], fontsize=10)
+        drawing.text(0.898, 0.125 - 0.027 * place, name, fontsize=10)
 
 
 def passages(entries: Sequence[Mapping[str, Any]], *, angle: str, label: str) -> list[Block]:

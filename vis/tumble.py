@@ -97,7 +97,8 @@ def _seen(drawn: Pictures) -> Section:
     blocks = [figure(one.file, title=one.title, caption=one.caption, show_file=one in film)
               for one in (*film, *drawn.stills)]  # fmt: skip
     camera = (
-        "In front of the spikes' plane the grains are left out. Red arrows: the force on a row, as long as its size."
+        "In front of the spikes' plane the grains are left out. Red arrows: the force on a row, as long as its size; "
+        "one that would leave the picture ends at its edge, with its number."
     )
     return Section("Seen from near", [*blocks, text(camera, small=True), *(text(note) for note in drawn.notes)])
 

@@ -23,6 +23,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from vis.arrows import FORCE, HALO, draw_force
 from vis.canvas import COLOURS, colour_values, colourmap
 from vis.frames import Frame
 from vis.jobs import draw_job, job_of
@@ -172,7 +173,7 @@ class Sheet:
         self._ruler(axis, stage, panel.near)
         self._mark(axis, stage, reel, frame, focus)
         if panel.near:
-            axis.text(0.012, level + 0.012, "undisturbed surface", fontsize=9, va="bottom", bbox=_HALO)
+            axis.text(0.012, level + 0.012, "undisturbed surface", fontsize=9, va="bottom", bbox=HALO)
             self._arrows(axis, stage, frame, focus)
 
     def _mark(self, axis: Any, stage: Eye, reel: Reel, frame: Frame, focus: tuple[float, float]) -> None:
@@ -189,7 +190,7 @@ class Sheet:
         right = 0.97
         axis.plot([right - step / stage.width, right], [0.035, 0.035], color=INK, lw=2.5, solid_capstyle="butt")
         middle = right - 0.5 * step / stage.width
-        axis.text(middle, 0.05, f"{1e3 * step:g} mm", ha="center", va="bottom", fontsize=10, bbox=_HALO)
+        axis.text(middle, 0.05, f"{1e3 * step:g} mm", ha="center", va="bottom", fontsize=10, bbox=HALO)
 
     def _arrows(self, axis: Any, stage: Eye, frame: Frame, focus: tuple[float, float]) -> None:
         """The force on each row that touches, and the weight as a measure."""
@@ -197,26 +198,15 @@ class Sheet:
         points, fields = frame.clouds.get("row_forces", (np.zeros((0, 3)), {}))
         for point, force in zip(points, fields.get("force", np.zeros((0, 3))), strict=True):
             ends = stage.place(np.array([point, point + long * np.asarray(force, dtype=float)]), focus)
-            if np.linalg.norm(ends[1] - ends[0]) > 0.005:
-                axis.annotate("", ends[1], ends[0], arrowprops=_FORCE, annotation_clip=True)
-        axis.annotate("", (0.035, 0.97), (0.035, 0.97 - _ARROW), arrowprops=_FORCE)
-        axis.text(0.055, 0.96, f"weight, {quote(self.weight, unit='N')}", fontsize=10, va="top", bbox=_HALO)
+            draw_force(axis, ends[0], ends[1], float(np.linalg.norm(force)))
+        axis.annotate("", (0.035, 0.97), (0.035, 0.97 - _ARROW), arrowprops=FORCE)
+        axis.text(0.055, 0.96, f"weight, {quote(self.weight, unit='N')}", fontsize=10, va="top", bbox=HALO)
 
     def _bar(self, sheet: Figure) -> None:
         axis = sheet.add_axes((0.925, 0.27, 0.012, 0.5))
         bar = sheet.colorbar(ScalarMappable(self.norm, self.map), cax=axis, extend="max", extendfrac=0.04)
         bar.set_label(COLOURS[self.by][0], fontsize=10.5)
         bar.outline.set_visible(False)  # type: ignore[operator]
-
-
-_HALO = {"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.5}
-_FORCE = {
-    "arrowstyle": "-|>,head_width=0.28,head_length=0.55",
-    "color": "#B00020",
-    "lw": 2.2,
-    "shrinkA": 0,
-    "shrinkB": 0,
-}
 
 
 def _layout(runs: int) -> list[_Panel]:

@@ -9,14 +9,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from vis.style import BED, GREY, MODEL
+from vis.style import BED, MODEL
 
 __all__ = ["STATES", "read_columns", "state_runs"]
 
 Array = NDArray[np.float64]
 
-STATES = {"stand": GREY, "pivot": BED, "slip": MODEL, "hop": "#009E73"}
-"""The states in the order of losing hold, with their colours."""
+STATES = {"stand": "#a4a4a4", "pivot": BED, "slip": MODEL, "hop": "#882255"}
+"""The states in the order of losing hold, with their colours: apart for the colour-blind too (tests/vis/test_style.py),
+to whom Okabe and Ito's green is the grey of standing or the blue of pivoting; Tol's wine is neither."""
 
 
 def read_columns(path: Path) -> tuple[dict[str, Array], NDArray[np.str_]]:

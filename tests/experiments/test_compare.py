@@ -94,3 +94,30 @@ def test_pictures_of_a_run_are_made_again_without_opengl_too(runs, monkeypatch, 
 def test_what_has_no_result_is_not_rendered(tmp_path, capsys):
     assert main(["render", str(tmp_path)]) == 2
     assert "is not a run folder" in capsys.readouterr().err
+
+
+def test_a_kept_result_is_refused_with_what_it_lacks_and_no_lock_is_left(runs, tmp_path, capsys):
+    """run.toml, result.json and trajectory.csv alone, as docs/results keeps them: `render`, `compare`, `from-run`."""
+    kept = tmp_path / "kept"
+    kept.mkdir()
+    for name in ("run.toml", "result.json", "trajectory.csv"):
+        (kept / name).write_bytes((runs / "sand" / name).read_bytes())
+    out = str(tmp_path / "out")
+    for words in (["render"], ["compare", str(runs / "brick"), "--out", out], ["campaign", "from-run"]):
+        after = [out] if words[0] == "campaign" else []
+        assert main([*words, str(kept), *after]) == 2
+        said = " ".join(capsys.readouterr().err.split())
+        assert "has no series/motion.csv; a kept result holds run.toml, result.json, trajectory.csv alone: " in said
+        assert f"`hedgebed tumble {kept / 'run.toml'}` computes it again" in said
+        assert len(list(kept.iterdir())) == 3 and not (tmp_path / "out").exists()
+
+
+def test_resuming_a_kept_result_shows_it_and_computes_and_writes_nothing(runs, tmp_path, capsys):
+    kept = tmp_path / "kept"
+    kept.mkdir()
+    for name in ("run.toml", "result.json", "trajectory.csv"):
+        (kept / name).write_bytes((runs / "sand" / name).read_bytes())
+    before = {path.name: path.read_bytes() for path in kept.iterdir()}
+    assert main(["resume", str(kept), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == json.loads((runs / "sand" / "result.json").read_text())
+    assert {path.name: path.read_bytes() for path in kept.iterdir()} == before

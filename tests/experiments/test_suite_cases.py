@@ -104,3 +104,14 @@ def test_what_has_no_result_is_done_gone_on_with_and_kept(stubbed, tmp_path, cap
 def test_a_case_there_is_not_is_refused(capsys):
     assert main(["experiments", "list", "grains9"]) == 2
     assert "there is no case 'grains9'" in capsys.readouterr().err
+
+
+def test_a_mistyped_case_names_those_spelt_like_it_and_an_unlike_one_those_of_the_folder():
+    """At most four names of the grains' cases that lie a folder deeper, too, not all seventy."""
+    with pytest.raises(ValueError, match="cases of names near it that ship are ") as raised:
+        find_case(Path("grains1-sand-0.0085-0.23"), CASES)
+    near = str(raised.value).partition(" that ship are ")[2].split(", ")
+    assert near[0] == "grains1-sand-0.0085-0.22" and len(near) == 4
+    assert all(find_case(Path(name), CASES).is_file() for name in near)
+    with pytest.raises(ValueError, match=r"that ship are bed-make, .* and \d+ that `hedgebed experiments list` names"):
+        find_case(Path("zzz"), CASES)

@@ -20,7 +20,7 @@ from experiments.surfaces import find_surface, surface_names
 from experiments.tumble_platform import torque_within_limit
 from experiments.tumble_settings import TumbleSettings
 from experiments.tumble_trial import plan_tumble
-from experiments.tumble_words import tumble_sentences
+from experiments.tumble_words import residual_warning, reversal_warning, tumble_sentences
 from rigid.planar import simulate
 from rigid.rig import STANDARD_GRAVITY
 
@@ -448,6 +448,8 @@ def test_a_term_of_ones_own_runs_from_a_file_beside_the_model():
         (["--mu-s", "0.2", "--mu-d", "0.3"], ["mu_d = 0.3", "mu_s = 0.2"]),
         (["--surface", "snow"], ["surface = 'snow'", "steel, brick, sand, sand-calibrated, jsc1a"]),
         (["--ground", "moon"], ["ground = 'moon'", "spring-damper"]),
+        (["--ground", "grains"], ["ground = 'grains'", "rft, bed (of grains)"]),
+        (["--ground", "beds"], ["ground = 'beds'", "did you mean 'bed'?"]),
         (["--ground", "power", "--stiffness", "100"], ["stiffness = 100", "ground_parameters"]),
         (["--ground", "power", "--ground-parameters", "n=2"], ["n is no parameter of power", "exponent"]),
         (["--ground", "power", "--ground-parameters", "exponent"], ["'exponent' has no =", "exponent=1.5"]),
@@ -602,3 +604,11 @@ def test_a_row_of_tumbles_lists_each_row_that_comes_down(reported):
     warned = " ".join(found["warnings"])
     assert ("had not come to lie" in warned) == (not all(lay))
     assert ("the run was over before" in warned) == (value_of("row", "tumbles_done") > len(lay))
+
+
+@pytest.mark.parametrize("value", [0.0100001, 0.01004, 0.0151, 0.3, math.inf])
+def test_a_residual_that_is_warned_of_is_written_larger_than_its_limit(value):
+    """`0.01 is above 0.01`, said of 0.01004, tells no one anything."""
+    for warned in (residual_warning(value), reversal_warning(value)):
+        said, limit = re.search(r"= (\S+) is above (\S+):", warned).groups()
+        assert float(said) > float(limit) and len(said) <= 9

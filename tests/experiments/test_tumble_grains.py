@@ -12,6 +12,7 @@ from coupling import CoupledTumble, LawFooting, LeftTheBedError
 from dem import SAND
 from experiments import following, tumble, tumble_grains, tumble_grains_result, tumble_steppers
 from experiments.cli import main
+from experiments.progress import Progress
 from experiments.runfolder import RunFolder
 from experiments.softening import Softening
 from experiments.tumble_settings import TumbleSettings
@@ -45,6 +46,8 @@ def on_bed(**more):
             {"coarse": 0.006, "grain": 0.0024, "place": 0.1, "bed_size": (0.4, 0.036, 0.046)},
             r"place = 0.1 m with coarse = 0.006 m: .* place = 0 or another seed would do",
         ),
+        ({"place": 5.0, "bed_size": (0.3, 0.06, 0.046)}, r"place = 5 m is off the bed, .* -0.15 to 0.15 m .* would do"),
+        ({"place": -0.31, "bed_size": (0.3, 0.06, 0.046), "bed_repeats": 2}, r"off the bed, 0.6 m long in all"),
         (
             {"coarse": 0.007, "grain": 0.0024, "bed_size": (0.4, 0.036, 0.046)},
             r"coarse = 0.007 m makes grains of .* coarse = 0.006 m would do",
@@ -165,6 +168,34 @@ def small_bed(settings, *_):
     bed.advance(1000)
     bed.surface = float((bed.grains()["position"][:, 2] + 0.5 * d).max())
     return bed
+
+
+def test_jsc1a_without_stages_is_told_before_the_bed_is_made_which_would_do(tmp_path, monkeypatch):
+    """Its grains were calibrated at 0.57: the stages named are those of the cases that ship, and a bed can go through
+    them; with them, and for sand, whose grains belong to no packing, nothing is said."""
+
+    class ReachedError(Exception):
+        pass
+
+    def prepare(*_):
+        raise ReachedError
+
+    monkeypatch.setattr(tumble_grains, "_prepare", prepare)
+    shipped = ("rain:dry", "compact:0.57", "stick", "level")
+    told = {}
+    for name, given in (
+        ("plain", {"surface": "jsc1a"}), ("staged", {"surface": "jsc1a", "bed_stages": shipped}), ("sand", {}),
+    ):  # fmt: skip
+        settings = on_bed(bed_size=(0.4, 0.06, 0.061), **given)
+        tumble.check(settings)
+        progress, told[name] = Progress(), []
+        monkeypatch.setattr(progress, "message", told[name].append)
+        with pytest.raises(ReachedError):
+            tumble_grains.tumble_on_grains(settings, RunFolder.create(tmp_path / name, "tumble", settings), progress)
+    (said,) = (text for text in told["plain"] if "bed_stages the bed is" in text)
+    assert said.startswith("warning: ") and "packed at 0.57" in said and "will not be jsc1a" in said
+    assert f"--bed-stages {' '.join(shipped)} would do" in said
+    assert not any("bed_stages the bed is" in text for name in ("staged", "sand") for text in told[name])
 
 
 @pytest.mark.parametrize("false", [False, True])
@@ -306,7 +337,6 @@ def test_stages_of_a_bed_reach_the_laboratory_and_its_cache(monkeypatch):
     from dem.laboratory import Prepared
     from dem.materials import material
     from experiments import bed_staged
-    from experiments.progress import Progress
 
     asked, bed = [], SimpleNamespace()
 
@@ -321,9 +351,34 @@ def test_stages_of_a_bed_reach_the_laboratory_and_its_cache(monkeypatch):
     monkeypatch.setattr(bed_staged, "prepare_as", prepare_as)
     options = {
         "size": (0.04, 0.04, 0.03), "grain": 0.005, "spread": 0.15, "gravity": 9.81, "seed": 1, "young": 1e6,
-        "max_overlap": 0.1, "threads": 1, "cache": True, "progress": Progress(), "asked_to_stop": lambda: False,
+        "max_overlap": 0.1, "arch": "cpu", "threads": 1, "cache": True, "progress": Progress(),
+        "asked_to_stop": lambda: False,
     }  # fmt: skip
     assert bed_staged.staged_bed(material("sand"), ("rain", "fluff", "level"), **options) is bed
     assert asked == [(("rain", "fluff", "level"), True)]
     with pytest.raises(RuntimeError, match=r"packing = 0\.6 cannot be reached"):
         bed_staged.staged_bed(material("sand"), ("rain", "compact:0.6", "level"), **options)
+
+
+def test_a_tumble_with_stages_asks_the_laboratory_for_a_bed_with_all_it_was_told(monkeypatch):
+    """jsc1a as its cases have it: what the tumble hands on, the laboratory takes (it ended in a TypeError)."""
+    import inspect
+
+    from dem.laboratory import prepare_as as laboratory
+    from experiments import bed_staged
+
+    asked, bed = {}, SimpleNamespace()
+
+    def prepare_as(*given, **options):
+        asked.update(inspect.signature(laboratory).bind(*given, **options).arguments)
+        return SimpleNamespace(bed=bed)
+
+    monkeypatch.setattr(bed_staged, "prepare_as", prepare_as)
+    stages = ("rain:dry", "compact:0.57", "stick", "level")
+    settings = on_bed(surface="jsc1a", bed_size=(0.4, 0.06, 0.061), bed_stages=stages, threads=1, seed=7)
+    plan = tumble_grains._plan(settings)
+    forecast = tumble_grains._forecast(settings, plan)
+    softening = tumble_grains._softness(settings, plan, forecast)
+    assert tumble_grains._prepare(settings, plan, forecast, softening, Progress()) is bed
+    assert asked["stages"] == stages and asked["seed"] == 7 and asked["young"] == softening.young
+    assert (asked["arch"], asked["threads"], asked["gravity"]) == ("cpu", 1, pytest.approx(9.80665))

@@ -1,10 +1,16 @@
-"""Ways of a platform: drawn in their true shape where something of it can be seen."""
+"""Ways of a platform, drawn in their true shape where something of it can be seen; colours of its states."""
+
+from itertools import combinations
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from PIL import Image, ImageColor
 
+from vis.render import write_gif
 from vis.style import as_it_lies
+from vis.tumble_series import STATES
 
 
 @pytest.mark.parametrize(("length", "aspect", "title"), [(0.3, 1.0, ""), (2.0, "auto", "heights stretched")])
@@ -15,3 +21,46 @@ def test_a_way_that_would_be_a_line_is_stretched_and_says_so(length: float, aspe
     as_it_lies(axis)
     assert axis.get_aspect() == aspect
     assert axis.get_title(loc="left") + axis.get_title() == title
+
+
+SIGHT = {
+    "whole": np.eye(3),
+    "no red": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+    "no green": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
+    "no blue": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
+}
+"""Linear RGB as it is seen where one kind of cone is missing: Machado, Oliveira and Fernandes, IEEE Transactions on
+Visualization and Computer Graphics 15 (2009), 1291, severity 1."""
+
+
+def lab(colour, sight):
+    """CIE L*a*b* (D65) of an sRGB colour, shape (3,)."""
+    rgb = np.array(to_rgb(colour))
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    to_xyz = np.array(
+        [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.072175], [0.0193339, 0.119192, 0.9503041]]
+    )
+    share = to_xyz @ np.clip(sight @ linear, 0, 1) / to_xyz.sum(axis=1)
+    f = np.where(share > 216 / 24389, np.cbrt(share), (24389 / 27 * share + 16) / 116)
+    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+
+
+@pytest.mark.parametrize("sight", SIGHT.values(), ids=SIGHT)
+def test_the_states_have_colours_apart_for_the_colour_blind_too_and_dark_enough_for_a_line(sight):
+    """CIE 1976 distance of any two above 30, where 2.3 is just seen; lightness of each at most 70 on white's 100."""
+    seen = {name: lab(colour, np.array(sight)) for name, colour in STATES.items()}
+    for one, other in combinations(seen, 2):
+        assert np.linalg.norm(seen[one] - seen[other]) > 30, (one, other)
+    assert max(colour[0] for colour in seen.values()) <= 70
+
+
+def test_a_film_keeps_the_colours_of_the_states_as_they_are_however_rare(tmp_path):
+    """Of a picture of all manner of colours, four patches of a few pixels: pivot and hop had come out alike."""
+    image = np.random.default_rng(1).integers(0, 256, (120, 160, 3)).astype(np.uint8)
+    colours = [ImageColor.getrgb(colour) for colour in STATES.values()]
+    for place, colour in enumerate(colours):
+        image[4:8, 10 * place : 10 * place + 4] = colour
+    write_gif(tmp_path / "film.gif", [image])
+    with Image.open(tmp_path / "film.gif") as film:
+        page = np.asarray(film.convert("RGB"))
+    assert [tuple(page[6, 10 * place + 2]) for place in range(4)] == colours

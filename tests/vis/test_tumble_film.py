@@ -1,11 +1,13 @@
 """Pictures of a tumble on grains: a camera that follows, a colour scale that stays, arrows and tracks in place."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from vis import arrows
 from vis.compare import _alike
 from vis.frames import FrameWriter
 from vis.meshes import spike_mesh
@@ -131,3 +133,51 @@ def test_stills_film_and_tracks_are_drawn_without_opengl(folder):
         assert film.n_frames == 3
     tracks = draw_tracks(Reel.open(folder), folder / "tracks.png")
     assert tracks.file.stat().st_size > 5000
+
+
+def red_of_the_feet(sheet):
+    """Where the sheet at 0 s has the arrows' red in the picture from near, its weight's arrow and text left out."""
+    image = sheet.draw(0.0).astype(int)
+    left, foot, width, height = sheet.panels[1].place
+    rows = slice(round((1 - foot - height) * image.shape[0]), round((1 - foot) * image.shape[0]))
+    columns = slice(round((left + 0.3 * width) * image.shape[1]), round((left + width) * image.shape[1]))
+    return (abs(image[rows, columns] - [176, 0, 32]) < 40).all(axis=2)
+
+
+def with_force(monkeypatch, x, force):
+    """Every frame with this force [N], shape (3,), on one row at x [m]."""
+    kept = Reel.frame
+
+    def frame(self, index):
+        point = np.array([[x, self.cut, self.surface]])
+        return replace(kept(self, index), clouds={"row_forces": (point, {"force": np.array([force])})})
+
+    monkeypatch.setattr(Reel, "frame", frame)
+
+
+@pytest.mark.parametrize("aside", [0.0, 6.0])
+def test_the_arrow_of_four_weights_is_cut_at_the_edge_and_says_its_number(folder, monkeypatch, aside):
+    """Its head would lie outside the picture: longer than that of one weight, up to the edge, with `8.00 N`."""
+    sheet = Sheet([Reel.open(folder)], (640, 360), by="displacement", opengl=False)
+    said, x = [], sheet.ways[1][0, 0]
+    monkeypatch.setattr(arrows, "_say", lambda axis, end, words: said.append((*end, words)))
+    reds = []
+    for force in ([0.0, 0.0, 2.0], [aside, 0.0, 8.0]):
+        with monkeypatch.context() as patch:
+            with_force(patch, x, force)
+            reds.append(red_of_the_feet(sheet))
+    assert reds[1].sum() > 1.5 * reds[0].sum() > 0
+    assert len(said) == 1
+    (x, y, words) = said[0]
+    assert max(x, y) == pytest.approx(0.99) and min(x, y) > 0.3
+    assert words == f"{'10.0' if aside else '8.00'}\N{NO-BREAK SPACE}N, arrow cut"
+
+
+def test_an_arrow_is_cut_where_it_leaves_the_picture_and_left_out_where_it_misses_it():
+    """From (0.5, 0.2) straight up by 1.2: inside for 0.79 / 1.2 of the way. One beside the picture is nowhere in it."""
+    inside = arrows._inside(np.array([0.5, 0.2]), np.array([0.5, 1.4]))
+    assert inside == pytest.approx((0.0, 0.79 / 1.2))
+    assert arrows._inside(np.array([0.5, 0.2]), np.array([0.6, 0.9])) == (0.0, 1.0)
+    for foot, head in (([1.2, 0.2], [1.2, 0.9]), ([1.2, 0.2], [1.1, 0.9])):
+        low, high = arrows._inside(np.array(foot), np.array(head))
+        assert low >= high

@@ -1,0 +1,60 @@
+"""Arrows of forces in a picture: one that is too long for it ends at its edge, with the number beside it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vis.numbers import quote
+from vis.style import INK
+
+__all__ = ["FORCE", "HALO", "draw_force"]
+
+HALO = {"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.5}
+"""Box of a word on a picture."""
+FORCE = {
+    "arrowstyle": "-|>,head_width=0.28,head_length=0.55", "color": "#B00020", "lw": 2.2, "shrinkA": 0, "shrinkB": 0,
+}  # fmt: skip
+"""How an arrow of a force is drawn."""
+_SHORTEST = 0.005
+"""A shorter arrow is not drawn, in fractions of the picture."""
+_RIM = 0.01
+"""Left free at the picture's edge by an arrow that is cut, in fractions of it."""
+
+
+def draw_force(axis: Any, foot: NDArray[np.float64], head: NDArray[np.float64], force: float) -> None:
+    """An arrow from `foot` to `head`, places of shape (2,) in an `axis` from 0 to 1; `force` is its amount [N].
+
+    What would lie outside is cut off, and the number says so. Where nothing of it lies inside, nothing is drawn.
+    """
+    if np.linalg.norm(head - foot) <= _SHORTEST:
+        return
+    low, high = _inside(foot, head)
+    if low >= high:
+        return
+    start, end = foot + low * (head - foot), foot + high * (head - foot)
+    axis.annotate("", end, start, arrowprops=FORCE)
+    if high < 1.0:
+        _say(axis, end, f"{quote(force, unit='N')}, arrow cut")
+
+
+def _inside(foot: NDArray[np.float64], head: NDArray[np.float64]) -> tuple[float, float]:
+    """From which share of the way to which it lies inside the rim (Liang and Barsky); from >= to: nowhere."""
+    low, high = 0.0, 1.0
+    for at, along in zip(foot, head - foot, strict=True):
+        if along == 0.0:
+            if not _RIM <= at <= 1.0 - _RIM:
+                return 1.0, 0.0
+            continue
+        first, last = sorted(((_RIM - at) / along, (1.0 - _RIM - at) / along))
+        low, high = max(low, first), min(high, last)
+    return low, high
+
+
+def _say(axis: Any, end: NDArray[np.float64], words: str) -> None:
+    """Words beside the end of an arrow and over its shaft, towards the middle; below the corner of the weight's."""
+    x, y = float(end[0]), float(np.clip(end[1] + 0.05, 0.06, 0.96 if end[0] > 0.4 else 0.87))
+    aside, side = (0.03, "left") if x < 0.6 else (-0.03, "right")
+    axis.text(x + aside, y, words, fontsize=10, ha=side, va="center", color=INK, bbox=HALO)
