@@ -24,7 +24,9 @@ class SpatialSettings(GrainsSettings):
     """A platform in space, driven by its wheels or thrown, on a bed of grains or on the spring-damper."""
 
     # The surface
-    surface: str | None = Field(None, description="Material: steel, brick, sand, sand-calibrated or jsc1a; brick if not given.")
+    surface: str | None = Field(
+        None, description="Material: steel, brick, sand, sand-calibrated or jsc1a; brick if not given."
+    )
     ground: Literal["spring-damper", "bed"] = Field(
         "spring-damper", description="What computes the surface's force: the spring-damper, or a bed of grains."
     )
