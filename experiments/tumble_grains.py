@@ -239,7 +239,8 @@ def _in_flight(settings: TumbleSettings, plan: TumblePlan, law: Forecast) -> For
     landing = settings.drop_speed is not None
     return replace(
         law, behind=min(law.behind, -lying.reach), ahead=max(law.ahead, ahead), deepest=max(law.deepest, lying.deepest),
-        fastest=max(law.fastest, lying.fastest), sunk=lying.sunk, margin=1.5 if landing else 1.0,
+        fastest=max(law.fastest, lying.fastest), sunk=lying.sunk, farthest=max(law.ahead, ahead),
+        margin=1.5 if landing else 1.0,
         on="on the spring-damper, or turning where it lies on its hull," if lying.on_hull else law.on,
     )  # fmt: skip
 
@@ -263,16 +264,17 @@ def _check_bed(settings: TumbleSettings, forecast: Forecast, material: Material)
     length, repeats = settings.bed_length, settings.bed_repeats
     margin = MARGIN * spike
     need = forecast.ahead - forecast.behind + 2 * margin
-    on_grains = max(need, _length_on_grains(forecast, margin))
+    on_grains = _length_on_grains(forecast, margin)
     if length < need:
         said = f"bed_size = {piece:g} m along the motion"
         if repeats > 1:
             said += f" with bed_repeats = {repeats}, {length:g} m in all,"
+        wanted = math.ceil(100 * max(need, on_grains)) / 100
+        farther = "; on grains it may go farther" if on_grains > need * (1 + 1e-9) else ""
         raise ValueError(
             f"{said} is too short: {forecast.on} tips come down from {forecast.behind:.3g} to {forecast.ahead:.3g} m "
             f"of the start within duration = {settings.duration:g} s, which takes {math.ceil(100 * need) / 100:g} m "
-            f"with {margin:g} m to spare at both ends; on grains it may go farther: "
-            f"{math.ceil(100 * on_grains) / 100:g} m would do, or a shorter duration"
+            f"with {margin:g} m to spare at both ends{farther}: {wanted:g} m would do, or a shorter duration"
         )
     if width < 3 * spike * (1 - 1e-9):
         raise ValueError(
