@@ -87,7 +87,10 @@ def test_a_gravity_to_settle_under_that_will_not_do_is_refused(given, said):
 @pytest.mark.parametrize(
     ("size", "said"),
     [
-        ((0.36, 0.036, 0.096), r"bed_size = 0.36 m along .* where it lies on its hull, .* at both ends: 0.45 m would do"),
+        (
+            (0.36, 0.036, 0.096),
+            r"bed_size = 0.36 m along .* where it lies on its hull, .* at both ends: 0.45 m would do",
+        ),
         ((0.5, 0.036, 0.046), r"bed_size = 0.046 m deep .* lies on its hull, a tip goes 0.07 m .* 0.094 m would do"),
     ],
 )
