@@ -325,12 +325,14 @@ def _may_leave(settings: TumbleSettings, forecast: Forecast) -> str | None:
     ahead = settings.bed_length - _origin(settings, forecast)
     if ahead >= forecast.farthest + 0.5 * settings.spike_diameter:
         return None
-    long = _length_on_grains(forecast, MARGIN * settings.spike_diameter)
+    long = _length_on_grains(forecast, MARGIN * settings.spike_diameter) + 2 * abs(settings.place)
+    longer = f"bed_size = {math.ceil(100 * long) / 100:g} m along it"
+    if settings.coarse is None:
+        longer += f", bed_repeats = {math.ceil(long / settings.bed_size[0])}"
     return (
         f"sand holds a row, and the torque with it, where the spring-damper lets go: tips may come down "
         f"{forecast.farthest:.3g} m ahead of the start within duration = {settings.duration:g} s, and the bed reaches "
-        f"{ahead:.3g} m; a run that leaves it ends there. bed_repeats = {math.ceil(long / settings.bed_size[0])}, or a "
-        f"shorter duration, would make sure"
+        f"{ahead:.3g} m; a run that leaves it ends there. {longer} or a shorter duration would make sure"
     )
 
 

@@ -136,7 +136,8 @@ def test_the_length_that_a_refusal_names_holds_the_way_that_tumbles_on_grains_ha
     assert named - tumble_grains._origin(wide, forecast) > 0.263 + 0.1
     short = on_bed(bed_size=(0.4, 0.06, 0.046), duration=2.0)
     tumble.check(short)
-    assert "bed_repeats = 2, or a shorter duration" in tumble_grains._may_leave(short, forecast)
+    said = tumble_grains._may_leave(short, forecast)
+    assert f"bed_size = {named:g} m along it, bed_repeats = 2 or a shorter duration" in said
 
 
 def test_a_tumble_on_grains_with_nothing_but_its_torque_given_stays_on_its_bed():
