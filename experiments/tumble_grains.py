@@ -105,8 +105,10 @@ def tumble_on_grains(settings: TumbleSettings, folder: RunFolder, progress: Prog
         for sentence in (*_sentences(settings, plan), *(f"warning: {warning}" for warning in warnings)):
             progress.message(sentence)
         forecast = _forecast(settings, plan)
-        if told := _may_leave(settings, forecast):
-            progress.message(f"warning: {told}")
+        spikes = _whose_spikes(settings)
+        for said in (_may_leave(settings, forecast), spikes):
+            if said:
+                progress.message(f"warning: {said}")
         softening = _softness(settings, plan, forecast)
         step_time = settings.duration + 0.3  # with the setting down
         progress.plan({"bed": 1.0, "tumble": step_time}, seconds={"report": 10.0})
@@ -121,6 +123,7 @@ def tumble_on_grains(settings: TumbleSettings, folder: RunFolder, progress: Prog
         series = _follow(settings, run, folder, progress)
         graded = _graded(settings, forecast)
         result = conclude(settings, plan, run, series, forecast.trajectory, softening, folder, graded)
+        result["warnings"] += [spikes] if spikes else []
         folder.write_result(result)
         progress.stage("report", total=1.0)
         write_report(folder.path, progress)
@@ -318,6 +321,20 @@ def _check_bed(settings: TumbleSettings, forecast: Forecast, material: Material)
 def _length_on_grains(forecast: Forecast, margin: float) -> float:
     """Of a bed whose footprints expected lie in its middle, with room for the farthest that there may be [m]."""
     return 2 * (forecast.farthest + margin) - forecast.behind - forecast.ahead
+
+
+def _whose_spikes(settings: TumbleSettings) -> str | None:
+    """That another platform's spikes were not said, in words."""
+    default = TumbleSettings.model_fields["platform"].default
+    other = [name for name in ("spike_length", "platform") if getattr(settings, name) not in (None, default)]
+    lacking = [name for name in ("spike_diameter", "spike_clear") if name not in settings.model_fields_set]
+    if not other or not lacking:
+        return None
+    return (
+        f"{other[0]} = {getattr(settings, other[0])} is given and {' and '.join(lacking)} not: spikes are "
+        f"{1e3 * settings.spike_diameter:g} mm thick and stand {1e3 * settings.spike_clear:g} mm clear of the hull, as "
+        f"the Hedgehog's; a planar run on grains does not take them from a platform's file"
+    )
 
 
 def _may_leave(settings: TumbleSettings, forecast: Forecast) -> str | None:

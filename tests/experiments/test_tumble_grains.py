@@ -107,6 +107,21 @@ def test_the_whole_of_a_bed_laid_end_to_end_counts_for_the_forecast():
     assert tumble_grains._count(settings, forecast) == pytest.approx(tumble_grains._count(whole, forecast))
 
 
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({}, None),
+        ({"spike_length": 0.1}, "spike_length = 0.1 is given and spike_diameter and spike_clear not: spikes are 12 mm"),
+        ({"spike_length": 0.1, "spike_diameter": 0.006}, "and spike_clear not: spikes are 6 mm thick and stand 40 mm"),
+        ({"spike_length": 0.1, "spike_diameter": 0.006, "spike_clear": 0.02}, None),
+        ({"platform": "mine.toml"}, "platform = mine.toml is given"),
+    ],
+)
+def test_whose_spikes_stand_in_the_sand_is_said_where_they_are_not_given(given, said):
+    warning = tumble_grains._whose_spikes(on_bed(**given))
+    assert warning is None if said is None else said in warning
+
+
 def test_the_box_over_the_sand_is_as_high_as_a_brake_may_throw_it():
     """v^2 / 2 g at twice the speed of the spring-damper's fastest tip; a slow motor's sand stays in its box."""
     made = []
