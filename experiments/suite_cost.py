@@ -24,6 +24,14 @@ FALL_TIMES = 1.5
 """What rain and rest take, over the time of a fall from the column's top: 0.27 s to 0.2 s for the beds of 80 mm in
 docs/performance.md, rounded up."""
 
+TAP = 1.07
+"""What a tap and the rest after it take, over the time of that fall: 0.189 s to 0.176 s, nine taps of the bed of
+grains1-jsc1a-*, 61,452 grains (docs/results/README.md, 2026-11-23)."""
+TAPPED = 0.0041
+"""Packing fraction that a tap adds, of the same nine: from 0.5343 to 0.5715."""
+POURED, DENSEST = 0.534, 0.62
+"""Where they began, and, roughly, where ``compact:densest`` ends."""
+
 AWAKE = 20260 * 2.4e-3**3 / 0.036
 """Grains that a motor's tumble keeps awake on average, times their diameter cubed, over the bed's width [m2]:
 grains1-sand-0.0085-0.22, 20.1 % of 100,753 over 2 s (the looks on 3 mm, of 0.9 to 1.2 s: 15, 25 and 28 % of 29,797). A
@@ -100,11 +108,20 @@ def cost_of_tumble(settings: TumbleSettings) -> Cost:
     if settings.sleep and settings.actuator == "motor":
         computed = min(grains, AWAKE * settings.bed_size[1] / settings.grain**3)
     prepared = grains / settings.bed_repeats
+    making = FALL_TIMES + TAP * _taps(settings)
     return Cost(
-        grains=grains, time_step=step, bed_seconds=FALL_TIMES * fall / step * prepared / _rate(prepared),
+        grains=grains, time_step=step, bed_seconds=making * fall / step * prepared / _rate(prepared),
         run_seconds=BOOK * steps * computed / _rate(computed) + steps / settings.substeps * MACRO_STEP,
         grain_steps=steps * computed,
     )  # fmt: skip
+
+
+def _taps(settings: TumbleSettings) -> int:
+    from dem.recipe import parse_stage
+
+    stages = [parse_stage(stage) for stage in settings.bed_stages or ()]
+    wanted = [DENSEST if s.value is None else s.value for s in stages if s.name == "compact" and s.by == "tap"]
+    return math.ceil(max(0.0, max(wanted, default=0.0) - POURED) / TAPPED)
 
 
 def _rate(grains: float) -> float:
