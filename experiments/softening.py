@@ -32,7 +32,7 @@ from typing import Any
 
 from dem.timestep import CHAIN
 
-__all__ = ["Softening", "bearing_gradient", "chain", "drop_depth", "soften", "soften_material"]
+__all__ = ["Softening", "bearing_gradient", "chain", "drop_depth", "run_limit", "soften", "soften_material"]
 
 RAIN_OVERLAP = 0.05
 """Overlap that a grain may have with the floor at the end of its fall, while the bed is made [of a diameter]."""
@@ -40,8 +40,8 @@ INERTIA = 1.1
 """lambda: dynamic pressure over rho v^2 [1] (Agarwal et al. 2023)."""
 
 SMALL = 0.05
-"""Overlap that grains meant to be hard may have [of a diameter]: the default of `max_overlap`, past which a run fails.
-A run that allows itself more is told so."""
+"""Overlap that grains meant to be hard may have [of a diameter]: the default of `max_overlap`, past which a drive of
+a spike fails, and a platform's run at `run_limit`. A run that had more is told so."""
 STIFF, STIFF_CHAIN = 0.01, 7.4
 """Overlap [of a diameter] at and below which a chain of grains carries as much as it does among stiff ones [1]."""
 SOFT = 0.05
@@ -70,14 +70,29 @@ class Softening:
         """Young's modulus [Pa] that would bring this overlap to the one wanted (Hertz: F goes with E overlap^1.5)."""
         return self.young * (overlap / wanted) ** 1.5
 
-    def overlapping(self, overlap: float) -> str | None:
-        """A warning that grains overlapped by more than `SMALL`, with the modulus that would keep it; or None."""
-        if overlap <= SMALL:
+    def overlapping(self, overlap: float, bound: float = SMALL) -> str | None:
+        """A warning that grains overlapped by more than was meant, with the modulus that would keep it; or None.
+
+        ``bound``: `max_overlap`, which a platform's run may pass (`run_limit`).
+        """
+        meant = min(bound, SMALL)
+        if overlap <= meant:
             return None
+        how = "as max_overlap allowed" if overlap <= bound else f"past max_overlap = {100 * bound:g} %"
         return (
-            f"the largest overlap was {100 * overlap:.2g} % of a diameter, as max_overlap allowed, where "
-            f"{100 * SMALL:g} % are small: young = {self.stiffer(overlap, SMALL):.2g} Pa or more would keep it there"
+            f"the largest overlap was {100 * overlap:.3g} % of a diameter, {how}, where {100 * meant:g} % "
+            f"{'are small' if meant == SMALL else 'were meant'}: "
+            f"young = {self.stiffer(overlap, meant):.2g} Pa or more would keep it there"
         )
+
+
+def run_limit(max_overlap: float) -> float:
+    """Overlap past which a platform's run on a bed made for `max_overlap` ends [of a diameter]: twice it, at most 0.2.
+
+    The step is an eighth of the half-period of contacts at `max_overlap` (`dem.timestep`); the stiffness of one at
+    twice that is sqrt(2) of theirs, of whose half-period it is 1/6.7: a few such contacts are followed safely.
+    """
+    return max(max_overlap, min(2 * max_overlap, 0.2))
 
 
 def bearing_gradient(bulk_density: float, gravity: float, friction: float) -> float:

@@ -26,7 +26,7 @@ from .progress import Progress
 from .reporting import write_report
 from .runfolder import RunFolder
 from .settings import expected_grain_count
-from .softening import Softening, soften_material
+from .softening import Softening, run_limit, soften_material
 from .spatial_frames import SpatialFrames
 from .spatial_result import conclude, write_series_of
 from .spatial_settings import SpatialSettings
@@ -248,7 +248,7 @@ def _on_bed(settings: SpatialSettings, plan: SpatialPlan, bed: Bed, forecast: Fo
         bed, spatial_members(plan.trial.platform), origin=(origin[0], origin[1]), bounded_across=True,
         touch=TOUCH * weight, friction=settings.spike_friction, restitution=settings.spike_restitution,
     )  # fmt: skip
-    bed.max_overlap = 0.0
+    bed.max_overlap, bed.overlap_limit = 0.0, run_limit(settings.max_overlap)
     bed.mark_origin()
     if settings.sleep:
         bed.let_sleep(Sleep(force=settings.sleep_force, share=settings.sleep_share))

@@ -284,7 +284,7 @@ def _add_grains(
     warnings = result["warnings"]
     if reversed_ := reversal_warning(run.dissipation_reversal):
         warnings.append(reversed_)
-    if pressed := softening.overlapping(float(bed.max_overlap)):
+    if pressed := softening.overlapping(float(bed.max_overlap), settings.max_overlap):
         warnings.append(pressed)
     across = 2 * plan.trial.platform.tip_radius / settings.grain
     if across < 10:

@@ -33,7 +33,10 @@ class GrainsSettings(StrictSettings):
     young: Positive | None = Field(
         None, description="On a bed: Young's modulus of the softened grains [Pa]; from max_overlap if not given."
     )
-    max_overlap: float = Field(0.05, gt=0, le=0.2, description="On a bed: largest overlap of grains over diameter [1].")
+    max_overlap: float = Field(
+        0.05, gt=0, le=0.2,
+        description="On a bed: overlap of grains over diameter that the step is chosen for [1]; a run ends at twice it.",
+    )  # fmt: skip
     spike_friction: NotNegative = Field(0.5, description="On a bed: friction of spike and grains [1].")
     spike_restitution: float = Field(0.5, ge=0.01, le=1, description="On a bed: restitution of spike and grains [1].")
     lowering_speed: Positive | None = Field(

@@ -29,7 +29,7 @@ from .progress import Progress
 from .reporting import write_report
 from .runfolder import RunFolder
 from .settings import expected_grain_count
-from .softening import Softening, soften_material
+from .softening import Softening, run_limit, soften_material
 from .stopping import held_back
 from .surfaces import find_surface, surface_names
 from .tips import tip_angles
@@ -449,7 +449,7 @@ def _stepper(settings: TumbleSettings, plan: TumblePlan, bed: Bed, forecast: For
         copies=COPIES, touch=TOUCH * plan.trial.weight / COPIES, friction=settings.spike_friction,
         restitution=settings.spike_restitution,
     )  # fmt: skip
-    bed.max_overlap = 0.0
+    bed.max_overlap, bed.overlap_limit = 0.0, run_limit(settings.max_overlap)
     bed.mark_origin()
     if settings.sleep:
         bed.let_sleep(Sleep(force=settings.sleep_force, share=settings.sleep_share))

@@ -102,7 +102,7 @@ def conclude(
     if reversed_ := reversal_warning(run.dissipation_reversal):
         result["warnings"].append(reversed_)
     result["warnings"] += [said for said in (unsettled_warning(run.master), own_warning(run)) if said]
-    if pressed := softening.overlapping(float(bed.max_overlap)):
+    if pressed := softening.overlapping(float(bed.max_overlap), settings.max_overlap):
         result["warnings"].append(pressed)
     if met_again := _same_sand_again(settings, run):
         result["warnings"].append(met_again)

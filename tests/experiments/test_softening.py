@@ -6,7 +6,7 @@ import pytest
 
 from dem import Material
 from dem.timestep import choose_young
-from experiments.softening import bearing_gradient, chain, drop_depth, soften, soften_material
+from experiments.softening import Softening, bearing_gradient, chain, drop_depth, run_limit, soften, soften_material
 
 SAND = {"grain": 0.0024, "density": 2650.0, "poisson": 0.25, "friction": 0.5, "real_young": 7e10, "gravity": 9.81,
         "bed_height": 0.05, "depth": 0.02, "speed": 0.1}  # fmt: skip
@@ -78,3 +78,15 @@ def test_a_drop_stops_where_the_energies_meet():
     depth = drop_depth(0.1, 2.6, 0.2, 100.0)
     assert 0.5 * 100 * depth**2 - 0.2 * depth == pytest.approx(0.5 * 2.6 * 0.1**2)
     assert drop_depth(0.0, 2.6, 0.2, 100.0) == pytest.approx(2 * 0.2 / 100)
+
+
+def test_a_run_may_pass_its_bound_and_says_so():
+    """F ~ E overlap^1.5 (Hertz): from 6 to 5 % of a diameter the modulus goes by 1.2^1.5 = 1.315."""
+    soft = Softening(1e7, 1.0, 1.0, 7e10)
+    assert soft.overlapping(0.049) is None
+    assert "6 % of a diameter, past max_overlap = 5 %, where 5 % are small: young = 1.3e+07" in soft.overlapping(0.06)
+    assert "6 % of a diameter, as max_overlap allowed, where 5 % are small" in soft.overlapping(0.06, 0.1)
+    assert "2 % of a diameter, past max_overlap = 1 %, where 1 % were meant: young = 2.8e+07" in soft.overlapping(
+        0.02, 0.01
+    )
+    assert [run_limit(bound) for bound in (0.01, 0.05, 0.15, 0.2)] == [0.02, 0.1, 0.2, 0.2]
