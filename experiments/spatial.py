@@ -20,6 +20,7 @@ from rigid.platform import Platform
 from rigid.quaternions import from_turn, to_matrix
 from rigid.rig import STANDARD_GRAVITY
 
+from .bed_box import carried_height
 from .bed_progress import BedProgress
 from .following import follow
 from .progress import Progress
@@ -90,7 +91,7 @@ def _carry_out(settings: SpatialSettings, folder: RunFolder, progress: Progress)
             forecast = _forecast(settings, plan)
             beside = forecast.run
             softening = _softness(settings, plan, forecast)
-            bed = _prepare(settings, plan, softening, progress)
+            bed = _laid_out(plan, forecast, _prepare(settings, plan, softening, progress), settings.grain)
             run = _on_bed(settings, plan, bed, forecast)
         else:
             run = _on_law(settings, plan)
@@ -238,6 +239,14 @@ def _prepare(settings: SpatialSettings, plan: SpatialPlan, softening: Softening,
             )  # fmt: skip
     except RuntimeError as error:
         raise RuntimeError(f"the bed could not be prepared: {error}; change young, max_overlap or seed") from error
+
+
+def _laid_out(plan: SpatialPlan, forecast: Forecast, bed: Bed, grain: float) -> Bed:
+    """The bed in a box as high as a platform on which grains stick carries them."""
+    height = forecast.run.columns["z"]
+    rise = float(height.max() - height[0])
+    carried = carried_height(_material(plan), reach=plan.trial.platform.reach, rise=rise, grain=grain)
+    return bed.repeated(1, height=bed.surface + carried) if bed.surface + carried > bed.height else bed
 
 
 def _on_bed(settings: SpatialSettings, plan: SpatialPlan, bed: Bed, forecast: Forecast) -> SpatialRun:

@@ -21,6 +21,7 @@ from rigid.rig import STANDARD_GRAVITY
 from rigid.trajectory import Trajectory
 from rigid.trial import Trial
 
+from .bed_box import carried_height
 from .bed_graded import graded_under
 from .bed_progress import BedProgress
 from .bed_staged import check_bed_stages, packing_warning, staged_bed
@@ -249,8 +250,10 @@ def _in_flight(settings: TumbleSettings, plan: TumblePlan, law: Forecast) -> For
 
 
 def _laid_out(settings: TumbleSettings, plan: TumblePlan, forecast: Forecast, bed: Bed) -> Bed:
-    """The prepared bed as often as it is to be repeated, in a box as high as its sand may be thrown."""
-    top = bed.surface + _thrown(settings, plan, forecast)
+    """The prepared bed as often as it is to be repeated, in a box as high as its sand may be thrown or carried."""
+    rise = float(forecast.trajectory.y.max() - forecast.trajectory.y[0])
+    carried = carried_height(_material(plan), reach=plan.trial.spike_length, rise=rise, grain=settings.grain)
+    top = bed.surface + max(_thrown(settings, plan, forecast), carried)
     return bed.repeated(settings.bed_repeats, height=top) if settings.bed_repeats > 1 or top > bed.height else bed
 
 
