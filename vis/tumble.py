@@ -20,6 +20,7 @@ from vis.page import Block, Page, Section, Tile, code, figure, table, text, writ
 from vis.pictures import Pictures
 from vis.state_figures import by_state, draw_states, legend_of_states, panels, passages
 from vis.style import BED, GREY, INK, MODEL, styled
+from vis.tumble_beside import HEAD
 from vis.tumble_grains import grains_section
 from vis.tumble_series import STATES, read_columns, state_runs
 from vis.tumble_sweep import sweep_section
@@ -75,7 +76,8 @@ def write_tumble_report(
         swept, _ = read_columns(folder / result["sweep"]["file"])
         page = replace(page, sections=[sweep_section(result, figures, swept), *page.sections])
     if "footfalls" in result:
-        listed = [table(shown["head"], shown["rows"], title=shown["title"]) for shown in result["tables"]]
+        own = [shown for shown in result["tables"] if tuple(shown["head"]) != HEAD]
+        listed = [table(shown["head"], shown["rows"], title=shown["title"]) for shown in own]
         page = replace(page, sections=[*page.sections[:1], Section("Tumble by tumble", listed), *page.sections[1:]])
     if "grains" in result:
         tables = {name: read_columns(folder / file) for name, file in result["grains"]["series"].items()}

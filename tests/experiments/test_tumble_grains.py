@@ -238,6 +238,28 @@ def test_the_result_dates_the_wheels_limit_and_warns_of_energy_made_and_of_overl
     assert any("young = 8e+07 Pa or more" in said for said in result["warnings"]) == false  # F ~ E overlap^1.5
     assert any("'sand': its rolling friction is a guess" in said for said in result["warnings"])
     assert "dissipated_friction" not in result["quantities"]  # a law keeps no such book
+    shown = {row[0]: row[1:] for row in result["tables"][0]["rows"]}
+    deepest = result["quantities"]["sinkage_largest"]["value"], result["grains"]["beside"]["sinkage_largest"]["value"]
+    assert deepest[0] == pytest.approx(deepest[1], rel=0.02)  # the same law, through the master and by itself
+    assert shown["sinkage of the deepest row"] == [f"{1e3 * depth:.2f} mm" for depth in deepest]
+    assert result["departures"]["sentences"][0].startswith("It does not get 10 mm away in this time, nor does it on")
+
+
+@pytest.mark.parametrize(
+    ("angles", "said"),
+    [
+        ((-24.04, 11.63), "It goes down (−24.0 degrees); on the spring-damper it would go up (+11.6 degrees)."),
+        ((20.0, 11.63), "It goes up (+20.0 degrees); on the spring-damper it goes up (+11.6 degrees)."),
+        ((-5.0, None), "It goes down (−5.0 degrees); on the spring-damper it does not get 10 mm away in this time."),
+        ((None, 90.0), "It does not get 10 mm away in this time; on the spring-damper it goes up (+90.0 degrees)."),
+        ((0.0, -0.01), "It goes level (0.0 degrees); on the spring-damper it goes level (0.0 degrees)."),
+    ],
+)
+def test_which_way_it_went_is_said_in_words_with_the_spring_damper_s(angles, said):
+    from vis.tumble_beside import beside_words
+
+    sides = [{"trajectory_angle": {"value": None if angle is None else math.radians(angle)}} for angle in angles]
+    assert beside_words(*sides) == said
 
 
 def test_a_run_that_leaves_the_bed_says_where_and_keeps_its_state_and_series(tmp_path, monkeypatch, capsys):
@@ -342,10 +364,10 @@ def _check_report(folder, result):
     tables = {name: read_columns(folder / file) for name, file in result["grains"]["series"].items()}
     tables["motion"] = read_columns(folder / "series" / "motion.csv")
     section = grains_section(result, folder / "figures", tables)
-    assert [block.kind for block in section.blocks] == ["figure", "table", "figure", "text", "figure"]
+    assert [block.kind for block in section.blocks] == ["figure", "text", "table", "figure", "text", "figure"]
     drawn = ("beside.png", "feet.png", "books.png")
     assert all((folder / "figures" / name).stat().st_size > 5000 for name in drawn)
-    assert "rig: grains at 1 g" in section.blocks[3].text
+    assert "rig: grains at 1 g" in section.blocks[4].text
 
 
 def test_stages_of_a_bed_reach_the_laboratory_and_its_cache(monkeypatch):
