@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from contextlib import contextmanager
 from types import SimpleNamespace
 
@@ -10,13 +11,14 @@ import pytest
 
 from coupling import CoupledTumble, LawFooting, LeftTheBedError
 from dem import SAND
-from experiments import following, tumble, tumble_grains, tumble_grains_result, tumble_steppers
+from experiments import following, tumble, tumble_grains, tumble_grains_result, tumble_opening, tumble_steppers
 from experiments.cli import main
 from experiments.progress import Progress
 from experiments.runfolder import RunFolder
 from experiments.softening import Softening
 from experiments.tumble_settings import TumbleSettings
 from rigid import Trial
+from rigid.planar import simulate
 
 SMALL = {
     "surface": "sand", "ground": "bed", "mass": 0.3, "inertia": 2e-4, "spike_length": 0.04, "wheel_inertia": 1e-5,
@@ -120,6 +122,42 @@ def test_the_whole_of_a_bed_laid_end_to_end_counts_for_the_forecast():
 def test_whose_spikes_stand_in_the_sand_is_said_where_they_are_not_given(given, said):
     warning = tumble_grains._whose_spikes(on_bed(**given))
     assert warning is None if said is None else said in warning
+
+
+def test_what_was_set_is_said_first_and_defaults_are_counted_and_young_is_told():
+    settings = on_bed(rig=0.0085, torque=0.22, grain=0.004, sleep=True)
+    plan = tumble_grains._plan(settings)
+    soft = Softening(2.1e7, 1.0, 1.0, 7e10)
+    said = tumble_opening.opening(settings, plan, grains=12345.0, softening=soft, lowering_speed=0.2)
+    assert said[0].startswith("set: ") and "rig = 0.0085, torque = 0.22 N m" in said[0] and "sleep = yes" in said[0]
+    assert any(text.startswith("platform hedgehog: mass = 5.3 kg, inertia") for text in said)
+    (bed,) = (text for text in said if text.startswith("the bed: "))
+    assert "12,300 grains of 4 mm" in bed and "young = 2.1e+07 Pa (from max_overlap = 0.05; 3,333 times softer" in bed
+    assert re.match(r"\d+ more settings are at their defaults: run.toml", said[-1]) and len(said) < 12
+    assert not any("default)" in text or "None" in text for text in said)
+
+
+def test_a_duration_in_which_the_first_10_mm_are_not_gone_is_told_before_any_work():
+    """0.22 N m in the rig: on the spring-damper they take some 0.58 s, and with 0.01 N m they never come."""
+    told = {}
+    for name, given in (
+        ("short", {"duration": 0.4}), ("long", {"duration": 0.9}), ("weak", {"duration": 0.4, "torque": 0.01}),
+        ("landing", {"duration": 0.1, "drop_speed": 0.05}),
+    ):  # fmt: skip
+        settings = on_bed(rig=0.0085, bed_size=(0.4, 0.06, 0.06), **given)
+        plan = tumble_grains._plan(settings)
+        law = tumble_grains._forecast(settings, plan).trajectory
+        told[name] = tumble_opening.short_of_way(settings, plan, law)
+    assert told["long"] is None is told["landing"]
+    assert "gets 4.1 mm away within duration = 0.4 s" in told["short"]
+    wanted = float(re.search(r"duration = (\S+) s would do there", told["short"])[1])
+    assert simulate(plan_of(0.4), duration=wanted).trajectory_angle is not None
+    assert simulate(plan_of(0.4), duration=wanted - 0.02).trajectory_angle is None
+    assert "nor in 3.2 s there; a larger torque would do" in told["weak"]
+
+
+def plan_of(duration):
+    return tumble_grains._plan(on_bed(rig=0.0085, duration=duration)).trial
 
 
 def test_the_box_over_the_sand_is_as_high_as_a_brake_may_throw_it():
