@@ -99,8 +99,9 @@ def _seen(drawn: Pictures) -> Section:
     blocks = [figure(one.file, title=one.title, caption=one.caption, show_file=one in film)
               for one in (*film, *drawn.stills)]  # fmt: skip
     camera = (
-        "In front of the spikes' plane the grains are left out. Red arrows: the force on a row, as long as its size; "
-        "one that would leave the picture ends at its edge, with its number."
+        "In front of the spikes' plane the grains are left out. Red arrows: the force on a row, to the scale of the "
+        "weight's above the picture; one that would leave the picture ends at its edge, with its number. The black "
+        "line from the centre to where row 0 begins shows how far the platform has turned."
     )
     return Section("Seen from near", [*blocks, text(camera, small=True), *(text(note) for note in drawn.notes)])
 
@@ -158,8 +159,9 @@ def _draw_trajectory(
         other.grid(False)
         other.spines["right"].set_visible(True)
         legend_of_states(drawing, states, more)
+    shape = " in proportion" if far >= 1e-4 else ", heights stretched"
     caption = (
-        "Left: path of the geometric centre in proportion, coloured by state, from the dot on. Right: speed of the "
+        f"Left: path of the geometric centre{shape}, coloured by state, from the dot on. Right: speed of the "
         "centre, and angular velocity (dotted)."
     )
     return "trajectory", "The path", caption, drawing

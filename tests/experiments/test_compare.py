@@ -1,6 +1,7 @@
 """`hedgebed compare` and `hedgebed render`: two tumbles in one report, what is refused, pictures made again."""
 
 import json
+import os
 import re
 import shutil
 from pathlib import Path
@@ -128,6 +129,27 @@ def test_pictures_of_a_run_are_made_again_without_opengl_too(runs, monkeypatch, 
     assert {"tumble-start.png", "tumble-half.png", "tumble-end.png", "trajectory.png"} <= set(drawn)
     page = (runs / "brick" / "report.html").read_text()
     assert "Seen from near" in page and "no OpenGL" in page
+
+
+def test_render_lists_what_it_has_drawn_and_no_film_of_before(runs, tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("HEDGEBED_NO_OPENGL", "1")
+    run = tmp_path / "run"
+    shutil.copytree(runs / "brick", run)
+    (run / "film.gif").write_bytes(b"of before")
+    os.utime(run / "film.gif", (1e9, 1e9))
+    assert main(["render", str(run), "--no-film", "--quiet"]) == 0
+    listed = [Path(line).name for line in capsys.readouterr().out.splitlines()]
+    assert "film.gif" not in listed and "tumble-end.png" in listed and "animation.gif" in listed
+
+
+def test_a_kept_result_of_a_spike_is_not_rendered_either_and_nothing_is_written_into_it(tmp_path, capsys):
+    kept = tmp_path / "penetrate"
+    shutil.copytree(Path(__file__).parents[2] / "docs" / "results" / "penetrate", kept)
+    assert main(["render", str(kept)]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "is a kept result, result.json, run.toml alone" in said
+    assert f"`hedgebed penetrate {kept / 'run.toml'}` computes it again" in said
+    assert sorted(path.name for path in kept.iterdir()) == ["result.json", "run.toml"]
 
 
 def test_what_has_no_result_is_not_rendered(tmp_path, capsys):

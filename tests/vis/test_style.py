@@ -8,6 +8,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from PIL import Image, ImageColor
 
+from vis.diagnose_figures import _PHASES
 from vis.render import write_gif
 from vis.style import as_it_lies
 from vis.tumble_series import STATES
@@ -18,7 +19,7 @@ def test_a_way_that_would_be_a_line_is_stretched_and_says_so(length: float, aspe
     axis = Figure().subplots()
     x = np.linspace(0.0, length, 50)
     axis.plot(x, 0.025 * (1.0 + np.sin(40.0 * x)))
-    as_it_lies(axis)
+    assert as_it_lies(axis) == (title == "")
     assert axis.get_aspect() == aspect
     assert axis.get_title(loc="left") + axis.get_title() == title
 
@@ -52,6 +53,12 @@ def test_the_states_have_colours_apart_for_the_colour_blind_too_and_dark_enough_
     for one, other in combinations(seen, 2):
         assert np.linalg.norm(seen[one] - seen[other]) > 30, (one, other)
     assert max(colour[0] for colour in seen.values()) <= 70
+
+
+def test_a_diagnosis_shows_states_in_the_colours_that_they_have_everywhere_and_pushes_in_the_same():
+    assert all(_PHASES[name] == colour for name, colour in STATES.items())
+    pushed = [_PHASES[name] for name in ("free", "in", "rest", "out")]
+    assert sorted(pushed) == sorted(STATES.values())
 
 
 def test_a_film_keeps_the_colours_of_the_states_as_they_are_however_rare(tmp_path):
