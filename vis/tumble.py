@@ -293,7 +293,8 @@ def _page(folder: Path, result: Mapping[str, Any], drawn: list[Block], moving: P
     animation = figure(
         moving,
         title="The section of the platform on its way",
-        caption=f"In real time, until the centre is {_FOLLOWED:g} m away; a spike stands for the row at its corner.",
+        caption=f"In real time, until the centre is {_FOLLOWED:g} m away; a spike stands for the row at its corner. "
+        "The dot is the centre, behind it the way it has come, both in the colour of the state of that moment.",
         half=True,
         show_file=True,
     )

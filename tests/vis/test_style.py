@@ -8,6 +8,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from PIL import Image, ImageColor
 
+from vis.compare_figures import _draw_path
 from vis.diagnose_figures import _PHASES
 from vis.render import write_gif
 from vis.style import as_it_lies
@@ -22,6 +23,19 @@ def test_a_way_that_would_be_a_line_is_stretched_and_says_so(length: float, aspe
     assert as_it_lies(axis) == (title == "")
     assert axis.get_aspect() == aspect
     assert axis.get_title(loc="left") + axis.get_title() == title
+
+
+@pytest.mark.parametrize(("height", "words"), [(5e-3, "in proportion"), (1e-5, "heights stretched")])
+def test_the_caption_of_two_paths_says_of_their_shape_what_the_picture_does(height: float, words: str) -> None:
+    time = np.linspace(0.0, 1.0, 50)
+    columns = {"t_s": time}
+    for number in (1, 2):
+        columns |= {f"x_m_{number}": 0.02 * time, f"y_m_{number}": height * time**2}
+        columns |= {f"{name}_{number}": time for name in ("vx_m_s", "vy_m_s", "omega_rad_s")}
+    drawing, in_proportion = _draw_path(columns, ("one", "other"))
+    assert in_proportion == (words == "in proportion")
+    path = drawing.axes[0]
+    assert path.get_title(loc="left") + path.get_title() == ("" if in_proportion else words)
 
 
 SIGHT = {
