@@ -363,7 +363,7 @@ class RunFolder:
 
         Of a spell that was killed what its last checkpoint knew.
         """
-        return self._spent_before + _processor_time() - self._began
+        return round(self._spent_before + _processor_time() - self._began, 2)
 
     def set_status(self, status: Status, reason: str = "") -> None:
         """Write status.json. `reason` says why a run stopped or failed."""
