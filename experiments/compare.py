@@ -1,7 +1,8 @@
 """`hedgebed compare`: two finished runs in one report, their numbers with differences, what they did over time.
 
 Differences are the second less the first. Of tumbles, two in the plane or two in space, series/compared.csv holds both
-on one grid of time; what they stood on does not matter, nor does who stepped them. Of penetrations numbers are
+on one grid of time; what they stood on does not matter, nor does who stepped them. Where one lasts longer, numbers that
+go with that are compared over the time that both last; those of each whole run are beside. Of penetrations numbers are
 compared, and the drives both have.
 """
 
@@ -16,6 +17,7 @@ from typing import Any
 from hedgebed import __version__
 
 from . import compare_spatial, compare_tumbles
+from .compare_common import TIMELESS, common_time, numbers_until, sinkage_of
 from .compare_settings import CompareSettings
 from .kept_results import PATH_AND_MOTION, require_files
 from .progress import Progress
@@ -86,7 +88,7 @@ def _carry_out(settings: CompareSettings, folder: RunFolder, progress: Progress)
                 for one, label, found in zip((first, second), labels, results, strict=True)
             ],
             "quantities": {}, "departures": {"sentences": []},
-            "compared": _compared(results), "differs": _differs(first, second, results),
+            "compared": [], "compared_over": None, "differs": _differs(first, second, results),
             "colour": settings.colour, "pictures": settings.pictures and first.command != "penetrate",
             "warnings": [
                 f"{label}: {warning}" for label, one in zip(labels, results, strict=True) for warning in one["warnings"]
@@ -95,8 +97,11 @@ def _carry_out(settings: CompareSettings, folder: RunFolder, progress: Progress)
         if first.command != "penetrate":
             progress.stage("series", total=1.0)
             _add_motion(result, (first, second), results, labels, folder)
+        else:
+            result["compared"] = _compared(results)
         result["tables"] = [
-            _table(f"Numbers of both, and {labels[1]} less {labels[0]}", labels, result["compared"]),
+            *_numbers(result, labels),
+            *([_row_sinkage(result["rows"], labels)] if result.get("rows") else []),
             *([_differing(labels, result["differs"])] if result["differs"] else []),
         ]
         folder.write_result(result)
@@ -115,6 +120,7 @@ def _add_motion(
     """series/compared.csv, the gaps between both as quantities, and sentences."""
     module: Any = compare_spatial if result["kind"] == IN_SPACE else compare_tumbles
     moved = [module.read_moved(one.path, found) for one, found in zip(runs, results, strict=True)]
+    _compare_numbers(result, runs, results, moved)
     columns = module.compared_columns(*moved)
     folder.write_series("compared", columns)
     result["series"] = "series/compared.csv"
@@ -122,10 +128,28 @@ def _add_motion(
         result["spikes"] = list(dict.fromkeys(spike for one in moved for spike in one.spikes))
     else:
         result["spike_count"] = min(one.count for one in moved)
+        result["rows"] = compare_tumbles.row_sinkage(columns, result["spike_count"])
     result["weights"] = [one.weight for one in moved]
     result["quantities"] = module.gaps(columns)
     result["departures"]["sentences"] = module.told_apart(columns, labels, moved)
     result["warnings"] += [f"{label}: {note}" for label, one in zip(labels, moved, strict=True) for note in one.notes]
+
+
+def _compare_numbers(
+    result: dict[str, Any], runs: tuple[RunFolder, RunFolder], results: list[dict[str, Any]], moved: list[Any]
+) -> None:
+    """`compared`, over the time that both last where one lasts longer, and how long that is: `compared_over` [s]."""
+    whole = [one["quantities"] for one in results]
+    if result["kind"] == IN_THE_PLANE:
+        whole = [sinkage_of(one) | own for one, own in zip(moved, whole, strict=True)]
+    named = [one | {"quantities": own} for one, own in zip(results, whole, strict=True)]
+    end = common_time(moved)
+    if end is None:
+        result["compared"] = _compared(named)
+        return
+    parts = [numbers_until(end, one, own, run.path) for one, own, run in zip(moved, named, runs, strict=True)]
+    result["compared_over"], result["lasts"] = end, [float(one.time[-1]) for one in moved]
+    result["compared"] = _compared(named, parts)
 
 
 def _labels(folders: tuple[RunFolder, RunFolder], results: list[dict[str, Any]]) -> tuple[str, str]:
@@ -144,23 +168,33 @@ def _ground(result: Mapping[str, Any]) -> str:
     return named if result.get("method") != "paper" else f"{named}, the paper's step"
 
 
-def _compared(results: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Every quantity of either, with the difference where both have a value."""
+def _compared(
+    results: list[dict[str, Any]], parts: list[dict[str, float | None]] | None = None
+) -> list[dict[str, Any]]:
+    """Every quantity of either, with the difference where both have a value.
+
+    `parts`: those that go with how long a run lasts, over the time that both last; they are compared in place of the
+    whole runs' own, which are kept as `first_whole` and `second_whole`.
+    """
     first, second = (result.get("quantities", {}) for result in results)
     rows = []
     for name in dict.fromkeys([*first, *second]):
         one, other = first.get(name, {}), second.get(name, {})
-        values = [entry.get("value") for entry in (one, other)]
+        whole = [entry.get("value") for entry in (one, other)]
+        shared = parts is not None and any(name in part for part in parts)
+        values: list[Any] = [part.get(name) for part in parts] if parts is not None and shared else whole
         both = all(isinstance(value, int | float) for value in values)
         spreads = [entry.get("std") for entry in (one, other)]
-        rows.append(
-            {
-                "name": name, "unit": one.get("unit", other.get("unit", "")), "first": values[0], "second": values[1],
-                "difference": values[1] - values[0] if both else None,
-                "relative": (values[1] - values[0]) / abs(values[0]) if both and values[0] else None,
-                "first_std": spreads[0], "second_std": spreads[1],
-            }
-        )  # fmt: skip
+        row = {
+            "name": name, "unit": one.get("unit", other.get("unit", "")), "first": values[0], "second": values[1],
+            "difference": values[1] - values[0] if both else None,
+            "relative": (values[1] - values[0]) / abs(values[0]) if both and values[0] else None,
+            "first_std": spreads[0], "second_std": spreads[1],
+        }  # fmt: skip
+        if parts is not None:
+            over = "shared time" if shared or name in TIMELESS else "whole runs"
+            row |= {"over": over, "first_whole": whole[0], "second_whole": whole[1]}
+        rows.append(row)
     return rows
 
 
@@ -197,17 +231,51 @@ def _written(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def _table(title: str, labels: tuple[str, str], rows: list[dict[str, Any]]) -> dict[str, Any]:
+def _numbers(result: dict[str, Any], labels: tuple[str, str]) -> list[dict[str, Any]]:
+    """For the terminal: one table, or those of the time that both last and of each run as a whole."""
+    rows, end = result["compared"], result["compared_over"]
+    less = f"{labels[1]} less {labels[0]}"
+    if end is None:
+        return [_table(f"Numbers of both, and {less}", labels, rows)]
+    lasts = " and ".join(f"{time:.4g}" for time in result["lasts"])
+    shared = [row for row in rows if row["over"] == "shared time"]
+    whole = [
+        row | {"first": row["first_whole"], "second": row["second_whole"]}
+        for row in rows
+        if (row["first_whole"], row["second_whole"]) != (row["first"], row["second"]) or row["over"] != "shared time"
+    ]
+    return [
+        _table(f"Numbers over the first {end:.4g} s, which both last, and {less}", labels, shared),
+        _table(f"Numbers of each run as a whole, over its own {lasts} s", labels, whole, differences=False),
+    ]
+
+
+def _row_sinkage(rows: list[dict[str, Any]], labels: tuple[str, str]) -> dict[str, Any]:
+    shown = [[str(row["row"]), *(f"{1e3 * row[key]:.3g}" for key in ("first", "second"))] for row in rows]
+    return {
+        "title": "Sinkage of each row of spikes while both last, deepest [mm]", "head": ["row", *labels], "rows": shown,
+    }  # fmt: skip
+
+
+def _table(
+    title: str, labels: tuple[str, str], rows: list[dict[str, Any]], *, differences: bool = True
+) -> dict[str, Any]:
     """For the terminal: angles in degrees."""
     shown = []
     for row in rows:
         scale, unit = (
             (180 / math.pi, "degrees") if row["unit"] == "rad" else (1.0, row["unit"] if row["unit"] != "1" else "")
         )
-        numbers = [_number(row[key], scale, key == "difference") for key in ("first", "second", "difference")]
-        relative = f"{100 * row['relative']:+.3g} %" if row["relative"] is not None else ""
-        shown.append([row["name"], *numbers, relative, unit])
-    return {"title": title, "head": ["quantity", *labels, "less", "", "unit"], "rows": shown}
+        numbers = [_number(row[key], scale, False) for key in ("first", "second")]
+        if differences:
+            relative = f"{100 * row['relative']:+.3g} %" if row["relative"] is not None else ""
+            numbers += [_number(row["difference"], scale, True), relative]
+        shown.append([row["name"], *numbers, unit])
+    return {
+        "title": title,
+        "head": ["quantity", *labels, *(["less", ""] if differences else []), "unit"],
+        "rows": shown,
+    }
 
 
 def _number(value: Any, scale: float, signed: bool) -> str:

@@ -15,7 +15,7 @@ from .runfolder import read_series
 
 __all__ = [
     "ENERGIES", "Moved", "as_quantities", "compared_columns", "deepest", "gap_entries", "gaps", "lasting", "mean_over",
-    "on_one_grid", "read_moved", "same_state", "told_apart",
+    "on_one_grid", "read_moved", "row_sinkage", "same_state", "told_apart",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -176,6 +176,16 @@ def deepest(columns: Mapping[str, Any], number: int) -> float:
     """Largest sinkage of any row of the one run [m]."""
     rows = [values for name, values in columns.items() if name.startswith("sinkage_") and name.endswith(f"_{number}")]
     return float(np.max(rows))
+
+
+def row_sinkage(columns: Mapping[str, Any], count: int) -> list[dict[str, Any]]:
+    """Largest sinkage [m] of each of `count` rows that goes in, in either run, while both last: row, first, second."""
+    found = []
+    for row in range(count):
+        first, second = (float(np.max(columns[f"sinkage_{row}_m_{number}"])) for number in (1, 2))
+        if first > 0 or second > 0:
+            found.append({"row": row, "first": first, "second": second})
+    return found
 
 
 def told_apart(columns: Mapping[str, Any], labels: tuple[str, str], moved: list[Moved]) -> list[str]:

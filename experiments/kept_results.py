@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from .runfolder import RunFolder
 
-__all__ = ["PATH_AND_MOTION", "drawn_from", "require_files"]
+__all__ = ["PATH_AND_MOTION", "drawn_from", "require_files", "require_whole"]
 
 PATH_AND_MOTION = ("trajectory.csv", "series/motion.csv")
 """What every run of a platform has written."""
@@ -34,3 +34,13 @@ def require_files(folder: RunFolder, names: Iterable[str], *, key: str) -> None:
         f"{key} = {str(folder.path)!r} has no {', '.join(missing)}{kept}: "
         f"`hedgebed {folder.command} {folder.path / 'run.toml'}` computes it again"
     )
+
+
+def require_whole(folder: RunFolder, *, key: str) -> None:
+    """Raise ValueError for a kept result: no status.json, and no series to draw; nothing is to be written into it."""
+    if folder.status is None and not (folder.path / "series").is_dir():
+        there = sorted(path.name for path in folder.path.iterdir() if path.is_file())
+        raise ValueError(
+            f"{key} = {str(folder.path)!r} is a kept result, {', '.join(there)} alone, of which there is nothing to "
+            f"draw: `hedgebed {folder.command} {folder.path / 'run.toml'}` computes it again"
+        )

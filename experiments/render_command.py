@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from experiments.cli_streams import refusing, say, stdout_to_stderr
-from experiments.kept_results import drawn_from, require_files
+from experiments.kept_results import drawn_from, require_files, require_whole
 from experiments.progress import make_progress
 from experiments.runfolder import RunFolder
 
@@ -37,8 +37,11 @@ def render(
             )
         if folder.command in ("tumble", "tumble spatial"):
             require_files(folder, drawn_from(folder), key="run")
+        else:
+            require_whole(folder, key="run")
         with folder.lock():
             pass
+    begun = _now(folder)
     with folder.lock(), stdout_to_stderr(), make_progress(quiet=quiet) as progress:
         progress.stage("pictures", total=1.0)
         if folder.command == "tumble":
@@ -55,7 +58,7 @@ def render(
             from vis.report import write_report
 
             report = write_report(run, progress=progress.update)
-    drawn = sorted(path for path in [*run.glob("figures/*.png"), *run.glob("*.gif")])
+    drawn = sorted(path for path in [*run.glob("figures/*.png"), *run.glob("*.gif")] if path.stat().st_mtime >= begun)
     if json:
         print(json_module.dumps({"report": str(report), "pictures": [str(path) for path in drawn]}, indent=2))
     else:
@@ -63,3 +66,10 @@ def render(
             print(path)
         print(f"report: {report}")
     return 0
+
+
+def _now(folder: RunFolder) -> float:
+    """The time [s] by the clock of the folder's file system: what is drawn from here on is not older."""
+    lock = folder.path / "lock"
+    lock.touch()
+    return lock.stat().st_mtime

@@ -5,7 +5,7 @@ was killed) finds either the whole of a file or none of it.
 
 ```
 run.toml                  the settings, each with its meaning and unit in a comment; reads back to the same settings
-status.json               {"status": "running|stopped|failed|done", "reason", "updated"}
+status.json               {"status": "running|stopped|failed|done", "reason", "updated", "processor_time"}
 lock                      the process that is writing the folder; the system frees it when that process dies
 result.json               the numbers a person would quote
 series/<id>.csv           time series, the unit of each column in its name
@@ -196,6 +196,16 @@ def _now() -> str:
     return datetime.now().astimezone().isoformat(timespec="seconds")
 
 
+def _processor_time() -> float:
+    """Of this process and its children that have ended [s]."""
+    spent = os.times()
+    return spent.user + spent.system + spent.children_user + spent.children_system
+
+
+def _float(value: Any) -> float:
+    return float(value) if isinstance(value, int | float) else 0.0
+
+
 def fresh_path(command: str, root: Path = Path("runs")) -> Path:
     """A folder under `root` that does not exist yet: ``<command>-<date>-<time>``."""
     stem = f"{command.replace(' ', '-')}-{datetime.now():%Y%m%d-%H%M%S}"
@@ -221,6 +231,8 @@ class RunFolder:
         self.version = version
         self.code = code  # digest of the code that computes, where the experiment has one
         self.settings = settings  # as run.toml has them: name -> value, None for what is not set
+        self._spent_before = _float(self._kept_status().get("processor_time"))
+        self._began = _processor_time()
 
     def __repr__(self) -> str:
         return f"RunFolder({str(self.path)!r}, command={self.command!r}, status={self.status!r})"
@@ -334,23 +346,37 @@ class RunFolder:
     @property
     def status(self) -> Status | None:
         """What status.json says; None where there is none."""
-        try:
-            status = read_json(self.path / "status.json").get("status")
-        except (OSError, json.JSONDecodeError):
-            return None
+        status = self._kept_status().get("status")
         return status if status in get_args(Status) else None
+
+    def _kept_status(self) -> dict[str, Any]:
+        """What status.json holds; nothing where there is none."""
+        try:
+            kept = read_json(self.path / "status.json")
+        except (OSError, json.JSONDecodeError):
+            return {}
+        return kept if isinstance(kept, dict) else {}
+
+    @property
+    def processor_time(self) -> float:
+        """Of this process and its children that have ended, since the folder was taken up, and of earlier spells [s].
+
+        Of a spell that was killed what its last checkpoint knew.
+        """
+        return round(self._spent_before + _processor_time() - self._began, 2)
 
     def set_status(self, status: Status, reason: str = "") -> None:
         """Write status.json. `reason` says why a run stopped or failed."""
         if status not in get_args(Status):
             raise ValueError(f"status = {status!r} is none of {', '.join(get_args(Status))}")
-        write_json(self.path / "status.json", {"status": status, "reason": reason, "updated": _now()})
+        told = {"status": status, "reason": reason, "updated": _now(), "processor_time": self.processor_time}
+        write_json(self.path / "status.json", told)
 
     # What it holds
 
     def write_result(self, result: Mapping[str, Any]) -> None:
-        """Write result.json (see `write_json`)."""
-        write_json(self.path / "result.json", result)
+        """Write result.json (see `write_json`), with the `processor_time` that it took so far [s]."""
+        write_json(self.path / "result.json", {**result, "processor_time": self.processor_time})
 
     def read_result(self) -> dict[str, Any]:
         """The contents of result.json."""
@@ -377,6 +403,8 @@ class RunFolder:
                 raise TypeError(f"{key!r} in checkpoint {name!r} is neither numbers nor text: {arrays[key]!r}")
         with _replacing(self.path / "checkpoint" / f"{_checked(name)}.npz") as temporary, temporary.open("wb") as file:
             np.savez(file, **stored)  # type: ignore[arg-type]
+        if self.status == "running":  # a run that is killed has its processor time until here
+            self.set_status("running")
 
     def load_checkpoint(self, name: str) -> dict[str, np.ndarray] | None:
         """The arrays of checkpoint/<name>.npz; None where there is none."""

@@ -21,6 +21,7 @@ from .progress import Progress
 from .reporting import write_report
 from .runfolder import RunFolder, write_series
 from .synthesis import check_tumble_campaign, write_tumble_campaign
+from .tips import tip_angles
 from .tumble_platform import torque_within_limit
 from .tumble_settings import TumbleSettings
 from .tumble_sweep import check_sweep, middle_of_sweep, run_sweep
@@ -88,6 +89,18 @@ def quantities_of(trajectory: Trajectory) -> dict[str, dict[str, Any]]:
             "1",
             "largest |E(t) - E(0) - work of the torque + dissipated| over max(|work of the torque|, W l)",
         ),
+    } | _tip_sinkage(trajectory)
+
+
+def _tip_sinkage(trajectory: Trajectory) -> dict[str, dict[str, Any]]:
+    """How deep the rows' tips go below the undisturbed surface: on a law its compression there."""
+    trial = trajectory.trial
+    tips = trial.spike_length * np.cos(tip_angles(trial, trajectory.theta)) - trajectory.y[:, None]
+    sinkage = np.maximum(tips, 0.0)
+    start = "of the two rows it stands on, mean, when the torque begins"
+    return {
+        "sinkage_start": _quantity(float(sinkage[0, [0, -1]].mean()), "m", start),
+        "sinkage_largest": _quantity(float(sinkage.max()), "m", "of any row, at the times of trajectory.csv"),
     }
 
 

@@ -34,10 +34,10 @@ from .softening import Softening, run_limit, soften_material
 from .stopping import held_back
 from .surfaces import find_surface, surface_names
 from .tips import tip_angles
-from .tumble_bed_settings import TumbleBedSettings
 from .tumble_flight import lies_in_flight
 from .tumble_grains_frames import TumbleFrames
 from .tumble_grains_result import conclude, sinkage_start, write_trajectory
+from .tumble_opening import opening, short_of_way
 from .tumble_platform import torque_within_limit
 from .tumble_settings import TumbleSettings
 from .tumble_steppers import is_plain, stepper_of
@@ -103,14 +103,18 @@ def tumble_on_grains(settings: TumbleSettings, folder: RunFolder, progress: Prog
         plan = _plan(settings)
         unlike = packing_warning(find_surface(plan.surface), _material(plan), settings.bed_stages)
         warnings = [*plan.warnings, *([unlike] if unlike else [])]
-        for sentence in (*_sentences(settings, plan), *(f"warning: {warning}" for warning in warnings)):
-            progress.message(sentence)
         forecast = _forecast(settings, plan)
+        softening = _softness(settings, plan, forecast)
+        for sentence in opening(
+            settings, plan, grains=_count(settings, forecast), softening=softening,
+            lowering_speed=_lowering_speed(settings, plan),
+        ):  # fmt: skip
+            progress.message(sentence)
         spikes = _whose_spikes(settings)
-        for said in (_may_leave(settings, forecast), spikes):
+        short = short_of_way(settings, plan, forecast.trajectory)
+        for said in (*warnings, short, _may_leave(settings, forecast), spikes):
             if said:
                 progress.message(f"warning: {said}")
-        softening = _softness(settings, plan, forecast)
         step_time = settings.duration + 0.3  # with the setting down
         progress.plan({"bed": 1.0, "tumble": step_time}, seconds={"report": 10.0})
         try:
@@ -130,17 +134,6 @@ def tumble_on_grains(settings: TumbleSettings, folder: RunFolder, progress: Prog
         write_report(folder.path, progress)
         folder.drop_checkpoint(CHECKPOINT)
     return result
-
-
-def _sentences(settings: TumbleSettings, plan: TumblePlan) -> list[str]:
-    """What was left at its default, and what the spring-damper's numbers are for."""
-    own = [text for text in plan.sentences() if not text.startswith(("ground =", "method =", "effects =", "sample_"))]
-    fields = TumbleBedSettings.model_fields
-    given = {*settings.bed_settings_given(), "lowering_speed"}
-    own += [f"{name} = {getattr(settings, name)} (default)" for name in fields if name not in given]
-    if settings.lowering_speed is None:
-        own.append(f"lowering_speed = {_lowering_speed(settings, plan):.4g} m/s (default: sqrt(g grain) of the grains)")
-    return [*own, "stiffness, damping: of the spring-damper beside; mu_d: also what tells sliding from sticking"]
 
 
 # Before it -----------------------------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from dem import Graded
 from dem.materials import caveat
 from dem.prepare import fingerprint
 from rigid.trajectory import Trajectory
+from vis.tumble_beside import HEAD, beside_rows, beside_words
 
 from .bed_graded import coarsest_touched, tips_in_ground
 from .runfolder import RunFolder, write_series
@@ -73,6 +74,12 @@ def conclude(
     added, tables = own_quantities(run, run.feet[:, 3], run.feet[:, 0])
     result["quantities"] |= _own_quantities(run) | added
     result |= tables
+    next_to = quantities_of(beside)
+    shown = [list(row) for row in beside_rows(result["quantities"], next_to)]
+    both = {"title": "On grains, and on the spring-damper beside", "head": list(HEAD), "rows": shown}
+    result["tables"] = [both, *tables.get("tables", [])]
+    if settings.drop_speed is None:
+        result["departures"]["sentences"].insert(0, beside_words(result["quantities"], next_to))
     if run.losses:
         result["quantities"]["energy_residual"]["note"] += (
             "; also of all together: what the bed holds and what its dashpots, friction and rolling took are measured, "
@@ -93,7 +100,7 @@ def conclude(
         "repeats": settings.bed_repeats, "piece_length": settings.bed_size[0],
         "spike_diameter": settings.spike_diameter, "spike_clear": settings.spike_clear,
         **_grain_steps(settings, run), "worst_guess": books.worst_guess, "largest_force": books.largest_force,
-        "beside": quantities_of(beside),
+        "beside": next_to,
         "beside_transitions": [
             {"time": float(t), "state": state, "theta": float(theta)}
             for t, state, theta in beside.transitions

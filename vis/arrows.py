@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from vis.numbers import quote
 from vis.style import INK
 
-__all__ = ["FORCE", "HALO", "draw_force"]
+__all__ = ["FORCE", "HALO", "draw_force", "draw_measure"]
 
 HALO = {"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.5}
 """Box of a word on a picture."""
@@ -40,6 +41,21 @@ def draw_force(axis: Any, foot: NDArray[np.float64], head: NDArray[np.float64], 
         _say(axis, end, f"{quote(force, unit='N')}, arrow cut")
 
 
+def draw_measure(sheet: Figure, *, right: float, height: float, length: float, weight: float) -> None:
+    """The weight [N] as an arrow of `length` [inch] above the pictures, where it hides and meets nothing.
+
+    right, height: where it ends on the sheet, in fractions of that.
+    """
+    wide = length / float(sheet.get_size_inches()[0])
+    axis = sheet.add_axes((right - wide, height - 0.01, wide, 0.02))
+    axis.set_axis_off()
+    axis.set_xlim(0.0, 1.0)
+    axis.set_ylim(0.0, 1.0)
+    axis.annotate("", (1.0, 0.5), (0.0, 0.5), arrowprops=FORCE)
+    words = f"weight, {quote(weight, unit='N')}"
+    sheet.text(right - wide - 0.008, height, words, fontsize=10, ha="right", va="center", color=INK)
+
+
 def _inside(foot: NDArray[np.float64], head: NDArray[np.float64]) -> tuple[float, float]:
     """From which share of the way to which it lies inside the rim (Liang and Barsky); from >= to: nowhere."""
     low, high = 0.0, 1.0
@@ -54,7 +70,7 @@ def _inside(foot: NDArray[np.float64], head: NDArray[np.float64]) -> tuple[float
 
 
 def _say(axis: Any, end: NDArray[np.float64], words: str) -> None:
-    """Words beside the end of an arrow and over its shaft, towards the middle; below the corner of the weight's."""
-    x, y = float(end[0]), float(np.clip(end[1] + 0.05, 0.06, 0.96 if end[0] > 0.4 else 0.87))
+    """Words beside the end of an arrow and over its shaft, towards the middle."""
+    x, y = float(end[0]), float(np.clip(end[1] + 0.05, 0.06, 0.96))
     aside, side = (0.03, "left") if x < 0.6 else (-0.03, "right")
     axis.text(x + aside, y, words, fontsize=10, ha=side, va="center", color=INK, bbox=HALO)

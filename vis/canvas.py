@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vis.style import INK, styled
 
-__all__ = ["COLOURS", "Caption", "ColourScale", "Page", "colour_values", "colourmap", "nice_above"]
+__all__ = ["COLOURS", "Caption", "ColourScale", "Page", "colour_values", "colourmap", "moved_since", "nice_above"]
 
 #: What grains are coloured by: name -> (label with unit, factor from SI).
 COLOURS: dict[str, tuple[str, float]] = {
@@ -76,6 +76,20 @@ def colour_values(grains: dict[str, NDArray[Any]], by: str) -> NDArray[np.float6
         raise ValueError(f"the frame has no {name!r} to colour the grains by")
     field = np.asarray(grains[name], dtype=np.float64)
     return COLOURS[by][1] * (np.linalg.norm(field, axis=1) if field.ndim == 2 else np.abs(field))
+
+
+def moved_since(grains: dict[str, NDArray[Any]], first: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """The fields of a frame's grains, their displacement [m] counted from the `first` frame on, not from before it.
+
+    A bed under a platform has been pressed by the setting down when time begins. Left as it is where a frame has none.
+    """
+    if "displacement" not in grains or "displacement" not in first:
+        return grains
+    before = np.asarray(first["displacement"], dtype=np.float64)
+    if "id" in grains and "id" in first:
+        places = np.argsort(first["id"])
+        before = before[places[np.searchsorted(first["id"], grains["id"], sorter=places)]]
+    return grains | {"displacement": np.asarray(grains["displacement"], dtype=np.float64) - before}
 
 
 def nice_above(value: float) -> float:

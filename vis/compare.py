@@ -52,7 +52,7 @@ def write_compare_report(folder: str | Path, *, progress: Callable[[float], None
             Section("", [listing(result["departures"]["sentences"]), *drawn[:-4]]),
             *([Section("Seen side by side", seen)] if seen else []),
             Section("States and angle", drawn[-4:-3]),
-            Section("Into the ground", drawn[-3:-1]),
+            Section("Into the ground", [*drawn[-3:-1], *_row_sinkage(result, labels)]),
             Section("Energy", drawn[-1:]),
         ]
     else:
@@ -68,7 +68,7 @@ def write_compare_report(folder: str | Path, *, progress: Callable[[float], None
         warnings=[str(warning)[:1].upper() + str(warning)[1:] for warning in result["warnings"]],
         sections=[
             *sections,
-            Section("Every number, side by side", [_numbers(result, labels)]),
+            Section("Every number, side by side", _numbers(result, labels)),
             *([Section("What the two were given", [_given(result, labels)])] if result["differs"] else []),
             Section("To do this again", [text("In this folder:"), code("hedgebed compare run.toml")]),
         ],
@@ -158,13 +158,15 @@ def _tiles(result: Mapping[str, Any]) -> list[Tile]:
         ("energy_residual", "Energy residual"),
     )  # fmt: skip
     rows = {row["name"]: row for row in result["compared"]}
+    end = result.get("compared_over")
+    words = "first | second" if end is None else f"first | second, over {end:.3g} s"
     tiles = []
     for name, label in wanted:
         row = rows.get(name)
         if row is None or row["first"] is None or row["second"] is None:
             continue
         values = [_said(row[key], row["unit"]) for key in ("first", "second")]
-        tiles.append(Tile(label, f"{values[0]} | {values[1]}", "first | second"))
+        tiles.append(Tile(label, f"{values[0]} | {values[1]}", words))
     return tiles[:5]
 
 
@@ -176,16 +178,40 @@ def _said(value: float, unit: str) -> str:
     return f"{short(value, 3)}{'' if unit == '1' else ' ' + unit}"
 
 
-def _numbers(result: Mapping[str, Any], labels: tuple[str, str]) -> Block:
-    rows = []
-    for row in result["compared"]:
-        in_degrees = row["unit"] == "rad"
-        scale, unit = (180 / math.pi, "°") if in_degrees else (1.0, "" if row["unit"] == "1" else row["unit"])
-        cells = ["–" if row[key] is None else f"{scale * row[key]:.5g}" for key in ("first", "second")]
-        difference = "–" if row["difference"] is None else f"{scale * row['difference']:+.4g}"
-        share = "–" if row["relative"] is None else f"{100 * row['relative']:+.3g} %"
-        rows.append((row["name"], *cells, difference, share, unit))
-    return table(("quantity", *labels, "difference", "of the first", "unit"), rows)
+def _numbers(result: Mapping[str, Any], labels: tuple[str, str]) -> list[Block]:
+    """One table; where one run lasts longer, of the time that both last, and of each as a whole."""
+    head = ("quantity", *labels, "difference", "of the first", "unit")
+    rows, end = result["compared"], result.get("compared_over")
+    if end is None:
+        return [table(head, [_row(row) for row in rows])]
+    lasts = " and ".join(f"{time:.4g}" for time in result["lasts"])
+    shared = [row for row in rows if row["over"] == "shared time"]
+    whole = [_row(row | {"first": row["first_whole"], "second": row["second_whole"]}) for row in rows]
+    return [
+        table(head, [_row(row) for row in shared], title=f"Over the first {end:.4g} s, which both last"),
+        table(
+            ("quantity", *labels, "unit"), [(*row[:3], row[-1]) for row in whole],
+            title=f"Of each run as a whole, over its own {lasts} s",
+        ),
+    ]  # fmt: skip
+
+
+def _row(row: Mapping[str, Any]) -> tuple[str, ...]:
+    in_degrees = row["unit"] == "rad"
+    scale, unit = (180 / math.pi, "°") if in_degrees else (1.0, "" if row["unit"] == "1" else row["unit"])
+    cells = ["–" if row[key] is None else f"{scale * row[key]:.5g}" for key in ("first", "second")]
+    difference = "–" if row["difference"] is None else f"{scale * row['difference']:+.4g}"
+    share = "–" if row["relative"] is None else f"{100 * row['relative']:+.3g} %"
+    return (row["name"], *cells, difference, share, unit)
+
+
+def _row_sinkage(result: Mapping[str, Any], labels: tuple[str, str]) -> list[Block]:
+    """The deepest point of each row, of tumbles in the plane."""
+    rows = [
+        (str(row["row"]), *(f"{1e3 * row[key]:.3g}" for key in ("first", "second"))) for row in result.get("rows", [])
+    ]
+    title = "Sinkage of each row while both last, deepest [mm]"
+    return [table(("row", *labels), rows, title=title)] if rows else []
 
 
 def _given(result: Mapping[str, Any], labels: tuple[str, str]) -> Block:

@@ -35,9 +35,10 @@ def plans(
     rows = [str(row) for row in range(int(result["spike_count"]))]
     forces = (("lift_N", "force upwards [N]"), ("push_N", "force along the motion [N]"))
     with styled():
+        path, in_proportion = _draw_path(columns, labels)
+        shape = "in proportion" if in_proportion else "heights stretched"
         return [
-            ("path", "Path and speed", "Left: the centre from its start, in proportion. Right: its speed, and dθ/dt.",
-             _draw_path(columns, labels)),
+            ("path", "Path and speed", f"Left: the centre from its start, {shape}. Right: its speed, and dθ/dt.", path),
             ("states", "Angle and states", "Above: the angle. Below: the states as bands; stand: two rows or more "
              "stick, pivot: one sticks, slip: all that touch slide, hop: none touches.",
              draw_states(columns, "theta_rad", states, labels)),
@@ -57,7 +58,8 @@ def legend(drawing: Figure, labels: tuple[str, str]) -> None:
     drawing.legend(handles=handles, loc="outside upper left", ncols=2)
 
 
-def _draw_path(columns: Mapping[str, Array], labels: tuple[str, str]) -> Figure:
+def _draw_path(columns: Mapping[str, Array], labels: tuple[str, str]) -> tuple[Figure, bool]:
+    """The figure, and whether the path is in proportion."""
     drawing, ((path, speed, spin),) = sheet(1, 3, 3.2)
     time = columns["t_s"]
     for number, style in enumerate(LINES, 1):
@@ -65,7 +67,7 @@ def _draw_path(columns: Mapping[str, Array], labels: tuple[str, str]) -> Figure:
         path.plot(x - x[0], y - y[0], **style)
         speed.plot(time, np.hypot(columns[f"vx_m_s_{number}"], columns[f"vy_m_s_{number}"]), **style)
         spin.plot(time, columns[f"omega_rad_s_{number}"], **style)
-    as_it_lies(path)
+    in_proportion = as_it_lies(path)
     path.set_xlabel("x − x(0) [mm]")
     path.set_ylabel("y − y(0) [mm]")
     speed.set_ylabel("speed of the centre [m/s]")
@@ -73,7 +75,7 @@ def _draw_path(columns: Mapping[str, Array], labels: tuple[str, str]) -> Figure:
     for axis in (speed, spin):
         axis.set_xlabel("time [s]")
     legend(drawing, labels)
-    return drawing
+    return drawing, in_proportion
 
 
 def draw_states(

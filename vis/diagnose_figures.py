@@ -19,7 +19,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from vis.style import BED, GREY, INK, MODEL
-from vis.tumble import state_runs
+from vis.tumble_series import STATES, state_runs
 
 __all__ = ["Channel", "draw_evidence", "draw_latent", "draw_phases", "draw_trajectories", "read_channel", "worst"]
 
@@ -41,8 +41,8 @@ _QUANTITIES: dict[str, tuple[str, str, float]] = {
     "force": ("force", "N", 1.0),
     "accel": ("acceleration", "m/s²", 1.0),
 }
-_PHASES = {"stand": "#b9b9b9", "pivot": "#009E73", "slip": "#CC79A7", "hop": "#9fd0f0",
-           "free": "#9fd0f0", "in": "#6f8aa3", "rest": "#E69F00", "out": "#CC79A7"}  # fmt: skip
+_PHASES = STATES | {"free": STATES["hop"], "in": STATES["pivot"], "rest": STATES["stand"], "out": STATES["slip"]}
+"""Of a tumble the colours that its states have everywhere; of a push, never in one figure with those, the same four."""
 #: column of latent.csv -> axis label and factor; what is not here is shown under its own name
 _COLUMNS: dict[str, tuple[str, float]] = {
     "t_s": ("time [s]", 1.0),

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vis.canvas import colour_values, nice_above
+from vis.canvas import colour_values, moved_since, nice_above
 from vis.frames import Frame, Frames, frame_names, read_frames
 from vis.meshes import in_place, spike_mesh
 from vis.tumble_series import read_columns
@@ -176,9 +176,13 @@ class Reel:
         }
         if self.frames is not None:  # grains touch a cylinder inside the hull: shown is the octagon
             found = self.frames[index]
-            return replace(found, bodies=found.bodies | {"hull": bodies["hull"]})
+            return replace(found, grains=self.grains(found), bodies=found.bodies | {"hull": bodies["hull"]})
         grains: dict[str, NDArray[Any]] = {"position": np.zeros((0, 3)), "radius": np.zeros(0)}
         return Frame(float(self.times[index]), grains, bodies, {}, {"row_forces": self._loads(row, x, y, theta)})
+
+    def grains(self, found: Frame) -> dict[str, NDArray[Any]]:
+        """The grains of a frame, displaced since the torque began: that the setting down moved them is left out."""
+        return found.grains if self._first is None else moved_since(found.grains, self._first.grains)
 
     @cached_property
     def _meshes(self) -> dict[str, tuple[Array, NDArray[np.int64]]]:
@@ -246,7 +250,7 @@ class Reel:
         most = 0.0
         if self.frames is not None:
             for index in {len(self) // 3, 2 * len(self) // 3, len(self) - 1}:
-                values = colour_values(self.frames[index].grains, by)
+                values = colour_values(self.grains(self.frames[index]), by)
                 taking = values[values > 0.05 * values.max()] if len(values) else values
                 most = max(most, float(np.percentile(taking, 97)) if len(taking) else 0.0)
         return nice_above(most)

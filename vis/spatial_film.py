@@ -22,14 +22,13 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from vis.arrows import FORCE, HALO, draw_force
-from vis.canvas import COLOURS, colour_values, colourmap, nice_above
+from vis.arrows import draw_force, draw_measure
+from vis.canvas import COLOURS, colour_values, colourmap, moved_since, nice_above
 from vis.frames import Frame, Frames, read_frames
 from vis.jobs import draw_job, job_of
-from vis.numbers import quote
 from vis.stage import FlatStage, Stage
 from vis.state_figures import state_strip
-from vis.style import INK, styled
+from vis.style import styled
 from vis.tumble_series import read_columns
 
 __all__ = ["NAME", "Scene", "View", "main", "run_spatial_job"]
@@ -106,8 +105,10 @@ class Scene:
         state = f"    {states[int(np.argmin(np.abs(self.track['t_s'] - at)))]}" if len(states) else ""
         return f"t = {at:.3f} s{state}"
 
-    def draw(self, axis: Any, time: float, *, colours: Callable[[Frame], NDArray[np.float64]], weight: float) -> None:
-        """Its picture at `time` [s] on an axes; an arrow as long as `weight` [N] is a measure of the forces."""
+    def draw(
+        self, axis: Any, time: float, *, colours: Callable[[Frame, Frame], NDArray[np.float64]], weight: float
+    ) -> None:
+        """Its picture at `time` [s] on an axes; forces as long as `weight` [N] is to `_ARROW` of it."""
         index = self.nearest(time)
         frame, focus = self.frames[index], (float(self.way[index, 0]), float(self.way[index, 1]))
         axis.set_xlim(0.0, 1.0)
@@ -117,17 +118,15 @@ class Scene:
         axis.set_xticks([])
         axis.set_yticks([])
         if isinstance(self.stage, Stage):
-            image = self.stage.render(frame, colours(frame), focus)
+            image = self.stage.render(frame, colours(frame, self.frames[0]), focus)
             axis.imshow(image, extent=(0.0, 1.0, 0.0, 1.0), aspect="auto", interpolation="nearest")
         else:
-            self.stage.draw(axis, frame, colours(frame), focus)
+            self.stage.draw(axis, frame, colours(frame, self.frames[0]), focus)
         long = _ARROW * self.stage.height / weight  # [m/N]
         points, fields = frame.clouds.get("row_forces", (np.zeros((0, 3)), {}))
         for point, force in zip(points, fields.get("force", np.zeros((0, 3))), strict=True):
             ends = self.stage.place(np.array([point, point + long * np.asarray(force, dtype=float)]), focus)
             draw_force(axis, ends[0], ends[1], float(np.linalg.norm(force)))
-        axis.annotate("", (0.025, 0.97), (0.025, 0.97 - _ARROW), arrowprops=FORCE)
-        axis.text(0.04, 0.96, f"weight, {quote(weight, unit='N')}", fontsize=10, va="top", color=INK, bbox=HALO)
 
     def close(self) -> None:
         """Free the window."""
@@ -179,6 +178,10 @@ class View:
                 scene.draw(sheet.add_axes(place), time, colours=self._colours, weight=self.weight)
                 sheet.text(place[0], 0.975, label, fontsize=15, fontweight="bold", va="top")
                 sheet.text(place[0], 0.93, scene.line(time), fontsize=13, va="top", color="#444444")
+                draw_measure(
+                    sheet, right=place[0] + place[2], height=0.915,
+                    length=_ARROW * place[3] * float(sheet.get_size_inches()[1]), weight=self.weight,
+                )  # fmt: skip
             if all(len(scene.track["state"]) for scene in self.scenes):
                 state_strip(sheet, [scene.track for scene in self.scenes], self.labels, time)
             if self.coloured:
@@ -196,10 +199,10 @@ class View:
         for scene in self.scenes:
             scene.close()
 
-    def _colours(self, frame: Frame) -> NDArray[np.float64]:
+    def _colours(self, frame: Frame, first: Frame) -> NDArray[np.float64]:
         if not len(frame.grains["position"]):
             return np.zeros((0, 4))
-        return np.asarray(self.map(self.norm(colour_values(frame.grains, self.by))))
+        return np.asarray(self.map(self.norm(colour_values(moved_since(frame.grains, first.grains), self.by))))
 
 
 def _centre(frame: Frame) -> NDArray[np.float64]:
@@ -212,7 +215,7 @@ def _top(frames: Frames, by: str) -> float:
     """Upper end of a scale for all pictures, by those grains that take part."""
     most = 0.0
     for index in {len(frames) // 3, 2 * len(frames) // 3, len(frames) - 1}:
-        values = colour_values(frames[index].grains, by)
+        values = colour_values(moved_since(frames[index].grains, frames[0].grains), by)
         taking = values[values > 0.05 * values.max()]
         most = max(most, float(np.percentile(taking, 97)) if len(taking) else 0.0)
     return nice_above(most)

@@ -14,7 +14,10 @@ from vis.spatial_film import NAME, run_spatial_job
 
 __all__ = ["ARROWS", "draw_in_space"]
 
-ARROWS = "Red arrows: the force on a spike, as long as its size; on the spring-damper without friction."
+ARROWS = (
+    "Red arrows: the force on a spike, to the scale of the weight's above the picture; on the spring-damper without "
+    "friction."
+)
 
 _MOST_FRAMES = 48
 

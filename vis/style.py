@@ -59,10 +59,14 @@ def styled() -> Iterator[None]:
         yield
 
 
-def as_it_lies(axis: Axes) -> None:
-    """One scale along and up for the ways drawn in `axis`; where no height would be left of them, it says so."""
+def as_it_lies(axis: Axes) -> bool:
+    """One scale along and up for the ways drawn in `axis`; where no height would be left of them, it says so.
+
+    Whether they are drawn in proportion.
+    """
     ways = axis.dataLim
     if ways.width <= _TOO_LONG * ways.height:
         axis.set_aspect("equal", adjustable="datalim")
-    else:
-        axis.set_title("heights stretched", fontsize=8.5, fontweight="normal", color=GREY)
+        return True
+    axis.set_title("heights stretched", fontsize=8.5, fontweight="normal", color=GREY)
+    return False

@@ -20,6 +20,7 @@ from vis.page import Block, Page, Section, Tile, code, figure, table, text, writ
 from vis.pictures import Pictures
 from vis.state_figures import by_state, draw_states, legend_of_states, panels, passages
 from vis.style import BED, GREY, INK, MODEL, styled
+from vis.tumble_beside import HEAD
 from vis.tumble_grains import grains_section
 from vis.tumble_series import STATES, read_columns, state_runs
 from vis.tumble_sweep import sweep_section
@@ -75,7 +76,8 @@ def write_tumble_report(
         swept, _ = read_columns(folder / result["sweep"]["file"])
         page = replace(page, sections=[sweep_section(result, figures, swept), *page.sections])
     if "footfalls" in result:
-        listed = [table(shown["head"], shown["rows"], title=shown["title"]) for shown in result["tables"]]
+        own = [shown for shown in result["tables"] if tuple(shown["head"]) != HEAD]
+        listed = [table(shown["head"], shown["rows"], title=shown["title"]) for shown in own]
         page = replace(page, sections=[*page.sections[:1], Section("Tumble by tumble", listed), *page.sections[1:]])
     if "grains" in result:
         tables = {name: read_columns(folder / file) for name, file in result["grains"]["series"].items()}
@@ -97,8 +99,9 @@ def _seen(drawn: Pictures) -> Section:
     blocks = [figure(one.file, title=one.title, caption=one.caption, show_file=one in film)
               for one in (*film, *drawn.stills)]  # fmt: skip
     camera = (
-        "In front of the spikes' plane the grains are left out. Red arrows: the force on a row, as long as its size; "
-        "one that would leave the picture ends at its edge, with its number."
+        "In front of the spikes' plane the grains are left out. Red arrows: the force on a row, to the scale of the "
+        "weight's above the picture; one that would leave the picture ends at its edge, with its number. The black "
+        "line from the centre to where row 0 begins shows how far the platform has turned."
     )
     return Section("Seen from near", [*blocks, text(camera, small=True), *(text(note) for note in drawn.notes)])
 
@@ -156,8 +159,9 @@ def _draw_trajectory(
         other.grid(False)
         other.spines["right"].set_visible(True)
         legend_of_states(drawing, states, more)
+    shape = " in proportion" if far >= 1e-4 else ", heights stretched"
     caption = (
-        "Left: path of the geometric centre in proportion, coloured by state, from the dot on. Right: speed of the "
+        f"Left: path of the geometric centre{shape}, coloured by state, from the dot on. Right: speed of the "
         "centre, and angular velocity (dotted)."
     )
     return "trajectory", "The path", caption, drawing
@@ -289,7 +293,8 @@ def _page(folder: Path, result: Mapping[str, Any], drawn: list[Block], moving: P
     animation = figure(
         moving,
         title="The section of the platform on its way",
-        caption=f"In real time, until the centre is {_FOLLOWED:g} m away; a spike stands for the row at its corner.",
+        caption=f"In real time, until the centre is {_FOLLOWED:g} m away; a spike stands for the row at its corner. "
+        "The dot is the centre, behind it the way it has come, both in the colour of the state of that moment.",
         half=True,
         show_file=True,
     )

@@ -23,11 +23,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from vis.arrows import FORCE, HALO, draw_force
+from vis.arrows import HALO, draw_force, draw_measure
 from vis.canvas import COLOURS, colour_values, colourmap
 from vis.frames import Frame
 from vis.jobs import draw_job, job_of
-from vis.numbers import quote
 from vis.reel import Reel
 from vis.stage import Eye, FlatStage, Stage
 from vis.state_figures import state_strip
@@ -44,6 +43,10 @@ _ARROW = 0.28
 """Length of the arrow of the whole weight, over the height of the picture from near."""
 _STEADY = 0.03
 """Over which the camera's way is smoothed (standard deviation), over the run's duration."""
+
+
+_MARK = INK
+"""Of the line that shows how far the platform has turned: forces are red."""
 
 
 @dataclass(frozen=True)
@@ -116,6 +119,12 @@ class Sheet:
                 title = str(reel.result["title"]) if len(self.reels) == 1 else self.labels[number]
                 sheet.text(left, 0.975, title, fontsize=15, fontweight="bold", va="top")
                 sheet.text(left, 0.93, reel.line(index), fontsize=13, va="top", color="#444444")
+            for panel in self.panels:
+                if panel.near:
+                    draw_measure(
+                        sheet, right=panel.place[0] + panel.place[2], height=0.915,
+                        length=_ARROW * panel.place[3] * float(sheet.get_size_inches()[1]), weight=self.weight,
+                    )  # fmt: skip
             runs = [{"t_s": reel.series["t_s"], "state": reel.states} for reel in self.reels]
             state_strip(sheet, runs, self.labels, time)
             if any(reel.frames is not None for reel in self.reels):
@@ -171,18 +180,22 @@ class Sheet:
         level = stage.place(np.array([[focus[0], reel.cut, reel.surface]]), focus)[0, 1]
         axis.plot([0.0, 1.0], [level, level], color=INK, lw=0.8, ls=(0, (5, 4)))
         self._ruler(axis, stage, panel.near)
-        self._mark(axis, stage, reel, frame, focus)
-        if panel.near:
+        if not panel.near:
+            self._mark(axis, stage, frame, focus)
+        else:
             axis.text(0.012, level + 0.012, "undisturbed surface", fontsize=9, va="bottom", bbox=HALO)
             self._arrows(axis, stage, frame, focus)
 
-    def _mark(self, axis: Any, stage: Eye, reel: Reel, frame: Frame, focus: tuple[float, float]) -> None:
-        """A line from the centre to where row 0 begins: it shows how far the platform has turned."""
+    def _mark(self, axis: Any, stage: Eye, frame: Frame, focus: tuple[float, float]) -> None:
+        """A line from the centre to where row 0 begins: it shows how far the platform has turned, and says so."""
         hull = frame.bodies["hull"][0]
         ring = hull[: len(hull) // 2]  # its face in front
         ends = stage.place(np.array([ring.mean(axis=0), ring[0]]), focus)
-        axis.plot(ends[:, 0], ends[:, 1], color="#B00020", lw=1.6, solid_capstyle="round")
-        axis.plot(ends[:1, 0], ends[:1, 1], "o", color="#B00020", ms=4)
+        axis.plot(ends[:, 0], ends[:, 1], color=_MARK, lw=1.6, solid_capstyle="round")
+        axis.plot(ends[:1, 0], ends[:1, 1], "o", color=_MARK, ms=4)
+        axis.plot([0.02, 0.06], [0.96, 0.96], color=_MARK, lw=1.6)
+        axis.plot([0.02], [0.96], "o", color=_MARK, ms=4)
+        axis.text(0.075, 0.96, "from the centre to row 0", fontsize=9, va="center", color=INK, bbox=HALO)
 
     def _ruler(self, axis: Any, stage: Eye, near: bool) -> None:
         """A length along the foot."""
@@ -193,14 +206,12 @@ class Sheet:
         axis.text(middle, 0.05, f"{1e3 * step:g} mm", ha="center", va="bottom", fontsize=10, bbox=HALO)
 
     def _arrows(self, axis: Any, stage: Eye, frame: Frame, focus: tuple[float, float]) -> None:
-        """The force on each row that touches, and the weight as a measure."""
+        """The force on each row that touches."""
         long = _ARROW * stage.height / self.weight  # [m/N]
         points, fields = frame.clouds.get("row_forces", (np.zeros((0, 3)), {}))
         for point, force in zip(points, fields.get("force", np.zeros((0, 3))), strict=True):
             ends = stage.place(np.array([point, point + long * np.asarray(force, dtype=float)]), focus)
             draw_force(axis, ends[0], ends[1], float(np.linalg.norm(force)))
-        axis.annotate("", (0.035, 0.97), (0.035, 0.97 - _ARROW), arrowprops=FORCE)
-        axis.text(0.055, 0.96, f"weight, {quote(self.weight, unit='N')}", fontsize=10, va="top", bbox=HALO)
 
     def _bar(self, sheet: Figure) -> None:
         axis = sheet.add_axes((0.925, 0.27, 0.012, 0.5))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from vis.numbers import short
 from vis.page import Section, figure, table, text
 from vis.style import BED, GREY, INK, MODEL, as_it_lies, styled
+from vis.tumble_beside import HEAD, beside_rows, beside_words
 
 __all__ = ["grains_section"]
 
@@ -51,12 +51,14 @@ def grains_section(result: Mapping[str, Any], figures: Path, tables: Mapping[str
             f" The bed is a piece of {short(grains['piece_length'], 3)} m laid end to end {repeats} times: the same "
             "grains lie in every copy."
         )
+    both = result["quantities"], grains["beside"]
     blocks = [
         figure(
             figures / "beside.png", title="Grains and spring-damper",
             caption="The same trial on the bed of grains and on the spring-damper of the same surface.",
         ),
-        table(("", "grains", "spring-damper"), _compared(result)),
+        *([] if result.get("quantities", {}).get("impact_speed") else [text(beside_words(*both))]),
+        table(HEAD, beside_rows(*both)),
         figure(
             figures / "feet.png", title="What each row feels",
             caption="Above: upward force, mean over 5 ms. Below: how deep its lowest point is under the surface.",
@@ -71,22 +73,6 @@ def grains_section(result: Mapping[str, Any], figures: Path, tables: Mapping[str
             "none by difference. Right: what is left over, of all together and of platform and exchange alone.",
         ))  # fmt: skip
     return Section("On grains, beside the spring-damper", blocks)
-
-
-def _compared(result: Mapping[str, Any]) -> list[tuple[str, ...]]:
-    """The numbers that both have."""
-    rows = []
-    for name, label, scale, unit in (
-        ("trajectory_angle", "trajectory angle", 180 / math.pi, "°"),
-        ("max_speed", "largest speed", 1.0, " m/s"),
-        ("max_angular_velocity", "largest dθ/dt", 1.0, " rad/s"),
-        ("transition_angle_slip", "slips from", 180 / math.pi, "°"),
-        ("transition_angle_hop", "hops from", 180 / math.pi, "°"),
-    ):
-        values = (result["quantities"][name]["value"], result["grains"]["beside"][name]["value"])
-        cells = ["–" if value is None else f"{short(scale * value, 3)}{unit}" for value in values]
-        rows.append((label, *cells))
-    return rows
 
 
 def _books(

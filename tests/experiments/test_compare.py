@@ -1,7 +1,9 @@
 """`hedgebed compare` and `hedgebed render`: two tumbles in one report, what is refused, pictures made again."""
 
 import json
+import os
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -36,15 +38,53 @@ def test_two_tumbles_side_by_side_have_their_differences_in_numbers_curves_and_a
     ends = [(run["x_m"] - run["x_m"][0])[np.searchsorted(run["t_s"], 0.2 - 1e-9)] for run in (one, other)]
     assert result["quantities"]["gap_x_end"]["value"] == pytest.approx(ends[1] - ends[0], rel=1e-3)
     assert 0 <= result["quantities"]["same_state"]["value"] <= 1
-    rows = {row["name"]: row for row in result["compared"]}
-    values = [json.loads((runs / name / "result.json").read_text())["quantities"] for name in ("sand", "brick")]
-    assert rows["max_speed"]["difference"] == values[1]["max_speed"]["value"] - values[0]["max_speed"]["value"]
-    assert rows["sinkage_start"]["second"] is None is rows["sinkage_start"]["difference"]
     assert {"surface", "stiffness", "mu_d", "method"} <= {row["key"] for row in result["differs"]}
     columns = read_series(out / "series" / "compared.csv")
     assert columns["t_s"][-1] == pytest.approx(0.2)
     page = (out / "report.html").read_text()
     assert page.count("data:image/png") == 5 and "They last 0.2 and 0.3 s" in page
+
+
+def test_numbers_that_go_with_how_long_a_run_lasts_are_compared_over_the_time_that_both_last(runs, tmp_path, capsys):
+    out = tmp_path / "both"
+    words = ["compare", str(runs / "sand"), str(runs / "brick"), "--no-pictures", "--out", str(out), "--quiet"]
+    assert main(words) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "Numbers over the first 0.2 s, which both last, and brick less sand" in printed
+    assert "Numbers of each run as a whole, over its own 0.2 and 0.3 s" in printed
+    result = json.loads((out / "result.json").read_text())
+    rows = {row["name"]: row for row in result["compared"]}
+    sand, brick = (json.loads((runs / name / "result.json").read_text())["quantities"] for name in ("sand", "brick"))
+    series = read_series(runs / "brick" / "trajectory.csv")
+    both = series["t_s"] <= 0.2 + 1e-9
+    speed, spin = np.hypot(series["vx_m_s"], series["vy_m_s"])[both].max(), np.abs(series["omega_rad_s"])[both].max()
+    assert result["compared_over"] == pytest.approx(0.2) and speed < brick["max_speed"]["value"]
+    for name, value in (("max_speed", speed), ("max_angular_velocity", spin)):
+        assert rows[name]["first"] == sand[name]["value"] and rows[name]["second"] == pytest.approx(value)
+        assert rows[name]["difference"] == rows[name]["second"] - rows[name]["first"]
+        assert rows[name]["second_whole"] == brick[name]["value"]
+    assert rows["energy_residual"]["over"] == "whole runs"
+
+
+def test_a_spring_damper_s_sinkage_is_its_compression_below_the_undisturbed_surface(runs, tmp_path):
+    """At rest each of two rows bears W / 2: W / (2 K) deep; an older run without the numbers is given them."""
+    result = json.loads((runs / "brick" / "result.json").read_text())
+    trial = {name: entry["value"] for name, entry in result["trial"].items()}
+    stood = result["quantities"]["sinkage_start"]["value"]
+    assert stood == pytest.approx(trial["weight"] / 2 / trial["stiffness"], rel=1e-6)
+    old = tmp_path / "old"
+    shutil.copytree(runs / "brick", old)
+    for name in ("sinkage_start", "sinkage_largest"):
+        del result["quantities"][name]
+    (old / "result.json").write_text(json.dumps(result))
+    out = tmp_path / "both"
+    assert main(["compare", str(old), str(runs / "sand"), "--no-pictures", "--out", str(out), "--quiet"]) == 0
+    found = json.loads((out / "result.json").read_text())
+    rows = {row["name"]: row for row in found["compared"]}
+    assert rows["sinkage_start"]["first"] == pytest.approx(stood) and rows["sinkage_start"]["second"] > 10 * stood
+    assert [row["row"] for row in found["rows"]] == [0, 7]
+    deepest = rows["sinkage_largest"]["second"]
+    assert max(row["second"] for row in found["rows"]) == pytest.approx(deepest)
 
 
 def test_the_loads_on_the_rows_are_the_force_that_lifts_the_platform(runs):
@@ -89,6 +129,27 @@ def test_pictures_of_a_run_are_made_again_without_opengl_too(runs, monkeypatch, 
     assert {"tumble-start.png", "tumble-half.png", "tumble-end.png", "trajectory.png"} <= set(drawn)
     page = (runs / "brick" / "report.html").read_text()
     assert "Seen from near" in page and "no OpenGL" in page
+
+
+def test_render_lists_what_it_has_drawn_and_no_film_of_before(runs, tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("HEDGEBED_NO_OPENGL", "1")
+    run = tmp_path / "run"
+    shutil.copytree(runs / "brick", run)
+    (run / "film.gif").write_bytes(b"of before")
+    os.utime(run / "film.gif", (1e9, 1e9))
+    assert main(["render", str(run), "--no-film", "--quiet"]) == 0
+    listed = [Path(line).name for line in capsys.readouterr().out.splitlines()]
+    assert "film.gif" not in listed and "tumble-end.png" in listed and "animation.gif" in listed
+
+
+def test_a_kept_result_of_a_spike_is_not_rendered_either_and_nothing_is_written_into_it(tmp_path, capsys):
+    kept = tmp_path / "penetrate"
+    shutil.copytree(Path(__file__).parents[2] / "docs" / "results" / "penetrate", kept)
+    assert main(["render", str(kept)]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "is a kept result, result.json, run.toml alone" in said
+    assert f"`hedgebed penetrate {kept / 'run.toml'}` computes it again" in said
+    assert sorted(path.name for path in kept.iterdir()) == ["result.json", "run.toml"]
 
 
 def test_what_has_no_result_is_not_rendered(tmp_path, capsys):

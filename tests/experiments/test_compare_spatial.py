@@ -11,6 +11,8 @@ from spatial_runs import CUBE, small_bed
 
 from experiments import spatial
 from experiments.cli import main
+from experiments.compare_common import numbers_until
+from experiments.compare_spatial import read_moved
 from experiments.runfolder import read_series, write_series
 from experiments.spatial_settings import SpatialSettings
 from rigid.quaternions import from_turn, multiply
@@ -150,3 +152,25 @@ def test_what_cannot_be_compared_is_refused_by_name(runs, tmp_path, capsys, othe
     assert main(["compare", str(runs / "law"), str(folder), "--out", str(tmp_path / "out")]) == 2
     assert re.search(said, " ".join(capsys.readouterr().err.split()))
     assert not (tmp_path / "out").exists()
+
+
+def test_numbers_of_a_run_in_space_until_a_time_within_it_are_those_of_its_series_until_then(runs):
+    """At the end of the run itself they are its own; at 20 ms displacement and largest values are those of then."""
+    result = json.loads((runs / "law" / "result.json").read_text())
+    own = {name: entry["value"] for name, entry in result["quantities"].items()}
+    moved = read_moved(runs / "law", result)
+    assert all(
+        numbers_until(0.03, moved, result, runs / "law")[name] == own[name] for name in ("max_speed", "tilt_end")
+    )
+    found = numbers_until(0.02, moved, result, runs / "law")
+    path = moved.series
+    until = path["t_s"] <= 0.02
+    fall = np.interp(0.02, path["t_s"], path["z_m"]) - path["z_m"][0]
+    assert found["displacement_z"] == pytest.approx(fall) and found["displacement_z"] != own["displacement_z"]
+    speed = np.sqrt(sum(path[f"v{axis}_m_s"][until] ** 2 for axis in "xyz"))
+    assert found["max_speed"] == pytest.approx(speed.max())
+    assert math.cos(found["tilt_end"]) == pytest.approx(
+        1 - 2 * float(np.interp(0.02, path["t_s"], path["q1"] ** 2 + path["q2"] ** 2)), abs=1e-6
+    )
+    touch = own["first_touch"]
+    assert found["first_touch"] == (touch if touch is not None and touch <= 0.02 else None)

@@ -228,3 +228,30 @@ def test_a_status_there_is_not_is_refused(folder):
     with pytest.raises(ValueError, match="running, stopped, failed, done"):
         folder.set_status("finished")
     assert folder.status == "running"
+
+
+def test_a_result_has_the_processor_time_of_all_its_spells_a_killed_one_until_its_last_checkpoint(folder, monkeypatch):
+    spent = [100.0]
+    monkeypatch.setattr(runfolder, "_processor_time", lambda: spent[0])
+    first = RunFolder.open(folder.path)
+    before = first.processor_time
+    spent[0] += 5.0
+    first.save_checkpoint("work", {"row": 1})
+    spent[0] += 3.0  # killed here: nobody writes that down
+    second = RunFolder.open(folder.path)
+    assert second.status == "running" and second.processor_time == pytest.approx(before + 5.0)
+    spent[0] += 2.0
+    second.set_status("stopped", "interrupted")
+    third = RunFolder.open(folder.path)
+    spent[0] += 1.0
+    third.write_result({"quantities": {}})
+    assert third.read_result() == {"quantities": {}, "processor_time": pytest.approx(before + 8.0)}
+
+
+def test_processor_time_counts_this_process_and_its_children(folder):
+    began = folder.processor_time
+    subprocess.run([sys.executable, "-c", "sum(i * i for i in range(1_500_000))"], check=True)
+    in_a_child = folder.processor_time - began
+    assert in_a_child > 0.02
+    sum(i * i for i in range(1_500_000))
+    assert folder.processor_time > began + in_a_child + 0.02

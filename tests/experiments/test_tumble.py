@@ -80,6 +80,8 @@ def test_the_quantities_are_those_of_the_trajectory():
         "tipping_torque": "N m",
         "slip_torque": "N m",
         "energy_residual": "1",
+        "sinkage_start": "m",
+        "sinkage_largest": "m",
     }
     rows = read_series(Path("a/trajectory.csv"))
     away = np.hypot(rows["x_m"] - rows["x_m"][0], rows["y_m"] - rows["y_m"][0])

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from contextlib import contextmanager
 from types import SimpleNamespace
 
@@ -10,13 +11,14 @@ import pytest
 
 from coupling import CoupledTumble, LawFooting, LeftTheBedError
 from dem import SAND, BedFailure
-from experiments import following, tumble, tumble_grains, tumble_grains_result, tumble_steppers
+from experiments import following, tumble, tumble_grains, tumble_grains_result, tumble_opening, tumble_steppers
 from experiments.cli import main
 from experiments.progress import Progress
 from experiments.runfolder import RunFolder
 from experiments.softening import Softening
 from experiments.tumble_settings import TumbleSettings
 from rigid import Trial
+from rigid.planar import simulate
 
 SMALL = {
     "surface": "sand", "ground": "bed", "mass": 0.3, "inertia": 2e-4, "spike_length": 0.04, "wheel_inertia": 1e-5,
@@ -120,6 +122,42 @@ def test_the_whole_of_a_bed_laid_end_to_end_counts_for_the_forecast():
 def test_whose_spikes_stand_in_the_sand_is_said_where_they_are_not_given(given, said):
     warning = tumble_grains._whose_spikes(on_bed(**given))
     assert warning is None if said is None else said in warning
+
+
+def test_what_was_set_is_said_first_and_defaults_are_counted_and_young_is_told():
+    settings = on_bed(rig=0.0085, torque=0.22, grain=0.004, sleep=True)
+    plan = tumble_grains._plan(settings)
+    soft = Softening(2.1e7, 1.0, 1.0, 7e10)
+    said = tumble_opening.opening(settings, plan, grains=12345.0, softening=soft, lowering_speed=0.2)
+    assert said[0].startswith("set: ") and "rig = 0.0085, torque = 0.22 N m" in said[0] and "sleep = yes" in said[0]
+    assert any(text.startswith("platform hedgehog: mass = 5.3 kg, inertia") for text in said)
+    (bed,) = (text for text in said if text.startswith("the bed: "))
+    assert "12,300 grains of 4 mm" in bed and "young = 2.1e+07 Pa (from max_overlap = 0.05; 3,333 times softer" in bed
+    assert re.match(r"\d+ more settings are at their defaults: run.toml", said[-1]) and len(said) < 12
+    assert not any("default)" in text or "None" in text for text in said)
+
+
+def test_a_duration_in_which_the_first_10_mm_are_not_gone_is_told_before_any_work():
+    """0.22 N m in the rig: on the spring-damper they take some 0.58 s, and with 0.01 N m they never come."""
+    told = {}
+    for name, given in (
+        ("short", {"duration": 0.4}), ("long", {"duration": 0.9}), ("weak", {"duration": 0.4, "torque": 0.01}),
+        ("landing", {"duration": 0.1, "drop_speed": 0.05}),
+    ):  # fmt: skip
+        settings = on_bed(rig=0.0085, bed_size=(0.4, 0.06, 0.06), **given)
+        plan = tumble_grains._plan(settings)
+        law = tumble_grains._forecast(settings, plan).trajectory
+        told[name] = tumble_opening.short_of_way(settings, plan, law)
+    assert told["long"] is None is told["landing"]
+    assert "gets 4.1 mm away within duration = 0.4 s" in told["short"]
+    wanted = float(re.search(r"duration = (\S+) s would do there", told["short"])[1])
+    assert simulate(plan_of(0.4), duration=wanted).trajectory_angle is not None
+    assert simulate(plan_of(0.4), duration=wanted - 0.02).trajectory_angle is None
+    assert "nor in 3.2 s there; a larger torque would do" in told["weak"]
+
+
+def plan_of(duration):
+    return tumble_grains._plan(on_bed(rig=0.0085, duration=duration)).trial
 
 
 def test_the_box_over_the_sand_is_as_high_as_a_brake_may_throw_it():
@@ -250,12 +288,32 @@ def test_the_result_dates_the_wheels_limit_and_warns_of_energy_made_and_of_overl
     assert any("max_wheel_speed = 1 rad/s, at 0.0096 s" in said for said in result["warnings"])
     reversal = result["quantities"]["dissipation_reversal"]["value"]
     assert any("dissipation_reversal" in said for said in result["warnings"]) == false == (reversal > 1e-3)
-    assert (
-        any("past max_overlap = 5 %, where 5 % are small: young = 8e+07 Pa" in said for said in result["warnings"])
-        == false
-    )  # F ~ E overlap^1.5
+    pressed = "past max_overlap = 5 %, where 5 % are small: young = 8e+07 Pa"  # F ~ E overlap^1.5
+    assert any(pressed in said for said in result["warnings"]) == false
     assert any("'sand': its rolling friction is a guess" in said for said in result["warnings"])
     assert "dissipated_friction" not in result["quantities"]  # a law keeps no such book
+    shown = {row[0]: row[1:] for row in result["tables"][0]["rows"]}
+    deepest = result["quantities"]["sinkage_largest"]["value"], result["grains"]["beside"]["sinkage_largest"]["value"]
+    assert deepest[0] == pytest.approx(deepest[1], rel=0.02)  # the same law, through the master and by itself
+    assert shown["sinkage of the deepest row"] == [f"{1e3 * depth:.2f} mm" for depth in deepest]
+    assert result["departures"]["sentences"][0].startswith("It does not get 10 mm away in this time, nor does it on")
+
+
+@pytest.mark.parametrize(
+    ("angles", "said"),
+    [
+        ((-24.04, 11.63), "It goes down (−24.0 degrees); on the spring-damper it would go up (+11.6 degrees)."),
+        ((20.0, 11.63), "It goes up (+20.0 degrees); on the spring-damper it goes up (+11.6 degrees)."),
+        ((-5.0, None), "It goes down (−5.0 degrees); on the spring-damper it does not get 10 mm away in this time."),
+        ((None, 90.0), "It does not get 10 mm away in this time; on the spring-damper it goes up (+90.0 degrees)."),
+        ((0.0, -0.01), "It goes level (0.0 degrees); on the spring-damper it goes level (0.0 degrees)."),
+    ],
+)
+def test_which_way_it_went_is_said_in_words_with_the_spring_damper_s(angles, said):
+    from vis.tumble_beside import beside_words
+
+    sides = [{"trajectory_angle": {"value": None if angle is None else math.radians(angle)}} for angle in angles]
+    assert beside_words(*sides) == said
 
 
 def test_a_run_on_a_bed_may_pass_the_overlap_that_its_step_is_chosen_for_up_to_twice():
@@ -374,10 +432,10 @@ def _check_report(folder, result):
     tables = {name: read_columns(folder / file) for name, file in result["grains"]["series"].items()}
     tables["motion"] = read_columns(folder / "series" / "motion.csv")
     section = grains_section(result, folder / "figures", tables)
-    assert [block.kind for block in section.blocks] == ["figure", "table", "figure", "text", "figure"]
+    assert [block.kind for block in section.blocks] == ["figure", "text", "table", "figure", "text", "figure"]
     drawn = ("beside.png", "feet.png", "books.png")
     assert all((folder / "figures" / name).stat().st_size > 5000 for name in drawn)
-    assert "rig: grains at 1 g" in section.blocks[3].text
+    assert "rig: grains at 1 g" in section.blocks[4].text
 
 
 def test_stages_of_a_bed_reach_the_laboratory_and_its_cache(monkeypatch):

@@ -8,6 +8,8 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from PIL import Image, ImageColor
 
+from vis.compare_figures import _draw_path
+from vis.diagnose_figures import _PHASES
 from vis.render import write_gif
 from vis.style import as_it_lies
 from vis.tumble_series import STATES
@@ -18,9 +20,22 @@ def test_a_way_that_would_be_a_line_is_stretched_and_says_so(length: float, aspe
     axis = Figure().subplots()
     x = np.linspace(0.0, length, 50)
     axis.plot(x, 0.025 * (1.0 + np.sin(40.0 * x)))
-    as_it_lies(axis)
+    assert as_it_lies(axis) == (title == "")
     assert axis.get_aspect() == aspect
     assert axis.get_title(loc="left") + axis.get_title() == title
+
+
+@pytest.mark.parametrize(("height", "words"), [(5e-3, "in proportion"), (1e-5, "heights stretched")])
+def test_the_caption_of_two_paths_says_of_their_shape_what_the_picture_does(height: float, words: str) -> None:
+    time = np.linspace(0.0, 1.0, 50)
+    columns = {"t_s": time}
+    for number in (1, 2):
+        columns |= {f"x_m_{number}": 0.02 * time, f"y_m_{number}": height * time**2}
+        columns |= {f"{name}_{number}": time for name in ("vx_m_s", "vy_m_s", "omega_rad_s")}
+    drawing, in_proportion = _draw_path(columns, ("one", "other"))
+    assert in_proportion == (words == "in proportion")
+    path = drawing.axes[0]
+    assert path.get_title(loc="left") + path.get_title() == ("" if in_proportion else words)
 
 
 SIGHT = {
@@ -52,6 +67,12 @@ def test_the_states_have_colours_apart_for_the_colour_blind_too_and_dark_enough_
     for one, other in combinations(seen, 2):
         assert np.linalg.norm(seen[one] - seen[other]) > 30, (one, other)
     assert max(colour[0] for colour in seen.values()) <= 70
+
+
+def test_a_diagnosis_shows_states_in_the_colours_that_they_have_everywhere_and_pushes_in_the_same():
+    assert all(_PHASES[name] == colour for name, colour in STATES.items())
+    pushed = [_PHASES[name] for name in ("free", "in", "rest", "out")]
+    assert sorted(pushed) == sorted(STATES.values())
 
 
 def test_a_film_keeps_the_colours_of_the_states_as_they_are_however_rare(tmp_path):

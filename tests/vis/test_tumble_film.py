@@ -8,6 +8,7 @@ import pytest
 from PIL import Image
 
 from vis import arrows
+from vis.canvas import moved_since
 from vis.compare import _alike
 from vis.frames import FrameWriter
 from vis.meshes import spike_mesh
@@ -79,6 +80,17 @@ def test_the_camera_follows_and_the_scale_stays_put(folder):
     sheet.draw(0.0)
     sheet.draw(1.0)
     assert sheet.norm.vmax == 2.0
+
+
+def test_displacement_counts_from_the_first_picture_whatever_the_setting_down_moved_and_however_grains_are_listed():
+    rng = np.random.default_rng(3)
+    before, moved = rng.normal(size=(6, 3)), np.arange(18.0).reshape(6, 3)
+    order = rng.permutation(6)
+    first = {"displacement": before, "id": np.arange(6)}
+    now = {"displacement": (before + moved)[order], "id": np.arange(6)[order], "radius": np.ones(6)}
+    assert moved_since(now, first)["displacement"] == pytest.approx(moved[order])
+    assert moved_since(first, first)["displacement"] == pytest.approx(np.zeros((6, 3)))
+    assert moved_since({"radius": np.ones(6)}, first).keys() == {"radius"}
 
 
 def widths_and_reach(points):
