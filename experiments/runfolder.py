@@ -375,8 +375,8 @@ class RunFolder:
     # What it holds
 
     def write_result(self, result: Mapping[str, Any]) -> None:
-        """Write result.json (see `write_json`), with the `processor_time` that it took so far [s]."""
-        write_json(self.path / "result.json", {**result, "processor_time": self.processor_time})
+        """Write result.json (see `write_json`): what the settings determine, so no times of day or of computing."""
+        write_json(self.path / "result.json", result)
 
     def read_result(self) -> dict[str, Any]:
         """The contents of result.json."""

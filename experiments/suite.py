@@ -19,7 +19,7 @@ from pathlib import Path
 
 from .reading import read_case, settings_from
 from .registry import CASES
-from .runfolder import read_json
+from .runfolder import read_json, write_json
 from .suite_cost import Cost, cost_of_tumble
 from .tumble_settings import TumbleSettings
 
@@ -122,7 +122,7 @@ def do_case(case: Case, results: Path, work: Path, *, say: Callable[[str], None]
 
 
 def keep(folder: Path, target: Path) -> None:
-    """Put the settings and the numbers of a finished run where results are kept, result.json last."""
+    """Put the settings and the numbers of a finished run where results are kept, and what it cost; result.json last."""
     target.mkdir(parents=True, exist_ok=True)
     for name in KEPT:
         source = folder / name
@@ -130,6 +130,8 @@ def keep(folder: Path, target: Path) -> None:
             _keep_thinned(source, target / name)
         elif name != "result.json":
             shutil.copyfile(source, target / name)
+    cost = json.loads((folder / "status.json").read_text(encoding="utf-8"))
+    write_json(target / "cost.json", {name: cost[name] for name in ("processor_time", "updated")})
     json.loads((folder / "result.json").read_text(encoding="utf-8"))
     shutil.copyfile(folder / "result.json", target / "result.json")
 

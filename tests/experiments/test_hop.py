@@ -358,6 +358,4 @@ def test_a_hop_is_resumed_to_the_same_numbers(tmp_path, capsys):
     (tmp_path / "run" / "result.json").unlink()
     (tmp_path / "run" / "status.json").write_text('{"status": "stopped", "reason": ""}')
     assert main(["resume", str(tmp_path / "run"), "--json", "--quiet"]) == DONE
-    again = json.loads(capsys.readouterr().out)
-    assert again.pop("processor_time") > 0 < result.pop("processor_time")
-    assert again == result
+    assert json.loads(capsys.readouterr().out) == result

@@ -89,6 +89,7 @@ def stubbed(monkeypatch, tmp_path):
         if len(calls) == 1:  # stopped the first time
             return SimpleNamespace(returncode=3)
         (folder / "result.json").write_text("{}")
+        (folder / "status.json").write_text('{"status": "done", "processor_time": 61.5, "updated": "2026-11-23"}')
         (folder / "trajectory.csv").write_text("t_s\n" + "\n".join(map(str, range(5000))) + "\n")
         return SimpleNamespace(returncode=0)
 
@@ -103,7 +104,8 @@ def test_what_has_no_result_is_done_gone_on_with_and_kept(stubbed, tmp_path, cap
     assert main(["experiments", "run", *where]) == 0
     assert calls[1][:1] == ["resume"] and len(calls) == 2  # the one of a day is left out
     kept = tmp_path / "results" / "grains1-sand-0.0085-0.22"
-    assert sorted(path.name for path in kept.iterdir()) == ["result.json", "run.toml", "trajectory.csv"]
+    assert sorted(path.name for path in kept.iterdir()) == ["cost.json", "result.json", "run.toml", "trajectory.csv"]
+    assert json.loads((kept / "cost.json").read_text()) == {"processor_time": 61.5, "updated": "2026-11-23"}
     assert len((kept / "trajectory.csv").read_text().splitlines()) == 1 + 5000 // 3 + 1
     assert main(["experiments", "run", *where]) == 0 and len(calls) == 2
     capsys.readouterr()
