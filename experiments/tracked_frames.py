@@ -8,7 +8,7 @@ import numpy as np
 
 from coupling import BedFooting, CoupledTumble, SpatialRun
 from vis.frames import FrameWriter, HeightMap, read_frames
-from vis.tracks import height_map
+from vis.tracks import height_map, lying
 
 __all__ = ["NAME", "TrackedFrames"]
 
@@ -38,7 +38,7 @@ class TrackedFrames:
         size = footing.bed.size
         found = height_map(
             grains["position"], grains["radius"], (float(size[0]), float(size[1])), spacing=self._spacing,
-            coordination=grains["coordination"],
+            lies=lying(grains["position"], grains["radius"]),
         )  # fmt: skip
         if self._untouched is None:
             self._untouched = found

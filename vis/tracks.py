@@ -4,10 +4,46 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from vis.frames import HeightMap
 
-__all__ = ["height_map"]
+__all__ = ["height_map", "lying"]
+
+NEAR = 1.1
+"""Centres this near, over the sum of the radii, are of one heap [1]: grains that hop by less still lie."""
+
+
+def lying(position: ArrayLike, radius: ArrayLike) -> NDArray[np.bool_]:
+    """Which grains belong to the bed, and not to what flies over it or hangs on a spike.
+
+    The lower three quarters of the grains do; above them those that a chain of neighbours, a tenth of a diameter apart at most, joins to these.
+
+    Args:
+        position: Centres of the grains [m], shape (n, 3). radius: Their radii [m], shape (n,).
+
+    Returns:
+        shape (n,).
+    """
+    centres, radii = np.asarray(position, dtype=float), np.asarray(radius, dtype=float)
+    found = np.ones(len(radii), dtype=bool)
+    if not len(radii):
+        return found
+    height = centres[:, 2]
+    cut = np.quantile(height, 0.75)
+    upper = np.flatnonzero(height >= cut - 2 * NEAR * radii.max())  # with a layer of those that lie anyway
+    near = cKDTree(centres[upper]).query_pairs(2 * NEAR * radii.max(), output_type="ndarray")
+    one, other = upper[near[:, 0]], upper[near[:, 1]]
+    away = np.linalg.norm(centres[one] - centres[other], axis=1)
+    near = near[away <= NEAR * (radii[one] + radii[other])]
+    graph = coo_array((np.ones(len(near)), (near[:, 0], near[:, 1])), shape=(len(upper), len(upper)))
+    count, group = connected_components(graph, directed=False)
+    joined = np.zeros(count, dtype=bool)
+    joined[group[height[upper] < cut]] = True
+    found[upper] = joined[group] | (height[upper] < cut)
+    return found
 
 
 def height_map(
@@ -16,7 +52,7 @@ def height_map(
     size: tuple[float, float],
     *,
     spacing: float,
-    coordination: ArrayLike | None = None,
+    lies: ArrayLike | None = None,
 ) -> HeightMap:
     """Height of the grains' tops over a grid on a bed that is periodic along x and y.
 
@@ -25,7 +61,7 @@ def height_map(
         radius: Their radii [m], shape (n,).
         size: Length of the bed along x and y [m]; the grid covers it once.
         spacing: Wanted between the points [m]; as near to it as divides the bed.
-        coordination: Contacts of each grain; grains in flight (none) are left out.
+        lies: Which of them count, shape (n,), as `lying` tells; all when None.
 
     Returns:
         A map with `height` [m]: z of the highest point of a sphere over each point of the grid, 0 (the floor) where
@@ -37,9 +73,9 @@ def height_map(
     if not spacing > 0:
         raise ValueError(f"spacing is {spacing!r}; it must be above 0 (in m)")
     centres, radii = np.asarray(position, dtype=float), np.asarray(radius, dtype=float)
-    if coordination is not None:
-        lies = np.asarray(coordination) > 0
-        centres, radii = centres[lies], radii[lies]
+    if lies is not None:
+        kept = np.asarray(lies, dtype=bool)
+        centres, radii = centres[kept], radii[kept]
     counts = np.maximum(1, np.round(np.array(size) / spacing).astype(int))
     step = np.array(size) / counts
     height = np.zeros(counts[1] * counts[0])

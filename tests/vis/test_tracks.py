@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from vis.frames import FrameWriter, HeightMap, read_frames
-from vis.tracks import height_map
+from vis.tracks import height_map, lying
 
 
 def test_a_height_map_is_the_upper_side_of_the_spheres_also_across_the_bed_s_ends():
-    """Over a sphere z = z_c + sqrt(r^2 - d^2); one at x = 0 shows at both ends, one in flight not at all."""
+    """Over a sphere z = z_c + sqrt(r^2 - d^2); one at x = 0 shows at both ends, one left out not at all."""
     radius = 3e-3
     at = np.array([[0.0, 0.01, 0.004], [0.02, 0.01, 0.005], [0.03, 0.01, 0.5]])
-    found = height_map(at, np.full(3, radius), (0.04, 0.02), spacing=5e-4, coordination=[1, 2, 0])
+    found = height_map(at, np.full(3, radius), (0.04, 0.02), spacing=5e-4, lies=[True, True, False])
     height = found.fields["height"]
     assert height.shape == (40, 80) and found.spacing == pytest.approx((5e-4, 5e-4))
     x = found.origin[0] + found.spacing[0] * np.arange(80)
@@ -25,6 +25,17 @@ def test_a_height_map_is_the_upper_side_of_the_spheres_also_across_the_bed_s_end
     assert height == pytest.approx(expected, abs=1e-12)
     covered = np.count_nonzero(height) * 5e-4**2
     assert covered == pytest.approx(2 * math.pi * radius**2, rel=0.03)
+
+
+def test_what_hangs_on_a_spike_or_flies_is_no_part_of_the_surface_and_a_heap_is():
+    """A cubic bed, 5 x 5 x 4; two grains on top of one another in the middle, and two that touch high above."""
+    r, apart = 1e-3, 1.999e-3
+    bed = apart * (np.stack(np.meshgrid(*map(np.arange, (5, 5, 4)), indexing="ij"), axis=-1).reshape(-1, 3) + 0.5)
+    x, y, z = bed[bed[:, 2] == bed[:, 2].max()][12]
+    heap, aloft = [[x, y, z + apart], [x, y, z + 2 * apart]], [[x, y, 0.05], [x + apart, y, 0.05]]
+    found = lying(np.vstack([bed, heap, aloft]), np.full(104, r))
+    assert found.tolist() == [True] * 102 + [False] * 2
+    assert lying(np.empty((0, 3)), []).shape == (0,)
 
 
 def test_frames_keep_forces_and_the_surface_and_paraview_s_reader_finds_them(tmp_path):
