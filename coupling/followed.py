@@ -17,8 +17,8 @@ __all__ = ["AT_REST", "REST_TIME", "Followed"]
 AT_REST = 0.005
 """What a platform at rest may still lack of its weight, and its mean speed over the lowering speed [1]."""
 SWINGS = math.sqrt(AT_REST)
-"""What it may swing about that mean (standard deviation), over weight and lowering speed [1]: what comes to rest from
-one side, never beyond the whole of them, swings less once its mean is at rest; what bounces in the hand does not."""
+"""Root of the mean square of the same in the last quarter of the time, at most [1]: what comes to rest from one side
+has less once its mean is at rest; what bounces in the hand does not."""
 FIRMER = 4.0
 """By how much the hand holds what swings more firmly [1]."""
 REST_TIME = 0.04
@@ -117,10 +117,13 @@ class Followed(Books):
         if mean is not None:
             scale = np.array([self._weight] * len(lacking) + [self.lowering_speed] * len(moving))
             rests = bool(reaction.contacts) and bool((mean <= AT_REST * scale).all())
-            swings = bool((np.std(self._settling, axis=0) > SWINGS * scale).any())
-            if rests and not swings:
+            late = self._settling[-max(2, len(self._settling) // 4) :]
+            calm = bool((np.sqrt(np.mean(np.square(late), axis=0)) <= SWINGS * scale).all())
+            if rests and calm:
                 self._lies()
-            elif swings and (rests or self.body.time > 0.5 * longest):
+            elif rests or (
+                self.body.time > 0.5 * longest and bool((np.std(self._settling, axis=0) > SWINGS * scale).any())
+            ):
                 self.body.hold_more_firmly(FIRMER)
                 self._settling = []
         if self.body.time > longest:  # 0 once it is let go
