@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -15,6 +16,11 @@ __all__ = ["AT_REST", "REST_TIME", "Followed"]
 
 AT_REST = 0.005
 """What a platform at rest may still lack of its weight, and its mean speed over the lowering speed [1]."""
+SWINGS = math.sqrt(AT_REST)
+"""Root of the mean square of the same in the last quarter of the time, at most [1]: what comes to rest from one side
+has less once its mean is at rest; what bounces in the hand does not."""
+FIRMER = 4.0
+"""By how much the hand holds what swings more firmly [1]."""
 REST_TIME = 0.04
 """For how long the signs of rest must hold [s]."""
 PLACING_WAY = 0.02
@@ -102,14 +108,24 @@ class Followed(Books):
 
     def _settle(self, reaction: FootReaction, lacking: Vector, moving: Vector) -> None:
         """A step in the hand: what of the weight the ground does not carry yet [N], and the speeds [m/s]. At rest the
-        hand lets go. Raises RuntimeError where that takes too long."""
+        hand lets go. What bounces in the hand (a light body, whose hand is light against the contacts' stiffness), so
+        that it rests on the mean alone or not for half the time there is, is held more firmly. Raises RuntimeError
+        where it takes too long."""
         assert self.lowering_speed is not None
         mean = self._mean_of_late(lacking, moving)
-        if mean is not None and reaction.contacts:
-            near = mean[: len(lacking)].max() <= AT_REST * self._weight
-            if near and mean[len(lacking) :].max() <= AT_REST * self.lowering_speed:
-                self._lies()
         longest = self.pace * LONGEST_PLACING
+        if mean is not None:
+            scale = np.array([self._weight] * len(lacking) + [self.lowering_speed] * len(moving))
+            rests = bool(reaction.contacts) and bool((mean <= AT_REST * scale).all())
+            late = self._settling[-max(2, len(self._settling) // 4) :]
+            calm = bool((np.sqrt(np.mean(np.square(late), axis=0)) <= SWINGS * scale).all())
+            if rests and calm:
+                self._lies()
+            elif rests or (
+                self.body.time > 0.5 * longest and bool((np.std(self._settling, axis=0) > SWINGS * scale).any())
+            ):
+                self.body.hold_more_firmly(FIRMER)
+                self._settling = []
         if self.body.time > longest:  # 0 once it is let go
             raise RuntimeError(
                 f"the platform did not come to rest within {longest:.3g} s of being set down: the ground carried "

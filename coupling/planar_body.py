@@ -85,6 +85,10 @@ class PlanarBody:
         self.inertia, self._drag = hand_time(step, pace) * drag * scale, drag * scale
         self.held_by_hand = True
 
+    def hold_more_firmly(self, factor: float) -> None:
+        """The hand's drag, and the mass that it leaves, times `factor`: slower by that, and as little apt to bounce."""
+        self.inertia, self._drag = factor * self.inertia, factor * self._drag
+
     def let_go(self) -> None:
         """The hand opens: at rest from here, its time is 0 and the torque begins."""
         self._let_go()

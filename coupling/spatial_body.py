@@ -109,6 +109,13 @@ class SpatialBody:
         self.held_by_hand = True
         self.momentum, self.angular_momentum = self._masses * velocity, self._spin_to_momentum(spin)
 
+    def hold_more_firmly(self, factor: float) -> None:
+        """As `PlanarBody.hold_more_firmly`."""
+        wheels = self._wheels_at(self.wheels, self.turn)
+        self._masses, self._inertia, self._drag = (factor * held for held in (self._masses, self._inertia, self._drag))
+        self.momentum = factor * self.momentum
+        self.angular_momentum = wheels + factor * (self.angular_momentum - wheels)
+
     def let_go(self) -> None:
         """The hand opens: at rest from here, its time is 0 and the torques begin."""
         self._let_go()

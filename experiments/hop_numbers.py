@@ -14,6 +14,7 @@ from rigid.platform_files import find_platform
 from rigid.trial import Trial
 
 from .hop_settings import DEFAULT_DISTANCE, HopSettings
+from .lengths import check_spike_length
 from .settled import (
     Number,
     Settled,
@@ -21,6 +22,7 @@ from .settled import (
     check_actuation,
     check_body,
     defaults_said,
+    of_other_spikes,
     settle_limits,
     settle_platform,
     settle_surface,
@@ -79,6 +81,7 @@ def plan_hop(settings: HopSettings) -> HopPlan:
         if getattr(settings, name) is not None:
             numbers.settle(name, math.nan, "given")
     settle_platform(numbers, of_platform)
+    check_spike_length(numbers)
     numbers.settle("lean", of_platform.lean, f"platform {of_platform.name}")
     settle_limits(numbers, of_platform)
     own, brake = platform.wheel(), brake_words(of_platform)
@@ -87,6 +90,8 @@ def plan_hop(settings: HopSettings) -> HopPlan:
     elif settings.torque is not None:
         numbers.settle("torque", settings.torque, "given")
     surface, warnings = settle_surface(numbers, settings.surface)
+    whose = f"platform {of_platform.name}"
+    warnings += of_other_spikes(numbers, surface, diameter=of_platform.spike_diameter, whose=whose)
     wheel = replace(
         own, inertia=numbers.value("wheel_inertia"), max_speed=numbers.value("max_wheel_speed"),
         motor_torque=numbers.value("max_motor_torque"),

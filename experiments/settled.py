@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from rigid.rig import STANDARD_GRAVITY
+
 from .surfaces import DEFAULT_SURFACE, find_surface
 from .tumble_platform import PlatformNumbers
 
@@ -22,6 +24,8 @@ __all__ = [
     "check_body",
     "check_wheel_speed",
     "defaults_said",
+    "of_other_spikes",
+    "rig_fault",
     "settle_limits",
     "settle_platform",
     "settle_surface",
@@ -165,6 +169,33 @@ def settle_surface(numbers: Settled, surface: str | None, *, model: Any = None) 
     if mu_d.value > mu_s.value:
         raise ValueError(f"mu_d = {mu_d.value:g} is above mu_s = {mu_s.value:g} ({mu_s.origin}): at most that would do")
     return name, warnings
+
+
+def of_other_spikes(numbers: Mapping[str, Number], surface: str, *, diameter: float, whose: str) -> list[str]:
+    """What has to be said where K or C is the surface's and was found with other spikes than these [m]; 0: none."""
+    taken = [name for name in ("stiffness", "damping") if numbers[name].origin.startswith("surface ")]
+    own = find_surface(surface).spike if taken else None
+    if own is None or math.isclose(diameter, own, rel_tol=1e-6):
+        return []
+    found = f"are {1e3 * diameter:.4g} mm thick" if diameter > 0 else "there are none"
+    return [
+        f"{' and '.join(taken)} of {surface} are those of spikes {1e3 * own:g} mm thick with ball tips, and of {whose} "
+        f"they {found}: K and C go with the spike, so give {' and '.join(taken)} of this one (`hedgebed penetrate` "
+        f"finds them)"
+    ]
+
+
+def rig_fault(stated: float, local: float = STANDARD_GRAVITY) -> str | None:
+    """That a rig leaves more than the local gravity [m/s2], in words; `stated` is in units of 9.80665 m/s2."""
+    here = local / STANDARD_GRAVITY
+    if stated < here:
+        return None
+    meant = stated / STANDARD_GRAVITY
+    asked = f" ({stated:g} m/s2 are {meant:.3g} g)" if meant < here else ""
+    return (
+        f"rig = {stated:g} g is not below the local gravity, {here:.6g} g (g: 9.80665 m/s2): a rig can only take "
+        f"weight away, so less would do{asked}, or gravity in place of rig"
+    )
 
 
 def check_actuation(

@@ -23,6 +23,7 @@ from rigid.rig import STANDARD_GRAVITY
 from .bed_box import carried_height
 from .bed_progress import BedProgress
 from .following import follow
+from .lengths import check_lengths
 from .progress import Progress
 from .reporting import write_report
 from .runfolder import RunFolder
@@ -64,6 +65,7 @@ def check(settings: SpatialSettings) -> None:
     """Raise ValueError, naming key, value and what would do, for what the settings class cannot see."""
     plan = plan_spatial(settings)
     if settings.ground == "bed":
+        check_lengths(settings, plan.trial.platform.stance().spike_length)
         material = _material(plan)
         spatial_members(plan.trial.platform)
         check_where(arch=settings.arch, threads=settings.threads)

@@ -13,7 +13,8 @@ from rigid.platform_files import find_platform
 from rigid.rig import STANDARD_GRAVITY, Rig
 from rigid.spatial import SpatialTrial
 
-from .settled import Number, defaults_said
+from .lengths import check_spike_length
+from .settled import Number, defaults_said, of_other_spikes, rig_fault
 from .spatial_settings import ZERO, SpatialSettings
 from .surfaces import DEFAULT_SURFACE, find_surface
 
@@ -47,6 +48,9 @@ def plan_spatial(settings: SpatialSettings) -> SpatialPlan:
     """
     platform = find_platform(settings.platform)
     surface = find_surface(settings.surface or DEFAULT_SURFACE)
+    length = Number(platform.stance().spike_length, "m", f"platform {settings.platform}")
+    moment = Number(platform.moment(), "kg m2", length.origin)
+    check_spike_length({"mass": Number(platform.mass, "kg", ""), "inertia": moment, "spike_length": length})
     own, half = f"surface {surface.name}", f"surface {surface.name}, a row's halved"
     numbers: dict[str, Number] = {"mass": Number(platform.mass, "kg", f"platform {settings.platform}")}
 
@@ -71,6 +75,8 @@ def plan_spatial(settings: SpatialSettings) -> SpatialPlan:
         torque_in_flight=settings.torque_in_flight,
     )  # fmt: skip
     warnings = [f"stiffness, damping and friction of {surface.name} are {surface.source}"] if surface.guess else []
+    whose = f"platform {settings.platform}"
+    warnings += of_other_spikes(numbers, surface.name, diameter=2 * platform.tip_radius, whose=whose)
     return SpatialPlan(trial, numbers, surface.name, _choices(settings, surface.name), tuple(warnings))
 
 
@@ -80,11 +86,8 @@ def _settle_gravity(settings: SpatialSettings, platform: Platform, numbers: dict
         numbers["gravity_sim"] = Number(settings.gravity, "m/s2", "given")
         return settings.gravity, 0.0
     stated = settings.rig if settings.rig is not None else DEFAULT_RIG
-    if stated >= 1:
-        raise ValueError(
-            f"rig = {stated:g} (of 9.80665 m/s2) is not below the local gravity: a rig can only take weight away, so "
-            f"less would do, or gravity in place of rig"
-        )
+    if fault := rig_fault(stated):
+        raise ValueError(fault)
     rig = Rig.offloading(platform.mass, stated * STANDARD_GRAVITY, reading=settings.rig_reading)
     read = f"rig = {stated:g}{'' if settings.rig is not None else ' by default'}, read as {settings.rig_reading}"
     numbers["gravity_sim"] = Number(rig.gravity_sim, "m/s2", read)

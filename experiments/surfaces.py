@@ -36,6 +36,8 @@ class Surface:
     """The material of `dem` whose grains a bed of it is made of."""
     packing: float | None = None
     """Packing fraction of the samples that those grains were calibrated with [1]; None: of no certain one."""
+    spike: float | None = None
+    """Diameter of the spikes with ball tips that K and C are of [m]; None: of no certain ones."""
     guess: bool = False
     """Whether nothing but judgement stands behind the numbers."""
 

@@ -21,6 +21,10 @@ OF_THE_MASTER = (
 """Those that ``method = "coupled"`` takes on the spring-damper too."""
 
 
+_ONCE = {"spike_diameter": 0.012, "spike_clear": 0.04}
+"""Defaults until 2026-11-23, which every run.toml of before has, on the spring-damper too."""
+
+
 class GrainsSettings(StrictSettings):
     """What a bed of grains under any platform is made of, and how it is coupled; SI units."""
 
@@ -120,8 +124,16 @@ class TumbleBedSettings(GrainsSettings):
         description="On a bed: how far along it from its middle the platform is set down [m]; the bed goes on "
         "periodically, so other grains lie there.",
     )
-    spike_diameter: Positive = Field(0.012, description="On a bed: diameter of shaft and ball tip of a spike [m].")
-    spike_clear: Positive = Field(0.04, description="On a bed: how far a spike stands out of the hull [m].")
+    spike_diameter: Positive | None = Field(
+        None,
+        description="On a bed: diameter of shaft and ball tip of a spike [m]; the platform's if not given (hedgehog: "
+        "0.012).",
+    )
+    spike_clear: Positive | None = Field(
+        None,
+        description="On a bed: how far a spike stands out of the hull [m]; the platform's if not given (hedgehog: "
+        "0.04).",
+    )
     settle_gravity: Positive | None = Field(
         None,
         description="On a bed, in flight: gravity under which the bed is rained and the platform set down, lowered to "
@@ -149,6 +161,10 @@ class TumbleBedSettings(GrainsSettings):
         return self.bed_repeats * self.bed_size[0]
 
     def bed_settings_given(self) -> list[str]:
-        """Names of those of these settings that are not at their defaults."""
+        """Names of those of these settings that are not at their defaults, and not at those that run.toml once had."""
         fields = TumbleBedSettings.model_fields
-        return [name for name, field in fields.items() if getattr(self, name) != field.default]
+        return [
+            name
+            for name, field in fields.items()
+            if getattr(self, name) != field.default and getattr(self, name) != _ONCE.get(name)
+        ]

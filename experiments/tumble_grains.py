@@ -26,6 +26,7 @@ from .bed_graded import graded_under
 from .bed_progress import BedProgress
 from .bed_staged import check_bed_stages, packing_warning, staged_bed
 from .following import CHECKPOINT, follow
+from .lengths import check_lengths
 from .progress import Progress
 from .reporting import write_report
 from .runfolder import RunFolder
@@ -38,7 +39,7 @@ from .tumble_flight import lies_in_flight
 from .tumble_grains_frames import TumbleFrames
 from .tumble_grains_result import conclude, sinkage_start, write_trajectory
 from .tumble_opening import opening, short_of_way
-from .tumble_platform import torque_within_limit
+from .tumble_platform import platform_numbers, spikes_of, torque_within_limit
 from .tumble_settings import TumbleSettings
 from .tumble_steppers import is_plain, stepper_of
 from .tumble_trial import TumblePlan, plan_tumble
@@ -141,7 +142,11 @@ def tumble_on_grains(settings: TumbleSettings, folder: RunFolder, progress: Prog
 
 def _plan(settings: TumbleSettings) -> TumblePlan:
     """The numbers of the trial: those of the spring-damper, of which grains take all but K, C and friction."""
-    return plan_tumble(_beside(settings))
+    spikes = spikes_of(settings)
+    plan = plan_tumble(_beside(settings), spike_diameter=spikes.diameter)
+    own = {"spike_diameter": spikes.diameter, "spike_clear": spikes.clear}
+    check_lengths(settings, plan.trial.spike_length, **own)
+    return plan
 
 
 def _beside(settings: TumbleSettings) -> TumbleSettings:
@@ -194,7 +199,7 @@ def _forecast(settings: TumbleSettings, plan: TumblePlan) -> Forecast:
     angles = tip_angles(trial, found.theta)
     tips_x = found.x[:, None] - trial.spike_length * np.sin(angles)
     depth = trial.spike_length * np.cos(angles) - found.y[:, None]
-    near = depth > -0.5 * settings.spike_diameter
+    near = depth > -0.5 * spikes_of(settings).diameter
     speed = np.hypot(
         found.vx[:, None] - found.omega[:, None] * trial.spike_length * np.cos(angles),
         found.vy[:, None] + found.omega[:, None] * trial.spike_length * np.sin(angles),
@@ -259,7 +264,7 @@ def _thrown(settings: TumbleSettings, plan: TumblePlan, forecast: Forecast) -> f
 
 
 def _check_bed(settings: TumbleSettings, forecast: Forecast, material: Material) -> None:
-    spike, (piece, width, depth) = settings.spike_diameter, settings.bed_size
+    spike, (piece, width, depth) = spikes_of(settings).diameter, settings.bed_size
     length, repeats = settings.bed_length, settings.bed_repeats
     margin = MARGIN * spike
     need = forecast.ahead - forecast.behind + 2 * margin
@@ -320,25 +325,23 @@ def _length_on_grains(forecast: Forecast, margin: float) -> float:
 
 
 def _whose_spikes(settings: TumbleSettings) -> str | None:
-    """That another platform's spikes were not said, in words."""
-    default = TumbleSettings.model_fields["platform"].default
-    other = [name for name in ("spike_length", "platform") if getattr(settings, name) not in (None, default)]
-    lacking = [name for name in ("spike_diameter", "spike_clear") if name not in settings.model_fields_set]
-    if not other or not lacking:
+    """That a body of another size than the platform's stands on the platform's spikes, in words."""
+    spikes, own = spikes_of(settings), platform_numbers(settings.platform).spike_length
+    if not spikes.of_platform or settings.spike_length is None or math.isclose(settings.spike_length, own):
         return None
     return (
-        f"{other[0]} = {getattr(settings, other[0])} is given and {' and '.join(lacking)} not: spikes are "
-        f"{1e3 * settings.spike_diameter:g} mm thick and stand {1e3 * settings.spike_clear:g} mm clear of the hull, as "
-        f"the Hedgehog's; a planar run on grains does not take them from a platform's file"
+        f"spike_length = {settings.spike_length:g} is given and {' and '.join(spikes.of_platform)} not: spikes are "
+        f"{1e3 * spikes.diameter:g} mm thick and stand {1e3 * spikes.clear:g} mm clear of the hull, where those of "
+        f"platform {settings.platform} are {1e3 * own:.4g} mm from its centre to their tips"
     )
 
 
 def _may_leave(settings: TumbleSettings, forecast: Forecast) -> str | None:
     """That tips may come down beyond the bed before the end, in words; None where they cannot."""
-    ahead = settings.bed_length - _origin(settings, forecast)
-    if ahead >= forecast.farthest + 0.5 * settings.spike_diameter:
+    ahead, spike = settings.bed_length - _origin(settings, forecast), spikes_of(settings).diameter
+    if ahead >= forecast.farthest + 0.5 * spike:
         return None
-    long = _length_on_grains(forecast, MARGIN * settings.spike_diameter) + 2 * abs(settings.place)
+    long = _length_on_grains(forecast, MARGIN * spike) + 2 * abs(settings.place)
     longer = f"bed_size = {math.ceil(100 * long) / 100:g} m along it"
     if settings.coarse is None:
         longer += f", bed_repeats = {math.ceil(long / settings.bed_size[0])}"
@@ -368,10 +371,11 @@ def _graded(settings: TumbleSettings, forecast: Forecast) -> Graded | None:
     """Fine grains where the forecast's tips come down, two spikes' diameters deeper than they go; None: one size."""
     if settings.coarse is None:
         return None
+    spike = spikes_of(settings).diameter
     return graded_under(
         forecast.trajectory, length=settings.bed_size[0], origin=_origin(settings, forecast),
-        spike_diameter=settings.spike_diameter, grain=settings.grain, spread=settings.spread, coarse=settings.coarse,
-        depth=min(settings.bed_size[2], forecast.deepest + 2 * settings.spike_diameter),
+        spike_diameter=spike, grain=settings.grain, spread=settings.spread, coarse=settings.coarse,
+        depth=min(settings.bed_size[2], forecast.deepest + 2 * spike),
     )  # fmt: skip
 
 
@@ -387,7 +391,7 @@ def _softness(settings: TumbleSettings, plan: TumblePlan, forecast: Forecast) ->
         bed_height=settings.bed_size[2],
         depth=forecast.margin * forecast.deepest,
         speed=max(forecast.margin * forecast.fastest, _lowering_speed(settings, plan)),
-        pressure=plan.trial.weight / COPIES / (0.25 * math.pi * settings.spike_diameter**2),
+        pressure=plan.trial.weight / COPIES / (0.25 * math.pi * spikes_of(settings).diameter ** 2),
         fall=RAIN * settings.bed_size[2],
     )
 
@@ -417,7 +421,7 @@ def _prepare(
 
 
 def _repeated_told(settings: TumbleSettings, forecast: Forecast, bed: Bed) -> str:
-    piece, way = settings.bed_size[0], forecast.ahead - forecast.behind + settings.spike_diameter
+    piece, way = settings.bed_size[0], forecast.ahead - forecast.behind + spikes_of(settings).diameter
     said = f"bed laid end to end {settings.bed_repeats} times: {bed.grain_count} grains, the same every {piece:g} m"
     if way <= piece:
         return said
@@ -425,16 +429,16 @@ def _repeated_told(settings: TumbleSettings, forecast: Forecast, bed: Bed) -> st
 
 
 def _members(settings: TumbleSettings, plan: TumblePlan) -> list[Any]:
-    trial = plan.trial
+    trial, spikes = plan.trial, spikes_of(settings)
     return platform_members(
-        spike_length=trial.spike_length, count=trial.spike_count, diameter=settings.spike_diameter,
-        clear=settings.spike_clear, hull_radius=_hull_radius(settings, trial), width=settings.bed_size[1],
+        spike_length=trial.spike_length, count=trial.spike_count, diameter=spikes.diameter, clear=spikes.clear,
+        hull_radius=_hull_radius(settings, trial), width=settings.bed_size[1],
     )  # fmt: skip
 
 
 def _hull_radius(settings: TumbleSettings, trial: Trial) -> float:
     """Of the cylinder that stands for the hull [m]."""
-    sides = (trial.spike_length - settings.spike_clear) * math.cos(math.pi / trial.spike_count)
+    sides = (trial.spike_length - spikes_of(settings).clear) * math.cos(math.pi / trial.spike_count)
     return HULL_SHARE * max(sides, 0.0)
 
 
@@ -453,7 +457,7 @@ def _stepper(settings: TumbleSettings, plan: TumblePlan, bed: Bed, forecast: For
     return stepper_of(
         settings, plan.trial, footing, **lowered, duration=settings.duration, substeps=settings.substeps,
         body_steps=settings.body_steps, extrapolation=settings.extrapolation, iterations=settings.iterations,
-        tip_radius=0.5 * settings.spike_diameter, lowering_speed=_lowering_speed(settings, plan),
+        tip_radius=0.5 * spikes_of(settings).diameter, lowering_speed=_lowering_speed(settings, plan),
         max_wheel_speed=plan.max_wheel_speed,
     )  # fmt: skip
 

@@ -18,6 +18,7 @@ from .bed_graded import coarsest_touched, tips_in_ground
 from .runfolder import RunFolder, write_series
 from .softening import Softening
 from .surfaces import find_surface
+from .tumble_platform import spikes_of
 from .tumble_settings import TumbleSettings
 from .tumble_steppers import own_quantities, own_warning, words
 from .tumble_trial import TumblePlan
@@ -69,6 +70,7 @@ def conclude(
     write_series(folder.path / "series" / "spring-damper.csv", trajectory_columns(beside))
     result = result_of(settings, plan, series, run.body.wheel_at_limit)
     bed, books = run.footing.bed, run.master.books  # type: ignore[attr-defined]
+    spikes = spikes_of(settings)
     result["title"] = words(settings, f"A tumble on a bed of {plan.surface}: {result['title'].partition(': ')[2]}")
     result["code"] = fingerprint()
     added, tables = own_quantities(run, run.feet[:, 3], run.feet[:, 0])
@@ -98,7 +100,7 @@ def conclude(
         "time_step": float(bed.time_step), "macro_step": run.master.macro_step,
         "max_overlap": float(bed.max_overlap), "seed": settings.seed, "arch": settings.arch, "steps": run.master.count,
         "repeats": settings.bed_repeats, "piece_length": settings.bed_size[0],
-        "spike_diameter": settings.spike_diameter, "spike_clear": settings.spike_clear,
+        "spike_diameter": spikes.diameter, "spike_clear": spikes.clear,
         **_grain_steps(settings, run), "worst_guess": books.worst_guess, "largest_force": books.largest_force,
         "beside": next_to,
         "beside_transitions": [
@@ -125,7 +127,7 @@ def conclude(
                 f"tips were in grains of {1e3 * coarsest:.3g} mm, beyond the spring-damper's footprints, under which "
                 f"they have {1e3 * settings.grain:.3g} mm"
             )
-    across = settings.spike_diameter / coarsest
+    across = spikes.diameter / coarsest
     if across < 10:
         result["warnings"].append(
             f"a spike is {across:.2g} grains across: 10 are wanted for a number to be quoted, 5 for a quick look"
@@ -157,7 +159,7 @@ def _same_sand_again(settings: TumbleSettings, run: CoupledTumble) -> str | None
     """Where the platform's way on a bed of copies is longer than one of them, in words."""
     if settings.bed_repeats == 1:
         return None
-    piece, spike = settings.bed_size[0], settings.spike_diameter
+    piece, spike = settings.bed_size[0], spikes_of(settings).diameter
     x, _ = tips_in_ground(run)
     way = float(np.ptp(x)) + spike if len(x) else 0.0
     if way <= piece:

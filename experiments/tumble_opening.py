@@ -12,7 +12,7 @@ from rigid.planar import simulate
 from rigid.trajectory import LAUNCH_DISTANCE, Trajectory
 
 from .softening import Softening
-from .tumble_platform import torque_within_limit
+from .tumble_platform import spikes_of, torque_within_limit
 from .tumble_settings import TumbleSettings
 from .tumble_steppers import is_plain
 
@@ -42,6 +42,11 @@ def opening(
             continue
         told.add(name)
         numbers.setdefault(number.origin, []).append(f"{name} = {number.value:.6g}{_unit(number.unit)}")
+    spikes = spikes_of(settings)
+    for name, length in (("spike_diameter", spikes.diameter), ("spike_clear", spikes.clear)):
+        if name in spikes.of_platform:
+            told.add(name)
+            numbers.setdefault(f"platform {settings.platform}", []).append(f"{name} = {length:.6g} m")
     said += [f"{listed[0]} ({origin})" if len(listed) == 1 else f"{origin}: {', '.join(listed)}"
              for origin, listed in numbers.items()]  # fmt: skip
     long, wide, deep = settings.bed_length, *settings.bed_size[1:]

@@ -18,7 +18,9 @@ from rigid.platform_files import find_platform
 from rigid.trajectory import Trajectory
 from rigid.trial import Trial
 
-__all__ = ["PlatformNumbers", "platform_numbers", "torque_within_limit"]
+from .tumble_settings import TumbleSettings
+
+__all__ = ["PlatformNumbers", "Spikes", "platform_numbers", "spikes_of", "torque_within_limit"]
 
 SPIKE_LENGTHS = {"hedgehog": 0.2}
 """l [m] where the paper gives it: its octagon is 0.4 m across, and the edge of 0.153 m is rounded."""
@@ -40,6 +42,10 @@ class PlatformNumbers:
     motor_torque: float
     brake_torque: float
     max_wheel_speed: float
+    spike_diameter: float
+    """Of shafts and ball tips [m]; 0 where it has no spikes."""
+    spike_clear: float
+    """How far a spike stands out of the hull, along itself [m]; 0 where it has none."""
 
     @property
     def max_motor_torque(self) -> float:
@@ -72,7 +78,41 @@ def platform_numbers(name: str, *, in_plane: bool = True) -> PlatformNumbers:
         motor_torque=wheel.motor_torque,
         brake_torque=wheel.brake_torque,
         max_wheel_speed=wheel.max_speed,
+        spike_diameter=2 * platform.tip_radius,
+        spike_clear=platform.spike_clear,
     )
+
+
+@dataclass(frozen=True)
+class Spikes:
+    """What grains meet of a platform's spikes."""
+
+    diameter: float
+    """[m]"""
+    clear: float
+    """How far they stand out of the hull [m]."""
+    of_platform: tuple[str, ...]
+    """Which of the two were not given, and are the platform's: by the settings' names."""
+
+
+def spikes_of(settings: TumbleSettings) -> Spikes:
+    """The spikes of a tumble on grains: as given, else those of the platform's file.
+
+    In the plane a spike stands as long as it is, also where it leans sideways. Raises ValueError, naming the setting,
+    for a platform without spikes.
+    """
+    given = {name: getattr(settings, name) for name in ("spike_diameter", "spike_clear")}
+    lacking = tuple(name for name, value in given.items() if value is None)
+    if lacking:
+        own = find_platform(settings.platform)
+        if own.tip_radius == 0:
+            raise ValueError(
+                f"platform = {settings.platform!r} has no [spikes], which grains are to meet: {' and '.join(lacking)} "
+                f"(in m) must be given"
+            )
+        of_file = {"spike_diameter": 2 * own.tip_radius, "spike_clear": own.spike_clear}
+        given |= {name: of_file[name] for name in lacking}
+    return Spikes(given["spike_diameter"], given["spike_clear"], lacking)
 
 
 def _spike_count(name: str, platform: Platform) -> int:

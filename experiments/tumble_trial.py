@@ -16,12 +16,15 @@ from rigid.terms import EFFECTS
 from rigid.trial import Effect, Ground, Trial
 
 from .campaign import TumbleModel, read_model
+from .lengths import check_spike_length
 from .settled import (
     Number,
     Settled,
     check_actuation,
     check_body,
     defaults_said,
+    of_other_spikes,
+    rig_fault,
     settle_limits,
     settle_platform,
     settle_surface,
@@ -58,8 +61,11 @@ class TumblePlan:
         return defaults_said(self.choices, self.numbers)
 
 
-def plan_tumble(settings: TumbleSettings, *, model_file: Path | None = None) -> TumblePlan:
-    """The trial that `settings` describe. `model_file` stands in for ``settings.model``, where that was copied.
+def plan_tumble(
+    settings: TumbleSettings, *, model_file: Path | None = None, spike_diameter: float | None = None
+) -> TumblePlan:
+    """The trial that `settings` describe. `model_file` stands in for ``settings.model``, where that was copied, and
+    `spike_diameter` [m] for the platform's.
 
     Raises ValueError, naming the setting, for a surface, law, effect or parameter there is not, a model that cannot be
     read, and numbers that no platform or rig can have.
@@ -69,6 +75,7 @@ def plan_tumble(settings: TumbleSettings, *, model_file: Path | None = None) -> 
     numbers = Settled(settings)
     platform = platform_numbers(settings.platform)
     settle_platform(numbers, platform, model=model)
+    check_spike_length(numbers)
     surface, warnings = settle_surface(numbers, settings.surface, model=model)
     _settle_gravity(settings, model, numbers)
     weak = platform.motor_torque < TORQUE
@@ -83,6 +90,10 @@ def plan_tumble(settings: TumbleSettings, *, model_file: Path | None = None) -> 
     warnings += check_actuation(settings.actuator, platform, numbers)
     warnings += check_body(numbers, platform) if model is None else []
     ground = _ground(settings)
+    if ground is None:
+        spike = platform.spike_diameter if spike_diameter is None else spike_diameter
+        whose = f"platform {platform.name}" if spike_diameter is None else "this run"
+        warnings += of_other_spikes(numbers, surface, diameter=spike, whose=whose)
     assert platform.spike_count is not None  # or it would have been refused
     trial = Trial(
         **values,
@@ -141,11 +152,8 @@ def _settle_gravity(settings: TumbleSettings, model: TumbleModel | None, numbers
     in_model = model.rig if model is not None else None
     local = in_model.gravity if in_model is not None else STANDARD_GRAVITY
     stated = settings.rig if settings.rig is not None else DEFAULT_RIG
-    if stated * STANDARD_GRAVITY >= local:
-        raise ValueError(
-            f"rig = {stated:g} (of 9.80665 m/s2) is not below the local gravity, {local:g} m/s2: a rig can only take "
-            f"weight away, so less would do, or gravity in place of rig"
-        )
+    if fault := rig_fault(stated, local):
+        raise ValueError(fault)
     counterweight = settings.counterweight
     origin = "given"
     if counterweight is None and in_model is not None and in_model.counterweight is not None:

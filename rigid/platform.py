@@ -54,6 +54,8 @@ class Platform:
     wheels: tuple[Flywheel, ...]
     tip_radius: float = 0.0
     """Radius of the balls at the ends of its spikes, and of their shafts [m]; 0 where it has none."""
+    spike_clear: float = 0.0
+    """How far each spike stands out of the hull, along itself [m]; 0 where it has none."""
     centre_of_mass: Array = field(default_factory=lambda: np.zeros(3))
     """From the geometric centre [m], shape (3,)."""
     sources: Mapping[str, str] = field(default_factory=dict)

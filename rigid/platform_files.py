@@ -153,13 +153,13 @@ def _sentence(path: Path, detail: Any) -> str:
 
 def _build(given: _File) -> Platform:
     outline = given.hull.vertices()
-    hull, tip_radius = outline, 0.0
+    hull, tip_radius, clear = outline, 0.0, 0.0
     if given.spikes is not None:
-        tip_radius = 0.5 * given.spikes.diameter
+        tip_radius, clear = 0.5 * given.spikes.diameter, given.spikes.clear
         far = float(np.linalg.norm(outline, axis=1).max())
-        if given.spikes.clear >= far:
-            raise ValueError(f"spikes.clear = {given.spikes.clear} m: the tips are only {far:.4g} m from the centre")
-        hull = outline * (1 - given.spikes.clear / far)
+        if clear >= far:
+            raise ValueError(f"spikes.clear = {clear} m: the tips are only {far:.4g} m from the centre")
+        hull = outline * (1 - clear / far)
     centre = np.zeros(3)
     if given.body.inertia is None:
         mass, centre, inertia = combine([Part(**part.model_dump()) for part in given.body.part])
@@ -186,5 +186,5 @@ def _build(given: _File) -> Platform:
     )  # fmt: skip
     return Platform(
         name=given.name, mass=given.body.mass, inertia=inertia, tips=outline, hull_vertices=hull, wheels=wheels,
-        tip_radius=tip_radius, centre_of_mass=centre, sources=given.sources,
+        tip_radius=tip_radius, spike_clear=clear, centre_of_mass=centre, sources=given.sources,
     )  # fmt: skip

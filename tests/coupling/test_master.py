@@ -260,3 +260,30 @@ def test_a_hand_sets_down_on_stiff_ground_in_long_steps_whatever_the_order_of_th
     assert np.abs(np.array(loads) - trial.weight).max() < 0.01 * trial.weight
     depth = 0.2 * math.cos(math.pi / 8) - float(run.body.place[1])
     assert depth == pytest.approx(0.5 * trial.weight / trial.stiffness, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("mass", "stiffness", "damping"),
+    [
+        pytest.param(5.3, 1.5e4, 60.0, id="Hedgehog on brick"),  # let go with 0.75 W carried
+        pytest.param(0.1, 3e3, 0.5, id="light"),  # with 3.6 W
+        pytest.param(0.1, 1.5e4, 60.0, id="light on brick"),  # never came to rest
+    ],
+)
+def test_what_bounces_in_the_hand_is_held_more_firmly_until_it_rests(mass, stiffness, damping):
+    """Its hand is light against K. Let go it stands on W, W / 2 K deep, and stays."""
+    length, inertia = (0.2, 0.06) if mass > 1 else (0.03, 1.2e-5)
+    trial = Trial(
+        mass=mass, inertia=inertia, spike_length=length, wheel_inertia=1e-6, torque=0.0, stiffness=stiffness,
+        damping=damping, mu_s=0.5, gravity_sim=0.0834, counterweight=mass * (9.80665 - 0.0834) / (9.80665 + 0.0834),
+    )  # fmt: skip
+    footing = LawFooting.of_trial(trial)
+    footing.grounds = [replace(ground, time_step=4e-5) for ground in footing.grounds]
+    run = CoupledTumble(trial, footing, duration=0.05, lowering_speed=0.2, energy_interval=1e-3)
+    run.run()
+    rows = run.columns
+    depth = length * math.cos(math.pi / 8) - rows["y"][0]
+    assert run.feet[0, 0].sum() == pytest.approx(trial.weight, rel=5e-3)
+    assert depth == pytest.approx(0.5 * trial.weight / stiffness, rel=5e-3)
+    assert np.abs(rows["vy"]).max() < 2e-6 and np.abs(rows["omega"]).max() * length < 2e-6
+    assert run.energy_residual < 1e-12

@@ -16,7 +16,11 @@ from experiments.cli import main
 from experiments.progress import Progress
 from experiments.runfolder import RunFolder
 from experiments.softening import Softening
+from experiments.spatial_settings import SpatialSettings
+from experiments.spatial_trial import plan_spatial
+from experiments.tumble_platform import spikes_of
 from experiments.tumble_settings import TumbleSettings
+from experiments.tumble_trial import plan_tumble
 from rigid import Trial
 from rigid.planar import simulate
 
@@ -109,17 +113,67 @@ def test_the_whole_of_a_bed_laid_end_to_end_counts_for_the_forecast():
     assert tumble_grains._count(settings, forecast) == pytest.approx(tumble_grains._count(whole, forecast))
 
 
+def eight_sided(tmp_path, spikes="clear = 0.012\ndiameter = 0.006"):
+    """A small platform's file: eight rows 30 mm from the axis."""
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        'format = "hedgebed-platform/1"\nname = "mine"\n[body]\nmass = 0.1\ninertia = [2e-5, 2e-5, 2e-5]\n'
+        '[hull]\nshape = "prism"\nsides = 8\ndiameter = 0.06\nheight = 0.03\n'
+        + (f"[spikes]\n{spikes}\n" if spikes else "")
+        + "[wheels]\ninertia = 1e-6\nmax_speed = 1000.0\nmotor_torque = 0.01\naxes = [[0.0, 1.0, 0.0]]\n"
+    )
+    return str(path)
+
+
+def test_spikes_are_those_of_the_platforms_file_unless_given(tmp_path):
+    """The Hedgehog's to the bit what the defaults were, 12 and 40 mm; a key wins over the file, each by itself."""
+    own = spikes_of(on_bed())
+    assert (own.diameter, own.clear) == (0.012, 0.04)
+    mine = eight_sided(tmp_path)
+    found = spikes_of(on_bed(platform=mine))
+    assert (found.diameter, found.clear, found.of_platform) == (0.006, 0.012, ("spike_diameter", "spike_clear"))
+    mixed = spikes_of(on_bed(platform=mine, spike_clear=0.015))
+    assert (mixed.diameter, mixed.clear, mixed.of_platform) == (0.006, 0.015, ("spike_diameter",))
+    settings = on_bed(platform=mine, rig=0.0085, torque=1e-3, duration=0.05, bed_size=(0.2, 0.02, 0.04))
+    tumble.check(settings)
+    plan = tumble_grains._plan(settings)
+    spike, *_, hull = tumble_grains._members(settings, plan)
+    assert spike.radius == 0.003 and np.linalg.norm(spike.at) == pytest.approx(0.03 - 0.003)
+    assert hull.radius == pytest.approx(0.95 * 0.018 * math.cos(math.pi / 8))
+    said = tumble_grains._sentences(settings, plan)
+    assert f"spike_diameter = 0.006 m (platform {mine})" in said
+
+
+def test_a_platform_without_spikes_is_refused_on_grains_unless_they_are_given(tmp_path):
+    bare = eight_sided(tmp_path, spikes="")
+    with pytest.raises(
+        ValueError, match=r"no \[spikes\], which grains are to meet: spike_clear \(in m\) must be given"
+    ):
+        tumble.check(on_bed(platform=bare, spike_diameter=0.006))
+    spikes = spikes_of(on_bed(platform=bare, spike_diameter=0.006, spike_clear=0.012))
+    assert (spikes.diameter, spikes.clear, spikes.of_platform) == (0.006, 0.012, ())
+
+
+def test_the_spikes_that_an_older_run_toml_names_on_the_spring_damper_are_no_fault():
+    TumbleSettings(surface="sand", spike_diameter=0.012, spike_clear=0.04)
+    with pytest.raises(ValueError, match=r"spike_diameter = 0.01 belongs to ground = 'bed'"):
+        TumbleSettings(surface="sand", spike_diameter=0.01)
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [
         ({}, None),
-        ({"spike_length": 0.1}, "spike_length = 0.1 is given and spike_diameter and spike_clear not: spikes are 12 mm"),
-        ({"spike_length": 0.1, "spike_diameter": 0.006}, "and spike_clear not: spikes are 6 mm thick and stand 40 mm"),
-        ({"spike_length": 0.1, "spike_diameter": 0.006, "spike_clear": 0.02}, None),
-        ({"platform": "mine.toml"}, "platform = mine.toml is given"),
+        ({"spike_length": 0.2}, None),
+        (
+            {"spike_length": 0.15},
+            "spike_length = 0.15 is given and spike_diameter and spike_clear not: spikes are 12 mm",
+        ),
+        ({"spike_length": 0.15, "spike_diameter": 0.006}, "and spike_clear not: spikes are 6 mm thick and stand 40 mm"),
+        ({"spike_length": 0.15, "spike_diameter": 0.006, "spike_clear": 0.02}, None),
     ],
 )
-def test_whose_spikes_stand_in_the_sand_is_said_where_they_are_not_given(given, said):
+def test_another_body_on_the_platforms_spikes_is_said(given, said):
     warning = tumble_grains._whose_spikes(on_bed(**given))
     assert warning is None if said is None else said in warning
 
@@ -131,6 +185,7 @@ def test_what_was_set_is_said_first_and_defaults_are_counted_and_young_is_told()
     said = tumble_opening.opening(settings, plan, grains=12345.0, softening=soft, lowering_speed=0.2)
     assert said[0].startswith("set: ") and "rig = 0.0085, torque = 0.22 N m" in said[0] and "sleep = yes" in said[0]
     assert any(text.startswith("platform hedgehog: mass = 5.3 kg, inertia") for text in said)
+    assert any("spike_diameter = 0.012 m, spike_clear = 0.04 m" in text for text in said)
     (bed,) = (text for text in said if text.startswith("the bed: "))
     assert "12,300 grains of 4 mm" in bed and "young = 2.1e+07 Pa (from max_overlap = 0.05; 3,333 times softer" in bed
     assert re.match(r"\d+ more settings are at their defaults: run.toml", said[-1]) and len(said) < 12
@@ -158,6 +213,47 @@ def test_a_duration_in_which_the_first_10_mm_are_not_gone_is_told_before_any_wor
 
 def plan_of(duration):
     return tumble_grains._plan(on_bed(rig=0.0085, duration=duration)).trial
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"spike_length": 40}, r"spike_length = 40 m \(given\) is 376 times .* metres are expected: 0.04\?"),
+        ({"spike_diameter": 12}, r"spike_diameter = 12 m, where .* 0.2 m from its centre: .* expected: 0.012\?"),
+        ({"spike_clear": 40}, r"spike_clear = 40 m, .* expected: 0.04\?"),
+        ({"grain": 3}, r"grain = 3 m, .* expected: 0.003\?"),
+        ({"coarse": 6}, r"coarse = 6 m, .* expected: 0.006\?"),
+        ({"bed_size": (0.5, 60, 0.046)}, r"bed_size\[1\] = 60 m, .* at most 20 m would do; .* expected: 0.06\?"),
+        ({"rig": 3}, r"rig = 3 g is not below the local gravity, 1 g .* \(3 m/s2 are 0.306 g\), or gravity"),
+    ],
+)
+def test_lengths_in_mm_and_a_rig_in_m_s2_are_refused_by_what_would_do(given, said):
+    with pytest.raises(ValueError, match=said):
+        tumble.check(on_bed(**given))
+
+
+def test_k_and_c_of_another_spike_are_said(tmp_path):
+    """Those of sand are of a spike of 12 mm; brick's of none; who gives both knows."""
+    mine = eight_sided(tmp_path)
+
+    def said(settings):
+        return [text for text in plan_tumble(settings).warnings if "with ball tips" in text]
+
+    assert not said(TumbleSettings(surface="sand"))
+    assert not said(TumbleSettings(platform=mine, torque=1e-3))
+    (warning,) = said(TumbleSettings(surface="sand", platform=mine, torque=1e-3))
+    assert warning.startswith("stiffness and damping of sand are those of spikes 12 mm thick with ball tips, and of")
+    assert "they are 6 mm thick" in warning
+    (half,) = said(TumbleSettings(surface="sand", platform=mine, torque=1e-3, stiffness=40.0))
+    assert half.startswith("damping of sand")
+    assert not said(TumbleSettings(surface="sand", platform=mine, torque=1e-3, stiffness=40.0, damping=0.3))
+    (bare,) = said(TumbleSettings(surface="sand", platform=eight_sided(tmp_path, ""), torque=1e-3))
+    assert "there are none" in bare
+    beside = tumble_grains._plan(on_bed(spike_diameter=0.008)).warnings
+    assert any("of this run they are 8 mm thick" in text for text in beside)
+    assert not any("with ball tips" in text for text in tumble_grains._plan(on_bed()).warnings)
+    cube = plan_spatial(SpatialSettings(surface="sand", platform=mine))
+    assert sum("with ball tips" in text for text in cube.warnings) == 1
 
 
 def test_the_box_over_the_sand_is_as_high_as_a_brake_may_throw_it():
@@ -418,7 +514,7 @@ def test_a_run_stopped_by_ctrl_c_is_taken_up_again_to_the_same_numbers(repeats, 
 def test_tips_that_come_down_over_more_than_one_copy_are_said_to_meet_the_same_sand(repeats, tips, said, monkeypatch):
     """Over 0.62 m and a spike's 12 mm on copies of 0.6 m; where there is one piece it is the whole bed."""
     monkeypatch.setattr(tumble_grains_result, "tips_in_ground", lambda run: (np.array([-0.1, tips - 0.1]), None))
-    settings = SimpleNamespace(bed_size=(0.6, 0.036, 0.06), bed_repeats=repeats, spike_diameter=0.012)
+    settings = SimpleNamespace(bed_size=(0.6, 0.036, 0.06), bed_repeats=repeats, spike_diameter=0.012, spike_clear=0.04)
     warning = tumble_grains_result._same_sand_again(settings, None)
     assert (warning is not None and "the same grains every 0.6 m" in warning) == said
 
