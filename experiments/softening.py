@@ -32,7 +32,10 @@ from typing import Any
 
 from dem.timestep import CHAIN
 
-__all__ = ["Softening", "bearing_gradient", "chain", "drop_depth", "run_limit", "soften", "soften_material"]
+__all__ = [
+    "Softening", "bearing_gradient", "chain", "drop_depth", "run_limit", "soften", "soften_material",
+    "stable_overlap",
+]  # fmt: skip
 
 RAIN_OVERLAP = 0.05
 """Overlap that a grain may have with the floor at the end of its fall, while the bed is made [of a diameter]."""
@@ -70,29 +73,52 @@ class Softening:
         """Young's modulus [Pa] that would bring this overlap to the one wanted (Hertz: F goes with E overlap^1.5)."""
         return self.young * (overlap / wanted) ** 1.5
 
-    def overlapping(self, overlap: float, bound: float = SMALL) -> str | None:
+    def overlapping(self, overlap: float, bound: float = SMALL, stable: float | None = None) -> str | None:
         """A warning that grains overlapped by more than was meant, with the modulus that would keep it; or None.
 
-        ``bound``: `max_overlap`, which a platform's run may pass (`run_limit`).
+        ``bound``: `max_overlap`, which a platform's run may pass (`run_limit`); ``stable``: `stable_overlap` of it.
         """
         meant = min(bound, SMALL)
         if overlap <= meant:
             return None
         how = "as max_overlap allowed" if overlap <= bound else f"past max_overlap = {100 * bound:g} %"
+        lost = ""
+        if stable is not None and overlap > stable:
+            lost = (
+                f"; past {100 * stable:.3g} % the time step is too long for grains all of whose contacts are there: "
+                f"energy_residual and dissipation_reversal say whether that made energy"
+            )
         return (
             f"the largest overlap was {100 * overlap:.3g} % of a diameter, {how}, where {100 * meant:g} % "
             f"{'are small' if meant == SMALL else 'were meant'}: "
-            f"young = {self.stiffer(overlap, meant):.2g} Pa or more would keep it there"
+            f"young = {self.stiffer(overlap, meant):.2g} Pa or more would keep it there{lost}"
         )
 
 
 def run_limit(max_overlap: float) -> float:
     """Overlap past which a platform's run on a bed made for `max_overlap` ends [of a diameter]: twice it, at most 0.2.
 
-    The step is an eighth of the half-period of contacts at `max_overlap` (`dem.timestep`); the stiffness of one at
-    twice that is sqrt(2) of theirs, of whose half-period it is 1/6.7: a few such contacts are followed safely.
+    The step is chosen for grains all of whose contacts are at `max_overlap` (`dem.timestep`); that holds up to
+    `stable_overlap`, some 1.2 times it. Beyond, single contacts are still followed: at twice the bound the step is
+    1/6.7 of the half-period of a grain on a wall, which is lost at 1/1.6 (`dem.timestep.stable_step`, a pair alone).
+    Whether more than a few were there, and made energy, the books tell (`energy_residual`, `dissipation_reversal`): the
+    result warns.
     """
     return max(max_overlap, min(2 * max_overlap, 0.2))
+
+
+def stable_overlap(material: Any, max_overlap: float) -> float:
+    """Largest overlap [of a diameter] at which the step of a bed made for `max_overlap` is stable for a whole lattice.
+
+    The longest stable step goes with the overlap to the power -1/4 (S_n = 2 E* a, a = sqrt(R* delta)):
+    max_overlap (longest / step)^4, by `dem.timestep.longest_step` and `time_step_for`, whatever the diameter; never
+    below `max_overlap`.
+    """
+    from dem.timestep import longest_step, time_step_for
+
+    of_like_grains = {"diameter": 1.0, "max_overlap": max_overlap}
+    longest, own = longest_step(material, **of_like_grains), time_step_for(material, **of_like_grains)
+    return float(max_overlap * (longest / own) ** 4)
 
 
 def bearing_gradient(bulk_density: float, gravity: float, friction: float) -> float:

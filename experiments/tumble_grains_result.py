@@ -16,7 +16,7 @@ from vis.tumble_beside import HEAD, beside_rows, beside_words
 
 from .bed_graded import coarsest_touched, tips_in_ground
 from .runfolder import RunFolder, write_series
-from .softening import Softening
+from .softening import Softening, stable_overlap
 from .surfaces import find_surface
 from .tumble_platform import spikes_of
 from .tumble_settings import TumbleSettings
@@ -111,7 +111,8 @@ def conclude(
     if reversed_ := reversal_warning(run.dissipation_reversal):
         result["warnings"].append(reversed_)
     result["warnings"] += [said for said in (unsettled_warning(run.master), own_warning(run)) if said]
-    if pressed := softening.overlapping(float(bed.max_overlap), settings.max_overlap):
+    stable = stable_overlap(bed.material, settings.max_overlap)
+    if pressed := softening.overlapping(float(bed.max_overlap), settings.max_overlap, stable):
         result["warnings"].append(pressed)
     if met_again := _same_sand_again(settings, run):
         result["warnings"].append(met_again)

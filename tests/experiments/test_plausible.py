@@ -51,6 +51,7 @@ def lost_for_a_while(columns: dict[str, np.ndarray]) -> None:
         ("tumble", "001", "imu", times("gyro_rad_s", -1.0), "sign reversed"),
         ("tumble", "001", "pose", times("y_m", 1e3), "thousandths"),
         ("tumble", "001", "pose", times("x_m", 1.0, 0.02), "its zero is to be taken off"),
+        ("tumble", "001", "pose", times("y_m", 1.0, 0.02), "m at the start where 0.18"),
         ("tumble", "001", "imu", times("ay_m_s2", 1 / GRAVITY), "units of g"),
         ("tumble", "001", "wheel", times("omega_rad_s", 9.55), "revolutions per minute"),
         ("tumble", "001", "wheel", times("t_s", 1.0, 0.2), "begins to change at 0.199 s"),
@@ -94,6 +95,7 @@ def anticlockwise(columns: dict[str, np.ndarray]) -> None:
         ({"pose": anticlockwise, "imu": anticlockwise}, {}, ["theta falls at the start", "anticlockwise"]),
         ({"pose": times("theta_rad", 57.3)}, {}, ["theta_deg would say so"]),
         ({}, {"spike_length": 200.0}, ["[platform] spike_length looks like mm, 0.2 m would fit"]),
+        ({}, {"stiffness": 0.015}, ["[surface] stiffness = 0.015", "would stand 29 m deep"]),
         ({}, {"torque": 220.0}, ["torque = 220 looks like mN m: 0.22 N m would fit"]),
         ({}, {"gravity_sim": 0.0085}, ["counterweight = 5.21 kg leaves 0.883 N", "units of g: 0.08336 m/s2 would"]),
         ({}, {"std": (5e-4, 5e-4, 0.17)}, ["[sensors.pose] states 0.17 for theta_rad", "degrees"]),
@@ -110,7 +112,8 @@ def test_a_mistake_in_a_tumble_is_said_once_by_its_cause(changes, tables, said):
     given = campaign.tables.model_dump(mode="python", exclude_none=True)
     given["trial"] = (given["trial"][0],)
     for key, value in tables.items():
-        place = {"spike_length": given["platform"], "std": given["sensors"]["pose"]}.get(key, given["trial"][0])
+        tables_of = {"spike_length": "platform", "stiffness": "surface"}
+        place = given["sensors"]["pose"] if key == "std" else given.get(tables_of.get(key, ""), given["trial"][0])
         place[key] = value
     told = [finding.what for finding in find_faults(Campaign(TumbleCampaign(**given), recordings))]
     assert len(told) == 1 and all(words in told[0] for words in said), told

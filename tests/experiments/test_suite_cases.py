@@ -20,7 +20,7 @@ def test_every_case_of_every_experiment_is_valid_and_found_by_its_name():
     assert all(case.settings.ground == "bed" for case in found)
     assert find_case(Path(found[0].name), CASES) == found[0].path
     counts = {number: sum(case.experiment == number for case in found) for number in suite.EXPERIMENTS}
-    assert counts == {1: 33, 2: 6, 3: 3, 4: 4, 5: 6, 6: 16}
+    assert counts == {1: 34, 2: 6, 3: 3, 4: 4, 5: 6, 6: 16}
 
 
 def test_no_case_that_ships_is_refused():
@@ -42,6 +42,7 @@ def test_cases_that_can_share_a_bed_do():
         (("grains1-coarse-jsc1a",), 1),
         (("grains2-flight-1e-2-brake", "grains2-flight-1e-4-brake", "grains2-flight-1e-6-brake"), 1),
         (("grains1-sand-0.0085-0.22", "grains1-long-sand"), 1),
+        (("grains1-overlap3",), 1),
     ):  # fmt: skip
         found = beds(*names)
         assert len(found) == len({bed[-1] for bed in found}) == seeds

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tumble_runs import SMALL, small_bed
 
 from coupling import CoupledTumble, LawFooting, LeftTheBedError
 from dem import SAND, BedFailure
@@ -23,13 +24,6 @@ from experiments.tumble_settings import TumbleSettings
 from experiments.tumble_trial import plan_tumble
 from rigid import Trial
 from rigid.planar import simulate
-
-SMALL = {
-    "surface": "sand", "ground": "bed", "mass": 0.3, "inertia": 2e-4, "spike_length": 0.04, "wheel_inertia": 1e-5,
-    "rig": 0.03, "torque": 0.01, "duration": 0.06, "bed_size": (0.2, 0.036, 0.03), "grain": 0.006, "frame_count": 3,
-    "spike_diameter": 0.008, "spike_clear": 0.015, "substeps": 8, "lowering_speed": 0.04, "stiffness": 500.0,
-    "damping": 2.0, "threads": 1,
-}  # fmt: skip
 
 
 def on_bed(**more):
@@ -316,23 +310,6 @@ def test_a_tumble_on_grains_with_nothing_but_its_torque_given_stays_on_its_bed()
     assert tumble_grains._may_leave(settings, forecast) is None
     # A tip may come down as far ahead as a torque that acts all the time rolls it, less what sand takes.
     assert forecast.farthest > 0.0788 + 0.077  # what grains did in 1.1 s, and the next row ahead of the centre
-
-
-def small_bed(settings, *_):
-    """Two layers of large grains, almost at rest."""
-    from dem import Bed
-    from dem.materials import SAND
-
-    d, rows, columns = 6e-3, 32 // settings.bed_repeats, 6
-    low = [((i + 0.5) * d, (j + 0.5) * d, 0.5 * d) for i in range(rows) for j in range(columns)]
-    high = [((i + 1.0) * d, (j + 1.0) * d, 0.5 * d + d * math.sqrt(0.5)) for i in range(rows) for j in range(columns)]
-    bed = Bed.from_grains(
-        SAND, positions=np.array(low + high), radii=np.full(2 * rows * columns, 0.5 * d), young=1e7, max_overlap=0.1,
-        size=(rows * d, columns * d, 0.03), height=0.3, threads=1, gravity=9.80665,
-    )  # fmt: skip
-    bed.advance(1000)
-    bed.surface = float((bed.grains()["position"][:, 2] + 0.5 * d).max())
-    return bed
 
 
 def test_jsc1a_without_stages_is_told_before_the_bed_is_made_which_would_do(tmp_path, monkeypatch):
