@@ -26,7 +26,7 @@ docs/performance.md, rounded up."""
 
 TAP = 1.07
 """What a tap and the rest after it take, over the time of that fall: 0.189 s to 0.176 s, nine taps of the bed of
-grains1-jsc1a-*, 61,452 grains (docs/results/README.md, 2026-11-23)."""
+grains1-jsc1a-*, 61,452 grains before the last `level` (docs/experiments.md, 2026-11-23)."""
 TAPPED = 0.0041
 """Packing fraction that a tap adds, of the same nine: from 0.5343 to 0.5715."""
 POURED, DENSEST = 0.534, 0.62

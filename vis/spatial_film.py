@@ -108,7 +108,7 @@ class Scene:
     def draw(
         self, axis: Any, time: float, *, colours: Callable[[Frame, Frame], NDArray[np.float64]], weight: float
     ) -> None:
-        """Its picture at `time` [s] on an axes; forces as long as `weight` [N] is to `_ARROW` of it."""
+        """Its picture at `time` [s] on an axes. A force of `weight` [N] is an arrow of `_ARROW` times its height."""
         index = self.nearest(time)
         frame, focus = self.frames[index], (float(self.way[index, 0]), float(self.way[index, 1]))
         axis.set_xlim(0.0, 1.0)
