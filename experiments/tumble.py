@@ -21,7 +21,7 @@ from .progress import Progress
 from .reporting import write_report
 from .runfolder import RunFolder, write_series
 from .synthesis import check_tumble_campaign, write_tumble_campaign
-from .tips import tip_angles
+from .tips import ball_radius, tip_depth
 from .tumble_platform import torque_within_limit
 from .tumble_settings import TumbleSettings
 from .tumble_sweep import check_sweep, middle_of_sweep, run_sweep
@@ -95,7 +95,9 @@ def quantities_of(trajectory: Trajectory) -> dict[str, dict[str, Any]]:
 def _tip_sinkage(trajectory: Trajectory) -> dict[str, dict[str, Any]]:
     """How deep the rows' tips go below the undisturbed surface: on a law its compression there."""
     trial = trajectory.trial
-    tips = trial.spike_length * np.cos(tip_angles(trial, trajectory.theta)) - trajectory.y[:, None]
+    tips = tip_depth(
+        trajectory.theta, trajectory.y, count=trial.spike_count, length=trial.spike_length, radius=ball_radius(trial)
+    )
     sinkage = np.maximum(tips, 0.0)
     start = "of the two rows it stands on, mean, when the torque begins"
     return {
@@ -271,6 +273,7 @@ def result_of(settings: TumbleSettings, plan: TumblePlan, trajectory: Trajectory
         "method": trajectory.method,
         "duration": settings.duration,
         "spike_count": trial.spike_count,
+        "tip_radius": ball_radius(trial),
         "effects": [{"id": effect.id, "parameters": dict(effect.values)} for effect in trial.effects],
         "wheel_at_limit": full,
         "transitions": [

@@ -34,7 +34,7 @@ from .settings import expected_grain_count
 from .softening import Softening, run_limit, soften_material
 from .stopping import held_back
 from .surfaces import find_surface, surface_names
-from .tips import tip_angles
+from .tips import tip_angles, tip_depth
 from .tumble_flight import lies_in_flight
 from .tumble_grains_frames import TumbleFrames
 from .tumble_grains_result import conclude, sinkage_start, write_trajectory
@@ -196,9 +196,9 @@ def _forecast(settings: TumbleSettings, plan: TumblePlan) -> Forecast:
             max_wheel_speed=plan.max_wheel_speed,
         )  # fmt: skip
         found, trial, full = run.run(), plan.trial, run.body.wheel_at_limit
-    angles = tip_angles(trial, found.theta)
+    angles = tip_angles(trial.spike_count, found.theta)
     tips_x = found.x[:, None] - trial.spike_length * np.sin(angles)
-    depth = trial.spike_length * np.cos(angles) - found.y[:, None]
+    depth = tip_depth(found.theta, found.y, count=trial.spike_count, length=trial.spike_length)
     near = depth > -0.5 * spikes_of(settings).diameter
     speed = np.hypot(
         found.vx[:, None] - found.omega[:, None] * trial.spike_length * np.cos(angles),
