@@ -16,7 +16,7 @@ from experiments import following, tumble, tumble_grains, tumble_grains_result, 
 from experiments.cli import main
 from experiments.progress import Progress
 from experiments.runfolder import RunFolder
-from experiments.softening import Softening
+from experiments.softening import Softening, run_limit
 from experiments.spatial_settings import SpatialSettings
 from experiments.spatial_trial import plan_spatial
 from experiments.tumble_platform import spikes_of
@@ -401,6 +401,29 @@ def test_a_run_on_a_bed_may_pass_the_overlap_that_its_step_is_chosen_for_up_to_t
     bed.max_overlap = 0.19
     with pytest.raises(BedFailure, match=r"overlap of 19 % .* its bound of 18 %"):
         bed.advance(1)
+
+
+def test_a_checkpoint_of_before_takes_the_bound_on_overlaps_that_a_run_has_now(tmp_path, monkeypatch):
+    """One that ended at its `max_overlap` of 9 % goes on with the bound of today, and with all else as it was."""
+    settings = on_bed(**SMALL | {"max_overlap": 0.09, "frame_count": 0})
+    plan = tumble_grains._plan(settings)
+    forecast = tumble_grains._forecast(settings, plan)
+    old, new = (tumble_grains._stepper(settings, plan, small_bed(settings), forecast) for _ in range(2))
+    old.footing.bed.overlap_limit = 0.09
+    for _ in range(3):
+        old.master.step()
+    folder = RunFolder.create(tmp_path / "run", "tumble", settings)
+    folder.save_checkpoint("tumble", old.state())
+
+    @contextmanager
+    def stopping():
+        yield lambda: True
+
+    monkeypatch.setattr(following, "held_back", stopping)
+    with pytest.raises(KeyboardInterrupt):
+        tumble_grains._follow(settings, new, folder, Progress())
+    assert new.footing.bed.overlap_limit == run_limit(0.09) > 0.09
+    assert new.footing.bed.steps == old.footing.bed.steps + settings.substeps
 
 
 def test_a_run_that_leaves_the_bed_says_where_and_keeps_its_state_and_series(tmp_path, monkeypatch, capsys):
