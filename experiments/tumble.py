@@ -17,12 +17,13 @@ from rigid.planar import PAPER_STEP, check_step, simulate
 from rigid.trajectory import Trajectory
 
 from .campaign import read_model
+from .kept_platform import keep_platform
 from .progress import Progress
 from .reporting import write_report
 from .runfolder import RunFolder, write_series
 from .synthesis import check_tumble_campaign, write_tumble_campaign
 from .tips import ball_radius, tip_depth
-from .tumble_platform import torque_within_limit
+from .tumble_platform import PlatformNumbers, platform_numbers, torque_within_limit
 from .tumble_settings import TumbleSettings
 from .tumble_sweep import check_sweep, middle_of_sweep, run_sweep
 from .tumble_trial import TumblePlan, plan_tumble
@@ -142,7 +143,9 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
         return tumble_on_grains(settings, folder, progress)
     with folder.lock():
         copied = _keep_model(settings, folder)
-        plan = plan_tumble(middle_of_sweep(settings, model_file=copied), model_file=copied)
+        platform = platform_numbers(settings.platform, file=keep_platform(settings.platform, folder.path))
+        middle = middle_of_sweep(settings, model_file=copied, platform=platform)
+        plan = plan_tumble(middle, model_file=copied, platform=platform)
         for sentence in plan.sentences():
             progress.message(sentence)
         for warning in plan.warnings:
@@ -169,7 +172,7 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
         if settings.sweep:
             progress.message("the numbers above are those of one trial of the sweep, in its middle or nearest to it")
             progress.stage("sweep")
-            _add_sweep(result, settings, folder, copied)
+            _add_sweep(result, settings, folder, copied, platform)
         made = write_tumble_campaign(settings, plan, folder.path, progress)
         result |= {"campaign": made} if made is not None else {}
         folder.write_result(result)
@@ -193,9 +196,11 @@ def _step_through_master(
     return trajectory, run.body.wheel_at_limit, quantities, besides, warnings
 
 
-def _add_sweep(result: dict[str, Any], settings: TumbleSettings, folder: RunFolder, model: Path | None) -> None:
+def _add_sweep(
+    result: dict[str, Any], settings: TumbleSettings, folder: RunFolder, model: Path | None, platform: PlatformNumbers
+) -> None:
     """Integrate the sweep and put what came out beside the trial in its middle."""
-    swept = run_sweep(settings, folder, model_file=model)
+    swept = run_sweep(settings, folder, model_file=model, platform=platform)
     result["departures"]["sentences"] += swept["sweep"]["sentences"]
     result["title"] += ", one trial of a sweep of " + " and ".join(settings.sweep)
     result |= swept
