@@ -33,7 +33,7 @@ from typing import Any
 from dem.timestep import CHAIN
 
 __all__ = [
-    "Softening", "bearing_gradient", "chain", "drop_depth", "run_limit", "soften", "soften_material",
+    "Softening", "bearing_gradient", "chain", "check_young", "drop_depth", "run_limit", "soften", "soften_material",
     "stable_overlap",
 ]  # fmt: skip
 
@@ -47,6 +47,10 @@ SMALL = 0.05
 a spike fails, and a platform's run at `run_limit`. A run that had more is told so."""
 STIFF, STIFF_CHAIN = 0.01, 7.4
 """Overlap [of a diameter] at and below which a chain of grains carries as much as it does among stiff ones [1]."""
+SOFTEST = 0.1
+"""Of the modulus chosen for `max_overlap`, below which one that is set is refused [1]: grains would overlap by
+10^(2/3) = 4.6 times as much. The estimate has a factor of some 3 to spare in the modulus (`chain`, and depth and speed
+beyond the forecast), and the softest case that ships has half of what is chosen."""
 SOFT = 0.05
 """Overlap at and above which grains share the load: `CHAIN`, as `dem` has it."""
 
@@ -125,6 +129,15 @@ def bearing_gradient(bulk_density: float, gravity: float, friction: float) -> fl
     """Growth of the pressure under a flat plate going straight down [Pa/m] (3D-RFT, see the module)."""
     mu = min(0.9, max(0.3, friction))
     return 0.876 * bulk_density * gravity * (894 * mu**3 - 386 * mu**2 + 89 * mu)
+
+
+def check_young(young: float | None, *, chosen: float, max_overlap: float) -> None:
+    """Raise ValueError for a modulus that is set [Pa] and could not hold the bed; `chosen`: what is without it [Pa]."""
+    if young is not None and young < SOFTEST * chosen:
+        raise ValueError(
+            f"young = {young:g} Pa is so soft that grains would overlap far past max_overlap = {max_overlap:g}: "
+            f"{chosen:.3g} Pa would do, which is what is chosen without it"
+        )
 
 
 def drop_depth(speed: float, mass: float, load: float, stiffness: float) -> float:

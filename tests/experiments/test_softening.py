@@ -11,6 +11,7 @@ from experiments.softening import (
     Softening,
     bearing_gradient,
     chain,
+    check_young,
     drop_depth,
     run_limit,
     soften,
@@ -88,6 +89,15 @@ def test_a_drop_stops_where_the_energies_meet():
     depth = drop_depth(0.1, 2.6, 0.2, 100.0)
     assert 0.5 * 100 * depth**2 - 0.2 * depth == pytest.approx(0.5 * 2.6 * 0.1**2)
     assert drop_depth(0.0, 2.6, 0.2, 100.0) == pytest.approx(2 * 0.2 / 100)
+
+
+def test_a_modulus_that_could_not_hold_the_bed_is_refused():
+    """A tenth of what is chosen is (1/10)^(-2/3) = 4.6 times the overlap; nothing is asked of what is chosen itself."""
+    chosen = soften(max_overlap=0.05, **SAND).young
+    for young in (None, chosen, 0.11 * chosen):
+        check_young(young, chosen=chosen, max_overlap=0.05)
+    with pytest.raises(ValueError, match=r"young = 1 Pa is so soft .* max_overlap = 0.05: .* Pa would do"):
+        check_young(1.0, chosen=chosen, max_overlap=0.05)
 
 
 def test_a_run_may_pass_its_bound_and_says_so():
