@@ -423,9 +423,7 @@ class BedFooting:
         With the velocities half a step ahead of the positions, which the impulses so far have made: what changes it is
         the body, to round-off.
         """
-        grains = self.bed.grains(contacts=False)
-        ahead = grains["mass"][:, None] * grains["velocity"] + 0.5 * self.time_step * grains["force"]
-        return self.copies * (ahead.sum(axis=0) - self.impulse)
+        return np.asarray(self.copies * (self.bed.momentum() - self.impulse))
 
     def angular_momentum(self) -> Vector:
         """Of the grains about the body's (0, 0, 0), less what they got from elsewhere than the body, `copies` times.

@@ -45,6 +45,7 @@ from .lists import (
     PERIOD_Y,
     QUEUE,
     SAME_IMAGE,
+    SCAN_BLOCKS,
     TURN,
     Lists,
     curve_ranks,
@@ -218,6 +219,8 @@ class Engine(Lists, Shapes, Sleepers, Bookkeeping):
         self.rank = ti.field(ti.i32, cell_capacity)
         self.cell_start = ti.field(ti.i32, 2 * cell_capacity + 1)
         self.cell_fill = ti.field(ti.i32, 2 * cell_capacity)
+        self.block_sum = ti.field(ti.i32, SCAN_BLOCKS)
+        self.block_stride = SCAN_BLOCKS if gpu else threads
         # Pair lists: chunk c owns the rows from c times its room, those of a grain lie together. ``first`` is the
         # grain a row belongs to, ``pair`` its neighbour's code, ``touching`` the rows in contact in this step,
         # ``slide`` the contact's history: x y z of the tangential spring, and what the normal dashpot remembers.
@@ -302,7 +305,10 @@ class Engine(Lists, Shapes, Sleepers, Bookkeeping):
         for k, value in enumerate(box):
             self.box[k] = value
         self.write("rank", curve_ranks(*cells))
-        for field in (self.pair_start, self.pair_end, self.overlap, self.ticket, self.near_end, self.body_turn):
+        bodies = (self.body_position, self.body_velocity, self.body_spin, self.body_turn, self.body_listed,
+            self.body_listed_turn, self.body_extent, self.body_primitives, self.body_pair, self.primitive_kind,
+            self.primitive_row)  # fmt: skip
+        for field in (self.pair_start, self.pair_end, self.overlap, self.ticket, self.near_end, *bodies):
             field.fill(0)
         for counter in (self.body_count, self.moved, self.halted, self.done):
             counter[None] = 0
@@ -323,7 +329,7 @@ class Engine(Lists, Shapes, Sleepers, Bookkeeping):
         self.rest = rest = self._kept_rest
         for field in (rest.asleep, rest.was, rest.woken, rest.leaves, rest.quiet, rest.start, rest.end):
             field.fill(0)
-        for field in (rest.side, rest.mass, rest.news, rest.held):
+        for field in (rest.side, rest.mass, rest.news, rest.held, rest.begins, rest.block):
             field.fill(0)
 
     def wake_all(self) -> None:

@@ -20,6 +20,7 @@ ITEMS_PER_THREAD = 512
 CACHE_LINE = 16
 QUEUE, TURN, FINISHED = 0, CACHE_LINE, 2 * CACHE_LINE
 BUILT = 2  # place of a number of ``dem.sleep.Rest.news``: the other store of frozen contacts is filled
+SCAN_BLOCKS = 64  # in which cells are added up
 MOST_BODIES = 32  # the floor, a platform's 24 spikes and hull, and some more
 
 # A neighbour's code: its index, and in the upper bits which periodic image is meant. The sign says "touching".
@@ -138,48 +139,56 @@ class Lists:
         return (k * self.count[NY] + j) * self.count[NX] + i
 
     @ti.kernel
-    def sort(self, gx: float, gy: float, gz: float, rest: ti.template(), ledger: ti.template()):
+    def sort(self, gx: float, gy: float, gz: float, awake: int, rest: ti.template(), ledger: ti.template()):
         """Wrap the grains into the box and bring them into the order of the curve; ids break ties.
 
-        Those that sleep come behind those awake: each set has the cells for itself.
+        Those that sleep come behind those awake: each set has the cells for itself. ``awake``: how many were, until
+        now; the others have not moved. A sleeper whose place in memory stays is left where it is, and few change it:
+        the order of sleepers begins where grains wake and fall asleep (``place_asleep``).
         """
         for k in range(rest.sets * self.count[CELLS]):
             self.cell_fill[k] = 0
         if ti.static(ledger.on):
             for _ in range(1):  # one thread: the sum has one order
-                for i in range(self.count[GRAINS]):
+                for i in range(awake):
                     x, v = self.position[i], self.velocity[i]
                     a = -ti.floor(x.x / self.box[PERIOD_X]) * self.box[PERIOD_X]
                     b = -ti.floor(x.y / self.box[PERIOD_Y]) * self.box[PERIOD_Y]
                     if a != 0.0 or b != 0.0:
                         ledger.turn(0, ledger.outside, v.w * ti.Vector([a, b, 0.0]).cross(v.xyz))
         for i in range(self.count[GRAINS]):
-            x = self.position[i]
-            inside = x.z >= self.box[BOTTOM] and x.z <= self.box[TOP]
-            inside = inside and ti.abs(x.x) < 1e6 * self.box[PERIOD_X] and ti.abs(x.y) < 1e6 * self.box[PERIOD_Y]
-            if not inside:
-                # Any of the lost ones will do; the host looks for the first id.
-                self.problem[None] = ti.Vector([1, self.id[i]])
-            else:
-                a = -ti.floor(x.x / self.box[PERIOD_X]) * self.box[PERIOD_X]
-                b = -ti.floor(x.y / self.box[PERIOD_Y]) * self.box[PERIOD_Y]
-                self.position[i].x = self.position[i].x + a
-                self.position[i].y = self.position[i].y + b
-                self.origin[i].x = self.origin[i].x + a
-                self.origin[i].y = self.origin[i].y + b
-            ci, cj, ck = self.cell_of(self.position[i])
-            r = self.rank[self.cell_index(ci, cj, ck)]
+            cell = 0
+            if i < awake:
+                self.wrap(i)
+                ci, cj, ck = self.cell_of(self.position[i])
+                cell = self.cell_index(ci, cj, ck)
+            elif ti.static(rest.on):
+                cell = rest.cell[self.id[i]]
+            r = self.rank[cell]
             if ti.static(rest.on):
-                r += self.count[CELLS] * rest.asleep[self.id[i]]
+                if rest.asleep[self.id[i]] == 1:
+                    if i < awake:
+                        rest.cell[self.id[i]] = cell
+                    r = self.place_asleep(r, rest)
             self.key[i] = r
             ti.atomic_add(self.cell_fill[r], 1)
+        for w in range(self.cpu_items if ti.static(not self.gpu) else SCAN_BLOCKS):
+            b = self.first_block(w)
+            while b < SCAN_BLOCKS:
+                self.block_sum[b] = self.scan(b, 0, rest.sets * self.count[CELLS], False)
+                b += self.block_stride
         for _ in range(1):
             total = 0
-            for r in range(rest.sets * self.count[CELLS]):
-                self.cell_start[r] = total
-                total += self.cell_fill[r]
-                self.cell_fill[r] = self.cell_start[r]
+            for b in range(SCAN_BLOCKS):
+                kept = self.block_sum[b]
+                self.block_sum[b] = total
+                total += kept
             self.cell_start[rest.sets * self.count[CELLS]] = total
+        for w in range(self.cpu_items if ti.static(not self.gpu) else SCAN_BLOCKS):
+            b = self.first_block(w)
+            while b < SCAN_BLOCKS:
+                self.scan(b, self.block_sum[b], rest.sets * self.count[CELLS], True)
+                b += self.block_stride
         for i in range(self.count[GRAINS]):
             slot = ti.atomic_add(self.cell_fill[self.key[i]], 1)
             self.came_from[slot] = i
@@ -194,23 +203,76 @@ class Lists:
                 self.came_from[b + 1] = moving
         for i in range(self.count[GRAINS]):
             o = self.came_from[i]
-            self.buffer4[0][i] = self.position[o]
-            self.buffer4[1][i] = self.velocity[o]
-            self.buffer4[2][i] = self.spin[o]
-            self.buffer3[i] = self.origin[o]
-            self.buffer_id[i] = self.id[o]
+            if not self.lies_on(i, awake, rest):
+                self.buffer4[0][i] = self.position[o]
+                self.buffer4[1][i] = self.velocity[o]
+                self.buffer4[2][i] = self.spin[o]
+                self.buffer3[i] = self.origin[o]
+                self.buffer_id[i] = self.id[o]
         for i in range(self.count[GRAINS]):
-            self.position[i] = self.buffer4[0][i]
-            self.velocity[i] = self.buffer4[1][i]
-            self.spin[i] = self.buffer4[2][i]
-            self.origin[i] = self.buffer3[i]
-            self.id[i] = self.buffer_id[i]
-            self.listed[i] = self.buffer4[0][i].xyz
-            self.force[i] = self.buffer4[1][i].w * ti.Vector([gx, gy, gz])
-            if ti.static(rest.on):
-                if i >= self.count[AWAKE]:
-                    self.force[i] = ti.Vector.zero(self.real, 3)
-            self.torque[i] = ti.Vector.zero(self.real, 3)
+            if not self.lies_on(i, awake, rest):
+                self.position[i] = self.buffer4[0][i]
+                self.velocity[i] = self.buffer4[1][i]
+                self.spin[i] = self.buffer4[2][i]
+                self.origin[i] = self.buffer3[i]
+                self.id[i] = self.buffer_id[i]
+                self.listed[i] = self.buffer4[0][i].xyz
+                self.force[i] = self.buffer4[1][i].w * ti.Vector([gx, gy, gz])
+                if ti.static(rest.on):
+                    if i >= self.count[AWAKE]:
+                        self.force[i] = ti.Vector.zero(self.real, 3)
+                self.torque[i] = ti.Vector.zero(self.real, 3)
+
+    @ti.func
+    def wrap(self, i):
+        """Put a grain back into the box, its origin with it; one that has left it for good is a problem."""
+        x = self.position[i]
+        inside = x.z >= self.box[BOTTOM] and x.z <= self.box[TOP]
+        inside = inside and ti.abs(x.x) < 1e6 * self.box[PERIOD_X] and ti.abs(x.y) < 1e6 * self.box[PERIOD_Y]
+        if not inside:
+            # Any of the lost ones will do; the host looks for the first id.
+            self.problem[None] = ti.Vector([1, self.id[i]])
+        else:
+            a = -ti.floor(x.x / self.box[PERIOD_X]) * self.box[PERIOD_X]
+            b = -ti.floor(x.y / self.box[PERIOD_Y]) * self.box[PERIOD_Y]
+            self.position[i].x = self.position[i].x + a
+            self.position[i].y = self.position[i].y + b
+            self.origin[i].x = self.origin[i].x + a
+            self.origin[i].y = self.origin[i].y + b
+
+    @ti.func
+    def lies_on(self, i, awake, rest: ti.template()):
+        """Whether the grain for this place is a sleeper that has been in it."""
+        result = False
+        if ti.static(rest.on):
+            result = i >= self.count[AWAKE] and i >= awake and self.came_from[i] == i
+        return result
+
+    @ti.func
+    def place_asleep(self, r, rest: ti.template()):
+        """Where the sleepers of the cell of rank r are listed: in the curve's order too, but begun elsewhere."""
+        turned = r - rest.begins[None]
+        return self.count[CELLS] + ti.select(turned < 0, turned + self.count[CELLS], turned)
+
+    @ti.func
+    def first_block(self, w):
+        """Of what item w of a loop scans, SCAN_BLOCKS where that is nothing; ``next_chunk`` says why."""
+        b = w
+        if ti.static(not self.gpu):
+            b = ti.select(w % ITEMS_PER_THREAD == 0, w // ITEMS_PER_THREAD, SCAN_BLOCKS)
+        return b
+
+    @ti.func
+    def scan(self, b, total, n, write: ti.template()):
+        """Grains in block b of n cells; ``write``: where each cell's begin, too, ``total`` being before them."""
+        size = (n + SCAN_BLOCKS - 1) // SCAN_BLOCKS
+        for r in range(b * size, ti.min((b + 1) * size, n)):
+            here = self.cell_fill[r]
+            if ti.static(write):
+                self.cell_start[r] = total
+                self.cell_fill[r] = total
+            total += here
+        return total
 
     @ti.kernel
     def keep_lists(self, rest: ti.template(), ledger: ti.template()):
@@ -325,7 +387,10 @@ class Lists:
                             gj -= self.count[NY]
                             mj = -1
                         r = self.rank[self.cell_index(gi, gj, k)]
-                        for _ in range(rest.sets):
+                        for part in range(rest.sets):
+                            if ti.static(rest.on):
+                                if part == 1:
+                                    r = self.place_asleep(r, rest)
                             for j in range(self.cell_start[r], self.cell_start[r + 1]):
                                 own = j >= start and j < end
                                 if j != i and (j > i or not own):
@@ -341,7 +406,6 @@ class Lists:
                                             image = (mi + 1 + 3 * (mj + 1)) << INDEX_BITS
                                             self.list_pair(s, i, j, j | image, rest, ledger)
                                         s += 1
-                            r += self.count[CELLS]
             self.pair_end[i] = ti.min(s, base + self.count[CHUNK_ROOM])
         if s > base + self.count[CHUNK_ROOM]:
             self.problem[None] = ti.Vector([2, s - base])

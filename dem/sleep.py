@@ -149,8 +149,9 @@ class Sleeper:
         frozen = self.frozen()
         owner, who = frozen["owner"].astype(np.int64), frozen["who"].astype(np.int64)
         grains = who >= 0
-        pairs = np.unique(np.sort(np.column_stack([owner, who])[grains], axis=1), axis=0)
-        counts = np.bincount(pairs.ravel(), minlength=n)
+        first, second = owner[grains], who[grains]
+        pairs = np.unique(np.minimum(first, second) * n + np.maximum(first, second))  # kept by both, or by one
+        counts = np.bincount(pairs // n, minlength=n) + np.bincount(pairs % n, minlength=n)
         touches = frozen["slide"][:, 3] != 0  # of a body's rows: what only is near it remembers nothing
         counts += np.bincount(owner[~grains & touches], minlength=n)
         start, end = e.read("pair_start")[: self.awake], e.read("pair_end")[: self.awake]
@@ -189,6 +190,7 @@ class Sleeper:
             "held": rest.held.to_numpy()[: e.chunk_count],
             "numbers": np.array([self.awake, int(e.count[CHUNKS]), self.bed.grain_steps]),
             "reals": np.array([self.mass, self.slept]),
+            "order": np.array([int(rest.begins[None]), int(rest.block[None])]),
         }
         own |= {f"store_{name}": values for name, values in self.frozen().items()}
         return {f"sleep_{name}": values for name, values in own.items()}
@@ -219,4 +221,6 @@ class Sleeper:
             field.fill(0)
         self.mass, self.slept = (float(value) for value in state["sleep_reals"])
         self.awake, _, self.bed.grain_steps = (int(number) for number in state["sleep_numbers"])
+        rest.begins[None], rest.block[None] = (int(number) for number in state.get("sleep_order", (0, 0)))
+        e.find_cells(rest)
         rest.mass[None] = self.mass

@@ -7,12 +7,32 @@ from typing import TYPE_CHECKING, Any
 
 import taichi as ti
 
-from .lists import ALL_CHUNKS, AWAKE, BUILT, CELLS, CHUNKS, GRAINS, INDEX_MASK, NX, NY, NZ, QUEUE
+from .lists import (
+    ALL_CHUNKS,
+    AWAKE,
+    BUILT,
+    CELL_X,
+    CELLS,
+    CHUNKS,
+    GRAINS,
+    INDEX_MASK,
+    NX,
+    NY,
+    NZ,
+    PERIOD_X,
+    QUEUE,
+)
 
 __all__ = ["EVERYONE", "FULL", "LEAVING", "Rest", "Sleepers", "WOKEN"]
 
 # Frozen contacts that there is room for, of a grain: both sides may keep a contact.
 _STORE_ROOM = 8
+# Sleepers lie in the order of the curve from so many blocks of cells behind the bodies on: what wakes and falls asleep
+# there leaves those that come after it in memory where they are. A block is as much of x as the curve does at a time.
+_BEHIND = 2
+_BLOCK = 32
+# Places of the numbers in Rest.near: where bodies are along x, and how far to both sides; below them.
+_MIDDLE, _HALF, _BELOW = range(3)
 # Places of what a look found, in Rest.news.
 WOKEN, LEAVING, FULL = 0, 1, 3  # and lists.BUILT
 
@@ -43,6 +63,7 @@ class Rest:
         self.leaves = ti.field(ti.i32, grains)
         self.quiet = ti.field(ti.i32, grains)  # looks in a row at which it was slow
         self.busy = ti.field(ti.i32, grains)
+        self.cell = ti.field(ti.i32, grains)  # a sleeper's
         self.flagged = ti.field(ti.i32, cells)
         # Of a row of the pair lists whose neighbour sleeps: the spring force that it had when the two were last alike.
         self.force = F(3, real, rows)
@@ -58,6 +79,9 @@ class Rest:
         self.held = F(3, real, chunks)  # force of those awake on sleepers, summed over steps
         self.mass = ti.field(ti.f64, ())  # of the sleepers [kg]
         self.news = ti.field(ti.i32, 4)
+        self.begins = ti.field(ti.i32, ())  # rank of the cell whose sleepers come first in memory
+        self.block = ti.field(ti.i32, ())  # its block along x
+        self.near = ti.field(real, 3)
 
     @ti.func
     def find(self, a, b):
@@ -178,18 +202,21 @@ class Sleepers:
 
         Between ``keep_lists`` and ``sort``: the lists are still those of before.
         """
+        for _ in range(1):
+            self.find_bodies(rest)
         for r in range(self.count[CELLS]):
             rest.flagged[r] = 0
         for k in range(self.count[GRAINS]):
             rest.was[k] = rest.asleep[k]
         for i in range(self.count[AWAKE], self.count[GRAINS]):
             if rest.woken[self.id[i]] == 1:
-                self.flag_around(self.position[i], rest)
+                self.flag_around(rest.cell[self.id[i]], rest)
         for i in range(self.count[AWAKE], self.count[GRAINS]):
             k = self.id[i]
-            ci, cj, ck = self.cell_of(self.position[i])
-            flagged = rest.flagged[self.cell_index(ci, cj, ck)] == 1
-            if flagged or self.close_to_body(i, ti.cast(reach, self.real), shapes):
+            flagged = rest.flagged[rest.cell[k]] == 1
+            if not flagged and self.may_be_close(i, ti.cast(reach, self.real), rest):
+                flagged = self.close_to_body(i, ti.cast(reach, self.real), shapes)
+            if flagged:
                 rest.asleep[k] = 0
                 rest.quiet[k] = 0
         for c in range(self.count[CHUNKS]):
@@ -210,15 +237,60 @@ class Sleepers:
             rest.woken[k] = 0
 
     @ti.func
-    def flag_around(self, x, rest: ti.template()):
-        """Flag the cell of a place and those around it."""
-        ci, cj, ck = self.cell_of(x)
+    def find_bodies(self, rest: ti.template()):
+        """Where the bodies but the floor are along x, and below which height none is: for ``may_be_close``.
+
+        And where sleepers begin in memory: that changes when the bodies have gone two blocks on.
+        """
+        first, last, below = ti.cast(0.0, self.real), ti.cast(0.0, self.real), ti.cast(1e30, self.real)
+        at, period = self.body_position[1].x, self.box[PERIOD_X]
+        for b in range(1, self.body_count[None]):
+            x, extent = self.body_position[b], self.body_extent[b]
+            ahead = x.x - at
+            ahead -= period * ti.round(ahead / period)
+            first = ti.min(first, ahead - extent)
+            last = ti.max(last, ahead + extent)
+            below = ti.min(below, x.z - extent)
+        middle = at + 0.5 * (first + last)
+        middle -= period * ti.floor(middle / period)
+        rest.near[_MIDDLE] = middle
+        rest.near[_HALF] = 0.5 * (last - first)
+        rest.near[_BELOW] = below
+        blocks = self.count[NX] // _BLOCK
+        if self.body_count[None] > 1 and last - first < period and blocks > 2 * _BEHIND:
+            block = ti.floor(middle / self.box[CELL_X], ti.i32) // _BLOCK - _BEHIND
+            block += ti.select(block < 0, blocks, 0)
+            if ti.abs(block - rest.block[None]) > 1:
+                rest.block[None] = block
+                rest.begins[None] = self.rank[self.cell_index(block * _BLOCK, 0, 0)]
+
+    @ti.func
+    def may_be_close(self, i, reach, rest: ti.template()):
+        """False where no body can be within ``reach`` [m] of a grain's surface: most lie beside or below them all."""
+        x = self.position[i]
+        within = 1.01 * (x.w + reach)  # round-off decides nothing
+        ahead = ti.abs(x.x - rest.near[_MIDDLE])
+        ahead = ti.min(ahead, self.box[PERIOD_X] - ahead)
+        return x.z > rest.near[_BELOW] - within and ahead < rest.near[_HALF] + within
+
+    @ti.func
+    def flag_around(self, cell, rest: ti.template()):
+        """Flag a cell and those around it."""
+        row = cell // self.count[NX]
+        ci, cj, ck = cell - row * self.count[NX], row % self.count[NY], row // self.count[NY]
         for dk, dj, di in ti.ndrange((-1, 2), (-1, 2), (-1, 2)):
             k = ck + dk
             if k >= 0 and k < self.count[NZ]:
                 i = (ci + di + self.count[NX]) % self.count[NX]
                 j = (cj + dj + self.count[NY]) % self.count[NY]
                 rest.flagged[self.cell_index(i, j, k)] = 1
+
+    @ti.kernel
+    def find_cells(self, rest: ti.template()):
+        """The cells of the sleepers, of a state that was put back."""
+        for i in range(self.count[AWAKE], self.count[GRAINS]):
+            ci, cj, ck = self.cell_of(self.position[i])
+            rest.cell[self.id[i]] = self.cell_index(ci, cj, ck)
 
     @ti.kernel
     def store_contacts(self, rest: ti.template()):

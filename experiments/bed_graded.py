@@ -15,7 +15,7 @@ from dem.laboratory import Prepared
 from rigid.trajectory import Trajectory
 
 from .spells import spells
-from .tips import tip_angles
+from .tips import tip_angles, tip_depth
 
 __all__ = ["coarsest_touched", "grading_told", "graded_under", "places_touched", "tips_in_ground"]
 
@@ -95,10 +95,9 @@ def places_touched(trajectory: Trajectory, *, reach: float) -> list[tuple[float,
         (from, to) of each stretch [m], ascending, none meeting another.
     """
     trial = trajectory.trial
-    angles = tip_angles(trial, trajectory.theta)
-    x = trajectory.x[:, None] - trial.spike_length * np.sin(angles)
-    height = trajectory.y[:, None] - trial.spike_length * np.cos(angles)
-    low, stretches = height < reach, []
+    count, length = trial.spike_count, trial.spike_length
+    x = trajectory.x[:, None] - length * np.sin(tip_angles(count, trajectory.theta))
+    low, stretches = tip_depth(trajectory.theta, trajectory.y, count=count, length=length) > -reach, []
     for tip in range(trial.spike_count):
         stretches += [(float(x[a:b, tip].min()), float(x[a:b, tip].max())) for a, b in spells(low[:, tip])]
     return merged(stretches)
@@ -163,5 +162,5 @@ def coarsest_touched(run: CoupledTumble, graded: Graded, *, size: Sequence[float
 def tips_in_ground(run: CoupledTumble) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Where tips of a tumble were below the surface: along the motion from its start, and how deep [m], shape [n]."""
     trial, rows, depth = run.trial, run.columns, run.feet[:, 3]
-    x = rows["x"][:, None] - trial.spike_length * np.sin(tip_angles(trial, rows["theta"]))
+    x = rows["x"][:, None] - trial.spike_length * np.sin(tip_angles(trial.spike_count, rows["theta"]))
     return x[depth > 0], depth[depth > 0]

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .runfolder import read_series
+from .tips import tip_angles, tip_depth
 
 __all__ = [
     "ENERGIES", "Moved", "as_quantities", "compared_columns", "deepest", "gap_entries", "gaps", "lasting", "mean_over",
@@ -66,8 +67,10 @@ def read_moved(folder: Path, result: Mapping[str, Any]) -> Moved:
     count = int(result["spike_count"])
     path = folder / "series" / "feet.csv"
     feet = read_series(path) if path.exists() else None
-    angle = math.pi / count + 2 * math.pi / count * np.arange(count) + series["theta_rad"][:, None]
-    depth = trial["spike_length"] * np.cos(angle) - series["y_m"][:, None]
+    angle = tip_angles(count, series["theta_rad"])
+    depth = tip_depth(
+        series["theta_rad"], series["y_m"], count=count, length=trial["spike_length"], radius=_ball_radius(result)
+    )
     sinkage, load = np.maximum(depth, 0.0), None
     notes = []
     effects = bool(result["effects"])
@@ -87,6 +90,12 @@ def read_moved(folder: Path, result: Mapping[str, Any]) -> Moved:
         lift = (trial["mass"] + trial["counterweight"]) * motion["ay_m_s2"] + trial["weight"]
         push = trial["mass"] * motion["ax_m_s2"]
     return Moved(series, motion, count, sinkage, load, lift, push, trial["weight"], notes)
+
+
+def _ball_radius(result: Mapping[str, Any]) -> float:
+    """Of its tips [m]; a result before `tip_radius` was written has it among its effects."""
+    of_effects = (effect["parameters"]["radius"] for effect in result["effects"] if effect["id"] == "tip-radius")
+    return float(result.get("tip_radius", next(of_effects, 0.0)))
 
 
 def compared_columns(first: Moved, second: Moved) -> dict[str, Any]:

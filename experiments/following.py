@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
-from coupling import LeftTheBedError
+from coupling import BedFooting, LeftTheBedError
 from dem import BedFailure
 
 from .progress import Progress
@@ -45,7 +45,7 @@ def follow(
     """
     kept = folder.load_checkpoint(CHECKPOINT)
     if kept is not None:
-        run.restore(kept)
+        _take_up(run, kept)
         progress.message(f"goes on at {run.time:.4g} s")
     drawn = frames(kept is not None)
     progress.stage("tumble", total=1.0)
@@ -81,6 +81,15 @@ def follow(
         raise RuntimeError(f"at {run.time:.4g} s: {error}; {_would_do(error)}; {left}") from error
     folder.save_checkpoint(CHECKPOINT, run.state())
     return found
+
+
+def _take_up(run: Any, kept: Mapping[str, Any]) -> None:
+    """Restore it, but for the bound on overlaps: a checkpoint has the one of the version that made it."""
+    bed = run.footing.bed if isinstance(run.footing, BedFooting) else None
+    limit = None if bed is None else bed.overlap_limit
+    run.restore(kept)
+    if bed is not None and limit is not None:
+        bed.overlap_limit = limit
 
 
 def _would_do(error: RuntimeError) -> str:

@@ -36,7 +36,7 @@ from .reporting import PictureCosts, write_report
 from .run_campaign import SpikeSensors, campaign_of, check_target, place_campaign
 from .runfolder import RunFolder
 from .settings import PenetrateSettings, expected_grain_count
-from .softening import Softening, bearing_gradient, drop_depth, soften_material
+from .softening import Softening, bearing_gradient, check_young, drop_depth, soften_material
 from .stopping import held_back
 from .units import Unit, deepest, expected_time, make_run, make_spike, plan_units, share_done, shown_units
 from .where import check_where
@@ -122,11 +122,7 @@ def _check_young(settings: PenetrateSettings) -> None:
         raise ValueError(
             f"young = {settings.young:g} Pa is more than {settings.material} itself has: at most {most:g} Pa would do"
         )
-    if settings.young < 0.1 * chosen:
-        raise ValueError(
-            f"young = {settings.young:g} Pa is so soft that grains would overlap far past max_overlap = "
-            f"{settings.max_overlap:g}: {chosen:.3g} Pa would do, which is what is chosen without it"
-        )
+    check_young(settings.young, chosen=chosen, max_overlap=settings.max_overlap)
 
 
 def _check_reach(settings: PenetrateSettings) -> None:

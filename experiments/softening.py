@@ -32,7 +32,10 @@ from typing import Any
 
 from dem.timestep import CHAIN
 
-__all__ = ["Softening", "bearing_gradient", "chain", "drop_depth", "run_limit", "soften", "soften_material"]
+__all__ = [
+    "Softening", "bearing_gradient", "chain", "check_young", "drop_depth", "run_limit", "soften", "soften_material",
+    "stable_overlap",
+]  # fmt: skip
 
 RAIN_OVERLAP = 0.05
 """Overlap that a grain may have with the floor at the end of its fall, while the bed is made [of a diameter]."""
@@ -44,6 +47,10 @@ SMALL = 0.05
 a spike fails, and a platform's run at `run_limit`. A run that had more is told so."""
 STIFF, STIFF_CHAIN = 0.01, 7.4
 """Overlap [of a diameter] at and below which a chain of grains carries as much as it does among stiff ones [1]."""
+SOFTEST = 0.1
+"""Of the modulus chosen for `max_overlap`, below which one that is set is refused [1]: grains would overlap by
+10^(2/3) = 4.6 times as much. The estimate has a factor of some 3 to spare in the modulus (`chain`, and depth and speed
+beyond the forecast), and the softest case that ships has half of what is chosen."""
 SOFT = 0.05
 """Overlap at and above which grains share the load: `CHAIN`, as `dem` has it."""
 
@@ -70,35 +77,67 @@ class Softening:
         """Young's modulus [Pa] that would bring this overlap to the one wanted (Hertz: F goes with E overlap^1.5)."""
         return self.young * (overlap / wanted) ** 1.5
 
-    def overlapping(self, overlap: float, bound: float = SMALL) -> str | None:
+    def overlapping(self, overlap: float, bound: float = SMALL, stable: float | None = None) -> str | None:
         """A warning that grains overlapped by more than was meant, with the modulus that would keep it; or None.
 
-        ``bound``: `max_overlap`, which a platform's run may pass (`run_limit`).
+        ``bound``: `max_overlap`, which a platform's run may pass (`run_limit`); ``stable``: `stable_overlap` of it.
         """
         meant = min(bound, SMALL)
         if overlap <= meant:
             return None
         how = "as max_overlap allowed" if overlap <= bound else f"past max_overlap = {100 * bound:g} %"
+        lost = ""
+        if stable is not None and overlap > stable:
+            lost = (
+                f"; past {100 * stable:.3g} % the time step is too long for grains all of whose contacts are there: "
+                f"energy_residual and dissipation_reversal say whether that made energy"
+            )
         return (
             f"the largest overlap was {100 * overlap:.3g} % of a diameter, {how}, where {100 * meant:g} % "
             f"{'are small' if meant == SMALL else 'were meant'}: "
-            f"young = {self.stiffer(overlap, meant):.2g} Pa or more would keep it there"
+            f"young = {self.stiffer(overlap, meant):.2g} Pa or more would keep it there{lost}"
         )
 
 
 def run_limit(max_overlap: float) -> float:
     """Overlap past which a platform's run on a bed made for `max_overlap` ends [of a diameter]: twice it, at most 0.2.
 
-    The step is an eighth of the half-period of contacts at `max_overlap` (`dem.timestep`); the stiffness of one at
-    twice that is sqrt(2) of theirs, of whose half-period it is 1/6.7: a few such contacts are followed safely.
+    The step is chosen for grains all of whose contacts are at `max_overlap` (`dem.timestep`); that holds up to
+    `stable_overlap`, some 1.2 times it. Beyond, single contacts are still followed: at twice the bound the step is
+    1/6.7 of the half-period of a grain on a wall, which is lost at 1/1.6 (`dem.timestep.stable_step`, a pair alone).
+    Whether more than a few were there, and made energy, the books tell (`energy_residual`, `dissipation_reversal`): the
+    result warns.
     """
     return max(max_overlap, min(2 * max_overlap, 0.2))
+
+
+def stable_overlap(material: Any, max_overlap: float) -> float:
+    """Largest overlap [of a diameter] at which the step of a bed made for `max_overlap` is stable for a whole lattice.
+
+    The longest stable step goes with the overlap to the power -1/4 (S_n = 2 E* a, a = sqrt(R* delta)):
+    max_overlap (longest / step)^4, by `dem.timestep.longest_step` and `time_step_for`, whatever the diameter; never
+    below `max_overlap`.
+    """
+    from dem.timestep import longest_step, time_step_for
+
+    of_like_grains = {"diameter": 1.0, "max_overlap": max_overlap}
+    longest, own = longest_step(material, **of_like_grains), time_step_for(material, **of_like_grains)
+    return float(max_overlap * (longest / own) ** 4)
 
 
 def bearing_gradient(bulk_density: float, gravity: float, friction: float) -> float:
     """Growth of the pressure under a flat plate going straight down [Pa/m] (3D-RFT, see the module)."""
     mu = min(0.9, max(0.3, friction))
     return 0.876 * bulk_density * gravity * (894 * mu**3 - 386 * mu**2 + 89 * mu)
+
+
+def check_young(young: float | None, *, chosen: float, max_overlap: float) -> None:
+    """Raise ValueError for a modulus that is set [Pa] and could not hold the bed; `chosen`: what is without it [Pa]."""
+    if young is not None and young < SOFTEST * chosen:
+        raise ValueError(
+            f"young = {young:g} Pa is so soft that grains would overlap far past max_overlap = {max_overlap:g}: "
+            f"{chosen:.3g} Pa would do, which is what is chosen without it"
+        )
 
 
 def drop_depth(speed: float, mass: float, load: float, stiffness: float) -> float:

@@ -23,12 +23,13 @@ from rigid.rig import STANDARD_GRAVITY
 from .bed_box import carried_height
 from .bed_progress import BedProgress
 from .following import follow
+from .kept_platform import keep_platform
 from .lengths import check_lengths
 from .progress import Progress
 from .reporting import write_report
 from .runfolder import RunFolder
 from .settings import expected_grain_count
-from .softening import Softening, run_limit, soften_material
+from .softening import Softening, check_young, run_limit, soften_material
 from .spatial_frames import SpatialFrames
 from .spatial_result import conclude, write_series_of
 from .spatial_settings import SpatialSettings
@@ -77,6 +78,8 @@ def check(settings: SpatialSettings) -> None:
                 f"another lowering_speed (m/s), or a height or velocity at the start, would do"
             ) from error
         _check_bed(settings, plan, forecast, material)
+        chosen = _softness(settings.model_copy(update={"young": None}), plan, forecast).young
+        check_young(settings.young, chosen=chosen, max_overlap=settings.max_overlap)
     else:
         _on_law(settings, plan)
 
@@ -84,7 +87,7 @@ def check(settings: SpatialSettings) -> None:
 def _carry_out(settings: SpatialSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
     """In `folder`, from its checkpoint where there is one; the result."""
     with folder.lock():
-        plan = plan_spatial(settings)
+        plan = plan_spatial(settings, platform_file=keep_platform(settings.platform, folder.path))
         for sentence in (*plan.sentences(), *(f"warning: {warning}" for warning in plan.warnings)):
             progress.message(sentence)
         softening, beside = None, None
@@ -227,6 +230,7 @@ def _softness(settings: SpatialSettings, plan: SpatialPlan, forecast: Forecast) 
         spread=settings.spread, gravity=_grain_gravity(plan), bed_height=settings.bed_size[2],
         depth=1.5 * forecast.deepest, speed=max(1.5 * forecast.fastest, _lowering_speed(settings, plan) or 0.0),
         pressure=load / (math.pi * plan.trial.platform.tip_radius**2), fall=RAIN * settings.bed_size[2],
+        fastest="the fastest tip's speed",
     )  # fmt: skip
 
 

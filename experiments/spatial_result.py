@@ -15,7 +15,7 @@ from hedgebed import __version__
 from rigid.quaternions import to_matrix
 
 from .runfolder import write_series
-from .softening import Softening
+from .softening import Softening, stable_overlap
 from .spatial_settings import SpatialSettings
 from .spatial_trial import SpatialPlan
 from .surfaces import find_surface
@@ -284,7 +284,8 @@ def _add_grains(
     warnings = result["warnings"]
     if reversed_ := reversal_warning(run.dissipation_reversal):
         warnings.append(reversed_)
-    if pressed := softening.overlapping(float(bed.max_overlap), settings.max_overlap):
+    stable = stable_overlap(bed.material, settings.max_overlap)
+    if pressed := softening.overlapping(float(bed.max_overlap), settings.max_overlap, stable):
         warnings.append(pressed)
     across = 2 * plan.trial.platform.tip_radius / settings.grain
     if across < 10:

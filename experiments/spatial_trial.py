@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -40,13 +41,13 @@ class SpatialPlan:
         return defaults_said(self.choices, self.numbers)
 
 
-def plan_spatial(settings: SpatialSettings) -> SpatialPlan:
-    """The trial that `settings` describe.
+def plan_spatial(settings: SpatialSettings, *, platform_file: Path | None = None) -> SpatialPlan:
+    """The trial that `settings` describe. `platform_file` stands in for ``settings.platform``, where that was copied.
 
     Raises ValueError, naming the setting, for a surface or platform there is not, an axis without a wheel, and what
     motor, brake, wheel or rig cannot be.
     """
-    platform = find_platform(settings.platform)
+    platform = find_platform(settings.platform if platform_file is None else platform_file)
     surface = find_surface(settings.surface or DEFAULT_SURFACE)
     length = Number(platform.stance().spike_length, "m", f"platform {settings.platform}")
     moment = Number(platform.moment(), "kg m2", length.origin)

@@ -8,11 +8,11 @@ is a process of its own, so that one that fails or is stopped leaves the others 
 from __future__ import annotations
 
 import functools
-import json
 import re
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -122,18 +122,29 @@ def do_case(case: Case, results: Path, work: Path, *, say: Callable[[str], None]
 
 
 def keep(folder: Path, target: Path) -> None:
-    """Put the settings and the numbers of a finished run where results are kept, and what it cost; result.json last."""
-    target.mkdir(parents=True, exist_ok=True)
-    for name in KEPT:
-        source = folder / name
-        if name == "trajectory.csv":
-            _keep_thinned(source, target / name)
-        elif name != "result.json":
-            shutil.copyfile(source, target / name)
-    cost = json.loads((folder / "status.json").read_text(encoding="utf-8"))
-    write_json(target / "cost.json", {name: cost[name] for name in ("processor_time", "updated")})
-    json.loads((folder / "result.json").read_text(encoding="utf-8"))
-    shutil.copyfile(folder / "result.json", target / "result.json")
+    """Put the settings and the numbers of a finished run where results are kept, and what it cost.
+
+    All or nothing: what is kept is put together beside `target` and renamed; result.json, by which a case is done, is
+    last where `target` is there already. cost.json has null for what an older run's status.json does not say.
+    """
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as beside:
+        made = Path(beside) / target.name
+        made.mkdir()
+        for name in KEPT:
+            if name == "trajectory.csv":
+                _keep_thinned(folder / name, made / name)
+            else:
+                shutil.copyfile(folder / name, made / name)
+        read_json(made / "result.json")
+        cost = read_json(folder / "status.json")
+        write_json(made / "cost.json", {name: cost.get(name) for name in ("processor_time", "updated")})
+        if not target.exists():
+            made.rename(target)
+            return
+        (target / "result.json").unlink(missing_ok=True)
+        for path in sorted(made.iterdir(), key=lambda path: path.name == "result.json"):
+            path.replace(target / path.name)
 
 
 def _keep_thinned(source: Path, target: Path) -> None:

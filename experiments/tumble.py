@@ -17,12 +17,13 @@ from rigid.planar import PAPER_STEP, check_step, simulate
 from rigid.trajectory import Trajectory
 
 from .campaign import read_model
+from .kept_platform import keep_platform
 from .progress import Progress
 from .reporting import write_report
 from .runfolder import RunFolder, write_series
 from .synthesis import check_tumble_campaign, write_tumble_campaign
-from .tips import tip_angles
-from .tumble_platform import torque_within_limit
+from .tips import ball_radius, tip_depth
+from .tumble_platform import PlatformNumbers, platform_numbers, torque_within_limit
 from .tumble_settings import TumbleSettings
 from .tumble_sweep import check_sweep, middle_of_sweep, run_sweep
 from .tumble_trial import TumblePlan, plan_tumble
@@ -95,7 +96,9 @@ def quantities_of(trajectory: Trajectory) -> dict[str, dict[str, Any]]:
 def _tip_sinkage(trajectory: Trajectory) -> dict[str, dict[str, Any]]:
     """How deep the rows' tips go below the undisturbed surface: on a law its compression there."""
     trial = trajectory.trial
-    tips = trial.spike_length * np.cos(tip_angles(trial, trajectory.theta)) - trajectory.y[:, None]
+    tips = tip_depth(
+        trajectory.theta, trajectory.y, count=trial.spike_count, length=trial.spike_length, radius=ball_radius(trial)
+    )
     sinkage = np.maximum(tips, 0.0)
     start = "of the two rows it stands on, mean, when the torque begins"
     return {
@@ -140,7 +143,9 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
         return tumble_on_grains(settings, folder, progress)
     with folder.lock():
         copied = _keep_model(settings, folder)
-        plan = plan_tumble(middle_of_sweep(settings, model_file=copied), model_file=copied)
+        platform = platform_numbers(settings.platform, file=keep_platform(settings.platform, folder.path))
+        middle = middle_of_sweep(settings, model_file=copied, platform=platform)
+        plan = plan_tumble(middle, model_file=copied, platform=platform)
         for sentence in plan.sentences():
             progress.message(sentence)
         for warning in plan.warnings:
@@ -167,7 +172,7 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
         if settings.sweep:
             progress.message("the numbers above are those of one trial of the sweep, in its middle or nearest to it")
             progress.stage("sweep")
-            _add_sweep(result, settings, folder, copied)
+            _add_sweep(result, settings, folder, copied, platform)
         made = write_tumble_campaign(settings, plan, folder.path, progress)
         result |= {"campaign": made} if made is not None else {}
         folder.write_result(result)
@@ -191,9 +196,11 @@ def _step_through_master(
     return trajectory, run.body.wheel_at_limit, quantities, besides, warnings
 
 
-def _add_sweep(result: dict[str, Any], settings: TumbleSettings, folder: RunFolder, model: Path | None) -> None:
+def _add_sweep(
+    result: dict[str, Any], settings: TumbleSettings, folder: RunFolder, model: Path | None, platform: PlatformNumbers
+) -> None:
     """Integrate the sweep and put what came out beside the trial in its middle."""
-    swept = run_sweep(settings, folder, model_file=model)
+    swept = run_sweep(settings, folder, model_file=model, platform=platform)
     result["departures"]["sentences"] += swept["sweep"]["sentences"]
     result["title"] += ", one trial of a sweep of " + " and ".join(settings.sweep)
     result |= swept
@@ -271,6 +278,7 @@ def result_of(settings: TumbleSettings, plan: TumblePlan, trajectory: Trajectory
         "method": trajectory.method,
         "duration": settings.duration,
         "spike_count": trial.spike_count,
+        "tip_radius": ball_radius(trial),
         "effects": [{"id": effect.id, "parameters": dict(effect.values)} for effect in trial.effects],
         "wheel_at_limit": full,
         "transitions": [

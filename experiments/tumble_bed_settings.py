@@ -39,7 +39,7 @@ class GrainsSettings(StrictSettings):
     )
     max_overlap: float = Field(
         0.05, gt=0, le=0.2,
-        description="On a bed: overlap over diameter that the step is chosen for [1]; past twice it a run ends.",
+        description="On a bed: overlap over diameter that the step is made for [1]; past twice it, or 0.2, a run ends.",
     )  # fmt: skip
     spike_friction: NotNegative = Field(0.5, description="On a bed: friction of spike and grains [1].")
     spike_restitution: float = Field(0.5, ge=0.01, le=1, description="On a bed: restitution of spike and grains [1].")

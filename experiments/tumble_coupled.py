@@ -13,7 +13,7 @@ import numpy as np
 
 from coupling import CoupledTumble, LawFooting
 
-from .tips import tip_angles
+from .tips import tip_depth
 from .tumble_settings import TumbleSettings
 from .tumble_steppers import own_quantities, stepper_of
 from .tumble_trial import TumblePlan
@@ -101,8 +101,8 @@ def law_feet(run: CoupledTumble) -> tuple[np.ndarray, np.ndarray]:
     The load is the mean over the step before; at the start, before any, it is what the spring carries at rest.
     """
     rows, trial = run.columns, run.trial
-    angles = tip_angles(trial, rows["theta"])
-    sinkage = np.maximum(0.0, trial.spike_length * np.cos(angles) - rows["y"][:, None])
+    depth = tip_depth(rows["theta"], rows["y"], count=trial.spike_count, length=trial.spike_length)
+    sinkage = np.maximum(0.0, depth)
     normal = run.feet[:, 0].copy()
     normal[0] = trial.stiffness * sinkage[0]
     return sinkage, normal

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,15 +27,16 @@ from .bed_graded import graded_under
 from .bed_progress import BedProgress
 from .bed_staged import check_bed_stages, packing_warning, staged_bed
 from .following import CHECKPOINT, follow
+from .kept_platform import keep_platform
 from .lengths import check_lengths
 from .progress import Progress
 from .reporting import write_report
 from .runfolder import RunFolder
 from .settings import expected_grain_count
-from .softening import Softening, run_limit, soften_material
+from .softening import Softening, check_young, run_limit, soften_material
 from .stopping import held_back
 from .surfaces import find_surface, surface_names
-from .tips import tip_angles
+from .tips import tip_angles, tip_depth
 from .tumble_flight import lies_in_flight
 from .tumble_grains_frames import TumbleFrames
 from .tumble_grains_result import conclude, sinkage_start, write_trajectory
@@ -69,6 +71,8 @@ HULL_SHARE = 0.95
 class Forecast:
     """The same trial on the spring-damper, and what it says of the bed."""
 
+    plan: TumblePlan
+    """What it is of."""
     trajectory: Trajectory
     full: float | None
     """When the wheel comes to its limit [s]."""
@@ -95,13 +99,16 @@ def check_on_grains(settings: TumbleSettings) -> None:
     material = _material(plan)
     _members(settings, plan)
     check_where(arch=settings.arch, threads=settings.threads)
-    _check_bed(settings, _forecast(settings, plan), material)
+    forecast = _forecast(settings, plan)
+    _check_bed(settings, forecast, material)
+    chosen = _softness(settings.model_copy(update={"young": None}), plan, forecast).young
+    check_young(settings.young, chosen=chosen, max_overlap=settings.max_overlap)
 
 
 def tumble_on_grains(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
     """Carry it out in `folder`, from its checkpoint where there is one; the result."""
     with folder.lock():
-        plan = _plan(settings)
+        plan = _plan(settings, keep_platform(settings.platform, folder.path))
         unlike = packing_warning(find_surface(plan.surface), _material(plan), settings.bed_stages)
         warnings = [*plan.warnings, *([unlike] if unlike else [])]
         forecast = _forecast(settings, plan)
@@ -111,7 +118,7 @@ def tumble_on_grains(settings: TumbleSettings, folder: RunFolder, progress: Prog
             lowering_speed=_lowering_speed(settings, plan),
         ):  # fmt: skip
             progress.message(sentence)
-        spikes = _whose_spikes(settings)
+        spikes = _whose_spikes(settings, plan)
         short = short_of_way(settings, plan, forecast.trajectory)
         for said in (*warnings, short, _may_leave(settings, forecast), spikes):
             if said:
@@ -140,10 +147,14 @@ def tumble_on_grains(settings: TumbleSettings, folder: RunFolder, progress: Prog
 # Before it -----------------------------------------------------------------------------------------------------------
 
 
-def _plan(settings: TumbleSettings) -> TumblePlan:
-    """The numbers of the trial: those of the spring-damper, of which grains take all but K, C and friction."""
-    spikes = spikes_of(settings)
-    plan = plan_tumble(_beside(settings), spike_diameter=spikes.diameter)
+def _plan(settings: TumbleSettings, platform_file: Path | None = None) -> TumblePlan:
+    """The numbers of the trial: those of the spring-damper, of which grains take all but K, C and friction.
+
+    `platform_file` stands in for ``settings.platform``, where that was copied.
+    """
+    platform = platform_numbers(settings.platform, file=platform_file)
+    spikes = spikes_of(settings, platform)
+    plan = plan_tumble(_beside(settings), platform=platform, spikes=spikes)
     own = {"spike_diameter": spikes.diameter, "spike_clear": spikes.clear}
     check_lengths(settings, plan.trial.spike_length, **own)
     return plan
@@ -196,16 +207,16 @@ def _forecast(settings: TumbleSettings, plan: TumblePlan) -> Forecast:
             max_wheel_speed=plan.max_wheel_speed,
         )  # fmt: skip
         found, trial, full = run.run(), plan.trial, run.body.wheel_at_limit
-    angles = tip_angles(trial, found.theta)
+    angles = tip_angles(trial.spike_count, found.theta)
     tips_x = found.x[:, None] - trial.spike_length * np.sin(angles)
-    depth = trial.spike_length * np.cos(angles) - found.y[:, None]
-    near = depth > -0.5 * spikes_of(settings).diameter
+    depth = tip_depth(found.theta, found.y, count=trial.spike_count, length=trial.spike_length)
+    near = depth > -0.5 * plan.spikes.diameter
     speed = np.hypot(
         found.vx[:, None] - found.omega[:, None] * trial.spike_length * np.cos(angles),
         found.vy[:, None] + found.omega[:, None] * trial.spike_length * np.sin(angles),
     )
     forecast = Forecast(
-        found, full, float(tips_x[near].min()), float(tips_x[near].max()), float(depth.max()),
+        plan, found, full, float(tips_x[near].min()), float(tips_x[near].max()), float(depth.max()),
         float(speed[near].max()), sunk=float(depth[0].max()),
         farthest=max(float(tips_x[near].max()), _rolled(settings, plan, float(depth.max()))),
     )  # fmt: skip
@@ -233,7 +244,7 @@ def _in_flight(settings: TumbleSettings, plan: TumblePlan, law: Forecast) -> For
     """What the spring-damper, with its one K for any gravity, cannot know (`experiments.tumble_flight`)."""
     trial = plan.trial
     lying = lies_in_flight(
-        trial, surface=plan.surface, material=_material(plan), hull_radius=_hull_radius(settings, trial),
+        trial, surface=plan.surface, material=_material(plan), hull_radius=_hull_radius(plan),
         width=COPIES * settings.bed_size[1], duration=settings.duration, max_wheel_speed=plan.max_wheel_speed,
     )  # fmt: skip
     pushed = 0.5 * trial.gravity_sim * settings.duration**2  # by sand that pushes ahead with the weight, as at 1e-2 g
@@ -264,7 +275,7 @@ def _thrown(settings: TumbleSettings, plan: TumblePlan, forecast: Forecast) -> f
 
 
 def _check_bed(settings: TumbleSettings, forecast: Forecast, material: Material) -> None:
-    spike, (piece, width, depth) = spikes_of(settings).diameter, settings.bed_size
+    spike, (piece, width, depth) = forecast.plan.spikes.diameter, settings.bed_size
     length, repeats = settings.bed_length, settings.bed_repeats
     margin = MARGIN * spike
     need = forecast.ahead - forecast.behind + 2 * margin
@@ -324,9 +335,9 @@ def _length_on_grains(forecast: Forecast, margin: float) -> float:
     return 2 * (forecast.farthest + margin) - forecast.behind - forecast.ahead
 
 
-def _whose_spikes(settings: TumbleSettings) -> str | None:
+def _whose_spikes(settings: TumbleSettings, plan: TumblePlan) -> str | None:
     """That a body of another size than the platform's stands on the platform's spikes, in words."""
-    spikes, own = spikes_of(settings), platform_numbers(settings.platform).spike_length
+    spikes, own = plan.spikes, plan.platform.spike_length
     if not spikes.of_platform or settings.spike_length is None or math.isclose(settings.spike_length, own):
         return None
     return (
@@ -338,7 +349,7 @@ def _whose_spikes(settings: TumbleSettings) -> str | None:
 
 def _may_leave(settings: TumbleSettings, forecast: Forecast) -> str | None:
     """That tips may come down beyond the bed before the end, in words; None where they cannot."""
-    ahead, spike = settings.bed_length - _origin(settings, forecast), spikes_of(settings).diameter
+    ahead, spike = settings.bed_length - _origin(settings, forecast), forecast.plan.spikes.diameter
     if ahead >= forecast.farthest + 0.5 * spike:
         return None
     long = _length_on_grains(forecast, MARGIN * spike) + 2 * abs(settings.place)
@@ -371,7 +382,7 @@ def _graded(settings: TumbleSettings, forecast: Forecast) -> Graded | None:
     """Fine grains where the forecast's tips come down, two spikes' diameters deeper than they go; None: one size."""
     if settings.coarse is None:
         return None
-    spike = spikes_of(settings).diameter
+    spike = forecast.plan.spikes.diameter
     return graded_under(
         forecast.trajectory, length=settings.bed_size[0], origin=_origin(settings, forecast),
         spike_diameter=spike, grain=settings.grain, spread=settings.spread, coarse=settings.coarse,
@@ -391,8 +402,9 @@ def _softness(settings: TumbleSettings, plan: TumblePlan, forecast: Forecast) ->
         bed_height=settings.bed_size[2],
         depth=forecast.margin * forecast.deepest,
         speed=max(forecast.margin * forecast.fastest, _lowering_speed(settings, plan)),
-        pressure=plan.trial.weight / COPIES / (0.25 * math.pi * spikes_of(settings).diameter ** 2),
+        pressure=plan.trial.weight / COPIES / (0.25 * math.pi * plan.spikes.diameter**2),
         fall=RAIN * settings.bed_size[2],
+        fastest="the fastest tip's speed",
     )
 
 
@@ -421,7 +433,7 @@ def _prepare(
 
 
 def _repeated_told(settings: TumbleSettings, forecast: Forecast, bed: Bed) -> str:
-    piece, way = settings.bed_size[0], forecast.ahead - forecast.behind + spikes_of(settings).diameter
+    piece, way = settings.bed_size[0], forecast.ahead - forecast.behind + forecast.plan.spikes.diameter
     said = f"bed laid end to end {settings.bed_repeats} times: {bed.grain_count} grains, the same every {piece:g} m"
     if way <= piece:
         return said
@@ -429,16 +441,17 @@ def _repeated_told(settings: TumbleSettings, forecast: Forecast, bed: Bed) -> st
 
 
 def _members(settings: TumbleSettings, plan: TumblePlan) -> list[Any]:
-    trial, spikes = plan.trial, spikes_of(settings)
+    trial, spikes = plan.trial, plan.spikes
     return platform_members(
         spike_length=trial.spike_length, count=trial.spike_count, diameter=spikes.diameter, clear=spikes.clear,
-        hull_radius=_hull_radius(settings, trial), width=settings.bed_size[1],
+        hull_radius=_hull_radius(plan), width=settings.bed_size[1],
     )  # fmt: skip
 
 
-def _hull_radius(settings: TumbleSettings, trial: Trial) -> float:
+def _hull_radius(plan: TumblePlan) -> float:
     """Of the cylinder that stands for the hull [m]."""
-    sides = (trial.spike_length - spikes_of(settings).clear) * math.cos(math.pi / trial.spike_count)
+    trial = plan.trial
+    sides = (trial.spike_length - plan.spikes.clear) * math.cos(math.pi / trial.spike_count)
     return HULL_SHARE * max(sides, 0.0)
 
 
@@ -457,7 +470,7 @@ def _stepper(settings: TumbleSettings, plan: TumblePlan, bed: Bed, forecast: For
     return stepper_of(
         settings, plan.trial, footing, **lowered, duration=settings.duration, substeps=settings.substeps,
         body_steps=settings.body_steps, extrapolation=settings.extrapolation, iterations=settings.iterations,
-        tip_radius=0.5 * spikes_of(settings).diameter, lowering_speed=_lowering_speed(settings, plan),
+        tip_radius=0.5 * plan.spikes.diameter, lowering_speed=_lowering_speed(settings, plan),
         max_wheel_speed=plan.max_wheel_speed,
     )  # fmt: skip
 

@@ -16,9 +16,8 @@ from vis.tumble_beside import HEAD, beside_rows, beside_words
 
 from .bed_graded import coarsest_touched, tips_in_ground
 from .runfolder import RunFolder, write_series
-from .softening import Softening
+from .softening import Softening, stable_overlap
 from .surfaces import find_surface
-from .tumble_platform import spikes_of
 from .tumble_settings import TumbleSettings
 from .tumble_steppers import own_quantities, own_warning, words
 from .tumble_trial import TumblePlan
@@ -70,7 +69,7 @@ def conclude(
     write_series(folder.path / "series" / "spring-damper.csv", trajectory_columns(beside))
     result = result_of(settings, plan, series, run.body.wheel_at_limit)
     bed, books = run.footing.bed, run.master.books  # type: ignore[attr-defined]
-    spikes = spikes_of(settings)
+    spikes = plan.spikes
     result["title"] = words(settings, f"A tumble on a bed of {plan.surface}: {result['title'].partition(': ')[2]}")
     result["code"] = fingerprint()
     added, tables = own_quantities(run, run.feet[:, 3], run.feet[:, 0])
@@ -111,9 +110,10 @@ def conclude(
     if reversed_ := reversal_warning(run.dissipation_reversal):
         result["warnings"].append(reversed_)
     result["warnings"] += [said for said in (unsettled_warning(run.master), own_warning(run)) if said]
-    if pressed := softening.overlapping(float(bed.max_overlap), settings.max_overlap):
+    stable = stable_overlap(bed.material, settings.max_overlap)
+    if pressed := softening.overlapping(float(bed.max_overlap), settings.max_overlap, stable):
         result["warnings"].append(pressed)
-    if met_again := _same_sand_again(settings, run):
+    if met_again := _same_sand_again(settings, run, spikes.diameter):
         result["warnings"].append(met_again)
     coarsest = settings.grain
     if graded is not None:
@@ -155,11 +155,11 @@ def sinkage_start(run: CoupledTumble) -> float:
     return float(run.feet[0, 3, [0, -1]].mean())
 
 
-def _same_sand_again(settings: TumbleSettings, run: CoupledTumble) -> str | None:
-    """Where the platform's way on a bed of copies is longer than one of them, in words."""
+def _same_sand_again(settings: TumbleSettings, run: CoupledTumble, spike: float) -> str | None:
+    """Where the platform's way on a bed of copies is longer than one of them, in words; `spike`: its diameter [m]."""
     if settings.bed_repeats == 1:
         return None
-    piece, spike = settings.bed_size[0], spikes_of(settings).diameter
+    piece = settings.bed_size[0]
     x, _ = tips_in_ground(run)
     way = float(np.ptp(x)) + spike if len(x) else 0.0
     if way <= piece:

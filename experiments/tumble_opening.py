@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from rigid.planar import simulate
 from rigid.trajectory import LAUNCH_DISTANCE, Trajectory
 
 from .softening import Softening
-from .tumble_platform import spikes_of, torque_within_limit
+from .tumble_platform import torque_within_limit
 from .tumble_settings import TumbleSettings
 from .tumble_steppers import is_plain
 
@@ -23,6 +24,8 @@ __all__ = ["opening", "short_of_way"]
 
 LONGER = (2.0, 4.0, 8.0)
 """Times the duration for which the spring-damper is followed until it is LAUNCH_DISTANCE away [1]."""
+STRONGER = (2.0, 4.0, 8.0)
+"""Times the wheel's speed, or the torque, of a brake that does not bring the platform that far [1]."""
 
 
 def opening(
@@ -42,7 +45,7 @@ def opening(
             continue
         told.add(name)
         numbers.setdefault(number.origin, []).append(f"{name} = {number.value:.6g}{_unit(number.unit)}")
-    spikes = spikes_of(settings)
+    spikes = plan.spikes
     for name, length in (("spike_diameter", spikes.diameter), ("spike_clear", spikes.clear)):
         if name in spikes.of_platform:
             told.add(name)
@@ -86,7 +89,29 @@ def short_of_way(settings: TumbleSettings, plan: TumblePlan, law: Trajectory) ->
             return (
                 f"{said}; duration = {math.ceil(100 * when) / 100:g} s would do there, and on grains it may take longer"
             )
-    return f"{said}, nor in {LONGER[-1] * settings.duration:g} s there; a larger torque would do"
+    longest = LONGER[-1] * settings.duration
+    stronger = _stronger_brake(plan, longest) if plan.trial.actuator == "brake" else "a larger torque would do"
+    return f"{said}, nor in {longest:g} s there; {stronger}"
+
+
+def _stronger_brake(plan: TumblePlan, duration: float) -> str:
+    """What would bring it LAUNCH_DISTANCE away on the spring-damper, in words.
+
+    A brake gives J_w wheel_speed_0 and no more, however long it lasts, and may be too weak to tip it over: the wheel's
+    speed, within its limit, is tried alone, then the torque, then both.
+    """
+    trial = plan.trial
+    for times in STRONGER:
+        for names in (("wheel_speed_0",), ("torque",), ("wheel_speed_0", "torque")):
+            changed: dict[str, Any] = {name: float(f"{times * getattr(trial, name):.3g}") for name in names}
+            if changed.get("wheel_speed_0", 0.0) > plan.max_wheel_speed:
+                continue
+            found = simulate(replace(trial, **changed), duration=duration, sample_interval=min(1e-3, duration))
+            if found.trajectory_angle is not None:
+                units = {"wheel_speed_0": "rad/s", "torque": "N m"}
+                said = (f"{name} = {value:g} {units[name]}" for name, value in changed.items())
+                return f"{' with '.join(said)} would do in that time"
+    return "a much faster wheel (wheel_speed_0) with a larger torque would do"
 
 
 def _away(trajectory: Trajectory) -> Any:

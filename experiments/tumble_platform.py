@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -53,13 +54,13 @@ class PlatformNumbers:
         return self.motor_torque
 
 
-def platform_numbers(name: str, *, in_plane: bool = True) -> PlatformNumbers:
-    """The numbers of a platform that ships, by name, or of the TOML file `name`.
+def platform_numbers(name: str, *, file: Path | None = None, in_plane: bool = True) -> PlatformNumbers:
+    """The numbers of a platform that ships, by name, or of the TOML file `name`; `file` stands in for a copied one.
 
     Raises ValueError for one there is not and, unless `in_plane` is false, for one that is no regular polygon seen from
     the side.
     """
-    platform = find_platform(name)
+    platform = find_platform(name if file is None else file)
     wheel, stance = platform.wheel(), platform.stance()
     try:
         count: int | None = _spike_count(name, platform)
@@ -95,8 +96,8 @@ class Spikes:
     """Which of the two were not given, and are the platform's: by the settings' names."""
 
 
-def spikes_of(settings: TumbleSettings) -> Spikes:
-    """The spikes of a tumble on grains: as given, else those of the platform's file.
+def spikes_of(settings: TumbleSettings, own: PlatformNumbers) -> Spikes:
+    """The spikes of a tumble on grains: as given, else those of the platform, `own`.
 
     In the plane a spike stands as long as it is, also where it leans sideways. Raises ValueError, naming the setting,
     for a platform without spikes.
@@ -104,14 +105,12 @@ def spikes_of(settings: TumbleSettings) -> Spikes:
     given = {name: getattr(settings, name) for name in ("spike_diameter", "spike_clear")}
     lacking = tuple(name for name, value in given.items() if value is None)
     if lacking:
-        own = find_platform(settings.platform)
-        if own.tip_radius == 0:
+        if own.spike_diameter == 0:
             raise ValueError(
                 f"platform = {settings.platform!r} has no [spikes], which grains are to meet: {' and '.join(lacking)} "
                 f"(in m) must be given"
             )
-        of_file = {"spike_diameter": 2 * own.tip_radius, "spike_clear": own.spike_clear}
-        given |= {name: of_file[name] for name in lacking}
+        given |= {name: getattr(own, name) for name in lacking}
     return Spikes(given["spike_diameter"], given["spike_clear"], lacking)
 
 

@@ -24,7 +24,7 @@ from rigid.trial import Trial
 
 from .runfolder import RunFolder, write_series
 from .sweep_ranges import SweepRange, parse_sweep, unit_of
-from .tumble_platform import torque_within_limit
+from .tumble_platform import PlatformNumbers, torque_within_limit
 from .tumble_settings import TumbleSettings
 from .tumble_trial import plan_tumble
 
@@ -61,15 +61,18 @@ class _Point:
     """[rad/s]."""
 
 
-def middle_of_sweep(settings: TumbleSettings, *, model_file: Path | None = None) -> TumbleSettings:
+def middle_of_sweep(
+    settings: TumbleSettings, *, model_file: Path | None = None, platform: PlatformNumbers | None = None
+) -> TumbleSettings:
     """The settings of the trial in the middle that can stand, or nearest to it; `settings` themselves without a sweep.
 
-    `model_file` stands in for ``settings.model``, where that was copied. Raises ValueError where no trial can stand.
+    `model_file` stands in for ``settings.model``, where that was copied, `platform` for ``settings.platform``, where
+    that was read. Raises ValueError where no trial can stand.
     """
     ranges = parse_sweep(settings.sweep)
     if not ranges:
         return settings
-    points = _plan(settings, model_file=model_file)
+    points = _plan(settings, model_file=model_file, platform=platform)
     return _at(settings, ranges, points[_shown(ranges, points)].values)
 
 
@@ -82,12 +85,19 @@ def check_sweep(settings: TumbleSettings) -> None:
     _plan(settings)
 
 
-def run_sweep(settings: TumbleSettings, folder: RunFolder, *, model_file: Path | None = None) -> dict[str, Any]:
+def run_sweep(
+    settings: TumbleSettings,
+    folder: RunFolder,
+    *,
+    model_file: Path | None = None,
+    platform: PlatformNumbers | None = None,
+) -> dict[str, Any]:
     """Integrate the sweep, write sweep.csv and return what result.json says of it.
 
-    `model_file` stands in for ``settings.model``, where that was copied.
+    `model_file` and `platform` as `middle_of_sweep` takes them.
     """
-    ranges, points = parse_sweep(settings.sweep), _plan(settings, model_file=model_file)
+    ranges = parse_sweep(settings.sweep)
+    points = _plan(settings, model_file=model_file, platform=platform)
     corners = _corners(ranges)
     time_step = min(PAPER_STEP, *(0.999 * longest_step(points[place].trial) for place in corners))
     batch = _batch(points, duration=settings.duration, time_step=time_step)
@@ -126,13 +136,15 @@ def run_sweep(settings: TumbleSettings, folder: RunFolder, *, model_file: Path |
 # Its trials -----------------------------------------------------------------------------------------------------------
 
 
-def _plan(settings: TumbleSettings, *, model_file: Path | None = None) -> list[_Point]:
+def _plan(
+    settings: TumbleSettings, *, model_file: Path | None = None, platform: PlatformNumbers | None = None
+) -> list[_Point]:
     """Every trial, the last key running fastest."""
     ranges = parse_sweep(settings.sweep)
     points = []
     for values in itertools.product(*(each.values for each in ranges)):
         try:
-            plan = plan_tumble(_at(settings, ranges, values), model_file=model_file)
+            plan = plan_tumble(_at(settings, ranges, values), model_file=model_file, platform=platform)
         except ValueError as error:
             where = ", ".join(f"{each.key} = {value:g}" for each, value in zip(ranges, values, strict=True))
             raise ValueError(f"sweep: at {where}: {_plain(error)}") from None

@@ -29,7 +29,7 @@ from .settled import (
     settle_platform,
     settle_surface,
 )
-from .tumble_platform import platform_numbers
+from .tumble_platform import PlatformNumbers, Spikes, platform_numbers
 from .tumble_settings import TumbleSettings
 
 __all__ = ["DEFAULT_RIG", "TumblePlan", "model_trial", "plan_tumble"]
@@ -52,6 +52,10 @@ class TumblePlan:
     """Name of the material."""
     choices: Mapping[str, str]
     """What else was left at its default: name -> value, as a person would type it."""
+    platform: PlatformNumbers
+    """What gives the numbers that nothing else gives."""
+    spikes: Spikes
+    """What grains meet of its spikes."""
     warnings: tuple[str, ...] = ()
     max_wheel_speed: float = math.inf
     """Where a motor's torque ends [rad/s]."""
@@ -62,10 +66,14 @@ class TumblePlan:
 
 
 def plan_tumble(
-    settings: TumbleSettings, *, model_file: Path | None = None, spike_diameter: float | None = None
+    settings: TumbleSettings,
+    *,
+    model_file: Path | None = None,
+    platform: PlatformNumbers | None = None,
+    spikes: Spikes | None = None,
 ) -> TumblePlan:
-    """The trial that `settings` describe. `model_file` stands in for ``settings.model``, where that was copied, and
-    `spike_diameter` [m] for the platform's.
+    """The trial that `settings` describe. `model_file` stands in for ``settings.model``, where that was copied,
+    `platform` for ``settings.platform``, where that was read, and `spikes` for the platform's.
 
     Raises ValueError, naming the setting, for a surface, law, effect or parameter there is not, a model that cannot be
     read, and numbers that no platform or rig can have.
@@ -73,7 +81,7 @@ def plan_tumble(
     source = model_file if model_file is not None else Path(settings.model) if settings.model is not None else None
     model = _read(source) if source is not None else None
     numbers = Settled(settings)
-    platform = platform_numbers(settings.platform)
+    platform = platform_numbers(settings.platform) if platform is None else platform
     settle_platform(numbers, platform, model=model)
     check_spike_length(numbers)
     surface, warnings = settle_surface(numbers, settings.surface, model=model)
@@ -91,9 +99,9 @@ def plan_tumble(
     warnings += check_body(numbers, platform) if model is None else []
     ground = _ground(settings)
     if ground is None:
-        spike = platform.spike_diameter if spike_diameter is None else spike_diameter
-        whose = f"platform {platform.name}" if spike_diameter is None else "this run"
-        warnings += of_other_spikes(numbers, surface, diameter=spike, whose=whose)
+        diameter = platform.spike_diameter if spikes is None else spikes.diameter
+        whose = f"platform {platform.name}" if spikes is None else "this run"
+        warnings += of_other_spikes(numbers, surface, diameter=diameter, whose=whose)
     assert platform.spike_count is not None  # or it would have been refused
     trial = Trial(
         **values,
@@ -113,7 +121,9 @@ def plan_tumble(
     numbers["spike_count"] = Number(trial.spike_count, "1", rows)
     warnings += _rig_warnings(trial)
     choices = _choices(settings, surface, model)
-    return TumblePlan(trial, numbers, surface, choices, tuple(warnings), numbers.value("max_wheel_speed"))
+    spikes = spikes or Spikes(platform.spike_diameter, platform.spike_clear, ("spike_diameter", "spike_clear"))
+    limit = numbers.value("max_wheel_speed")
+    return TumblePlan(trial, numbers, surface, choices, platform, spikes, tuple(warnings), limit)
 
 
 def _choices(settings: TumbleSettings, surface: str, model: TumbleModel | None) -> dict[str, str]:

@@ -183,13 +183,19 @@ def _candidates(said: Mapping[str, Any]) -> list[str]:
     return [*sentences, *_why_unknown(said)]
 
 
+_LOST = 100.0
+"""A standard error over the value itself [1] past which it is none: the curvature there is round-off."""
+
+
 def _numbers(leading: Mapping[str, Any]) -> list[str]:
     """The parameters of names that are not certain, which stand in no table."""
     parts = []
     for effect, parameters in leading.get("parameters", {}).items():
         for name, told in parameters.items() if effect not in leading["certain"] else ():
             error = f" +- {told['std']:.2g}" if told["std"] > 0 else ""
-            parts.append(f"{effect} {name} {told['value']:.4g}{error} {told['unit']}".removesuffix(" 1"))
+            lost = told["std"] > _LOST * abs(told["value"]) > 0  # nothing that was seen changes with it there
+            value = f"{effect} {name} {told['value']:.4g}{'' if lost else error} {told['unit']}".removesuffix(" 1")
+            parts.append(f"{value} (no standard error: a little more or less of it changes nothing)" if lost else value)
     return [f"Its numbers, should it be that: {', '.join(parts)}."] if parts else []
 
 

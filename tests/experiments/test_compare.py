@@ -1,6 +1,7 @@
 """`hedgebed compare` and `hedgebed render`: two tumbles in one report, what is refused, pictures made again."""
 
 import json
+import math
 import os
 import re
 import shutil
@@ -85,6 +86,26 @@ def test_a_spring_damper_s_sinkage_is_its_compression_below_the_undisturbed_surf
     assert [row["row"] for row in found["rows"]] == [0, 7]
     deepest = rows["sinkage_largest"]["second"]
     assert max(row["second"] for row in found["rows"]) == pytest.approx(deepest)
+
+
+@pytest.mark.parametrize("effects", [("tip-radius.radius=0.006",), ("tip-radius.radius=0.006", "slope.angle=0.05")])
+def test_ball_tips_sink_in_as_deep_as_points_on_a_slope_too(effects, tmp_path, monkeypatch):
+    """Each of two rows bears half of W cos(slope), so their mean depth is W cos(slope) / 2K: of a ball's lowest point,
+    (l - r) cos a + r - y. Read from the folder, of today's result and of an older one, it is the same."""
+    monkeypatch.setattr("experiments.tumble.write_report", lambda folder, progress: None)
+    run = tmp_path / "run"
+    given = [word for effect in effects for word in ("--effects", effect)]
+    assert main(["tumble", "--rig", "0.0085", *given, "--duration", "0.02", "--quiet", "--out", str(run)]) == 0
+    result = json.loads((run / "result.json").read_text())
+    trial = {name: entry["value"] for name, entry in result["trial"].items()}
+    carried = trial["weight"] * (math.cos(0.05) if len(effects) > 1 else 1.0)
+    stood = result["quantities"]["sinkage_start"]["value"]
+    assert stood == pytest.approx(carried / 2 / trial["stiffness"], rel=1e-6)
+    largest = result["quantities"]["sinkage_largest"]["value"]
+    for told in (result, {key: value for key, value in result.items() if key != "tip_radius"}):
+        sinkage = read_moved(run, told).sinkage
+        assert sinkage[0, [0, -1]].mean() == pytest.approx(stood, rel=1e-9)
+        assert sinkage.max() == pytest.approx(largest, rel=1e-9) and largest >= stood
 
 
 def test_the_loads_on_the_rows_are_the_force_that_lifts_the_platform(runs):

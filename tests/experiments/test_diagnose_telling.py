@@ -12,7 +12,7 @@ from experiments.diagnose.gaps import Gaps, numeral
 from experiments.diagnose.localise import Place
 from experiments.diagnose.next_steps import _follow
 from experiments.diagnose.noise_words import together
-from experiments.diagnose.summary import scatter_sentence, summary_sentences, title_words
+from experiments.diagnose.summary import _numbers, scatter_sentence, summary_sentences, title_words
 from experiments.diagnose.telling import (
     PhaseTable,
     size_sentences,
@@ -238,3 +238,12 @@ def test_the_title_says_that_a_second_name_is_small_and_that_another_is_as_likel
     near = {"effect": "plastic-sinkage", "evidence_behind": 0.3, "angle_deg": 9.0, "told_apart": False}
     leading = {"effects": ["adhesion"], "certain": [], "nearest": near}
     assert "the likeliest is adhesion or plastic-sinkage, not" in title_words(unknown(effects=[], leading=leading))
+
+
+def test_a_number_that_the_trials_do_not_tell_has_no_standard_error_of_round_off():
+    force = {"value": 1.841, "unit": "N"}
+    leading = {"certain": [], "parameters": {"rig-friction": {"force": force | {"std": 7.3e132}}}}
+    (told,) = _numbers(leading)
+    assert "rig-friction force 1.841 N (no standard error" in told and "e+" not in told
+    leading["parameters"]["rig-friction"]["force"]["std"] = 0.09
+    assert _numbers(leading) == ["Its numbers, should it be that: rig-friction force 1.841 +- 0.09 N."]

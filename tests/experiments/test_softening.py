@@ -1,12 +1,23 @@
 """The modulus goes with pressure and overlap as Hertz says, and never above the real grains'."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from dem import Material
-from dem.timestep import choose_young
-from experiments.softening import Softening, bearing_gradient, chain, drop_depth, run_limit, soften, soften_material
+from dem.timestep import choose_young, contact_time, longest_step, stable_step, time_step_for
+from experiments.softening import (
+    Softening,
+    bearing_gradient,
+    chain,
+    check_young,
+    drop_depth,
+    run_limit,
+    soften,
+    soften_material,
+    stable_overlap,
+)
 
 SAND = {"grain": 0.0024, "density": 2650.0, "poisson": 0.25, "friction": 0.5, "real_young": 7e10, "gravity": 9.81,
         "bed_height": 0.05, "depth": 0.02, "speed": 0.1}  # fmt: skip
@@ -80,6 +91,15 @@ def test_a_drop_stops_where_the_energies_meet():
     assert drop_depth(0.0, 2.6, 0.2, 100.0) == pytest.approx(2 * 0.2 / 100)
 
 
+def test_a_modulus_that_could_not_hold_the_bed_is_refused():
+    """A tenth of what is chosen is (1/10)^(-2/3) = 4.6 times the overlap; nothing is asked of what is chosen itself."""
+    chosen = soften(max_overlap=0.05, **SAND).young
+    for young in (None, chosen, 0.11 * chosen):
+        check_young(young, chosen=chosen, max_overlap=0.05)
+    with pytest.raises(ValueError, match=r"young = 1 Pa is so soft .* max_overlap = 0.05: .* Pa would do"):
+        check_young(1.0, chosen=chosen, max_overlap=0.05)
+
+
 def test_a_run_may_pass_its_bound_and_says_so():
     """F ~ E overlap^1.5 (Hertz): from 6 to 5 % of a diameter the modulus goes by 1.2^1.5 = 1.315."""
     soft = Softening(1e7, 1.0, 1.0, 7e10)
@@ -90,3 +110,21 @@ def test_a_run_may_pass_its_bound_and_says_so():
         0.02, 0.01
     )
     assert [run_limit(bound) for bound in (0.01, 0.05, 0.15, 0.2)] == [0.02, 0.1, 0.2, 0.2]
+
+
+def test_past_its_bound_a_step_is_stable_for_a_lattice_up_to_the_overlap_whose_longest_step_it_is():
+    """At e = 0.5 six contacts that stick allow 0.1099 of a pair's half-period, 2^(1/4) of which a wall's is: where a
+    step is an eighth of that, overlaps may be (0.1099 2^(1/4) 8)^4 = 1.195 times as large."""
+    sand = Material("sand", 2650.0, 7e10, 0.25, 0.5, 0.5, 0.1)
+    assert stable_step(0.5, neighbours=6, sticking=True) == pytest.approx(0.1099, abs=5e-5)
+    found = stable_overlap(sand, 0.05)
+    assert found / 0.05 == pytest.approx((0.1099 * 2**0.25 * 8) ** 4, rel=2e-3)
+    step = time_step_for(sand, diameter=2.4e-3, max_overlap=0.05)
+    assert longest_step(sand, diameter=2.4e-3, max_overlap=found) == pytest.approx(step, rel=1e-12)
+    assert stable_overlap(replace(sand, restitution=0.3), 0.05) == 0.05  # its step is the longest already
+    # A pair alone, at the overlap where a run ends: 1/6.7 of a wall's half-period, where 2 / pi of it is the most.
+    share = step / contact_time(sand, diameter=2.4e-3, max_overlap=run_limit(0.05))
+    assert share == pytest.approx(2**0.25 / 8) and share < stable_step(0.5, neighbours=3) / 4
+    soft = Softening(1e7, 1e4, 0.1, 7e10)
+    assert "past 5.97 % the time step is too long for grains all of" in soft.overlapping(0.065, 0.05, found)
+    assert "time step" not in soft.overlapping(0.055, 0.05, found)

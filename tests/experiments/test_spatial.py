@@ -61,6 +61,7 @@ def test_what_does_not_go_together_is_refused_by_name(given, said):
         ),
         ({"bed_size": (0.2, 0.2, 0.02)}, r"bed_size = 0.02 m deep is too shallow: .* would do"),
         ({"bed_size": (0.2, 0.2, 0.05), "grain": 0.009}, "grain = 0.009 m is larger than the spike"),
+        ({"bed_size": (0.2, 0.2, 0.05), "grain": 0.003, "young": 1.0}, "young = 1 Pa is so soft that grains would"),
     ],
 )
 def test_what_cannot_be_is_refused_before_any_work(cube, given, said):

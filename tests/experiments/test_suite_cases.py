@@ -11,6 +11,7 @@ from experiments import suite, suite_commands
 from experiments.cli import main
 from experiments.reading import find_case
 from experiments.registry import CASES
+from experiments.suite import keep
 from experiments.suite_cost import Cost, cost_of_tumble
 
 
@@ -20,7 +21,7 @@ def test_every_case_of_every_experiment_is_valid_and_found_by_its_name():
     assert all(case.settings.ground == "bed" for case in found)
     assert find_case(Path(found[0].name), CASES) == found[0].path
     counts = {number: sum(case.experiment == number for case in found) for number in suite.EXPERIMENTS}
-    assert counts == {1: 34, 2: 6, 3: 3, 4: 4, 5: 6, 6: 16}
+    assert counts == {1: 35, 2: 6, 3: 3, 4: 4, 5: 6, 6: 16}
 
 
 def test_no_case_that_ships_is_refused():
@@ -114,6 +115,49 @@ def test_what_has_no_result_is_done_gone_on_with_and_kept(stubbed, tmp_path, cap
     rows = {row["case"]: row["standing"] for row in json.loads(capsys.readouterr().out)}
     assert rows == {"grains1-sand-0.0085-0.22": "done", "grains1-sand-0.015-brake": "too long"}
     assert main(["experiments", "run", "grains1-sand-0.015-brake", *where]) == 0 and len(calls) == 3
+
+
+@pytest.fixture
+def finished(tmp_path):
+    """The folder of a run that has finished, of before status.json had the processor's time."""
+    folder = tmp_path / "run"
+    folder.mkdir()
+    for name, text in (
+        ("run.toml", "x = 1\n"), ("result.json", '{"n": 2}'), ("trajectory.csv", "t_s\n0\n1\n"),
+        ("status.json", '{"status": "done", "reason": "", "updated": "2026-11-20"}'),
+    ):  # fmt: skip
+        (folder / name).write_text(text)
+    return folder
+
+
+def test_a_run_of_before_the_processor_s_time_was_kept_is_kept_without_it(finished, tmp_path):
+    keep(finished, tmp_path / "results" / "case")
+    assert json.loads((tmp_path / "results" / "case" / "cost.json").read_text()) == {
+        "processor_time": None, "updated": "2026-11-20",
+    }  # fmt: skip
+    assert [path.name for path in (tmp_path / "results").iterdir()] == ["case"]
+
+
+@pytest.mark.parametrize("before", [(), ("run.toml", "result.json", "README.md")])
+def test_a_result_is_kept_whole_or_not_at_all(finished, tmp_path, before):
+    """What is missing or no JSON leaves what was there; whole, it takes its place and leaves notes beside it alone."""
+    target = tmp_path / "results" / "case"
+    for name in before:
+        target.mkdir(parents=True, exist_ok=True)
+        (target / name).write_text("old")
+    (finished / "result.json").write_text("{")
+    with pytest.raises(ValueError):
+        keep(finished, target)
+    (finished / "result.json").unlink()
+    with pytest.raises(OSError):
+        keep(finished, target)
+    assert [path.name for path in (tmp_path / "results").iterdir()] == (["case"] if before else [])
+    assert all((target / name).read_text() == "old" for name in before)
+    (finished / "result.json").write_text('{"n": 2}')
+    keep(finished, target)
+    kept = {path.name: path.read_text() for path in target.iterdir()}
+    assert kept["result.json"] == '{"n": 2}' and kept["run.toml"] == "x = 1\n" and "cost.json" in kept
+    assert kept.get("README.md") == ("old" if before else None)
 
 
 def test_a_case_there_is_not_is_refused(capsys):

@@ -4,6 +4,7 @@ import json
 import math
 import re
 from contextlib import contextmanager
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,10 +17,10 @@ from experiments import following, tumble, tumble_grains, tumble_grains_result, 
 from experiments.cli import main
 from experiments.progress import Progress
 from experiments.runfolder import RunFolder
-from experiments.softening import Softening
+from experiments.softening import Softening, run_limit
 from experiments.spatial_settings import SpatialSettings
 from experiments.spatial_trial import plan_spatial
-from experiments.tumble_platform import spikes_of
+from experiments.tumble_platform import platform_numbers, spikes_of
 from experiments.tumble_settings import TumbleSettings
 from experiments.tumble_trial import plan_tumble
 from rigid import Trial
@@ -67,6 +68,8 @@ def on_bed(**more):
         ),
         ({"bed_repeats": 99, "grain": 0.002}, r"makes about .* or a smaller bed would do"),
         ({"bed_stages": ("rain", "tilt:5")}, r"bed_stages has 'tilt:5': a platform needs a level bed"),
+        ({"young": 1.0, "bed_size": (0.5, 0.06, 0.046)}, r"young = 1 Pa is so soft .* max_overlap = 0.05: .* would do"),
+        ({"max_overlap": 1e-5, "bed_size": (0.5, 0.06, 0.046)}, r"the fastest tip's speed = .* max_overlap = 1e-05 of"),
     ],
 )
 def test_a_bed_that_will_not_do_is_refused_before_any_work(given, said):
@@ -119,14 +122,18 @@ def eight_sided(tmp_path, spikes="clear = 0.012\ndiameter = 0.006"):
     return str(path)
 
 
+def spikes_in(settings):
+    return spikes_of(settings, platform_numbers(settings.platform))
+
+
 def test_spikes_are_those_of_the_platforms_file_unless_given(tmp_path):
     """The Hedgehog's to the bit what the defaults were, 12 and 40 mm; a key wins over the file, each by itself."""
-    own = spikes_of(on_bed())
+    own = spikes_in(on_bed())
     assert (own.diameter, own.clear) == (0.012, 0.04)
     mine = eight_sided(tmp_path)
-    found = spikes_of(on_bed(platform=mine))
+    found = spikes_in(on_bed(platform=mine))
     assert (found.diameter, found.clear, found.of_platform) == (0.006, 0.012, ("spike_diameter", "spike_clear"))
-    mixed = spikes_of(on_bed(platform=mine, spike_clear=0.015))
+    mixed = spikes_in(on_bed(platform=mine, spike_clear=0.015))
     assert (mixed.diameter, mixed.clear, mixed.of_platform) == (0.006, 0.015, ("spike_diameter",))
     settings = on_bed(platform=mine, rig=0.0085, torque=1e-3, duration=0.05, bed_size=(0.2, 0.02, 0.04))
     tumble.check(settings)
@@ -144,7 +151,7 @@ def test_a_platform_without_spikes_is_refused_on_grains_unless_they_are_given(tm
         ValueError, match=r"no \[spikes\], which grains are to meet: spike_clear \(in m\) must be given"
     ):
         tumble.check(on_bed(platform=bare, spike_diameter=0.006))
-    spikes = spikes_of(on_bed(platform=bare, spike_diameter=0.006, spike_clear=0.012))
+    spikes = spikes_in(on_bed(platform=bare, spike_diameter=0.006, spike_clear=0.012))
     assert (spikes.diameter, spikes.clear, spikes.of_platform) == (0.006, 0.012, ())
 
 
@@ -168,7 +175,8 @@ def test_the_spikes_that_an_older_run_toml_names_on_the_spring_damper_are_no_fau
     ],
 )
 def test_another_body_on_the_platforms_spikes_is_said(given, said):
-    warning = tumble_grains._whose_spikes(on_bed(**given))
+    settings = on_bed(**given)
+    warning = tumble_grains._whose_spikes(settings, tumble_grains._plan(settings))
     assert warning is None if said is None else said in warning
 
 
@@ -203,6 +211,25 @@ def test_a_duration_in_which_the_first_10_mm_are_not_gone_is_told_before_any_wor
     assert simulate(plan_of(0.4), duration=wanted).trajectory_angle is not None
     assert simulate(plan_of(0.4), duration=wanted - 0.02).trajectory_angle is None
     assert "nor in 3.2 s there; a larger torque would do" in told["weak"]
+
+
+@pytest.mark.parametrize(
+    ("torque", "wheel_speed", "said"),
+    [
+        (5.0, 10.0, "wheel_speed_0 = 20 rad/s would do"),
+        (0.01, 900.0, "torque = 0.04 N m would do"),
+        (0.01, 10.0, "wheel_speed_0 = 40 rad/s with torque = 0.04 N m would do"),
+    ],
+)
+def test_of_a_brake_that_does_not_bring_it_away_what_would_do_is_said(torque, wheel_speed, said):
+    """A wheel with too little in it, whatever slows it; a brake far below W l sin(pi / n) = 0.067 N m; both."""
+    settings = on_bed(rig=0.0085, actuator="brake", duration=0.4, torque=torque, wheel_speed_0=wheel_speed)
+    plan = tumble_grains._plan(settings)
+    trial = plan.trial
+    told = tumble_opening.short_of_way(settings, plan, simulate(trial, duration=0.4))
+    assert f"nor in 3.2 s there; {said} in that time" in told
+    stronger = {name: float(value) for name, value in re.findall(r"(wheel_speed_0|torque) = (\S+)", said)}
+    assert simulate(replace(trial, **stronger), duration=3.2).trajectory_angle is not None
 
 
 def plan_of(duration):
@@ -403,6 +430,29 @@ def test_a_run_on_a_bed_may_pass_the_overlap_that_its_step_is_chosen_for_up_to_t
         bed.advance(1)
 
 
+def test_a_checkpoint_of_before_takes_the_bound_on_overlaps_that_a_run_has_now(tmp_path, monkeypatch):
+    """One that ended at its `max_overlap` of 9 % goes on with the bound of today, and with all else as it was."""
+    settings = on_bed(**SMALL | {"max_overlap": 0.09, "frame_count": 0})
+    plan = tumble_grains._plan(settings)
+    forecast = tumble_grains._forecast(settings, plan)
+    old, new = (tumble_grains._stepper(settings, plan, small_bed(settings), forecast) for _ in range(2))
+    old.footing.bed.overlap_limit = 0.09
+    for _ in range(3):
+        old.master.step()
+    folder = RunFolder.create(tmp_path / "run", "tumble", settings)
+    folder.save_checkpoint("tumble", old.state())
+
+    @contextmanager
+    def stopping():
+        yield lambda: True
+
+    monkeypatch.setattr(following, "held_back", stopping)
+    with pytest.raises(KeyboardInterrupt):
+        tumble_grains._follow(settings, new, folder, Progress())
+    assert new.footing.bed.overlap_limit == run_limit(0.09) > 0.09
+    assert new.footing.bed.steps == old.footing.bed.steps + settings.substeps
+
+
 def test_a_run_that_leaves_the_bed_says_where_and_keeps_its_state_and_series(tmp_path, monkeypatch, capsys):
     """On the spring-damper in place of grains, which after 50 steps answers as a bed whose end is passed."""
 
@@ -491,8 +541,8 @@ def test_a_run_stopped_by_ctrl_c_is_taken_up_again_to_the_same_numbers(repeats, 
 def test_tips_that_come_down_over_more_than_one_copy_are_said_to_meet_the_same_sand(repeats, tips, said, monkeypatch):
     """Over 0.62 m and a spike's 12 mm on copies of 0.6 m; where there is one piece it is the whole bed."""
     monkeypatch.setattr(tumble_grains_result, "tips_in_ground", lambda run: (np.array([-0.1, tips - 0.1]), None))
-    settings = SimpleNamespace(bed_size=(0.6, 0.036, 0.06), bed_repeats=repeats, spike_diameter=0.012, spike_clear=0.04)
-    warning = tumble_grains_result._same_sand_again(settings, None)
+    settings = SimpleNamespace(bed_size=(0.6, 0.036, 0.06), bed_repeats=repeats)
+    warning = tumble_grains_result._same_sand_again(settings, None, 0.012)
     assert (warning is not None and "the same grains every 0.6 m" in warning) == said
 
 
