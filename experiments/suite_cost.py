@@ -74,6 +74,7 @@ def cost_of_tumble(settings: TumbleSettings) -> Cost:
     from .tumble_grains import (
         RAIN,
         _check_bed,
+        _check_young,
         _count,
         _first_gravity,
         _forecast,
@@ -90,6 +91,7 @@ def cost_of_tumble(settings: TumbleSettings) -> Cost:
     _members(settings, plan)
     forecast = _forecast(settings, plan)
     _check_bed(settings, forecast, material)
+    _check_young(settings, plan, forecast)
     softening = _softness(settings, plan, forecast)
     soft = material.softened(softening.young)
     smallest = settings.grain * (1 - settings.spread)

@@ -101,8 +101,7 @@ def check_on_grains(settings: TumbleSettings) -> None:
     check_where(arch=settings.arch, threads=settings.threads)
     forecast = _forecast(settings, plan)
     _check_bed(settings, forecast, material)
-    chosen = _softness(settings.model_copy(update={"young": None}), plan, forecast).young
-    check_young(settings.young, chosen=chosen, max_overlap=settings.max_overlap)
+    _check_young(settings, plan, forecast)
 
 
 def tumble_on_grains(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
@@ -406,6 +405,11 @@ def _softness(settings: TumbleSettings, plan: TumblePlan, forecast: Forecast) ->
         fall=RAIN * settings.bed_size[2],
         fastest="the fastest tip's speed",
     )
+
+
+def _check_young(settings: TumbleSettings, plan: TumblePlan, forecast: Forecast) -> None:
+    chosen = _softness(settings.model_copy(update={"young": None}), plan, forecast).young
+    check_young(settings.young, chosen=chosen, max_overlap=settings.max_overlap)
 
 
 def _prepare(
