@@ -183,3 +183,51 @@ def test_grains_without_their_contacts_are_told_the_same_of_all_else(layer):
     whole, rest = bed.grains(), bed.grains(contacts=False)
     assert set(whole) - set(rest) == {"coordination"}
     assert all(np.array_equal(rest[name], whole[name]) for name in rest)
+
+
+def skimmed(steps, *, wide=0.05, cut=None):
+    """A ball skims a layer of 840 grains, 0.84 m long, that sleeps but below it; the bed, and where sleepers began.
+
+    Far above goes another, `wide` its radius [m]: where that is as wide as the bed is long no place along it is told
+    from another, and sleepers keep to the curve's own order. `cut`: steps after which a state is taken, and put back
+    later on.
+    """
+    i, j = (a.ravel() for a in np.meshgrid(np.arange(210), np.arange(4)))
+    bed = Bed.from_grains(
+        STUFF, positions=np.column_stack([(i + 0.5) * D, (j + 0.5) * D, np.full(i.size, 0.5 * D)]),
+        radii=np.full(i.size, 0.5 * D), size=(210 * D, 4 * D, 0.02), height=0.05, max_overlap=0.1, threads=2,
+    )  # fmt: skip
+    bed.advance(200, drag_time=2e-3)
+    ball = bed.add_body(Ball(radius=5e-3), position=(0.05, 0.006, D + 5e-3 - 2e-5))
+    bed.move_body(ball, velocity=(10.0, 0.0, 0.0))
+    above = bed.add_body(Ball(radius=wide), position=(0.05, 0.006, 3.0))
+    bed.move_body(above, velocity=(10.0, 0.0, 0.0))
+    bed.let_sleep(Sleep(calm=0.05))
+    begins, done, state = set(), 0, None
+    while done < steps:
+        bed.advance(100)
+        done += 100
+        begins.add(int(bed._engine.rest.begins[None]))
+        if done == cut:
+            state = bed.state()
+        if state is not None and done == cut + 300:
+            bed.restore(state)
+            done, state = cut, None
+    return bed, begins
+
+
+def test_where_sleepers_begin_in_memory_changes_no_bit_of_what_the_grains_do():
+    """It follows the ball; grains wake, are dragged and fall asleep the same, gone on with from a state too."""
+    steps = 6000
+    bed, begins = skimmed(steps)
+    count, found, kept = bed.awake_count, bed.grains(), bed.state()
+    assert 0 < count < 400 and len(begins) > 2
+    assert np.ptp(found["displacement"][:, 0]) > 1e-5 and bed.list_count > 100
+    plain, unturned = skimmed(steps, wide=0.5)
+    assert unturned == {0} and plain.awake_count == count
+    for name, values in plain.grains().items():
+        assert values.tobytes() == found[name].tobytes(), name
+    again, _ = skimmed(steps, cut=3000)
+    assert {name: values.tobytes() for name, values in again.state().items()} == {
+        name: values.tobytes() for name, values in kept.items()
+    }
