@@ -87,7 +87,7 @@ def check(settings: SpatialSettings) -> None:
 def _carry_out(settings: SpatialSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
     """In `folder`, from its checkpoint where there is one; the result."""
     with folder.lock():
-        plan = plan_spatial(settings, platform_file=keep_platform(settings.platform, folder.path))
+        plan = plan_spatial(settings, platform_file=keep_platform(settings.platform, folder.path, progress.message))
         for sentence in (*plan.sentences(), *(f"warning: {warning}" for warning in plan.warnings)):
             progress.message(sentence)
         softening, beside = None, None

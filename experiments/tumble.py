@@ -143,7 +143,9 @@ def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) 
         return tumble_on_grains(settings, folder, progress)
     with folder.lock():
         copied = _keep_model(settings, folder)
-        platform = platform_numbers(settings.platform, file=keep_platform(settings.platform, folder.path))
+        platform = platform_numbers(
+            settings.platform, file=keep_platform(settings.platform, folder.path, progress.message)
+        )
         middle = middle_of_sweep(settings, model_file=copied, platform=platform)
         plan = plan_tumble(middle, model_file=copied, platform=platform)
         for sentence in plan.sentences():

@@ -107,7 +107,7 @@ def check_on_grains(settings: TumbleSettings) -> None:
 def tumble_on_grains(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
     """Carry it out in `folder`, from its checkpoint where there is one; the result."""
     with folder.lock():
-        plan = _plan(settings, keep_platform(settings.platform, folder.path))
+        plan = _plan(settings, keep_platform(settings.platform, folder.path, progress.message))
         unlike = packing_warning(find_surface(plan.surface), _material(plan), settings.bed_stages)
         warnings = [*plan.warnings, *([unlike] if unlike else [])]
         forecast = _forecast(settings, plan)

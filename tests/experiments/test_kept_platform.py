@@ -120,3 +120,13 @@ def test_a_platform_that_ships_needs_no_copy_and_a_file_that_is_none_is_refused(
         with pytest.raises(ValueError, match=said):
             keep_platform(name, tmp_path)
     assert not (tmp_path / PLATFORM_COPY).exists()
+
+
+def test_that_the_file_is_another_by_now_is_said(mine, tmp_path):
+    told = []
+    keep_platform(str(mine), tmp_path, told.append)
+    keep_platform(str(mine), tmp_path, told.append)
+    assert told == []
+    for _ in changes(mine):
+        keep_platform(str(mine), tmp_path, told.append)
+    assert len(told) == 3 and all(f"{mine} has changed since" in said and PLATFORM_COPY in said for said in told)
