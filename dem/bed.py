@@ -496,9 +496,7 @@ class Bed:
 
     def momentum(self) -> np.ndarray:
         """Of the grains [N s], shape [3], with the velocities half a step ahead, where the forces so far bring them."""
-        e = self._engine
-        awake = slice(0, self.awake_count)  # those awake come first
-        v, f = (e.read(name)[awake].astype(float) for name in ("velocity", "force"))
+        v, f = self._of_those_awake("velocity", "force")
         return np.asarray((v[:, 3:] * v[:, :3] + self.time_step * f).sum(axis=0))
 
     def angular_momentum(self) -> dict[str, np.ndarray]:
@@ -516,15 +514,27 @@ class Bed:
         """
         if not self._engine.ledger.on:
             raise ValueError("this bed keeps no book of what contacts take: keep_book() opens it")
-        e = self._engine
-        awake = slice(0, self.awake_count)  # those awake come first
-        names = ("position", "velocity", "spin", "force", "torque")
-        x, v, w, f, t = (e.read(name)[awake].astype(float) for name in names)
+        x, v, w, f, t = self._of_those_awake("position", "velocity", "spin", "force", "torque")
         radius, mass = x[:, 3], v[:, 3]
         momentum = mass[:, None] * v[:, :3] + self.time_step * f
         own = (0.4 * mass * radius**2)[:, None] * w[:, :3] + self.time_step * t
         total = np.cross(x[:, :3], momentum).sum(axis=0) + own.sum(axis=0)
-        return {"grains": total, **dict(zip(TURNED, e.ledger.turns(), strict=True))}
+        return {"grains": total, **dict(zip(TURNED, self._engine.ledger.turns(), strict=True))}
+
+    def _of_those_awake(self, *names: str) -> list[np.ndarray]:
+        """Fields of the engine, of the grains awake, who come first in memory: the others have no speed, no force."""
+        self._check_valid()
+        awake = slice(0, self.awake_count)
+        return [self._engine.read(name)[awake].astype(float) for name in names]
+
+    def _rates_now(
+        self, position: np.ndarray, velocity: np.ndarray, spin: np.ndarray, force: np.ndarray, torque: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Velocity [m/s] and spin [rad/s] at the time of the positions, half a step after the engine's, of its rows."""
+        half = 0.5 * self.time_step
+        radius, mass = position[:, 3], velocity[:, 3]
+        now = velocity[:, :3] + half * force / mass[:, None]
+        return now, spin[:, :3] + half * torque * (2.5 / (mass * radius**2))[:, None]
 
     # ------------------------------------------------------------------ time
 
@@ -669,20 +679,19 @@ class Bed:
         order = np.argsort(e.read("id"))
         position = e.read("position")[order].astype(float)
         velocity = e.read("velocity")[order].astype(float)
-        spin = e.read("spin")[order, :3].astype(float)
+        spin = e.read("spin")[order].astype(float)
         force = e.read("force")[order].astype(float)
         torque = e.read("torque")[order].astype(float)
         origin = e.read("origin")[order].astype(float)
-        half = 0.5 * self.time_step
-        radius, mass = position[:, 3], velocity[:, 3]
+        rates = self._rates_now(position, velocity, spin, force, torque)
         counted = {"coordination": self.contact_counts()} if contacts else {}
         return {
             "id": np.arange(self.grain_count),
             "position": position[:, :3],
-            "radius": radius,
-            "mass": mass,
-            "velocity": velocity[:, :3] + half * force / mass[:, None],
-            "spin": spin + half * torque * (2.5 / (mass * radius**2))[:, None],
+            "radius": position[:, 3],
+            "mass": velocity[:, 3],
+            "velocity": rates[0],
+            "spin": rates[1],
             "force": force,
             "displacement": position[:, :3] - origin,
             **counted,

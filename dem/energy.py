@@ -39,13 +39,10 @@ def bed_energies(bed: Bed, *, bodies: Mapping[int, Gap]) -> dict[str, float]:
         kinetic (translation and rotation, at the time of the positions), potential (of gravity, from z = 0), normal,
         tangential, turning (springs of all contacts, bodies and floor included).
     """
-    e, awake = bed._engine, slice(0, bed.awake_count)  # those awake come first; the others have no speed and no force
-    position, kept = (e.read(name).astype(float) for name in ("position", "velocity"))
+    position, kept = (bed._engine.read(name).astype(float) for name in ("position", "velocity"))
+    awake = slice(0, bed.awake_count)
     radius, mass = position[awake, 3], kept[awake, 3]
-    force, spin, torque = (e.read(name)[awake].astype(float) for name in ("force", "spin", "torque"))
-    half = 0.5 * bed.time_step
-    velocity = kept[awake, :3] + half * force / mass[:, None]
-    rates = spin[:, :3] + half * torque * (2.5 / (mass * radius**2))[:, None]
+    velocity, rates = bed._rates_now(position[awake], kept[awake], *bed._of_those_awake("spin", "force", "torque"))
     moving = 0.5 * mass @ (velocity**2).sum(axis=1)
     turning = 0.2 * (mass * radius**2) @ (rates**2).sum(axis=1)
     height = -(kept[:, 3] @ (position[:, :3] @ np.array(bed.gravity, dtype=float)))

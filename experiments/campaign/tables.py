@@ -238,6 +238,10 @@ class _TumbleTables(_Tables):
         own = trial.counterweight if trial.counterweight is not None else self.rig.counterweight
         return 0.0 if own is None else own
 
+    def weight_of(self, trial: TumbleTrial) -> float:
+        """What stands on the surface [N]: of platform and counterweight, under the simulated gravity."""
+        return (self.platform.mass + self.counterweight_of(trial)) * trial.gravity_sim
+
     def local_gravity_of(self, trial: TumbleTrial) -> float:
         """The true gravity where a trial was made [m/s2]: the rig's, or without one the simulated one."""
         return trial.gravity_sim if self.rig is None else self.rig.gravity

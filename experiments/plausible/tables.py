@@ -27,7 +27,7 @@ def gravity_oddities(tables: TumbleCampaign, trial: TumbleTrial) -> Iterator[Odd
     if tables.rig is None:
         return
     mass, other, local = tables.platform.mass, tables.counterweight_of(trial), tables.rig.gravity
-    hung, weight = (mass - other) * local, (mass + other) * trial.gravity_sim
+    hung, weight = (mass - other) * local, tables.weight_of(trial)
     doubt = math.hypot(tables.uncertainty.mass * mass * local, tables.uncertainty.gravity_sim * weight)
     if abs(hung - weight) <= max(_SIGMAS * doubt, _LEAST * weight):
         return

@@ -93,8 +93,7 @@ def _start(tables: TumbleCampaign, trial: TumbleTrial, pose: Recording, *, angle
     """
     sensor = tables.sensors.pose
     assert sensor is not None
-    weight = (tables.platform.mass + tables.counterweight_of(trial)) * trial.gravity_sim
-    sunk = weight / (2 * tables.surface.stiffness)
+    sunk = tables.weight_of(trial) / (2 * tables.surface.stiffness)
     height = tables.platform.spike_length * math.cos(math.pi / tables.platform.rows) - sunk
     if height <= 0:
         yield said(
