@@ -188,7 +188,10 @@ def _own_quantities(run: CoupledTumble) -> dict[str, dict[str, Any]]:
     sinkage = run.feet[:, 3]
     gap = run.columns["given"] - run.columns["taken"]
     found = {
-        "sinkage_start": (sinkage_start(run), "m", "of the two rows it stands on, mean, when the torque begins"),
+        "sinkage_start": (
+            sinkage_start(run), "m",
+            "of the two rows it stands on, mean, when the torque begins; a tip above the mean surface counts as 0",
+        ),
         "sinkage_largest": (float(sinkage.max()), "m", "of any row"),
         "largest_row_force": (float(run.feet[:, 0].max()), "N", "upwards, mean of one macro step"),
         "exchange_residual": (

@@ -36,7 +36,9 @@ def opening(
     `grains`: about how many the bed will have; lowering_speed [m/s].
     """
     fields = TumbleSettings.model_fields
-    given = [name for name in fields if name in settings.model_fields_set and getattr(settings, name) is not None]
+    # A run that is taken up again has all of them set, by its run.toml.
+    given = [name for name, field in fields.items() if name in settings.model_fields_set
+             and getattr(settings, name) not in (None, (), field.get_default(call_default_factory=True))]  # fmt: skip
     said = ["set: " + ", ".join(f"{name} = {_shown(settings, name)}" for name in given)]
     numbers: dict[str, list[str]] = {}
     told = {*given, "bed_size", "grain", "seed", "young", "duration", "lowering_speed"}

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import tomllib
+from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -145,10 +146,31 @@ def _sentence(path: Path, detail: Any) -> str:
     if detail["type"] == "missing":
         return f"{path}: {key} is missing: it must be given"
     if detail["type"] == "extra_forbidden":
-        return f"{path}: {key} = {detail['input']!r} is no key of a platform"
+        names = _keys_beside(detail["loc"])
+        close = get_close_matches(str(detail["loc"][-1]), names, n=1)
+        meant = f"did you mean {close[0]!r}?" if close else f"there is {', '.join(names)}"
+        return f"{path}: {key} = {detail['input']!r} is no key of a platform; {meant}"
     said = detail["msg"].removeprefix("Value error, ")
     found = detail["input"] if not isinstance(detail["input"], dict) else sorted(detail["input"])
     return f"{path}: {key} = {found!r} will not do: {said[:1].lower()}{said[1:]}"
+
+
+def _keys_beside(place: tuple[Any, ...]) -> list[str]:
+    """The keys of the table in which the key at `place` stands."""
+    model: type[BaseModel] = _File
+    for part in place[:-1]:
+        field = model.model_fields.get(str(part))
+        if field is not None:
+            models = [kind for kind in _kinds(field.annotation) if issubclass(kind, BaseModel)]
+            model = models[0] if models else model
+    return list(model.model_fields)
+
+
+def _kinds(annotation: Any) -> list[type]:
+    """The classes inside an annotation."""
+    if isinstance(annotation, type):
+        return [annotation]
+    return [kind for inner in get_args(annotation) for kind in _kinds(inner)]
 
 
 def _build(given: _File) -> Platform:

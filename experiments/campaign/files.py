@@ -162,7 +162,9 @@ def _make_tables(
     try:
         return tables(**frozen), []
     except ValidationError as error:
-        said = [line for detail in error.errors() for line in _sentence(tables, detail, table).splitlines()]
+        # Trials that are all refused leave pydantic with none: that there are none is not what is wrong.
+        found = [detail for detail in error.errors() if not (detail["loc"] == ("trial",) and table.get("trial"))]
+        said = [line for detail in found for line in _sentence(tables, detail, table).splitlines()]
         return None, [f"{path}: {line}" for line in dict.fromkeys(said)]
 
 

@@ -90,6 +90,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
     said["evidence"] = _evidence(found)
     said["evidence_base"] = _evidence_base(found)
     said["sizes"] = effect_sizes(found)
+    said["remarks"] = list(found.remarks)
     said["equations"] = _equations(found)
     said["symbols"] = SYMBOLS if found.problem.kind == "penetration" and found.forms else ""
     said["equivalence"] = _equivalence(found)

@@ -69,6 +69,10 @@ def diagnose_campaign(
             told.stage(what, total=1.0)
         told.update(done)
 
+    known = getattr(problem, "explains", lambda finding: False)
+    odd = [finding for finding in find_implausible(measured) if not known(finding)]
+    for finding in odd:  # before the long part: a wrong number in campaign.toml is soon put right
+        told.message(f"before anything is fitted: {finding.what}")
     gates = None
     if thorough:
         from dem.prepare import cache_folder
@@ -76,8 +80,7 @@ def diagnose_campaign(
         gates = cache_folder() / "gates"
     with threadpool_limits(1):  # matrices are small: threads of the linear algebra only get in each other's way
         found = diagnose(problem, thorough=thorough, seed=seed, tell=tell, gates=gates)
-    known = getattr(problem, "explains", lambda finding: False)
-    odd = (finding for finding in find_implausible(measured) if not known(finding))
+    odd = [finding for finding in odd if not known(finding)]  # by now zeros may be taken into account
     seen = (*missing_sensors(measured), *odd, *findings_in_words(found.findings))
     return replace(found, findings=seen)
 

@@ -96,6 +96,12 @@ class Diagnosis:
         """The same of the best model."""
         return bounds_met(self.best)
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What of the best model's numbers is hard to believe, a sentence each."""
+        of_forms: Callable[..., tuple[str, ...]] = getattr(self.problem, "remarks", lambda values, forms: ())
+        return of_forms(self.best.values, self.forms)
+
     def latent(self) -> dict[str, Any]:
         """Columns of latent.csv."""
         return latent_table(self.problem, self.own_values, self.forms)

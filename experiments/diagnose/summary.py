@@ -11,7 +11,7 @@ from .effect_words import meaning
 from .evidence import SMALL
 from .gaps import numeral, size_words
 from .spectrum import line_sentence
-from .telling import shares_words, size_sentences, small_names, sure_sentences
+from .telling import remark_sentences, shares_words, size_sentences, small_names, sure_sentences, worse_sentences
 
 __all__ = ["scatter_sentence", "summary_sentences", "title_words"]
 
@@ -72,9 +72,9 @@ def summary_sentences(said: Mapping[str, Any]) -> list[str]:
             "that these trials could show."
         ]
     elif said["verdict"] == "unknown":
-        first = [*_candidates(said), *_left(said)]
+        first = [*_candidates(said), *_left(said), *worse_sentences(said)]
     else:
-        first = sure_sentences(said)
+        first = [*sure_sentences(said), *worse_sentences(said)]
     ask = said["next_experiment"]
     if wrong:
         ask = (
@@ -176,7 +176,7 @@ def _candidates(said: Mapping[str, Any]) -> list[str]:
             f"{near['angle_deg']:.0f} degrees away in what it changes (0: the same): {apart}"
         )
     sentences.append(f"{first}.")
-    sentences += [*_numbers(leading), *size_sentences(said), *unnamed_sentence(said)]
+    sentences += [*_numbers(leading), *size_sentences(said), *remark_sentences(said), *unnamed_sentence(said)]
     rest = [row for row in _singles(said) if row["effects"][0] not in leading["effects"]][: _NAMES - 1]
     if rest and not certain:
         sentences.append(f"Of what the base model leaves beyond the noise{_weighed(said)}, {_closing(rest)}.")
@@ -261,7 +261,8 @@ def _left(said: Mapping[str, Any]) -> list[str]:
         first = places[0]
         beyond = ", beyond what replicates differ by," if "gap_with_scatter" in said else ""
         sentences.append(
-            f"What is left then{beyond} is in phase {phase} and channel {channel}; its worst stretch is "
+            f"What is left then{beyond} is in phase {phase} and channel {channel}, phases as that model has them; its "
+            f"worst stretch is "
             f"{first['channel']} of trial {first['trial']} from {first['from_s']:.4g} to {first['to_s']:.4g} s."
         )
     if "latent" in said:

@@ -15,8 +15,8 @@ from .gaps import numeral
 from .problem import Array, Finding
 
 __all__ = [
-    "PhaseTable", "findings_in_words", "setting_words", "shares_words", "small_names", "sure_sentences", "told_tables",
-    "valid_residuals", "where_sentences",
+    "PhaseTable", "findings_in_words", "remark_sentences", "setting_words", "shares_words", "size_sentences",
+    "small_names", "sure_sentences", "told_tables", "valid_residuals", "where_sentences", "worse_sentences",
 ]  # fmt: skip
 
 _UNITS = {"N_m": "N m", "m_s2": "m/s2", "m_s": "m/s", "m": "m"}
@@ -26,6 +26,8 @@ _SMALL_SHARE, _SMALL_BESIDE = 0.05, 0.2
 """Share of the force up to which an effect is called small, and of the largest one's signature."""
 _STANDING = 2.0
 """Chi-square per sample of a platform that stands from which on it is explained."""
+_WORSE_OF_ALL, _WORSE_CELL, _TOLD_WORSE = 1.1, 1.5, 3
+"""Factor from which on a condition, and a channel in a phase, is said to have got worse; how many of each are said."""
 _MAINLY = 0.5
 """Share of what is beyond the noise from which on a phase, a channel or a setting is said to hold it."""
 
@@ -73,8 +75,8 @@ def where_sentences(said: Mapping[str, Any]) -> list[str]:
     first = places[0]
     said_first = (
         f"The base model fails most in phase {phase} and channel {channel}, shares of the chi-square beyond the "
-        f"noise; its worst stretch is {first['channel']} of trial {first['trial']} from {first['from_s']:.4g} to "
-        f"{first['to_s']:.4g} s."
+        f"noise, phases as it has them; its worst stretch is {first['channel']} of trial {first['trial']} from "
+        f"{first['from_s']:.4g} to {first['to_s']:.4g} s."
     )
     settings = _settings(said)
     return [said_first, *([f"Sample for sample most of it is at {settings}."] if settings else []), *_parted(said)]
@@ -104,7 +106,8 @@ def sure_sentences(said: Mapping[str, Any]) -> list[str]:
             else ""
         )
         sure += f"{near['angle_deg']:.0f} degrees away in what it changes (0: the same): {apart}"
-    return [*sentences, *size_sentences(said), *([f"{sure}."] if sure else []), *unnamed_sentence(said)]
+    return [*sentences, *size_sentences(said), *remark_sentences(said), *([f"{sure}."] if sure else []),
+            *unnamed_sentence(said)]  # fmt: skip
 
 
 def size_sentences(said: Mapping[str, Any]) -> list[str]:
@@ -115,6 +118,38 @@ def size_sentences(said: Mapping[str, Any]) -> list[str]:
     most = max(size["signature"] for size in sizes)
     told = [_size_words(size, is_small=_is_small(size, most)) for size in sizes]
     return [f"How large: {'; '.join(told)}."]
+
+
+def remark_sentences(said: Mapping[str, Any]) -> list[str]:
+    """What of the numbers is hard to believe."""
+    return [f"Hard to believe: {remark}." for remark in said.get("remarks", [])]
+
+
+def worse_sentences(said: Mapping[str, Any]) -> list[str]:
+    """Which conditions, phases and channels the best model explains less well than the base model, in a sentence; none
+    where there are none, or where it is the base model. A cell counts where it is worse by half and past noise."""
+    conditions = said.get("by_condition", [])
+    first = conditions[0]["settings"] if conditions else {}
+    varied = [name for name in first if any(row["settings"].get(name) != first[name] for row in conditions)]
+    told = []
+    for row in _worst(conditions, _WORSE_OF_ALL):
+        settings = ", ".join(setting_words(name, row["settings"][name]) for name in varied if name in row["settings"])
+        trials = f"trial{'s' if len(row['trials']) > 1 else ''} {', '.join(row['trials'])}"
+        told.append(f"{trials}{f' ({settings})' if settings else ''} {_from_to(row)}")
+    for row in _worst(said.get("by_phase", []), _WORSE_CELL):
+        held = " of trials held out" if row["held_out"] else ""
+        told.append(f"{row['channel']} in phase {row['phase']}{held} {_from_to(row)}")
+    return [f"It makes worse, in chi-square per sample: {'; '.join(told)}."] if told else []
+
+
+def _worst(rows: Sequence[Mapping[str, Any]], factor: float) -> list[Mapping[str, Any]]:
+    """Those that grow by `factor` and are past noise then, at most three, by what is added over all samples."""
+    grown = [row for row in rows if row["after"] > max(factor * row["before"], _STANDING)]
+    return sorted(grown, key=lambda row: row["samples"] * (row["before"] - row["after"]))[:_TOLD_WORSE]
+
+
+def _from_to(row: Mapping[str, Any]) -> str:
+    return f"from {numeral(row['before'])} to {numeral(row['after'])}"
 
 
 def small_names(said: Mapping[str, Any]) -> dict[str, str]:
@@ -169,11 +204,20 @@ def _parted(said: Mapping[str, Any]) -> list[str]:
                 and row["channel"] in ("x", "y", "theta")]  # fmt: skip
     if standing:
         names = ", ".join(dict.fromkeys(row["channel"] for row in standing))
+        felt = sorted({row["channel"] for row in said["by_phase"] if row["phase"] == "stand"
+                       and row["before"] > _STANDING and row["channel"] in ("ax", "ay")})  # fmt: skip
         sentences.append(
             f"In phase stand, before, {names} are off by more than noise: the camera's zero is fitted to the whole "
-            f"trial, up to 3 std of the sensor, and follows what is missing later on; nothing is wrong while it stands."
-        )
+            f"trial, up to 3 std of the sensor, and follows what is missing later on"
+            + (f"; but {' and '.join(felt)} of the IMU, whose zero is not fitted, {_is_off(felt)} off there too: the "
+               f"platform stands otherwise than the model has it, higher, deeper or askew."
+               if felt else ". By itself that is no sign that it stands otherwise than the model has it.")
+        )  # fmt: skip
     return sentences
+
+
+def _is_off(names: Sequence[str]) -> str:
+    return "is" if len(names) == 1 else "are"
 
 
 def shares_words(places: Sequence[Mapping[str, Any]], key: str, total: float) -> str:

@@ -307,6 +307,23 @@ class TumbleProblem:
         assert isinstance(form, TumbleForm)
         return {form.amplitude.partition(".")[2]: form.form_std} if form.form_std else {}
 
+    def remarks(self, values: Values, forms: Sequence[Form]) -> tuple[str, ...]:
+        """What of the forms' numbers no rig and no platform has, a sentence each."""
+        said = []
+        for form in forms:
+            if form.effect != "rig-friction" or form.effect in self.own:
+                continue
+            force = self.reported(values, form)["force"][0]
+            trial = min(self.data.tables.trial, key=self.data.tables.weight_of)
+            weight = self.data.tables.weight_of(trial)
+            if force > weight:
+                said.append(
+                    f"rig-friction of {force:.3g} N is more than the {weight:.3g} N that stand on the surface (trial "
+                    f"{trial.id}): a rig with it would hold the platform up wherever it is. So it is hardly the "
+                    f"pulleys, but something that resists when the platform rises and falls"
+                )
+        return tuple(said)
+
     def prepare(self, tell: Callable[[str, float], None]) -> None:
         """Compile the kernels, which takes a while where that was not done before, and says so."""
         for place, forward in enumerate((self.forward, self._guesser.forward)):

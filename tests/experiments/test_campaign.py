@@ -1,6 +1,7 @@
 """Campaigns read, written and read back; what is wrong with one is said by file, line or key."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -283,6 +284,17 @@ def test_every_fault_of_the_tables_is_said_at_once(tmp_path):
     with pytest.raises(ValueError) as caught:
         read_campaign(folder)
     assert len(str(caught.value).splitlines()) == 3  # the mass, mu_s missing, mu_x unknown
+
+
+def test_trials_that_are_all_refused_are_not_said_to_be_missing(tmp_path):
+    folder = tumble_folder(tmp_path / "c")
+    path = folder / "campaign.toml"
+    text = re.sub(r'actuator = "(motor|brake)"', 'actuator = "hand"', path.read_text())
+    path.write_text(text)
+    with pytest.raises(ValueError) as caught:
+        read_campaign(folder)
+    said = str(caught.value).splitlines()
+    assert len(said) == text.count("[[trial]]") and all("actuator = 'hand'" in line for line in said)
 
 
 def test_a_campaign_there_is_not_is_refused(tmp_path):

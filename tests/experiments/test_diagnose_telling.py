@@ -15,11 +15,13 @@ from experiments.diagnose.noise_words import together
 from experiments.diagnose.summary import _numbers, scatter_sentence, summary_sentences, title_words
 from experiments.diagnose.telling import (
     PhaseTable,
+    remark_sentences,
     size_sentences,
     sure_sentences,
     told_tables,
     valid_residuals,
     where_sentences,
+    worse_sentences,
 )
 
 
@@ -63,6 +65,43 @@ def test_where_the_model_fails_is_said_with_phase_channel_seconds_and_torque():
     # The slow trials hold 4000 of 4400 beyond noise, in forty times as many samples; the gravity is shared by all.
     assert second == "Sample for sample most of it is at torque 6 N m (80 %)."
     assert where_sentences({"where": []}) == []
+
+
+def cell(phase: str, channel: str, before: float, after: float, *, held_out: bool = False) -> dict:
+    return {"phase": phase, "channel": channel, "held_out": held_out, "samples": 100, "before": before, "after": after}
+
+
+def test_a_platform_that_stands_otherwise_than_the_model_has_it_is_told_from_a_camera_zero_alone():
+    said = {"where": [place("001", "x", "slip", 80.0, 6.0)], "by_phase": [cell("stand", "y", 18.0, 18.0)]}
+    zero = where_sentences(said)[-1]
+    assert zero.startswith("In phase stand, before, y are off") and "no sign that it stands otherwise" in zero
+    said["by_phase"].append(cell("stand", "ax", 5.1, 5.0))
+    stands = where_sentences(said)[-1]
+    assert "ax of the IMU" in stands and "stands otherwise than the model has it" in stands and "no sign" not in stands
+    quiet = {"where": said["where"], "by_phase": [cell("stand", "y", 1.1, 1.0), cell("stand", "ax", 5.1, 5.0)]}
+    assert not any("phase stand" in sentence for sentence in where_sentences(quiet))
+
+
+def test_what_the_best_model_explains_less_well_than_the_base_model_is_said():
+    slow = {"settings": {"torque_N_m": 0.125, "gravity_m_s2": 0.147}, "trials": ["004"], "samples": 2772,
+            "before": 224.0, "after": 395.0}  # fmt: skip
+    fast = {"settings": {"torque_N_m": 0.22, "gravity_m_s2": 0.147}, "trials": ["005"], "samples": 2772,
+            "before": 312.0, "after": 132.0}  # fmt: skip
+    cells = [cell("pivot", "x", 144.0, 222.0), cell("pivot", "y", 93.0, 4087.0, held_out=True),
+             cell("pivot", "wheel", 1.02, 1.9), cell("slip", "x", 90.0, 100.0)]  # fmt: skip
+    (told,) = worse_sentences({"by_condition": [slow, fast], "by_phase": cells})
+    assert told == (
+        "It makes worse, in chi-square per sample: trial 004 (torque 0.125 N m) from 224 to 395; y in phase pivot of "
+        "trials held out from 93 to 4,090; x in phase pivot from 144 to 222."
+    )
+    assert worse_sentences({"by_condition": [fast], "by_phase": cells[2:]}) == []
+
+
+def test_a_number_that_is_hard_to_believe_is_said_with_the_candidate():
+    assert remark_sentences({"remarks": ["rig-friction of 2 N is more than 1 N"]}) == [
+        "Hard to believe: rig-friction of 2 N is more than 1 N."
+    ]
+    assert remark_sentences({}) == []
 
 
 def test_the_table_of_candidates_has_every_name_once_and_sets_that_beat_their_parts():

@@ -325,6 +325,16 @@ def test_a_cable_may_hang_wound_up_with_drag_of_any_power_beside():
     assert {tuple(start[name] > 0 for name in names) for start in form.starts} == set(product((False, True), repeat=2))
 
 
+def test_a_friction_of_the_rig_above_the_weight_on_the_surface_is_said_to_be_hard_to_believe():
+    """(5.3 + 5.2) kg under 0.0834 m/s2 weigh 0.876 N, the least of the four."""
+    problem = make_problem(campaign())
+    form = next(form for form in problem.forms if form.id == "rig-friction:dry")
+    assert problem.remarks({"rig-friction.force": 0.8}, [form]) == ()
+    (said,) = problem.remarks({"rig-friction.force": 1.84}, [form])
+    assert "1.84 N is more than the 0.876 N that stand on the surface (trial 001)" in said
+    assert problem.remarks({}, []) == ()
+
+
 @pytest.mark.parametrize(("effect", "level"), [("bearing-drag", "torque"), ("rig-friction", "force")])
 def test_dry_friction_may_be_more_near_rest_from_none_at_all(effect, level):
     forms = tumble_forms(rig=True, sinkage=3e-5, weight=0.88)

@@ -192,6 +192,8 @@ def test_what_was_set_is_said_first_and_defaults_are_counted_and_young_is_told()
     assert "12,300 grains of 4 mm" in bed and "young = 2.1e+07 Pa (from max_overlap = 0.05; 3,333 times softer" in bed
     assert re.match(r"\d+ more settings are at their defaults: run.toml", said[-1]) and len(said) < 12
     assert not any("default)" in text or "None" in text for text in said)
+    again = TumbleSettings(**settings.model_dump())  # as from the run.toml of a run that is taken up again
+    assert tumble_opening.opening(again, plan, grains=12345.0, softening=soft, lowering_speed=0.2) == said
 
 
 def test_a_duration_in_which_the_first_10_mm_are_not_gone_is_told_before_any_work():
