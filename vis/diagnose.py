@@ -273,7 +273,7 @@ def _evidence(said: Mapping[str, Any]) -> list[Block]:
         blocks.append(text(f"No better than the base model with its parameters fitted: {', '.join(worse)}."))
     blocks.append(text(
         "Every candidate in every form is in evidence.csv. Chi-square here is that of the search, beyond the noise as "
-        "it was found (its jitter, its correlation, replicates' scatter) and without the trials held out; the gap above "
+        "it was found (its jitter, its correlation, replicates' scatter) and without those held out; the gap above "
         "is counted with the noise that campaign.toml states, so the two are not the same number.", small=True,
     ))  # fmt: skip
     return blocks
