@@ -32,6 +32,7 @@ from .lists import (
     AWAKE,
     BOTTOM,
     CACHE_LINE,
+    CELLS,
     CHUNK_ROOM,
     CHUNKS,
     FINISHED,
@@ -46,7 +47,8 @@ from .lists import (
     QUEUE,
     SAME_IMAGE,
     SCAN_BLOCKS,
-    TURN,
+    SORTED,
+    SORTED_CELLS,
     Lists,
     curve_ranks,
 )
@@ -199,7 +201,7 @@ class Engine(Lists, Shapes, Sleepers, Bookkeeping):
         self.cohesion = cohesion
         self.gpu = gpu
         F = ti.Vector.field
-        self.count = ti.field(ti.i32, 10)
+        self.count = ti.field(ti.i32, 12)
         self.box = ti.field(real, 7)
         # Per grain. position: x y z radius; velocity: x y z mass (half a step behind); spin: x y z and nothing.
         self.position = F(4, real, n)
@@ -253,7 +255,8 @@ class Engine(Lists, Shapes, Sleepers, Bookkeeping):
         self.old_near_roll = F(3, real, near)
         # Who computes which chunk, each counter in a cache line of its own.
         self.cpu_items = threads * ITEMS_PER_THREAD
-        self.ticket = ti.field(ti.i32, 3 * CACHE_LINE)
+        self.ticket = ti.field(ti.i32, 2 * CACHE_LINE)
+        self.claim = ti.field(ti.i32, chunk_capacity * CACHE_LINE if not gpu else 1)
         # Per chunk.
         self.overlap = ti.field(real, chunk_capacity)
         self.pushes = F(6, real, (chunk_capacity, MOST_BODIES))
@@ -301,7 +304,7 @@ class Engine(Lists, Shapes, Sleepers, Bookkeeping):
         # Fewer awake have smaller chunks, so that all threads have some.
         self.awake_per_chunk = max(1, round(AWAKE_SHARE * GRAINS_PER_CHUNK))
         sizes = (grain_count, chunk_count, self.chunk_room, self.near_room, *cells, math.prod(cells))
-        self.count.from_numpy(np.array([*sizes, grain_count, chunk_count], dtype=np.int32))
+        self.count.from_numpy(np.array([*sizes, grain_count, chunk_count, grain_count, sizes[-1]], dtype=np.int32))
         for k, value in enumerate(box):
             self.box[k] = value
         self.write("rank", curve_ranks(*cells))
@@ -331,11 +334,13 @@ class Engine(Lists, Shapes, Sleepers, Bookkeeping):
             field.fill(0)
         for field in (rest.side, rest.mass, rest.news, rest.held, rest.begins, rest.block):
             field.fill(0)
+        rest.whole[None] = 1
 
     def wake_all(self) -> None:
         """All are awake, and the kernels are those that know of no sleep."""
         self.rest = EVERYONE
         self.count[AWAKE], self.count[CHUNKS] = self.grain_count, self.chunk_count
+        self.count[SORTED], self.count[SORTED_CELLS] = self.grain_count, self.count[CELLS]
 
     def open_ledger(self, gravity: tuple[float, float, float]) -> None:
         """From here on kernels keep the book of what contacts take."""
@@ -643,49 +648,50 @@ class Engine(Lists, Shapes, Sleepers, Bookkeeping):
 
         Then halted is 1, done says how many steps are whole, and the forces of the next one are still to come.
 
-        One parallel loop for all the steps, because waking threads costs more than a small bed's step. Threads take
-        tickets; ticket t is chunk t mod chunk_count of phase t div chunk_count, even phases move and odd ones push. A
-        phase opens when the one before is finished, so a thread that finds itself alone does everything and never
-        waits for one that has not started.
+        One parallel loop for all the steps, because waking threads costs more than a small bed's step. Phase p moves
+        (even p) or pushes (odd p) every chunk, and opens when all chunks of the one before are finished. A thread takes
+        those of its own range first, so that a chunk mostly stays in one core's cache, then those that are left.
+        Whoever raises a chunk's claim past p has it, so nobody waits for a thread that has not started.
         """
+        for c in range(self.count[CHUNKS]):
+            self.claim[c * CACHE_LINE] = 0
         for _ in range(1):
-            self.ticket[TURN] = 0
             self.ticket[FINISHED] = 0
             self.done[None] = steps
         for w in range(self.cpu_items):
             if w % ITEMS_PER_THREAD == 0:
                 chunks = self.count[CHUNKS]
+                own = w // ITEMS_PER_THREAD * chunks // (self.cpu_items // ITEMS_PER_THREAD)
                 patience = PATIENCE * (1 + self.count[GRAINS] // chunks)
-                here = True
-                while here:
-                    # Leave when it takes long (another program has the core of whom we wait for): the rest is done
-                    # by those who stay. Once a ticket is taken there is no leaving.
-                    opens = ti.atomic_add(self.ticket[TURN], 0) // chunks * chunks
-                    looks = 0
-                    while ti.atomic_add(self.ticket[FINISHED], 0) < opens and looks < patience:
-                        looks += 1
-                    if looks == patience:
-                        here = False
+                phase = 0
+                while phase < 2 * steps:
+                    # In this order: who comes late to a phase that is over must not take the next move's word for it.
+                    far = ti.atomic_add(self.moved[None], 0)
+                    now = ti.atomic_add(self.ticket[FINISHED], 0) // chunks
+                    if now > phase:
+                        phase = now
+                    elif phase % 2 == 1 and far == 1:
+                        self.halted[None] = 1
+                        self.done[None] = phase // 2
+                        phase = 2 * steps
                     else:
-                        turn = ti.atomic_add(self.ticket[TURN], 1)
-                        phase = turn // chunks
-                        if phase >= 2 * steps:
-                            here = False
-                        else:
-                            while ti.atomic_add(self.ticket[FINISHED], 0) < phase * chunks:
-                                pass
-                            c = turn - phase * chunks
-                            if ti.atomic_add(self.halted[None], 0) == 1:
-                                here = False
-                            elif phase % 2 == 0:
-                                self.move(c, dt, limit, ti.Vector([gx, gy, gz]), keep)
-                            elif ti.atomic_add(self.moved[None], 0) == 1:
-                                self.halted[None] = 1
-                                self.done[None] = phase // 2
-                                here = False
-                            else:
-                                self.push(c, dt, shapes, rest, ledger)
-                            ti.atomic_add(self.ticket[FINISHED], 1)
+                        for k in range(chunks):
+                            c = ti.select(own + k < chunks, own + k, own + k - chunks)
+                            if self.claim[c * CACHE_LINE] <= phase:
+                                if ti.atomic_max(self.claim[c * CACHE_LINE], phase + 1) <= phase:
+                                    if phase % 2 == 0:
+                                        self.move(c, dt, limit, ti.Vector([gx, gy, gz]), keep)
+                                    else:
+                                        self.push(c, dt, shapes, rest, ledger)
+                                    ti.atomic_add(self.ticket[FINISHED], 1)
+                        phase += 1
+                        # Leave when it takes long (another program has the core of whom we wait for): the rest is done
+                        # by those who stay.
+                        looks = 0
+                        while ti.atomic_add(self.ticket[FINISHED], 0) < phase * chunks and looks < patience:
+                            looks += 1
+                        if looks == patience:
+                            phase = 2 * steps
 
     @ti.kernel
     def run_on_gpu(

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 __all__ = ["Held", "hold", "take_back"]
 
 # What lists are made with, and what a step makes anew: nothing of it is read before it is written.
-_SCRATCH = ("old_", "cell_", "block_", "came_from", "key", "near_first", "touching", "rank", "ticket", "problem")
+_SCRATCH = ("old_", "cell_", "block_", "came_from", "key", "near_first", "touching", "rank", "ticket", "claim",
+            "problem")  # fmt: skip
 _NUMBERS = ("steps", "list_count", "grain_steps", "_since_lists", "_reaction_steps", "_skin", "_tallied")
 _SLEEPERS_NUMBERS = ("awake", "mass", "slept", "leaving")
 
@@ -55,6 +56,8 @@ def take_back(bed: Bed, held: Held) -> None:
     for table in held.tables:
         for name, twin in _twins(table).items():
             getattr(table, name).copy_from(twin)
+    if e.rest.on:
+        e.rest.whole[None] = 1  # of what lists were made with nothing is held
     for name, value in held.numbers.items():
         setattr(bed, name, value)
     for name, value in (held.sleeper or {}).items():

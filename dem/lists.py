@@ -18,7 +18,7 @@ __all__ = ["INDEX_BITS", "INDEX_MASK", "ITEMS_PER_THREAD", "Lists", "MOST_BODIES
 ITEMS_PER_THREAD = 512
 # Places of the counters in Engine.ticket: of a plain loop over chunks; of ``Engine.run``.
 CACHE_LINE = 16
-QUEUE, TURN, FINISHED = 0, CACHE_LINE, 2 * CACHE_LINE
+QUEUE, FINISHED = 0, CACHE_LINE
 BUILT = 2  # place of a number of ``dem.sleep.Rest.news``: the other store of frozen contacts is filled
 SCAN_BLOCKS = 64  # in which cells are added up
 MOST_BODIES = 32  # the floor, a platform's 24 spikes and hull, and some more
@@ -29,8 +29,9 @@ INDEX_MASK = (1 << INDEX_BITS) - 1
 SAME_IMAGE = 1 + 3 * 1  # (0 + 1) + 3 * (0 + 1)
 
 # Places of the numbers in Engine.count and Engine.box. CHUNKS are those of the grains AWAKE (``dem.sleep``: all, unless
-# a bed lets its grains sleep), of ALL_CHUNKS that there is room for.
-GRAINS, CHUNKS, CHUNK_ROOM, NEAR_ROOM, NX, NY, NZ, CELLS, AWAKE, ALL_CHUNKS = range(10)
+# a bed lets its grains sleep), of ALL_CHUNKS that there is room for. SORTED of the grains are sorted, into SORTED_CELLS
+# cells: all, but for sleepers that stay where they are.
+GRAINS, CHUNKS, CHUNK_ROOM, NEAR_ROOM, NX, NY, NZ, CELLS, AWAKE, ALL_CHUNKS, SORTED, SORTED_CELLS = range(12)
 PERIOD_X, PERIOD_Y, BOTTOM, TOP, CELL_X, CELL_Y, CELL_Z = range(7)
 
 
@@ -144,9 +145,10 @@ class Lists:
 
         Those that sleep come behind those awake: each set has the cells for itself. ``awake``: how many were, until
         now; the others have not moved. A sleeper whose place in memory stays is left where it is, and few change it:
-        the order of sleepers begins where grains wake and fall asleep (``place_asleep``).
+        the order of sleepers begins where grains wake and fall asleep (``place_asleep``), and from SORTED on, behind
+        the last that wakes, nothing changes: of the grains from its cell on as many lie before it as did.
         """
-        for k in range(rest.sets * self.count[CELLS]):
+        for k in range(self.count[SORTED_CELLS]):
             self.cell_fill[k] = 0
         if ti.static(ledger.on):
             for _ in range(1):  # one thread: the sum has one order
@@ -156,7 +158,7 @@ class Lists:
                     b = -ti.floor(x.y / self.box[PERIOD_Y]) * self.box[PERIOD_Y]
                     if a != 0.0 or b != 0.0:
                         ledger.turn(0, ledger.outside, v.w * ti.Vector([a, b, 0.0]).cross(v.xyz))
-        for i in range(self.count[GRAINS]):
+        for i in range(self.count[SORTED]):
             cell = 0
             if i < awake:
                 self.wrap(i)
@@ -175,7 +177,7 @@ class Lists:
         for w in range(self.cpu_items if ti.static(not self.gpu) else SCAN_BLOCKS):
             b = self.first_block(w)
             while b < SCAN_BLOCKS:
-                self.block_sum[b] = self.scan(b, 0, rest.sets * self.count[CELLS], False)
+                self.block_sum[b] = self.scan(b, 0, self.count[SORTED_CELLS], False)
                 b += self.block_stride
         for _ in range(1):
             total = 0
@@ -183,16 +185,19 @@ class Lists:
                 kept = self.block_sum[b]
                 self.block_sum[b] = total
                 total += kept
-            self.cell_start[rest.sets * self.count[CELLS]] = total
+            self.cell_start[self.count[SORTED_CELLS]] = total
         for w in range(self.cpu_items if ti.static(not self.gpu) else SCAN_BLOCKS):
             b = self.first_block(w)
             while b < SCAN_BLOCKS:
-                self.scan(b, self.block_sum[b], rest.sets * self.count[CELLS], True)
+                self.scan(b, self.block_sum[b], self.count[SORTED_CELLS], True)
                 b += self.block_stride
-        for i in range(self.count[GRAINS]):
+        for i in range(self.count[SORTED]):
             slot = ti.atomic_add(self.cell_fill[self.key[i]], 1)
             self.came_from[slot] = i
-        for r in range(rest.sets * self.count[CELLS]):
+        if ti.static(rest.on):
+            for i in range(self.count[SORTED], self.count[GRAINS]):
+                self.came_from[i] = i
+        for r in range(self.count[SORTED_CELLS]):
             # Whatever thread came first, the order within a cell is that of the ids.
             for a in range(self.cell_start[r] + 1, self.cell_start[r + 1]):
                 moving = self.came_from[a]
@@ -201,7 +206,7 @@ class Lists:
                     self.came_from[b + 1] = self.came_from[b]
                     b -= 1
                 self.came_from[b + 1] = moving
-        for i in range(self.count[GRAINS]):
+        for i in range(self.count[SORTED]):
             o = self.came_from[i]
             if not self.lies_on(i, awake, rest):
                 self.buffer4[0][i] = self.position[o]
@@ -209,7 +214,7 @@ class Lists:
                 self.buffer4[2][i] = self.spin[o]
                 self.buffer3[i] = self.origin[o]
                 self.buffer_id[i] = self.id[o]
-        for i in range(self.count[GRAINS]):
+        for i in range(self.count[SORTED]):
             if not self.lies_on(i, awake, rest):
                 self.position[i] = self.buffer4[0][i]
                 self.velocity[i] = self.buffer4[1][i]
@@ -285,10 +290,12 @@ class Lists:
                 self.keep_chunk(c, rest, ledger)
                 c = self.next_chunk(w, False)
         if ti.static(rest.on):
-            for i in range(self.count[AWAKE], self.count[GRAINS]):
+            for i in range(self.count[AWAKE], rest.before(rest.kept, self.count[GRAINS])):
                 self.old_start[i] = 0
                 self.old_end[i] = 0
                 self.near_first[i] = -1
+            for _ in range(1):
+                rest.kept[None] = self.count[AWAKE]
 
     @ti.func
     def keep_chunk(self, c, rest: ti.template(), ledger: ti.template()):
@@ -345,7 +352,7 @@ class Lists:
                 self.list_chunk(c, ti.cast(skin, self.real), shapes, rest, ledger)
                 c = self.next_chunk(w, False)
         if ti.static(rest.on):
-            for i in range(self.count[AWAKE], self.count[GRAINS]):
+            for i in range(self.count[AWAKE], rest.before(rest.made, self.count[GRAINS])):
                 self.pair_start[i] = 0
                 self.pair_end[i] = 0
             for c in range(self.count[CHUNKS], self.count[ALL_CHUNKS]):
@@ -354,6 +361,8 @@ class Lists:
                 if rest.news[BUILT] == 1:
                     rest.side[None] = 1 - rest.side[None]
                     rest.news[BUILT] = 0
+                rest.made[None] = self.count[AWAKE]
+                rest.whole[None] = 0
         for _ in range(1):
             self.moved[None] = 0
             self.halted[None] = 0

@@ -82,7 +82,9 @@ class Sleeper:
         g = math.hypot(*bed.gravity)
         d = bed._diameter
         # The same to the bit in whatever order the grains lie.
-        weight = g * math.fsum(bed._engine.read("velocity")[:, 3]) / bed.grain_count
+        total = math.fsum(bed._engine.read("velocity")[:, 3])
+        bed._engine.rest.total[None] = total
+        weight = g * total / bed.grain_count
         self.limit = rules.force * weight
         self.fast, self.slow = (share * math.sqrt(g * d) for share in (rules.waking_speed, rules.speed))
         self.reach = rules.reach * d
@@ -224,3 +226,4 @@ class Sleeper:
         rest.begins[None], rest.block[None] = (int(number) for number in state.get("sleep_order", (0, 0)))
         e.find_cells(rest)
         rest.mass[None] = self.mass
+        rest.whole[None] = 1

@@ -21,6 +21,8 @@ from .lists import (
     NZ,
     PERIOD_X,
     QUEUE,
+    SORTED,
+    SORTED_CELLS,
 )
 
 __all__ = ["EVERYONE", "FULL", "LEAVING", "Rest", "Sleepers", "WOKEN"]
@@ -78,10 +80,22 @@ class Rest:
         self.roll = F(3, real, (2, _STORE_ROOM * grains))
         self.held = F(3, real, chunks)  # force of those awake on sleepers, summed over steps
         self.mass = ti.field(ti.f64, ())  # of the sleepers [kg]
+        self.total = ti.field(ti.f64, ())  # of all grains [kg]
+        # Which sleepers the next lists pass over: 1 in ``whole`` is none. Else those of the cells behind that of rank
+        # ``last``, whose places stay; and of rows of those behind how many were awake then nothing is to be cleared.
+        self.whole = ti.field(ti.i32, ())
+        self.last = ti.field(ti.i32, ())
+        self.kept = ti.field(ti.i32, ())
+        self.made = ti.field(ti.i32, ())
         self.news = ti.field(ti.i32, 4)
         self.begins = ti.field(ti.i32, ())  # rank of the cell whose sleepers come first in memory
         self.block = ti.field(ti.i32, ())  # its block along x
         self.near = ti.field(real, 3)
+
+    @ti.func
+    def before(self, awake, grains):
+        """Where sleepers begin that had no rows when as many as ``awake`` says were."""
+        return ti.select(self.whole[None] == 1, grains, awake[None])
 
     @ti.func
     def find(self, a, b):
@@ -203,6 +217,9 @@ class Sleepers:
         Between ``keep_lists`` and ``sort``: the lists are still those of before.
         """
         for _ in range(1):
+            rest.last[None] = -1
+            if leaving == 1:
+                rest.whole[None] = 1
             self.find_bodies(rest)
         for r in range(self.count[CELLS]):
             rest.flagged[r] = 0
@@ -219,6 +236,7 @@ class Sleepers:
             if flagged:
                 rest.asleep[k] = 0
                 rest.quiet[k] = 0
+                ti.atomic_max(rest.last[None], self.place_asleep(self.rank[rest.cell[k]], rest) - self.count[CELLS])
         for c in range(self.count[CHUNKS]):
             if leaving == 1:
                 start, end = self.chunk_range(c)
@@ -262,6 +280,7 @@ class Sleepers:
             block += ti.select(block < 0, blocks, 0)
             if ti.abs(block - rest.block[None]) > 1:
                 rest.block[None] = block
+                rest.whole[None] = 1
                 rest.begins[None] = self.rank[self.cell_index(block * _BLOCK, 0, 0)]
 
     @ti.func
@@ -396,16 +415,21 @@ class Sleepers:
 
     @ti.kernel
     def recount(self, grains_per_chunk: int, rest: ti.template()):
-        """How many are awake, in how many chunks; the mass of the others."""
+        """How many are awake, in how many chunks; the mass of the others; how many are to be sorted."""
         for _ in range(1):
+            sets = 2 * self.count[CELLS]
+            cells = ti.select(rest.whole[None] == 1, sets, self.count[CELLS] + rest.last[None] + 1)
+            until = self.count[GRAINS]
+            if cells < sets:
+                until = self.cell_start[cells]
             awake = 0
             mass = ti.cast(0.0, ti.f64)
-            for i in range(self.count[GRAINS]):
-                if rest.asleep[self.id[i]] == 1:
+            for i in range(until):
+                if rest.asleep[self.id[i]] == 0:
                     mass += ti.cast(self.velocity[i].w, ti.f64)
-                else:
                     awake += 1
-            rest.mass[None] = mass
+            rest.mass[None] = rest.total[None] - mass
+            self.count[SORTED], self.count[SORTED_CELLS] = until, cells
             self.count[AWAKE] = awake
             chunks = (awake + grains_per_chunk - 1) // grains_per_chunk
             self.count[CHUNKS] = ti.max(1, ti.min(self.count[ALL_CHUNKS], chunks))
