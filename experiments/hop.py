@@ -19,6 +19,7 @@ from .hop_on_surface import SurfaceHop, flight_path, hop_on_surface, hop_trial, 
 from .hop_search import Hop, find_hop, longest_flight
 from .hop_settings import HopSettings
 from .hop_words import sentences, warnings
+from .kept_platform import keep_platform
 from .progress import Progress
 from .reporting import write_report
 from .runfolder import RunFolder, write_series
@@ -38,7 +39,7 @@ def check(settings: HopSettings) -> None:
 
 def _carry_out(settings: HopSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
     with folder.lock():
-        plan, hop = find_hop(settings)
+        plan, hop = find_hop(settings, keep_platform(settings.platform, folder.path, progress.message))
         for sentence in plan.sentences():
             progress.message(sentence)
         progress.stage("hop", total=1.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from rigid.actuation import Flywheel
@@ -65,13 +66,14 @@ class HopPlan:
         return defaults_said(self.choices, self.numbers)
 
 
-def plan_hop(settings: HopSettings) -> HopPlan:
-    """The numbers that `settings` stand for.
+def plan_hop(settings: HopSettings, platform_file: Path | None = None) -> HopPlan:
+    """The numbers that `settings` stand for; `platform_file` stands in for ``settings.platform``, where copied.
 
     Raises ValueError, naming the setting, for a platform or a surface there is not, a torque beyond the motor, a wheel
     speed beyond the wheel's, and numbers that cannot be.
     """
-    platform, of_platform = find_platform(settings.platform), platform_numbers(settings.platform, in_plane=False)
+    platform = find_platform(platform_file or settings.platform)
+    of_platform = platform_numbers(settings.platform, file=platform_file, in_plane=False)
     numbers = Settled(settings)
     given = settings.model_fields_set
     numbers["gravity"] = Number(settings.gravity, "m/s2", "given" if "gravity" in given else "default")

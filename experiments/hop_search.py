@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -56,12 +57,14 @@ class _Means:
     unit: str
 
 
-def find_hop(settings: HopSettings) -> tuple[HopPlan, Hop]:
+def find_hop(settings: HopSettings, platform_file: Path | None = None) -> tuple[HopPlan, Hop]:
     """The numbers, and the hop over the distance or by the means given.
+
+    `platform_file` stands in for ``settings.platform``, where that was copied.
 
     Raises ValueError for numbers that cannot be, and for a distance or means with which there is no hop.
     """
-    plan = plan_hop(settings)
+    plan = plan_hop(settings, platform_file)
     means = _by_brake(plan, settings) if settings.actuator == "brake" else _by_motor(plan, settings)
     if settings.asks_for == "distance":
         return plan, _search(settings, plan, means)

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field, replace
 from multiprocessing import get_context
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from hedgebed import __version__
 from rigid.planar import simulate
 from rigid.trial import Trial
 
+from .kept_platform import keep_platform
 from .memory import cores_there
 from .paper_claims import claims, first_lasting
 from .paper_settings import PaperSettings
@@ -29,7 +31,7 @@ from .progress import Progress
 from .reporting import write_report
 from .runfolder import RunFolder
 from .surfaces import find_surface
-from .tumble_platform import torque_within_limit
+from .tumble_platform import PlatformNumbers, platform_numbers, torque_within_limit
 from .tumble_settings import TumbleSettings
 from .tumble_trial import plan_tumble
 from .whole_runs import whole_run
@@ -74,8 +76,9 @@ def check(settings: PaperSettings) -> None:
             simulate(job.trial, duration=1e-3, method="paper")
 
 
-def plan_jobs(settings: PaperSettings) -> list[Job]:
-    """Every integration, in order."""
+def plan_jobs(settings: PaperSettings, platform_file: Path | None = None) -> list[Job]:
+    """Every integration, in order; `platform_file` stands in for ``settings.platform``, where that was copied."""
+    platform = platform_numbers(settings.platform, file=platform_file)
     jobs: list[Job] = []
     turns: list[dict[str, Any]] = [{"torque": torque, "actuator": "motor"} for torque in settings.motor_torques]
     turns += [
@@ -85,14 +88,17 @@ def plan_jobs(settings: PaperSettings) -> list[Job]:
     for rig in settings.rigs:
         for turn in turns:
             for surface in settings.surfaces:
-                jobs += _case_jobs(settings, rig, turn, surface)
+                jobs += _case_jobs(settings, rig, turn, surface, platform)
     return jobs
 
 
-def _case_jobs(settings: PaperSettings, rig: float, turn: dict[str, Any], surface: str) -> Iterator[Job]:
+def _case_jobs(
+    settings: PaperSettings, rig: float, turn: dict[str, Any], surface: str, platform: PlatformNumbers
+) -> Iterator[Job]:
     """The integrations of one gravity, torque and surface."""
     plan = plan_tumble(
-        TumbleSettings(rig=rig, surface=surface, platform=settings.platform, rig_reading=settings.rig_reading, **turn)
+        TumbleSettings(rig=rig, surface=surface, platform=settings.platform, rig_reading=settings.rig_reading, **turn),
+        platform=platform,
     )
     trial, torque = plan.trial, turn["torque"]
     name = f"{surface}-{rig:g}g-{torque:g}Nm"
@@ -214,9 +220,9 @@ def _all(jobs: Sequence[Job], workers: int, progress: Progress) -> list[dict[str
 
 
 def _carry_out(settings: PaperSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
-    jobs = plan_jobs(settings)
     workers = settings.workers or cores_there()
     with folder.lock():
+        jobs = plan_jobs(settings, keep_platform(settings.platform, folder.path, progress.message))
         progress.plan({"trials": float(len(jobs)), "report": 0.1 * len(jobs)})
         progress.stage("trials", total=float(len(jobs)))
         progress.message(f"{len(jobs)} integrations on {workers} process{'es' if workers > 1 else ''}")

@@ -68,6 +68,40 @@ def test_a_tumble_in_the_plane_is_done_again_with_the_platform_that_it_began_wit
         assert json.loads(Path("a/result.json").read_text()) == before
 
 
+@pytest.mark.parametrize(
+    "given",
+    [
+        ("hop", "--gravity", "0.01", "--surface", "steel", "--distance", "0.1"),
+        (
+            "paper",
+            "--no-sweep",
+            "--rigs",
+            "0.0085",
+            "--surfaces",
+            "sand",
+            "--motor-torques",
+            "1e-3",
+            "--brake-torques",
+            "0.01",
+            "--duration",
+            "0.2",
+            "--brake-duration",
+            "0.2",
+            "--workers",
+            "1",
+        ),
+    ],
+)
+def test_a_hop_and_the_papers_cases_are_done_again_with_the_platform_that_they_began_with(mine, given):
+    assert main([*given, "--platform", str(mine), "--out", "a", "--quiet"]) == 0
+    before = json.loads(Path("a/result.json").read_text())
+    assert before["platform"]["mass"] == 0.1
+    for _ in changes(mine):
+        Path("a/result.json").unlink()
+        assert main(["resume", "a", "--quiet"]) == 0
+        assert json.loads(Path("a/result.json").read_text()) == before
+
+
 def test_on_grains_spikes_and_all_are_those_that_it_began_with(mine, monkeypatch):
     seen = []
 
