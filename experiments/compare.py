@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -90,9 +90,7 @@ def _carry_out(settings: CompareSettings, folder: RunFolder, progress: Progress)
             "quantities": {}, "departures": {"sentences": []},
             "compared": [], "compared_over": None, "differs": _differs(first, second, results),
             "colour": settings.colour, "pictures": settings.pictures and first.command != "penetrate",
-            "warnings": [
-                f"{label}: {warning}" for label, one in zip(labels, results, strict=True) for warning in one["warnings"]
-            ],
+            "warnings": _whose(labels, [one["warnings"] for one in results]),
         }  # fmt: skip
         if first.command != "penetrate":
             progress.stage("series", total=1.0)
@@ -108,6 +106,18 @@ def _carry_out(settings: CompareSettings, folder: RunFolder, progress: Progress)
         progress.stage("report", total=1.0)
         write_report(folder.path, progress)
     return result
+
+
+def _whose(labels: Sequence[str], said: Sequence[Sequence[str]]) -> list[str]:
+    """What is said of each run, by its label; what is said of both stands once."""
+    both = [sentence for sentence in said[0] if sentence in said[1]]
+    alone = [
+        f"{label}: {sentence}"
+        for label, sentences in zip(labels, said, strict=True)
+        for sentence in sentences
+        if sentence not in both
+    ]
+    return [f"both: {sentence}" for sentence in both] + alone
 
 
 def _add_motion(
@@ -132,7 +142,7 @@ def _add_motion(
     result["weights"] = [one.weight for one in moved]
     result["quantities"] = module.gaps(columns)
     result["departures"]["sentences"] = module.told_apart(columns, labels, moved)
-    result["warnings"] += [f"{label}: {note}" for label, one in zip(labels, moved, strict=True) for note in one.notes]
+    result["warnings"] += _whose(labels, [one.notes for one in moved])
 
 
 def _compare_numbers(

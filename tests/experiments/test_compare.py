@@ -67,6 +67,19 @@ def test_numbers_that_go_with_how_long_a_run_lasts_are_compared_over_the_time_th
     assert rows["energy_residual"]["over"] == "whole runs"
 
 
+def test_a_warning_of_both_runs_stands_once_and_one_of_either_is_told_with_its_label(runs, tmp_path):
+    for name, own in (("sand", ["the wind blew", "sand's own"]), ("brick", ["the wind blew"])):
+        shutil.copytree(runs / name, tmp_path / name)
+        file = tmp_path / name / "result.json"
+        file.write_text(json.dumps({**json.loads(file.read_text()), "warnings": own}))
+    given = [str(tmp_path / name) for name in ("sand", "brick")]
+    assert main(["compare", *given, "--no-pictures", "--out", str(tmp_path / "both"), "--quiet"]) == 0
+    assert json.loads((tmp_path / "both" / "result.json").read_text())["warnings"] == [
+        "both: the wind blew",
+        "sand: sand's own",
+    ]
+
+
 def test_a_spring_damper_s_sinkage_is_its_compression_below_the_undisturbed_surface(runs, tmp_path):
     """At rest each of two rows bears W / 2: W / (2 K) deep; an older run without the numbers is given them."""
     result = json.loads((runs / "brick" / "result.json").read_text())
