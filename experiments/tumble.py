@@ -27,7 +27,7 @@ from .tumble_platform import PlatformNumbers, platform_numbers, torque_within_li
 from .tumble_settings import TumbleSettings
 from .tumble_sweep import check_sweep, middle_of_sweep, run_sweep
 from .tumble_trial import TumblePlan, plan_tumble
-from .tumble_words import tumble_sentences, unsettled_warning
+from .tumble_words import stayed_words, tumble_sentences, unsettled_warning
 from .whole_runs import whole_run
 
 __all__ = ["check", "motion_columns", "quantities_of", "result_of", "resume", "run", "trajectory_columns"]
@@ -260,7 +260,7 @@ def result_of(settings: TumbleSettings, plan: TumblePlan, trajectory: Trajectory
             f"there on the motor has no torque"
         )
     if trajectory.trajectory_angle is None:
-        warnings.append("the centre never got 10 mm away from its start: there is no trajectory angle")
+        warnings.append(stayed_words(trajectory))
     return {
         "format": "hedgebed-result/1",
         "experiment": "tumble",

@@ -6,12 +6,17 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from rigid.trajectory import Trajectory, Transition
 
 if TYPE_CHECKING:
     from coupling import Master
 
-__all__ = ["MOST", "residual_warning", "reversal_warning", "tumble_sentences", "unsettled_warning", "way_through"]
+__all__ = [
+    "MOST", "residual_warning", "reversal_warning", "stayed_words", "tumble_sentences", "unsettled_warning",
+    "way_through",
+]  # fmt: skip
 
 MOST = 8
 """Changes of state that are told one by one."""
@@ -39,6 +44,17 @@ def way_through(transitions: Sequence[Transition]) -> str:
     more = len(transitions) - MOST
     rest = f" -> {more} more change{'s' if more > 1 else ''} of state (in result.json)" if more > 0 else ""
     return f"{' -> '.join(told)}{rest}."
+
+
+def stayed_words(trajectory: Trajectory) -> str:
+    """That there is no trajectory angle, and how far the centre got instead, and which way."""
+    along, up = (values - values[0] for values in (trajectory.x, trajectory.y))
+    far = int(np.argmax(np.hypot(along, up)))
+    return (
+        f"the centre never got 10 mm away from its start: there is no trajectory angle; at most it was "
+        f"{1e3 * math.hypot(along[far], up[far]):.3g} mm away, {1e3 * along[far]:+.3g} mm along and "
+        f"{1e3 * up[far]:+.3g} mm up, at {trajectory.time[far]:.4g} s"
+    )
 
 
 def residual_warning(residual: float) -> str | None:

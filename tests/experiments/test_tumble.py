@@ -104,6 +104,19 @@ def test_what_never_happens_is_null():
         assert value_of("a", name) is None
 
 
+def test_a_centre_that_stays_within_10_mm_is_told_how_far_it_got_and_which_way():
+    assert main(["tumble", "--torque", "0.02", *SHORT, "--out", "a"]) == 0
+    (said,) = (warning for warning in result_of("a")["warnings"] if "no trajectory angle" in warning)
+    away, along, up, when = (
+        float(x) for x in re.findall(r"[+-]?[0-9.]+(?:e-?[0-9]+)?(?= (?:mm (?:away,|along|up)|s$))", said)
+    )
+    rows = read_series("a/trajectory.csv")
+    row = int(np.argmin(np.abs(rows["t_s"] - when)))
+    for told, of in ((along, "x_m"), (up, "y_m")):
+        assert told == pytest.approx(1e3 * (rows[of][row] - rows[of][0]), rel=0.01)
+    assert away == pytest.approx(math.hypot(along, up), rel=0.01) and 0 < away < 10
+
+
 def test_json_prints_the_result_and_nothing_else(capsys):
     assert main(["tumble", *SHORT, "--json", "--out", "a"]) == 0
     assert json.loads(capsys.readouterr().out) == result_of("a")
