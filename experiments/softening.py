@@ -6,7 +6,8 @@ that is refused.
 
 1. Pressure under the tip, from 3D-RFT (Agarwal et al. 2023, arXiv 2205.14920), a flat plate going straight down:
        p = 0.876 xi_n z + lambda rho_b v^2,   xi_n = rho_b g (894 mu^3 - 386 mu^2 + 89 mu), mu held to 0.3-0.9,
-   rho_b the bulk density, lambda = 1.1, plus the weight of the bed itself, rho_b g H, and at least load / area.
+   rho_b the bulk density, lambda = 1.1, plus the weight of the bed itself, rho_b g H, and at least load / area,
+   which in flight is what the torque presses with (`PUSHED`).
 2. Mean contact force from the stress of an assembly (Rothenburg), F = pi d^2 p / (Z phi), which is d^2 p within 5 % at
    Z = 5, phi = 0.6. Forces in a loaded bed fall off exponentially from the mean, so that the largest of n loaded
    contacts would be ln n times the mean. Soft grains share the load: `chain` is 1.4 times what was
@@ -33,8 +34,8 @@ from typing import Any
 from dem.timestep import CHAIN
 
 __all__ = [
-    "Softening", "bearing_gradient", "chain", "check_young", "drop_depth", "run_limit", "soften", "soften_material",
-    "stable_overlap",
+    "PUSHED", "Softening", "bearing_gradient", "chain", "check_young", "drop_depth", "run_limit", "soften",
+    "soften_material", "stable_overlap",
 ]  # fmt: skip
 
 RAIN_OVERLAP = 0.05
@@ -42,6 +43,11 @@ RAIN_OVERLAP = 0.05
 INERTIA = 1.1
 """lambda: dynamic pressure over rho v^2 [1] (Agarwal et al. 2023)."""
 
+PUSHED = {"motor": 1.0, "brake": 3.0}
+"""Force on a platform's rows in flight that grains are made stiff enough for, over the spring-damper's largest [1].
+
+There a bed's own weight says nothing of what a torque presses with. 0.7 to 0.8 (motor) and 2.9 to 4.9 (brake, whose
+spring-damper is not yet pressed in when a tip has its speed in grains) were met (docs/results/grains2-flight-*)."""
 SMALL = 0.05
 """Overlap that grains meant to be hard may have [of a diameter]: the default of `max_overlap`, past which a drive of
 a spike fails, and a platform's run at `run_limit`. A run that had more is told so."""

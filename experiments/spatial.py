@@ -29,7 +29,7 @@ from .progress import Progress
 from .reporting import write_report
 from .runfolder import RunFolder
 from .settings import expected_grain_count
-from .softening import Softening, check_young, run_limit, soften_material
+from .softening import PUSHED, Softening, check_young, run_limit, soften_material
 from .spatial_frames import SpatialFrames
 from .spatial_result import conclude, write_series_of
 from .spatial_settings import SpatialSettings
@@ -225,6 +225,8 @@ def _check_bed(settings: SpatialSettings, plan: SpatialPlan, forecast: Forecast,
 def _softness(settings: SpatialSettings, plan: SpatialPlan, forecast: Forecast) -> Softening:
     """The modulus of the grains for this run (`experiments.softening`), or the one that is set."""
     load = float(np.linalg.norm(plan.trial.weight)) / _feet(plan)
+    if plan.trial.counterweight == 0:
+        load = max(load, PUSHED[settings.actuator] * plan.numbers["stiffness"].value * forecast.deepest)
     return soften_material(
         _material(plan), young=settings.young, max_overlap=settings.max_overlap, grain=settings.grain,
         spread=settings.spread, gravity=_grain_gravity(plan), bed_height=settings.bed_size[2],

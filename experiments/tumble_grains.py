@@ -33,7 +33,7 @@ from .progress import Progress
 from .reporting import write_report
 from .runfolder import RunFolder
 from .settings import expected_grain_count
-from .softening import Softening, check_young, run_limit, soften_material
+from .softening import PUSHED, Softening, check_young, run_limit, soften_material
 from .stopping import held_back
 from .surfaces import find_surface, surface_names
 from .tips import tip_angles, tip_depth
@@ -85,6 +85,8 @@ class Forecast:
     """Largest speed of a tip in the ground [m/s]."""
     sunk: float
     """Depth of the tips that it stands on before it moves [m]."""
+    pushed: float
+    """Largest force of the rows together [N]."""
     farthest: float
     """Where tips may come down on grains, which hold a row and the torque with it as long as it acts [m]."""
     margin: float = 1.5
@@ -217,6 +219,7 @@ def _forecast(settings: TumbleSettings, plan: TumblePlan) -> Forecast:
     forecast = Forecast(
         plan, found, full, float(tips_x[near].min()), float(tips_x[near].max()), float(depth.max()),
         float(speed[near].max()), sunk=float(depth[0].max()),
+        pushed=trial.weight + (trial.mass + trial.counterweight) * float(np.gradient(found.vy, found.time).max()),
         farthest=max(float(tips_x[near].max()), _rolled(settings, plan, float(depth.max()))),
     )  # fmt: skip
     return forecast if trial.counterweight > 0 else _in_flight(settings, plan, forecast)
@@ -391,6 +394,9 @@ def _graded(settings: TumbleSettings, forecast: Forecast) -> Graded | None:
 
 def _softness(settings: TumbleSettings, plan: TumblePlan, forecast: Forecast) -> Softening:
     """The modulus of the grains for this run (`experiments.softening`), or the one that is set."""
+    load = plan.trial.weight
+    if plan.trial.counterweight == 0:
+        load = max(load, PUSHED[plan.trial.actuator] * forecast.pushed)
     return soften_material(
         _material(plan),
         young=settings.young,
@@ -401,7 +407,7 @@ def _softness(settings: TumbleSettings, plan: TumblePlan, forecast: Forecast) ->
         bed_height=settings.bed_size[2],
         depth=forecast.margin * forecast.deepest,
         speed=max(forecast.margin * forecast.fastest, _lowering_speed(settings, plan)),
-        pressure=plan.trial.weight / COPIES / (0.25 * math.pi * plan.spikes.diameter**2),
+        pressure=load / COPIES / (0.25 * math.pi * plan.spikes.diameter**2),
         fall=RAIN * settings.bed_size[2],
         fastest="the fastest tip's speed",
     )

@@ -1,6 +1,10 @@
 """How a platform lies on grains in flight: what carries it, how that scales, what is refused."""
 
+import json
 import math
+import tomllib
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -104,10 +108,25 @@ def test_the_bed_is_made_and_its_grains_chosen_under_the_gravity_to_settle_under
     assert tumble_grains._first_gravity(in_flight(), plan) == 0.4903325
     assert tumble_grains._first_gravity(in_flight(settle_gravity=None), plan) == 0.0980665
     law = tumble_grains._forecast(in_flight(), plan)
+    resting = replace(law, pushed=0.0)  # no torque, which presses as much under any gravity
     soft, softer = (
-        tumble_grains._softness(settings, plan, law).pressure
+        tumble_grains._softness(settings, plan, resting).pressure
         for settings in (in_flight(), in_flight(settle_gravity=None))
     )
     assert soft > 1.5 * softer
     speed = tumble_grains._lowering_speed(in_flight(), plan)
     assert speed == pytest.approx(math.sqrt(0.4903325 * law.sunk))
+
+
+@pytest.mark.parametrize("gravity", ["1e-2", "1e-4", "1e-6"])
+@pytest.mark.parametrize("turn", ["0.22", "brake"])
+def test_grains_chosen_for_what_a_torque_presses_with_would_have_kept_the_overlaps_that_were_met(gravity, turn):
+    """By Hertz, from the kept runs of 0.22 N m and of the brake, whose grains had a modulus that was set by hand."""
+    root, name = Path(__file__).parents[2], f"grains2-flight-{gravity}-{turn}"
+    case = tomllib.loads((root / f"experiments/cases/grains/{name}.toml").read_text())
+    kept = json.loads((root / f"docs/results/{name}/result.json").read_text())["grains"]
+    settings = TumbleSettings(**case | {"young": None})
+    plan = tumble_grains._plan(settings)
+    chosen = tumble_grains._softness(settings, plan, tumble_grains._forecast(settings, plan)).young
+    needed = kept["young"] * (kept["max_overlap"] / settings.max_overlap) ** 1.5
+    assert needed < chosen < 4 * needed, chosen / needed
