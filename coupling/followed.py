@@ -66,6 +66,11 @@ class Followed(Books):
         return min(1.0, done / (hand + self.duration))
 
     @property
+    def held_long(self) -> bool:
+        """Whether it is still in the hand, for longer than was guessed."""
+        return not self.placed and self.body.time > self._hand_time
+
+    @property
     def _hand_time(self) -> float:
         """How long setting down was guessed to take [s]; 0 without a hand."""
         return self.pace * REST_TIME + PLACING_WAY / self.lowering_speed if self.lowering_speed is not None else 0.0

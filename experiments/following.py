@@ -49,11 +49,15 @@ def follow(
         progress.message(f"goes on at {run.time:.4g} s")
     drawn = frames(kept is not None)
     progress.stage("tumble", total=1.0)
-    saved, in_hand = time.monotonic(), not run.placed
+    saved, in_hand, said = time.monotonic(), not run.placed, False
 
     def on_step(run: Any) -> None:
-        nonlocal saved, in_hand
+        nonlocal saved, in_hand, said
         progress.update(run.fraction)
+        if run.held_long and not said:
+            said = True
+            held = run.body.time
+            progress.message(f"still in the hand that sets it down after {held:.3g} s: it is let go once it rests")
         if in_hand and run.placed:
             in_hand = False
             held = run.placing_steps * run.master.macro_step
