@@ -24,10 +24,15 @@ from rigid.reaction import Contact
 from .footing import FootReaction, row_tips
 from .poses import Pose, Twist, Vector, Wrench, chord_share, matrices
 
-__all__ = ["HULL", "BedFooting", "LeftTheBedError", "Member", "ball_member", "platform_members", "spatial_members"]
+__all__ = [
+    "FEWEST_SLOTS", "HULL", "BedFooting", "LeftTheBedError", "Member", "ball_member", "platform_members", "slots_of",
+    "spatial_members",
+]  # fmt: skip
 
 HULL = -1
 """Row number of what is no spike."""
+FEWEST_SLOTS = 3
+"""Bodies of the bed that rows share in turn, with which those that share one are far enough apart."""
 AWAY = 100.0
 """How far above the bed a body waits before it is placed [m]."""
 
@@ -77,6 +82,11 @@ def ball_member(radius: float) -> Member:
     return Member(row=0, at=np.zeros(3), turn=np.array([1.0, 0.0, 0.0, 0.0]), radius=radius)
 
 
+def slots_of(count: int) -> int:
+    """How many bodies of the bed the `count` rows of a platform in the plane share in turn; `FEWEST_SLOTS` will do."""
+    return next(n for n in (6, 5, 4, 3, 2, 1) if count % n == 0 and (n < count or n == 1))
+
+
 def platform_members(
     *, spike_length: float, count: int, diameter: float, clear: float, hull_radius: float = 0.0, width: float = 0.0
 ) -> list[Member]:
@@ -93,8 +103,8 @@ def platform_members(
             f"spike_diameter = {diameter} m, spike_clear = {clear} m: it must be thinner than it is long, and no "
             f"longer than spike_length = {spike_length} m"
         )
-    slots = next(n for n in (6, 5, 4, 3, 2, 1) if count % n == 0 and n < count)
-    if slots < 3:
+    slots = slots_of(count)
+    if slots < FEWEST_SLOTS:
         raise ValueError(f"spike_count = {count}: rows that share a body must be far apart; 6, 8 or 16 would do")
     inner = row_tips(spike_length - radius, count)
     shaft = max(clear, spike_length - hull_radius + radius) if hull_radius > 0 else clear
@@ -264,10 +274,10 @@ class BedFooting:
         overlap, row = self._deepest_overlap(self.bed.grains(), pose)
         if overlap > 0:
             what = "the hull" if row == HULL else f"spike {row}"
-            lifted = float(pose.position[2]) + self.clear_height(pose)
+            higher = self.clear_height(pose)
             raise ValueError(
-                f"the body at a height of {pose.position[2]:.6g} m starts in overlap with a grain: {what} by "
-                f"{overlap:.3g} m; {lifted:.6g} m would do"
+                f"the body, its centre at a height of {pose.position[2]:.6g} m, starts in overlap with a grain: {what} "
+                f"by {overlap:.3g} m; {higher:.6g} m higher would do"
             )
 
     def _deepest_overlap(self, grains: Mapping[str, Any], pose: Pose, lift: float = 0.0) -> tuple[float, int]:

@@ -98,12 +98,12 @@ class SpatialBody:
         self._drag = np.zeros(2)
         self.held_by_hand = False
 
-    def take_in_hand(self, lowering_speed: float, *, step: float = 0.0) -> None:
+    def take_in_hand(self, lowering_speed: float, *, pace: float = 1.0, step: float = 0.0) -> None:
         """From here on a hand lowers it at `lowering_speed` [m/s], as `PlanarBody.take_in_hand` says. Torques wait."""
         weight, reach = float(np.linalg.norm(self.trial.weight)), self.trial.platform.reach
         drag = weight / lowering_speed
         velocity, spin = self.twist.velocity, self.twist.spin
-        time = hand_time(step)
+        time = hand_time(step, pace)
         self._masses, self._inertia = time * drag * np.ones(3), time * drag * reach**2 * np.eye(3)
         self._drag = np.array([drag, drag * reach**2])
         self.held_by_hand = True

@@ -20,6 +20,7 @@ from .bed_footing import BedFooting
 from .contact_state import ContactReader, changes_of, feet_of, state_of
 from .followed import Followed
 from .footing import Footing, FootReaction, LawFooting
+from .lowered_gravity import pace_under
 from .master import Master
 from .poses import Twist, Vector, Wrench
 from .spatial_body import SpatialBody
@@ -31,8 +32,8 @@ COLUMNS = (
     "kinetic_energy", "potential_energy", "torque_work", "given", "taken", "fx", "fy", "fz", "touching", "sinkage",
 )  # fmt: skip
 """Of a row: centre of mass [m], quaternion, velocity [m/s] and spin [rad/s] in world axes, absolute speeds of the
-wheels [rad/s], energies and works [J] as the planar rows have them, the footing's force [N], how many members touch,
-the deepest spike's depth [m]."""
+wheels about the platform's x, y and z [rad/s], energies and works [J] as the planar rows have them, the footing's force
+[N], how many members touch, the deepest spike's depth [m]."""
 FEET = 6
 """Numbers of a spike (`contact_state.feet_of`); of those that have none a step keeps nothing."""
 
@@ -112,7 +113,9 @@ class SpatialRun(Followed):
         self._not_begun()
         self._order()
         if lowering_speed is not None:
-            self.body.take_in_hand(lowering_speed, step=self.master.macro_step)
+            if isinstance(footing, BedFooting):
+                self.pace = pace_under(footing.gravity)
+            self.body.take_in_hand(lowering_speed, pace=self.pace, step=self.master.macro_step)
         else:
             self.body.start(footing.lag)
             self._begin()
@@ -166,7 +169,7 @@ class SpatialRun(Followed):
         deepest = max(reaction.sinkage.values(), default=0.0) if reaction is not None else 0.0
         self._rows.append(
             [
-                body.time, *body.place, *body.turn, *twist.velocity, *twist.spin, *body.wheel_speed,
+                body.time, *body.place, *body.turn, *twist.velocity, *twist.spin, *(body.axes.T @ body.wheel_speed),
                 body.kinetic_energy(lag), body.potential_energy, body.torque_work, *self.master.exchanged(),
                 *self.master.wrench.force, touching, deepest,
             ]

@@ -236,11 +236,17 @@ def _campaign_from_run() -> Callable[..., int]:
 
     def command(run: Path, folder: Path, **given: Any) -> int:
         with refusing():
-            tumbled = RunFolder.open(run).command == "tumble"
+            kind = RunFolder.open(run).command
+            tumbled = kind == "tumble"
+            if kind not in ("tumble", "penetrate"):
+                raise ValueError(
+                    f"{str(run)!r} is a run of {kind!r}: one of 'penetrate', or of 'tumble' in the plane, was "
+                    f"expected; campaigns and `hedgebed diagnose` know no others"
+                )
             stray = sorted(set(given) & (set(of_spikes) - {"seed"} if tumbled else set(of_tumbles)))
             if stray:
-                kind = "a tumble" if tumbled else "a spike"
-                raise ValueError(f"{option(stray[0])} is given, and {str(run)!r} is a run of {kind}: without it")
+                of_what = "a tumble" if tumbled else "a spike"
+                raise ValueError(f"{option(stray[0])} is given, and {str(run)!r} is a run of {of_what}: without it")
             typed = as_typed(given, fields)
             if tumbled:
                 own = Layer(None, {name: value for name, value in typed.items() if name in of_tumbles})

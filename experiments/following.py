@@ -82,7 +82,9 @@ def follow(
         left = f"the state is in checkpoint/{CHECKPOINT}.failed.npz"
         if run.placed:
             left += ", what was before it in trajectory.csv and series/"
-        raise RuntimeError(f"at {run.time:.4g} s: {error}; {_would_do(error)}; {left}") from error
+        when = f"at {run.time:.4g} s" if run.placed else f"after {run.body.time:.4g} s in the hand that sets it down"
+        clock = " (t is the bed's own time, its preparation included)" if " at t = " in str(error) else ""
+        raise RuntimeError(f"{when}: {error}{clock}; {_would_do(error)}; {left}") from error
     folder.save_checkpoint(CHECKPOINT, run.state())
     return found
 
@@ -104,6 +106,8 @@ def _would_do(error: RuntimeError) -> str:
         )
     if isinstance(error, LeftTheBedError):
         return "a deeper bed_size, or a shorter duration, would do"
+    if "come to rest" in str(error):
+        return "a slower lowering_speed, a finer grain or, in space, a height to fall from would do"
     if isinstance(error, BedFailure):
         return "fewer substeps tell whether it is the coupling, stiffer grains (young) whether it is the bed"
     return "a longer or deeper bed_size, a shorter duration or another young would do"

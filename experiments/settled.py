@@ -185,6 +185,24 @@ def of_other_spikes(numbers: Mapping[str, Number], surface: str, *, diameter: fl
     ]
 
 
+def of_earth(
+    numbers: Mapping[str, Number], surface: str, *, weight: float, mass: float, counterweight: float
+) -> list[str]:
+    """What has to be said in flight where K is the surface's, found in grains at 1 g; `weight` in N, masses in kg."""
+    own = find_surface(surface)
+    gravity = weight / mass
+    if counterweight > 0 or own.grains is None or gravity > 0.5 * STANDARD_GRAVITY or gravity == 0:
+        return []
+    if not numbers["stiffness"].origin.startswith(("surface ", "half of")):
+        return []
+    less = STANDARD_GRAVITY / gravity
+    return [
+        f"stiffness of {surface} is that of grains at 1 g: what grains bear goes with their weight (but for cohesion), "
+        f"so in flight at {gravity:.3g} m/s2 they bear about {less:.3g} times less per depth, and a platform sinks in "
+        f"and ploughs farther than on this spring-damper; on a rig, whose grains are at 1 g, it holds"
+    ]
+
+
 def rig_fault(stated: float, local: float = STANDARD_GRAVITY) -> str | None:
     """That a rig leaves more than the local gravity [m/s2], in words; `stated` is in units of 9.80665 m/s2."""
     here = local / STANDARD_GRAVITY

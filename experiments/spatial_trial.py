@@ -15,7 +15,7 @@ from rigid.rig import STANDARD_GRAVITY, Rig
 from rigid.spatial import SpatialTrial
 
 from .lengths import check_spike_length
-from .settled import Number, defaults_said, of_other_spikes, rig_fault
+from .settled import Number, defaults_said, of_earth, of_other_spikes, rig_fault
 from .spatial_settings import ZERO, SpatialSettings
 from .surfaces import DEFAULT_SURFACE, find_surface
 
@@ -78,6 +78,8 @@ def plan_spatial(settings: SpatialSettings, *, platform_file: Path | None = None
     warnings = [f"stiffness, damping and friction of {surface.name} are {surface.source}"] if surface.guess else []
     whose = f"platform {settings.platform}"
     warnings += of_other_spikes(numbers, surface.name, diameter=2 * platform.tip_radius, whose=whose)
+    weight = float(np.linalg.norm(trial.weight))
+    warnings += of_earth(numbers, surface.name, weight=weight, mass=platform.mass, counterweight=counterweight)
     return SpatialPlan(trial, numbers, surface.name, _choices(settings, surface.name), tuple(warnings))
 
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from coupling import BedFooting, CoupledTumble, LawFooting, platform_members
+from coupling.bed_footing import FEWEST_SLOTS, slots_of
 from dem import Bed, Graded, Sleep
 from dem.materials import Material
 from dem.materials import material as find_material
@@ -452,6 +453,11 @@ def _repeated_told(settings: TumbleSettings, forecast: Forecast, bed: Bed) -> st
 
 def _members(settings: TumbleSettings, plan: TumblePlan) -> list[Any]:
     trial, spikes = plan.trial, plan.spikes
+    if slots_of(trial.spike_count) < FEWEST_SLOTS:
+        raise ValueError(
+            f"platform = {settings.platform!r} has {trial.spike_count} rows of spikes in the plane, too near each "
+            f"other for a bed of grains: 6, 8 or 16 would do, or `hedgebed tumble spatial`, which takes any platform"
+        )
     return platform_members(
         spike_length=trial.spike_length, count=trial.spike_count, diameter=spikes.diameter, clear=spikes.clear,
         hull_radius=_hull_radius(plan), width=settings.bed_size[1],

@@ -23,6 +23,7 @@ from .settled import (
     check_actuation,
     check_body,
     defaults_said,
+    of_earth,
     of_other_spikes,
     rig_fault,
     settle_limits,
@@ -120,6 +121,8 @@ def plan_tumble(
     rows = f"rows of platform {platform.name}" if model is None else "model"
     numbers["spike_count"] = Number(trial.spike_count, "1", rows)
     warnings += _rig_warnings(trial)
+    if ground is None and model is None:
+        warnings += of_earth(numbers, surface, weight=trial.weight, mass=trial.mass, counterweight=trial.counterweight)
     choices = _choices(settings, surface, model)
     spikes = spikes or Spikes(platform.spike_diameter, platform.spike_clear, ("spike_diameter", "spike_clear"))
     limit = numbers.value("max_wheel_speed")

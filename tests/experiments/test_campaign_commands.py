@@ -248,6 +248,18 @@ def test_what_is_recorded_is_the_run_plus_the_noise_that_is_stated(grains):
     assert second[inside] == pytest.approx(drop["accel_m_s2"][1:-1][inside], abs=0.02 * abs(drop["accel_m_s2"]).max())
 
 
+@pytest.mark.parametrize("more", [(), ("--also", "other")])
+def test_a_run_of_another_kind_is_refused_by_what_it_is(tmp_path, capsys, more):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("experiments.spatial.write_report", lambda *_: None)
+        spatial = ("tumble", "spatial", "--torque", "0", "0.02", "0", "--duration", "0.02", "--quiet")
+        assert main([*spatial, "--out", str(tmp_path / "run")]) == 0
+    capsys.readouterr()
+    assert main(["campaign", "from-run", str(tmp_path / "run"), str(tmp_path / "made"), *more]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "is a run of 'tumble spatial': one of 'penetrate', or of 'tumble' in the plane, was expected" in said
+
+
 def test_only_a_finished_run_of_penetrate_becomes_a_campaign(grains, tmp_path):
     with pytest.raises(ValueError, match="has no run"):
         campaign_of_run(tmp_path)

@@ -13,6 +13,8 @@ from experiments.cli import main
 from experiments.runfolder import RunFolder, read_series
 from experiments.spatial_settings import SpatialSettings
 from experiments.spatial_trial import plan_spatial
+from experiments.tumble_settings import TumbleSettings
+from experiments.tumble_trial import plan_tumble
 from rigid import find_platform
 from rigid.rig import STANDARD_GRAVITY
 from vis.tumble_series import read_columns
@@ -238,3 +240,39 @@ def test_in_flight_grains_are_chosen_for_what_a_torque_presses_with(cube):
     assert springs[1] > 10 * springs[0]
     assert chosen[1].pressure - chosen[0].pressure == pytest.approx((springs[1] - springs[0]) / area, rel=0.01)
     assert chosen[1].young > 10 * chosen[0].young
+
+
+@pytest.mark.parametrize(
+    ("gravity", "surface", "stiffness", "said"),
+    [
+        (1e-3, "sand", None, True),
+        (1e-3, "sand", 50.0, False),  # given: for whatever gravity it was found at
+        (1e-3, "brick", None, False),  # no grains
+        (0.9, "sand", None, False),
+    ],
+)
+def test_in_flight_it_is_said_that_the_surface_s_stiffness_is_of_grains_at_1_g(gravity, surface, stiffness, said):
+    given = {"surface": surface, "gravity": gravity * STANDARD_GRAVITY, "stiffness": stiffness}
+    in_space = plan_spatial(SpatialSettings(**given, torque=(0.0, 0.1, 0.0))).warnings
+    in_the_plane = plan_tumble(TumbleSettings(**given, torque=0.1)).warnings
+    for warnings in (in_space, in_the_plane):
+        told = [warning for warning in warnings if "is that of grains at 1 g" in warning]
+        assert len(told) == int(said)
+        assert not told or "they bear about 1e+03 times less per depth" in told[0]
+    rig = {"surface": surface, "rig": gravity, "stiffness": stiffness}
+    assert not any("at 1 g" in warning for warning in plan_tumble(TumbleSettings(**rig, torque=0.1)).warnings)
+
+
+def test_the_wheels_columns_are_of_the_axes_that_they_turn_about(tmp_path, monkeypatch):
+    """One wheel, about y: its speed stands under y whatever its place in the file."""
+    monkeypatch.setattr(spatial, "write_report", lambda *_: None)
+    text = CUBE.read_text()
+    axes = next(line for line in text.splitlines() if line.startswith("axes"))
+    mine = tmp_path / "mine.toml"
+    mine.write_text(text.replace(axes, "axes = [[0.0, 1.0, 0.0]]"))
+    settings = SpatialSettings(platform=str(mine), surface="brick", gravity=1.0, torque=(0.0, 1e-4, 0.0), duration=0.05)
+    spatial.run(settings, tmp_path / "run")
+    motion = read_columns(tmp_path / "run" / "series" / "motion.csv")[0]
+    wheel = find_platform(mine).wheels[0]
+    assert motion["wheel_y_rad_s"][-1] == pytest.approx(-1e-4 * 0.05 / wheel.inertia, rel=1e-6)
+    assert not motion["wheel_x_rad_s"].any() and not motion["wheel_z_rad_s"].any()

@@ -145,6 +145,13 @@ def test_spikes_are_those_of_the_platforms_file_unless_given(tmp_path):
     assert any(text.startswith(f"platform {mine}:") and "spike_diameter = 0.006 m" in text for text in said)
 
 
+def test_a_platform_of_four_rows_is_refused_on_grains_in_the_plane_and_sent_into_space():
+    """Rows that share a body of the bed would be next to each other."""
+    said = r"platform = 'cubli' has 4 rows of spikes .*: 6, 8 or 16 would do, or `hedgebed tumble spatial`"
+    with pytest.raises(ValueError, match=said):
+        tumble.check(on_bed(platform="cubli", torque=0.05, spike_diameter=0.006, spike_clear=0.012))
+
+
 def test_a_platform_without_spikes_is_refused_on_grains_unless_they_are_given(tmp_path):
     bare = eight_sided(tmp_path, spikes="")
     with pytest.raises(
