@@ -35,6 +35,8 @@ OF_A_BED: dict[str, tuple[type[GrainsSettings], tuple[str, ...]]] = {
     IN_THE_PLANE: (TumbleBedSettings, OF_THE_MASTER), IN_SPACE: (GrainsSettings, ON_ANY_GROUND),
 }  # fmt: skip
 """Settings that are of a bed of grains, and those among them that other grounds take too."""
+MOST_RELATIVE = 10.0
+"""Difference over the first run's number up to which it is told as a share of it [1]."""
 
 
 def check(settings: CompareSettings) -> None:
@@ -106,6 +108,12 @@ def _carry_out(settings: CompareSettings, folder: RunFolder, progress: Progress)
         progress.stage("report", total=1.0)
         write_report(folder.path, progress)
     return result
+
+
+def _relative(first: float, second: float) -> float | None:
+    """The difference over the first; None of a first that is next to nothing, of which it says nothing."""
+    apart = abs(second - first)
+    return (second - first) / abs(first) if first and apart < MOST_RELATIVE * abs(first) else None
 
 
 def _whose(labels: Sequence[str], said: Sequence[Sequence[str]]) -> list[str]:
@@ -198,7 +206,7 @@ def _compared(
         row = {
             "name": name, "unit": one.get("unit", other.get("unit", "")), "first": values[0], "second": values[1],
             "difference": values[1] - values[0] if both else None,
-            "relative": (values[1] - values[0]) / abs(values[0]) if both and values[0] else None,
+            "relative": _relative(*values) if both else None,
             "first_std": spreads[0], "second_std": spreads[1],
         }  # fmt: skip
         if parts is not None:

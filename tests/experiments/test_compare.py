@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from experiments import compare
 from experiments.cli import main
 from experiments.compare_tumbles import read_moved
 from experiments.runfolder import read_series
@@ -78,6 +79,11 @@ def test_a_warning_of_both_runs_stands_once_and_one_of_either_is_told_with_its_l
         "both: the wind blew",
         "sand: sand's own",
     ]
+
+
+def test_no_difference_is_told_in_per_cent_of_next_to_nothing():
+    assert compare._relative(2.0, 3.0) == 0.5 and compare._relative(-2.0, 3.0) == 2.5
+    assert compare._relative(1e-25, -4e-3) is None and compare._relative(0.0, 1.0) is None
 
 
 def test_a_spring_damper_s_sinkage_is_its_compression_below_the_undisturbed_surface(runs, tmp_path):
