@@ -148,6 +148,18 @@ def _distance(columns: Mapping[str, Any], names: tuple[str, ...], *, from_start:
     return np.asarray(np.linalg.norm(away - from_start * away[0], axis=1))
 
 
+def _never_down(columns: Mapping[str, Any], labels: tuple[str, str]) -> list[str]:
+    """That one of the two never touches what it is over, while the other does."""
+    down = [bool(np.any(columns[f"lift_N_{number}"])) for number in (1, 2)]
+    if down[0] == down[1]:
+        return []
+    label = labels[down.index(False)]
+    return [
+        f"On {label} it never touches anything in this time, so what the two do apart is the fall: let it last longer, "
+        f"or begin lower (grains stick out of their mean surface by some of their radius)."
+    ]
+
+
 def told_apart(columns: Mapping[str, Any], labels: tuple[str, str], moved: list[MovedInSpace]) -> list[str]:
     """What a reader wants to hear of the two."""
     found = gaps(columns)
@@ -170,5 +182,6 @@ def told_apart(columns: Mapping[str, Any], labels: tuple[str, str], moved: list[
         f"{100 * float(found['same_state']['value']):.0f} % of the time.",
         f"The deepest spike goes {1e3 * deepest(columns, 1):.3g} mm deep on {labels[0]}, "
         f"{1e3 * deepest(columns, 2):.3g} mm on {labels[1]}.",
+        *_never_down(columns, labels),
         *lasting([one.time for one in moved]),
     ]

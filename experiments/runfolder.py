@@ -192,6 +192,15 @@ def settings_in(table: Mapping[str, Any]) -> dict[str, Any]:
 # The folder ----------------------------------------------------------------------------------------------------------
 
 
+def _what_else(path: Path) -> str:
+    """What may be done with the run that a folder holds, after what else would do."""
+    try:
+        done = RunFolder.open(path).status == "done"
+    except ValueError:
+        return ""
+    return "; that run is done" if done else f", or finish that run with `hedgebed resume {path}`"
+
+
 def _now() -> str:
     return datetime.now().astimezone().isoformat(timespec="seconds")
 
@@ -260,7 +269,7 @@ class RunFolder:
             held = sorted(item.name for item in path.iterdir())
             if held:
                 what = ", ".join(held[:3]) + (", ..." if len(held) > 3 else "")
-                remedy = f", or finish that run with `hedgebed resume {path}`" if "run.toml" in held else ""
+                remedy = _what_else(path) if "run.toml" in held else ""
                 raise ValueError(
                     f"out = {str(path)!r} is in use (it holds {what}): "
                     f"name a folder that is empty or does not exist yet{remedy}"

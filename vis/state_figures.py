@@ -6,6 +6,7 @@ What they show is the same in the plane and in space; only the angle is another.
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -33,6 +34,10 @@ LINES: tuple[dict[str, Any], dict[str, Any]] = (
 )
 """Of the first of two runs and of the second, which is dashed as well."""
 _WIDTH = 8.6
+_LABEL = 26
+"""Letters of a run's label in a line."""
+_LETTER = 0.0063
+"""Width of a letter beside the strip, over the picture's [1]."""
 _MOST_TOLD = 60
 _MOST_STEPS = 60
 """Changes of state that are joined by a line; more would paint the panel grey."""
@@ -123,13 +128,16 @@ def draw_bands(
 def state_strip(drawing: Figure, runs: Sequence[Mapping[str, Any]], labels: Sequence[str], time: float) -> None:
     """At the foot of a picture: the states of its runs (`t_s`, `state`) over time, a cursor at `time` [s]."""
     count = len(runs)
-    axis = drawing.add_axes((0.09, 0.055, 0.78, 0.045 + 0.02 * count))
+    names = ["\n".join(textwrap.wrap(label, _LABEL)) for label in labels[::-1]] if count > 1 else [""]
+    longest = max(len(line) for name in names for line in name.split("\n"))
+    left = max(0.09, 0.02 + _LETTER * longest)
+    axis = drawing.add_axes((left, 0.055, 0.87 - left, 0.045 + 0.02 * count))
     for number, run in enumerate(runs):
         _band(axis, count - 1 - number, run["t_s"], run["state"])
     axis.axvline(time, color=INK, lw=2.0)
     axis.set_xlim(0.0, max(float(run["t_s"][-1]) for run in runs))
     axis.set_ylim(-0.5, count - 0.5)
-    axis.set_yticks(range(count), list(labels)[::-1] if count > 1 else [""])
+    axis.set_yticks(range(count), names)
     axis.grid(False)
     axis.set_xlabel("time [s]", labelpad=1)
     there = [name for name in STATES if any(name in run["state"] for run in runs)]

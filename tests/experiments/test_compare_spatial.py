@@ -12,7 +12,7 @@ from spatial_runs import CUBE, small_bed
 from experiments import spatial
 from experiments.cli import main
 from experiments.compare_common import numbers_until
-from experiments.compare_spatial import read_moved
+from experiments.compare_spatial import _never_down, read_moved
 from experiments.runfolder import read_series, write_series
 from experiments.spatial_settings import SpatialSettings
 from rigid.quaternions import from_turn, multiply
@@ -174,3 +174,16 @@ def test_numbers_of_a_run_in_space_until_a_time_within_it_are_those_of_its_serie
     )
     touch = own["first_touch"]
     assert found["first_touch"] == (touch if touch is not None and touch <= 0.02 else None)
+
+
+def test_that_one_of_two_never_touches_is_said_and_of_both_or_none_nothing():
+    hit, none = np.array([0.0, 0.2, 0.0]), np.zeros(3)
+    for lifts, said in (
+        ((none, hit), "On law it never"),
+        ((hit, none), "On bed it never"),
+        ((hit, hit), ""),
+        ((none, none), ""),
+    ):
+        columns = {f"lift_N_{number}": lift for number, lift in enumerate(lifts, 1)}
+        assert " ".join(_never_down(columns, ("law", "bed"))).startswith(said)
+        assert len(_never_down(columns, ("law", "bed"))) == int(bool(said))
