@@ -332,9 +332,10 @@ class Engine(Lists, Shapes, Sleepers, Bookkeeping):
         self.rest = rest = self._kept_rest
         for field in (rest.asleep, rest.was, rest.woken, rest.leaves, rest.quiet, rest.start, rest.end):
             field.fill(0)
-        for field in (rest.side, rest.mass, rest.news, rest.held, rest.begins, rest.block):
+        for field in (rest.side, rest.mass, rest.news, rest.held, rest.begins, rest.block, rest.force):
             field.fill(0)
         rest.whole[None] = 1
+        rest.last[None] = -1
 
     def wake_all(self) -> None:
         """All are awake, and the kernels are those that know of no sleep."""

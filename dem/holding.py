@@ -31,6 +31,8 @@ class Held:
     """The engine, those that sleep, the book: whose fields were copied."""
     numbers: dict[str, Any]
     sleeper: dict[str, Any] | None
+    under: tuple[Any, ...]
+    """Gravity, and who lets grains sleep by which rules: what a bed may not have changed meanwhile."""
 
 
 def hold(bed: Bed) -> Held:
@@ -40,6 +42,7 @@ def hold(bed: Bed) -> Held:
         tables=(e, *(table for table in (e.rest, e.ledger) if table.on)),
         numbers={name: getattr(bed, name) for name in _NUMBERS},
         sleeper=None if bed._sleeper is None else {name: getattr(bed._sleeper, name) for name in _SLEEPERS_NUMBERS},
+        under=_under(bed),
     )
     for table in held.tables:
         for name, twin in _twins(table).items():
@@ -49,10 +52,15 @@ def hold(bed: Bed) -> Held:
 
 
 def take_back(bed: Bed, held: Held) -> None:
-    """Bring the bed back. Raises ValueError for what is not the last that was held, or where sleep or book changed."""
+    """Bring the bed back.
+
+    Raises ValueError for what is not the last that was held, or where sleep, its rules, gravity or book changed.
+    """
     e = bed._engine
     if e.held is not held or held.tables != (e, *(table for table in (e.rest, e.ledger) if table.on)):
         raise ValueError("this bed holds another state by now: only the last one that was held can be taken back")
+    if held.under != _under(bed):
+        raise ValueError("gravity or the rules of sleep are others by now than when this bed was held")
     for table in held.tables:
         for name, twin in _twins(table).items():
             getattr(table, name).copy_from(twin)
@@ -62,6 +70,10 @@ def take_back(bed: Bed, held: Held) -> None:
         setattr(bed, name, value)
     for name, value in (held.sleeper or {}).items():
         setattr(bed._sleeper, name, value)
+
+
+def _under(bed: Bed) -> tuple[Any, ...]:
+    return (*(float(part) for part in bed.gravity), bed._sleeper)
 
 
 def _twins(table: Any) -> dict[str, Any]:

@@ -363,6 +363,7 @@ class Lists:
                     rest.news[BUILT] = 0
                 rest.made[None] = self.count[AWAKE]
                 rest.whole[None] = 0
+                rest.last[None] = -1
         for _ in range(1):
             self.moved[None] = 0
             self.halted[None] = 0

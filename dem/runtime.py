@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import threading
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -77,7 +78,8 @@ def start(*, arch: str = "cpu", threads: int | None = None, precision: str = "fl
         if arch == "cpu":
             before = _own_threads()
             ti.init(arch=ti.cpu, cpu_max_num_threads=threads, **options)
-            _keep_apart(sorted(_own_threads() - before)[-threads:])
+            ours = {thread.native_id for thread in threading.enumerate()}  # started meanwhile by somebody else
+            _keep_apart(sorted(_own_threads() - before - ours)[-threads:])
         else:
             try:
                 ti.init(arch=ti.cuda, enable_fallback=False, **options)

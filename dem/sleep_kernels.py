@@ -217,7 +217,6 @@ class Sleepers:
         Between ``keep_lists`` and ``sort``: the lists are still those of before.
         """
         for _ in range(1):
-            rest.last[None] = -1
             if leaving == 1:
                 rest.whole[None] = 1
             self.find_bodies(rest)

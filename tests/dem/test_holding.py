@@ -6,6 +6,8 @@ Of a bed whose grains sleep `test_sleep` shows it.
 import cloud
 import pytest
 
+from dem import Sleep
+
 
 def made(layout, engines):
     """The cloud and its ball after fifty steps."""
@@ -45,3 +47,18 @@ def test_only_the_last_state_held_is_taken_back_and_none_across_a_change_of_slee
     bed.let_sleep()
     with pytest.raises(ValueError, match="only the last one that was held can be taken back"):
         bed.take_back(second)
+
+
+@pytest.mark.parametrize("changed", ["gravity", "rules"])
+def test_a_state_held_under_another_gravity_or_other_rules_of_sleep_is_not_taken_back(changed, engines):
+    bed = made("chunks", engines)
+    if changed == "rules":
+        bed.let_sleep()
+    held = bed.hold()
+    if changed == "gravity":
+        bed.set_gravity(1.62)
+    else:
+        bed.wake()
+        bed.let_sleep(Sleep(calm=5.0, every=7))
+    with pytest.raises(ValueError, match="gravity or the rules of sleep are others by now"):
+        bed.take_back(held)

@@ -259,3 +259,23 @@ def test_sleepers_that_lists_pass_over_are_where_sorting_all_would_put_them(monk
     assert {name: values.tobytes() for name, values in plain.state().items()} == {
         name: values.tobytes() for name, values in state.items()
     }
+
+
+def test_lists_that_were_interrupted_leave_nobody_behind_who_was_woken(layer, monkeypatch):
+    """Ctrl-C between the waking and the sorting: the next lists sort those who were woken before it too."""
+    bed, state = layer
+    bed.restore(state)
+    bed.let_sleep(Sleep(calm=0.1))
+    bed.advance(1200)
+    assert 0 < bed.awake_count < 0.5 * bed.grain_count and bed._engine.rest.whole[None] == 0
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    bed._engine.rest.woken[int(np.flatnonzero(bed.asleep)[-1])] = 1
+    with monkeypatch.context() as patch:
+        patch.setattr(bed._engine, "sort", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            bed._make_lists()
+    bed._make_lists()
+    assert bed.awake_count == int((~bed.asleep).sum())

@@ -65,6 +65,7 @@ def told(bed, chance, folder):
             taken += 1
         elif order == "gravity":
             bed.set_gravity(9.81 * (0.5 + x[0]))
+            held = None
         elif order == "save and load":
             bed, held = Bed.load(bed.save(folder / "bed.npz"), threads=2), None
         found.append((str(order), bed.awake_count, digest(bed)))
