@@ -1,18 +1,18 @@
-"""The version of hedgebed, and the way in for ``python -m hedgebed``.
+"""The version of hedgebed, and what ``python -m hedgebed`` runs.
 
-Everything else lives in the rooms: ``dem``, ``rigid``, ``coupling``, ``experiments`` and ``vis``.
+The code is in the packages ``dem``, ``rigid``, ``coupling``, ``experiments`` and ``vis``.
 """
 
 import sys
 
-__all__ = ["__version__", "main"]
+from experiments.runs.version import __version__
 
-__version__ = "0.1.0"
+__all__ = ["__version__", "main"]
 
 
 def main() -> int:
     """Run the command line on ``sys.argv`` and return its exit status."""
-    from experiments.cli import main as command_line
+    from experiments.cli.main import main as command_line
 
     return command_line()
 

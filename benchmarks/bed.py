@@ -24,12 +24,12 @@ from typing import Any
 
 from rich.console import Console
 
-from benchmarks import table
-from benchmarks.entrants import GRAVITY, TIME_STEP, WARM_STEPS, Entrant, Heat, Ours, Theirs
-from benchmarks.grains import BENCH, DIAMETER, SPREAD, Grains, coordination, prepare_grains, write_data
-from benchmarks.machine import count_cores, describe_machine
-from benchmarks.peers import LAMMPS, LIGGGHTS, Peer, find_mpirun
-from hedgebed import __version__
+from benchmarks.race import table
+from benchmarks.race.entrants import GRAVITY, TIME_STEP, WARM_STEPS, Entrant, Heat, Ours, Theirs
+from benchmarks.race.grains import BENCH, DIAMETER, SPREAD, Grains, coordination, prepare_grains, write_data
+from benchmarks.race.machine import count_cores, describe_machine
+from benchmarks.race.peers import LAMMPS, LIGGGHTS, Peer, find_mpirun
+from experiments.runs.version import __version__
 
 __all__ = ["Lane", "Settings", "pick_best", "run"]
 
@@ -141,7 +141,7 @@ def run(out: Path, *, progress: Any) -> dict[str, Any]:
 
     Args:
         out: folder of bench.json; nothing else is written there.
-        progress: an ``experiments.progress.Progress``.
+        progress: an ``experiments.runs.progress.Progress``.
 
     Raises:
         ValueError: a variable of the environment is wrong.

@@ -6,7 +6,7 @@
 The campaigns are those of `hidden_suite`. Each is written to a folder, and a process of its own that is given that
 folder and nothing else diagnoses it. DIR/cases.jsonl keeps every verdict: the same command with the same DIR goes on
 where it was stopped. A campaign is diagnosed again only where the code of the diagnosis or of the suite has changed
-since. With ``pip install .[bench]`` the baselines (`baselines`) get the same campaigns.
+since. With ``pip install .[bench]`` the baselines (`benchmarks/baseline/`) get the same campaigns.
 """
 
 from __future__ import annotations
@@ -28,12 +28,13 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from experiments.campaign import read_campaign, write_campaign
-from experiments.progress import Progress
+from experiments.runs.progress import Progress
 
-from . import baselines as others
-from .diagnose_table import show, summarise
-from .diagnose_worker import answer, begin
-from .hidden_suite import KINDS, make_case, suite
+from .baseline import methods as others
+from .diagnosis.records import CASES_FILE, read_cases
+from .diagnosis.table import show, summarise
+from .diagnosis.worker import answer, begin
+from .hidden.suite import KINDS, make_case, suite
 
 __all__ = ["continues", "digest", "read_cases", "run"]
 
@@ -41,12 +42,11 @@ Ask = Callable[[str], dict[str, Any]]
 _ROOT = Path(__file__).resolve().parent.parent
 _CODE = {
     "code": ("experiments/diagnose", "experiments/campaign", "rigid"),
-    "suite": ("benchmarks/hidden_penetration.py", "benchmarks/hidden_tumble.py", "benchmarks/hidden_tumble_motion.py"),
-    "rig": ("benchmarks/hidden_rig.py", "benchmarks/hidden_rig_bed.py", "benchmarks/hidden_rig_plan.py"),
-    "baselines": ("benchmarks/baselines.py", "benchmarks/baseline_rows.py", "benchmarks/baseline_motion.py"),
+    "suite": ("benchmarks/hidden/penetration.py", "benchmarks/hidden/tumble.py", "benchmarks/hidden/tumble_motion.py"),
+    "rig": ("benchmarks/hidden/rig.py", "benchmarks/hidden/rig_bed.py", "benchmarks/hidden/rig_plan.py"),
+    "baselines": ("benchmarks/baseline/methods.py", "benchmarks/baseline/rows.py", "benchmarks/baseline/motion.py"),
 }
 _SEVERAL = {"both": ("penetration", "tumble"), "all": KINDS}
-_FILE = "cases.jsonl"
 
 
 def run(
@@ -83,7 +83,7 @@ def run(
         progress.message(missing)
     wanted = baselines == "yes" and not missing
     progress.plan({f"diagnose {one}": float(count) for one in kinds})
-    _mend(out / _FILE)
+    _mend(out / CASES_FILE)
     done = {_key(case): case for case in read_cases(out) if _current(case)}
     with _asking(ask) as asked:
         for one, cases in plans.items():
@@ -94,7 +94,7 @@ def run(
             for number, case in enumerate(left, 1):
                 record = _one(one, case, asked, done.get(_key({"kind": one, "case": case})), wanted)
                 done[_key(record)] = record
-                with (out / _FILE).open("a", encoding="utf-8") as file:
+                with (out / CASES_FILE).open("a", encoding="utf-8") as file:
                     file.write(json.dumps(record) + "\n")
                 progress.message(_line(record))
                 progress.update(number)
@@ -109,27 +109,7 @@ def run(
 
 def continues(out: Path) -> bool:
     """Whether `out` holds an unfinished or finished run of this benchmark, with which it goes on."""
-    return (out / _FILE).is_file()
-
-
-def read_cases(out: Path) -> list[dict[str, Any]]:
-    """The records in a folder's cases.jsonl, the latest last; none where there is no such file.
-
-    Raises ValueError, naming file and line, for a line that is no record; a last line that was cut short is left out.
-    """
-    path = out / _FILE
-    lines = path.read_text(encoding="utf-8").split("\n") if path.is_file() else []
-    found = []
-    for number, line in enumerate(lines, 1):
-        if not line.strip():
-            continue
-        try:
-            found.append(json.loads(line))
-        except ValueError as error:
-            if number == len(lines):  # without an end of line: the process ended while it wrote
-                break
-            raise ValueError(f"{path}, line {number}: {error}; a record of a case was expected") from None
-    return found
+    return (out / CASES_FILE).is_file()
 
 
 def _mend(path: Path) -> None:

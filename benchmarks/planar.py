@@ -4,7 +4,7 @@ Trials are drawn at random over platform, ground, gravity and torque; the step i
 model, and every effect on at once. Several rounds, the median counts; compiling is timed on its own. Beside the figure
 of the clock stands what the processor time would give on as many idle cores. For quick trials, in the environment:
 HEDGEBED_BENCH_TRIALS (timed ones), HEDGEBED_BENCH_ROUNDS, HEDGEBED_BENCH_COMPARED (with the accurate integrator; a
-third as many with all terms on). What agreement means is in ``benchmarks/planar_agreement.py``.
+third as many with all terms on). What agreement means is in ``benchmarks/planar_trials/agreement.py``.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.machine import count_cores, describe_machine
-from benchmarks.planar_agreement import CHANNELS, SHARE_WITHIN, TOLERANCE, compare, random_trial
-from hedgebed import __version__
+from benchmarks.planar_trials.agreement import CHANNELS, SHARE_WITHIN, TOLERANCE, compare, random_trial
+from benchmarks.race.machine import count_cores, describe_machine
+from experiments.runs.version import __version__
 from rigid import Effect, Trial, simulate_batch
 
 __all__ = ["Settings", "drawn_trials", "run"]
@@ -119,7 +119,7 @@ def _timed(base: Trial, vary: dict[str, np.ndarray], rounds: int) -> tuple[list[
 
 
 def _agreement(count: int, *, all_terms: bool) -> dict[str, Any]:
-    """How near `count` random trials come to the accurate integrator (see `benchmarks.planar_agreement`)."""
+    """How near `count` random trials come to the accurate integrator (see `benchmarks.planar_trials.agreement`)."""
     rng = np.random.default_rng(2026)
     effects = tuple(AMPLITUDES) if all_terms else ()
     return compare([random_trial(rng, effects, AMPLITUDES) for _ in range(count)]).summary()
@@ -130,7 +130,7 @@ def run(out: Path, *, progress: Any) -> dict[str, Any]:
 
     Args:
         out: folder of bench.json; nothing else is written there.
-        progress: an ``experiments.progress.Progress``.
+        progress: an ``experiments.runs.progress.Progress``.
 
     Raises:
         ValueError: a variable of the environment is wrong.

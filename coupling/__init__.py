@@ -1,10 +1,18 @@
-"""The master that steps a body and a ground together."""
+"""Bodies on grounds: a spike or a platform and what pushes on it, stepped together, with their energy balance.
 
-from .bed_footing import BedFooting, LeftTheBedError, platform_members, spatial_members
-from .bed_ground import BedGround
-from .footing import Footing, LawFooting
+A ground (`Ground`) is a surface law (`LawGround`, `rigid.SpringDamper`) or a bed of grains (`BedGround`). `drive`,
+`drop` and `set_down` push a spike into one, `CoupledTumble` and `SpatialRun` follow a platform on one, `Master` steps
+any body. The package imports `dem` (where it needs grains) and `rigid`, and nothing above itself.
+"""
+
+from typing import Any
+from warnings import warn
+
+from .bed_ground import BedGround, LeftTheBedError
 from .ground import Ground
+from .law_ground import LawGround
 from .master import Body, Master
+from .members import platform_members, spatial_members
 from .penetration import Drive, Drop, Run, SetDown, drive, drop, overdamped_below, set_down
 from .planar_body import PlanarBody
 from .spatial_body import SpatialBody
@@ -14,31 +22,17 @@ from .tumbles import Landing, Rest, TumblesInARow
 from .tumbling import MOST_REVERSAL, CoupledTumble
 
 __all__ = [
-    "MOST_REVERSAL",
-    "BedFooting",
-    "BedGround",
-    "Body",
-    "CoupledTumble",
-    "Drive",
-    "Drop",
-    "Footing",
-    "Ground",
-    "Landing",
-    "LawFooting",
-    "LeftTheBedError",
-    "Master",
-    "Penetration",
-    "PlanarBody",
-    "Rest",
-    "Run",
-    "SetDown",
-    "SpatialBody",
-    "SpatialRun",
-    "TumblesInARow",
-    "drive",
-    "drop",
-    "overdamped_below",
-    "platform_members",
-    "set_down",
-    "spatial_members",
-]
+    "MOST_REVERSAL", "BedGround", "Body", "CoupledTumble", "Drive", "Drop", "Ground", "Landing", "LawGround",
+    "LeftTheBedError", "Master", "Penetration", "PlanarBody", "Rest", "Run", "SetDown", "SpatialBody", "SpatialRun",
+    "TumblesInARow", "drive", "drop", "overdamped_below", "platform_members", "set_down", "spatial_members",
+]  # fmt: skip
+
+_RENAMED = {"BedFooting": BedGround, "Footing": Ground, "LawFooting": LawGround}
+
+
+def __getattr__(name: str) -> Any:
+    """Old names, for one version."""
+    if name not in _RENAMED:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    warn(f"coupling.{name} is now coupling.{_RENAMED[name].__name__}", DeprecationWarning, stacklevel=2)
+    return _RENAMED[name]

@@ -18,12 +18,12 @@ changes longer. Changes come late by half the window.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .footing import FootReaction
+from rigid.ground.reaction import Reaction, State
+
 from .poses import Twist, Vector
 
 __all__ = [
@@ -66,7 +66,7 @@ def in_a_line(places: Array, within: float) -> bool:
     return bool(np.linalg.norm(away @ axes[1:].T, axis=1).max() <= within)
 
 
-def feet_of(reaction: FootReaction | None, centre: Vector, twist: Twist, count: int, *, hull: bool = False) -> Array:
+def feet_of(reaction: Reaction | None, centre: Vector, twist: Twist, count: int, *, hull: bool = False) -> Array:
     """What each row feels: N [N], F along x and y [N], u along x and y [m/s], depth [m]; shape [6, row].
 
     Parameters
@@ -79,7 +79,7 @@ def feet_of(reaction: FootReaction | None, centre: Vector, twist: Twist, count: 
     if reaction is None:
         return feet
     velocity, spin = twist.velocity, twist.spin
-    for row, contact in reaction.contacts.items():
+    for row, contact in reaction.by_member.items():
         if row < 0 and not hull:
             continue
         along = contact.tangential_force
@@ -134,10 +134,10 @@ class ContactReader:
         sliding = (force >= self.mu_d * n) & ((f * u).sum(axis=0) < 0) & (speed > CREEP)
         return state_of(touching, sliding, self.places)
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> State:
         """What the next answers depend on."""
         return {"ring": self._ring.copy(), "filled": np.array(self._filled)}
 
-    def restore(self, state: dict[str, Any]) -> None:
+    def restore(self, state: State) -> None:
         """Go back to what `state` gave."""
         self._ring, self._filled = np.array(state["ring"], dtype=float), int(state["filled"])

@@ -1,7 +1,8 @@
 """The contract between a body and whatever pushes on it.
 
-A body does not know what it stands on. It hands a ground its pose and velocity, and the ground answers with the mean
-reaction over the step. A ground may remember (a bed of grains does), so it can be saved and restored, to the bit.
+A body does not know what it stands on. It states its pose and how it moves, and the ground answers with the mean
+reaction over the step: the contact of each of the body's members. A platform has many members, a single spike is the
+case of one. A ground may have a memory (a bed of grains does), so it can be saved and restored, to the bit.
 """
 
 from __future__ import annotations
@@ -10,9 +11,9 @@ from typing import Any, Protocol, runtime_checkable
 
 from numpy.typing import ArrayLike
 
-from rigid.reaction import Contact, Reaction
+from rigid.ground.reaction import Contact, Facts, Reaction, State
 
-__all__ = ["Contact", "Ground", "Reaction"]
+__all__ = ["Contact", "Described", "Ground", "Reaction", "State"]
 
 
 @runtime_checkable
@@ -25,7 +26,7 @@ class Ground(Protocol):
 
     @property
     def time_step(self) -> float:
-        """The step it wants to be driven at [s]; where it is the ground's own, dt of `step` is a whole multiple."""
+        """The step it is to be driven at [s]; where it is the ground's own, dt of `step` is a whole multiple."""
 
     @property
     def surface(self) -> float:
@@ -37,20 +38,58 @@ class Ground(Protocol):
 
     @property
     def clearance(self) -> float:
-        """How far above `surface` the body it was made for touches nothing yet [m]; grains stick out of a bed."""
+        """How far above `surface` a spike that it was made for touches nothing yet [m]; grains stick out of a bed."""
 
     @property
     def depth_limit(self) -> float:
-        """How deep the body it was made for may go [m]; infinite where there is no floor."""
+        """How deep a spike that it was made for may go [m]; infinite where there is no floor."""
 
-    def step(self, position: ArrayLike, velocity: ArrayLike, dt: float) -> Reaction:
-        """Advance by `dt` [s] under a body at `position` [m] (at the start) that moves at constant `velocity` [m/s].
+    @property
+    def gives_friction(self) -> bool:
+        """Whether its contacts state the horizontal force; otherwise a Coulomb bound, which the body resolves."""
 
-        Both have shape (3,), world axes, z up. Returns the mean over the step: force * dt is the exact impulse.
+    @property
+    def lag(self) -> float:
+        """By how much its forces stand for a time later than the mean of the step's [s], twice over.
+
+        0 where the mean is exact. A bed's impulse over a step is that of the forces at the *ends* of its own steps dt,
+        so it belongs to a time dt / 2 later: its lag is dt.
         """
 
-    def state(self) -> dict[str, Any]:
+    def step(
+        self,
+        position: ArrayLike,
+        velocity: ArrayLike,
+        dt: float,
+        turn: ArrayLike | None = None,
+        spin: ArrayLike | None = None,
+    ) -> Reaction:
+        """Advance by `dt` [s] under a body at `position` [m] (at the start) that moves at constant `velocity` [m/s].
+
+        Both have shape (3,), world axes, z up. `turn` is the body's at the start, a unit quaternion, scalar first, and
+        `spin` its constant angular velocity [rad/s]; None: not turned, and not turning. Returns the mean over the step:
+        force * dt is the exact impulse.
+        """
+
+    def energies(self) -> dict[str, float]:
+        """What it stores now [J]: name -> energy."""
+
+    def checkpoint(self) -> Any:
+        """What `rollback` brings back, of a step that may be repeated: only the last checkpoint is kept."""
+
+    def rollback(self, kept: Any) -> None:
+        """Go back to the last `checkpoint`."""
+
+    def state(self) -> State:
         """Everything that the next steps depend on: a flat dict of numpy arrays."""
 
-    def restore(self, state: dict[str, Any]) -> None:
+    def restore(self, state: State) -> None:
         """Go back to what `state` gave; the steps that follow repeat to the bit."""
+
+
+@runtime_checkable
+class Described(Protocol):
+    """A ground that describes itself in run.toml."""
+
+    def describe(self) -> Facts:
+        """What it is, in plain numbers."""

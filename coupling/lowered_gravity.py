@@ -1,6 +1,6 @@
-"""Gravity that falls while a hand still holds a platform on grains: from the one it was set down under to the run's.
+"""Gravity that falls while a platform is being placed on grains: from the one it was set down under to the run's.
 
-Grains without cohesion are the same problem under any gravity g, lengths told in grains d, times in sqrt(d / g) and
+Grains without cohesion are the same problem under any gravity g, lengths in grains d, times in sqrt(d / g) and
 moduli in rho g d (tests/coupling/test_lowered_gravity.py has it to the bit). So what is rained and set down under a
 larger g lies as it would under the small one, and is there sooner by the root of their ratio. Only springs remember:
 overlaps go with (g / E)^(2/3), some micrometres here. They are let out while g falls by a factor of e every `EFOLD`
@@ -8,8 +8,8 @@ sqrt(d / g1), g1 the first one, from when the grains are calm. The bed rises by 
 meanwhile would be long in coming down again (at 1e-6 g: minutes), so a drag of time `DRAG` sqrt(d / g1) holds it.
 What the fall leaves behind is lateral stress, that of a bed which was loaded more before (overconsolidated).
 
-At rest the drag ends, and at rest without it the hand lets go: by what is left of their speeds and by the weight that
-is lacking, neither platform nor grains would go further than `NEAR` d in the shorter of sqrt(d / g) and the time that
+At rest the drag ends, and at rest without it the placement ends: by what is left of their speeds and by the weight that
+is missing, neither platform nor grains would go further than `NEAR` d in the shorter of sqrt(d / g) and the time that
 the run lasts.
 """
 
@@ -20,9 +20,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rigid.rig import STANDARD_GRAVITY
+from rigid.platform.rig import STANDARD_GRAVITY
 
-from .bed_footing import BedFooting
+from .bed_ground import BedGround
 
 __all__ = ["EFOLD", "NEAR", "LoweredGravity", "pace_under"]
 
@@ -42,17 +42,17 @@ def pace_under(gravity: float) -> float:
 
 
 class LoweredGravity:
-    """Of the grains of `footing`, from what it is to `last` [m/s2], for a run of `duration` [s].
+    """Of the grains of `ground`, from what it is to `last` [m/s2], for a run of `duration` [s].
 
     Raises ValueError where it is below `last` or grains sleep, who would keep the springs of the gravity before.
     """
 
-    def __init__(self, footing: BedFooting, *, last: float, duration: float) -> None:
-        self.footing, self.last = footing, last
-        self.first = footing.gravity
+    def __init__(self, ground: BedGround, *, last: float, duration: float) -> None:
+        self.ground, self.last = ground, last
+        self.first = ground.gravity
         if self.first < last:
             raise ValueError(f"settle_gravity is {self.first:g} m/s2: it must not be below that of the run, {last:g}")
-        self.grain = footing.grain
+        self.grain = ground.grain
         decay = EFOLD * math.sqrt(self.grain / self.first)
         self.steps = math.ceil(LOOKS * math.log(self.first / last))
         """Of the gravity, from the first to the last."""
@@ -82,7 +82,7 @@ class LoweredGravity:
     @property
     def calm(self) -> bool:
         """Whether the grains, under the first gravity, would go less than NEAR d in sqrt(d / g1): what moves flies."""
-        return self.footing.grain_speed() * math.sqrt(self.grain / self.first) < NEAR * self.grain
+        return self.ground.grain_speed() * math.sqrt(self.grain / self.first) < NEAR * self.grain
 
     def begin(self, time: float) -> None:
         """It falls from here on, the drag acts."""
@@ -92,7 +92,7 @@ class LoweredGravity:
     def drag(self, acts: bool) -> None:
         """Let the drag act, or no more."""
         self.dragged = acts
-        self.footing.drag_time = DRAG * math.sqrt(self.grain / self.first) if acts else math.inf
+        self.ground.drag_time = DRAG * math.sqrt(self.grain / self.first) if acts else math.inf
 
     def fall(self, time: float) -> bool:
         """Lower it as far as it is by `time` [s]; whether it has changed."""
@@ -101,7 +101,7 @@ class LoweredGravity:
         if due <= self.done:
             return False
         self.done = due
-        self.footing.set_gravity(self.now)
+        self.ground.set_gravity(self.now)
         return True
 
     def far(self, speeds: Sequence[float], lacking: Sequence[float]) -> float:

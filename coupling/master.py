@@ -1,40 +1,41 @@
-"""The master: steps a body and what it stands on together, and keeps the books of what passes between them.
+"""The master: steps a body and its ground together, and records the work that passes between them.
 
-Over one macro step H the body's twist is held and the footing answers with its mean wrench. The twist is that of the
+Over one macro step H the body's twist is held and the ground answers with its mean wrench. The twist is that of the
 step's middle, guessed with a wrench that is extrapolated from the steps before (`extrapolation` 0: the last one, 1: on
 the straight line through the last two, 2: on the parabola through three). With `iterations` above 1 the step is
-repeated, from the footing's saved state, until the wrench that comes out is the one that went in, within `tolerance` of
+repeated, from the ground's checkpoint, until the wrench that comes out is the one that went in, within `tolerance` of
 the largest force met. Handing back what came out contracts by K H^2 / 4m, K the contacts' stiffness: no better than the
 explicit step, which is stable up to K H^2 / m = 4, and of no use to a light body. So what goes in is what the
 differences between the times before, or in the step before, say would come out unchanged (interface quasi-Newton with
 an inverse Jacobian from least squares; Degroote et al. 2009, Comput. Struct. 87:793). What is found is the implicit
 midpoint rule, stable at any K H^2 / m.
 
-Either side may be sub-cycled: the footing takes `substeps` of its own steps in H, the body `body_steps` of its own. The
-wrench is exchanged once all the same. With the guess the body goes through its steps H / body_steps, the footing under
+Either side may be sub-cycled: the ground takes `substeps` of its own steps in H, the body `body_steps` of its own. The
+wrench is exchanged once all the same. With the guess the body goes through its steps H / body_steps, the ground under
 each with the twist held over it; then the body goes through them once more, from where it was and along the same
-twists, with what the footing answered to each. So what the body does by itself within H (it nutates, its wheels run
+twists, with what the ground answered to each. So what the body does by itself within H (it nutates, its wheels run
 up) is followed at H / body_steps; the bound on K H^2 / m stays.
 
-The books (docs/coupling.md). What the footing takes is its wrench times the twist it saw, what the body gives is the
-wrench times the mean of its rates before and after; the difference is the error of the exchange, of second order in H
+The energy balance is in docs/coupling.md. The ground takes its wrench times the twist it saw, the body gives the wrench
+times the mean of its rates before and after; the difference is the error of the exchange, of second order in H
 (Sadjina et al. 2016, Eng. Comput. 33:607, call it the residual of a power bond).
 """
 
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field, replace
-from typing import Any, Protocol, runtime_checkable
+from dataclasses import astuple, dataclass, field, replace
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from rigid.reaction import Contact
+from rigid.ground.reaction import Contact, Reaction, State
 
-from .footing import Footing, FootReaction
+from .deprecated import renamed
+from .ground import Ground
 from .poses import Pose, Twist, Vector, Wrench
 
-__all__ = ["Body", "Master", "StepBooks"]
+__all__ = ["Body", "Exchange", "Master"]
 
 _WEIGHTS = ((1.0,), (2.0, -1.0), (3.0, -3.0, 1.0))
 """Of the last wrenches, the newest first, by order of extrapolation."""
@@ -44,7 +45,7 @@ _MOST_PAIRS = 6
 
 @runtime_checkable
 class Body(Protocol):
-    """Whatever a footing can push: `coupling.PlanarBody`, `coupling.SpatialBody`."""
+    """Whatever a ground can push: `coupling.PlanarBody`, `coupling.SpatialBody`."""
 
     @property
     def pose(self) -> Pose:
@@ -60,40 +61,35 @@ class Body(Protocol):
     def predict(self, dt: float, guess: Wrench, lag: float) -> Twist:
         """The twist to hold over the next `dt` [s], under the guess at the ground's wrench."""
 
-    def resolve(self, dt: float, twist: Twist, reaction: FootReaction) -> Wrench:
+    def resolve(self, dt: float, twist: Twist, reaction: Reaction) -> Wrench:
         """The whole wrench of the ground: `reaction` with the friction that its Coulomb bounds leave open."""
 
     def advance(self, dt: float, twist: Twist, wrench: Wrench) -> None:
         """Take the step: along `twist`, with the impulse of `wrench`."""
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> State:
         """All that its next steps depend on: a flat dict of numpy arrays."""
 
-    def restore(self, state: dict[str, Any]) -> None:
+    def restore(self, state: State) -> None:
         """Go back to what `state` gave."""
 
 
 @dataclass(slots=True)
-class StepBooks:
-    """What passed since the books were opened [J]."""
+class Exchange:
+    """What passed between body and ground since the energy balance began [J]."""
 
     given: float = 0.0
-    """Work of the body on the footing, as the body sees it: by the mean of its rates before and after each step."""
+    """Work of the body on the ground, as the body sees it: by the mean of its rates before and after each step."""
     taken: float = 0.0
-    """The same as the footing sees it: by the twist that was held."""
+    """The same as the ground sees it: by the twist that was held."""
     worst_guess: float = 0.0
     """Largest |force guessed - force found| [N]."""
     largest_force: float = 0.0
     """Largest force of one step [N]."""
     repeats: int = 0
-    """Steps of the footing beyond one a macro step."""
+    """Steps of the ground beyond one a macro step."""
     unsettled: int = 0
     """Macro steps that were repeated as often as allowed and did not settle."""
-
-    def numbers(self) -> list[float]:
-        """As they are kept in a state."""
-        own = [self.given, self.taken, self.worst_guess, self.largest_force]
-        return [*own, float(self.repeats), float(self.unsettled)]
 
 
 @dataclass(slots=True)
@@ -101,7 +97,7 @@ class _Piece:
     """One of the body's steps in a macro step."""
 
     held: Twist
-    reaction: FootReaction
+    reaction: Reaction
     wrench: Wrench = field(default_factory=Wrench.none)
     before: Twist = field(default_factory=lambda: Twist(np.zeros(3), np.zeros(3)))
     """Of the body, before the step and"""
@@ -109,11 +105,11 @@ class _Piece:
 
 
 class Master:
-    """`body` and `footing`, in macro steps of `substeps` of the footing's own steps.
+    """`body` and `ground`, in macro steps of `substeps` of the ground's own steps.
 
     Parameters
     ----------
-    substeps : of the footing in a macro step [1].
+    substeps : of the ground in a macro step [1].
     body_steps : of the body in a macro step [1]; `substeps` is a whole multiple of it.
     extrapolation : order of the guess at the next wrench, 0 to 2.
     iterations : how often a macro step is computed at most; 1: explicit.
@@ -126,7 +122,7 @@ class Master:
     def __init__(
         self,
         body: Body,
-        footing: Footing,
+        ground: Ground,
         *,
         substeps: int = 10,
         body_steps: int = 1,
@@ -146,8 +142,8 @@ class Master:
             raise ValueError(f"extrapolation is {extrapolation!r}: it must be 0, 1 or 2")
         if not tolerance > 0:
             raise ValueError(f"tolerance is {tolerance!r}: it must be above 0")
-        self.body, self.footing = body, footing
-        self.macro_step = substeps * footing.time_step
+        self.body, self.ground = body, ground
+        self.macro_step = substeps * ground.time_step
         self.body_steps = body_steps
         self.extrapolation, self.iterations, self.tolerance = extrapolation, iterations, tolerance
         self.count = 0
@@ -156,15 +152,20 @@ class Master:
         self._held: Twist | None = None
         self._learnt: list[tuple[Vector, Vector]] = []
         """How the wrench that came out changed with the one that went in, when a step was last repeated."""
-        self.books = StepBooks()
-        self.last: FootReaction | None = None
-        """The footing's answer in the last step."""
+        self.exchange = Exchange()
+        self.last: Reaction | None = None
+        """The ground's answer in the last step."""
         self.wrench = Wrench.none()
         """The whole wrench of the body's last step, friction included."""
 
-    def open_books(self) -> None:
+    books, footing = renamed("books", "exchange"), renamed("footing", "ground")
+
+    def __repr__(self) -> str:
+        return f"Master({self.body!r} on {self.ground!r}, macro step {self.macro_step:.3g} s, {self.count} done)"
+
+    def start_balance(self) -> None:
         """Count from here."""
-        self.books = StepBooks()
+        self.exchange = Exchange()
         self._held = None
 
     def guess(self) -> Wrench:
@@ -176,50 +177,50 @@ class Master:
         torque = sum(w * past.torque for w, past in zip(weights, self._wrenches, strict=False))
         return Wrench(np.asarray(force), np.asarray(torque))
 
-    def step(self) -> FootReaction:
-        """One macro step; the footing's answer, its mean over the step."""
-        footing, books = self.footing, self.books
+    def step(self) -> Reaction:
+        """One macro step; the ground's answer, its mean over the step."""
+        ground, passed = self.ground, self.exchange
         expected = self.guess()
         before = self.body.state() if self.iterations > 1 or self.body_steps > 1 else {}
-        kept = footing.hold() if self.iterations > 1 else None
+        kept = ground.checkpoint() if self.iterations > 1 else None
         trial = expected
         tried: list[tuple[Vector, Vector]] = []
         for turn in range(self.iterations):
             if turn:
-                footing.take_back(kept)
+                ground.rollback(kept)
                 self.body.restore(before)
-                books.repeats += 1
+                passed.repeats += 1
             pieces = self._answered(trial, before)
             self._take(pieces, trial)
             wrench = _mean_wrench([piece.wrench for piece in pieces])
-            books.largest_force = max(books.largest_force, _size(wrench))
-            if _apart(wrench, trial) <= self.tolerance * books.largest_force:
+            passed.largest_force = max(passed.largest_force, _size(wrench))
+            if _apart(wrench, trial) <= self.tolerance * passed.largest_force:
                 break
             if self.iterations > 1:
                 tried.append((_row(trial), _row(wrench)))
                 trial = _unpack(_unchanged(tried[-1], _differences(tried) or self._learnt))
         else:
-            books.unsettled += self.iterations > 1
+            passed.unsettled += self.iterations > 1
         if len(tried) > 1:
             self._learnt = _differences(tried)
         for piece in pieces:
-            self._book(piece)
-        books.worst_guess = max(books.worst_guess, _apart(wrench, expected))
+            self._record(piece)
+        passed.worst_guess = max(passed.worst_guess, _apart(wrench, expected))
         self._wrenches.appendleft(wrench)
         self.last = _joined([piece.reaction for piece in pieces])
         self.count += 1
         return self.last
 
-    def _answered(self, guess: Wrench, before: dict[str, Any]) -> list[_Piece]:
-        """The body's steps under the guess, and the footing's answers to them; the body is back where it was."""
-        body, footing, dt = self.body, self.footing, self.macro_step / self.body_steps
+    def _answered(self, guess: Wrench, before: State) -> list[_Piece]:
+        """The body's steps under the guess, and the ground's answers to them; the body is back where it was."""
+        body, ground, dt = self.body, self.ground, self.macro_step / self.body_steps
         pieces: list[_Piece] = []
         for _ in range(self.body_steps):
             if pieces:
                 body.resolve(dt, pieces[-1].held, pieces[-1].reaction)
                 body.advance(dt, pieces[-1].held, guess)
-            held = body.predict(dt, guess, footing.lag)
-            pieces.append(_Piece(held, footing.step(body.pose, held, dt)))
+            held = body.predict(dt, guess, ground.lag)
+            pieces.append(_Piece(held, ground.step(body.pose.position, held.velocity, dt, body.pose.turn, held.spin)))
         if len(pieces) > 1:
             body.restore(before)
         return pieces
@@ -229,51 +230,51 @@ class Master:
         body, dt = self.body, self.macro_step / self.body_steps
         for piece in pieces:
             if len(pieces) > 1:
-                body.predict(dt, guess, self.footing.lag)  # for the torque of this step alone
+                body.predict(dt, guess, self.ground.lag)  # for the torque of this step alone
             piece.wrench = body.resolve(dt, piece.held, piece.reaction)
             piece.before = body.twist
             body.advance(dt, piece.held, piece.wrench)
             piece.after = body.twist
 
-    def _book(self, piece: _Piece) -> None:
-        dt, lag, wrench = self.macro_step / self.body_steps, self.footing.lag, piece.wrench
-        self.books.given -= dt * wrench.power(_mean(piece.before, piece.after))
-        self.books.taken -= dt * wrench.power(piece.held)
+    def _record(self, piece: _Piece) -> None:
+        dt, lag, wrench = self.macro_step / self.body_steps, self.ground.lag, piece.wrench
+        self.exchange.given -= dt * wrench.power(_mean(piece.before, piece.after))
+        self.exchange.taken -= dt * wrench.power(piece.held)
         if lag and self._held is not None:
             # The last force of the step before was met by grains half with its twist, half with the one now held.
             change = Twist(piece.held.velocity - self._held.velocity, piece.held.spin - self._held.spin)
-            self.books.taken -= 0.5 * lag * self.wrench.power(change)
+            self.exchange.taken -= 0.5 * lag * self.wrench.power(change)
         self._held, self.wrench = piece.held, wrench
 
     def exchanged(self) -> tuple[float, float]:
-        """Work on the footing up to the time of the pose [J], as the body sees it and as the footing sees it.
+        """Work on the ground up to the time of the pose [J], as the body sees it and as the ground sees it.
 
-        A bed's last force acts half before that time and half after it; the books hold all of it.
+        A bed's last force acts half before that time and half after it; `exchange` has all of it.
         """
-        lag, books = self.footing.lag, self.books
+        lag, passed = self.ground.lag, self.exchange
         if not lag or self._held is None:
-            return books.given, books.taken
+            return passed.given, passed.taken
         return (
-            books.given + 0.5 * lag * self.wrench.power(_mean(self.body.twist, self.body.twist_now(lag))),
-            books.taken + 0.5 * lag * self.wrench.power(self._held),
+            passed.given + 0.5 * lag * self.wrench.power(_mean(self.body.twist, self.body.twist_now(lag))),
+            passed.taken + 0.5 * lag * self.wrench.power(self._held),
         )
 
-    def state(self) -> dict[str, Any]:
-        """All that the next steps depend on, body and footing included: a flat dict of numpy arrays."""
+    def state(self) -> State:
+        """All that the next steps depend on, body and ground included: a flat dict of numpy arrays."""
         past = [_row(wrench) for wrench in self._wrenches]
         held = self._held
-        own: dict[str, Any] = {
+        own: State = {
             "master.count": np.array(self.count),
             "master.wrenches": np.array(past).reshape(-1, 6),
             "master.wrench": _row(self.wrench),
             "master.held": np.concatenate([held.velocity, held.spin]) if held is not None else np.zeros(0),
-            "master.books": np.array(self.books.numbers()),
+            "master.books": np.array(astuple(self.exchange), dtype=float),
             "master.learnt": np.array(self._learnt, dtype=float).reshape(-1, 2, 6),
         }
         own |= {f"body.{key}": value for key, value in self.body.state().items()}
-        return own | {f"footing.{key}": value for key, value in self.footing.state().items()}
+        return own | {f"footing.{key}": value for key, value in self.ground.state().items()}
 
-    def restore(self, state: dict[str, Any]) -> None:
+    def restore(self, state: State) -> None:
         """Go back to what `state` gave."""
         self.count = int(state["master.count"])
         self._wrenches.clear()
@@ -284,8 +285,8 @@ class Master:
         learnt = np.asarray(state.get("master.learnt", ()), dtype=float).reshape(-1, 2, 6)
         self._learnt = [(into.copy(), out.copy()) for into, out in learnt]
         given, taken, worst, largest, *counts = (float(number) for number in state["master.books"])
-        self.books = StepBooks(given, taken, worst, largest, *(int(count) for count in counts))
-        for name, part in (("body.", self.body), ("footing.", self.footing)):
+        self.exchange = Exchange(given, taken, worst, largest, *(int(count) for count in counts))
+        for name, part in (("body.", self.body), ("footing.", self.ground)):
             part.restore({key[len(name) :]: value for key, value in state.items() if key.startswith(name)})
 
 
@@ -323,21 +324,22 @@ def _mean_wrench(wrenches: list[Wrench]) -> Wrench:
     return _unpack(np.mean([_row(wrench) for wrench in wrenches], axis=0))
 
 
-def _joined(reactions: list[FootReaction]) -> FootReaction:
+def _joined(reactions: list[Reaction]) -> Reaction:
     """The answers to the body's steps as one: mean forces, each row where it touched last, sinkage at the end."""
     if len(reactions) == 1:
         return reactions[0]
     share = 1 / len(reactions)
     contacts: dict[int, Contact] = {}
     for reaction in reactions:
-        for row, contact in reaction.contacts.items():
+        for row, contact in reaction.by_member.items():
             kept = contacts.get(row)
             along = None if contact.tangential_force is None else share * contact.tangential_force
             if kept is not None and along is not None and kept.tangential_force is not None:
                 along = along + kept.tangential_force
             load = share * contact.normal_force + (kept.normal_force if kept is not None else 0.0)
             contacts[row] = replace(contact, normal_force=load, tangential_force=along)
-    return FootReaction(_mean_wrench([reaction.wrench for reaction in reactions]), contacts, reactions[-1].sinkage)
+    mean = _mean_wrench([Wrench.of(reaction) for reaction in reactions])
+    return Reaction(mean.force, mean.torque, tuple(contacts.values()), reactions[-1].sinkage)
 
 
 def _mean(one: Twist, other: Twist) -> Twist:

@@ -13,37 +13,38 @@ the tip meets the undisturbed surface, depth 0; before that the spike is carried
 clear of the grains that stick out.
 
 Each run is a stepper: `advance` once or `run` to the end, `state` and `restore` at any time between macro steps, the
-ground's memory included, so that a run taken up again gives the same bits.
+ground's memory included, so that a run taken up again is bitwise the same.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import asdict
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
-from rigid import Spike
+from rigid.ground.reaction import Facts, State
+from rigid.platform.spike import Spike
 
-from .bed_ground import BedGround
-from .ground import Ground
+from .bed_ground import BedGround, GrainBed
+from .ground import Described, Ground
+from .stepper import Reporting, Stepper
 from .trajectory import PHASES, Penetration
 
 __all__ = ["Drive", "Drop", "Run", "SetDown", "drive", "drop", "overdamped_below", "set_down"]
 
 SUBSTEPS = 10
 """Steps of the ground in a macro step, by default."""
-HAND_TIME = 0.002
+PLACEMENT_TIME = 0.002
 """Mass over drag of a spike that is set down [s]."""
 AT_REST = 0.003
-"""What a spike at rest may still lack of its load, and its mean speed over the lowering speed [1]."""
+"""What of its load may still be missing at rest, and the mean speed there over the lowering speed [1]."""
 FREE, IN, REST, OUT = range(4)
 
 
-class Run:
-    """Common to all three runs: the clock, the rows, the saved state. `advance` makes one macro step."""
+class Run(Stepper):
+    """A spike that goes into `ground` (or a bed): what all three runs share, clock, rows and saved state."""
 
     kind = ""
     lets_go_at_touch = False
@@ -59,8 +60,9 @@ class Run:
         start_depth: float | None = None,
         max_time: float = 10.0,
     ) -> None:
+        super().__init__()
         self.spike = spike
-        self.ground: Ground = BedGround(ground, spike) if hasattr(ground, "add_body") else ground
+        self.ground: Ground = BedGround(ground, spike) if isinstance(ground, GrainBed) else ground
         for key, value in {"speed": speed, "substeps": substeps, "max_time": max_time}.items():
             if not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{key} is {value}: it must be above 0")
@@ -82,7 +84,10 @@ class Run:
         """How long it may well take [s], for those who show progress."""
         self._rows: list[tuple[float, float, float, float]] = []
         self._phases: list[int] = []
-        self._frames = 0
+
+    def __repr__(self) -> str:
+        where = f"{1e3 * self.depth:.3g} mm deep at {self.time:.4g} s"
+        return f"{type(self).__name__}({self.spike!r} into {self.ground.name}, {where}{', ' * self.done}{self.ended})"
 
     @property
     def done(self) -> bool:
@@ -95,14 +100,8 @@ class Run:
         return (self.count - self._approach) * self.macro_step
 
     @property
-    def frames_taken(self) -> int:
-        """How many times `frame_interval` was up."""
-        return self._frames
-
-    @property
-    def at_bottom(self) -> bool:
-        """Whether the step just done ended the way in, at the deepest point."""
-        return False
+    def _elapsed(self) -> float:
+        return self.count * self.macro_step
 
     @property
     def position(self) -> tuple[float, float, float]:
@@ -145,30 +144,10 @@ class Run:
         if not self.done and self.time >= self.max_time - 0.5 * self.macro_step:
             self.ended = "max_time"
 
-    def run(
-        self,
-        *,
-        on_step: Callable[[Run], None] | None = None,
-        on_frame: Callable[[Run], None] | None = None,
-        frame_interval: float | None = None,
-    ) -> Penetration:
-        """Go on to the end. `on_step` is called after every macro step, `on_frame` every `frame_interval` [s].
-
-        The first frame is taken before the first step, one at the deepest point and one at the end. Frames already
-        taken are part of the saved state.
-        """
-        while True:
-            elapsed = self.count * self.macro_step
-            if on_frame and frame_interval:
-                due = elapsed >= self._frames * frame_interval - 0.5 * self.macro_step
-                self._frames += due
-                if due or self.at_bottom or self.done:
-                    on_frame(self)
-            if self.done:
-                return self.result()
-            self.advance()
-            if on_step:
-                on_step(self)
+    def run(self, **reporting: Unpack[Reporting]) -> Penetration:
+        """Go on to the end, with the reports of `Stepper.follow`."""
+        self.follow(**reporting)
+        return self.result()
 
     def result(self) -> Penetration:
         """The rows so far."""
@@ -176,18 +155,11 @@ class Run:
         phases = np.array(PHASES)[np.array(self._phases, dtype=int)]
         time, depth, velocity, force = (column.copy() for column in rows.T)
         return Penetration(
-            kind=self.kind,
-            time=time,
-            depth=depth,
-            velocity=velocity,
-            force=force,
-            phase=phases,
-            macro_step=self.macro_step,
-            ended=self.ended or "unfinished",
-            settings=self.settings(),
-        )
+            kind=self.kind, time=time, depth=depth, velocity=velocity, force=force, phase=phases,
+            macro_step=self.macro_step, ended=self.ended or "unfinished", settings=self.settings(),
+        )  # fmt: skip
 
-    def settings(self) -> dict[str, Any]:
+    def settings(self) -> Facts:
         """What was asked for, SI units."""
         return {
             "ground": self.ground.name,
@@ -195,10 +167,10 @@ class Run:
             "start_depth": self._start,
             "substeps": round(self.macro_step / self.ground.time_step),
             "spike": asdict(self.spike),
-            "ground_settings": getattr(self.ground, "describe", dict)(),
+            "ground_settings": self.ground.describe() if isinstance(self.ground, Described) else {},
         }
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> State:
         """All that the rest of the run depends on: a flat dict of numpy arrays, the ground's under "ground.*"."""
         own = {
             "run.kind": np.array(self.kind),
@@ -210,7 +182,7 @@ class Run:
         }
         return own | {f"ground.{key}": value for key, value in self.ground.state().items()}
 
-    def restore(self, state: dict[str, Any]) -> None:
+    def restore(self, state: State) -> None:
         """Go back to what `state` gave. Raises ValueError for the state of another kind of run."""
         if str(state["run.kind"]) != self.kind:
             raise ValueError(f"the state is of a {state['run.kind']} run, this one is {self.kind}")
@@ -270,9 +242,8 @@ class Drive(Run):
             raise ValueError(f"hold is {hold}: it must be 0 or more (in s)")
         if not (math.isfinite(self.retreat_speed) and self.retreat_speed > 0):
             raise ValueError(f"retreat_speed is {retreat_speed}: it must be above 0 (in m/s)")
-        total = (
-            self.target / max(float(speed), 1e-9) + self.hold + (self.target / self.retreat_speed if retreat else 0.0)
-        )
+        back = self.target / self.retreat_speed if retreat else 0.0
+        total = self.target / max(float(speed), 1e-9) + self.hold + back
         super().__init__(spike, ground, speed=speed, max_time=max(2 * total, 1e-9), **common)
         if self.target > self.ground.depth_limit:
             raise ValueError(
@@ -293,7 +264,7 @@ class Drive(Run):
     def at_bottom(self) -> bool:
         return self.count - self._approach == self._in
 
-    def settings(self) -> dict[str, Any]:
+    def settings(self) -> Facts:
         return super().settings() | {
             "depth": self.target, "hold": self.hold, "retreat": self._retreat, "retreat_speed": self.retreat_speed
         }  # fmt: skip
@@ -355,7 +326,7 @@ class Drop(Run):
     def at_bottom(self) -> bool:
         return self._stopped_at == self.time
 
-    def settings(self) -> dict[str, Any]:
+    def settings(self) -> Facts:
         return super().settings() | {
             "mass": self.mass, "load": self.load, "rest_time": self.rest_time, "rest_tolerance": self.rest_tolerance,
             "after_stop": self.after_stop if math.isfinite(self.after_stop) else None, "max_time": self.max_time,
@@ -391,15 +362,15 @@ class Drop(Run):
 
 
 class SetDown(Drop):
-    """Lowered as by a hand that lets go slowly: m dv/dt = W - F - c v with c = W / lowering_speed.
+    """Placed against a drag: m dv/dt = W - F - c v with c = W / lowering_speed.
 
-    It is let go where it first touches, which grains that stick out of a bed make sooner than depth 0: time counts from
-    there. Free of the ground it sinks at `lowering_speed`; the hand bears whatever the ground does not, so the ground's
-    force rises to the load from below and the spike comes to rest where the bed first carries it. `mass` is what the
-    hand leaves the spike to feel; by default c times 2 ms, so light that the motion is damped beyond critical on any
-    ground softer than W / (8 ms lowering_speed) (`overdamped_below`) and cannot overshoot. It ends when over the last
-    `rest_time` the mean speed is below 0.3 % of the lowering speed and the mean force within 0.3 % of the load. What is
-    left of the way is not waited for: on a spring the sinkage comes out shallow by what the force lacks, 0.3 % at most.
+    The placement begins where the spike first touches, which grains that stick out of a bed make sooner than depth 0:
+    time counts from there. Free of the ground it sinks at `lowering_speed`; the drag carries whatever the ground does
+    not, so the ground's force rises to the load from below and the spike comes to rest where the bed first carries it.
+    `mass` is by default c times 2 ms, so light that the motion is damped beyond critical on any ground softer than
+    W / (8 ms lowering_speed) (`overdamped_below`) and cannot overshoot. It ends when over the last `rest_time` the mean
+    speed is below 0.3 % of the lowering speed and the mean force within 0.3 % of the load: on a spring the sinkage is
+    too small by what is missing of the force, 0.3 % at most.
     """
 
     kind = "set_down"
@@ -417,34 +388,28 @@ class SetDown(Drop):
     ) -> None:
         if not (math.isfinite(lowering_speed) and lowering_speed > 0):
             raise ValueError(f"lowering_speed is {lowering_speed}: it must be above 0 (in m/s)")
-        self.hand = float(load) / lowering_speed
+        self.drag = float(load) / lowering_speed
         """c [N s/m]."""
-        super().__init__(
-            spike,
-            ground,
-            speed=lowering_speed,
-            mass=self.hand * HAND_TIME if mass is None else mass,
-            load=load,
-            **common,
-        )
+        mass = self.drag * PLACEMENT_TIME if mass is None else mass
+        super().__init__(spike, ground, speed=lowering_speed, mass=mass, load=load, **common)
 
     @property
     def at_bottom(self) -> bool:
         return False  # its end is
 
-    def settings(self) -> dict[str, Any]:
+    def settings(self) -> Facts:
         return super().settings() | {"lowering_speed": self.speed}
 
     def _held_velocity(self) -> float:
         half = 0.5 * self.macro_step
-        # The hand's drag is taken implicitly, so that a light spike stays stable at any step.
-        return (self.mass * self.velocity + half * (self.load - self._force)) / (self.mass + half * self.hand)
+        # The drag is taken implicitly, so that a light spike stays stable at any step.
+        return (self.mass * self.velocity + half * (self.load - self._force)) / (self.mass + half * self.drag)
 
     def _after(self, held: float, force: float) -> None:
         before = self.velocity
         super()._after(held, force)
         step = self.macro_step
-        self.velocity = (self.mass * before + step * (self.load - force)) / (self.mass + step * self.hand)
+        self.velocity = (self.mass * before + step * (self.load - force)) / (self.mass + step * self.drag)
 
     def _rests(self, last: np.ndarray) -> bool:
         slow = abs(float(last[:, 2].mean())) <= AT_REST * self.speed
@@ -453,39 +418,40 @@ class SetDown(Drop):
 
 def overdamped_below(load: float, lowering_speed: float) -> float:
     """Stiffness of a ground [N/m] up to which a spike set down by default is damped beyond critical."""
-    return load / (4 * HAND_TIME * lowering_speed)
+    return load / (4 * PLACEMENT_TIME * lowering_speed)
 
 
 def drive(spike: Spike, *, into: Any, speed: float, depth: float, **options: Any) -> Penetration:
     """Drive `spike` straight down `into` a ground (or a bed) at `speed` [m/s] to `depth` [m], hold it, pull it out.
 
     Options: hold [s] (0.02), retreat (True), retreat_speed [m/s] (as speed), substeps of the ground in a macro step
-    (10), start_depth [m, negative] (just clear of the grains), and `on_step`, `on_frame`, `frame_interval` of
-    `Run.run`. Raises ValueError, naming key and value, for what cannot be; and what the ground raises.
+    (10), start_depth [m, negative] (just clear of the grains), and `on_step`, `on_frame`, `frame_interval`, `progress`
+    of `Stepper.follow`. Raises ValueError, naming key and value, for what cannot be; and what the ground raises.
     """
-    hooks = _hooks(options)
-    return Drive(spike, into, speed=speed, depth=depth, **options).run(**hooks)
+    reporting = _reporting(options)
+    return Drive(spike, into, speed=speed, depth=depth, **options).run(**reporting)
 
 
 def drop(spike: Spike, *, into: Any, speed: float, **options: Any) -> Penetration:
-    """Drop `spike` `into` a ground (or a bed): at the surface it has `speed` [m/s], and then it is left to itself.
+    """Drop `spike` `into` a ground (or a bed): at the surface it has `speed` [m/s], and then it is free.
 
     Options: mass [kg] (the spike's), load [N] (mass * gravity), gravity [m/s2] (9.80665), rest_time [s],
     rest_tolerance [1], max_depth [m], max_time [s], and those of `drive` that are not about the way out.
     """
-    hooks = _hooks(options)
-    return Drop(spike, into, speed=speed, **options).run(**hooks)
+    reporting = _reporting(options)
+    return Drop(spike, into, speed=speed, **options).run(**reporting)
 
 
 def set_down(spike: Spike, *, onto: Any, load: float, **options: Any) -> Penetration:
-    """Set `spike` down `onto` a ground (or a bed) under `load` [N], held back by a hand, to the resting sinkage.
+    """Place `spike` `onto` a ground (or a bed) under `load` [N], slowed by a drag, to the resting sinkage.
 
-    Options: lowering_speed [m/s] (0.03), mass [kg] that the hand leaves it to feel, and those of `drop`.
+    Options: lowering_speed [m/s] (0.03), mass [kg] that counts during placement, and those of `drop`.
     """
-    hooks = _hooks(options)
-    return SetDown(spike, onto, load=load, **options).run(**hooks)
+    reporting = _reporting(options)
+    return SetDown(spike, onto, load=load, **options).run(**reporting)
 
 
-def _hooks(options: dict[str, Any]) -> dict[str, Any]:
-    """Take the hooks of `Run.run` out of the options."""
-    return {key: options.pop(key) for key in ("on_step", "on_frame", "frame_interval") if key in options}
+def _reporting(options: dict[str, Any]) -> Reporting:
+    """Take what `Stepper.follow` wants out of the options."""
+    found = {key: options.pop(key) for key in Reporting.__annotations__ if key in options}
+    return Reporting(**found)  # type: ignore[typeddict-item]

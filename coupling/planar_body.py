@@ -1,9 +1,9 @@
-"""The platform of the planar model as a body that a footing pushes: three coordinates, a flywheel, and the rig.
+"""The platform of the planar model as a body that a ground pushes: three coordinates, a flywheel, and the rig.
 
 Coordinates and signs are the planar model's (docs/planar.md): x along the surface, z up from it (the model's y), theta
 about +y, clockwise. The inertia in z is m + m_b where there is a rig, in x it is m; the weight is (m + m_b) g_sim.
 
-A macro step of length H from the velocity v, s the footing's lag (0 for a law, its own step for a bed):
+A macro step of length H from the velocity v, s the ground's lag (0 for a law, its own step for a bed):
 
     u  = v + (H - s) / 2 M^-1 (G + F_guess)      held during the step: a guess at the velocity of its middle
     q' = q + H u
@@ -18,23 +18,22 @@ passes through zero. Events of friction are found to the step, so they are of fi
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigid.reaction import Contact
-from rigid.trial import Trial
+from rigid.ground.reaction import Contact, Reaction, State
+from rigid.model.trial import Trial
 
-from .footing import FootReaction
+from .deprecated import renamed
 from .poses import Pose, Twist, Vector, Wrench
 
-__all__ = ["HAND_STEP", "HAND_TIME", "PlanarBody", "hand_time"]
+__all__ = ["PLACEMENT_STEP", "PLACEMENT_TIME", "PlanarBody", "placement_time"]
 
-HAND_TIME = 0.002
-"""Mass over drag of a body that a hand sets down [s], as in `coupling.SetDown`."""
-HAND_STEP = 4e-4
-"""Macro step up to which that mass bears it [s]; beyond, mass goes with the square of the step, as K H^2 / m does."""
+PLACEMENT_TIME = 0.002
+"""Mass over drag of a body during placement [s], as in `coupling.SetDown`."""
+PLACEMENT_STEP = 4e-4
+"""Macro step up to which that mass is stable [s]; beyond, mass goes with the square of the step, as K H^2 / m does."""
 _OPEN = 9
 """Mode of a row that does not touch."""
 
@@ -57,7 +56,7 @@ class PlanarBody:
         self.wheel_speed = trial.wheel_speed_0
         self.time = 0.0
         self.torque_work = 0.0
-        """Work of the torque since it was let go [J]."""
+        """Work of the torque since its release [J]."""
         self.max_wheel_speed = math.inf
         self.wheel_at_limit: float | None = None
         """When a motor's wheel came to `max_wheel_speed` [s], counted as `time`; None if it has not."""
@@ -65,42 +64,52 @@ class PlanarBody:
         """Of each row under a Coulomb bound: 0 sticks, +1 and -1 slides towards +x and -x, 9 does not touch."""
         self.touching = False
         """Whether anything touched in the last step, which is when the torque acts."""
-        self._let_go()
+        self._free()
 
-    def _let_go(self) -> None:
+    def _free(self) -> None:
         trial = self.trial
         self.inertia = np.array([trial.mass, trial.mass + trial.counterweight, trial.inertia])
         self._drag = np.zeros(3)
-        self.held_by_hand = False
+        self.in_placement = False
 
-    def take_in_hand(self, lowering_speed: float, *, pace: float = 1.0, step: float = 0.0) -> None:
-        """From here on a hand lowers it: c = W / lowering_speed [m/s] resists, and what is felt has the mass 2 ms c.
+    take_in_hand, let_go = renamed("take_in_hand", "begin_placement"), renamed("let_go", "release")
+    hold_more_firmly, held_by_hand = (
+        renamed("hold_more_firmly", "slow_placement"),
+        renamed("held_by_hand", "in_placement"),
+    )
+
+    def begin_placement(self, lowering_speed: float, *, pace: float = 1.0, step: float = 0.0) -> None:
+        """It is lowered from here on: c = W / lowering_speed [m/s] resists, and its mass is 2 ms c.
 
         The same in all directions, and about the axis with l^2: it sinks until the ground carries it, and cannot bounce
         on a ground softer than W / (8 ms lowering_speed). The torque waits. `pace` times 2 ms where all is slower; more
-        where `step`, the macro step [s], is long (`hand_time`).
+        where `step`, the macro step [s], is long (`placement_time`).
         """
         scale = np.array([1.0, 1.0, self.trial.spike_length**2])
         drag = self.trial.weight / lowering_speed
-        self.inertia, self._drag = hand_time(step, pace) * drag * scale, drag * scale
-        self.held_by_hand = True
+        self.inertia, self._drag = placement_time(step, pace) * drag * scale, drag * scale
+        self.in_placement = True
 
-    def hold_more_firmly(self, factor: float) -> None:
-        """The hand's drag, and the mass that it leaves, times `factor`: slower by that, and as little apt to bounce."""
+    def slow_placement(self, factor: float) -> None:
+        """Drag and mass of the placement times `factor`: slower by that, and as little apt to bounce."""
         self.inertia, self._drag = factor * self.inertia, factor * self._drag
 
-    def let_go(self) -> None:
-        """The hand opens: at rest from here, its time is 0 and the torque begins."""
-        self._let_go()
+    def release(self) -> None:
+        """The placement ends: at rest from here, its time is 0 and the torque begins."""
+        self._free()
         self.rates = np.zeros(3)
         self.time = self.torque_work = 0.0
+
+    def lift(self, height: float) -> None:
+        """Put it higher by this [m]."""
+        self.place[1] += height
 
     def start(self, rates: Vector, lag: float) -> None:
         """Free of contact, with `rates` at the time of its pose: brought to their own time."""
         self.acceleration = np.array([0.0, -self.trial.weight, 0.0]) / self.inertia
         self.rates = rates + 0.5 * lag * self.acceleration
 
-    # What a footing sees -------------------------------------------------------------------------------------------
+    # What a ground sees -------------------------------------------------------------------------------------------
 
     @property
     def pose(self) -> Pose:
@@ -118,15 +127,15 @@ class PlanarBody:
         held = (self.inertia * self.rates + half * push) / (self.inertia + half * self._drag)
         return _twist(held)
 
-    def resolve(self, dt: float, twist: Twist, reaction: FootReaction) -> Wrench:
+    def resolve(self, dt: float, twist: Twist, reaction: Reaction) -> Wrench:
         """The whole wrench of the ground: `reaction` with the friction that its Coulomb bounds leave open."""
-        bounded = {row: contact for row, contact in reaction.contacts.items() if contact.tangential_force is None}
+        bounded = {row: contact for row, contact in reaction.by_member.items() if contact.tangential_force is None}
         self._next_modes = np.full(len(self.modes), _OPEN, dtype=np.int8)
         self._next_touching = bool(reaction.contacts)
         if not bounded:
-            return reaction.wrench
-        force = _Friction(self, dt, twist, reaction.wrench, bounded).solve(self._next_modes)
-        return Wrench(reaction.wrench.force + force[0], reaction.wrench.torque + force[1])
+            return Wrench.of(reaction)
+        force = _Friction(self, dt, twist, Wrench.of(reaction), bounded).solve(self._next_modes)
+        return Wrench(reaction.force + force[0], reaction.torque + force[1])
 
     def advance(self, dt: float, twist: Twist, wrench: Wrench) -> None:
         """Take the step: along `twist`, with the impulse of `wrench`."""
@@ -142,6 +151,10 @@ class PlanarBody:
         self.wheel_speed += sign * self._torque * dt / self.trial.wheel_inertia
         self.modes, self.touching = self._next_modes, self._next_touching
         self.time += dt
+
+    def __repr__(self) -> str:
+        x, z, theta = self.place
+        return f"PlanarBody({self.trial.mass:g} kg at x = {x:.4g} m, z = {z:.4g} m, theta = {theta:.4g} rad)"
 
     # What it has ---------------------------------------------------------------------------------------------------
 
@@ -159,6 +172,11 @@ class PlanarBody:
         return self.rates - 0.5 * lag * self.acceleration
 
     @property
+    def masses(self) -> Vector:
+        """Along x, y and z [kg], shape (3,); those of its placement while that lasts."""
+        return self.inertia[[0, 0, 1]]
+
+    @property
     def momentum(self) -> Vector:
         """Of platform and counterweight, at the time of the rates [N s], shape (3,)."""
         along, up = self.inertia[:2] * self.rates[:2]
@@ -174,26 +192,26 @@ class PlanarBody:
         """(m + m_b) g_sim z [J]."""
         return self.trial.weight * float(self.place[1])
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> State:
         """All that its next steps depend on."""
         return {
             "numbers": np.concatenate(
                 [
                     self.place, self.rates, self.acceleration, self.inertia, self._drag,
-                    [self.wheel_speed, self.time, self.torque_work, self.touching, self.held_by_hand],
+                    [self.wheel_speed, self.time, self.torque_work, self.touching, self.in_placement],
                     [math.nan if self.wheel_at_limit is None else self.wheel_at_limit],
                 ]
             ),
             "modes": self.modes.copy(),
         }  # fmt: skip
 
-    def restore(self, state: dict[str, Any]) -> None:
+    def restore(self, state: State) -> None:
         """Go back to what `state` gave."""
         numbers = np.asarray(state["numbers"], dtype=float)
         parts = numbers[:15].reshape(5, 3)
         self.place, self.rates, self.acceleration, self.inertia, self._drag = (part.copy() for part in parts)
         self.wheel_speed, self.time, self.torque_work = (float(number) for number in numbers[15:18])
-        self.touching, self.held_by_hand = bool(numbers[18]), bool(numbers[19])
+        self.touching, self.in_placement = bool(numbers[18]), bool(numbers[19])
         self.wheel_at_limit = None if math.isnan(numbers[20]) else float(numbers[20])
         self.modes = np.array(state["modes"], dtype=np.int8)
 
@@ -213,7 +231,7 @@ class PlanarBody:
         """Mean torque of the next step [N m]: it acts while anything touches, until its end or the wheel's."""
         trial = self.trial
         self._until_limit = math.inf
-        if self.held_by_hand or not self.touching or trial.torque == 0:
+        if self.in_placement or not self.touching or trial.torque == 0:
             return 0.0
         left = trial.torque_until - self.time
         room = self.wheel_speed if trial.actuator == "brake" else self.max_wheel_speed - self.wheel_speed
@@ -224,10 +242,10 @@ class PlanarBody:
         return trial.torque * min(1.0, max(0.0, left / dt))
 
 
-def hand_time(step: float, pace: float = 1.0) -> float:
-    """Mass over drag of a body in a hand [s] whose forces are exchanged every `step` [s], where all is `pace` times
-    slower than at 1 g."""
-    return pace * HAND_TIME * max(1.0, step / (pace * HAND_STEP)) ** 2
+def placement_time(step: float, pace: float = 1.0) -> float:
+    """Mass over drag of a body during placement [s] whose forces are exchanged every `step` [s], where all is `pace`
+    times slower than at 1 g."""
+    return pace * PLACEMENT_TIME * max(1.0, step / (pace * PLACEMENT_STEP)) ** 2
 
 
 class _Friction:

@@ -10,13 +10,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
-from rigid.quaternions import from_turn, multiply, to_matrix
+from rigid.ground.reaction import Reaction, Vector
+from rigid.spatial.quaternions import from_turn, multiply, to_matrix
 
-__all__ = ["Pose", "Twist", "Wrench", "chord_share", "moved"]
-
-Vector = NDArray[np.float64]
+__all__ = ["Pose", "Twist", "Vector", "Wrench", "chord_share", "matrices", "moved"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +27,12 @@ class Pose:
     turn: Vector
     """Unit quaternion, shape (4,)."""
 
+    @classmethod
+    def of(cls, position: ArrayLike, turn: ArrayLike | None) -> Pose:
+        """At `position` [m]; None: not turned."""
+        unturned = (1.0, 0.0, 0.0, 0.0)
+        return cls(np.asarray(position, dtype=float), np.asarray(unturned if turn is None else turn, dtype=float))
+
 
 @dataclass(frozen=True, slots=True)
 class Twist:
@@ -38,6 +43,11 @@ class Twist:
     spin: Vector
     """[rad/s], shape (3,)."""
 
+    @classmethod
+    def of(cls, velocity: ArrayLike, spin: ArrayLike | None) -> Twist:
+        """At `velocity` [m/s]; None: not turning."""
+        return cls(np.asarray(velocity, dtype=float), np.zeros(3) if spin is None else np.asarray(spin, dtype=float))
+
 
 @dataclass(frozen=True, slots=True)
 class Wrench:
@@ -47,6 +57,11 @@ class Wrench:
     """[N], shape (3,)."""
     torque: Vector
     """[N m], shape (3,)."""
+
+    @classmethod
+    def of(cls, reaction: Reaction) -> Wrench:
+        """What the ground stated."""
+        return cls(reaction.force, reaction.torque)
 
     @classmethod
     def none(cls) -> Wrench:

@@ -1,8 +1,8 @@
-"""A platform with six degrees of freedom and up to three flywheels as a body that a footing pushes.
+"""A platform with six degrees of freedom and up to three flywheels as a body that a ground pushes.
 
 World axes, z up from the undisturbed surface; the origin is the centre of mass. Momentum P and angular momentum L about
 it (platform and wheels) are what a step changes, so flight keeps both to round-off; I omega = L - sum h_i a_i, as in
-`rigid.spatial_motion`. A macro step of length H, s the footing's lag (0 for a law, its own step for a bed):
+`rigid.spatial.motion`. A macro step of length H, s the ground's lag (0 for a law, its own step for a bed):
 
     u, w  of  P + (H - s) / 2 (W + F_guess),  L + (H - s) / 2 T_guess,  turned half way     held during the step
     r' = r + H u,   q' = exp(H w) q
@@ -11,24 +11,23 @@ it (platform and wheels) are what a step changes, so flight keeps both to round-
 P and L belong to a time s / 2 later than r and q, as `coupling.planar_body` has it. Under a Coulomb bound the tips that
 stick share what holds them in proportion to their loads, f_k = N_k (c + b z x (rho_k - mean rho)), so that at the
 step's end their mean slip, and turning about the vertical, are zero; one beyond mu_s N_k slides with mu_d N_k until its
-slip turns back (`coupling.spatial_friction`). Events of friction are found to the step: of first order in H.
+slip turns back (docs/platform.md). Events of friction are found to the step: of first order in H.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
-from rigid.quaternions import to_matrix
-from rigid.spatial import SpatialTrial
+from rigid.ground.reaction import Contact, Reaction, State
+from rigid.spatial.quaternions import from_turn, multiply, to_matrix
+from rigid.spatial.spatial import SpatialTrial
 
-from .footing import FootReaction
-from .planar_body import hand_time
+from .deprecated import renamed
+from .planar_body import placement_time
 from .poses import Pose, Twist, Vector, Wrench, moved
-from .spatial_friction import SpatialFriction
 
 __all__ = ["SpatialBody"]
 
@@ -78,50 +77,60 @@ class SpatialBody:
         """Angular momentum of each wheel along its axis [N m s], shape (3,)."""
         self.time = 0.0
         self.torque_work = 0.0
-        """Work of the torques since it was let go [J]."""
+        """Work of the torques since its release [J]."""
         self.touching = False
         """Whether anything touched in the last step."""
         self.sliding: dict[int, Vector] = {}
         """Tip under a Coulomb bound that slides -> the unit vector of its slip, shape (2,)."""
         self.sticking: frozenset[int] = frozenset()
         """Those that stick."""
-        self._let_go()
+        self._free()
         self.momentum = self._masses * np.asarray(velocity, dtype=float)
         """(m v_x, m v_y, (m + m_b) v_z) [N s], shape (3,)."""
         self.angular_momentum = self._spin_to_momentum(np.asarray(angular_velocity, dtype=float))
         """Of platform and wheels about the centre of mass [N m s], shape (3,)."""
 
-    def _let_go(self) -> None:
+    def _free(self) -> None:
         platform = self.trial.platform
         self._masses = np.array([1.0, 1.0, 1.0]) * platform.mass + (0.0, 0.0, self.trial.counterweight)
         self._inertia = np.array(platform.inertia)
         self._drag = np.zeros(2)
-        self.held_by_hand = False
+        self.in_placement = False
 
-    def take_in_hand(self, lowering_speed: float, *, pace: float = 1.0, step: float = 0.0) -> None:
-        """From here on a hand lowers it at `lowering_speed` [m/s], as `PlanarBody.take_in_hand` says. Torques wait."""
+    take_in_hand, let_go = renamed("take_in_hand", "begin_placement"), renamed("let_go", "release")
+    hold_more_firmly, held_by_hand = (
+        renamed("hold_more_firmly", "slow_placement"),
+        renamed("held_by_hand", "in_placement"),
+    )
+
+    def begin_placement(self, lowering_speed: float, *, pace: float = 1.0, step: float = 0.0) -> None:
+        """It is lowered from here on at `lowering_speed` [m/s], as with `PlanarBody.begin_placement`. Torques wait."""
         weight, reach = float(np.linalg.norm(self.trial.weight)), self.trial.platform.reach
         drag = weight / lowering_speed
         velocity, spin = self.twist.velocity, self.twist.spin
-        time = hand_time(step, pace)
+        time = placement_time(step, pace)
         self._masses, self._inertia = time * drag * np.ones(3), time * drag * reach**2 * np.eye(3)
         self._drag = np.array([drag, drag * reach**2])
-        self.held_by_hand = True
+        self.in_placement = True
         self.momentum, self.angular_momentum = self._masses * velocity, self._spin_to_momentum(spin)
 
-    def hold_more_firmly(self, factor: float) -> None:
-        """As `PlanarBody.hold_more_firmly`."""
+    def slow_placement(self, factor: float) -> None:
+        """As `PlanarBody.slow_placement`."""
         wheels = self._wheels_at(self.wheels, self.turn)
         self._masses, self._inertia, self._drag = (factor * held for held in (self._masses, self._inertia, self._drag))
         self.momentum = factor * self.momentum
         self.angular_momentum = wheels + factor * (self.angular_momentum - wheels)
 
-    def let_go(self) -> None:
-        """The hand opens: at rest from here, its time is 0 and the torques begin."""
-        self._let_go()
+    def release(self) -> None:
+        """The placement ends: at rest from here, its time is 0 and the torques begin."""
+        self._free()
         self.momentum, self.angular_momentum = np.zeros(3), self._spin_to_momentum(np.zeros(3))
         self._force, self._moment = np.zeros(3), np.zeros(3)
         self.time = self.torque_work = 0.0
+
+    def lift(self, height: float) -> None:
+        """Put it higher by this [m]."""
+        self.place[2] += height
 
     def start(self, lag: float) -> None:
         """Free of contact, its velocity given for the time of its pose: the momentum is brought to its own time."""
@@ -130,10 +139,10 @@ class SpatialBody:
 
     @property
     def masses(self) -> Vector:
-        """(m, m, m + m_b) [kg], shape (3,); a hand's while it holds it."""
+        """(m, m, m + m_b) [kg], shape (3,); those of its placement while that lasts."""
         return self._masses
 
-    # What a footing sees -------------------------------------------------------------------------------------------
+    # What a ground sees --------------------------------------------------------------------------------------------
 
     @property
     def pose(self) -> Pose:
@@ -160,17 +169,17 @@ class SpatialBody:
                 break
         return Twist(momentum / self._masses, spin)
 
-    def resolve(self, dt: float, twist: Twist, reaction: FootReaction) -> Wrench:
+    def resolve(self, dt: float, twist: Twist, reaction: Reaction) -> Wrench:
         """The whole wrench of the ground: `reaction` with the friction that its Coulomb bounds leave open."""
-        bounded = {tip: contact for tip, contact in reaction.contacts.items() if contact.tangential_force is None}
+        bounded = {tip: contact for tip, contact in reaction.by_member.items() if contact.tangential_force is None}
         self._next_sliding, self._next_sticking = dict[int, Vector](), frozenset[int]()
         self._next_touching = bool(reaction.contacts)
         if not bounded:
-            return reaction.wrench
-        friction = SpatialFriction(self, dt, twist, reaction.wrench, bounded)
+            return Wrench.of(reaction)
+        friction = _Friction(self, dt, twist, Wrench.of(reaction), bounded)
         force, torque = friction.solve()
         self._next_sliding, self._next_sticking = friction.sliding, frozenset(friction.sticking)
-        return Wrench(reaction.wrench.force + force, reaction.wrench.torque + torque)
+        return Wrench(reaction.force + force, reaction.torque + torque)
 
     def advance(self, dt: float, twist: Twist, wrench: Wrench) -> None:
         """Take the step: along `twist`, with the impulse of `wrench`."""
@@ -181,7 +190,7 @@ class SpatialBody:
         self._force, self._moment = self.trial.weight + wrench.force, wrench.torque
         slowed = 1 + dt * self._drag / np.array([self._masses[0], self._inertia[0, 0]])
         self.momentum = (self.momentum + dt * self._force) / slowed[0]
-        if self.held_by_hand:  # the wheels' share is not slowed
+        if self.in_placement:  # the wheels' share is not slowed
             own = self.angular_momentum - self._wheels_at(self.wheels, self.turn)
             self.angular_momentum = self._wheels_at(self.wheels, self.turn) + (own + dt * self._moment) / slowed[1]
         else:
@@ -189,6 +198,12 @@ class SpatialBody:
         self.wheels = self.wheels - dt * self._torques
         self.touching, self.sliding, self.sticking = self._next_touching, self._next_sliding, self._next_sticking
         self.time += dt
+
+    def __repr__(self) -> str:
+        x, y, z = self.place
+        return (
+            f"SpatialBody({self.trial.platform.name} of {self.trial.platform.mass:g} kg at {x:.4g}, {y:.4g}, {z:.4g} m)"
+        )
 
     # What it has ---------------------------------------------------------------------------------------------------
 
@@ -224,7 +239,7 @@ class SpatialBody:
         inertias = [wheel.inertia for wheel in self.trial.platform.wheels] + [math.inf] * 3
         return self.wheels / np.array(inertias[:3])
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> State:
         """All that its next steps depend on."""
         slides = sorted(self.sliding)
         return {
@@ -232,7 +247,7 @@ class SpatialBody:
                 [
                     self.place, self.turn, self.momentum, self.angular_momentum, self.wheels, self._force, self._moment,
                     self._torques, self._masses, self._drag,
-                    [self.time, self.torque_work, self._lag, self.touching, self.held_by_hand],
+                    [self.time, self.torque_work, self._lag, self.touching, self.in_placement],
                 ]
             ),
             "inertia": self._inertia.copy(),
@@ -240,7 +255,7 @@ class SpatialBody:
             "sticking": np.array(sorted(self.sticking), dtype=np.int64),
         }  # fmt: skip
 
-    def restore(self, state: dict[str, Any]) -> None:
+    def restore(self, state: State) -> None:
         """Go back to what `state` gave."""
         numbers = np.asarray(state["numbers"], dtype=float)
         ends = np.cumsum([3, 4, 3, 3, 3, 3, 3, 3, 3, 2])
@@ -248,7 +263,7 @@ class SpatialBody:
         self.place, self.turn, self.momentum, self.angular_momentum, self.wheels = parts[:5]
         self._force, self._moment, self._torques, self._masses, self._drag = parts[5:10]
         self.time, self.torque_work, self._lag = (float(number) for number in parts[10][:3])
-        self.touching, self.held_by_hand = bool(parts[10][3]), bool(parts[10][4])
+        self.touching, self.in_placement = bool(parts[10][3]), bool(parts[10][4])
         self._inertia = np.array(state["inertia"], dtype=float)
         rows = np.asarray(state["sliding"], dtype=float).reshape(-1, 3)
         self.sliding = {int(row[0]): row[1:].copy() for row in rows}
@@ -277,7 +292,7 @@ class SpatialBody:
     def _mean_torques(self, dt: float) -> Vector:
         """Mean torque of each wheel on the platform over the next step [N m]; cut at a wheel's end to what is left."""
         torques = np.zeros(3)
-        if self.held_by_hand or not (self.touching or self.trial.torque_in_flight):
+        if self.in_placement or not (self.touching or self.trial.torque_in_flight):
             return torques
         for k, history in enumerate(self.trial.histories):
             if history is None:
@@ -290,3 +305,110 @@ class SpatialBody:
             impulse = min(max(impulse, min(self.wheels[k] - high, 0.0)), max(self.wheels[k] - low, 0.0))
             torques[k] = impulse / dt
         return torques
+
+
+class _Friction:
+    """The friction of tips under Coulomb bounds in one step."""
+
+    def __init__(
+        self, body: SpatialBody, dt: float, twist: Twist, wrench: Wrench, contacts: dict[int, Contact]
+    ) -> None:
+        self.dt, self.tips = dt, sorted(contacts)
+        self.loads = np.array([contacts[tip].normal_force for tip in self.tips])
+        self.mu_s = np.array([float(contacts[tip].mu_s or 0.0) for tip in self.tips])
+        self.mu_d = np.array([float(contacts[tip].mu_d or 0.0) for tip in self.tips])
+        centre = body.place + 0.5 * dt * twist.velocity
+        self.arms = np.array([contacts[tip].point - centre for tip in self.tips])
+        half = to_matrix(from_turn(0.5 * dt * twist.spin))
+        self.arms_end = self.arms @ half.T
+        turn = multiply(from_turn(dt * twist.spin), body.turn)
+        matrix = to_matrix(turn)
+        self.masses, self.inverse = body._masses, matrix @ np.linalg.inv(body._inertia) @ matrix.T
+        slowed = 1 + dt * body._drag / np.array([body._masses[0], body._inertia[0, 0]])
+        momentum = (body.momentum + dt * (body.trial.weight + wrench.force)) / slowed[0]
+        wheels = matrix @ (body.axes.T @ (body.wheels - dt * body._torques))
+        self.velocity = momentum / self.masses
+        """After the step without friction; likewise:"""
+        self.spin = self.inverse @ (body.angular_momentum + dt * wrench.torque - wheels) / slowed[1]
+        self.masses, self.inverse = self.masses * slowed[0], self.inverse / slowed[1]
+        before = body.twist
+        slips = (before.velocity + np.cross(before.spin, self.arms))[:, :2]
+        self.sticking = {tip for tip in self.tips if tip in body.sticking}
+        self.sliding: dict[int, Vector] = {}
+        for k, tip in enumerate(self.tips):
+            size = float(np.linalg.norm(slips[k]))
+            if tip in self.sticking:
+                continue
+            if tip in body.sliding and float(slips[k] @ body.sliding[tip]) <= 0:
+                self.sticking.add(tip)  # it has turned back, and sticks where its bound allows it
+            elif size > 0:
+                self.sliding[tip] = slips[k] / size
+            else:
+                self.sticking.add(tip)
+
+    def solve(self) -> tuple[Vector, Vector]:
+        """Force [N] and torque [N m] of friction; who slides and who sticks is in `sliding` and `sticking` then."""
+        for _ in range(6 * len(self.tips) + 6):
+            force = self._with()
+            over = [
+                k for k, tip in enumerate(self.tips)
+                if tip in self.sticking and math.hypot(*force[k]) > self.mu_s[k] * self.loads[k] * (1 + 1e-12)
+            ]  # fmt: skip
+            slips = self._slips(force)
+            back = [k for k, tip in enumerate(self.tips) if tip in self.sliding and slips[k] @ self.sliding[tip] < 0]
+            if not over and not back:
+                break
+            for k in over:
+                self.sticking.discard(self.tips[k])
+                self.sliding[self.tips[k]] = -force[k] / math.hypot(*force[k])
+            for k in back:
+                del self.sliding[self.tips[k]]
+                self.sticking.add(self.tips[k])
+        pushes = np.column_stack([force, np.zeros(len(force))])
+        return pushes.sum(axis=0), np.cross(self.arms, pushes).sum(axis=0)
+
+    def _slips(self, force: Vector) -> Vector:
+        """Horizontal velocity of each tip at the step's end [m/s], shape [tip, 2]."""
+        pushes = np.column_stack([force, np.zeros(len(force))])
+        velocity = self.velocity + self.dt * pushes.sum(axis=0) / self.masses
+        spin = self.spin + self.dt * self.inverse @ np.cross(self.arms, pushes).sum(axis=0)
+        return np.asarray((velocity + np.cross(spin, self.arms_end))[:, :2])
+
+    def _with(self) -> Vector:
+        """Friction of each tip in these modes [N], shape [tip, 2]."""
+        force = np.zeros((len(self.tips), 2))
+        for k, tip in enumerate(self.tips):
+            if tip in self.sliding:
+                force[k] = -self.mu_d[k] * self.loads[k] * self.sliding[tip]
+        held = [k for k, tip in enumerate(self.tips) if tip in self.sticking]
+        if not held:
+            return force
+        loads = self.loads[held]
+        share = loads / loads.sum() if loads.sum() > 0 else np.full(len(held), 1 / len(held))
+        shapes = self._shapes(held, share)
+        free = self._held_slip(self._slips(force), held, share)
+        answers = np.array(
+            [self._held_slip(self._slips(force + shape) - self._slips(force), held, share) for shape in shapes]
+        )
+        # Tips in a line leave a turn about it open: the smallest solution.
+        scale = np.sqrt(np.maximum(np.abs(np.diag(answers)), 1e-300))
+        size = np.linalg.lstsq(answers.T / np.outer(scale, scale), -free / scale, rcond=1e-10)[0] / scale
+        return force + np.tensordot(size, shapes, axes=1)
+
+    def _shapes(self, held: list[int], share: Vector) -> Vector:
+        """Forces of one unit of each multiplier, shape [2 or 3, tip, 2]."""
+        shapes = np.zeros((2 if len(held) == 1 else 3, len(self.tips), 2))
+        shapes[0, held, 0] = shapes[1, held, 1] = share
+        if len(held) > 1:
+            away = self.arms[held] - share @ self.arms[held]
+            shapes[2, held] = share[:, None] * np.column_stack([-away[:, 1], away[:, 0]])
+        return shapes
+
+    def _held_slip(self, slips: Vector, held: list[int], share: Vector) -> Vector:
+        """Mean slip of those that stick, and their turning about the vertical, shape [2 or 3]."""
+        mean = share @ slips[held]
+        if len(held) == 1:
+            return np.asarray(mean)
+        away = self.arms_end[held] - share @ self.arms_end[held]
+        turning = share @ (away[:, 0] * slips[held, 1] - away[:, 1] * slips[held, 0])
+        return np.array([*mean, turning])

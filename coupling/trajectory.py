@@ -6,7 +6,7 @@ import csv
 import itertools
 import json
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
@@ -19,6 +19,7 @@ __all__ = ["PHASES", "Penetration"]
 
 PHASES = ("free", "in", "rest", "out")
 COLUMNS = ("t_s", "depth_m", "velocity_m_s", "force_N", "phase")
+FACTS = ("kind", "macro_step", "ended", "settings")
 Array = NDArray[np.float64]
 
 
@@ -106,13 +107,27 @@ class Penetration:
             return None
         return float(self.time[rows[-1]] + 0.5 * self.macro_step)
 
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """The rows as columns of a table, names with units, shapes [n]."""
+        return dict(zip(COLUMNS, (self.time, self.depth, self.velocity, self.force, self.phase), strict=True))
+
+    def facts(self) -> dict[str, Any]:
+        """What is not in the rows: kind, macro_step, ended, settings."""
+        return {name: getattr(self, name) for name in FACTS}
+
+    @classmethod
+    def from_columns(cls, columns: Mapping[str, NDArray[Any]], facts: Mapping[str, Any]) -> Penetration:
+        """The run that `columns` and `facts` came from, to the bit; what else `facts` holds is left out."""
+        time, depth, velocity, force, phase = (columns[name] for name in COLUMNS)
+        known = {name: facts[name] for name in FACTS if name in facts}
+        return cls(time=time, depth=depth, velocity=velocity, force=force, phase=phase, **known)
+
     def write_csv(self, path: str | Path) -> None:
         """Write the rows with every digit, so that reading them back gives the same bits."""
         with Path(path).open("w", newline="", encoding="utf-8") as stream:
             writer = csv.writer(stream)
             writer.writerow(COLUMNS)
-            columns = (self.time, self.depth, self.velocity, self.force)
-            for *numbers, phase in zip(*columns, self.phase, strict=True):
+            for *numbers, phase in zip(*self.columns().values(), strict=True):
                 writer.writerow([*(repr(float(number)) for number in numbers), str(phase)])
 
     @classmethod
@@ -120,11 +135,9 @@ class Penetration:
         """Read what `write_csv` wrote; `kind`, `macro_step` and the rest are not in the file."""
         with Path(path).open(newline="", encoding="utf-8") as stream:
             rows = list(csv.DictReader(stream))
-        numbers = {name: np.array([float(row[name]) for row in rows]) for name in COLUMNS[:4]}
-        phase = np.array([row["phase"] for row in rows], dtype="U4")
-        time, depth, velocity, force = (numbers[name] for name in COLUMNS[:4])
-        return cls(kind=kind, time=time, depth=depth, velocity=velocity, force=force, phase=phase,
-                   macro_step=macro_step, **more)  # fmt: skip
+        columns: dict[str, NDArray[Any]] = {name: np.array([float(row[name]) for row in rows]) for name in COLUMNS[:4]}
+        columns["phase"] = np.array([row["phase"] for row in rows], dtype="U4")
+        return cls.from_columns(columns, {"kind": kind, "macro_step": macro_step, **more})
 
     def quantities(self) -> dict[str, dict[str, Any]]:
         """The numbers a person would quote, as in result.json: name -> value, std (unknown), unit."""

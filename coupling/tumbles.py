@@ -4,7 +4,7 @@ Several tumbles: the torque acts until the platform has turned by `turn` times h
 middle is over the leading row, from where it falls by itself); then it waits until the platform lies at rest, which is
 noted, and begins anew. The wheel goes on from the speed that it has. Over how many rows a tumble goes is as it comes.
 
-A landing: no hand and no torque; the platform starts just clear of the ground with the velocities of its fall.
+A landing: no placement and no torque; the platform starts just clear of the ground with the velocities of its fall.
 """
 
 from __future__ import annotations
@@ -15,11 +15,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rigid.trajectory import STATES
-from rigid.trial import Trial
+from rigid.ground.reaction import State
+from rigid.model.trial import Trial
+from rigid.planar.trajectory import STATES
 
-from .bed_footing import BedFooting
-from .footing import Footing, LawFooting
+from .bed_ground import BedGround
+from .ground import Ground
+from .law_ground import LawGround
 from .lowered_gravity import pace_under
 from .tumbling import CoupledTumble
 
@@ -63,7 +65,7 @@ class TumblesInARow(CoupledTumble):
     The other parameters as `CoupledTumble`. Raises ValueError for a brake, whose wheel turns the platform once.
     """
 
-    def __init__(self, trial: Trial, footing: Footing, *, tumbles: int, turn: float = 1.0, **options: Any) -> None:
+    def __init__(self, trial: Trial, ground: Ground, *, tumbles: int, turn: float = 1.0, **options: Any) -> None:
         if trial.actuator == "brake":
             raise ValueError("tumbles in a row need a motor: a brake stops its wheel in the first")
         self.tumbles, self.turn = tumbles, turn
@@ -71,7 +73,7 @@ class TumblesInARow(CoupledTumble):
         self._rests: list[list[float]] = []
         self._on, self._from, self._quiet_since, self._ended, self._seen = True, 0.0, 0.0, 0.0, 0
         self.tip_radius = float(options.get("tip_radius", 0.0))
-        super().__init__(trial, footing, **options)
+        super().__init__(trial, ground, **options)
 
     @property
     def done(self) -> bool:
@@ -138,14 +140,14 @@ class TumblesInARow(CoupledTumble):
         self._on = on
         self.body.trial = replace(self.trial, torque_until=math.inf if on else self.body.time)
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> State:
         """See `CoupledTumble.state`."""
         return super().state() | {
             "row.numbers": np.array([self._on, self._from, self._quiet_since, self._ended, self._seen], dtype=float),
             "row.rests": np.array(self._rests, dtype=float).reshape(-1, len(NOTED)),
         }
 
-    def restore(self, state: dict[str, Any]) -> None:
+    def restore(self, state: State) -> None:
         """See `CoupledTumble.restore`."""
         super().restore(state)
         on, self._from, self._quiet_since, self._ended, seen = (float(value) for value in state["row.numbers"])
@@ -157,13 +159,13 @@ class TumblesInARow(CoupledTumble):
 class Landing(CoupledTumble):
     """The platform comes down at `speed` [m/s], moving `along` [m/s], turned by `theta` [rad] and with `spin` [rad/s].
 
-    The other parameters as `CoupledTumble`, without a hand or a height; of the torque nothing acts.
+    The other parameters as `CoupledTumble`, without a placement or a height; of the torque nothing acts.
     """
 
     def __init__(
         self,
         trial: Trial,
-        footing: Footing,
+        ground: Ground,
         *,
         speed: float,
         along: float = 0.0,
@@ -176,18 +178,16 @@ class Landing(CoupledTumble):
         self._comes = np.array([along, -speed, spin])
         self._turned, self.tip_radius = theta, float(options.get("tip_radius", 0.0))
         high = trial.spike_length + 0.05  # above the grains, whatever is turned down; `_begin` takes it to them
-        super().__init__(replace(trial, torque=0.0), footing, height=high, **options)
+        super().__init__(replace(trial, torque=0.0), ground, height=high, **options)
 
     def _begin(self) -> None:
         body, count = self.body, self.trial.spike_count
         angles = self._turned + math.pi / count * (1 + 2 * np.arange(count))
         reach = (self.trial.spike_length - self.tip_radius) * float(np.cos(angles).max()) + self.tip_radius
         body.place = np.array([0.0, reach, self._turned])
-        if isinstance(self.footing, BedFooting):
-            body.place[1] += self.footing.clear_height(body.pose)
-            self.footing.check_start(body.pose)
-        elif isinstance(self.footing, LawFooting):
-            self.footing.place(body.pose)
-        body.start(self._comes, self.footing.lag)
+        if isinstance(self.ground, BedGround | LawGround):
+            body.lift(self.ground.clear_height(body.pose))
+            self.ground.place(body.pose)
+        body.start(self._comes, self.ground.lag)
         super()._begin()
         self._states[0] = STATES.index("hop")

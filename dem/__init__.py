@@ -1,6 +1,10 @@
-"""The granular bed. Knows nothing of platforms or spikes.
+"""The granular bed: spherical grains, shapes that move among them, their preparation and measurement.
 
-Names are looked up when they are first used, so that ``import dem`` does not start Taichi.
+It imports nothing of ours outside dem. Its packages, lowest first: grains (materials, sizes), contact (the contact
+law), shapes, engine (fields, kernels and the core of a bed), measure, prepare; ``dem.bed.Bed`` stands above them all.
+
+The names in ``__all__`` are public and are imported from here. They are looked up when they are first used, so that
+``import dem`` does not start Taichi.
 """
 
 from __future__ import annotations
@@ -19,6 +23,7 @@ __all__ = [
     "Cylinder",
     "Facing",
     "Graded",
+    "Grains",
     "LogNormal",
     "MATERIALS",
     "Material",
@@ -27,9 +32,11 @@ __all__ = [
     "Placed",
     "Plane",
     "Polyhedron",
+    "Prepared",
     "SAND",
     "Sieve",
     "Sleep",
+    "StageReport",
     "Tube",
     "Uniform",
     "material",
@@ -42,31 +49,35 @@ os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
 os.environ.setdefault("TI_LOG_LEVEL", "error")
 
 if TYPE_CHECKING:
-    from .bed import Bed, BedFailure
-    from .graded import Graded
-    from .grading import measure_grading
-    from .materials import MATERIALS, SAND, Facing, Material, material
-    from .mesh import Mesh, Polyhedron, mesh_from_file
-    from .shapes import Ball, Cone, Cylinder, Plane
-    from .sizes import LogNormal, Normal, Sieve, Uniform
-    from .sleep import Sleep
-    from .solids import Box, Capsule, Placed, Tube
+    from .bed import Bed
+    from .engine.sleep import Sleep
+    from .engine.values import BedFailure, Grains
+    from .grains.graded import Graded
+    from .grains.materials import MATERIALS, SAND, Facing, Material, material
+    from .grains.sizes import LogNormal, Normal, Sieve, Uniform
+    from .measure.grading import measure_grading
+    from .prepare.report import Prepared, StageReport
+    from .shapes.basic import Ball, Cone, Cylinder, Plane
+    from .shapes.mesh import Mesh, Polyhedron, mesh_from_file
+    from .shapes.solids import Box, Capsule, Placed, Tube
 
-_ROOMS = {
-    "bed": ("Bed", "BedFailure"),
-    "graded": ("Graded",),
-    "grading": ("measure_grading",),
-    "materials": ("Facing", "MATERIALS", "Material", "SAND", "material"),
-    "mesh": ("Mesh", "Polyhedron", "mesh_from_file"),
-    "shapes": ("Ball", "Cone", "Cylinder", "Plane"),
-    "sizes": ("LogNormal", "Normal", "Sieve", "Uniform"),
-    "sleep": ("Sleep",),
-    "solids": ("Box", "Capsule", "Placed", "Tube"),
+_MODULES = {
+    "bed": ("Bed",),
+    "engine.sleep": ("Sleep",),
+    "engine.values": ("BedFailure", "Grains"),
+    "grains.graded": ("Graded",),
+    "grains.materials": ("Facing", "MATERIALS", "Material", "SAND", "material"),
+    "grains.sizes": ("LogNormal", "Normal", "Sieve", "Uniform"),
+    "measure.grading": ("measure_grading",),
+    "prepare.report": ("Prepared", "StageReport"),
+    "shapes.basic": ("Ball", "Cone", "Cylinder", "Plane"),
+    "shapes.mesh": ("Mesh", "Polyhedron", "mesh_from_file"),
+    "shapes.solids": ("Box", "Capsule", "Placed", "Tube"),
 }
 
 
 def __getattr__(name: str) -> Any:
-    for room, names in _ROOMS.items():
+    for module, names in _MODULES.items():
         if name in names:
-            return getattr(importlib.import_module(f".{room}", __name__), name)
+            return getattr(importlib.import_module(f".{module}", __name__), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

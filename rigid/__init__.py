@@ -7,18 +7,17 @@ for, since scipy takes longer to load than a tumble to integrate.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .batch import BatchTrajectory, simulate_batch
-from .grounds import SpringDamper, SurfaceGround
-from .laws import GROUNDS
-from .planar import simulate
-from .reaction import Contact, Reaction
-from .spike import Section, Spike
+from .batch.simulate import BatchTrajectory, simulate_batch
+from .ground.grounds import SpringDamper, SurfaceGround
+from .ground.laws import GROUNDS
+from .ground.reaction import Contact, Reaction
+from .model.trial import Effect, Ground, Trial
+from .planar.simulate import simulate
+from .planar.trajectory import STATES, Trajectory
+from .platform.spike import Section, Spike
 from .terms import EFFECTS, Term
-from .trajectory import STATES, Trajectory
-from .trial import Effect, Ground, Trial
 
 if TYPE_CHECKING:
-    from .actuation import Flywheel, TorqueHistory
     from .hop import (
         Flight,
         Launch,
@@ -31,60 +30,29 @@ if TYPE_CHECKING:
         launch_speed_for,
         least_viable_angle,
     )
-    from .platform import Platform, Stance
-    from .platform_files import find_platform, platform_names, read_platform
-    from .spatial import SpatialTrajectory, SpatialTrial
-    from .spatial import simulate as simulate_spatial
+    from .platform.actuation import Flywheel, TorqueHistory
+    from .platform.files import find_platform, platform_names, read_platform
+    from .platform.platform import Platform, Stance
+    from .spatial.spatial import SpatialTrajectory, SpatialTrial
+    from .spatial.spatial import simulate as simulate_spatial
 
 __all__ = [
-    "EFFECTS",
-    "GROUNDS",
-    "STATES",
-    "BatchTrajectory",
-    "Contact",
-    "Effect",
-    "Flight",
-    "Flywheel",
-    "Ground",
-    "Launch",
-    "Platform",
-    "Reaction",
-    "Section",
-    "SpatialTrajectory",
-    "SpatialTrial",
-    "SpringDamper",
-    "Spike",
-    "Stance",
-    "SurfaceGround",
-    "Term",
-    "TorqueHistory",
-    "Trajectory",
-    "Trial",
-    "Tumbler",
-    "brake_launch",
-    "escape_speed",
-    "find_platform",
-    "flight",
-    "impulsive_launch",
-    "launch",
-    "launch_speed_for",
-    "least_viable_angle",
-    "platform_names",
-    "read_platform",
-    "simulate",
-    "simulate_batch",
-    "simulate_spatial",
-]
+    "EFFECTS", "GROUNDS", "STATES", "BatchTrajectory", "Contact", "Effect", "Flight", "Flywheel", "Ground", "Launch",
+    "Platform", "Reaction", "Section", "SpatialTrajectory", "SpatialTrial", "SpringDamper", "Spike", "Stance",
+    "SurfaceGround", "Term", "TorqueHistory", "Trajectory", "Trial", "Tumbler", "brake_launch", "escape_speed",
+    "find_platform", "flight", "impulsive_launch", "launch", "launch_speed_for", "least_viable_angle", "platform_names",
+    "read_platform", "simulate", "simulate_batch", "simulate_spatial",
+]  # fmt: skip
 
 _LATER = {
-    "actuation": ("Flywheel", "TorqueHistory"),
+    "platform.actuation": ("Flywheel", "TorqueHistory"),
     "hop": (
         "Flight", "Launch", "Tumbler", "brake_launch", "escape_speed", "flight", "impulsive_launch", "launch",
         "launch_speed_for", "least_viable_angle",
     ),
-    "platform": ("Platform", "Stance"),
-    "platform_files": ("find_platform", "platform_names", "read_platform"),
-    "spatial": ("SpatialTrajectory", "SpatialTrial", "simulate_spatial"),
+    "platform.platform": ("Platform", "Stance"),
+    "platform.files": ("find_platform", "platform_names", "read_platform"),
+    "spatial.spatial": ("SpatialTrajectory", "SpatialTrial", "simulate_spatial"),
 }  # fmt: skip
 _HOME = {name: module for module, names in _LATER.items() for name in names}
 _NAME_AT_HOME = {"simulate_spatial": "simulate"}

@@ -32,17 +32,9 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 __all__ = [
-    "Flight",
-    "Launch",
-    "Tumbler",
-    "brake_launch",
-    "escape_speed",
-    "flight",
-    "impulsive_launch",
-    "launch",
-    "launch_speed_for",
-    "least_viable_angle",
-]
+    "Flight", "Launch", "Tumbler", "brake_launch", "escape_speed", "flight", "impulsive_launch", "launch",
+    "launch_speed_for", "least_viable_angle",
+]  # fmt: skip
 
 PHASES = 60
 """A launch with more changes between stick and slip than this is given up."""

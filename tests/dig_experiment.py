@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from experiments.runfolder import RunFolder
+from experiments.runs.folder import RunFolder
 
 
 class DigSettings(BaseModel):

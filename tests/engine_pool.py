@@ -7,8 +7,8 @@ import gc
 
 import pytest
 
-import dem.bed
-from dem.engine import Engine
+import dem.engine.base
+from dem.engine.engine import Engine
 
 LEAST_GRAINS, LEAST_CELLS = 1024, 8192
 """Room in an engine of the tests. Where an engine is large enough it makes no difference to a bed how large it is, and
@@ -16,11 +16,11 @@ one that is compiled for the largest bed of most tests serves them all, one afte
 
 
 class EnginePool:
-    """Stands in for ``dem.bed.take_engine`` while it is installed; ``overrides`` go over what the bed asks for."""
+    """Stands in for ``take_engine`` of ``dem.engine.base``; ``overrides`` go over what the bed asks for."""
 
     def __init__(self):
         self.overrides: dict = {}
-        self._take = dem.bed.take_engine
+        self._take = dem.engine.base.take_engine
 
     def __call__(self, owner, **settings):
         return self._take(owner, **(settings | self.overrides))
@@ -28,11 +28,11 @@ class EnginePool:
     @contextlib.contextmanager
     def installed(self):
         """Beds made inside have the overrides."""
-        real, dem.bed.take_engine = dem.bed.take_engine, self
+        real, dem.engine.base.take_engine = dem.engine.base.take_engine, self
         try:
             yield self
         finally:
-            dem.bed.take_engine = real
+            dem.engine.base.take_engine = real
             self.overrides = {}
 
 

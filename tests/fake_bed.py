@@ -6,11 +6,15 @@ to zero. The deepest point is its memory.
 
 import numpy as np
 
+from dem.engine.values import Grains
+
 __all__ = ["FakeBed"]
 
 
 class FakeBed:
     """See the module. `size` [m], `surface` [m], `grain` diameter [m]."""
+
+    material, recipe = None, {}
 
     def __init__(self, *, size=(0.06, 0.06, 0.05), surface=0.045, grain=0.002, time_step=2e-5, seed=1,
                  hardness=100.0, power=1.0, rate=0.0, unload=5000.0, gravity=9.80665, proud=0.0):  # fmt: skip
@@ -24,7 +28,7 @@ class FakeBed:
         rng = np.random.default_rng(seed)
         self._grains = rng.uniform((0, 0, 0), (*size[:2], surface - grain), (200, 3))
         self._pose, self._rate, self._deepest, self._force = np.zeros(3), np.zeros(3), 0.0, 0.0
-        self.bodies = 0
+        self.bodies = self.grain_steps = 0
 
     def add_body(self, shapes, *, position, friction=0.5, restitution=0.5):
         self._pose, self.bodies = np.array(position, dtype=float), self.bodies + 1
@@ -36,6 +40,10 @@ class FakeBed:
         if velocity is not None:
             self._rate = np.array(velocity, dtype=float)
 
+    def move_bodies(self, bodies, *, positions, velocities, turns, spins):
+        for body, position, velocity in zip(bodies, positions, velocities, strict=True):
+            self.move_body(body, position=position, velocity=velocity)
+
     def law(self, depth, sinking):
         """Force [N] at `depth` [m], `sinking` [m/s], after all that was before."""
         depth += self.proud
@@ -45,7 +53,7 @@ class FakeBed:
             return self.hardness * depth**self.power + self.rate * max(sinking, 0.0)
         return max(0.0, self.hardness * self._deepest**self.power - self.unload * (self._deepest - depth))
 
-    def advance(self, steps):
+    def advance(self, steps, *, drag_time=np.inf):
         total = 0.0
         for _ in range(steps):
             depth = self.surface - self._pose[2] - 0.5 * self._rate[2] * self.time_step
@@ -61,16 +69,19 @@ class FakeBed:
     def reaction(self, body):
         return np.array([0.0, 0.0, self._force]), np.zeros(3)
 
+    def reactions(self):
+        return np.concatenate(self.reaction(0))[None]
+
     def body_position(self, body):
         return self._pose
 
     def grains(self):
         count = len(self._grains)
-        return {
-            "id": np.arange(count), "position": self._grains.copy(), "radius": np.full(count, 0.5 * self.grain),
-            "velocity": np.zeros((count, 3)), "spin": np.zeros((count, 3)), "force": np.zeros((count, 3)),
-            "coordination": np.full(count, 5), "displacement": np.zeros((count, 3)),
-        }  # fmt: skip
+        return Grains(
+            id=np.arange(count), position=self._grains.copy(), radius=np.full(count, 0.5 * self.grain),
+            mass=np.full(count, 1e-5), velocity=np.zeros((count, 3)), spin=np.zeros((count, 3)),
+            force=np.zeros((count, 3)), displacement=np.zeros((count, 3)), coordination=np.full(count, 5),
+        )  # fmt: skip
 
     def state(self):
         return {"pose": self._pose.copy(), "rate": self._rate.copy(),

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import solid_shapes
 
-import dem.engine
+import dem.engine.engine
 from dem import Ball, Bed, Box, Capsule, Cylinder, Material, Mesh, Placed, Polyhedron, Sleep, Tube
 
 GRAINS_PER_CHUNK = 37
@@ -45,7 +45,7 @@ DOZING = {"speed": 0.5, "calm": 0.02, "reach": 0.2, "force": 3.0, "waking_speed"
 def make(threads=None, precision="float64", cohesion="none", body="spike", sleep=False):
     """The bed at time 0, with a ball-tipped cylinder (or ``solids``) that is pulled through it at a slant; at Bond
     number 1 or 0. Where grains ``sleep`` it keeps a book."""
-    dem.engine.GRAINS_PER_CHUNK = GRAINS_PER_CHUNK
+    dem.engine.engine.GRAINS_PER_CHUNK = GRAINS_PER_CHUNK
     rng = np.random.default_rng(7)
     i = np.arange(300)
     positions = np.column_stack([i % 8, i // 8 % 8, i // 64]) * [0.0044, 0.0044, 0.0042] + [0.001, 0.002, 0.0026]
@@ -66,14 +66,14 @@ def make(threads=None, precision="float64", cohesion="none", body="spike", sleep
     bed.move_body(number, velocity=(0.05, 0.02, -0.5), spin=(0.0, 0.0, 20.0))
     if sleep:
         bed.let_sleep(Sleep(**DOZING))
-        bed.keep_book()
+        bed.track_contact_work()
     return bed
 
 
 def digest(bed) -> str:
     """Of everything that the next step depends on, and of what users read."""
     total = hashlib.sha256()
-    for name, array in sorted((bed.state() | bed.grains()).items()):
+    for name, array in sorted((bed.state() | bed.grains().as_dict()).items()):
         total.update(name.encode() + np.ascontiguousarray(array).tobytes())
     for body in (0, 1):
         for array in bed.reaction(body):
@@ -84,7 +84,7 @@ def digest(bed) -> str:
 def main() -> None:
     what, path, steps, threads = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])
     every = int(sys.argv[5]) if len(sys.argv) > 5 else steps
-    dem.engine.GRAINS_PER_CHUNK = GRAINS_PER_CHUNK
+    dem.engine.engine.GRAINS_PER_CHUNK = GRAINS_PER_CHUNK
     cohesion = sys.argv[6] if len(sys.argv) > 6 else "none"
     body = sys.argv[7] if len(sys.argv) > 7 else "spike"
     sleep = len(sys.argv) > 8

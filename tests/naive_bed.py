@@ -34,7 +34,7 @@ class NaiveBed:
             self.ball = ball
 
     def contact(self, key, n, v_n, v_t, spin, overlap, radius, mass, rigid, dt):
-        """Force, and turning torque, on the first of the pair; the law as ``dem.contact``'s docstring states it.
+        """Force, and turning torque, on the first of the pair; the law as ``dem.contact.law``'s docstring states it.
 
         ``v_n``, ``v_t``: how fast it moved away and slid half a step before.
         """

@@ -7,7 +7,7 @@ from functools import wraps
 import numpy as np
 
 from benchmarks.planar import AMPLITUDES
-from benchmarks.planar_agreement import random_trial
+from benchmarks.planar_trials.agreement import random_trial
 from rigid import Effect, Trial
 
 G = 9.80665

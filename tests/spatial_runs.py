@@ -14,7 +14,7 @@ CUBE = Path(__file__).parents[1] / "experiments/examples/platform-cube/cube.toml
 def small_bed(*_):
     """Two layers of large grains, almost at rest."""
     from dem import Bed
-    from dem.materials import SAND
+    from dem.grains.materials import SAND
 
     d, rows = 6e-3, 20
     low = [((i + 0.5) * d, (j + 0.5) * d, 0.5 * d) for i in range(rows) for j in range(rows)]
@@ -25,5 +25,5 @@ def small_bed(*_):
         size=(rows * d, rows * d, 0.05), height=0.3, threads=1, gravity=1.0,
     )  # fmt: skip
     bed.advance(200)
-    bed.surface = float((bed.grains()["position"][:, 2] + 0.5 * d).max())
+    bed.surface = float((bed.grains().position[:, 2] + 0.5 * d).max())
     return bed

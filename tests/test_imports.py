@@ -45,5 +45,5 @@ def test_a_room_imports_only_what_it_may(room):
 
 
 def test_the_walk_sees_imports_inside_functions_and_by_name():
-    source = "def f():\n    from dem.bed import Bed\n    import_module('rigid.spike')\n    from . import x\n"
+    source = "def f():\n    from dem.bed import Bed\n    import_module('rigid.platform.spike')\n    from . import x\n"
     assert imported_rooms(source, "vis") == {"dem", "rigid", "vis"}

@@ -1,7 +1,7 @@
 """Campaigns of tumbles for tests of diagnose: the accurate integrator through the rig's sensors."""
 
 from experiments.campaign import Campaign, Recording, TumbleCampaign
-from experiments.synthesis import record
+from experiments.tumble.synthesis import record
 from rigid import Trial
 from rigid.sensors import SensorSet
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from dem import SAND, Bed
 
-__all__ = ["SMALL", "small_bed"]
+__all__ = ["SMALL", "prepare_small", "small_bed"]
 
 SMALL: dict[str, Any] = {
     "surface": "sand", "ground": "bed", "mass": 0.3, "inertia": 2e-4, "spike_length": 0.04, "wheel_inertia": 1e-5,
@@ -17,7 +17,12 @@ SMALL: dict[str, Any] = {
 }  # fmt: skip
 
 
-def small_bed(settings, *_):
+def prepare_small(on_bed, *_):
+    """In place of `PlanarOnBed.prepare`."""
+    return small_bed(on_bed.settings)
+
+
+def small_bed(settings):
     """Two layers of large grains, almost at rest."""
     d, rows, columns = 6e-3, 32 // settings.bed_repeats, 6
     low = [((i + 0.5) * d, (j + 0.5) * d, 0.5 * d) for i in range(rows) for j in range(columns)]
@@ -27,5 +32,5 @@ def small_bed(settings, *_):
         size=(rows * d, columns * d, 0.03), height=0.3, threads=1, gravity=9.80665,
     )  # fmt: skip
     bed.advance(1000)
-    bed.surface = float((bed.grains()["position"][:, 2] + 0.5 * d).max())
+    bed.surface = float((bed.grains().position[:, 2] + 0.5 * d).max())
     return bed

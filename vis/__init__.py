@@ -3,9 +3,10 @@
 Reads and writes run folders (docs/architecture.md) and plain arrays; imports nothing of `dem`, `rigid`, `coupling` or
 `experiments`. A picture can thus be made again, elsewhere, years later. The modules:
 
-`vis.frames` (VTU and PVD), `vis.meshes` (triangle meshes), `vis.pictures` (off-screen pictures and the animation),
-`vis.plots` (curves), `vis.report` (`report.html`). What scripts want most can be had from `vis` itself, and is loaded
-when it is first asked for: frames are written without matplotlib.
+`vis.pictures.frames` (VTU and PVD), `vis.pictures.meshes` (triangle meshes), `vis.pictures.pictures` (off-screen
+pictures and the animation),
+`vis.penetrate.plots` (curves), `vis.report` (`report.html`). What scripts want most can be had from `vis` itself,
+and is loaded when it is first asked for: frames are written without matplotlib.
 """
 
 from __future__ import annotations
@@ -14,12 +15,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from vis.frames import FrameWriter, read_frames
+    from vis.pictures.frames import FrameWriter, read_frames
     from vis.report import write_report
 
 __all__ = ["FrameWriter", "read_frames", "write_report"]
 
-_HOMES = {"FrameWriter": "vis.frames", "read_frames": "vis.frames", "write_report": "vis.report"}
+_HOMES = {"FrameWriter": "vis.pictures.frames", "read_frames": "vis.pictures.frames", "write_report": "vis.report"}
 
 
 def __getattr__(name: str) -> Any:

@@ -10,13 +10,13 @@ from pathlib import Path
 
 from PIL import Image
 
-from vis.amended import is_amended
-from vis.columns import template
-from vis.folder import RunFolder, from_python, read_folder
-from vis.pictures import Picture, Pictures, make_pictures
-from vis.plot_parts import Plot
-from vis.plots import make_plots
-from vis.summary import summarise
+from vis.page.columns import template
+from vis.page.folder import RunFolder, from_python, read_folder
+from vis.penetrate.amended import is_amended
+from vis.penetrate.plot_parts import Plot
+from vis.penetrate.plots import make_plots
+from vis.penetrate.summary import summarise
+from vis.pictures.pictures import Picture, Pictures, make_pictures
 
 __all__ = ["write_report"]
 
@@ -25,22 +25,22 @@ _NEEDS = {"Drag against depth": "driven", "Work in and out": "driven", "Set down
 _NEEDS |= {"Drops": "drop", "Peaks of the drops": "drop"}
 #: Experiment -> module and function of its own report.
 _OTHERS = {
-    "tumble": ("vis.tumble", "write_tumble_report"),
-    "tumble spatial": ("vis.spatial", "write_spatial_report"),
-    "hop": ("vis.hop", "write_hop_report"),
-    "paper": ("vis.paper", "write_paper_report"),
-    "campaign": ("vis.campaign", "write_campaign_report"),
-    "campaign check": ("vis.inspection", "write_inspection_report"),
-    "diagnose": ("vis.diagnose", "write_diagnosis_report"),
-    "bed make": ("vis.bed", "write_bed_report"),
-    "bed refine": ("vis.bed", "write_bed_report"),
-    "bed test shear": ("vis.bed_shear", "write_shear_report"),
-    "bed test repose": ("vis.bed_repose", "write_repose_report"),
-    "bed test cone": ("vis.bed_cone", "write_cone_report"),
-    "bed test cut": ("vis.bed_cut", "write_cut_report"),
-    "bed calibrate": ("vis.calibrate", "write_calibration_report"),
-    "compare": ("vis.compare", "write_compare_report"),
-    "validate": ("vis.validation", "write_validation_report"),
+    "tumble": ("vis.tumble.report", "write_tumble_report"),
+    "tumble spatial": ("vis.spatial.report", "write_spatial_report"),
+    "hop": ("vis.paper.hop", "write_hop_report"),
+    "paper": ("vis.paper.report", "write_paper_report"),
+    "campaign": ("vis.diagnose.campaign", "write_campaign_report"),
+    "campaign check": ("vis.diagnose.inspection", "write_inspection_report"),
+    "diagnose": ("vis.diagnose.report", "write_diagnosis_report"),
+    "bed make": ("vis.bed.report", "write_bed_report"),
+    "bed refine": ("vis.bed.report", "write_bed_report"),
+    "bed test shear": ("vis.bed.shear", "write_shear_report"),
+    "bed test repose": ("vis.bed.repose", "write_repose_report"),
+    "bed test cone": ("vis.bed.cone", "write_cone_report"),
+    "bed test cut": ("vis.bed.cut", "write_cut_report"),
+    "bed calibrate": ("vis.bed.calibrate", "write_calibration_report"),
+    "compare": ("vis.compare.report", "write_compare_report"),
+    "validate": ("vis.bed.validation", "write_validation_report"),
 }
 
 
@@ -65,7 +65,7 @@ def write_report(folder: str | Path, *, pictures: bool = True, progress: Callabl
     run = read_folder(folder)
     home, name = _OTHERS.get(str(run.result.get("experiment")), ("", ""))
     if run.result.get("ground") == "spring-damper" and is_amended(run):
-        home, name = "vis.amended", "write_amended_report"
+        home, name = "vis.penetrate.amended", "write_amended_report"
     if home:
         return getattr(import_module(home), name)(folder, progress=progress)
     plots, undrawn = make_plots(run)

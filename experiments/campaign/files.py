@@ -20,8 +20,8 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from experiments.reading import nearest
-from experiments.runfolder import toml_value, write_text
+from experiments.runs.folder import toml_value, write_text
+from experiments.runs.reading import nearest
 
 from .recording import Recording, read_recording, write_recording
 from .tables import (

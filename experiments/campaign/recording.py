@@ -19,7 +19,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.runfolder import write_text
+from experiments.runs.folder import write_text
 
 __all__ = ["Recording", "read_recording", "write_recording"]
 

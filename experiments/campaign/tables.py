@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from rigid.rig import STANDARD_GRAVITY
+from rigid.platform.rig import STANDARD_GRAVITY
 
 __all__ = [
     "FORMAT",

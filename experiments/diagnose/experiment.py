@@ -13,22 +13,22 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from experiments.campaign import Campaign, read_campaign
-from experiments.diagnose_settings import DiagnoseSettings
-from experiments.kernel_cache import free_kernel_cache
-from experiments.plausible import find_implausible, missing_sensors, said_once
-from experiments.progress import Progress
-from experiments.runfolder import RunFolder
-from hedgebed import __version__
+from experiments.check import find_implausible, missing_sensors, said_once
+from experiments.diagnose.settings import DiagnoseSettings
+from experiments.runs.folder import RunFolder
+from experiments.runs.kernel_cache import free_kernel_cache
+from experiments.runs.progress import Progress
+from experiments.runs.version import __version__
 
-from .bounds import is_strained
-from .diagnosis import diagnose
-from .document import write_diagnosis
-from .noise_words import together
-from .outcome import Diagnosis
-from .own import load_own
-from .problem import Problem
-from .summary import summary_sentences, title_words
-from .telling import findings_in_words, told_tables, where_sentences
+from .core.diagnosis import diagnose
+from .core.outcome import Diagnosis
+from .fit.bounds import is_strained
+from .fit.own import load_own
+from .fit.problem import Problem
+from .noise.words import together
+from .report.document import write_diagnosis
+from .report.summary import summary_sentences, title_words
+from .report.telling import findings_in_words, told_tables, where_sentences
 
 __all__ = ["check", "diagnose_campaign", "resume", "run"]
 
@@ -75,7 +75,7 @@ def diagnose_campaign(
         told.message(f"before anything is fitted: {finding.what}")
     gates = None
     if thorough:
-        from dem.prepare import cache_folder
+        from dem.prepare.prepare import cache_folder
 
         gates = cache_folder() / "gates"
     with threadpool_limits(1):  # matrices are small: threads of the linear algebra only get in each other's way
@@ -88,8 +88,9 @@ def diagnose_campaign(
 def _make_problem(folder: Path, effect_file: Sequence[str | Path]) -> tuple[Campaign, Problem]:
     campaign = read_campaign(folder)
     own = tuple(load_own(file) for file in effect_file)
-    name = f"experiments.diagnose.{campaign.tables.kind}_problem"
-    if find_spec(name) is None:
+    package = {"penetration": "push", "tumble": "tumble"}.get(campaign.tables.kind, "")
+    name = f"experiments.diagnose.{package}.problem"
+    if not package or find_spec(name) is None:
         raise ValueError(f"{folder}: kind = {campaign.tables.kind!r} cannot be diagnosed yet")
     with threadpool_limits(1):
         return campaign, import_module(name).make_problem(campaign, own=own)
@@ -110,7 +111,7 @@ def _carry_out(settings: DiagnoseSettings, folder: RunFolder, progress: Progress
         result = _result(found, said)
         folder.write_result(result)
         progress.stage("report", total=1.0)
-        from vis.diagnose import write_diagnosis_report
+        from vis.diagnose.report import write_diagnosis_report
 
         write_diagnosis_report(folder.path, progress=progress.update)
     return result

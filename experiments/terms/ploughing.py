@@ -31,4 +31,4 @@ TERM = Term(
     ),
 )  # fmt: skip
 FIT = {"strength": {"typical": 1300.0}, "speed": {"typical": 0.01}}
-"""How `hedgebed diagnose --effect-file` fits it."""
+"""How `hedgebed diagnose --effects-from` fits it."""

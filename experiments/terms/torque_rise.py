@@ -26,4 +26,4 @@ TERM = Term(
     ),
 )
 FIT = {"rise": {"typical": 0.05, "off": 1e-4}}
-"""How `hedgebed diagnose --effect-file` fits it: a size that can be seen, and one that changes nothing."""
+"""How `hedgebed diagnose --effects-from` fits it: a size that can be seen, and one that changes nothing."""

@@ -10,13 +10,14 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from experiments.progress import Progress
-from experiments.runfolder import RunFolder, write_text
-from experiments.validate_settings import ValidateSettings
-from hedgebed import __version__
+from experiments.runs.folder import RunFolder, write_text
+from experiments.runs.progress import Progress
+from experiments.runs.types import Json
+from experiments.runs.version import __version__
+from experiments.validate.settings import ValidateSettings
 
 from . import kept as kept_result
-from .case import Case, Outcome
+from .base.case import Case, Outcome
 from .document import markdown
 from .suite import SUITE, chosen, fingerprint, fingerprint_of
 
@@ -25,14 +26,14 @@ __all__ = ["check", "fingerprint", "keep", "resume", "run", "run_case"]
 _ROOT = Path(__file__).resolve().parents[2]
 
 
-def run(settings: ValidateSettings, folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
+def run(settings: ValidateSettings, folder: str | Path, *, progress: Progress | None = None) -> Json:
     """Run the suite into `folder` and return the result, as result.json has it. Raises ValueError as `check` does."""
     check(settings)
     kept = RunFolder.ensure(Path(folder), "validate", settings, code=fingerprint())
     return _carry_out(settings, kept, progress or Progress())
 
 
-def resume(folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
+def resume(folder: str | Path, *, progress: Progress | None = None) -> Json:
     """Go on: cases that this code has finished are kept, others are run."""
     kept = RunFolder.open(Path(folder))
     return _carry_out(ValidateSettings(**kept.settings), kept, progress or Progress())
@@ -62,9 +63,9 @@ def run_case(case: Case, tell: Any = None) -> tuple[Outcome, float]:
     return found, time.monotonic() - began
 
 
-def _carry_out(settings: ValidateSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
+def _carry_out(settings: ValidateSettings, folder: RunFolder, progress: Progress) -> Json:
     wanted = chosen(settings.only, quick=settings.quick)
-    records: dict[str, dict[str, Any]] = {}
+    records: dict[str, Json] = {}
     with folder.lock():
         work = [case for case in wanted if case.compute is not None]
         for case in work:
@@ -90,13 +91,13 @@ def _carry_out(settings: ValidateSettings, folder: RunFolder, progress: Progress
         elif settings.keep:
             keep(result["cases"], command=_command(settings))
         progress.stage("report", total=1.0)
-        from vis.validation import write_validation_report
+        from vis.bed.validation import write_validation_report
 
         write_validation_report(folder.path, progress=progress.update)
         return result
 
 
-def _record(folder: RunFolder, case: Case, progress: Progress) -> dict[str, Any]:
+def _record(folder: RunFolder, case: Case, progress: Progress) -> Json:
     """Run a case; its record, kept unless it was skipped."""
     found, seconds = run_case(case, progress.update)
     plots = []
@@ -133,7 +134,7 @@ def _record(folder: RunFolder, case: Case, progress: Progress) -> dict[str, Any]
     return record
 
 
-def _said(record: dict[str, Any]) -> str:
+def _said(record: Json) -> str:
     """What is worth a line while it runs."""
     worst = worst_of(record["comparisons"])
     if record["skipped"]:
@@ -143,12 +144,12 @@ def _said(record: dict[str, Any]) -> str:
     return f": {worst['quantity']} {worst['ours']:.5g}, wanted {worst['reference']:.5g}"
 
 
-def worst_of(comparisons: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
+def worst_of(comparisons: Sequence[Json]) -> Json | None:
     """The comparison that takes the largest share of its band."""
     return max(comparisons, key=lambda one: math.inf if one["share"] is None else one["share"], default=None)
 
 
-def _row(case: Case, records: dict[str, dict[str, Any]], wanted: Sequence[Case]) -> dict[str, Any]:
+def _row(case: Case, records: dict[str, Json], wanted: Sequence[Case]) -> Json:
     head = dict(case.head())
     if case.compute is None:
         return head | {"status": "not yet", "waits_for": case.waits_for}
@@ -165,7 +166,7 @@ def _row(case: Case, records: dict[str, dict[str, Any]], wanted: Sequence[Case])
 STATUSES = ("pass", "fail", "skipped", "not run", "not yet")
 
 
-def _result(rows: list[dict[str, Any]], entire: bool) -> dict[str, Any]:
+def _result(rows: list[Json], entire: bool) -> Json:
     counts = {status: sum(row["status"] == status for row in rows) for status in STATUSES}
     words = [f"{counts['pass']} pass", f"{counts['fail']} fail"]
     words += [f"{counts[key]} {key}" for key in STATUSES[2:] if counts[key]]
@@ -190,7 +191,7 @@ def _result(rows: list[dict[str, Any]], entire: bool) -> dict[str, Any]:
     }
 
 
-def _why(row: dict[str, Any]) -> str:
+def _why(row: Json) -> str:
     worst = row["worst"]
     said = (
         f"{worst['quantity']} is {worst['ours']:.4g}, {worst['reference']:.4g} was wanted"
@@ -205,7 +206,7 @@ def _is_checkout() -> bool:
     return (_ROOT / "docs").is_dir() and (_ROOT / "pyproject.toml").is_file()
 
 
-def keep(cases: Sequence[dict[str, Any]], *, command: str) -> None:
+def keep(cases: Sequence[Json], *, command: str) -> None:
     """Put the cases that were run into the checkout's table, docs/validation.md, and the result that it is made of."""
     before = kept_result.read(_ROOT)
     rows = kept_result.merged_rows(before["cases"] if before else (), cases, SUITE, command=command)

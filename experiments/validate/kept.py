@@ -11,9 +11,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.runfolder import write_text
+from experiments.runs.folder import write_text
+from experiments.runs.types import Json
 
-from .case import Case
+from .base.case import Case
 
 __all__ = ["FILE", "merged_rows", "read", "write"]
 
@@ -21,7 +22,7 @@ FILE = Path("docs/results/validate/result.json")
 RAN = ("pass", "fail")
 
 
-def read(root: Path) -> dict[str, Any] | None:
+def read(root: Path) -> Json | None:
     """The result kept in a checkout, or None where there is none."""
     path = root / FILE
     return dict(json.loads(path.read_text(encoding="utf-8"))) if path.is_file() else None
@@ -37,7 +38,7 @@ def write(root: Path, result: Mapping[str, Any]) -> None:
 
 def merged_rows(
     before: Iterable[Mapping[str, Any]], now: Iterable[Mapping[str, Any]], suite: Sequence[Case], *, command: str
-) -> list[dict[str, Any]]:
+) -> list[Json]:
     """A row for each case of the suite: as run now, or as it was before, or what is known of one that was not run."""
     ran = {row["id"]: dict(row) | {"command": command} for row in now if row["status"] in RAN}
     old = {row["id"]: dict(row) for row in before if row["status"] in RAN}

@@ -2,73 +2,39 @@
 
 from __future__ import annotations
 
+import ast
 import difflib
 import hashlib
+import pkgutil
 import sys
-from collections.abc import Iterable, Sequence
+import tomllib
+from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
+from importlib import import_module
+from importlib.util import resolve_name
 from pathlib import Path
 
-from . import (
-    books,
-    cohesion,
-    collisions,
-    dosta,
-    friction_angle,
-    impact,
-    integrator,
-    intrusion,
-    large_body,
-    low_gravity,
-    oblique,
-    one_grain,
-    peers,
-    restitution,
-    silo,
-    sliding,
-    slump,
-    spinning,
-)
-from .case import Case
+from . import base, beds, contacts
+from .base.case import Case, Compute
 
 __all__ = ["SUITE", "chosen", "fingerprint", "fingerprint_of"]
 
-SHARED = ("case.py", "spheres.py")
-"""What cases of every family are computed by."""
-NEEDS = {
-    "books": ("cloud.py", "energy.py"),
-    "peers": ("cloud.py",),
-    "sliding": ("laws.py", "peers.py", "cloud.py"),
-    "spinning": ("oblique.py",),
-    "friction_angle": ("peers.py",),
-    "slump": ("peers.py", "friction_angle.py"),
-    "dosta": ("peers.py",),
-    "low_gravity": ("drops.py", "parts.py"),
-    "impact": ("drops.py", "parts.py"),
-    "intrusion": ("drops.py", "parts.py"),
-}
-"""What else those of a module are."""
+_FOLDER = Path(__file__).parent
 
-_MODULES = (
-    one_grain,
-    integrator,
-    collisions,
-    restitution,
-    oblique,
-    spinning,
-    cohesion,
-    books,
-    silo,
-    large_body,
-    peers,
-    sliding,
-    friction_angle,
-    slump,
-    dosta,
-    low_gravity,
-    impact,
-    intrusion,
-)
-SUITE: tuple[Case, ...] = tuple(case for module in _MODULES for case in module.CASES)
+
+def _found() -> Iterator[Case]:
+    """The cases of cases.toml, in its order, each with what computes it: the entry of a module's ``CASES``."""
+    computed: dict[str, Compute] = {}
+    for package in (base, beds, contacts):
+        for module in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
+            computed |= vars(import_module(module.name)).get("CASES", {})
+    for id, row in tomllib.loads((_FOLDER / "cases.toml").read_text(encoding="utf-8")).items():
+        yield Case(id, **row, compute=computed.pop(id, None))
+    if computed:
+        raise RuntimeError(f"{', '.join(computed)}: no such case in cases.toml")
+
+
+SUITE: tuple[Case, ...] = tuple(_found())
 
 
 def chosen(only: Sequence[str] = (), *, quick: bool = False) -> list[Case]:
@@ -87,20 +53,32 @@ def chosen(only: Sequence[str] = (), *, quick: bool = False) -> list[Case]:
 
 def fingerprint() -> str:
     """A digest of the bed's code and of the suite's."""
-    return _digest(path for path in Path(__file__).parent.glob("*.py"))
+    return _digest(path for path in _FOLDER.rglob("*.py"))
 
 
 def fingerprint_of(case: Case) -> str:
-    """A digest of the bed's code and of what this case is computed by: a case that other code has finished is "
-    "run again."""
-    module = case.compute.__module__ if case.compute is not None else __name__
-    own = sys.modules[module].__file__
-    others = (*SHARED, *NEEDS.get(module.rpartition(".")[2], ()))
-    return _digest([*([Path(own)] if own else []), *(Path(__file__).with_name(name) for name in others)])
+    """A digest of the bed's code and of what computes this case: a case that other code has finished is run again."""
+    compute = case.compute.func if isinstance(case.compute, partial) else case.compute
+    return _digest(_sources(__name__ if compute is None else compute.__module__))
+
+
+def _sources(module: str, seen: frozenset[str] = frozenset()) -> set[Path]:
+    """The file of a module and those of the suite that it imports."""
+    file = sys.modules[module].__file__ if module in sys.modules else None
+    if file is None or module in seen:
+        return set()
+    found = {Path(file)}
+    for node in ast.walk(ast.parse(Path(file).read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            name = resolve_name("." * node.level + (node.module or ""), sys.modules[module].__package__)
+            if name.startswith(__package__):
+                for one in (name, *(f"{name}.{alias.name}" for alias in node.names)):
+                    found |= _sources(one, seen | {module})
+    return found
 
 
 def _digest(paths: Iterable[Path]) -> str:
-    from dem.prepare import fingerprint as of_dem
+    from dem.prepare.prepare import fingerprint as of_dem
 
     digest = hashlib.sha256(of_dem().encode())
     for path in sorted(paths):

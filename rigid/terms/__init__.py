@@ -1,28 +1,57 @@
-"""The named terms of the planar model: the paper's own and the effects it leaves out.
+"""The named terms of the planar model: the paper's own and the effects it leaves out, each in a file of its own.
 
-`EFFECTS` lists every effect by id. A further one is a `Term` in a file of its own, ``TERM = Term(...)``, read with
-`load_effect`; it then runs in both integrators.
+An effect is one file in `body/`, `contact/` or `sensor/`: ``TERM = Term(...)`` says what it does to the motion of a
+platform, ``CANDIDATE = Candidate(...)`` what a diagnosis must know of it. Files are found by themselves; nothing else
+is edited. An effect of one's own is such a file anywhere, read with `load_effect`; it then runs in both integrators.
 """
 
 from __future__ import annotations
 
 import importlib.util
+import pkgutil
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from importlib import import_module
 from pathlib import Path
-from types import FunctionType
+from types import FunctionType, ModuleType
+from typing import Any
 
 from .base import BASE
-from .body import BODY_EFFECTS
-from .contact import CONTACT_EFFECTS
-from .sensor import SENSOR_EFFECTS
+from .candidate import Candidate
 from .term import FIXED_ARGUMENTS, STATE_FIELDS, Parameter, Term
-from .wires import WIRE_EFFECTS
 
-__all__ = ["BASE", "EFFECTS", "FIXED_ARGUMENTS", "STATE_FIELDS", "Parameter", "Term", "find_effect", "load_effect"]
+__all__ = [
+    "BASE", "CANDIDATES", "EFFECTS", "FIXED_ARGUMENTS", "STATE_FIELDS", "LOADED", "Candidate", "Parameter",
+    "Term", "find_candidate", "find_effect", "load_effect",
+]  # fmt: skip
 
-EFFECTS: dict[str, Term] = {term.id: term for term in (*BODY_EFFECTS, *WIRE_EFFECTS, *CONTACT_EFFECTS, *SENSOR_EFFECTS)}
-"""All effects by id, in the order in which they are summed."""
+
+def _discover(folders: Iterable[str], package: str) -> tuple[dict[str, Term], dict[str, Candidate]]:
+    """Terms and candidates of every file in the folders of a package, by id; terms by rank, then by id."""
+    terms: list[Term] = []
+    candidates: dict[str, Candidate] = {}
+    for found in pkgutil.walk_packages(folders, f"{package}."):
+        if found.ispkg or found.name.count(".") < package.count(".") + 2:
+            continue
+        module = vars(import_module(found.name))
+        term, candidate = module.get("TERM"), module.get("CANDIDATE")
+        id = term.id if term is not None else found.name.rpartition(".")[2].replace("_", "-")
+        if term is not None:
+            terms.append(term)
+        if candidate is not None:
+            candidates[id] = candidate
+    return {term.id: term for term in sorted(terms, key=lambda term: (term.rank, term.id))}, candidates
+
+
+EFFECTS, CANDIDATES = _discover(__path__, __name__)
+"""All effects on tumbles by id, in the order in which they are summed; all candidates of diagnoses by id."""
+LOADED: dict[str, tuple[Candidate | None, Any]] = {}
+"""CANDIDATE and FIT of the effects that were read from files of a person's own, by id."""
+
+
+def find_candidate(id: str) -> Candidate | None:
+    """What a diagnosis knows of the effect called `id`, shipped or read from a file; None where there is nothing."""
+    return CANDIDATES[id] if id in CANDIDATES else LOADED.get(id, (None, None))[0]
 
 
 def find_effect(id: str) -> Term:
@@ -43,7 +72,7 @@ def load_effect(file: str | Path) -> Term:
         raise ValueError(f"file = {str(file)!r} is not there: an effect of one's own is a Python file with TERM in it")
     name = f"hedgebed_effect_{path.stem}_{abs(hash(str(path))):x}"
     if name in sys.modules:
-        return sys.modules[name].TERM
+        return _entered(sys.modules[name])
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise ValueError(f"file = {str(file)!r} is no Python file")
@@ -52,25 +81,32 @@ def load_effect(file: str | Path) -> Term:
         spec.loader.exec_module(module)
     except (SyntaxError, ImportError, NameError) as problem:
         raise ValueError(f"file = {str(file)!r} cannot be read: {problem}") from None
-    term = getattr(module, "TERM", None)
+    term = vars(module).get("TERM")
     if not isinstance(term, Term):
         raise ValueError(f"file = {str(file)!r} has no TERM = rigid.terms.Term(...)")
-    if term.id in EFFECTS or term.id in {base.id for base in BASE}:
+    if term.id in CANDIDATES or term.id in EFFECTS or term.id in {base.id for base in BASE}:
         raise ValueError(f"file = {str(file)!r}: the id {term.id!r} is taken; choose another")
     for key, hook in term.hooks.items():
         _check_alone(hook, f"file = {str(file)!r}: hook {key!r}")
     sys.modules[name] = module
+    return _entered(module)
+
+
+def _entered(module: ModuleType) -> Term:
+    """The term of a file that was read, its candidate where reports find it."""
+    term: Term = module.TERM
+    LOADED[term.id] = (vars(module).get("CANDIDATE"), vars(module).get("FIT"))
     return term
 
 
 def _check_alone(hook: Callable[..., object], said: str) -> None:
     """Raise ValueError for a hook that calls a function of its own file: each is compiled by itself, and the call would
     come out as nothing, without an error."""
-    own = getattr(hook, "__globals__", {})
-    code = getattr(hook, "__code__", None)
-    for called in code.co_names if code is not None else ():
-        found = own.get(called)
-        if isinstance(found, FunctionType) and found.__globals__ is own:
+    if not isinstance(hook, FunctionType):
+        return
+    for called in hook.__code__.co_names:
+        found = hook.__globals__.get(called)
+        if isinstance(found, FunctionType) and found.__globals__ is hook.__globals__:
             raise ValueError(
                 f"{said} calls {called}() of the same file: hooks are compiled one by one, so write what it does into "
                 f"the hook itself"

@@ -131,6 +131,8 @@ class Term:
     source: str
     limits: str
     hooks: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
+    rank: int = 1000
+    """Place in the sum over terms; those of one rank are summed by their ids."""
     sensor: bool = False
     """Whether it alters a sensor, not the motion."""
     needs_rig: bool = False

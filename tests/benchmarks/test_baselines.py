@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial, drop_trial
 
-from benchmarks import baselines
-from benchmarks.baseline_motion import _TERM, _fall, _hooks, held_out_gap
-from benchmarks.baseline_rows import NAMES, Rows, make_rows, touching
-from experiments.diagnose.penetration_problem import make_problem
+from benchmarks.baseline import methods as baselines
+from benchmarks.baseline.motion import _TERM, _fall, _hooks, held_out_gap
+from benchmarks.baseline.rows import NAMES, Rows, make_rows, touching
+from experiments.diagnose.push.problem import make_problem
 from rigid import Effect, Trial, simulate
 from rigid.terms import load_effect
 

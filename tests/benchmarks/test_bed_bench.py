@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import benchmarks.bed as race
-from benchmarks import table
 from benchmarks.bed import Lane, Settings, pick_best
-from benchmarks.entrants import Entrant, Heat, Ours
-from benchmarks.grains import BENCH, DIAMETER, Grains, coordination, packing, prepare_grains, wrapped, write_data
-from benchmarks.peers import LIGGGHTS, PeerError, read_log, run_peer
-from experiments.cli import main
-from experiments.progress import Progress
+from benchmarks.race import table
+from benchmarks.race.entrants import Entrant, Heat, Ours
+from benchmarks.race.grains import BENCH, DIAMETER, Grains, coordination, packing, prepare_grains, wrapped, write_data
+from benchmarks.race.peers import LIGGGHTS, PeerError, read_log, run_peer
+from experiments.cli.main import main
+from experiments.runs.progress import Progress
 
 PROGRAMS = {"liggghts": ("liggghts",), "lammps": ("lmp", "lammps"), "openmpi-bin": ("mpirun",)}
 MISSING = [package for package, names in PROGRAMS.items() if not any(map(shutil.which, names))]
@@ -267,15 +267,15 @@ def test_coordination_from_positions_is_that_of_the_beds_own_lists(ours):
     heat = ours.heat(20)
     bed = ours._bed
     grains = bed.grains()
-    floor = np.count_nonzero(grains["position"][:, 2] < grains["radius"])
+    floor = np.count_nonzero(grains.position[:, 2] < grains.radius)
     assert heat.coordination > 6
     assert bed.coordination_number == pytest.approx(heat.coordination + floor / bed.grain_count, rel=1e-12)
 
 
 def test_a_race_without_peers_has_null_ratios_and_says_who_was_missing(tiny, monkeypatch, capfd):
-    import experiments.benching
+    import experiments.cli.benching
 
-    monkeypatch.setattr(experiments.benching, "load_benchmark", lambda what: race.run)
+    monkeypatch.setattr(experiments.cli.benching, "load_benchmark", lambda what: race.run)
     monkeypatch.setenv("PATH", "")
     assert main(["bench", "bed", "--out", "b", "--quiet", "--json"]) == 0
     shown = capfd.readouterr()

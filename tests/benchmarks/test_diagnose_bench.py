@@ -9,10 +9,10 @@ import pytest
 from penetration_campaigns import campaign_of, driven_trial
 
 import benchmarks.diagnose as bench
-from benchmarks.diagnose_table import _by_truth, show, summarise
-from benchmarks.hidden_penetration import EFFECTS, Hidden, make_hidden
-from experiments.benching import benchmark_options, goes_on
-from experiments.progress import Progress
+from benchmarks.diagnosis.table import _by_truth, show, summarise
+from benchmarks.hidden.penetration import EFFECTS, Hidden, make_hidden
+from experiments.cli.benching import benchmark_options, goes_on
+from experiments.runs.progress import Progress
 
 
 def case(truth, verdict, effects=(), *, outside=None, signature=20.0, alternatives=(), before=9.0, after=1.0, **more):
@@ -122,7 +122,7 @@ def test_whoever_diagnoses_is_given_a_folder_without_the_answer(made, tmp_path):
     bench.run(tmp_path, ask=ask, progress=Progress(), kind="penetration", count=1, baselines="no")
     (record,) = bench.read_cases(tmp_path)
     assert record["truth"] == ["layering"]
-    source = Path(bench.__file__).with_name("diagnose_worker.py").read_text(encoding="utf-8")
+    source = (Path(bench.__file__).with_name("diagnosis") / "worker.py").read_text(encoding="utf-8")
     imported = {node.module or "" for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ImportFrom)}
     assert not any("hidden" in name or name == "" for name in imported)
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from benchmarks.hidden_penetration import make_hidden
+from benchmarks.hidden.penetration import make_hidden
 
 
 def test_the_depths_noise_is_correlated_from_row_to_row_in_a_quarter_of_all_campaigns_as_it_is_told():

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from benchmarks import hidden_penetration, hidden_tumble
-from benchmarks.hidden_suite import STRENGTHS, suite, write_suite
-from benchmarks.hidden_tumble import EFFECTS, OUTSIDE, make_hidden_tumble
-from benchmarks.hidden_tumble_motion import COLUMNS, move
+from benchmarks.hidden import penetration as hidden_penetration
+from benchmarks.hidden import tumble as hidden_tumble
+from benchmarks.hidden.suite import STRENGTHS, suite, write_suite
+from benchmarks.hidden.tumble import EFFECTS, OUTSIDE, make_hidden_tumble
+from benchmarks.hidden.tumble_motion import COLUMNS, move
 from rigid import Trial, simulate
 
 BASE = {

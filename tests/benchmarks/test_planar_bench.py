@@ -5,7 +5,7 @@ import json
 import pytest
 
 from benchmarks import planar
-from experiments.cli import main
+from experiments.cli.main import main
 from rigid import EFFECTS
 
 

@@ -21,7 +21,7 @@ def test_the_ball_starts_just_clear_of_the_grain(away):
     bed = OneGrain(away)
     ground = BedGround(bed, Spike(diameter=0.012, length=0.05))
     centre = np.array([0.03, 0.03, bed.surface + ground.clearance + 0.006])
-    gap = np.linalg.norm(centre - bed.grains()["position"][0]) - 0.006 - 0.001
+    gap = np.linalg.norm(centre - bed.grains().position[0]) - 0.006 - 0.001
     assert 0 < gap < 5e-5
 
 

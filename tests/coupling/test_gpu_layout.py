@@ -32,8 +32,8 @@ def test_nothing_of_the_beds_size_is_read_or_written_in_a_macro_step_in_a_gpus_l
                 return plain(field, *given, **more)
 
             monkeypatch.setattr(kind, name, counted)
-    bed = run.footing.bed
-    engine = bed._engine
+    bed = run.ground.bed
+    engine = bed.engine
     for name in ("tally", "place_bodies"):
         plain = getattr(engine, name)
 
@@ -42,11 +42,11 @@ def test_nothing_of_the_beds_size_is_read_or_written_in_a_macro_step_in_a_gpus_l
             return plain(*arrays)
 
         monkeypatch.setattr(engine, name, given_to)
-    repeats = run.master.books.repeats
+    repeats = run.master.exchange.repeats
     assert engine.chunk_count == bed.grain_count == 240
     for _ in range(5):
         run.master.step()
-    assert run.master.books.repeats > repeats
+    assert run.master.exchange.repeats > repeats
     assert passed and max(passed) < 6 * bed.grain_count / 4
 
 
@@ -57,9 +57,7 @@ def test_reactions_in_a_gpus_layout_are_those_of_a_cpus_to_round_off(other_layou
         other_layouts.overrides = override
         run = small(layer())
         until_it_touches(run)
-        found.append(
-            (run.master.count, run.footing.bed.reactions(), run.footing.bed.max_overlap, run.body.place.copy())
-        )
+        found.append((run.master.count, run.ground.bed.reactions(), run.ground.bed.max_overlap, run.body.place.copy()))
     (count, one, overlap, place), (as_many, other, also, also_place) = found
     assert count == as_many and np.abs(one[1:]).max() > 0.01
     assert np.abs(one - other).max() < 1e-7 * np.abs(one).max()

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from coupling import BedFooting, CoupledTumble, platform_members
-from coupling.followed import AT_REST
+from coupling import BedGround, CoupledTumble, platform_members
 from coupling.lowered_gravity import NEAR, pace_under
+from coupling.platform_run import AT_REST
 from dem import Bed, Material
 from rigid import Trial
 
@@ -28,7 +28,7 @@ def layers(gravity, *, young=YOUNG, steps=1500):
         size=(rows * D, columns * D, 0.03), height=0.3, max_overlap=0.1, threads=1,
     )  # fmt: skip
     bed.advance(steps)
-    bed.surface = float((bed.grains()["position"][:, 2] + 0.5 * D).max())
+    bed.surface = float((bed.grains().position[:, 2] + 0.5 * D).max())
     return bed
 
 
@@ -44,7 +44,7 @@ def run_on(bed, gravity, *, torque=0.0, duration=0.1, speed=0.02, **options):
         torque=torque,
     )
     members = platform_members(spike_length=0.04, count=8, diameter=8e-3, clear=0.015, hull_radius=0.02, width=0.036)
-    footing = BedFooting(bed, members, origin=(0.06, 0.018), copies=2.0, touch=1e-3 * trial.weight, friction=0.5)
+    footing = BedGround(bed, members, origin=(0.06, 0.018), copies=2.0, touch=1e-3 * trial.weight, friction=0.5)
     return CoupledTumble(
         trial,
         footing,
@@ -88,7 +88,7 @@ def test_gravity_lowered_in_the_hand_leaves_the_platform_at_rest_where_it_lay():
     assert bed.gravity == (0.0, 0.0, -0.01)
     assert run.body.trial.gravity_sim == 0.01
     assert abs(run.body.place[1] - heights[True]) < bounds
-    assert run.lowered.sees * run.footing.grain_speed() < bounds
+    assert run.lowered.sees * run.ground.grain_speed() < bounds
     found = run.run()
     assert np.hypot(np.ptp(found.x), np.ptp(found.y)) < 2 * bounds
     carried = run.feet[:, 0].sum(axis=1)

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from coupling import MOST_REVERSAL, CoupledTumble, LawFooting, Master, PlanarBody
-from coupling.footing import row_tips
+from coupling import MOST_REVERSAL, CoupledTumble, LawGround, Master, PlanarBody
+from coupling.law_ground import row_tips
 from coupling.poses import Wrench
-from experiments.tumble_words import unsettled_warning
+from experiments.grains.bed_result import unsettled_warning
 from rigid import Effect, SpringDamper, Trial, simulate
-from rigid.reaction import Contact, Reaction
+from rigid.ground.reaction import Contact, Reaction
 
 RIG = {"gravity_sim": 0.0085 * 9.80665, "counterweight": 5.2107}
 CASES = {
@@ -25,7 +25,7 @@ TOLERANCE = {"x": 5e-5, "y": 2e-4, "theta": 1.5e-3, "vx": 1e-4, "vy": 4e-4, "ome
 
 def coupled(trial, macro_step, duration, **options):
     """A tumble on the spring-damper through the master."""
-    footing = LawFooting.of_trial(trial)
+    footing = LawGround.of_trial(trial)
     substeps = round(macro_step / footing.time_step)
     run = CoupledTumble(trial, footing, duration=duration, substeps=substeps, **options)
     return run, run.run()
@@ -66,7 +66,7 @@ def test_the_error_falls_as_the_square_of_the_macro_step():
     coarse, fine = (abs(run.body.place - end) for run, _ in runs)
     assert (np.log(coarse / fine) / math.log(5) > 1.8).all()
     # The exchange at the interface likewise: its residual is the only gap in the books.
-    gaps = [abs(run.master.books.given - run.master.books.taken) for run, _ in runs]
+    gaps = [abs(run.master.exchange.given - run.master.exchange.taken) for run, _ in runs]
     assert math.log(gaps[0] / gaps[1], 5) > 1.8
     assert np.abs(runs[1][0].balance).max() < 1e-6 * trial.weight * trial.spike_length
 
@@ -77,7 +77,7 @@ def test_iterated_steps_leave_nothing_between_what_is_given_and_what_is_taken():
     run, found = coupled(trial, 2e-3, 0.5, iterations=12)
     explicit, _ = coupled(trial, 2e-3, 0.5)
     assert found.energy_residual < 1e-11 < 1e-9 < explicit.trajectory().energy_residual
-    assert run.master.books.repeats > 0
+    assert run.master.exchange.repeats > 0
 
 
 def test_a_light_body_on_a_stiff_spring_is_iterated_to_the_implicit_midpoint_where_the_explicit_step_flies_off():
@@ -90,7 +90,7 @@ def test_a_light_body_on_a_stiff_spring_is_iterated_to_the_implicit_midpoint_whe
     )  # fmt: skip
     heights, run = {}, None
     for iterations in (1, 8):
-        footing = LawFooting.of_trial(trial)
+        footing = LawGround.of_trial(trial)
         footing.grounds = [replace(ground, time_step=step) for ground in footing.grounds]
         run = CoupledTumble(trial, footing, duration=steps * step, substeps=1, iterations=iterations)
         run.body.rates[1] = swing * omega
@@ -98,16 +98,16 @@ def test_a_light_body_on_a_stiff_spring_is_iterated_to_the_implicit_midpoint_whe
         heights[iterations] = run.columns["y"] - run.columns["y"][0]
     turned = 2 * math.atan(0.5 * omega * step) * np.arange(len(heights[8]))
     assert np.abs(heights[8] - swing * np.sin(turned)).max() < 1e-6 * swing
-    assert run.master.books.unsettled == 0 and run.master.books.repeats < 1.1 * steps  # the step before taught it
+    assert run.master.exchange.unsettled == 0 and run.master.exchange.repeats < 1.1 * steps  # the step before taught it
     assert np.abs(heights[1]).max() > 100 * swing
 
 
 def test_steps_that_do_not_settle_are_counted():
     trial = Trial(**RIG, **CASES["sand"])
     run, _ = coupled(trial, 2e-3, 0.1, iterations=2)
-    assert 0 < run.master.books.unsettled <= run.master.count
+    assert 0 < run.master.exchange.unsettled <= run.master.count
     assert unsettled_warning(run.master) == (
-        f"{run.master.books.unsettled} of {run.master.count} macro steps did not settle in iterations = 2: more of "
+        f"{run.master.exchange.unsettled} of {run.master.count} macro steps did not settle in iterations = 2: more of "
         "them, or fewer substeps, would do"
     )
     assert unsettled_warning(coupled(trial, 2e-3, 0.1)[0].master) is None
@@ -135,7 +135,7 @@ def test_flight_keeps_momentum_and_spin_to_round_off():
     trial = Trial(gravity_sim=1e-3, torque=0.22, stiffness=1e3, mu_s=0.5)
     body = PlanarBody(trial, z=1.0)
     body.rates = np.array([0.3, 0.01, 2.0])
-    master = Master(body, LawFooting.of_trial(trial), substeps=50)
+    master = Master(body, LawGround.of_trial(trial), substeps=50)
     for _ in range(400):
         master.step()
     time = body.time
@@ -159,7 +159,7 @@ def test_a_brake_gives_its_wheels_momentum_and_no_more():
 def test_a_motor_whose_wheel_comes_to_its_limit_ends_there_and_says_when():
     """From rest under a torque tau the wheel has 1 rad/s after J_w / tau, with the platform on its feet."""
     trial = Trial(**RIG, **CASES["pivot"])
-    run = CoupledTumble(trial, LawFooting.of_trial(trial), duration=0.03, max_wheel_speed=1.0)
+    run = CoupledTumble(trial, LawGround.of_trial(trial), duration=0.03, max_wheel_speed=1.0)
     middle = None
     while not run.done:
         run.advance()
@@ -167,13 +167,13 @@ def test_a_motor_whose_wheel_comes_to_its_limit_ends_there_and_says_when():
     assert run.body.wheel_at_limit == pytest.approx(trial.wheel_inertia / trial.torque, rel=1e-12)
     speed, work = run.columns["wheel_speed"], run.columns["torque_work"]
     assert speed[-1] == pytest.approx(1.0, rel=1e-12) and np.ptp(work[speed >= 1 - 1e-9]) < 1e-12 * work[-1]
-    again = CoupledTumble(trial, LawFooting.of_trial(trial), duration=0.03, max_wheel_speed=1.0)
+    again = CoupledTumble(trial, LawGround.of_trial(trial), duration=0.03, max_wheel_speed=1.0)
     again.restore(middle)
     assert again.body.wheel_at_limit == run.body.wheel_at_limit
-    free = CoupledTumble(trial, LawFooting.of_trial(trial), duration=0.03)
+    free = CoupledTumble(trial, LawGround.of_trial(trial), duration=0.03)
     free.run()
     assert free.body.wheel_at_limit is None and free.body.wheel_speed > 2.0
-    ended = CoupledTumble(replace(trial, torque_until=0.002), LawFooting.of_trial(trial), duration=0.03)
+    ended = CoupledTumble(replace(trial, torque_until=0.002), LawGround.of_trial(trial), duration=0.03)
     ended.body.max_wheel_speed = 1.0
     ended.run()
     assert ended.body.wheel_at_limit is None
@@ -187,7 +187,7 @@ def test_a_ground_that_makes_energy_is_seen_by_the_reversal_though_not_by_the_re
     for law in (SpringDamper, GivesBack):
         grounds = [law(stiffness=trial.stiffness, damping=trial.damping, mu_s=0.5) for _ in tips]
         height = trial.spike_length * (math.cos(math.pi / 8) + 0.02)
-        found[law] = CoupledTumble(trial, LawFooting(tips, grounds), duration=0.2, height=height)
+        found[law] = CoupledTumble(trial, LawGround(tips, grounds), duration=0.2, height=height)
         assert found[law].run().energy_residual < 1e-3
     sound, false = found[SpringDamper], found[GivesBack]
     assert sound.dissipated[-1] > 1e-3 * sound.energy_scale  # it did strike
@@ -198,7 +198,7 @@ def test_a_ground_that_makes_energy_is_seen_by_the_reversal_though_not_by_the_re
 def test_the_guess_follows_a_line_and_a_parabola():
     trial = Trial(**RIG, **CASES["brick"])
     for order in (0, 1, 2):
-        master = Master(PlanarBody(trial, z=0.2), LawFooting.of_trial(trial), extrapolation=order)
+        master = Master(PlanarBody(trial, z=0.2), LawGround.of_trial(trial), extrapolation=order)
         for k in range(3):
             master._wrenches.appendleft(Wrench(np.array([0.0, 0.0, float(k**order)]), np.zeros(3)))
         assert master.guess().force[2] == pytest.approx(3.0**order if order else 1.0)
@@ -208,13 +208,13 @@ def test_the_guess_follows_a_line_and_a_parabola():
 def test_a_run_taken_up_again_gives_the_same_bits(steps, tmp_path):
     trial = Trial(**RIG, **CASES["sand"])
     options = {"duration": 0.9, "substeps": 10, "extrapolation": 1}
-    whole = CoupledTumble(trial, LawFooting.of_trial(trial), **options)
+    whole = CoupledTumble(trial, LawGround.of_trial(trial), **options)
     expected = whole.run()
-    broken = CoupledTumble(trial, LawFooting.of_trial(trial), **options)
+    broken = CoupledTumble(trial, LawGround.of_trial(trial), **options)
     for _ in range(steps):
         broken.advance()
     np.savez(tmp_path / "state.npz", **broken.state())
-    other = CoupledTumble(trial, LawFooting.of_trial(trial), **options)
+    other = CoupledTumble(trial, LawGround.of_trial(trial), **options)
     with np.load(tmp_path / "state.npz") as kept:
         other.restore(dict(kept))
     found = other.run()
@@ -226,7 +226,7 @@ def test_a_run_taken_up_again_gives_the_same_bits(steps, tmp_path):
 
 def test_what_cannot_be_is_refused_by_name():
     trial = Trial(**RIG, **CASES["brick"])
-    footing = LawFooting.of_trial(trial)
+    footing = LawGround.of_trial(trial)
     body = PlanarBody(trial, z=0.2)
     for key, value in {"substeps": 0, "iterations": 0, "extrapolation": 3, "tolerance": 0.0}.items():
         with pytest.raises(ValueError, match=key):
@@ -237,14 +237,14 @@ def test_what_cannot_be_is_refused_by_name():
     with pytest.raises(ValueError, match="effects = pendulum"):
         PlanarBody(Trial(**RIG, effects=(Effect(id="pendulum", parameters={"length": 2.2}),)), z=0.2)
     with pytest.raises(ValueError, match="grounds has 1 entries: there are 8"):
-        LawFooting(row_tips(0.2, 8), footing.grounds[:1])
+        LawGround(row_tips(0.2, 8), footing.grounds[:1])
 
 
 @pytest.mark.parametrize("order", [0, 1, 2])
 def test_a_hand_sets_down_on_stiff_ground_in_long_steps_whatever_the_order_of_the_guess(order):
     """Brick in steps of 1 ms: at rest on W / 2 K a row when it lets go, and for 30 ms after; then the order is kept."""
     trial = Trial(**RIG, **(CASES["brick"] | {"torque": 0.0}))
-    footing = LawFooting.of_trial(trial)
+    footing = LawGround.of_trial(trial)
     substeps = round(1e-3 / footing.time_step)
     run = CoupledTumble(
         trial, footing, duration=0.03, substeps=substeps, extrapolation=order, lowering_speed=0.05, height=0.186
@@ -277,7 +277,7 @@ def test_what_bounces_in_the_hand_is_held_more_firmly_until_it_rests(mass, stiff
         mass=mass, inertia=inertia, spike_length=length, wheel_inertia=1e-6, torque=0.0, stiffness=stiffness,
         damping=damping, mu_s=0.5, gravity_sim=0.0834, counterweight=mass * (9.80665 - 0.0834) / (9.80665 + 0.0834),
     )  # fmt: skip
-    footing = LawFooting.of_trial(trial)
+    footing = LawGround.of_trial(trial)
     footing.grounds = [replace(ground, time_step=4e-5) for ground in footing.grounds]
     run = CoupledTumble(trial, footing, duration=0.05, lowering_speed=0.2, energy_interval=1e-3)
     run.run()

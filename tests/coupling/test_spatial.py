@@ -1,4 +1,4 @@
-"""The master with a body in space: flight, tops, `rigid.spatial` again on a surface law, grains under it."""
+"""The master with a body in space: flight, tops, `rigid.spatial.spatial` again on a surface law, grains under it."""
 
 import math
 from dataclasses import replace
@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from coupling import BedFooting, LawFooting, LeftTheBedError, Master, SpatialBody, SpatialRun, spatial_members
-from coupling.bed_footing import ball_member
+from coupling import BedGround, LawGround, LeftTheBedError, Master, SpatialBody, SpatialRun, spatial_members
+from coupling.members import ball_member
 from dem import Bed, Material
-from rigid.actuation import Flywheel, TorqueHistory
-from rigid.platform import Platform
-from rigid.platform_files import find_platform
-from rigid.quaternions import from_turn, to_matrix
-from rigid.solids import box_vertices
-from rigid.spatial import SpatialTrial, simulate, standing
+from rigid.platform.actuation import Flywheel, TorqueHistory
+from rigid.platform.files import find_platform
+from rigid.platform.platform import Platform
+from rigid.platform.solids import box_vertices
+from rigid.spatial.quaternions import from_turn, to_matrix
+from rigid.spatial.spatial import SpatialTrial, simulate, standing
 
 HEDGEHOG = find_platform("hedgehog")
 STIFF = {"stiffness": 7500.0, "damping": 30.0}
@@ -23,7 +23,7 @@ FAR = (0.0, 0.0, 5.0)
 
 def stepped(trial, step, duration, *, standing_on=False, **start):
     """A body on the surface law of `trial`, after `duration` [s] in steps of `step` [s], and its master."""
-    footing = LawFooting.of_spatial(trial)
+    footing = LawGround.of_spatial(trial)
     body = SpatialBody(trial, **start)
     footing.place(body.pose)
     body.touching = standing_on
@@ -96,7 +96,7 @@ def test_a_landing_on_one_corner_out_of_the_plane_is_that_of_the_located_events_
     assert np.abs(body.turn - model.quaternion[-1]).max() < 1e-5
     assert np.abs(body.angular_momentum - model.angular_momentum[-1]).max() < 1e-5
     energy = 0.5 * trial.platform.mass * 0.1**2
-    assert abs(master.books.given - master.books.taken) < 1e-3 * energy
+    assert abs(master.exchange.given - master.exchange.taken) < 1e-3 * energy
 
 
 def test_sliding_on_several_tips_comes_to_rest_where_the_located_events_have_it():
@@ -142,7 +142,7 @@ def bed_of(positions, *, velocities=None, restitution=1.0, friction=0.0, gravity
 
 def thrown(bed, *, at, velocity, spin=(0.0, 0.0, 0.0), gravity=9.81, substeps=1, **grain):
     bed.surface = 0.0
-    footing = BedFooting(bed, [ball_member(RADIUS)], origin=(0.0, 0.0), young=YOUNG, poisson=POISSON, **grain)
+    footing = BedGround(bed, [ball_member(RADIUS)], origin=(0.0, 0.0), young=YOUNG, poisson=POISSON, **grain)
     trial = SpatialTrial(platform=ball(), gravity=gravity, mu_s=0.0)
     body = SpatialBody(trial, position=at, velocity=velocity, angular_velocity=spin)
     body.start(bed.time_step)
@@ -160,7 +160,7 @@ def test_a_ball_in_space_through_the_coupling_is_the_same_ball_as_a_grain():
         met = max(met, float(master.wrench.force[2]))
     grains.advance(360)
     assert met > 0.2
-    assert np.abs(grains.grains()["position"][1] - master.body.place).max() < 1e-14
+    assert np.abs(grains.grains().position[1] - master.body.place).max() < 1e-14
 
 
 @pytest.mark.parametrize(("substeps", "most"), [(1, 5e-13), (2, 1e-5)])
@@ -181,16 +181,16 @@ def test_body_and_grains_together_keep_momentum_and_angular_momentum(substeps, m
 
     def both():
         seen, body = bed.grains(), master.body
-        momentum = seen["mass"][:, None] * seen["velocity"]
-        inertia = 0.4 * seen["mass"] * seen["radius"] ** 2
-        about = np.cross(seen["position"], momentum).sum(axis=0) + (inertia[:, None] * seen["spin"]).sum(axis=0)
+        momentum = seen.mass[:, None] * seen.velocity
+        inertia = 0.4 * seen.mass * seen.radius**2
+        about = np.cross(seen.position, momentum).sum(axis=0) + (inertia[:, None] * seen.spin).sum(axis=0)
         return momentum.sum(axis=0) + body.momentum, about + np.cross(body.place, body.momentum) + body.angular_momentum
 
     linear, angular = both()
     for _ in range(1600 // substeps):
         master.step()
-    assert not bed.grains()["force"].any() and not master.wrench.force.any()  # they have parted
-    assert np.abs(bed.grains()["spin"]).max() > 1.0 and master.books.taken > 0
+    assert not bed.grains().force.any() and not master.wrench.force.any()  # they have parted
+    assert np.abs(bed.grains().spin).max() > 1.0 and master.exchange.taken > 0
     later = both()
     assert np.abs(later[0] - linear).max() < 2e-13 * np.linalg.norm(linear)
     assert np.abs(later[1] - angular).max() < most * np.linalg.norm(angular)
@@ -227,7 +227,7 @@ def layer():
 def dropped(**options):
     platform = small_platform()
     bed = layer()
-    footing = BedFooting(bed, spatial_members(platform), origin=(0.03, 0.03), friction=0.5, bounded_across=True)
+    footing = BedGround(bed, spatial_members(platform), origin=(0.03, 0.03), friction=0.5, bounded_across=True)
     motor = TorqueHistory.constant(platform.wheels[1], 2e-3)
     trial = SpatialTrial(platform=platform, gravity=9.81, mu_s=0.5, torques=(motor,))
     return SpatialRun(
@@ -256,9 +256,10 @@ def test_a_platform_let_fall_askew_on_grains_closes_its_books_and_goes_on_from_i
 
 
 def test_a_ball_that_rolls_into_grains_keeps_the_angular_momentum_of_all_to_round_off():
-    """On a floor, under gravity, through the periodic side: weight, floor and side told apart (`dem.ledger`); n = 1."""
+    """On a floor, under gravity, through the periodic side: weight, floor and side told apart
+    (`dem.engine.dissipation`); n = 1."""
     bed = layer()
-    footing = BedFooting(bed, [ball_member(RADIUS)], origin=(0.05, 0.03), friction=0.5, bounded=False)
+    footing = BedGround(bed, [ball_member(RADIUS)], origin=(0.05, 0.03), friction=0.5, bounded=False)
     trial = SpatialTrial(platform=ball(), gravity=9.81, mu_s=0.5)
     run = SpatialRun(
         trial, footing, substeps=1, duration=0.04, energy_interval=2e-3, position=(0.0, 0.0, RADIUS + 1e-4),
@@ -304,7 +305,7 @@ def test_where_it_leaves_the_bed_across_is_said():
 def test_what_cannot_be_is_refused_by_its_name(change, word):
     trial = SpatialTrial(platform=HEDGEHOG, gravity=0.0834, ground_parameters=STIFF)
     with pytest.raises(ValueError, match=word):
-        SpatialRun(trial, LawFooting.of_spatial(trial), **({"duration": 0.1} | change))
+        SpatialRun(trial, LawGround.of_spatial(trial), **({"duration": 0.1} | change))
 
 
 def test_grains_need_spikes():

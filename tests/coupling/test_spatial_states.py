@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from coupling import CoupledTumble, LawFooting, SpatialRun
+from coupling import CoupledTumble, LawGround, SpatialRun
 from rigid import Trial
-from rigid.actuation import TorqueHistory
-from rigid.platform_files import find_platform
-from rigid.quaternions import from_turn
-from rigid.spatial import SpatialTrial, simulate
+from rigid.platform.actuation import TorqueHistory
+from rigid.platform.files import find_platform
+from rigid.spatial.quaternions import from_turn
+from rigid.spatial.spatial import SpatialTrial, simulate
 
 HEDGEHOG = find_platform("hedgehog")
 STIFF = {"stiffness": 7500.0, "damping": 30.0}
@@ -28,8 +28,8 @@ def test_a_tumble_in_the_plane_has_the_states_of_the_planar_run(torque, duration
     motor = TorqueHistory.constant(HEDGEHOG.wheel(), torque)
     tips = SpatialTrial(platform=HEDGEHOG, gravity=0.0834, ground_parameters=STIFF, torques=(motor,), **shared)
     options = {"duration": duration, "substeps": 5, "lowering_speed": 0.05}
-    plane = CoupledTumble(rows, LawFooting.of_trial(rows), **options)
-    space = SpatialRun(tips, LawFooting.of_spatial(tips), **options)
+    plane = CoupledTumble(rows, LawGround.of_trial(rows), **options)
+    space = SpatialRun(tips, LawGround.of_spatial(tips), **options)
     plane.run()
     space.run()
     flat, spatial = plane.trajectory().transitions, space.transitions
@@ -53,7 +53,7 @@ def test_a_landing_on_one_corner_pivots_slips_and_hops_as_the_located_events_hav
         state = "hop" if touching == 0 else "pivot" if sticking == 1 else "slip"
         if state != expected[-1][0]:
             expected.append((state, time))
-    run = SpatialRun(trial, LawFooting.of_spatial(trial), duration=0.6, substeps=4, **start)
+    run = SpatialRun(trial, LawGround.of_spatial(trial), duration=0.6, substeps=4, **start)
     run.run()
     found = [(state, time) for time, state, _ in run.transitions]
     assert [state for state, _ in found] == [state for state, _ in expected] and len(found) >= 3

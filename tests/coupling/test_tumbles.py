@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from coupling import BedFooting, Landing, LawFooting, Rest, TumblesInARow, platform_members
+from coupling import BedGround, Landing, LawGround, Rest, TumblesInARow, platform_members
 from dem import Bed
-from dem.materials import SAND
-from experiments.tumble_steppers import own_warning
+from dem.grains.materials import SAND
+from experiments.tumble.steppers import own_warning
 from rigid import Trial
 
 RIG = {"gravity_sim": 0.3, "counterweight": 0.28}
@@ -18,7 +18,7 @@ SMALL = {"mass": 0.3, "inertia": 2e-4, "spike_length": 0.04, "wheel_inertia": 1e
 def row():
     """A small platform on ground whose damper lets it fall and lie; the torque is 1.5 times the least that tips."""
     trial = Trial(**RIG, **SMALL, stiffness=300.0, damping=30.0, torque=1.5 * 0.58 * 0.3 * 0.04 * math.sin(math.pi / 8))
-    return TumblesInARow(trial, LawFooting.of_trial(trial), tumbles=2, duration=8.0, substeps=20)
+    return TumblesInARow(trial, LawGround.of_trial(trial), tumbles=2, duration=8.0, substeps=20)
 
 
 def test_a_tumble_follows_the_other_when_the_platform_lies_and_goes_on_from_a_checkpoint_to_the_same_bits():
@@ -76,20 +76,20 @@ def test_a_row_that_gets_no_time_to_lie_says_so():
 def test_a_landing_falls_on_as_it_came_and_bounces_off_a_spring():
     """Without damping and friction, flat on two rows: m_y v^2 / 2 is given back, so it leaves as fast as it came."""
     trial = Trial(**RIG, **(SMALL | {"mu_s": 0.0}), stiffness=2000.0, damping=0.0)
-    run = Landing(trial, LawFooting.of_trial(trial), speed=0.1, along=0.02, duration=0.3, substeps=1)
+    run = Landing(trial, LawGround.of_trial(trial), speed=0.1, along=0.02, duration=0.3, substeps=1)
     found = run.run()
     assert found.state_names[0] == "hop" and found.torque_work[-1] == 0.0
     assert found.vx == pytest.approx(np.full(len(found.time), 0.02), abs=1e-12)
     up = float(found.vy.max())
     assert up == pytest.approx(0.1, rel=2e-3)
     with pytest.raises(ValueError, match="drop_speed is 0"):
-        Landing(trial, LawFooting.of_trial(trial), speed=0.0, duration=0.3)
+        Landing(trial, LawGround.of_trial(trial), speed=0.0, duration=0.3)
 
 
 def test_a_brake_turns_once():
     trial = Trial(**RIG, **SMALL, torque=0.1, actuator="brake", wheel_speed_0=30.0)
     with pytest.raises(ValueError, match="motor"):
-        TumblesInARow(trial, LawFooting.of_trial(trial), tumbles=2, duration=1.0)
+        TumblesInARow(trial, LawGround.of_trial(trial), tumbles=2, duration=1.0)
 
 
 @pytest.mark.slow
@@ -104,7 +104,7 @@ def test_a_landing_on_grains_keeps_the_momentum_that_it_came_with_in_the_books()
     bed.surface = d
     members = platform_members(spike_length=0.04, count=8, diameter=8e-3, clear=0.015)
     trial = Trial(**RIG, **SMALL)
-    footing = BedFooting(bed, members, origin=(0.06, 0.018), copies=2.0, touch=1e-3 * trial.weight, friction=0.5)
+    footing = BedGround(bed, members, origin=(0.06, 0.018), copies=2.0, touch=1e-3 * trial.weight, friction=0.5)
     run = Landing(trial, footing, speed=0.1, along=0.05, spin=1.0, duration=0.02, substeps=8, tip_radius=4e-3,
                   energy_interval=2e-3)  # fmt: skip
     found = run.run()

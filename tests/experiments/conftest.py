@@ -8,8 +8,8 @@ import dig_experiment
 import pytest
 from engine_pool import roomy_engines
 
-from experiments import registry
-from experiments.runfolder import RunFolder
+from experiments.runs import registry
+from experiments.runs.folder import RunFolder
 
 __all__ = ["dig", "reported", "roomy_engines", "unreported"]
 
@@ -24,7 +24,7 @@ def unreported(tmp_path, monkeypatch, request):
     """Runs go to `tmp_path`; only what asks for it with ``reported`` draws a report."""
     monkeypatch.chdir(tmp_path)
     if "reported" not in request.fixturenames:
-        for module in ("hop", "synthesis", "tumble"):
+        for module in ("hop.experiment", "tumble.synthesis", "tumble.experiment"):
             monkeypatch.setattr(f"experiments.{module}.write_report", lambda folder, progress: None)
 
 

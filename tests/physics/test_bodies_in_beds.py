@@ -7,12 +7,12 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from dem import Bed
-from experiments.validate.drops import BEADS, drop
-from experiments.validate.impact import energy, fit_law, published
-from experiments.validate.intrusion import cone_coefficient, plate_law
-from experiments.validate.low_gravity import collapsed, power_of
-from experiments.validate.parts import part
-from rigid.rft import tractions
+from experiments.validate.base.drops import BEADS, drop
+from experiments.validate.base.parts import part
+from experiments.validate.beds.impact import energy, fit_law, published
+from experiments.validate.beds.intrusion import cone_coefficient, plate_law
+from experiments.validate.beds.low_gravity import collapsed, power_of
+from rigid.ground.rft import tractions
 
 
 def law(speed, d1, k_over_m):

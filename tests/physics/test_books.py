@@ -3,15 +3,15 @@
 import cloud
 import numpy as np
 
-from experiments.validate.books import ROUGH, cluster, hertz_energy
+from experiments.validate.contacts.books import ROUGH, cluster, hertz_energy
 
 
 def test_momentum_is_handed_on_to_every_grain_of_the_cloud():
     """So the suite's case, that its sum stays, is about a cloud in which everything collides."""
     bed = cloud.make(gravity=0.0, floor=False, shift=(0, 0, 0.03))
-    before = bed.grains()["velocity"]
+    before = bed.grains().velocity
     bed.advance(500)
-    assert np.linalg.norm(bed.grains()["velocity"] - before, axis=1).min() > 0.01
+    assert np.linalg.norm(bed.grains().velocity - before, axis=1).min() > 0.01
 
 
 def test_energy_never_grows_in_a_dissipative_cluster():

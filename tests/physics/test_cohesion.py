@@ -10,8 +10,8 @@ import pytest
 from scipy.optimize import brentq
 
 from dem import Bed, Material
-from dem.cohesion import jkr_contact, jkr_range, pull_off
-from dem.contact import effective_moduli
+from dem.contact.cohesion import jkr_contact, jkr_range, pull_off
+from dem.contact.law import effective_moduli
 
 RADIUS, YOUNG, POISSON, DENSITY, GAMMA = 0.0025, 1e7, 0.25, 2600, 0.5
 STAR = {
@@ -85,8 +85,8 @@ def test_the_force_curves_are_dmts_and_jkrs():
     for law in LAWS:
         bed = make(stuff(law), positions)
         grains = bed.grains()
-        assert grains["force"][:, 2] == pytest.approx(wanted[law], rel=1e-9, abs=1e-12)
-        assert (grains["coordination"] == (wanted[law] != 0)).all()
+        assert grains.force[:, 2] == pytest.approx(wanted[law], rel=1e-9, abs=1e-12)
+        assert (grains.coordination == (wanted[law] != 0)).all()
 
 
 def test_jkrs_closed_solution_has_its_landmarks():
@@ -131,11 +131,11 @@ def test_a_grain_hangs_as_long_as_its_weight_is_below_the_pull_off_force(law):
         heights.append(r - overlap)
     bed = make(stuff(law), SITES + np.outer(heights, [0, 0, 1]), radii=radii, gravity=(0, 0, g))
     bed.advance(round(0.02 / bed.time_step))
-    moved = bed.grains()["displacement"][:, 2]
+    moved = bed.grains().displacement[:, 2]
     assert np.abs(moved[:8]).max() < 1e-9
     assert moved[8:].min() > 2e-5
     # Those that stay are held by the floor with their weight.
-    assert bed.grains()["force"][:8, 2] == pytest.approx(0.0, abs=1e-6 * -peak.max())
+    assert bed.grains().force[:8, 2] == pytest.approx(0.0, abs=1e-6 * -peak.max())
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -152,7 +152,7 @@ def test_pairs_that_touch_come_to_rest_at_the_overlap_of_no_load(law):
     positions[1:8:2] = positions[:8:2] + [0, 0, 2 * RADIUS + gap]
     bed = make(stuff(law, restitution=0.05), positions)
     bed.advance(round(0.05 / bed.time_step))
-    z = bed.grains()["position"][:, 2]
+    z = bed.grains().position[:, 2]
     w = 2 * GAMMA
     for name, radius, overlap in (
         ("pair", RADIUS / 2, 2 * RADIUS - (z[1:8:2] - z[:8:2])),
@@ -163,7 +163,7 @@ def test_pairs_that_touch_come_to_rest_at_the_overlap_of_no_load(law):
         else:
             wanted = (9 * math.pi * w * radius**2 / (2 * STAR[name])) ** (2 / 3) / (3 * radius)
         assert overlap == pytest.approx(wanted, rel=1e-6), name
-    assert np.abs(bed.grains()["velocity"]).max() < 1e-8
+    assert np.abs(bed.grains().velocity).max() < 1e-8
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -185,7 +185,7 @@ def test_cohesion_holds_a_weightless_grain_against_sliding(law):
         bed.advance(round(0.02 / bed.time_step))
         first, start = bed.grains(), bed.time
         bed.advance(round(0.02 / bed.time_step))
-        pulls[share] = (bed.grains()["velocity"] - first["velocity"])[:, 0] / (bed.time - start) / gravity
+        pulls[share] = (bed.grains().velocity - first.velocity)[:, 0] / (bed.time - start) / gravity
     assert pulls[1.5] == pytest.approx(1 - 1 / 1.5, rel=2e-3)
     assert np.abs(pulls[0.98]).max() < 0.02
 
@@ -209,7 +209,7 @@ def cluster(material, *, step, spin=100.0):
 
 def stored(bed, law):
     """Elastic and surface energy of all pairs of like grains [J], by a double loop."""
-    x = bed.grains()["position"]
+    x = bed.grains().position
     i, j = np.triu_indices(len(x), 1)
     overlap = 2 * RADIUS - np.linalg.norm(x[i] - x[j], axis=1)
     if law == "jkr":
@@ -226,9 +226,9 @@ def test_momentum_and_angular_momentum_close_with_cohesion(law):
 
     def books():
         g = bed.grains()
-        moment = np.cross(g["position"], g["mass"][:, None] * g["velocity"])
-        own = 0.4 * (g["mass"] * g["radius"] ** 2)[:, None] * g["spin"]
-        return (g["mass"][:, None] * g["velocity"]).sum(axis=0), (moment + own).sum(axis=0), np.abs(moment).sum()
+        moment = np.cross(g.position, g.mass[:, None] * g.velocity)
+        own = 0.4 * (g.mass * g.radius**2)[:, None] * g.spin
+        return (g.mass[:, None] * g.velocity).sum(axis=0), (moment + own).sum(axis=0), np.abs(moment).sum()
 
     before = books()
     energy, coordination = [bed.kinetic_energy], 0.0

@@ -6,10 +6,10 @@ The collisions themselves, Chung & Ooi's T1 to T8 and the order of the integrato
 import numpy as np
 
 from dem import Bed
-from experiments.validate.integrator import oblique_pair
-from experiments.validate.oblique import ANGLES, oblique
-from experiments.validate.restitution import staggered_rebound
-from experiments.validate.spinning import sliding_share
+from experiments.validate.contacts.integrator import oblique_pair
+from experiments.validate.contacts.oblique import ANGLES, oblique
+from experiments.validate.contacts.restitution import staggered_rebound
+from experiments.validate.contacts.spinning import sliding_share
 
 
 def test_each_sphere_of_t4_stays_in_its_plane():
@@ -42,10 +42,10 @@ def test_contact_history_survives_new_lists(monkeypatch):
     """The same collision with new lists at every other step, which also sorts the grains anew."""
     _, seldom, made = oblique_pair(2e-7, steps=400)
     assert made < 10
-    monkeypatch.setattr(Bed, "_adapt_skin", lambda self: None)
-    monkeypatch.setattr("dem.bed._SKIN", 1e-4)
+    monkeypatch.setattr(Bed, "adapt_skin", lambda self: None)
+    monkeypatch.setattr("dem.engine.base._SKIN", 1e-4)
     _, often, made = oblique_pair(2e-7, steps=400)
     assert made > 100
     for name in ("position", "velocity", "spin"):
-        assert np.abs(often[name] - seldom[name]).max() <= 1e-12 * np.abs(seldom[name]).max()
-    assert np.linalg.norm(seldom["velocity"][0]) > 0.1
+        assert np.abs(getattr(often, name) - getattr(seldom, name)).max() <= 1e-12 * np.abs(getattr(seldom, name)).max()
+    assert np.linalg.norm(seldom.velocity[0]) > 0.1

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from dem import Ball
-from experiments.validate.one_grain import GRAVITY, advance_to, sixteen
+from experiments.validate.contacts.one_grain import GRAVITY, advance_to, sixteen
 
 
 @pytest.mark.parametrize("rolling", [0.05, 0.2])
 def test_every_grain_rolls_down_an_incline_alike(rolling):
     angle = math.radians(20)
     bed = sixteen(gravity=(GRAVITY * math.sin(angle), 0.0, -GRAVITY * math.cos(angle)), friction=0.5, rolling=rolling)
-    speed = advance_to(bed, 0.02)["velocity"][:, 0]
+    speed = advance_to(bed, 0.02).velocity[:, 0]
     assert speed[0] > 0.01 and np.ptp(speed) < 1e-12
 
 
@@ -28,7 +28,7 @@ def test_forces_computed_anew_do_not_disturb_a_sliding_grain():
                 bed.set_gravity(GRAVITY)
             bed.add_body([Ball(radius=0.002)], position=(0.0, 0.0, 0.07))
         bed.advance(2000)
-        return bed.grains()
+        return bed.grains().as_dict()
 
     a, b = motion(touch=False), motion(touch=True)
     for name in ("position", "velocity", "spin", "force"):

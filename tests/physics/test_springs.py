@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 from dem import Bed, Facing, Material, Plane
-from dem.contact import damping_factor, effective_moduli
+from dem.contact.law import damping_factor, effective_moduli
 
 RADIUS, YOUNG, POISSON, DENSITY, G = 0.0025, 1e8, 0.25, 2600, 9.81
 MASS = DENSITY * 4 / 3 * math.pi * RADIUS**3
@@ -50,10 +50,10 @@ def test_a_grain_at_rest_on_a_slope_does_not_creep():
     there = bed.grains()
     overlap = (MASS * G * math.cos(angle) / rigid_stiffness()) ** (2 / 3)
     tangential = 8 * effective_moduli(YOUNG, POISSON, math.inf, POISSON)[1] * math.sqrt(RADIUS * overlap)
-    assert there["displacement"][:, 0] == pytest.approx(2 * MASS * G * math.sin(angle) / tangential, rel=5e-3)
+    assert there.displacement[:, 0] == pytest.approx(2 * MASS * G * math.sin(angle) / tangential, rel=5e-3)
     after = to(bed, 0.08)
-    assert np.abs(after["position"] - there["position"]).max() < 1e-14
-    assert np.abs(after["velocity"]).max() < 1e-14 and np.abs(after["spin"]).max() < 1e-11
+    assert np.abs(after.position - there.position).max() < 1e-14
+    assert np.abs(after.velocity).max() < 1e-14 and np.abs(after.spin).max() < 1e-11
 
 
 def test_a_grain_rocks_on_its_rolling_spring_and_turns_on_its_twisting_spring():
@@ -82,11 +82,11 @@ def test_a_grain_rocks_on_its_rolling_spring_and_turns_on_its_twisting_spring():
         bed.advance(200)
         grains = bed.grains()
         wanted = expm(system * bed.time) @ start
-        assert grains["velocity"][:8, 0] == pytest.approx(wanted[2], abs=3e-3 * 1e-6)
-        assert grains["spin"][:8, 1] * RADIUS == pytest.approx(wanted[3] * RADIUS, abs=3e-3 * 1e-6)
+        assert grains.velocity[:8, 0] == pytest.approx(wanted[2], abs=3e-3 * 1e-6)
+        assert grains.spin[:8, 1] * RADIUS == pytest.approx(wanted[3] * RADIUS, abs=3e-3 * 1e-6)
     decay, rate = share * twisting, twisting * math.sqrt(1 - share**2)
     for time in (0.01, 0.02, 0.04):
-        spin, t = to(bed, time)["spin"][8:, 2], bed.time
+        spin, t = to(bed, time).spin[8:, 2], bed.time
         wanted = math.exp(-decay * t) * (math.cos(rate * t) - decay / rate * math.sin(rate * t))
         assert spin == pytest.approx(1e-4 * wanted, abs=2e-3 * 1e-4)
     assert twisting * bed.time > 2
@@ -120,9 +120,9 @@ def test_floor_and_body_have_pairs_of_their_own():
     bed.advance(round(1.5e-3 / 5e-7))
     grains = bed.grains()
     rebound = np.where(I16 < 8, 0.95, -0.9)
-    assert grains["velocity"][:, 2] == pytest.approx(rebound * speed, rel=2e-3)
+    assert grains.velocity[:, 2] == pytest.approx(rebound * speed, rel=2e-3)
     gained = np.where(I16 < 8, 0.05 * 1.95, -0.02 * 1.9) * speed
-    assert grains["velocity"][:, 0] == pytest.approx(gained, rel=5e-3)
+    assert grains.velocity[:, 0] == pytest.approx(gained, rel=5e-3)
     soft = Bed.from_grains(
         Material("grain", DENSITY, YOUNG, POISSON, 0.4, 0.3),
         positions=positions[:8],
@@ -181,7 +181,7 @@ def test_the_restitution_is_that_asked_for_with_the_beds_own_step_too():
             time_step=time / count,
         )
         bed.advance(5 * count)
-        found = bed.grains()["velocity"][:, 2] / speed
+        found = bed.grains().velocity[:, 2] / speed
         assert found == pytest.approx([leapfrog_rebound(e, 1 / count, gap) for gap in gaps], abs=1e-6)
         means.append(found.mean() - e)
         furthest.append(np.abs(found - e).max())

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dem import Bed, Material, Plane
-from dem.contact import damping_factor
-from dem.timestep import contact_time, stable_step
+from dem.contact.law import damping_factor
+from dem.contact.timestep import contact_time, stable_step
 
 FCC = np.array([[0, 0, 0], [1, 1, 0], [1, 0, 1], [0, 1, 1]]) / math.sqrt(2)
 
@@ -104,7 +104,7 @@ def crystal(restitution, share, monkeypatch):
     shift = 0.25 + 0.5 * (layer % 2)
     positions = np.column_stack([pitch * (i + shift), pitch * (j + shift), r - floor + layer * pitch / math.sqrt(2)])
     step = share * contact_time(stuff, diameter=DIAMETER, max_overlap=OVERLAP)
-    monkeypatch.setattr("dem.bed.time_step_for", lambda *args, **options: step)
+    monkeypatch.setattr("dem.engine.core.time_step_for", lambda *args, **options: step)
     bed = Bed.from_grains(
         stuff,
         positions=positions,
@@ -128,7 +128,7 @@ def test_strongly_damped_grains_are_at_rest_at_the_beds_own_step_and_not_at_an_e
         speeds = []
         for _ in range(30):  # the plate's arrival is felt for some steps
             bed.advance(10)
-            v = bed.grains()["velocity"]
+            v = bed.grains().velocity
             speeds.append(np.abs(v - v.mean(axis=0)).max())
         assert max(speeds) < most and speeds[-1] < left
     assert max(speeds) > 0.05

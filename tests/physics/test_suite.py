@@ -7,16 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from experiments.validate import dosta, silo
-from experiments.validate.case import Case, Comparison, Outcome, compared
+from experiments.validate.base.case import Case, Comparison, Outcome, compared
+from experiments.validate.base.peers import PEERS
+from experiments.validate.beds import dosta, silo
 from experiments.validate.experiment import run_case
-from experiments.validate.peers import PEERS
 from experiments.validate.suite import SUITE, chosen
 
-FAILING = {
-    "t4-spin",
-    *("katsuragi-durian", "katsuragi-durian-fine", "murdoch", "rft", "size-collapse"),
-}
+FAILING = {"t4-spin", *("katsuragi-durian", "katsuragi-durian-fine", "murdoch", "rft", "size-collapse")}
 """Cases that are known to fail; docs/validation.md says why. One that passes is to be taken off."""
 QUICK = [case for case in chosen(quick=True) if case.compute is not None]
 
@@ -56,7 +53,7 @@ def test_every_case_has_a_name_of_its_own_and_its_source():
 
 
 def test_a_peer_that_is_not_installed_is_skipped_in_words(monkeypatch):
-    monkeypatch.setattr("experiments.validate.peers.shutil.which", lambda name: None)
+    monkeypatch.setattr("experiments.validate.base.peers.shutil.which", lambda name: None)
     for case in SUITE:
         if case.id.partition("-")[0] in PEERS:
             outcome, _ = run_case(case)

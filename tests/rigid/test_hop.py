@@ -21,7 +21,7 @@ from rigid.hop import (
     launch_speed_for,
     least_viable_angle,
 )
-from rigid.platform_files import find_platform
+from rigid.platform.files import find_platform
 
 RIG = 5.21
 STICKS = {"mu_s": math.inf, "mu_d": math.inf}

@@ -9,11 +9,11 @@ import pytest
 
 from rigid import Ground, Trial
 from rigid import simulate as simulate_planar
-from rigid.actuation import Flywheel, TorqueHistory
-from rigid.laws import GROUNDS
-from rigid.platform_files import find_platform
-from rigid.quaternions import from_turn, multiply, to_matrix
-from rigid.spatial import SpatialTrial, simulate, standing
+from rigid.ground.laws import GROUNDS
+from rigid.platform.actuation import Flywheel, TorqueHistory
+from rigid.platform.files import find_platform
+from rigid.spatial.quaternions import from_turn, multiply, to_matrix
+from rigid.spatial.spatial import SpatialTrial, simulate, standing
 
 HEDGEHOG = find_platform("hedgehog")
 LENGTH = HEDGEHOG.stance().spike_length

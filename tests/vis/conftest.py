@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vis.frames import FrameWriter
-from vis.meshes import spike_mesh
+from vis.pictures.frames import FrameWriter
+from vis.pictures.meshes import spike_mesh
 
 K, C, MASS, DEPTH = 230.0, 4.2, 0.05, 0.020
 SPEEDS, DROPS, SEEDS = (0.1, 0.2, 0.4), (0.1, 0.3), (1, 2, 3)

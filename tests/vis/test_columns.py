@@ -7,10 +7,10 @@ import pytest
 from matplotlib import get_data_path
 from PIL import ImageFont
 
-from vis.columns import columns
-from vis.folder import read_folder
-from vis.page import Page, Section, table, write_page
-from vis.summary import summarise
+from vis.page.columns import columns
+from vis.page.folder import read_folder
+from vis.page.page import Page, Section, table, write_page
+from vis.penetrate.summary import summarise
 
 SHEET = files("vis").joinpath("templates/style.css").read_text().partition("@media print")[0]
 REASON = (

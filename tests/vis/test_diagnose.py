@@ -6,9 +6,9 @@ import json
 
 import numpy as np
 
-from vis.diagnose import write_diagnosis_report
-from vis.diagnose_figures import Channel, read_channel, worst
-from vis.palette import line_handles, line_styles
+from vis.diagnose.figures import Channel, read_channel, worst
+from vis.diagnose.report import write_diagnosis_report
+from vis.page.palette import line_handles, line_styles
 
 
 def write_folder(folder, *, trials: dict[str, float], scatter: float | None = None) -> None:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import pyvista
 
-from vis.frames import GRAIN_FIELDS, FrameWriter, frame_names, read_frames
-from vis.meshes import spike_mesh
+from vis.pictures.frames import GRAIN_FIELDS, FrameWriter, frame_names, read_frames
+from vis.pictures.meshes import spike_mesh
 
 COUNT = 50
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from dem import Ball, Box, Capsule, Cone, Cylinder, Mesh, Placed, Plane, Polyhedron, Tube
-from vis.frames import FrameWriter, read_frames
-from vis.meshes import in_place, mesh_volume, shape_mesh, spike_mesh, spike_profile
+from vis.pictures.frames import FrameWriter, read_frames
+from vis.pictures.meshes import in_place, mesh_volume, shape_mesh, spike_mesh, spike_profile
 
 A, B, LENGTH = 0.006, 0.004, 0.05  # radius of tip and shaft, length [m]
 

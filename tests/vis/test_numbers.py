@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from vis.numbers import column, plain, quantity, quote
+from vis.page.numbers import column, plain, quantity, quote
 
 SPACE = "\N{NO-BREAK SPACE}"
 

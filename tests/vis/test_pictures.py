@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from vis import pictures
-from vis.canvas import colour_values, nice_above
-from vis.pictures import make_pictures, opengl_available
-from vis.render import write_gif
+from vis.pictures import pictures
+from vis.pictures.canvas import colour_values, nice_above
+from vis.pictures.pictures import make_pictures, opengl_available
+from vis.pictures.render import write_gif
 
 SMALL = {"size": (400, 300), "animation_size": (200, 150)}
 
@@ -76,9 +76,9 @@ def test_rendered_with_opengl(tmp_path, needs_opengl, make_run):
 
 def test_a_flat_tip_meets_the_scale_of_depth(needs_opengl):
     """The spike is cut at the plane that the scale lies in: its lower edge is where `place` puts the tip's depth."""
-    from vis.frames import Frame
-    from vis.meshes import spike_mesh
-    from vis.scene import Scene
+    from vis.pictures.frames import Frame
+    from vis.pictures.meshes import spike_mesh
+    from vis.pictures.scene import Scene
 
     points, triangles = spike_mesh("flat", diameter=0.016, length=0.06)
     tip = np.array([0.036, 0.036, 0.030])

@@ -12,12 +12,12 @@ import pytest
 from PIL import Image
 
 import vis
-from vis import style
-from vis.folder import read_folder, read_series
-from vis.plot_drops import _running_mean
-from vis.plots import PLOTS, make_plots
+from vis.page import style
+from vis.page.folder import read_folder, read_series
+from vis.penetrate.plot_drops import _running_mean
+from vis.penetrate.plots import PLOTS, make_plots
+from vis.penetrate.summary import summarise
 from vis.report import write_report
-from vis.summary import summarise
 
 FIGURES = {"drag", "gap", "set_down", "drops", "drop_peaks", "work", "spread"}
 

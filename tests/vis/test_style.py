@@ -8,11 +8,11 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from PIL import Image, ImageColor
 
-from vis.compare_figures import _draw_path
-from vis.diagnose_figures import _PHASES
-from vis.render import write_gif
-from vis.style import as_it_lies
-from vis.tumble_series import STATES
+from vis.compare.figures import _draw_path
+from vis.diagnose.figures import _PHASES
+from vis.page.style import as_it_lies
+from vis.page.tumble_series import STATES
+from vis.pictures.render import write_gif
 
 
 @pytest.mark.parametrize(("length", "aspect", "title"), [(0.3, 1.0, ""), (2.0, "auto", "heights stretched")])

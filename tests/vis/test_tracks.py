@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from vis.frames import FrameWriter, HeightMap, read_frames
-from vis.tracks import height_map, lying
+from vis.pictures.frames import FrameWriter, HeightMap, read_frames
+from vis.pictures.tracks import height_map, lying
 
 
 def test_a_height_map_is_the_upper_side_of_the_spheres_also_across_the_bed_s_ends():

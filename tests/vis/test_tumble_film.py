@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from vis import arrows
-from vis.canvas import moved_since
-from vis.compare import _alike
-from vis.frames import FrameWriter
-from vis.meshes import spike_mesh
-from vis.reel import Reel
-from vis.stage import Eye
-from vis.tracks import height_map
-from vis.tumble_film import Sheet, run_film_job
-from vis.tumble_pictures import _film_times, draw_tracks, moments
+from vis.compare.report import _alike
+from vis.pictures import arrows
+from vis.pictures.canvas import moved_since
+from vis.pictures.frames import FrameWriter
+from vis.pictures.meshes import spike_mesh
+from vis.pictures.stage import Eye
+from vis.pictures.tracks import height_map
+from vis.tumble.film import Sheet, run_film_job
+from vis.tumble.pictures import _film_times, draw_tracks, moments
+from vis.tumble.reel import Reel
 
 LENGTH, SIZE = 0.04, (0.12, 0.03)
 

@@ -1,0 +1,281 @@
+"""Made-up campaigns of a laboratory's rig for `hedgebed bench diagnose --kind rig`.
+
+A second generator beside `hidden_penetration`, unlike it in all that a person can do otherwise: how the drive moves,
+how often a test is repeated, what the sensors do wrong (`hidden_rig_plan`), and the laws (`hidden_rig_bed`). Nulls and
+effects alike get, by chance, nuisances that are no effect: beds that differ, zeros that are off, a sensor louder than
+stated.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.campaign import Campaign, PenetrationCampaign, Recording
+
+from .penetration import EFFECTS, Hidden
+from .rig_bed import LAWS, Bed, Law, draw_law, drop, push
+from .rig_plan import NUISANCES, SIZES, Rig, Trial, draw_rig
+
+__all__ = ["EFFECTS", "NUISANCES", "OUTSIDE", "make_rig"]
+
+OUTSIDE = ("relaxation", "collapse", "magnet", "cell-drift", "ringing", "rate", "wrong-mass")
+
+_WRONG_MASS = 0.06
+_HALVINGS = 9
+_ONE_CURVE = {"depth-hardening", "layering"}
+"""Two names for one curve of force over depth: no data could tell the two together from either alone."""
+
+Array = NDArray[np.float64]
+_Columns = dict[str, Array]
+
+
+def make_rig(
+    seed: int, *, kind: str | None = None, strength: float | None = None, trials: int | None = None,
+    law: str | None = None,
+) -> tuple[Campaign, Hidden]:  # fmt: skip
+    """A campaign, its columns in the units of its files (some in mm and ms: write it, and read it), and what is hidden.
+
+    `kind`: None draws one; else ``null``, an effect's id, ``pair`` or one of `OUTSIDE`. `strength`: the signature aimed
+    at, over the noise. `trials`: how many; None draws 6 to 21. `law`: the kind of the effect's law (`LAWS`).
+
+    The signature is the root mean square of what the effect changes over the noise, weighed with all that K, C and the
+    nuisances that are there may explain within their standard deviations. `Hidden.extra["left"]` has for each trial the
+    chi-square, with the stated noise, that the motion and forces themselves leave of what was recorded, and of how many
+    readings: zeros, jitter and noise louder than stated are in it, and no law can leave less.
+    """
+    random = np.random.default_rng((seed, 20))
+    kind = kind or _draw_kind(random)
+    if kind not in ("null", "pair", *EFFECTS, *OUTSIDE):
+        raise ValueError(f"kind = {kind!r}: null, pair, {', '.join((*EFFECTS, *OUTSIDE))} was expected")
+    strength = strength if strength is not None else float(np.exp(random.uniform(math.log(0.7), math.log(50.0))))
+    effects = (kind,) if kind in EFFECTS else ()
+    while kind == "pair" and (not effects or set(effects) == _ONE_CURVE):
+        effects = tuple(str(e) for e in random.choice(EFFECTS, 2, replace=False))
+    outside = kind if kind in OUTSIDE else None
+    rig, design = draw_rig(random, effects, outside, trials)
+    names = [*effects, *([outside] if outside in LAWS else [])]
+    laws = [draw_law(random, name, rig.depth, law if name == kind else None) for name in names]
+    clean = [_moved(rig, trial) for trial in rig.trials]
+    made, amplitude, measure = clean, 0.0, 0.0
+    if outside == "wrong-mass":
+        rig = replace(rig, true_mass=rig.mass * (1.0 + float(random.choice([-1, 1])) * _WRONG_MASS))
+        made = [_moved(rig, trial) for trial in rig.trials]
+        measure = _signature([_change(rig, *three) for three in zip(rig.trials, clean, made, strict=True)])
+    elif laws:
+        amplitude, made = _amplified(rig, laws, clean, strength)
+        measure = _signature([_change(rig, *three) for three in zip(rig.trials, clean, made, strict=True)])
+    campaign, left = _record(random, rig, made)
+    parameters = {f"{own.name}.{key}": value for own in laws for key, value in own.numbers.items()}
+    coloured = rig.persistence["force"] > 0.0
+    extra = design | {
+        "laws": {own.name: own.kind for own in laws}, "nuisances": rig.wandering, "louder": rig.louder,
+        "k": rig.k, "c": rig.c, "drawn": [[t.factor_k, t.factor_c, t.force_zero, t.depth_zero] for t in rig.trials],
+        "left": left,
+    }  # fmt: skip
+    return campaign, Hidden(effects, outside, parameters | {"amplitude": amplitude}, measure, coloured,
+                            len(clean), rig.persistence["depth"], extra)  # fmt: skip
+
+
+def _draw_kind(random: np.random.Generator) -> str:
+    draw = random.random()
+    if draw < 0.22:
+        return "null"
+    if draw < 0.39:
+        return str(random.choice(OUTSIDE))
+    return "pair" if draw < 0.47 else str(random.choice(EFFECTS))
+
+
+# What comes of it -----------------------------------------------------------------------------------------------------
+
+
+def _moved(rig: Rig, trial: Trial, laws: Sequence[Law] = (), amplitude: float = 0.0, k: float = 1.0, c: float = 1.0
+           ) -> _Columns:  # fmt: skip
+    """A trial without noise, zeros or rows, K and C times `k` and `c`: time, depth, and force or acceleration."""
+    size = trial.size / SIZES[1]
+    grown = size**rig.power
+    bed = Bed(
+        rig.k * grown * trial.factor_k * k, rig.c * grown * trial.factor_c * c, laws, amplitude,
+        full=rig.k * rig.depth, size=size, event=trial.event,
+    )  # fmt: skip
+    if trial.path is not None:
+        return {"time": trial.path.time, "depth": trial.path.depth, "other": push(bed, trial.path)}
+    return drop(bed, mass=rig.true_mass, gravity=rig.gravity, speed=trial.speed, duration=rig.drop_time,
+                rate=trial.rate)  # fmt: skip
+
+
+def _amplified(
+    rig: Rig, laws: Sequence[Law], clean: Sequence[_Columns], strength: float
+) -> tuple[float, list[_Columns]]:
+    """The amplitude with the signature aimed at, by halving its logarithm: one trial of each condition is looked at."""
+    first: dict[tuple[bool, float, float], int] = {}
+    for index, trial in enumerate(rig.trials):
+        first.setdefault((trial.driven, trial.speed, trial.size), index)
+    few = [(rig.trials[index], clean[index]) for index in sorted(first.values())]
+    uncertain = [_slopes(rig, trial, one) for trial, one in few]
+    low, high = math.log(1e-4), math.log(30.0)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        changes = [
+            _change(rig, trial, one, _moved(rig, trial, laws, math.exp(middle)), slopes)
+            for (trial, one), slopes in zip(few, uncertain, strict=True)
+        ]
+        low, high = (middle, high) if _signature(changes) < strength else (low, middle)
+    amplitude = math.exp(0.5 * (low + high))
+    return amplitude, [_moved(rig, trial, laws, amplitude) for trial in rig.trials]
+
+
+def _noise(rig: Rig, trial: Trial) -> dict[str, float]:
+    """Of the columns that tell something. Where a push's depth is wrong by its noise, its force is by a tenth of K
+    times that, for a path is smooth."""
+    true = {name: std * rig.louder[name] for name, std in rig.noise.items()}
+    if trial.driven:
+        return {"other": math.hypot(true["force"], 0.1 * rig.k * (trial.size / SIZES[1]) ** rig.power * true["depth"])}
+    return {"depth": true["depth"]} | ({} if rig.only_depth else {"other": true["accel"]})
+
+
+def _over_noise(rig: Rig, trial: Trial, columns: _Columns) -> Array:
+    """Those columns over their noise, one after the other, of some 400 rows each."""
+    every = max(1, len(columns["other"]) // 400)
+    return np.concatenate([columns[name][::every] / std for name, std in _noise(rig, trial).items()])
+
+
+def _slopes(rig: Rig, trial: Trial, clean: _Columns) -> dict[str, Array]:
+    """What one standard deviation of all that is uncertain changes, over the noise; a * is this trial's own."""
+    if trial.path is not None:
+        inside = clean["depth"] > 0
+        k = rig.k * (trial.size / SIZES[1]) ** rig.power
+        damper = np.maximum(trial.path.speed, 0.0) * inside
+        damper *= rig.c * (trial.size / SIZES[1]) ** rig.power * trial.factor_c
+        of_k, of_c = clean["other"] - damper, damper
+    raw: dict[str, _Columns] = {}
+    for what in ("k", "c"):
+        if trial.path is not None:
+            raw[what] = {"other": of_k if what == "k" else of_c}
+        else:
+            nudged = _moved(replace(rig, true_mass=rig.mass), trial, **{what: 1.01})
+            raw[what] = {name: (nudged[name] - clean[name]) / 0.01 for name in ("depth", "other")}
+    wandering, found = rig.wandering, {}
+    for (what, columns), doubt in zip(raw.items(), rig.doubt, strict=True):
+        slope = _over_noise(rig, trial, columns)
+        found[f"{what} {trial.size}"] = doubt * slope
+        found[f"{what} *"] = wandering["bed"] * (what == "k" or trial.factor_c != 1.0) * slope
+    if trial.path is not None:
+        force = {"other": np.full(len(inside), wandering["force-zero"] * rig.noise["force"])}
+        depth = {"other": inside * k * wandering["depth-zero"] * rig.noise["depth"]}
+        found |= {"force *": _over_noise(rig, trial, force), "depth *": _over_noise(rig, trial, depth)}
+    return {name: slope for name, slope in found.items() if slope.any()}
+
+
+def _change(
+    rig: Rig, trial: Trial, clean: _Columns, made: _Columns, slopes: dict[str, Array] | None = None
+) -> tuple[Array, dict[str, Array]]:
+    """What is changed in a trial, over the noise, and the slopes of what is uncertain."""
+    change = {name: made[name] - clean[name] for name in ("depth", "other")}
+    return _over_noise(rig, trial, change), _slopes(rig, trial, clean) if slopes is None else slopes
+
+
+def _signature(changes: Sequence[tuple[Array, dict[str, Array]]]) -> float:
+    """sqrt(d' S^-1 d / n): d the change over the noise, S = 1 + X X' with the slopes X of all that is uncertain to
+    first order, times its standard deviations (S^-1 by Woodbury's identity)."""
+    d = np.concatenate([change for change, _ in changes])
+    columns: dict[str, Array] = {}
+    start = 0
+    for number, (change, slopes) in enumerate(changes):
+        for name, slope in slopes.items():
+            column = columns.setdefault(name.replace("*", f"of {number}"), np.zeros(len(d)))
+            column[start : start + len(slope)] = slope
+        start += len(change)
+    x = np.column_stack(list(columns.values()))
+    explained = x.T @ d
+    left = float(d @ d) - float(explained @ np.linalg.solve(np.eye(x.shape[1]) + x.T @ x, explained))
+    return math.sqrt(max(left, 0.0) / len(d))
+
+
+# What is written ------------------------------------------------------------------------------------------------------
+
+
+def _record(
+    random: np.random.Generator, rig: Rig, made: Sequence[_Columns]
+) -> tuple[Campaign, list[tuple[float, int]]]:
+    """The campaign, and what the truth leaves of each trial."""
+    trials, recordings, left = [], {}, []
+    for number, (trial, data) in enumerate(zip(rig.trials, made, strict=True), 1):
+        name = f"{'p' if trial.driven else 'd'}{number:02d}"
+        trials.append({"id": name, "mode": "driven" if trial.driven else "drop", "gravity": rig.gravity,
+                       "speed": trial.speed, "diameter": trial.size, "data": f"{name}.csv"})  # fmt: skip
+        recordings[name, "data"] = _read_off(random, rig, trial, data, gaps=rig.gaps and number % 2 == 0)
+        left.append(_left(rig, trial, data, recordings[name, "data"]))
+    shape = str(random.choice(["sphere", "flat", "cone"]))
+    tables = PenetrationCampaign.model_validate({
+        "format": "hedgehog-campaign/1", "kind": "penetration", "name": "a rig",
+        "spike": {"mass": rig.mass, "diameter": SIZES[1], "tip": shape}
+        | ({"cone_angle": 60.0} if shape == "cone" else {}),
+        "surface": {"kind": "sand", "stiffness": rig.believed[0], "damping": rig.believed[1]},
+        "uncertainty": {"stiffness": rig.doubt[0], "damping": rig.doubt[1]},
+        "sensors": {name: {"std": (std,)} for name, std in rig.noise.items()}, "trial": tuple(trials),
+    })  # fmt: skip
+    return Campaign(tables, recordings), left
+
+
+def _left(rig: Rig, trial: Trial, data: _Columns, read: Recording) -> tuple[float, int]:
+    """Chi-square of the readings that count (force; of a drop depth and acceleration) about the truth at the times that
+    stand beside them, with the stated noise, and how many they are."""
+    time = read["t_ms"] / 1e3 if rig.small_units else read["t_s"]
+    total, count = 0.0, 0
+    for name, column, small, factor, usual in (
+        ("depth", "depth", "depth_mm", 1e-3, "depth_m"),
+        ("force", "other", "force_mN", 1e-3, "force_N"),
+        ("accel", "other", "accel_g", 9.80665, "accel_m_s2"),
+    ):
+        label = small if rig.small_units else usual
+        if label not in read.columns or (name == "depth" and trial.driven):
+            continue
+        value = read[label] * (factor if rig.small_units else 1.0)
+        off = (value - np.interp(time, data["time"], data[column]))[time >= 0.0] / rig.noise[name]
+        off = off[np.isfinite(off)]
+        total, count = total + float(off @ off), count + len(off)
+    return total, count
+
+
+def _read_off(random: np.random.Generator, rig: Rig, trial: Trial, data: _Columns, *, gaps: bool) -> Recording:
+    """What the sensors make of it, in the columns and units of the file."""
+    end = float(data["time"][-1])
+    time = np.arange(0.0, end, 1 / trial.rate)
+    when = np.clip(time + rig.jitter / trial.rate * random.standard_normal(len(time)), 0.0, end)
+    what = "force" if trial.driven else "accel"
+    depth, other = np.interp(when, data["time"], data["depth"]), np.interp(when, data["time"], data["other"])
+    if not trial.driven and rig.flight:
+        flight = np.arange(-int(random.integers(0, 20)), 0) / trial.rate  # rows before it touches
+        time = np.concatenate([flight, time])
+        depth = np.concatenate([trial.speed * flight + 0.5 * rig.gravity * flight**2, depth])
+        other = np.concatenate([np.full(len(flight), rig.gravity), other])
+    zeros = {"depth": trial.depth_zero, what: trial.force_zero}
+    read = {}
+    for name, true in (("depth", depth), (what, other)):
+        value = true + zeros[name]
+        value = value + rig.noise[name] * rig.louder[name] * _coloured(random, len(true), rig.persistence[name])
+        step = rig.steps[name]
+        read[name] = np.round(value / step) * step if step else value
+    if gaps:
+        first = int(0.35 * len(time))
+        read[what][first : first + max(6, len(time) // 25)] = np.nan
+        read["depth"][random.random(len(time)) < 0.02] = np.nan
+    if rig.only_depth and not trial.driven:
+        read[what][:] = np.nan
+    if rig.small_units:
+        name, factor = ("force_mN", 1e3) if trial.driven else ("accel_g", 1 / 9.80665)
+        return Recording({"t_ms": 1e3 * time, "depth_mm": 1e3 * read["depth"], name: factor * read[what]})
+    return Recording({"t_s": time, "depth_m": read["depth"], "force_N" if trial.driven else "accel_m_s2": read[what]})
+
+
+def _coloured(random: np.random.Generator, count: int, persistence: float) -> Array:
+    """Unit variance, correlated from row to row."""
+    white = random.standard_normal(count)
+    for row in range(1, count if persistence else 0):
+        white[row] = persistence * white[row - 1] + math.sqrt(1 - persistence**2) * white[row]
+    return np.asarray(white)

@@ -1,0 +1,163 @@
+"""Table and figures of docs/planar.md: `python -m benchmarks.planar_trials.table docs`.
+
+Both integrators and the batch on the paper's cases (two gravities, three torques, steel and brick), how the error at
+the end of a tumble falls with the step, and the list of effects. Writes into docs/planar.md between its marks, and
+docs/images/planar-*.png.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+
+from rigid import EFFECTS, Trajectory, Trial, simulate, simulate_batch
+from rigid.planar.dynamics import System
+from rigid.planar.located import integrate
+
+matplotlib.use("Agg")
+from matplotlib import pyplot as plt
+
+GRAVITY, MASS = 9.80665, 5.3
+MARKS = "<!-- planar {0}: begin -->", "<!-- planar {0}: end -->"
+SURFACES = {"steel": 0.25, "brick": 0.5}
+WHEEL_SPEED = 300.0  # of the brake trials [rad/s]: ours, the paper gives none
+DURATION = 2.0
+NAMES = ("x", "y", "theta", "vx", "vy", "omega")
+
+
+def case(level: float, torque: float, mu_s: float) -> Trial:
+    """The platform in the rig, at `level` g."""
+    gravity_sim = level * GRAVITY
+    brake = torque == 6.0
+    return Trial(
+        gravity_sim=gravity_sim, counterweight=MASS * (GRAVITY - gravity_sim) / (GRAVITY + gravity_sim), torque=torque,
+        mu_s=mu_s, actuator="brake" if brake else "motor", wheel_speed_0=WHEEL_SPEED if brake else 0.0,
+    )  # fmt: skip
+
+
+def _degrees(angle: float | None) -> str:
+    return "-" if angle is None or math.isnan(angle) else f"{math.degrees(angle):.2f}"
+
+
+def _row(label: str, run: Trajectory, paper: Trajectory, batch: tuple[float, float, float, float]) -> str:
+    def three(located: float | None, fixed: float | None, many: float, show) -> str:
+        return f"{show(located)} / {show(fixed)} / {show(many)}"
+
+    angle, speed, spin, hop = batch
+    cells = (
+        label,
+        three(run.trajectory_angle, paper.trajectory_angle, angle, _degrees),
+        three(run.max_speed, paper.max_speed, speed, lambda v: f"{v:.4f}"),
+        three(run.max_angular_velocity, paper.max_angular_velocity, spin, lambda v: f"{v:.3f}"),
+        three(run.transition_angle("hop"), paper.transition_angle("hop"), hop, _degrees),
+        f"{run.energy_residual:.0e} / {paper.energy_residual:.0e}",
+    )
+    return f"| {' | '.join(cells)} |"
+
+
+def table() -> str:
+    """The Markdown table."""
+    columns = ("case", "trajectory angle [deg]", "largest speed [m/s]", "largest spin [rad/s]", "hop at [deg]",
+               "energy residual")  # fmt: skip
+    lines = [f"| {' | '.join(columns)} |", "|---|---|---|---|---|---|"]
+    for level in (0.0085, 0.015):
+        for surface, mu_s in SURFACES.items():
+            for torque in (0.125, 0.22, 6.0):
+                trial = case(level, torque, mu_s)
+                run = simulate(trial, duration=DURATION)
+                paper = simulate(trial, duration=DURATION, method="paper")
+                many = simulate_batch([trial], duration=DURATION)
+                batch = (
+                    float(many.trajectory_angle[0]),
+                    float(many.max_speed[0]),
+                    float(many.max_angular_velocity[0]),
+                    float(many.transition_angles["hop"][0]),
+                )
+                lines.append(_row(f"{level:g} g, {surface}, {torque:g} N m", run, paper, batch))
+    return "\n".join(lines)
+
+
+def effects() -> str:
+    """The list of effects, in Markdown."""
+    lines = ["| effect | what it is | acts on | parameters | source | limits |", "|---|---|---|---|---|---|"]
+    for term in EFFECTS.values():
+        own = "; ".join(f"`{p.name}` [{p.unit}] = {p.default:g}: {p.summary}" for p in term.parameters)
+        lines.append(f"| `{term.id}` | {term.summary} | {term.acts} | {own} | {term.source} | {term.limits} |")
+    return "\n".join(line.replace("|u|", "abs(u)") for line in lines)
+
+
+def _final(trial: Trial, duration: float, longest: float, tolerance: float) -> np.ndarray:
+    last: dict[str, list[float]] = {}
+    integrate(
+        System(trial), duration=duration, tolerance=tolerance, longest=longest,
+        on_step=lambda t0, t1, z, at, modes: last.update(z=z),
+    )  # fmt: skip
+    return np.array(last["z"][:6])
+
+
+def draw_orders(path: Path) -> None:
+    """Error at the end of a tumble over the step, three integrators, two trials with events."""
+    figure, axes = plt.subplots(1, 2, figsize=(9, 4.4), sharey=True, layout="constrained")
+    trials = (
+        ("motor, 0.125 N m on brick, 0.4 s: slips, sticks, a row lifts off", case(0.0085, 0.125, 0.5), 0.4),
+        ("brake, 6 N m on steel, 0.1 s: slips, the wheel stops, hops", case(0.0085, 6.0, 0.25), 0.1),
+    )
+    for axis, (title, trial, duration) in zip(axes, trials, strict=True):
+        exact = _final(trial, duration, 5e-3, 1e-13)
+        steps = [1e-3 / 2**k for k in range(5)]
+        runs = [simulate(trial, duration=duration, method="paper", time_step=h) for h in steps]
+        ends = [np.array([getattr(run, name)[-1] for name in NAMES]) for run in runs]
+        axis.loglog(steps, [np.abs(end - exact).max() for end in ends], "s-", label="the paper's step, order 1")
+        finals = [simulate_batch([trial], duration=duration, time_step=h).final for h in steps]
+        ends = [np.array([final[name][0] for name in NAMES]) for final in finals]
+        axis.loglog(steps, [np.abs(end - exact).max() for end in ends], "o-", label="the batch, order 2")
+        longer = [8e-3 / 2**k for k in range(5)]
+        errors = [float(np.abs(_final(trial, duration, h, 1e3) - exact).max()) for h in longer]
+        axis.loglog(longer, errors, "^-", label="located, order 5 (its longest step)")
+        axis.set(xlabel="step [s]", title=title)
+        axis.title.set_fontsize(9)
+        axis.grid(alpha=0.3)
+    axes[0].set_ylabel("largest error in x, y, theta and their rates (SI)")
+    # Below the axes: within them it would cover points.
+    figure.legend(*axes[0].get_legend_handles_labels(), fontsize=8, ncols=3, loc="outside lower center")
+    figure.savefig(path, dpi=120)
+    plt.close(figure)
+
+
+def draw_states(path: Path) -> None:
+    """State over theta, as the paper's Figure 6 has it, for steel and brick at 0.0085 g."""
+    figure, axes = plt.subplots(1, 2, figsize=(9, 2.6), sharey=True)
+    order = {"pivot": 0, "slip": 1, "hop": 2, "stand": 0}
+    for axis, (surface, mu_s) in zip(axes, SURFACES.items(), strict=True):
+        for torque in (0.125, 0.22, 6.0):
+            run = simulate(case(0.0085, torque, mu_s), duration=DURATION)
+            axis.step(np.degrees(run.theta), [order[name] for name in run.state_names], label=f"{torque:g} N m")
+        axis.set(title=f"{surface}, 0.0085 g", xlabel="theta [deg]", xlim=(0, 45), yticks=(0, 1, 2))
+        axis.set_yticklabels(["pivot", "slip", "hop"])
+        axis.grid(alpha=0.3)
+    axes[0].legend(fontsize=8, loc="center right")
+    figure.tight_layout()
+    figure.savefig(path, dpi=120)
+    plt.close(figure)
+
+
+def main(folder: str) -> None:
+    """Write the table and the figures into the documentation in `folder`."""
+    docs = Path(folder)
+    draw_orders(docs / "images" / "planar-orders.png")
+    draw_states(docs / "images" / "planar-states.png")
+    page = docs / "planar.md"
+    text = page.read_text(encoding="utf-8")
+    for name, part in (("cases", table()), ("effects", effects())):
+        begin, end = (mark.format(name) for mark in MARKS)
+        before, rest = text.split(begin)
+        text = f"{before}{begin}\n{part}\n{end}{rest.split(end)[1]}"
+    page.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1] if len(sys.argv) > 1 else "docs")

@@ -1,0 +1,198 @@
+"""The energy balance of a run: what body, exchange and ground gained, lost and kept, and what is not accounted for.
+
+docs/coupling.md explains the terms.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigid.ground.reaction import State
+
+from .bed_ground import BedGround
+from .ground import Ground
+from .master import Master
+from .poses import Vector
+
+__all__ = ["EnergyBalance"]
+
+
+class EnergyBalance:
+    """Samples of the ground's energies beside the rows of a run, and their balance.
+
+    A run gives `columns` (`time`, `kinetic_energy`, `potential_energy`, `torque_work`, `given`, `taken`, one
+    entry a macro step) and `energy_scale`, and calls `_start_balance` where time begins, `_sample` now and then.
+    """
+
+    ground: Ground
+    master: Master
+    _free: tuple[int, ...] = (0, 1, 2)
+    """Along which axes the body can move."""
+    _turns: tuple[int, ...] = (0, 1, 2)
+    """About which axes it can turn."""
+
+    def _no_samples(self) -> None:
+        self._samples: list[list[float]] = []
+        self.energy_names: tuple[str, ...] = ()
+        """What the ground's energies are, in the order of `samples`."""
+        self.work_names: tuple[str, ...] = ()
+        """Likewise of what a bed's contacts took (`Bed.contact_work`)."""
+        self._momentum, self._angular_momentum = np.zeros(3), np.zeros(3)
+        self._moment = np.zeros(3)
+        """Angular impulse on the body from elsewhere than the ground since the balance began [N m s]."""
+
+    @property
+    def columns(self) -> dict[str, Vector]:
+        """The rows so far, by name."""
+        raise NotImplementedError
+
+    @property
+    def energy_scale(self) -> float:
+        """What residuals are relative to [J]."""
+        raise NotImplementedError
+
+    def _start_balance(self, moving: Vector, turning: Vector) -> None:
+        """Count from here; `moving`, `turning`: the body's own momentum [N s] and its angular momentum about its
+        (0, 0, 0), wheels included or not [N m s], shape (3,) both."""
+        self.master.start_balance()
+        self._samples.clear()
+        self._momentum, self._angular_momentum = moving.copy(), turning.copy()
+        self._moment = np.zeros(3)
+        if isinstance(self.ground, BedGround):
+            self.ground.keep_book()
+            self._momentum = self._momentum + self.ground.momentum()
+            self._angular_momentum = self._angular_momentum + self.ground.angular_momentum()
+
+    def _pull(self, before: Vector, after: Vector, weight: Vector, masses: Vector) -> None:
+        """A macro step on which the body went from `before` to `after` [m]: weight about (0, 0, 0), and the rig.
+
+        In a rig the momentum is not along the velocity v, since it is heavier upwards, and v x P is the moment of the
+        wires. By the middle of the step, half the ground's lag later as momentum is: of second order in it.
+        """
+        dt = self.master.macro_step
+        velocity = (after - before) / dt
+        middle = 0.5 * (before + after + self.ground.lag * velocity)
+        self._moment = self._moment + dt * (np.cross(middle, weight) + np.cross(velocity, masses * velocity))
+
+    def _sample(self, time: float, moving: Vector, turning: Vector) -> None:
+        """What the ground holds, by how much the momenta of all are off, and the grains computed.
+
+        `moving`: the body's momentum less the impulse of its weight since the balance began [N s], `turning` its
+        angular momentum less what a torque gave that is not of its wheels [N m s], shape (3,) both.
+        """
+        found = self.ground.energies()
+        self.energy_names = tuple(found)
+        off, turned, computed, taken = 0.0, 0.0, 0, dict[str, float]()
+        if isinstance(self.ground, BedGround):
+            computed, taken = self.ground.grain_steps, self.ground.work_taken()
+            gained = self.ground.momentum() + moving - self._momentum
+            off = float(np.linalg.norm(gained[list(self._free)]))
+            about = self.ground.angular_momentum() + turning - self._moment - self._angular_momentum
+            turned = float(np.linalg.norm(about[list(self._turns)]))
+        self.work_names = tuple(f"{name}_work" for name in taken)
+        self._samples.append([time, off, turned, computed, *found.values(), *taken.values()])
+
+    @property
+    def samples(self) -> dict[str, Vector]:
+        """Of the ground, by time: `time` [s], `momentum_error` [N s], `angular_momentum_error` [N m s], `grain_steps`
+        of a bed so far, energies [J], work that its contacts took [J]."""
+        own = ("time", "momentum_error", "angular_momentum_error", "grain_steps")
+        return dict(zip((*own, *self.energy_names, *self.work_names), self._sample_table.T, strict=True))
+
+    @property
+    def _sample_table(self) -> Vector:
+        """The samples as rows, also where there are none yet."""
+        count = 4 + len(self.energy_names) + len(self.work_names)
+        return np.array(self._samples, dtype=float).reshape(-1, count)
+
+    @property
+    def balance(self) -> Vector:
+        """Energy of the body gained, less the torque's work, plus what the ground took [J]: 0 but for the coupling."""
+        rows = self.columns
+        energy = rows["kinetic_energy"] + rows["potential_energy"]
+        return energy - energy[0] - rows["torque_work"] + rows["taken"] - rows["taken"][0]
+
+    @property
+    def _stored(self) -> Vector:
+        """What the ground holds [J], at each time of `samples`."""
+        samples = self.samples
+        return np.asarray(np.sum([samples[name] for name in self.energy_names], axis=0))
+
+    @property
+    def stored_by_row(self) -> Vector:
+        """What the ground holds at every row [J], between two samples in proportion."""
+        return np.interp(self.columns["time"], self.samples["time"], self._stored)
+
+    @property
+    def dissipated_by_row(self) -> Vector:
+        """What the ground took less what it holds more than at the start [J], at every row."""
+        taken, stored = self.columns["taken"], self.stored_by_row
+        return np.asarray(taken - taken[0] - (stored - stored[0]))
+
+    @property
+    def dissipated(self) -> Vector:
+        """What the ground took less what it holds more than at the start [J], at each time of `samples`."""
+        rows, samples, held = self.columns, self.samples, self._stored
+        taken = rows["taken"][np.searchsorted(rows["time"], samples["time"])]
+        return np.asarray(taken - taken[0] - (held - held[0]))
+
+    @property
+    def dissipation_reversal(self) -> float:
+        """Largest fall of `dissipated` below what it was before, over `energy_scale` [1]: energy that the ground made.
+
+        What it makes while it dissipates more elsewhere does not show.
+        """
+        lost = self.dissipated
+        return float((np.maximum.accumulate(lost) - lost).max()) / self.energy_scale
+
+    @property
+    def losses(self) -> dict[str, Vector]:
+        """What a bed lost by measurement [J], at each time of `samples`: to normal dashpots, to friction (with the
+        tangential dashpot), to rolling and twisting. Empty on a law."""
+        if not self.work_names:
+            return {}
+        samples = self.samples
+
+        def less_springs(part: str) -> Vector:
+            return np.asarray(samples[f"{part}_work"] - (samples[part] - samples[part][0]))
+
+        friction, rolling = less_springs("tangential"), less_springs("turning")
+        return {"damping": samples["damping_work"], "friction": friction, "rolling": rolling}
+
+    @property
+    def balance_gap(self) -> Vector:
+        """What a bed lost by measurement less `dissipated` [J], at each time of `samples`; empty on a law.
+
+        Here nothing cancels: it is the energy that the grains' integrator made (above 0) or lost, and what `energies`
+        or the losses have wrong.
+        """
+        lost = list(self.losses.values())
+        return np.asarray(np.sum(lost, axis=0) - self.dissipated) if lost else np.zeros(0)
+
+    @property
+    def energy_residual(self) -> float:
+        """Largest energy that is not accounted for, over `energy_scale` [1].
+
+        Of the body and the exchange (`balance`) and, on a bed, with what the grains hold and lost, each measured.
+        """
+        balance, gap = self.balance, self.balance_gap
+        worst = float(np.abs(balance).max())
+        if gap.size:
+            at = np.searchsorted(self.columns["time"], self.samples["time"])
+            worst = max(worst, float(np.abs(balance[at] + gap).max()))
+        return worst / self.energy_scale
+
+    def _balance_state(self) -> State:
+        return {
+            "books.samples": self._sample_table,
+            "books.energies": np.array(self.energy_names, dtype=str),
+            "books.works": np.array(self.work_names, dtype=str),
+            "books.momentum": np.concatenate([self._momentum, self._angular_momentum, self._moment]),
+        }
+
+    def _restore_balance(self, state: State) -> None:
+        self._samples = np.asarray(state["books.samples"]).tolist()
+        self.energy_names = tuple(str(name) for name in np.asarray(state["books.energies"]))
+        self.work_names = tuple(str(name) for name in np.asarray(state["books.works"]))
+        numbers = np.array(state["books.momentum"], dtype=float)
+        self._momentum, self._angular_momentum, self._moment = (part.copy() for part in np.split(numbers, 3))

@@ -1,0 +1,328 @@
+"""What runs of a platform on a ground share: rows, state and balance, and the placement before time begins.
+
+Placement lowers the platform onto the ground against a drag until the ground carries it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from rigid.ground.reaction import Reaction, State
+from rigid.planar.trajectory import STATES
+
+from .balance import EnergyBalance
+from .bed_ground import BedGround
+from .contact_state import ContactReader, feet_of
+from .deprecated import renamed
+from .ground import Ground
+from .law_ground import LawGround
+from .lowered_gravity import pace_under
+from .master import Master
+from .poses import Twist, Vector
+from .stepper import Stepper
+
+__all__ = ["AT_REST", "REST_TIME", "PlatformRun"]
+
+AT_REST = 0.005
+"""What of its weight may still be missing at rest, and the mean speed there over the lowering speed [1]."""
+SWINGS = math.sqrt(AT_REST)
+"""Root of the mean square of the same in the last quarter of the time, at most [1]: what comes to rest from one side
+has less once its mean is at rest; what bounces does not."""
+FIRMER = 4.0
+"""Factor on drag and mass of the placement of what swings [1]."""
+REST_TIME = 0.04
+"""For how long the signs of rest must hold [s]."""
+PLACING_WAY = 0.02
+"""Lowering speed times the time that setting down took in the first runs, without REST_TIME [m]; for progress only."""
+LONGEST_PLACING = 3.0
+"""A platform that has not come to rest after this [s] is an error."""
+
+
+class PlatformRun(EnergyBalance, Stepper):
+    """A platform on a ground, placed on it if asked to and followed from where time begins.
+
+    It can be saved and restored between any two macro steps; every macro step leaves one row.
+
+    Parameters
+    ----------
+    lift : whether the body is lifted until it is clear of grains. Raises ValueError for a start in overlap with grains.
+    lowering_speed : of a placement before time begins [m/s]; None: none.
+    energy_interval : between measurements of what the ground holds [s].
+    members : of the body, where each is about its origin [m], shape [member, 3], in space; in the plane their number.
+    options : of `Master`.
+    """
+
+    COLUMNS: tuple[str, ...]
+    """Of a row."""
+    _prefix: str
+    """Of the keys of a state."""
+    _hull = 0
+    """Members that are no spikes."""
+    trial: Any
+    pace = 1.0
+    """The placement's times over those on grains at 1 g (`lowered_gravity.pace_under`) [1]."""
+
+    def __init__(
+        self,
+        trial: Any,
+        ground: Ground,
+        body: Any,
+        *,
+        duration: float,
+        lift: bool,
+        lowering_speed: float | None,
+        energy_interval: float,
+        members: Vector | int,
+        **options: Any,
+    ) -> None:
+        super().__init__()
+        self.trial, self.ground, self.body, self.duration = trial, ground, body, float(duration)
+        if isinstance(ground, BedGround | LawGround):
+            if lift:
+                body.lift(ground.clear_height(body.pose))
+            ground.place(body.pose)
+        self.master = Master(body, ground, **options)
+        self.macro_step, self._extrapolation = self.master.macro_step, self.master.extrapolation
+        places, count = (None, members) if isinstance(members, int) else (members, len(members))
+        self.reader = ContactReader(
+            count, weight=self._weight, mu_d=trial.sliding_friction, macro_step=self.macro_step, places=places
+        )
+        self._every = max(1, round(energy_interval / self.macro_step))
+        self.energy_interval = self._every * self.macro_step
+        """Between measurements of what the ground holds [s]."""
+        self.lowering_speed = lowering_speed
+        self.placed = lowering_speed is None
+        """Whether the placement is over."""
+        self.placing_steps = 0
+        """Macro steps that the placement took."""
+        self._members = count
+        self._settling: list[Vector] = []
+        self._rows: list[list[float]] = []
+        self._states: list[int] = []
+        self._feet: list[Vector] = []
+        self._no_samples()
+        self._order()
+
+    held_long, footing = renamed("held_long", "placement_is_long"), renamed("footing", "ground")
+
+    def __repr__(self) -> str:
+        when = f"{self.time:.4g} of {self.duration:g} s" if self.placed else f"being placed for {self.body.time:.4g} s"
+        return f"{type(self).__name__}({self.body!r} on {self.ground!r}, {when})"
+
+    @staticmethod
+    def _check(duration: float, energy_interval: float, lowering_speed: float | None) -> None:
+        for key, value in {"duration": duration, "energy_interval": energy_interval}.items():
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"{key} is {value}: it must be above 0 (in s)")
+        if lowering_speed is not None and not (math.isfinite(lowering_speed) and lowering_speed > 0):
+            raise ValueError(f"lowering_speed is {lowering_speed}: it must be above 0 (in m/s)")
+
+    # How far -------------------------------------------------------------------------------------------------------
+
+    @property
+    def done(self) -> bool:
+        """Whether it has come to its end."""
+        return self.placed and bool(self.body.time >= self.duration - 0.5 * self.macro_step)
+
+    @property
+    def time(self) -> float:
+        """Now [s]; before 0 during placement: how long that has taken, negative."""
+        return float(self.body.time if self.placed else -self.body.time)
+
+    @property
+    def _elapsed(self) -> float:
+        return float(self.body.time) if self.placed else -1.0
+
+    @property
+    def fraction(self) -> float:
+        """How far it is along, 0 to 1, the placement, as long as it was expected to take, included."""
+        placing = self._placement_time
+        done = placing + self.body.time if self.placed else min(placing, self.body.time)
+        return float(min(1.0, done / (placing + self.duration)))
+
+    @property
+    def placement_is_long(self) -> bool:
+        """Whether the placement still goes on, for longer than was expected."""
+        return not self.placed and bool(self.body.time > self._placement_time)
+
+    @property
+    def _placement_time(self) -> float:
+        """How long the placement is expected to take [s]; 0 without one."""
+        return self.pace * REST_TIME + PLACING_WAY / self.lowering_speed if self.lowering_speed is not None else 0.0
+
+    def _order(self) -> None:
+        """During placement, where the body is light, the guess at the next force is the last one, whatever is asked."""
+        self.master.extrapolation = self._extrapolation if self.placed else 0
+
+    # Stepping ------------------------------------------------------------------------------------------------------
+
+    def advance(self) -> None:
+        """One macro step; nothing once it is done. Raises RuntimeError where a placement does not come to rest."""
+        if self.done:
+            return
+        before = self.body.pose.position
+        reaction = self.master.step()
+        if not self.placed:
+            self._lower(reaction)
+            return
+        self._pull(before, self.body.pose.position, self._pull_of_weight, self.body.masses)
+        self._keep(reaction)
+        if (self.master.count - self.placing_steps) % self._every == 0 or self.done:
+            self._measure()
+
+    def _begin(self) -> None:
+        """Time is 0."""
+        self._start_balance(self.body.momentum, self._turning)
+        self._keep(self.master.last)
+        self._measure()
+
+    def _measure(self) -> None:
+        body = self.body
+        self._sample(body.time, body.momentum - self._pull_of_weight * body.time, self._turning)
+
+    def _keep(self, reaction: Reaction | None) -> None:
+        """One row, of the time of the pose."""
+        now = self.body.twist_now(self.ground.lag)
+        self._rows.append(self._row(reaction, now))
+        centre = self.body.pose.position - 0.5 * self.macro_step * now.velocity
+        feet = feet_of(reaction, centre, now, self._members - self._hull, hull=bool(self._hull))
+        self._keep_feet(feet)
+        self._states.append(STATES.index(self._read(feet) if self.ground.gives_friction else self._law_state()))
+
+    def _start_placement(self) -> None:
+        if isinstance(self.ground, BedGround):
+            self.pace = pace_under(self.ground.gravity)
+        self.body.begin_placement(self.lowering_speed, pace=self.pace, step=self.macro_step)
+
+    @property
+    def _weight(self) -> float:
+        """[N]"""
+        raise NotImplementedError
+
+    @property
+    def _pull_of_weight(self) -> Vector:
+        """Weight as a force [N], shape (3,)."""
+        raise NotImplementedError
+
+    @property
+    def _turning(self) -> Vector:
+        """Angular momentum of the body about (0, 0, 0) [N m s], for the balance."""
+        raise NotImplementedError
+
+    def _unrest(self) -> tuple[Vector, Vector]:
+        """What of the weight the ground does not carry yet [N], and the speeds [m/s]."""
+        raise NotImplementedError
+
+    def _row(self, reaction: Reaction | None, now: Twist) -> list[float]:
+        """By COLUMNS."""
+        raise NotImplementedError
+
+    def _keep_feet(self, feet: Vector) -> None:
+        """Keep what each member feels (`contact_state.feet_of`)."""
+        raise NotImplementedError
+
+    def _read(self, feet: Vector) -> str:
+        """The state, from forces of grains."""
+        raise NotImplementedError
+
+    def _law_state(self) -> str:
+        """The state, from who sticks and who slides on a law."""
+        raise NotImplementedError
+
+    # What came of it -----------------------------------------------------------------------------------------------
+
+    @property
+    def columns(self) -> dict[str, Vector]:
+        """The rows so far, by COLUMNS."""
+        return dict(zip(self.COLUMNS, self._row_table.T, strict=True))
+
+    @property
+    def _row_table(self) -> Vector:
+        return np.array(self._rows, dtype=float).reshape(-1, len(self.COLUMNS))
+
+    @property
+    def states(self) -> list[str]:
+        """The state at every row: on grains as `coupling.contact_state` reads it, on a law by who sticks and slides."""
+        return [STATES[code] for code in self._states]
+
+    @property
+    def _feet_table(self) -> Vector:
+        """What is kept of the feet, as an array."""
+        raise NotImplementedError
+
+    def state(self) -> State:
+        """All that the rest of the run depends on: a flat dict of numpy arrays."""
+        width = sum(part.size for part in self._unrest())
+        own: State = {
+            "counts": np.array([self.placed, self.placing_steps, self._frames], dtype=np.int64),
+            "settling": np.array(self._settling, dtype=float).reshape(-1, width),
+            "rows": self._row_table,
+            "states": np.array(self._states, dtype=np.int8),
+            "feet": self._feet_table,
+        }
+        own = {f"{self._prefix}.{key}": value for key, value in own.items()}
+        own |= {f"reader.{key}": value for key, value in self.reader.state().items()}
+        return own | self._balance_state() | self.master.state()
+
+    def restore(self, state: State) -> None:
+        """Go back to what `state` gave."""
+        own = {key.partition(".")[2]: value for key, value in state.items() if key.startswith(f"{self._prefix}.")}
+        placed, self.placing_steps, self._frames = (int(number) for number in own["counts"])
+        self.placed = bool(placed)
+        self._settling = list(np.array(own["settling"], dtype=float))
+        self._rows = np.asarray(own["rows"]).tolist()
+        self._states = [int(code) for code in own["states"]]
+        self._feet = list(np.array(own["feet"], dtype=float))
+        self._restore_balance(state)
+        self.reader.restore({key[7:]: value for key, value in state.items() if key.startswith("reader.")})
+        self.master.restore(state)
+        self._order()
+
+    # Placement -----------------------------------------------------------------------------------------------------
+
+    def _lower(self, reaction: Reaction) -> None:
+        """A step of the placement."""
+        self._settle(reaction, *self._unrest())
+
+    def _settle(self, reaction: Reaction, lacking: Vector, moving: Vector) -> None:
+        """A step of the placement, which ends at rest: what of the weight the ground does not carry yet [N], and the
+        speeds [m/s]. A body that bounces (its mass during placement is small against the contacts' stiffness), so that
+        it rests on the mean alone or not for half the time there is, is placed more slowly. Raises RuntimeError where
+        it takes too long."""
+        assert self.lowering_speed is not None
+        mean = self._mean_of_late(lacking, moving)
+        longest = self.pace * LONGEST_PLACING
+        if mean is not None:
+            scale = np.array([self._weight] * len(lacking) + [self.lowering_speed] * len(moving))
+            rests = bool(reaction.contacts) and bool((mean <= AT_REST * scale).all())
+            late = self._settling[-max(2, len(self._settling) // 4) :]
+            calm = bool((np.sqrt(np.mean(np.square(late), axis=0)) <= SWINGS * scale).all())
+            if rests and calm:
+                self._lies()
+            elif rests or (
+                self.body.time > 0.5 * longest and bool((np.std(self._settling, axis=0) > SWINGS * scale).any())
+            ):
+                self.body.slow_placement(FIRMER)
+                self._settling = []
+        if self.body.time > longest:  # 0 after its release
+            raise RuntimeError(
+                f"the platform did not come to rest within {longest:.3g} s of being set down: the ground carried "
+                f"{self.master.wrench.force[2]:.3g} of {self._weight:.3g} N at the end"
+            )
+
+    def _mean_of_late(self, lacking: Vector, moving: Vector) -> Vector | None:
+        """Size of the mean over the last REST_TIME of what lacks and moves; None as long as there is less of it."""
+        self.placing_steps = self.master.count
+        count = max(2, round(self.pace * REST_TIME / self.master.macro_step))
+        self._settling = [*self._settling, np.concatenate([lacking, moving])][-count:]
+        return np.abs(np.mean(self._settling, axis=0)) if len(self._settling) == count else None
+
+    def _lies(self) -> None:
+        """It lies where it was set down: the placement ends."""
+        self.body.release()
+        self.placed = True
+        self._order()
+        self._begin()

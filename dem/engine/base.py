@@ -1,0 +1,357 @@
+"""The part of a bed that steps: its fields, clock, bodies, neighbour lists and sleeping grains.
+
+``BedBase`` holds what one bed owns of an ``Engine``. Names without an underscore are public to the modules of dem:
+state, checkpoints, stresses and energies read them (``dem.engine.core`` is what a user's ``dem.Bed`` adds to).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from typing import Self
+
+import numpy as np
+import taichi as ti
+
+from dem.contact.cohesion import COHESIONS, jkr_range
+from dem.contact.law import effective_moduli, pair_row
+from dem.grains.materials import Material
+from dem.grains.profile import bulk_packing, surface_height
+from dem.grains.sizes import Json
+
+from . import runtime
+from .engine import take_engine
+from .lists import MOST_BODIES
+from .sleep import Sleep, Sleeper
+from .values import BedFailure, BedSettings
+
+__all__ = ["FLOOR", "BedBase", "check_array"]
+
+# Skin over mean diameter: first guess and bounds. It adapts to how often lists are made.
+_SKIN, _LEAST_SKIN, _LARGEST_SKIN = 0.06, 0.02, 0.15
+# A rebuild costs about as much as this many steps, and a skin of one diameter would add about this share to a step.
+_REBUILD_STEPS, _SKIN_COST = 4.0, 1.2
+FLOOR = 0
+
+
+class BedBase:
+    """Grains in an engine, the bodies among them, and the clock.
+
+    Attributes:
+        engine: fields and kernels. runtime: what Taichi runs on. settings: what the bed was made with.
+        material, size, gravity, time_step, seed: in force now; SI units.
+        overlap_limit: the bound on overlap over diameter [1]; ``advance`` raises BedFailure past it.
+        mean_diameter: of the grains [m]. skin: of the neighbour lists [m].
+        steps, list_count: time steps and neighbour lists so far. steps_since_lists: since the last lists.
+        reaction_steps: of the last ``advance``. tallied: sums of the forces on bodies since, or None.
+        sleeper: the rules of sleep at work, or None. has_floor: whether body 0 is a plane.
+        grain_steps: grains computed, summed over the steps since the bed was made in this process.
+        recipe: what the bed was prepared from; empty where it was made otherwise.
+        surface: height of the undisturbed surface [m]. packing_fraction: bulk value [1].
+    """
+
+    def __init__(self, settings: BedSettings, radii: np.ndarray, *, precision: str, arch: str, threads: int | None):
+        """Fields without grains in them; ``from_grains`` and the like check what they pass, and fill them."""
+        self.runtime = runtime.start(arch=arch, threads=threads, precision=precision)
+        self._generation = runtime.generation()
+        self.settings = settings
+        self.material = stuff = settings.material
+        self.size = settings.size
+        self.gravity = settings.gravity
+        self.time_step = settings.time_step
+        self.overlap_limit = settings.max_overlap
+        self.seed = settings.seed
+        self.steps = 0
+        self.list_count = 0
+        self.grain_count = len(radii)
+        # The same to the bit in whatever order the grains come, as a bed taken up again has them in another.
+        self.mean_diameter = 2 * math.fsum(radii) / self.grain_count
+        self.skin = _SKIN * self.mean_diameter
+        self.steps_since_lists = 0
+        self.reaction_steps = 0
+        self.tallied: np.ndarray | None = None
+        self.sleeper: Sleeper | None = None
+        self.grain_steps = 0
+        self.has_floor = False
+        self.recipe: Json = {}
+        self.surface = math.nan
+        self.packing_fraction = math.nan
+        largest = float(radii.max())
+        largest_skin = _LARGEST_SKIN * self.mean_diameter + _reach(stuff, largest / 2)
+        self.engine = take_engine(
+            self,
+            grain_count=self.grain_count,
+            period=self.size[:2],
+            bottom=-4 * largest,
+            height=settings.height,
+            largest_diameter=2 * largest,
+            largest_skin=largest_skin,
+            rolling=stuff.rolling_friction > 0,
+            tensile=settings.tensile,
+            cohesion=COHESIONS[stuff.cohesion],
+            real=ti.f64 if precision == "float64" else ti.f32,
+            gpu=arch == "cuda",
+            threads=self.runtime.threads,
+            neighbours_per_grain=_rows_per_grain(radii, largest_skin, gpu=arch == "cuda"),
+        )
+        self.engine.grain_pair[None] = pair_row(stuff, tensile=settings.tensile)
+        turn = np.zeros((MOST_BODIES, 4))
+        turn[:, 0] = 1
+        self.engine.write("body_turn", turn.astype(self.runtime.dtype))
+
+    def alike(self, settings: BedSettings, radii: np.ndarray) -> Self:
+        """Another bed of the same class, precision, architecture and threads, without grains in it yet."""
+        return type(self)(settings, radii, **asdict(self.runtime))
+
+    # ------------------------------------------------------------------ sleep
+
+    def let_sleep(self, rules: Sleep | None = None) -> None:
+        """From here on grains at rest far from the bodies are not computed; ``dem.engine.sleep`` has the rules.
+
+        What is read of the bed counts sleepers in, with no speed and no force. The floor's reaction has what they
+        would have passed on to it.
+
+        Raises:
+            ValueError: a bed on a GPU, without floor or gravity, or whose grains cohere by JKR.
+        """
+        self.check_valid()
+        if self.engine.gpu:
+            raise ValueError("arch = 'cuda': grains sleep on a CPU only so far")
+        if not self.has_floor or not any(self.gravity):
+            raise ValueError("grains sleep in a bed with a floor and gravity only: they must lie on something")
+        if self.material.cohesion == "jkr":
+            raise ValueError("cohesion = 'jkr': the force that wakes such grains is not measured; dmt or none would do")
+        self.wake()
+        self.engine.let_sleep()
+        self.sleeper = Sleeper(self, rules or Sleep())
+
+    def wake(self) -> None:
+        """All grains are awake and stay so."""
+        self.check_valid()
+        if self.sleeper is not None:
+            self.make_lists(all_awake=True)
+            self.sleeper = None
+            self.engine.wake_all()
+            self.compute_forces()
+
+    @property
+    def awake_count(self) -> int:
+        """Grains that are computed."""
+        return self.grain_count if self.sleeper is None else self.sleeper.awake
+
+    @property
+    def asleep(self) -> np.ndarray:
+        """Whether each grain sleeps, by id, bool, shape [grain_count]."""
+        if self.sleeper is None:
+            return np.zeros(self.grain_count, dtype=bool)
+        return np.asarray(self.engine.rest.asleep.to_numpy()[: self.grain_count] == 1)
+
+    def tally(self) -> tuple[np.ndarray, float]:
+        """Sums over the chunks of what grains did to the bodies, shape [body, 6]; the largest overlap."""
+        rows = np.zeros((MOST_BODIES + 1, 6))
+        self.engine.tally(rows)
+        return rows[:-1], float(rows[-1, 0])
+
+    def awake_rows(self, *names: str) -> list[np.ndarray]:
+        """Fields of the engine, of the grains awake, who come first in memory: the others have no speed, no force."""
+        self.check_valid()
+        awake = slice(0, self.awake_count)
+        return [self.engine.read(name)[awake].astype(float) for name in names]
+
+    def rates_now(
+        self, position: np.ndarray, velocity: np.ndarray, spin: np.ndarray, force: np.ndarray, torque: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Velocity [m/s] and spin [rad/s] at the time of the positions, half a step after the engine's, of its rows."""
+        half = 0.5 * self.time_step
+        radius, mass = position[:, 3], velocity[:, 3]
+        now = velocity[:, :3] + half * force / mass[:, None]
+        return now, spin[:, :3] + half * torque * (2.5 / (mass * radius**2))[:, None]
+
+    # ------------------------------------------------------------------ time
+
+    @property
+    def height(self) -> float:
+        """Top of the box [m]: a grain above it is lost."""
+        return float(self.settings.height)
+
+    @property
+    def time(self) -> float:
+        """Time since the bed was made [s]."""
+        return self.steps * self.time_step
+
+    def advance(self, steps: int = 1, *, drag_time: float = math.inf) -> None:
+        """Advance by a number of time steps.
+
+        Args:
+            drag_time: the grains settle as in a fluid that takes their speed away with this time constant [s]; a tool
+                of preparation, off by default.
+
+        Raises:
+            ValueError: steps that are no whole number, a drag time shorter than two steps.
+            BedFailure: a grain left the box, a number is not a number, or an overlap went past its bound.
+        """
+        self.check_valid()
+        e = self.engine
+        if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 0:
+            raise ValueError(
+                f"steps = {steps!r} must be a whole number of time steps of {self.time_step:.3g} s, 0 or more; "
+                f"round(time / bed.time_step) is that for a time"
+            )
+        if not drag_time >= 2 * self.time_step:
+            raise ValueError(f"drag_time = {drag_time} s must be at least two time steps of {self.time_step:.3g} s")
+        keep = 1 - self.time_step / drag_time
+        e.clear_pushes()
+        self.reaction_steps, self.tallied = steps, None
+        sleeper, forced = self.sleeper, False
+        if sleeper is not None:
+            e.rest.held.fill(0)
+            sleeper.slept = 0.0
+        limit = 0.5 * self.skin
+        done = 0
+        while done < steps:
+            most = steps - done
+            if sleeper is not None:
+                forced = sleeper.look()
+                if forced:  # new lists in the step to come, as if a grain had moved far
+                    e.moved[None] = 1
+                most = min(most, sleeper.steps_to_look())
+            advanced, halted = e.launch(most, self.time_step, limit, self.gravity, keep)
+            done += advanced
+            self._count(advanced)
+            if halted:
+                if not forced:
+                    self.adapt_skin()
+                self.make_lists()
+                self.compute_forces(self.time_step)
+                limit = 0.5 * self.skin
+                done += 1
+                self._count(1)
+        self.tallied, overlap = self.tally()
+        if not overlap <= self.overlap_limit:
+            raise BedFailure(
+                f"an overlap of {100 * overlap:.3g} % of a diameter went past its bound of "
+                f"{100 * self.overlap_limit:g} % at t = {self.time:.6g} s; make the grains stiffer (young = "
+                f"{self.material.young:.3g} Pa now) or the bound larger"
+            )
+
+    def _count(self, steps: int) -> None:
+        self.steps += steps
+        self.steps_since_lists += steps
+        self.grain_steps += steps * self.awake_count
+        if self.sleeper is not None:
+            self.sleeper.slept += steps * self.sleeper.mass
+
+    def adapt_skin(self) -> None:
+        """Towards the skin at which lists cost as much to make as their extra pairs cost to look at."""
+        steps = max(1, self.steps_since_lists)
+        ratio = math.sqrt(_REBUILD_STEPS / (_SKIN_COST * self.skin / self.mean_diameter * steps))
+        skin = self.skin * min(1.4, max(0.7, ratio))
+        self.skin = min(_LARGEST_SKIN * self.mean_diameter, max(_LEAST_SKIN * self.mean_diameter, skin))
+
+    def make_lists(self, *, all_awake: bool = False) -> None:
+        e = self.engine
+        e.keep_lists(e.rest, e.ledger)
+        awake = self.awake_count
+        if self.sleeper is not None:
+            self.sleeper.rearrange(all_awake=all_awake)
+        e.sort(*self.gravity, awake, e.rest, e.ledger)
+        e.make_lists(self.skin, e.shapes, e.rest, e.ledger)
+        self.list_count += 1
+        self.steps_since_lists = 0
+        code, value = (int(v) for v in e.problem[None])
+        if code:
+            e.problem[None] = [0, 0]
+            raise BedFailure(self._explain(code, value))
+
+    def _explain(self, code: int, value: int) -> str:
+        e = self.engine
+        if code == 1:
+            position = e.read("position")
+            ids = e.read("id")
+            bad = ~np.isfinite(position).all(axis=1)
+            if bad.any():
+                return f"the position of grain {int(ids[bad].min())} is not a number at t = {self.time:.6g} s"
+            lost = (position[:, 2] > self.settings.height) | (position[:, 2] < e.bottom)
+            first = int(ids[lost].min()) if lost.any() else value
+            where = position[ids == first][0, :3]
+            return (
+                f"grain {first} left the box ({int(lost.sum())} in all) at t = {self.time:.6g} s: it is at "
+                f"({where[0]:.4g}, {where[1]:.4g}, {where[2]:.4g}) m, the box reaches from {e.bottom:.4g} to "
+                f"{self.settings.height:.4g} m"
+            )
+        room = e.chunk_room if code == 2 else e.near_room
+        what = "pairs" if code == 2 else "grains near bodies"
+        return f"the lists have room for {room} {what} a chunk and {value} are needed; the grains overlap too much"
+
+    def compute_forces(self, elapsed: float = 0.0) -> None:
+        """Forces where the grains are; ``elapsed`` is the time by which contacts have slid since they were computed."""
+        self.tallied = None
+        e = self.engine
+        e.push_all(elapsed, e.shapes, e.rest, e.ledger)
+
+    def shift_velocities(self, part: float) -> None:
+        self.engine.shift_velocities(part * self.time_step)
+
+    def measure_surface(self) -> None:
+        """Take ``surface`` and ``packing_fraction`` anew from where the grains are now."""
+        position = self.engine.read("position").astype(float)
+        area = self.size[0] * self.size[1]
+        self.packing_fraction = bulk_packing(position[:, 2], position[:, 3], area)
+        self.surface = surface_height(position[:, 2], position[:, 3], area, bulk=self.packing_fraction)
+
+    @property
+    def max_overlap(self) -> float:
+        """Largest overlap over mean diameter of the pair [1] since the bed was made or this was set."""
+        return float(self.engine.read("overlap").max())
+
+    @max_overlap.setter
+    def max_overlap(self, value: float) -> None:
+        self.engine.overlap.fill(value)
+
+    def fill(self, positions, velocities, spins, radii, mass) -> None:
+        e = self.engine
+        dtype = self.runtime.dtype
+        n = self.grain_count
+        e.write("position", np.column_stack([positions, radii]).astype(dtype))
+        e.write("velocity", np.column_stack([velocities, mass]).astype(dtype))
+        e.write("spin", np.column_stack([spins, np.zeros(n)]).astype(dtype))
+        e.write("origin", positions.astype(dtype))
+        e.write("id", np.arange(n, dtype=np.int32))
+        e.write("near_end", (np.arange(e.chunk_count) * e.near_room).astype(np.int32))
+
+    def check_valid(self) -> None:
+        if self._generation != runtime.generation():
+            raise RuntimeError(
+                "this bed is no longer valid: Taichi was started anew with another precision, arch or number of threads"
+            )
+
+    def check_body(self, body: int) -> None:
+        self.check_valid()
+        if not 0 <= body < int(self.engine.body_count[None]):
+            raise ValueError(f"body = {body}: there is no such body in the bed")
+
+
+def check_array(name: str, array: np.ndarray, shape: tuple[int, ...]) -> None:
+    if array.shape != shape:
+        raise ValueError(f"{name} has shape {array.shape}, {shape} was expected")
+    if not np.isfinite(array).all():
+        raise ValueError(
+            f"{name} holds a number that is not finite, in row {int(np.argwhere(~np.isfinite(array))[0][0])}"
+        )
+
+
+def _reach(material: Material, radius: float) -> float:
+    """How far two grains of this effective radius [m] feel one another before they touch [m]; 0 but with JKR."""
+    if material.cohesion != "jkr":
+        return 0.0
+    young, _ = effective_moduli(material.young, material.poisson, material.young, material.poisson)
+    return jkr_range(surface_energy=material.surface_energy, radius=radius, effective_young=young)
+
+
+def _rows_per_grain(radii: np.ndarray, skin: float, *, gpu: bool) -> int:
+    """Rows of the pair lists for a grain: the most that fit around it (on a GPU) or around a mean one, with spare."""
+    small, large = float(radii.min()), float(radii.max())
+    # Caps of neighbours on a sphere: each takes a cone of half angle asin(r_s / (r_l + r_s + skin)).
+    half = math.asin(small / (large + small + skin))
+    most = math.ceil(2 / (1 - math.cos(half)))
+    return most + 4 if gpu else min(most + 4, 20)

@@ -1,0 +1,212 @@
+"""The bodies in a bed: putting them in, moving them, and the forces of the grains on them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from dem.contact.law import pair_row
+from dem.grains.materials import Facing
+from dem.shapes.basic import Plane
+from dem.shapes.solids import AnyShape
+
+from .base import FLOOR, BedBase, check_array
+from .engine import MOST_PRIMITIVES
+from .lists import MOST_BODIES
+
+__all__ = ["BedBodies"]
+
+
+class BedBodies(BedBase):
+    """A bed into which bodies are put; they move as they are set to, and the grains give way."""
+
+    def add_body(
+        self,
+        shape: AnyShape | Sequence[AnyShape],
+        *,
+        position: Sequence[float],
+        friction: float | None = None,
+        restitution: float | None = None,
+        rolling_friction: float | None = None,
+        young: float | None = None,
+        poisson: float = 0.3,
+        surface_energy: float | None = None,
+    ) -> int:
+        """Put a body among the grains and return its number. It moves as it is told; see ``move_body``.
+
+        Args:
+            shape: one or several of dem's Ball, Cylinder, Cone, Capsule, Box, Tube, Polyhedron, Mesh, Plane and Placed,
+                in the body's frame; their union is the body, and touches a grain once. What lies farther sideways from
+                the body's origin than half the bed's period touches nothing.
+            position: of the body's origin [m].
+            friction, restitution, rolling_friction: of a grain on the body; the grains' own when None.
+            young, poisson: of the body; rigid when None. [Pa], [1].
+            surface_energy: of a grain and the body [J/m2], see ``dem.Facing``; the grains' own when None.
+
+        Raises:
+            ValueError: no shape, a number that no pair can have, too many bodies, a grain already in contact by more
+                than the overlap bound.
+        """
+        self.check_valid()
+        facing = Facing(
+            friction=friction,
+            restitution=restitution,
+            rolling_friction=rolling_friction,
+            young=young,
+            poisson=poisson,
+            surface_energy=surface_energy,
+        )
+        body = self.place_body(shape, position, facing)
+        kept = self.max_overlap
+        self.max_overlap = 0.0
+        self.make_lists()
+        self.compute_forces()
+        found = self.max_overlap
+        if found > self.overlap_limit:
+            self.engine.body_count[None] = body
+            self.engine.drop_shapes(int(self.engine.body_primitives[body][0]))
+            self.make_lists()
+            self.max_overlap = kept
+            self.compute_forces()
+            raise ValueError(
+                f"the body at {tuple(position)} m starts in overlap with a grain by {100 * found:.2g} % of its "
+                f"diameter (the bound is {100 * self.overlap_limit:g} %); start it higher"
+            )
+        self.max_overlap = max(kept, found)
+        return body
+
+    def place_body(self, shape: AnyShape | Sequence[AnyShape], position: Sequence[float], facing: Facing) -> int:
+        e = self.engine
+        parts: list[Any] = [shape] if isinstance(shape, AnyShape) else list(shape)
+        body = int(e.body_count[None])
+        used = int(e.body_primitives[body - 1][1]) if body else 0
+        if not parts:
+            raise ValueError("shape is empty; a body needs at least one primitive")
+        for part in parts:
+            if not isinstance(part, AnyShape):
+                raise ValueError(
+                    f"shape holds {part!r}, which is no shape; use Ball, Cylinder, Cone, Capsule, Box, Tube, "
+                    f"Polyhedron, Mesh, Plane or Placed"
+                )
+        if len(position) != 3 or not all(math.isfinite(p) for p in position):
+            raise ValueError(f"position = {tuple(position)} must be 3 finite numbers [m]")
+        if body >= MOST_BODIES or used + len(parts) > MOST_PRIMITIVES:
+            raise ValueError(f"a bed takes at most {MOST_BODIES} bodies of {MOST_PRIMITIVES} primitives in all")
+        self.set_facing(body, facing)
+        e.put_shapes(used, parts)
+        e.body_primitives[body] = [used, used + len(parts)]
+        e.body_extent[body] = min(1e35, max(p.extent() for p in parts))
+        e.body_position[body] = [float(p) for p in position]
+        e.body_velocity[body] = [0.0, 0.0, 0.0]
+        e.body_spin[body] = [0.0, 0.0, 0.0]
+        e.body_turn[body] = [1.0, 0.0, 0.0, 0.0]
+        e.body_count[None] = body + 1
+        if body == FLOOR and any(isinstance(p, Plane) for p in parts):
+            self.has_floor = True
+        return body
+
+    def set_facing(self, body: int, facing: Facing) -> None:
+        """How grains touch a body, from now on. Raises ValueError as ``Facing.refuse_for`` does."""
+        facing.refuse_for(self.material)
+        self.engine.body_pair[body] = pair_row(self.material, facing, tensile=self.settings.tensile)
+
+    def move_body(
+        self,
+        body: int,
+        *,
+        position: Sequence[float] | None = None,
+        velocity: Sequence[float] | None = None,
+        turn: Sequence[float] | None = None,
+        spin: Sequence[float] | None = None,
+    ) -> None:
+        """Set a body's pose and the velocity that it holds while the bed advances.
+
+        Args:
+            position: of its origin [m]. velocity: [m/s].
+            turn: unit quaternion, scalar first. spin: angular velocity [rad/s].
+
+        Raises:
+            ValueError: a body that is not there, numbers that are not finite, a turn that is not of length 1.
+        """
+        self.check_body(body)
+        e = self.engine
+        for name, value, width in (
+            ("body_position", position, 3),
+            ("body_velocity", velocity, 3),
+            ("body_turn", turn, 4),
+            ("body_spin", spin, 3),
+        ):
+            if value is not None:
+                numbers = [float(v) for v in value]
+                if len(numbers) != width or not all(map(math.isfinite, numbers)):
+                    raise ValueError(f"{name[5:]} = {tuple(value)} must be {width} finite numbers")
+                if name == "body_turn":
+                    _refuse_turns("turn", np.array([numbers]))
+                getattr(e, name)[body] = numbers
+
+    def move_bodies(
+        self,
+        bodies: Sequence[int],
+        *,
+        positions: np.ndarray,
+        velocities: np.ndarray,
+        turns: np.ndarray,
+        spins: np.ndarray,
+    ) -> None:
+        """Several bodies at once, as ``move_body`` does one: quicker, where a platform has many.
+
+        Args:
+            bodies: their numbers. positions, velocities, spins: [m], [m/s], [rad/s], each of shape [body, 3].
+            turns: unit quaternions, scalar first, shape [body, 4].
+
+        Raises:
+            ValueError: a body that is not there, numbers that are not finite, a wrong shape, a turn not of length 1.
+        """
+        self.check_valid()
+        count = int(self.engine.body_count[None])
+        if not all(0 <= body < count for body in bodies):
+            raise ValueError(f"bodies = {list(bodies)}: the bed has bodies 0 to {count - 1}")
+        n = len(bodies)
+        given = {"positions": positions, "velocities": velocities, "turns": turns, "spins": spins}
+        for name, values in given.items():
+            check_array(name, np.asarray(values, dtype=float), (n, 4 if name == "turns" else 3))
+        _refuse_turns("turns", np.asarray(turns, dtype=float))
+        self.engine.place_bodies(np.array(bodies, dtype=np.int32), np.hstack(list(given.values())).astype(float))
+
+    def body_position(self, body: int) -> np.ndarray:
+        """Where a body's origin is [m], shape [3]."""
+        self.check_body(body)
+        return np.array(self.engine.body_position[body], dtype=float)
+
+    def body_turn(self, body: int) -> np.ndarray:
+        """How a body is turned: a unit quaternion, scalar first, shape [4]."""
+        self.check_body(body)
+        return np.array(self.engine.body_turn[body], dtype=float)
+
+    def reaction(self, body: int) -> tuple[np.ndarray, np.ndarray]:
+        """Force [N] and torque about the body's origin [N m] from the grains, each of shape [3].
+
+        The mean over the last ``advance``: the impulse divided by the time.
+        """
+        self.check_body(body)
+        row = self.reactions()[body]
+        return row[:3], row[3:]
+
+    def reactions(self) -> np.ndarray:
+        """What ``reaction`` gives, of every body there may be: force and torque in a row of six, shape [body, 6]."""
+        if self.tallied is None:
+            self.tallied = self.tally()[0]
+        total = self.tallied
+        if self.sleeper is not None:
+            total = total.copy()
+            total[FLOOR, :3] += self.sleeper.on_floor()
+        return total / max(1, self.reaction_steps)
+
+
+def _refuse_turns(name: str, turns: np.ndarray) -> None:
+    """Raise ValueError where a quaternion of shape [n, 4] is not of length 1, which would stretch the body."""
+    for turn in turns[~(np.abs((turns**2).sum(axis=1) - 1) < 1e-3)]:
+        raise ValueError(f"{name} = {tuple(map(float, turn))} must be of length 1 (a unit quaternion, scalar first)")

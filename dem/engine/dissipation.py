@@ -1,0 +1,210 @@
+"""The book of what contacts take: work against dashpots, friction and turning, summed while the bed runs.
+
+A step carries a pair from one set of forces to the next at one velocity (leapfrog), so what a part of the force takes
+over it is minus the mean of the part before and after, times that velocity, times dt: the same sum as that of
+``experiments.validate.base.energy`` in another order, of second order in the step and without a memory but the parts
+of the
+step before. Three parts: the normal dashpot, the tangential force (its spring included), the rolling and twisting
+torque (likewise). What the springs hold, ``dem.engine.energy`` reads off; less that, the last two are friction.
+
+Beside it stands the book of angular momentum about the bed's origin: what the bodies took, and what reaches the grains
+from outside, which is weight, contacts across the periodic sides (the torques on a pair whose neighbour is an image do
+not cancel but leave the period x F), grains put back into the box at its other side, and sleepers (what those awake do
+to them, and what falling asleep takes). Leapfrog's x_n x m v_(n+1/2) changes by exactly the sum of these each step.
+
+A bed without a book has ``NO_LEDGER`` for a table, and its kernels are compiled without all this.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import taichi as ti
+
+from .lists import AWAKE, INDEX_BITS, INDEX_MASK, PERIOD_X, PERIOD_Y, SAME_IMAGE
+from .rows import put_rows, take_rows
+
+__all__ = ["NO_LEDGER", "OUTSIDE", "PARTS", "TURNED", "Bookkeeping", "Ledger"]
+
+PARTS = ("damping", "tangential", "turning")
+TURNED = ("outside", "first_body", "bodies")
+OUTSIDE, FIRST, OTHERS = range(3)
+# Of a row of ``last``: the normal dashpot's force, the tangential force, the turning torque.
+_WIDTH = 7
+
+
+@ti.data_oriented
+class _NoLedger:
+    """Stands where no book is kept."""
+
+    on = False
+
+
+NO_LEDGER = _NoLedger()
+
+
+@ti.data_oriented
+class Ledger:
+    """Parts of the forces of the last step, by row of the pair lists and the near lists, and the sums of chunks."""
+
+    on = True
+    outside = OUTSIDE
+
+    def __init__(self, *, rows: int, near: int, chunks: int, real):
+        self.real = real
+        F = ti.Vector.field
+        self.last = F(_WIDTH, real, rows)
+        self.old_last = F(_WIDTH, real, rows)
+        self.near_last = F(_WIDTH, real, near)
+        self.old_near_last = F(_WIDTH, real, near)
+        self.taken = F(len(PARTS), ti.f64, chunks)
+        # Angular impulses about the bed's origin: from outside, to the first body (the floor, where there is one), to
+        # the other bodies; and gravity.
+        self.turned = F(3, ti.f64, (chunks, len(TURNED)))
+        self.pull = F(3, ti.f64, ())
+
+    def clear(self) -> None:
+        """A new book: no sums, nothing remembered."""
+        for field in (self.last, self.near_last, self.taken, self.turned):
+            field.fill(0)
+
+    def sums(self) -> np.ndarray:
+        """Over all chunks, in their order, shape [3] [J]."""
+        return np.asarray(np.cumsum(self.taken.to_numpy(), axis=0)[-1])
+
+    def turns(self) -> np.ndarray:
+        """Angular impulses over all chunks, in their order: a row each of ``TURNED`` [N m s], shape [3, 3]."""
+        return np.asarray(np.cumsum(self.turned.to_numpy(), axis=0)[-1])
+
+    def state(self, rows: np.ndarray, near: np.ndarray) -> dict[str, np.ndarray]:
+        """All that the book's next step depends on; ``rows``, ``near``: of the lists, those in use."""
+        return {
+            "ledger_last": take_rows(self.last, rows),
+            "ledger_near_last": take_rows(self.near_last, near),
+            "ledger_taken": self.taken.to_numpy(),
+            "ledger_turned": self.turned.to_numpy(),
+        }
+
+    def restore(self, state: dict[str, np.ndarray], rows: np.ndarray, near: np.ndarray) -> None:
+        """Go back to what ``state`` gave; the lists are already as they were."""
+        for field, name, where in (
+            (self.last, "ledger_last", rows), (self.near_last, "ledger_near_last", near),
+            (self.taken, "ledger_taken", slice(None)), (self.turned, "ledger_turned", slice(None)),
+        ):  # fmt: skip
+            put_rows(field, state[name], where)
+
+    @ti.func
+    def nothing(self):
+        """A row of ``last`` of a pair apart."""
+        return ti.Vector.zero(self.real, _WIDTH)
+
+    @ti.func
+    def parts(self, damped, f_t, turn):
+        """A row of ``last``."""
+        return ti.Vector([damped, f_t.x, f_t.y, f_t.z, turn.x, turn.y, turn.z])
+
+    @ti.func
+    def took(self, before, now, v_n, v_t, spin, dt):
+        """What the parts took [J] over a step in which the pair parted at v_n, slid at v_t and turned at ``spin``."""
+        p = -0.5 * dt * (before + now)
+        return ti.Vector(
+            [p[0] * v_n, p[1] * v_t.x + p[2] * v_t.y + p[3] * v_t.z, p[4] * spin.x + p[5] * spin.y + p[6] * spin.z]
+        )
+
+    @ti.func
+    def add(self, c, took):
+        """To a chunk's sums."""
+        self.taken[c] = self.taken[c] + ti.cast(took, ti.f64)
+
+    @ti.func
+    def turn(self, c, which: ti.template(), impulse):
+        """To a chunk's angular impulses."""
+        self.turned[c, which] = self.turned[c, which] + ti.cast(impulse, ti.f64)
+
+
+@ti.data_oriented
+class Bookkeeping:
+    """The part of the engine that keeps the book of pairs."""
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any: ...
+
+    @ti.func
+    def book_pair(self, c, s, i, j, d, now, dt, rest: ti.template(), ledger: ti.template()):
+        """What a pair's row took over the step; ``now`` the parts of its force."""
+        start, end = self.chunk_range(c)
+        length = d.norm()
+        n = d / length
+        v = self.velocity[i].xyz - self.velocity[j].xyz
+        v_n = v.dot(n)
+        v_t = v - v_n * n
+        h = 0.5 * dt / length
+        half = 0.5 * (self.position[i].w + self.position[j].w - length) + 0.25 * dt * v_n
+        w_i, w_j = self.spin[i].xyz, self.spin[j].xyz
+        turning = (self.position[i].w - half) * w_i + (self.position[j].w - half) * w_j
+        took = ledger.took(
+            ledger.last[s], now, v_n - h * v_t.norm_sqr(), (1.0 + h * v_n) * v_t - turning.cross(n), w_i - w_j, dt
+        )
+        ledger.last[s] = now
+        # Across chunks both sides have a row; a sleeper has none.
+        share = ti.cast(0.5, self.real)
+        if j >= start and j < end:
+            share = ti.cast(1.0, self.real)
+        if ti.static(rest.on):
+            if j >= self.count[AWAKE]:
+                share = ti.cast(1.0, self.real)
+        ledger.add(c, share * took)
+
+    @ti.func
+    def book_weight(self, c, dt, ledger: ti.template()):
+        """Gravity's angular impulse on the grains of a chunk."""
+        start, end = self.chunk_range(c)
+        moment = ti.Vector.zero(ti.f64, 3)
+        for i in range(start, end):
+            moment += ti.cast(self.velocity[i].w * self.position[i].xyz, ti.f64)
+        ledger.turn(c, OUTSIDE, ti.cast(dt, ti.f64) * moment.cross(ledger.pull[None]))
+
+    @ti.func
+    def book_turning(self, c, bits, f, f_t, turn, n, arm_j, dt, rest: ti.template(), ledger: ti.template()):
+        """Of a touching pair's force: what crosses the periodic sides, and what a sleeper takes."""
+        start, end = self.chunk_range(c)
+        j = bits & INDEX_MASK
+        image = bits >> INDEX_BITS
+        sleeps = False
+        if ti.static(rest.on):
+            sleeps = j >= self.count[AWAKE]
+        if image != SAME_IMAGE or sleeps:
+            shift = ti.Vector.zero(self.real, 3)
+            shift.x = ti.cast(image % 3 - 1, self.real) * self.box[PERIOD_X]
+            shift.y = ti.cast(image // 3 - 1, self.real) * self.box[PERIOD_Y]
+            # Across chunks both sides have a row; a sleeper has none.
+            share = ti.cast(0.5, self.real)
+            if sleeps or (j >= start and j < end):
+                share = ti.cast(1.0, self.real)
+            out = -share * shift.cross(f)
+            if sleeps:
+                out -= arm_j * f_t.cross(n) - turn - self.position[j].xyz.cross(f)
+            ledger.turn(c, OUTSIDE, dt * out)
+
+    @ti.func
+    def book_body(self, c, i, b, f, t_body, n, arm, arm_i, dt, ledger: ti.template()):
+        """Of a grain's force on a body's row: what the body took, and what crosses the periodic sides."""
+        at = self.body_position[b]
+        # From the grain to where the body has the contact: a period where an image of the body is met.
+        off = at + arm + arm_i * n - self.position[i].xyz
+        shift = ti.Vector.zero(self.real, 3)
+        shift.x = ti.round(off.x / self.box[PERIOD_X]) * self.box[PERIOD_X]
+        shift.y = ti.round(off.y / self.box[PERIOD_Y]) * self.box[PERIOD_Y]
+        ledger.turn(c, OUTSIDE, -dt * shift.cross(f))
+        taken = dt * (t_body - at.cross(f))
+        if b == 0:
+            ledger.turn(c, FIRST, taken)
+        else:
+            ledger.turn(c, OTHERS, taken)
+
+    @ti.func
+    def book_leaving(self, c, i, ledger: ti.template()):
+        """A grain that falls asleep: what its motion had is gone."""
+        x, v, w = self.position[i], self.velocity[i], self.spin[i]
+        own = (ti.cast(0.4, self.real) * v.w * x.w * x.w) * w.xyz
+        ledger.turn(c, OUTSIDE, -(v.w * x.xyz.cross(v.xyz) + own))

@@ -1,0 +1,371 @@
+"""The fields and the time step: everything that runs once a step.
+
+Layout (measured reasons in docs/performance.md):
+
+* Grains lie in memory in the order of a space-filling curve through the cells, so that neighbours are near.
+* They are cut into a fixed number of contiguous chunks, whatever the number of threads. A pair inside a chunk is
+  computed once, by the chunk's own serial loop, and added to both; a pair across chunks is computed by both sides. So
+  no two threads write to one grain, and every sum has one order: the same bits on any number of threads. On a GPU a
+  chunk is one grain, and the same code is a full list.
+* A step has two phases. ``move`` kicks and drifts (leapfrog: velocities live half a step behind positions); ``push``
+  computes forces. Moving also finds out whether a grain has come further than half the skin; if so the launch ends
+  there, and the host makes new lists and goes on. On a CPU all steps of a launch are one parallel loop (``run``).
+* Sums into a field are written as x = x + y, because Taichi's x += y is an atomic operation.
+
+An engine is compiled for a capacity, not for a number of grains, and is used again by the next bed that fits:
+``take_engine`` keeps those that no bed holds any more.
+"""
+
+import math
+import weakref
+from typing import Any
+
+import numpy as np
+import taichi as ti
+
+from dem.contact.law import PAIR_WIDTH
+from dem.grains.curve import curve_ranks
+from dem.grains.sizes import Json
+from dem.shapes.basic import ROW_WIDTH
+
+from . import runtime
+from .dissipation import NO_LEDGER, Bookkeeping, Ledger
+from .lists import (
+    AWAKE,
+    BOTTOM,
+    CACHE_LINE,
+    CELLS,
+    CHUNKS,
+    ITEMS_PER_THREAD,
+    MOST_BODIES,
+    SCAN_BLOCKS,
+    SORTED,
+    SORTED_CELLS,
+    Lists,
+)
+from .readings import TALLY_BLOCKS, Readings
+from .shape_table import PLAIN, Shapes
+from .sleep_kernels import EVERYONE, Rest, Sleepers
+from .steps import Steps
+
+__all__ = ["Engine", "MOST_BODIES", "MOST_PRIMITIVES", "STEPS_PER_LAUNCH", "take_engine"]
+
+# A launch is short enough for a thread that left to come back soon, and for Ctrl-C.
+STEPS_PER_LAUNCH = 20
+GRAINS_PER_CHUNK = 1250
+MOST_CHUNKS = 64
+AWAKE_SHARE = 0.64
+MOST_PRIMITIVES = 64
+
+_free: dict[tuple, list] = {}
+
+
+def take_engine(owner: Any, **settings: Any) -> "Engine":
+    """An engine for ``owner``, set up by ``settings`` (those of ``Engine.set_up``, and ``rolling``, ``tensile``,
+    ``cohesion``, ``real``, ``gpu``, ``threads``); one that an earlier owner has left, where there is one of the shape.
+
+    Raises:
+        ValueError: a bed less than three grains wide.
+    """
+    fixed = {key: settings.pop(key) for key in ("rolling", "tensile", "cohesion", "real", "gpu", "threads")}
+    plan = Engine.plan(gpu=fixed["gpu"], **settings)
+    shape = {key: plan.pop(key) for key in ("capacity", "cell_capacity", "chunk_capacity", "neighbours_per_grain")}
+    key = (runtime.generation(), *shape.values(), *(str(value) for value in fixed.values()))
+    for old in [k for k in _free if k[0] != key[0]]:
+        del _free[old]
+    idle = _free.setdefault(key, [])
+    engine = idle.pop() if idle else Engine(**shape, **fixed)
+    engine.set_up(**plan)
+    weakref.finalize(owner, idle.append, engine).atexit = False
+    return engine
+
+
+def _roomy(count: int, *, least: int) -> int:
+    """The next of 1 and 1.5 times a power of two: few shapes to compile, and little room wasted."""
+    power = least
+    while power < count:
+        if power * 3 // 2 >= count:
+            return power * 3 // 2
+        power *= 2
+    return power
+
+
+@ti.data_oriented
+class Engine(Lists, Steps, Readings, Shapes, Sleepers, Bookkeeping):
+    """Grains, lists and bodies in Taichi fields, and the kernels that advance them.
+
+    Args:
+        capacity: grains that there is room for, at most 2^26.
+        cell_capacity, chunk_capacity: likewise.
+        neighbours_per_grain: rows of the pair lists for each.
+        rolling: whether contacts carry a rolling spring.
+        tensile: whether a contact's damping may pull at its end.
+        cohesion: a law of ``dem.contact.cohesion.COHESIONS``.
+        real: ti.f64 or ti.f32.
+        gpu: one grain a chunk.
+        threads: of the CPU.
+    """
+
+    # Fields with a row for each grain: ``read`` and ``write`` see those in use.
+    GRAIN_FIELDS = (
+        "position",
+        "velocity",
+        "spin",
+        "force",
+        "torque",
+        "origin",
+        "listed",
+        "id",
+        "pair_start",
+        "pair_end",
+    )
+
+    @staticmethod
+    def plan(
+        *,
+        grain_count: int,
+        period: tuple[float, float],
+        bottom: float,
+        height: float,
+        largest_diameter: float,
+        largest_skin: float,
+        gpu: bool = False,
+        neighbours_per_grain: int = 16,
+        chunk_count: int | None = None,
+    ) -> Json:
+        """The shape to compile and the numbers to set up.
+
+        Args:
+            grain_count: number of grains.
+            period: lateral period (x, y) [m].
+            bottom, height: z of the box's bottom and top [m].
+            largest_diameter: of the grains [m]. largest_skin: of the lists [m].
+            gpu: one grain a chunk.
+            neighbours_per_grain: room in the lists.
+            chunk_count: chosen when None.
+        """
+        cell = largest_diameter + largest_skin
+        cells = (
+            max(1, int(period[0] / cell)),
+            max(1, int(period[1] / cell)),
+            max(1, int((height - bottom) / cell) + 1),
+        )
+        if min(cells[:2]) < 3:
+            # With fewer the same neighbour would be met through two images.
+            raise ValueError(
+                f"the bed is {min(period):g} m across, less than three grains of {largest_diameter:g} m; "
+                f"make it at least {3 * cell:.3g} m wide"
+            )
+        if chunk_count is None:
+            chunk_count = grain_count if gpu else max(1, min(MOST_CHUNKS, round(grain_count / GRAINS_PER_CHUNK)))
+        return {
+            "capacity": _roomy(grain_count, least=64),
+            "cell_capacity": _roomy(math.prod(cells), least=1024),
+            "chunk_capacity": _roomy(chunk_count, least=MOST_CHUNKS),
+            "neighbours_per_grain": neighbours_per_grain,
+            "grain_count": grain_count,
+            "chunk_count": chunk_count,
+            "cells": cells,
+            "box": (*period, bottom, height, period[0] / cells[0], period[1] / cells[1], cell),
+        }
+
+    def __init__(
+        self,
+        *,
+        capacity: int,
+        cell_capacity: int,
+        chunk_capacity: int,
+        neighbours_per_grain: int,
+        rolling: bool,
+        tensile: bool,
+        cohesion: int,
+        real,
+        gpu: bool = False,
+        threads: int = 1,
+    ):
+        self.real = real
+        self.rolling = rolling
+        self.tensile = tensile
+        self.cohesion = cohesion
+        self.gpu = gpu
+        self.cpu_items = threads * ITEMS_PER_THREAD
+        self.block_stride = SCAN_BLOCKS if gpu else threads
+        self.count = ti.field(ti.i32, 12)
+        self.box = ti.field(real, 7)
+        self._make_grain_fields(capacity, cell_capacity)
+        self._make_list_fields(capacity, chunk_capacity, capacity * neighbours_per_grain + 8 * chunk_capacity)
+        self._make_body_fields(chunk_capacity)
+        # Who computes which chunk, each counter in a cache line of its own.
+        self.ticket = ti.field(ti.i32, 2 * CACHE_LINE)
+        self.claim = ti.field(ti.i32, chunk_capacity * CACHE_LINE if not gpu else 1)
+        self.shapes = PLAIN  # the table of the shapes that need one; kernels are compiled anew for another
+        self._kept = None
+        self._meshes = []
+        self.rest: Any = EVERYONE  # the table of those that sleep, likewise
+        self._kept_rest: Rest | None = None
+        self.held: Any = None  # what `dem.engine.checkpoint` copied last
+        self.ledger: Any = NO_LEDGER  # the table of the book of dissipation, likewise
+        self._kept_ledger: Ledger | None = None
+        # Step control: moved is written by move and read by push; halted is written by push and read by move.
+        self.moved = ti.field(ti.i32, ())
+        self.halted = ti.field(ti.i32, ())
+        self.done = ti.field(ti.i32, ())
+        self.problem = ti.Vector.field(2, ti.i32, ())
+
+    def _make_grain_fields(self, n: int, cell_capacity: int) -> None:
+        """A row for each grain, and room for sorting."""
+        F, real = ti.Vector.field, self.real
+        # position: x y z radius; velocity: x y z mass (half a step behind); spin: x y z and nothing.
+        self.position, self.velocity, self.spin = (F(4, real, n) for _ in range(3))
+        self.force, self.torque, self.origin, self.listed = (F(3, real, n) for _ in range(4))
+        self.id = ti.field(ti.i32, n)
+        self.buffer4 = [F(4, real, n) for _ in range(3)]
+        self.buffer3 = F(3, real, n)
+        self.buffer_id, self.came_from, self.key = (ti.field(ti.i32, n) for _ in range(3))
+        self.rank = ti.field(ti.i32, cell_capacity)
+        self.cell_start = ti.field(ti.i32, 2 * cell_capacity + 1)
+        self.cell_fill = ti.field(ti.i32, 2 * cell_capacity)
+        self.block_sum = ti.field(ti.i32, SCAN_BLOCKS)
+
+    def _make_list_fields(self, n: int, chunk_capacity: int, rows: int) -> None:
+        """Pair lists and lists of grains near bodies.
+
+        Chunk c owns the rows from c times its room, those of a grain lie together. ``first`` is the grain a row belongs
+        to, ``pair`` its neighbour's code, ``touching`` the rows in contact in this step, ``slide`` the contact's
+        history: x y z of the tangential spring, and what the normal dashpot remembers.
+        """
+        F, real = ti.Vector.field, self.real
+        self.pair_start, self.pair_end, self.old_start, self.old_end = (ti.field(ti.i32, n) for _ in range(4))
+        self.pair, self.first, self.touching, self.old_pair = (ti.field(ti.i32, rows) for _ in range(4))
+        self.slide, self.old_slide = F(4, real, rows), F(4, real, rows)
+        if self.rolling:
+            self.roll, self.old_roll = F(3, real, rows), F(3, real, rows)
+        near = 2 * n + 8 * chunk_capacity
+        self.near_end, self.old_near_end = (ti.field(ti.i32, chunk_capacity) for _ in range(2))
+        self.near_grain, self.near_body, self.old_near_grain, self.old_near_body = (
+            ti.field(ti.i32, near) for _ in range(4)
+        )
+        self.near_slide, self.old_near_slide = F(4, real, near), F(4, real, near)
+        self.near_roll, self.old_near_roll = F(3, real, near), F(3, real, near)
+        self.near_first = ti.field(ti.i32, n)
+
+    def _make_body_fields(self, chunk_capacity: int) -> None:
+        """Bodies, whose velocities the host sets, their shapes, and the forces of each chunk on them."""
+        F, real = ti.Vector.field, self.real
+        self.overlap = ti.field(real, chunk_capacity)
+        self.pushes = F(6, real, (chunk_capacity, MOST_BODIES))
+        if self.gpu:  # sums over blocks of chunks, so that nothing of the bed's size is summed by one thread or read
+            self.block_pushes = F(6, ti.f64, (TALLY_BLOCKS, MOST_BODIES))
+            self.block_overlap = ti.field(ti.f64, TALLY_BLOCKS)
+        self.body_count = ti.field(ti.i32, ())
+        self.body_position, self.body_velocity, self.body_spin, self.body_listed = (
+            F(3, real, MOST_BODIES) for _ in range(4)
+        )
+        self.body_turn, self.body_listed_turn = (F(4, real, MOST_BODIES) for _ in range(2))  # quaternions, scalar first
+        self.body_extent = ti.field(real, MOST_BODIES)
+        self.body_primitives = F(2, ti.i32, MOST_BODIES)
+        self.body_pair = F(PAIR_WIDTH, real, MOST_BODIES)
+        self.primitive_kind = ti.field(ti.i32, MOST_PRIMITIVES)
+        self.primitive_row = F(ROW_WIDTH, real, MOST_PRIMITIVES)
+        self.grain_pair = F(PAIR_WIDTH, real, ())
+
+    def set_up(
+        self, *, grain_count: int, chunk_count: int, cells: tuple[int, int, int], box: tuple[float, ...]
+    ) -> None:
+        """Make it new for a bed: sizes set, lists and bodies empty."""
+        self.grain_count = grain_count
+        self.chunk_count = chunk_count
+        self.nx, self.ny, self.nz = cells
+        self.bottom = box[BOTTOM]
+        self.chunk_room = self.pair.shape[0] // chunk_count
+        self.near_room = self.near_grain.shape[0] // chunk_count
+        # Fewer awake have smaller chunks, so that all threads have some.
+        self.awake_per_chunk = max(1, round(AWAKE_SHARE * GRAINS_PER_CHUNK))
+        sizes = (grain_count, chunk_count, self.chunk_room, self.near_room, *cells, math.prod(cells))
+        self.count.from_numpy(np.array([*sizes, grain_count, chunk_count, grain_count, sizes[-1]], dtype=np.int32))
+        for k, value in enumerate(box):
+            self.box[k] = value
+        self.write("rank", curve_ranks(*cells))
+        bodies = (self.body_position, self.body_velocity, self.body_spin, self.body_turn, self.body_listed,
+            self.body_listed_turn, self.body_extent, self.body_primitives, self.body_pair, self.primitive_kind,
+            self.primitive_row)  # fmt: skip
+        for field in (self.pair_start, self.pair_end, self.overlap, self.ticket, self.near_end, *bodies):
+            field.fill(0)
+        for counter in (self.body_count, self.moved, self.halted, self.done):
+            counter[None] = 0
+        self.problem[None] = [0, 0]
+        self.clear_pushes()
+        self.clear_shapes()
+        self.held = None
+        self.rest = EVERYONE
+        self.ledger = NO_LEDGER
+
+    def let_sleep(self) -> None:
+        """From here on kernels know of sleep; all are awake still."""
+        if self._kept_rest is None:
+            self._kept_rest = Rest(
+                grains=self.id.shape[0], cells=self.rank.shape[0], chunks=self.overlap.shape[0],
+                rows=self.pair.shape[0], real=self.real,
+            )  # fmt: skip
+        self.rest = rest = self._kept_rest
+        for field in (rest.asleep, rest.was, rest.woken, rest.leaves, rest.quiet, rest.start, rest.end):
+            field.fill(0)
+        for field in (rest.side, rest.mass, rest.news, rest.held, rest.begins, rest.block, rest.force):
+            field.fill(0)
+        rest.whole[None] = 1
+        rest.last[None] = -1
+
+    def wake_all(self) -> None:
+        """All are awake, and the kernels are those that know of no sleep."""
+        self.rest = EVERYONE
+        self.count[AWAKE], self.count[CHUNKS] = self.grain_count, self.chunk_count
+        self.count[SORTED], self.count[SORTED_CELLS] = self.grain_count, self.count[CELLS]
+
+    def open_ledger(self, gravity: tuple[float, float, float]) -> None:
+        """From here on kernels keep the book of what contacts take."""
+        if self._kept_ledger is None:
+            self._kept_ledger = Ledger(
+                rows=self.pair.shape[0], near=self.near_grain.shape[0], chunks=self.overlap.shape[0], real=self.real
+            )
+        self.ledger = self._kept_ledger
+        self.ledger.clear()
+        self.ledger.pull[None] = gravity
+
+    def close_ledger(self) -> None:
+        """The kernels are those that keep no book."""
+        self.ledger = NO_LEDGER
+
+    def read(self, name: str) -> np.ndarray:
+        """A field as a numpy array: the rows of the grains or chunks there are, or all of them."""
+        array = getattr(self, name).to_numpy()
+        if name in self.GRAIN_FIELDS:
+            return array[: self.grain_count]
+        if name in ("overlap", "pushes", "near_end"):
+            return array[: self.chunk_count]
+        return array
+
+    def write(self, name: str, values: np.ndarray, rows: np.ndarray | None = None) -> None:
+        """Put values into the first rows of a field, or into the rows given; the others become zero."""
+        field = getattr(self, name)
+        values = np.asarray(values)
+        shape = (*field.shape, *values.shape[len(field.shape) :])
+        array = np.zeros(shape, dtype=values.dtype)
+        if rows is None:
+            array[tuple(slice(count) for count in values.shape[: len(field.shape)])] = values
+        else:
+            array[rows] = values
+        field.from_numpy(array)
+
+    # ------------------------------------------------------------------ the step
+
+    def launch(
+        self, most: int, dt: float, limit: float, gravity: tuple[float, float, float], keep: float
+    ) -> tuple[int, bool]:
+        """Up to ``most`` steps, or a few where that is many: (steps done, whether new lists are needed)."""
+        if self.gpu:
+            self.done[None] = 0
+            for _ in range(min(most, STEPS_PER_LAUNCH)):
+                self.run_on_gpu(dt, limit, *gravity, keep, self.shapes, self.rest, self.ledger)
+        else:
+            self.run(dt, limit, *gravity, keep, min(most, STEPS_PER_LAUNCH), self.shapes, self.rest, self.ledger)
+        return int(self.done[None]), bool(self.halted[None])

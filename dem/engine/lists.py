@@ -1,0 +1,498 @@
+"""Who is near whom: sorting the grains by cell, pair lists, the grains near bodies, and the history carried over.
+
+Runs every hundred steps or so. The kernels belong to ``dem.engine.engine.Engine``, whose fields they use.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+import taichi as ti
+
+from dem.contact.cohesion import JKR
+from dem.contact.law import adhesive_range
+from dem.shapes.basic import distance_to, rotate
+
+__all__ = ["INDEX_BITS", "INDEX_MASK", "ITEMS_PER_THREAD", "Lists", "MOST_BODIES", "SAME_IMAGE"]
+
+ITEMS_PER_THREAD = 512
+# Places of the counters in Engine.ticket: of a plain loop over chunks; of ``Engine.run``.
+CACHE_LINE = 16
+QUEUE, FINISHED = 0, CACHE_LINE
+BUILT = 2  # place of a number of ``dem.engine.sleep.Rest.news``: the other store of frozen contacts is filled
+SCAN_BLOCKS = 64  # in which cells are added up
+MOST_BODIES = 32  # the floor, a platform's 24 spikes and hull, and some more
+
+# A neighbour's code: its index, and in the upper bits which periodic image is meant. The sign says "touching".
+INDEX_BITS = 26
+INDEX_MASK = (1 << INDEX_BITS) - 1
+SAME_IMAGE = 1 + 3 * 1  # (0 + 1) + 3 * (0 + 1)
+
+# Places of the numbers in Engine.count and Engine.box. CHUNKS are those of the grains AWAKE (``dem.engine.sleep``: all,
+# unless a bed lets its grains sleep), of ALL_CHUNKS that there is room for. SORTED of the grains are sorted, into
+# SORTED_CELLS cells: all, but for sleepers that stay where they are.
+GRAINS, CHUNKS, CHUNK_ROOM, NEAR_ROOM, NX, NY, NZ, CELLS, AWAKE, ALL_CHUNKS, SORTED, SORTED_CELLS = range(12)
+PERIOD_X, PERIOD_Y, BOTTOM, TOP, CELL_X, CELL_Y, CELL_Z = range(7)
+
+
+@ti.data_oriented
+class Lists:
+    """The part of the engine that finds neighbours."""
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any: ...
+
+    @ti.func
+    def next_chunk(self, w, first: ti.template()):
+        """The next chunk for work item w, or chunk_count where nothing is left.
+
+        Taichi gives a CPU thread at least 512 items of a loop, so each thread has that many and one of them works.
+        Which thread takes a chunk does not matter to the result.
+        """
+        c = self.count[CHUNKS]
+        if ti.static(self.gpu):
+            if ti.static(first):
+                c = w
+        elif w % ITEMS_PER_THREAD == 0:
+            c = ti.atomic_add(self.ticket[QUEUE], 1)
+        return c
+
+    @ti.func
+    def chunk_range(self, c):
+        n = self.count[AWAKE]
+        m = self.count[CHUNKS]
+        if ti.static(self.gpu):
+            return c, c + 1
+        base = n // m
+        rest = n - base * m
+        start = c * base + ti.min(c, rest)
+        return start, start + base + ti.select(c < rest, 1, 0)
+
+    @ti.func
+    def chunk_of(self, i):
+        result = i
+        if ti.static(not self.gpu):
+            m = self.count[CHUNKS]
+            base = self.count[AWAKE] // m
+            rest = self.count[AWAKE] - base * m
+            wide = rest * (base + 1)
+            result = ti.select(i < wide, i // (base + 1), rest + (i - wide) // ti.max(base, 1))
+        return result
+
+    @ti.func
+    def from_body(self, b, x):
+        """From a body's origin, or its nearest image's, to a point."""
+        d = x - self.body_position[b]
+        if self.body_extent[b] < 1e30:
+            d.x -= self.box[PERIOD_X] * ti.round(d.x / self.box[PERIOD_X])
+            d.y -= self.box[PERIOD_Y] * ti.round(d.y / self.box[PERIOD_Y])
+        return d
+
+    @ti.func
+    def nearest(self, b, x, reach, shapes: ti.template(), deep: ti.template()):
+        """Distance, normal and curvature of body b at a point, and the arm from its origin to the nearest point.
+
+        Of bodies farther than ``reach`` the distance may be 1e30. ``deep``: also tell how deep a point far inside is.
+        """
+        d = self.from_body(b, x)
+        q = self.body_turn[b]
+        local = rotate(ti.Vector([q[0], -q[1], -q[2], -q[3]]), d)
+        best = ti.cast(1e30, self.real)
+        normal = local * 0.0
+        curvature = best * 0.0
+        primitives = self.body_primitives[b]
+        for k in range(primitives[0], primitives[1]):
+            row = self.primitive_row[k]
+            if ti.static(shapes.full):
+                distance, n_k, c_k = shapes.distance_to(k, self.primitive_kind[k], row, local, reach, deep)
+                if distance < best:
+                    best = distance
+                    normal = n_k
+                    curvature = c_k
+            else:
+                distance, n_k, c_k = distance_to(self.primitive_kind[k], row, local)
+                if distance < best:
+                    best = distance
+                    normal = n_k
+                    curvature = c_k
+        normal = rotate(q, normal)
+        return best, normal, curvature, d - best * normal
+
+    @ti.func
+    def body_range(self, b, r, curvature):
+        """How far from body b a grain of radius r still feels it [m]; 0 but with JKR."""
+        result = ti.cast(0.0, self.real)
+        if ti.static(self.cohesion == JKR):
+            result = adhesive_range(self.body_pair[b], r / (1.0 + r * curvature))
+        return result
+
+    @ti.func
+    def cell_of(self, x):
+        """Cell of a position inside the box, as three integers."""
+        i = ti.min(self.count[NX] - 1, ti.max(0, ti.floor(x.x / self.box[CELL_X], ti.i32)))
+        j = ti.min(self.count[NY] - 1, ti.max(0, ti.floor(x.y / self.box[CELL_Y], ti.i32)))
+        k = ti.min(self.count[NZ] - 1, ti.max(0, ti.floor((x.z - self.box[BOTTOM]) / self.box[CELL_Z], ti.i32)))
+        return i, j, k
+
+    @ti.func
+    def cell_index(self, i, j, k):
+        return (k * self.count[NY] + j) * self.count[NX] + i
+
+    @ti.kernel
+    def sort(self, gx: float, gy: float, gz: float, awake: int, rest: ti.template(), ledger: ti.template()):
+        """Wrap the grains into the box and bring them into the order of the curve; ids break ties.
+
+        Those that sleep come behind those awake: each set has the cells for itself. ``awake``: how many were, until
+        now; the others have not moved. A sleeper whose place in memory stays is left where it is, and few change it:
+        the order of sleepers begins where grains wake and fall asleep (``place_asleep``), and from SORTED on, behind
+        the last that wakes, nothing changes: of the grains from its cell on as many lie before it as did.
+        """
+        for k in range(self.count[SORTED_CELLS]):
+            self.cell_fill[k] = 0
+        if ti.static(ledger.on):
+            for _ in range(1):  # one thread: the sum has one order
+                for i in range(awake):
+                    x, v = self.position[i], self.velocity[i]
+                    a = -ti.floor(x.x / self.box[PERIOD_X]) * self.box[PERIOD_X]
+                    b = -ti.floor(x.y / self.box[PERIOD_Y]) * self.box[PERIOD_Y]
+                    if a != 0.0 or b != 0.0:
+                        ledger.turn(0, ledger.outside, v.w * ti.Vector([a, b, 0.0]).cross(v.xyz))
+        for i in range(self.count[SORTED]):
+            cell = 0
+            if i < awake:
+                self.wrap(i)
+                ci, cj, ck = self.cell_of(self.position[i])
+                cell = self.cell_index(ci, cj, ck)
+            elif ti.static(rest.on):
+                cell = rest.cell[self.id[i]]
+            r = self.rank[cell]
+            if ti.static(rest.on):
+                if rest.asleep[self.id[i]] == 1:
+                    if i < awake:
+                        rest.cell[self.id[i]] = cell
+                    r = self.place_asleep(r, rest)
+            self.key[i] = r
+            ti.atomic_add(self.cell_fill[r], 1)
+        for w in range(self.cpu_items if ti.static(not self.gpu) else SCAN_BLOCKS):
+            b = self.first_block(w)
+            while b < SCAN_BLOCKS:
+                self.block_sum[b] = self.scan(b, 0, self.count[SORTED_CELLS], False)
+                b += self.block_stride
+        for _ in range(1):
+            total = 0
+            for b in range(SCAN_BLOCKS):
+                kept = self.block_sum[b]
+                self.block_sum[b] = total
+                total += kept
+            self.cell_start[self.count[SORTED_CELLS]] = total
+        for w in range(self.cpu_items if ti.static(not self.gpu) else SCAN_BLOCKS):
+            b = self.first_block(w)
+            while b < SCAN_BLOCKS:
+                self.scan(b, self.block_sum[b], self.count[SORTED_CELLS], True)
+                b += self.block_stride
+        for i in range(self.count[SORTED]):
+            slot = ti.atomic_add(self.cell_fill[self.key[i]], 1)
+            self.came_from[slot] = i
+        if ti.static(rest.on):
+            for i in range(self.count[SORTED], self.count[GRAINS]):
+                self.came_from[i] = i
+        for r in range(self.count[SORTED_CELLS]):
+            # Whatever thread came first, the order within a cell is that of the ids.
+            for a in range(self.cell_start[r] + 1, self.cell_start[r + 1]):
+                moving = self.came_from[a]
+                b = a - 1
+                while b >= self.cell_start[r] and self.id[self.came_from[b]] > self.id[moving]:
+                    self.came_from[b + 1] = self.came_from[b]
+                    b -= 1
+                self.came_from[b + 1] = moving
+        for i in range(self.count[SORTED]):
+            o = self.came_from[i]
+            if not self.lies_on(i, awake, rest):
+                self.buffer4[0][i] = self.position[o]
+                self.buffer4[1][i] = self.velocity[o]
+                self.buffer4[2][i] = self.spin[o]
+                self.buffer3[i] = self.origin[o]
+                self.buffer_id[i] = self.id[o]
+        for i in range(self.count[SORTED]):
+            if not self.lies_on(i, awake, rest):
+                self.position[i] = self.buffer4[0][i]
+                self.velocity[i] = self.buffer4[1][i]
+                self.spin[i] = self.buffer4[2][i]
+                self.origin[i] = self.buffer3[i]
+                self.id[i] = self.buffer_id[i]
+                self.listed[i] = self.buffer4[0][i].xyz
+                self.force[i] = self.buffer4[1][i].w * ti.Vector([gx, gy, gz])
+                if ti.static(rest.on):
+                    if i >= self.count[AWAKE]:
+                        self.force[i] = ti.Vector.zero(self.real, 3)
+                self.torque[i] = ti.Vector.zero(self.real, 3)
+
+    @ti.func
+    def wrap(self, i):
+        """Put a grain back into the box, its origin with it; one that has left it for good is a problem."""
+        x = self.position[i]
+        inside = x.z >= self.box[BOTTOM] and x.z <= self.box[TOP]
+        inside = inside and ti.abs(x.x) < 1e6 * self.box[PERIOD_X] and ti.abs(x.y) < 1e6 * self.box[PERIOD_Y]
+        if not inside:
+            # Any of the lost ones will do; the host looks for the first id.
+            self.problem[None] = ti.Vector([1, self.id[i]])
+        else:
+            a = -ti.floor(x.x / self.box[PERIOD_X]) * self.box[PERIOD_X]
+            b = -ti.floor(x.y / self.box[PERIOD_Y]) * self.box[PERIOD_Y]
+            self.position[i].x = self.position[i].x + a
+            self.position[i].y = self.position[i].y + b
+            self.origin[i].x = self.origin[i].x + a
+            self.origin[i].y = self.origin[i].y + b
+
+    @ti.func
+    def lies_on(self, i, awake, rest: ti.template()):
+        """Whether the grain for this place is a sleeper that has been in it."""
+        result = False
+        if ti.static(rest.on):
+            result = i >= self.count[AWAKE] and i >= awake and self.came_from[i] == i
+        return result
+
+    @ti.func
+    def place_asleep(self, r, rest: ti.template()):
+        """Where the sleepers of the cell of rank r are listed: in the curve's order too, but begun elsewhere."""
+        turned = r - rest.begins[None]
+        return self.count[CELLS] + ti.select(turned < 0, turned + self.count[CELLS], turned)
+
+    @ti.func
+    def first_block(self, w):
+        """Of what item w of a loop scans, SCAN_BLOCKS where that is nothing; ``next_chunk`` says why."""
+        b = w
+        if ti.static(not self.gpu):
+            b = ti.select(w % ITEMS_PER_THREAD == 0, w // ITEMS_PER_THREAD, SCAN_BLOCKS)
+        return b
+
+    @ti.func
+    def scan(self, b, total, n, write: ti.template()):
+        """Grains in block b of n cells; ``write``: where each cell's begin, too, ``total`` being before them."""
+        size = (n + SCAN_BLOCKS - 1) // SCAN_BLOCKS
+        for r in range(b * size, ti.min((b + 1) * size, n)):
+            here = self.cell_fill[r]
+            if ti.static(write):
+                self.cell_start[r] = total
+                self.cell_fill[r] = total
+            total += here
+        return total
+
+    @ti.kernel
+    def keep_lists(self, rest: ti.template(), ledger: ti.template()):
+        """Put the lists aside, so that the new ones can take the history over."""
+        for _ in range(1):
+            self.ticket[QUEUE] = 0
+        for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
+            c = self.next_chunk(w, True)
+            while c < self.count[CHUNKS]:
+                self.keep_chunk(c, rest, ledger)
+                c = self.next_chunk(w, False)
+        if ti.static(rest.on):
+            for i in range(self.count[AWAKE], rest.before(rest.kept, self.count[GRAINS])):
+                self.old_start[i] = 0
+                self.old_end[i] = 0
+                self.near_first[i] = -1
+            for _ in range(1):
+                rest.kept[None] = self.count[AWAKE]
+
+    @ti.func
+    def keep_chunk(self, c, rest: ti.template(), ledger: ti.template()):
+        start, end = self.chunk_range(c)
+        for i in range(start, end):
+            self.old_start[i] = self.pair_start[i]
+            self.old_end[i] = self.pair_end[i]
+            self.near_first[i] = -1
+            for s in range(self.pair_start[i], self.pair_end[i]):
+                code = self.pair[s]
+                self.old_pair[s] = code
+                if code < 0:
+                    self.old_slide[s] = self.slide[s]
+                    if ti.static(self.rolling):
+                        self.old_roll[s] = self.roll[s]
+                    if ti.static(rest.on):
+                        rest.old_force[s] = rest.force[s]
+                    if ti.static(ledger.on):
+                        ledger.old_last[s] = ledger.last[s]
+        self.old_near_end[c] = self.near_end[c]
+        base = c * self.count[NEAR_ROOM]
+        for k in range(self.near_end[c] - base):
+            s = self.near_end[c] - 1 - k
+            i = self.near_grain[s]
+            self.near_first[i] = s
+            self.old_near_grain[s] = i
+            self.old_near_body[s] = self.near_body[s]
+            self.old_near_slide[s] = self.near_slide[s]
+            self.old_near_roll[s] = self.near_roll[s]
+            if ti.static(ledger.on):
+                ledger.old_near_last[s] = ledger.near_last[s]
+
+    @ti.func
+    def find_old(self, i, j):
+        """Row of the old list that holds touching pair i, j (old indices), or -1."""
+        found = -1
+        for s in range(self.old_start[i], self.old_end[i]):
+            code = self.old_pair[s]
+            if code < 0 and ((~code) & INDEX_MASK) == j:
+                found = s
+        return found
+
+    @ti.kernel
+    def make_lists(self, skin: float, shapes: ti.template(), rest: ti.template(), ledger: ti.template()):
+        """New pair and near lists for the sorted grains; history comes over from the lists put aside."""
+        for b in range(MOST_BODIES):
+            self.body_listed[b] = self.body_position[b]
+            self.body_listed_turn[b] = self.body_turn[b]
+        for _ in range(1):
+            self.ticket[QUEUE] = 0
+        for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
+            c = self.next_chunk(w, True)
+            while c < self.count[CHUNKS]:
+                self.list_chunk(c, ti.cast(skin, self.real), shapes, rest, ledger)
+                c = self.next_chunk(w, False)
+        if ti.static(rest.on):
+            for i in range(self.count[AWAKE], rest.before(rest.made, self.count[GRAINS])):
+                self.pair_start[i] = 0
+                self.pair_end[i] = 0
+            for c in range(self.count[CHUNKS], self.count[ALL_CHUNKS]):
+                self.near_end[c] = c * self.count[NEAR_ROOM]
+            for _ in range(1):
+                if rest.news[BUILT] == 1:
+                    rest.side[None] = 1 - rest.side[None]
+                    rest.news[BUILT] = 0
+                rest.made[None] = self.count[AWAKE]
+                rest.whole[None] = 0
+                rest.last[None] = -1
+        for _ in range(1):
+            self.moved[None] = 0
+            self.halted[None] = 0
+
+    @ti.func
+    def list_chunk(self, c, skin, shapes: ti.template(), rest: ti.template(), ledger: ti.template()):
+        start, end = self.chunk_range(c)
+        base = c * self.count[CHUNK_ROOM]
+        s = base
+        for i in range(start, end):
+            x_i = self.position[i]
+            self.pair_start[i] = s
+            ci, cj, ck = self.cell_of(x_i)
+            for dk in range(-1, 2):
+                k = ck + dk
+                if k >= 0 and k < self.count[NZ]:
+                    for dj, di in ti.ndrange((-1, 2), (-1, 2)):
+                        # Stepping out on the left means the neighbour's image one period to the left.
+                        gi, gj = ci + di, cj + dj
+                        mi, mj = 0, 0
+                        if gi < 0:
+                            gi += self.count[NX]
+                            mi = 1
+                        elif gi >= self.count[NX]:
+                            gi -= self.count[NX]
+                            mi = -1
+                        if gj < 0:
+                            gj += self.count[NY]
+                            mj = 1
+                        elif gj >= self.count[NY]:
+                            gj -= self.count[NY]
+                            mj = -1
+                        r = self.rank[self.cell_index(gi, gj, k)]
+                        for part in range(rest.sets):
+                            if ti.static(rest.on):
+                                if part == 1:
+                                    r = self.place_asleep(r, rest)
+                            for j in range(self.cell_start[r], self.cell_start[r + 1]):
+                                own = j >= start and j < end
+                                if j != i and (j > i or not own):
+                                    x_j = self.position[j]
+                                    d = x_i.xyz - x_j.xyz
+                                    d.x += ti.cast(mi, self.real) * self.box[PERIOD_X]
+                                    d.y += ti.cast(mj, self.real) * self.box[PERIOD_Y]
+                                    reach = x_i.w + x_j.w + skin
+                                    if ti.static(self.cohesion == JKR):
+                                        reach += adhesive_range(self.grain_pair[None], x_i.w * x_j.w / (x_i.w + x_j.w))
+                                    if d.norm_sqr() < reach * reach:
+                                        if s < base + self.count[CHUNK_ROOM]:
+                                            image = (mi + 1 + 3 * (mj + 1)) << INDEX_BITS
+                                            self.list_pair(s, i, j, j | image, rest, ledger)
+                                        s += 1
+            self.pair_end[i] = ti.min(s, base + self.count[CHUNK_ROOM])
+        if s > base + self.count[CHUNK_ROOM]:
+            self.problem[None] = ti.Vector([2, s - base])
+        self.list_near(c, start, end, skin, shapes, rest, ledger)
+
+    @ti.func
+    def list_pair(self, s, i, j, code, rest: ti.template(), ledger: ti.template()):
+        oi, oj = self.came_from[i], self.came_from[j]
+        self.first[s] = i
+        sign = ti.cast(1.0, self.real)
+        old = self.find_old(oi, oj)
+        if old < 0:
+            old = self.find_old(oj, oi)
+            sign = -sign
+        if old >= 0:
+            self.pair[s] = ~code
+            slide = self.old_slide[old]
+            slide.xyz = sign * slide.xyz  # its last entry is the same from either side
+            self.slide[s] = slide
+            if ti.static(self.rolling):
+                self.roll[s] = sign * self.old_roll[old]
+        else:
+            self.pair[s] = code
+            self.slide[s] = ti.Vector.zero(self.real, 4)
+            if ti.static(self.rolling):
+                self.roll[s] = ti.Vector.zero(self.real, 3)
+        if ti.static(rest.on):
+            self.list_sleeper(s, i, j, code, old, rest)
+        if ti.static(ledger.on):
+            ledger.last[s] = ledger.nothing()
+            if old >= 0:
+                last = sign * ledger.old_last[old]
+                last[0] = sign * last[0]  # the normal part is the same from either side
+                ledger.last[s] = last
+
+    @ti.func
+    def list_near(self, c, start, end, skin, shapes: ti.template(), rest: ti.template(), ledger: ti.template()):
+        base = c * self.count[NEAR_ROOM]
+        s = base
+        for i in range(start, end):
+            x = self.position[i]
+            for b in range(self.body_count[None]):
+                reach = x.w + skin + self.body_range(b, x.w, 0.0)
+                distance = 2.0 * reach
+                if self.from_body(b, x.xyz).norm_sqr() < (self.body_extent[b] + reach) ** 2:
+                    distance, n, curvature, arm = self.nearest(b, x.xyz, reach, shapes, True)
+                if ti.static(shapes.full):
+                    # A grain in the midst of a mesh is out of its surface's reach: no force would tell of it.
+                    if distance < -x.w:
+                        self.overlap[c] = ti.max(self.overlap[c], (x.w - distance) / (2.0 * x.w))
+                if distance < reach:
+                    if s < base + self.count[NEAR_ROOM]:
+                        self.near_grain[s] = i
+                        self.near_body[s] = b
+                        self.near_slide[s] = ti.Vector.zero(self.real, 4)
+                        self.near_roll[s] = ti.Vector.zero(self.real, 3)
+                        if ti.static(ledger.on):
+                            ledger.near_last[s] = ledger.nothing()
+                        o = self.near_first[self.came_from[i]]
+                        while o >= 0:
+                            if self.old_near_body[o] == b:
+                                self.near_slide[s] = self.old_near_slide[o]
+                                self.near_roll[s] = self.old_near_roll[o]
+                                if ti.static(ledger.on):
+                                    ledger.near_last[s] = ledger.old_near_last[o]
+                            o = self.next_near(o, self.came_from[i])
+                        if ti.static(rest.on):
+                            self.wake_near(s, i, b, rest)
+                    s += 1
+        self.near_end[c] = ti.min(s, base + self.count[NEAR_ROOM])
+        if s > base + self.count[NEAR_ROOM]:
+            self.problem[None] = ti.Vector([3, s - base])
+
+    @ti.func
+    def next_near(self, o, i):
+        """The row of the old near list behind row o if it is of the same grain (i, its old index), or -1."""
+        result = o + 1
+        if result % self.count[NEAR_ROOM] == 0 or result >= self.old_near_end[result // self.count[NEAR_ROOM]]:
+            result = -1
+        elif self.old_near_grain[result] != i:
+            result = -1
+        return result

@@ -1,0 +1,136 @@
+"""What the host reads of grains and bodies: sums over chunks, contacts counted, and small changes to all grains.
+
+The kernels belong to ``dem.engine.engine.Engine``, whose fields they use.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+import taichi as ti
+
+from .lists import ALL_CHUNKS, CHUNKS, GRAINS, INDEX_MASK, MOST_BODIES, NEAR_ROOM
+
+__all__ = ["TALLY_BLOCKS", "Readings"]
+
+TALLY_BLOCKS = 256
+
+
+@ti.data_oriented
+class Readings:
+    """The part of the engine that the host reads sums and counts from."""
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any: ...
+
+    @ti.kernel
+    def clear_pushes(self):
+        for c, b in ti.ndrange(self.count[ALL_CHUNKS], MOST_BODIES):
+            self.pushes[c, b] = ti.Vector.zero(self.real, 6)
+
+    @ti.kernel
+    def place_bodies(
+        self, bodies: ti.types.ndarray(dtype=ti.i32, ndim=1), rows: ti.types.ndarray(dtype=ti.f64, ndim=2)
+    ):
+        """Pose and motion of several bodies: position, velocity, turn, spin in a row of 13."""
+        for _ in range(1):
+            for k in range(bodies.shape[0]):
+                b = bodies[k]
+                for d in ti.static(range(3)):
+                    self.body_position[b][d] = ti.cast(rows[k, d], self.real)
+                    self.body_velocity[b][d] = ti.cast(rows[k, 3 + d], self.real)
+                    self.body_spin[b][d] = ti.cast(rows[k, 10 + d], self.real)
+                for d in ti.static(range(4)):
+                    self.body_turn[b][d] = ti.cast(rows[k, 6 + d], self.real)
+
+    @ti.kernel
+    def tally(self, rows: ti.types.ndarray(dtype=ti.f64, ndim=2)):
+        """Sums over the chunks, in their order: of what grains do to each body; and the largest overlap, or NaN.
+
+        A row of six for each body, and one more whose first number is the overlap. On a GPU, where a chunk is a grain,
+        over blocks of chunks first: what the host gets is as small as from a CPU.
+        """
+        if ti.static(self.gpu):
+            for block, b in ti.ndrange(TALLY_BLOCKS, MOST_BODIES + 1):
+                size = (self.count[ALL_CHUNKS] + TALLY_BLOCKS - 1) // TALLY_BLOCKS
+                first = block * size
+                end = ti.min(first + size, self.count[ALL_CHUNKS])
+                if b == MOST_BODIES:
+                    self.block_overlap[block] = self.largest_overlap(self.overlap, first, end)
+                elif b < self.body_count[None]:
+                    self.block_pushes[block, b] = self.sum_of_pushes(self.pushes, b, first, end)
+                else:
+                    self.block_pushes[block, b] = ti.Vector.zero(ti.f64, 6)
+            for b in range(MOST_BODIES + 1):
+                self.put_tally(rows, b, self.block_pushes, self.block_overlap, TALLY_BLOCKS)
+        else:
+            for b in range(MOST_BODIES + 1):
+                self.put_tally(rows, b, self.pushes, self.overlap, self.count[ALL_CHUNKS])
+
+    @ti.func
+    def put_tally(self, rows: ti.template(), b, pushes: ti.template(), overlaps: ti.template(), parts):
+        if b < MOST_BODIES:
+            total = self.sum_of_pushes(pushes, b, 0, parts)
+            for k in ti.static(range(6)):
+                rows[b, k] = total[k]
+        else:
+            rows[b, 0] = self.largest_overlap(overlaps, 0, parts)
+
+    @ti.func
+    def sum_of_pushes(self, pushes: ti.template(), b, first, end):
+        total = ti.Vector.zero(ti.f64, 6)
+        for c in range(first, end):
+            total += ti.cast(pushes[c, b], ti.f64)
+        return total
+
+    @ti.func
+    def largest_overlap(self, overlaps: ti.template(), first, end):
+        largest = ti.cast(0.0, ti.f64)
+        for c in range(first, end):
+            overlap = ti.cast(overlaps[c], ti.f64)
+            if not (overlap <= largest) and largest == largest:
+                largest = overlap
+        return largest
+
+    @ti.kernel
+    def mark_origin(self):
+        """Count displacements from here."""
+        for i in range(self.count[GRAINS]):
+            self.origin[i] = self.position[i].xyz
+
+    @ti.kernel
+    def shift_velocities(self, time: float):
+        """Kick all grains by the present forces for a time of either sign."""
+        for i in range(self.count[GRAINS]):
+            r = self.position[i].w
+            share = ti.cast(time, self.real) / self.velocity[i].w
+            for k in ti.static(range(3)):
+                self.velocity[i][k] = self.velocity[i][k] + self.force[i][k] * share
+                self.spin[i][k] = self.spin[i][k] + self.torque[i][k] * (2.5 * share / (r * r))
+
+    @ti.kernel
+    def count_contacts(self, counts: ti.types.ndarray(dtype=ti.i32, ndim=1), shapes: ti.template()):
+        """Contacts of each grain, by id."""
+        for i in range(self.count[GRAINS]):
+            counts[self.id[i]] = 0
+        for i in range(self.count[GRAINS]):
+            c = self.chunk_of(i)
+            start, end = self.chunk_range(c)
+            for s in range(self.pair_start[i], self.pair_end[i]):
+                code = self.pair[s]
+                if code < 0:
+                    j = (~code) & INDEX_MASK
+                    ti.atomic_add(counts[self.id[i]], 1)
+                    if j >= start and j < end:
+                        ti.atomic_add(counts[self.id[j]], 1)
+        for c in range(self.count[CHUNKS]):
+            for s in range(c * self.count[NEAR_ROOM], self.near_end[c]):
+                i = self.near_grain[s]
+                r = self.position[i].w
+                reach = r
+                if ti.static(shapes.full):
+                    reach += self.body_range(self.near_body[s], r, 0.0)
+                distance, n, curvature, arm = self.nearest(
+                    self.near_body[s], self.position[i].xyz, reach, shapes, False
+                )
+                if distance < r + self.body_range(self.near_body[s], r, curvature):
+                    ti.atomic_add(counts[self.id[i]], 1)

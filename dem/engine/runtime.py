@@ -1,0 +1,120 @@
+"""Starts Taichi once, for every bed of the process.
+
+Contract: ``start`` may be called any number of times. With the settings that are in force it does nothing; with other
+settings it starts Taichi anew, which invalidates the fields of every earlier bed. Beds remember the generation they
+belong to and refuse to go on after it has ended.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+__all__ = ["Runtime", "generation", "start"]
+
+ARCHITECTURES = ("cpu", "cuda")
+PRECISIONS = {"float64": np.float64, "float32": np.float32}
+
+
+@dataclass(frozen=True)
+class Runtime:
+    """What Taichi runs on: architecture, number of threads, precision of the grains' numbers."""
+
+    arch: str
+    threads: int
+    precision: str
+
+    @property
+    def dtype(self):
+        """The numpy type of the grains' numbers."""
+        return PRECISIONS[self.precision]
+
+
+_current: Runtime | None = None
+_generation = 0
+
+
+def generation() -> int:
+    """The number of times that Taichi was started; a bed of an earlier generation is no longer valid."""
+    return _generation
+
+
+def start(*, arch: str = "cpu", threads: int | None = None, precision: str = "float64") -> Runtime:
+    """Start Taichi, or keep it if it already runs with these settings.
+
+    Args:
+        arch: "cpu" or "cuda".
+        threads: CPU threads; all that the machine has when None.
+        precision: "float64" or "float32".
+
+    Raises:
+        ValueError: an unknown architecture or precision, or a number of threads below one.
+        RuntimeError: the architecture is not available on this machine.
+    """
+    global _current, _generation
+    if arch not in ARCHITECTURES:
+        raise ValueError(f"arch = {arch!r} is unknown; use one of {', '.join(ARCHITECTURES)}")
+    if precision not in PRECISIONS:
+        raise ValueError(f"precision = {precision!r} is unknown; use one of {', '.join(PRECISIONS)}")
+    if threads is None:
+        threads = len(_cores())
+    if threads < 1:
+        raise ValueError(f"threads = {threads} must be at least 1")
+    wanted = Runtime(arch, threads, precision)
+    if wanted == _current:
+        return wanted
+    import taichi as ti
+
+    real = ti.f64 if precision == "float64" else ti.f32
+    # Taichi's own control-flow pass triples the time to compile and LLVM does its work: steps run as fast without it.
+    options = dict(default_fp=real, default_ip=ti.i32, fast_math=False, cfg_optimization=False)
+    with contextlib.redirect_stdout(io.StringIO()):  # its greeting would spoil what a script prints
+        if arch == "cpu":
+            before = _own_threads()
+            ti.init(arch=ti.cpu, cpu_max_num_threads=threads, **options)
+            ours = {thread.native_id for thread in threading.enumerate()}  # started meanwhile by somebody else
+            _keep_apart(sorted(_own_threads() - before - ours)[-threads:])
+        else:
+            try:
+                ti.init(arch=ti.cuda, enable_fallback=False, **options)
+            except Exception as problem:
+                raise RuntimeError(f"arch = 'cuda' is not available here ({problem}); use arch = 'cpu'") from None
+    _current = wanted
+    _generation += 1
+    return wanted
+
+
+def _cores() -> list[int]:
+    """The cores that this process may run on; all, where the system does not restrict them."""
+    try:
+        return sorted(os.sched_getaffinity(0))
+    except AttributeError:
+        return list(range(os.cpu_count() or 1))
+
+
+def _own_threads() -> set[int]:
+    """Ids of this process's threads; none where the system does not tell."""
+    try:
+        return {int(path.name) for path in Path("/proc/self/task").iterdir()}
+    except OSError:
+        return set()
+
+
+def _keep_apart(workers: list[int]) -> None:
+    """Give each of Taichi's workers a core of its own where there are as many: the last threads that it has started.
+
+    A launch is some milliseconds. Left to itself Linux may wake two workers on one core, and moves one of them only at
+    the next tick, 4 ms later; and a worker that stays where it is has its chunks in that core's cache.
+    """
+    cores = _cores()
+    if len(workers) < 2 or len(workers) != len(cores):
+        return
+    for worker, core in zip(workers, cores, strict=True):
+        with contextlib.suppress(OSError, AttributeError):
+            os.sched_setaffinity(worker, {core})

@@ -1,0 +1,316 @@
+"""The shapes beyond planes, balls and cones as the kernels see them: their places, and the triangles of meshes.
+
+A bed whose bodies are of planes, balls, cylinders and cones alone has ``PLAIN`` for a table, and its kernels are
+compiled without all this. The table is a template argument of the kernels, so they are compiled anew for a larger one.
+"""
+
+from typing import Any
+
+import numpy as np
+import taichi as ti
+
+from dem.shapes.basic import FRUSTUM, distance_to, rotate
+from dem.shapes.mesh import MESH, Mesh, Polyhedron
+from dem.shapes.mesh_tree import CORNER_A, CORNER_B, CORNER_C, EDGE_AB, EDGE_BC, EDGE_CA, FACE, FEATURES, mesh_tree
+from dem.shapes.solids import (
+    BOX,
+    CAPSULE,
+    PLACE_WIDTH,
+    PLACED,
+    TUBE,
+    bare,
+    box_distance,
+    capsule_distance,
+    place_row,
+    tube_distance,
+)
+
+__all__ = ["PLAIN", "ShapeTable", "Shapes"]
+
+FAR = 1e30
+FEATURE_COUNT = len(FEATURES)
+_LEAST_TRIANGLES = 1024
+
+
+@ti.data_oriented
+class PlainTable:
+    """Stands where no table is needed."""
+
+    full = False
+    triangle_capacity = 0
+
+
+PLAIN = PlainTable()
+
+
+@ti.data_oriented
+class ShapeTable:
+    """Fields for the places of ``primitives`` shapes and for ``triangles`` triangles, and distances to them.
+
+    Trees of several meshes lie one behind the other.
+    """
+
+    full = True
+
+    def __init__(self, *, primitives: int, triangles: int, real):
+        F = ti.Vector.field
+        self.real = real
+        self.triangle_capacity = triangles
+        self.place = F(PLACE_WIDTH, real, primitives)
+        self.low = F(3, real, 2 * triangles)
+        self.high = F(3, real, 2 * triangles)
+        self.skip = ti.field(ti.i32, 2 * triangles)
+        self.leaf = ti.field(ti.i32, 2 * triangles)
+        self.corner = F(3, real, triangles)
+        self.side_ab = F(3, real, triangles)
+        self.side_ac = F(3, real, triangles)
+        self.normal = F(3, real, FEATURE_COUNT * triangles)
+
+    def fill(self, meshes: list[Mesh], dtype) -> None:
+        """Put these meshes' trees into the fields."""
+        columns: dict[str, list[np.ndarray]] = {}
+        nodes = triangles = 0
+        for mesh in meshes:
+            tree = mesh_tree(mesh)
+            parts = {
+                "low": tree.low,
+                "high": tree.high,
+                "skip": tree.skip + nodes,
+                "leaf": np.where(tree.leaf < 0, -1, tree.leaf + triangles),
+                "corner": tree.corner,
+                "side_ab": tree.side_ab,
+                "side_ac": tree.side_ac,
+                "normal": tree.normals.reshape(-1, 3),
+            }
+            for name, array in parts.items():
+                columns.setdefault(name, []).append(array)
+            nodes += len(tree.leaf)
+            triangles += len(tree.corner)
+        for name, arrays in columns.items():
+            field = getattr(self, name)
+            rows = np.concatenate(arrays)
+            whole = np.zeros((*field.shape, *rows.shape[1:]), dtype=dtype if rows.ndim == 2 else np.int32)
+            whole[: len(rows)] = rows
+            field.from_numpy(whole)
+
+    @ti.func
+    def distance_to(self, k, kind, row: ti.template(), p, reach, deep: ti.template()):
+        """Signed distance, outward unit normal and curvature of shape k at a point of the body's frame.
+
+        Of a mesh that is farther than ``reach`` the distance may be FAR. With ``deep`` it is told for points that lie
+        deeper inside a mesh than that as well.
+        """
+        place = self.place[k]
+        turn = ti.Vector([place[3], place[4], place[5], place[6]])
+        q = p
+        shape = kind % PLACED
+        if kind >= PLACED:
+            origin = ti.Vector([place[0], place[1], place[2]])
+            q = rotate(ti.Vector([turn[0], -turn[1], -turn[2], -turn[3]]), p - origin)
+        distance = p.x * 0.0
+        normal = p * 0.0
+        curvature = p.x * 0.0
+        if shape <= FRUSTUM:
+            distance, normal, curvature = distance_to(shape, row, q)
+        elif shape == CAPSULE:
+            distance, normal, curvature = capsule_distance(row, place[7], q)
+        elif shape == BOX:
+            distance, normal = box_distance(row, q)
+        elif shape == TUBE:
+            distance, normal = tube_distance(row, q)
+        else:
+            distance, normal = self.mesh_distance(ti.cast(row[0], ti.i32), ti.cast(row[1], ti.i32), q, reach, deep)
+        if kind >= PLACED:
+            normal = rotate(turn, normal)
+        return distance, normal, curvature
+
+    @ti.func
+    def beyond_box(self, node, p):
+        """How far a point is from a node's box, squared."""
+        return ti.max(self.low[node] - p, p - self.high[node], 0.0).norm_sqr()
+
+    @ti.func
+    def mesh_distance(self, first, end, p, reach, deep: ti.template()):
+        """Signed distance and outward normal of the mesh whose nodes are first to end - 1; FAR beyond the reach."""
+        best = reach * reach
+        if ti.static(deep):
+            if self.beyond_box(first, p) == 0.0:
+                best = best * 0.0 + FAR
+        found = -1
+        feature = FACE
+        nearest = p
+        node = first
+        while node < end:
+            if self.beyond_box(node, p) < best:
+                t = self.leaf[node]
+                if t >= 0:
+                    square, where, point = self.on_triangle(t, p)
+                    if square < best:
+                        best = square
+                        found = t
+                        feature = where
+                        nearest = point
+                node += 1
+            else:
+                node = self.skip[node]
+        distance = p.x * 0.0 + FAR
+        normal = p * 0.0
+        if found >= 0:
+            normal = self.normal[FEATURE_COUNT * found + feature]
+            if feature == FACE:
+                distance = normal.dot(p - self.corner[found])
+            else:
+                offset = p - nearest
+                length = offset.norm()
+                side = ti.select(offset.dot(normal) < 0.0, -1.0, 1.0)
+                distance = side * length
+                if length > 1e-12:
+                    normal = offset * (side / length)
+        return distance, normal
+
+    @ti.func
+    def on_triangle(self, t, p):
+        """Square of the distance to a triangle, the feature on which the nearest point lies, and that point.
+
+        Ericson 2005 (Real-Time Collision Detection, section 5.1.5): by the Voronoi regions of corners, edges and face.
+        """
+        a = self.corner[t]
+        ab = self.side_ab[t]
+        ac = self.side_ac[t]
+        ap = p - a
+        bp = ap - ab
+        cp = ap - ac
+        d1, d2 = ab.dot(ap), ac.dot(ap)
+        d3, d4 = ab.dot(bp), ac.dot(bp)
+        d5, d6 = ab.dot(cp), ac.dot(cp)
+        va = d3 * d6 - d5 * d4
+        vb = d5 * d2 - d1 * d6
+        vc = d1 * d4 - d3 * d2
+        feature = FACE
+        v = d1 * 0.0
+        w = d1 * 0.0
+        if d1 <= 0.0 and d2 <= 0.0:
+            feature = CORNER_A
+        elif d3 >= 0.0 and d4 <= d3:
+            feature = CORNER_B
+            v += 1.0
+        elif d6 >= 0.0 and d5 <= d6:
+            feature = CORNER_C
+            w += 1.0
+        elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+            feature = EDGE_AB
+            v = d1 / (d1 - d3)
+        elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+            feature = EDGE_CA
+            w = d2 / (d2 - d6)
+        elif va <= 0.0 and d4 >= d3 and d5 >= d6:
+            feature = EDGE_BC
+            w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+            v = 1.0 - w
+        nearest = a + v * ab + w * ac
+        square = (p - nearest).norm_sqr()
+        if feature == FACE:
+            square = self.normal[FEATURE_COUNT * t].dot(ap) ** 2
+        return square, feature, nearest
+
+
+class Shapes:
+    """The part of the engine that puts shapes into its fields and takes them out again."""
+
+    primitive_kind: Any
+    primitive_row: Any
+    body_primitives: Any
+    body_count: Any
+    real: Any
+    shapes: Any
+    _kept: ShapeTable | None
+    _meshes: list[Mesh]
+
+    def put_shapes(self, first: int, shapes: list) -> None:
+        """Put the shapes of a new body into the rows from ``first`` on; what was there is forgotten."""
+        self.drop_shapes(first)
+        for shape in shapes:
+            inner = bare(shape)
+            if isinstance(inner, Mesh | Polyhedron) and not any(inner.mesh is other for other in self._meshes):
+                self._meshes.append(inner.mesh)
+        if any(shape.kind > FRUSTUM for shape in shapes):
+            self._make_table()
+        for k, shape in enumerate(shapes, first):
+            inner = bare(shape)
+            self.primitive_kind[k] = shape.kind
+            if isinstance(inner, Mesh | Polyhedron):
+                self.primitive_row[k] = [*self._nodes_of(inner.mesh), 0, 0, 0, 0]
+            else:
+                self.primitive_row[k] = inner.row()
+            if self.shapes.full:
+                self.shapes.place[k] = place_row(shape)
+
+    def shape_state(self) -> dict[str, np.ndarray]:
+        """What of the shapes is in no other field: nothing where the kernels are plain."""
+        if not self.shapes.full:
+            return {}
+        empty = np.zeros((0, 3))
+        return {
+            "primitive_place": self.shapes.place.to_numpy(),
+            "mesh_sizes": np.array([[len(m.vertices), len(m.triangles)] for m in self._meshes]).reshape(-1, 2),
+            "mesh_vertices": np.concatenate([empty, *(m.vertices for m in self._meshes)]),
+            "mesh_triangles": np.concatenate([empty.astype(np.int64), *(m.triangles for m in self._meshes)]),
+        }
+
+    def restore_shapes(self, state: dict[str, np.ndarray]) -> None:
+        """Bring the shapes to what ``shape_state`` gave."""
+        if "primitive_place" not in state:
+            self.clear_shapes()
+            return
+        ends = np.cumsum(state["mesh_sizes"], axis=0)
+        starts = ends - state["mesh_sizes"]
+        parts = [
+            (state["mesh_vertices"][a:b], state["mesh_triangles"][c:d])
+            for (a, c), (b, d) in zip(starts, ends, strict=True)
+        ]
+        same = len(parts) == len(self._meshes) and all(
+            np.array_equal(m.vertices, vertices) and np.array_equal(m.triangles, triangles)
+            for m, (vertices, triangles) in zip(self._meshes, parts, strict=True)
+        )
+        if not same or not self.shapes.full:
+            self._meshes = [Mesh(*part) for part in parts]
+            self._make_table()
+        self.shapes.place.from_numpy(state["primitive_place"])
+
+    def clear_shapes(self) -> None:
+        """No shape but plain ones."""
+        self.shapes = PLAIN
+        self._meshes = []
+
+    def _make_table(self) -> None:
+        """A table with room for the meshes there are, and their trees in it."""
+        needed = sum(len(m.triangles) for m in self._meshes)
+        before = self.shapes
+        if self._kept is None or self._kept.triangle_capacity < needed:
+            room = _LEAST_TRIANGLES
+            while room < needed:
+                room *= 2
+            self._kept = ShapeTable(primitives=self.primitive_kind.shape[0], triangles=room, real=self.real)
+        self.shapes = self._kept
+        if before is not self.shapes:
+            self.shapes.place.copy_from(before.place) if before.full else self.shapes.place.fill(0)
+        self.shapes.fill(self._meshes, np.float64 if self.real == ti.f64 else np.float32)
+
+    def _nodes_of(self, mesh: Mesh) -> tuple[int, int]:
+        """First node of a mesh's tree and the one after its last."""
+        first = 0
+        for other in self._meshes:
+            count = 2 * len(other.triangles) - 1
+            if other is mesh:
+                return first, first + count
+            first += count
+        raise KeyError("the mesh is not in the table")
+
+    def drop_shapes(self, first: int) -> None:
+        """Forget what rows from ``first`` on hold, as of a body that was refused."""
+        kinds, rows = self.primitive_kind.to_numpy()[:first], self.primitive_row.to_numpy()[:first]
+        if not (kinds > FRUSTUM).any():
+            self.clear_shapes()
+            return
+        used = {int(row[0]) for kind, row in zip(kinds, rows, strict=True) if kind % PLACED == MESH}
+        self._meshes = [mesh for mesh in self._meshes if self._nodes_of(mesh)[0] in used]

@@ -1,0 +1,312 @@
+"""Grain materials: the numbers of single grains, each with where it comes from; and those of what grains meet.
+
+A material has a name, of those that ship, or a file, as ``hedgebed bed calibrate`` writes it (TOML):
+```
+format = "hedgebed-material/1"
+name = "my-sand"
+density = 2650.0            # [kg/m3]
+young = 70e9                # [Pa]
+poisson = 0.25
+friction = 0.5
+restitution = 0.5
+rolling_friction = 0.2      # 0 if not given
+cohesion = "dmt"            # "none" if not given
+surface_energy = 0.3        # [J/m2]; with cohesion
+grain = 0.004               # the mean diameter for which surface_energy holds [m]; for every one if not given
+[sources]                   # where each number comes from, in words
+friction = "..."
+```
+A table ``[calibration]`` may follow, which says how the numbers were found and is not read here.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+import tomllib
+from dataclasses import MISSING, dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+__all__ = [
+    "CAVEATS",
+    "COHESIONS",
+    "Facing",
+    "MATERIALS",
+    "MATERIAL_FORMAT",
+    "Material",
+    "SAND",
+    "caveat",
+    "material",
+    "read_material",
+]
+
+MATERIAL_FORMAT = "hedgebed-material/1"
+_NAME = re.compile(r"[a-z0-9][a-z0-9._+-]*")
+
+COHESIONS = ("none", "dmt", "jkr")
+"""The laws of cohesion, see ``dem.contact.cohesion``."""
+LEAST_RESTITUTION = 0.01
+LEAST_ROLLING = 1e-9
+"""A rolling friction that resists nothing [1]: with none at all rolling is left out of a bed, on its bodies as well."""
+
+
+@dataclass(frozen=True)
+class Material:
+    """What a grain is made of, and how two grains of it touch. SI units; ratios are dimensionless.
+
+    Attributes:
+        friction, restitution, rolling_friction: of two grains on one another.
+        cohesion: "none", "dmt" or "jkr" (``dem.contact.cohesion``).
+        surface_energy: gamma [J/m2], half the work of adhesion of two grains; 0 without cohesion.
+        grain: mean diameter of the grains for which ``surface_energy`` holds [m], see ``for_grain``; None: of all.
+
+    Raises:
+        ValueError: a number that no material can have, with the key and what would do.
+    """
+
+    name: str
+    density: float
+    young: float
+    poisson: float
+    friction: float
+    restitution: float
+    rolling_friction: float = 0.0
+    cohesion: str = "none"
+    surface_energy: float = 0.0
+    grain: float | None = field(default=None, compare=False)
+    sources: dict[str, str] = field(default_factory=dict, compare=False)
+
+    def __post_init__(self):
+        def refuse(key, bounds):
+            raise ValueError(f"material {self.name!r}: {key} = {getattr(self, key)} must be {bounds}")
+
+        for key in ("density", "young"):
+            if not getattr(self, key) > 0:
+                refuse(key, "positive")
+            if math.isinf(getattr(self, key)):
+                refuse(key, "finite")
+        if not 0 <= self.poisson < 0.5:
+            refuse("poisson", "at least 0 and below 0.5")
+        if not LEAST_RESTITUTION <= self.restitution <= 1:
+            refuse("restitution", f"between {LEAST_RESTITUTION} and 1")
+        for key in ("friction", "rolling_friction"):
+            if not 0 <= getattr(self, key) < math.inf:
+                refuse(key, "0 or more")
+        if self.cohesion not in COHESIONS:
+            near = difflib.get_close_matches(str(self.cohesion).lower(), COHESIONS, n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise ValueError(
+                f"material {self.name!r}: cohesion = {self.cohesion!r} is no law; there is {', '.join(COHESIONS)}{hint}"
+            )
+        if self.cohesion == "none":
+            if self.surface_energy != 0:
+                refuse("surface_energy", "0 without a law of cohesion; set cohesion to 'dmt' or 'jkr' [J/m2]")
+        elif not 0 < self.surface_energy < math.inf:
+            refuse("surface_energy", f"positive with cohesion {self.cohesion!r} [J/m2]")
+        if self.grain is not None and not 0 < self.grain < math.inf:
+            refuse("grain", "positive [m]")
+
+    def softened(self, young: float) -> Material:
+        """The same material with another Young's modulus [Pa]."""
+        return replace(self, young=young)
+
+    def with_rolling(self) -> Material:
+        """The same material, so that bodies of its bed can have a rolling friction where its grains have none."""
+        return replace(self, rolling_friction=max(self.rolling_friction, LEAST_ROLLING))
+
+    def for_grain(self, diameter: float) -> Material:
+        """The same material in grains of another mean diameter [m], with the strength that it has in its own.
+
+        Cohesion, a stress, goes as surface energy over diameter, so that the surface energy is taken in proportion. A
+        material that does not say for which grains its surface energy holds stays as it is.
+        """
+        if self.grain is None or self.cohesion == "none":
+            return self
+        return replace(self, surface_energy=self.surface_energy * diameter / self.grain, grain=diameter)
+
+
+@dataclass(frozen=True)
+class Facing:
+    """How a grain touches something else than a grain: the floor, a wall, a body. None: as two grains touch.
+
+    Attributes:
+        friction, restitution, rolling_friction: of a grain on it [1].
+        young: of what it is made of [Pa]; rigid when None. poisson: [1].
+        surface_energy: of the pair [J/m2], half its work of adhesion; 0 for what grains do not stick to.
+
+    Raises:
+        ValueError: a number that no pair can have, with the key and what would do.
+    """
+
+    friction: float | None = None
+    restitution: float | None = None
+    rolling_friction: float | None = None
+    young: float | None = None
+    poisson: float = 0.3
+    surface_energy: float | None = None
+
+    def __post_init__(self):
+        def refuse(key, bounds):
+            raise ValueError(f"{key} = {getattr(self, key)} must {bounds}")
+
+        for key in ("friction", "rolling_friction", "surface_energy"):
+            value = getattr(self, key)
+            if value is not None and not 0 <= value < math.inf:
+                refuse(key, "be 0 or more")
+        if self.restitution is not None and not LEAST_RESTITUTION <= self.restitution <= 1:
+            refuse("restitution", f"lie between {LEAST_RESTITUTION} and 1")
+        if self.young is not None and not self.young > 0:
+            refuse("young", "be positive [Pa], or None for what is rigid")
+        if not 0 <= self.poisson < 0.5:
+            refuse("poisson", "be at least 0 and below 0.5")
+
+    def refuse_for(self, material: Material) -> None:
+        """Raise ValueError for a surface energy where the material has no law of cohesion, and likewise for rolling."""
+        if self.rolling_friction and not material.rolling_friction:
+            raise ValueError(
+                f"rolling_friction = {self.rolling_friction} needs rolling, which a bed of {material.name!r} leaves "
+                f"out, as its grains have no rolling friction; {LEAST_ROLLING:g} for theirs would do"
+            )
+        if self.surface_energy and material.cohesion == "none":
+            raise ValueError(
+                f"surface_energy = {self.surface_energy} J/m2 needs a law: the material {material.name!r} has cohesion "
+                f"'none'; give it 'dmt' or 'jkr'"
+            )
+
+
+SAND = Material(
+    name="sand",
+    density=2650.0,
+    young=70e9,
+    poisson=0.25,
+    friction=0.5,
+    restitution=0.5,
+    rolling_friction=0.1,
+    sources={
+        "density": "quartz; Toyoura and F-75 Ottawa sand",
+        "young": "quartz, lower end of 70 to 90 GPa; runs soften it and say by how much",
+        "poisson": "within the usual 0.2 to 0.3",
+        "friction": "Bhattacharya & Lee 2021 use 0.5 for Toyoura sand",
+        "restitution": "a guess, lower end of the usual 0.5 to 0.8",
+        "rolling_friction": "a guess within the usual 0.05 to 0.3, not calibrated to a friction angle yet",
+    },
+)
+"""Fine silica sand. Its rolling friction and restitution are guesses within the field's usual range."""
+
+PRESETS = Path(__file__).parents[1] / "presets"
+
+
+def read_material(path: str | Path) -> Material:
+    """The material in a file of the form that this module's docstring gives.
+
+    Raises:
+        ValueError: a file that cannot be read or is not of this form, a key that there is not or that lacks, a value of
+            the wrong kind or that no material can have, the name of a material that ships with other numbers.
+    """
+    stuff = _read(Path(path))
+    known = MATERIALS.get(stuff.name)
+    if known is not None and (known != stuff or known.grain != stuff.grain):
+        raise ValueError(
+            f"{path}: name = {stuff.name!r} is that of a material that ships, with other numbers; another name would do"
+        )
+    return stuff
+
+
+def _read(path: Path) -> Material:
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ValueError(f"material = {str(path)!r} cannot be read: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"material = {str(path)!r} is not TOML: {error}") from None
+    found = table.pop("format", None)
+    if found != MATERIAL_FORMAT:
+        raise ValueError(f"{path}: format = {found!r}, {MATERIAL_FORMAT!r} was expected")
+    table.pop("calibration", None)
+    known = {one.name: one for one in fields(Material)}
+    for key in table:
+        if key not in known:
+            near = difflib.get_close_matches(key, known, n=1)
+            hint = f"did you mean {near[0]!r}?" if near else f"there is {', '.join(known)}"
+            raise ValueError(f"{path}: {key} = {table[key]!r} is no key of a material; {hint}")
+    lacking = [
+        key
+        for key, one in known.items()
+        if key not in table and one.default is MISSING and one.default_factory is MISSING
+    ]
+    if lacking:
+        raise ValueError(f"{path}: {', '.join(lacking)} must be given")
+    return Material(**{key: _of_its_kind(path, key, value) for key, value in table.items()})
+
+
+def _of_its_kind(path: Path, key: str, value: Any) -> Any:
+    """A value as ``Material`` takes it. Raises ValueError for one of another kind."""
+    if key == "sources":
+        if not isinstance(value, dict) or not all(isinstance(text, str) for text in value.values()):
+            raise ValueError(f"{path}: sources = {value!r} must be a table of texts, one for each number")
+        return value
+    if key in ("name", "cohesion"):
+        if not isinstance(value, str):
+            raise ValueError(f"{path}: {key} = {value!r} must be a text")
+        if key == "name" and not _NAME.fullmatch(value):
+            raise ValueError(
+                f"{path}: name = {value!r} cannot name a material: small letters, digits, '.', '_', '+', '-'"
+            )
+        return value
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"{path}: {key} = {value!r} must be a number")
+    return float(value)
+
+
+MATERIALS = {SAND.name: SAND} | {
+    stuff.name: stuff for stuff in map(_read, sorted(PRESETS.glob("*.toml") if PRESETS.is_dir() else ()))
+}
+"""The materials that ship: ``SAND``, and the calibrated ones of dem/presets (docs/materials.md)."""
+
+CAVEATS = {
+    "sand": "its rolling friction is a guess: 24 to 25 degrees of triaxial friction, where fine sand has 30 to 33; "
+    "'sand-calibrated' has 31, and a spike meets 1.7 times the force in it",
+    "jsc-1a-loose": "calibrated to a cohesion that is JSC-1A's at most: faces of it stand seven times as high as "
+    "JSC-1A's; 'jsc-1a-loose-heights' is the one to take",
+    "jsc-1a-dense": "calibrated to a cohesion that is JSC-1A's at most: faces of it stand ten times as high as "
+    "JSC-1A's; 'jsc-1a-dense-heights' is the one to take",
+    "jsc-1a-loose-heights": "faces of it stand 2.7 times as high as JSC-1A's",
+    "jsc-1a-dense-heights": "faces of it stand 2.4 times as high as JSC-1A's, and it peaks at 52 degrees in ring "
+    "shear, where the vibrated powder, which is denser, has 60",
+}
+"""What a user of a material that ships has to know of it, by name: where its bulk figures are not the real one's."""
+
+
+def material(name: str | Path | Material, *, grain: float | None = None) -> Material:
+    """The material of that name or in that file, or the material itself.
+
+    Args:
+        name: of a material that ships, or the path of a file: what ends in .toml or has a slash in it.
+        grain: mean diameter of the grains that it is wanted for [m], see ``Material.for_grain``.
+
+    Raises:
+        ValueError: no material of that name, with those there are; a file that will not do (``read_material``).
+    """
+    stuff = name if isinstance(name, Material) else _find(name)
+    return stuff if grain is None else stuff.for_grain(grain)
+
+
+def caveat(stuff: Material) -> str | None:
+    """A sentence for the warnings of a run: what ``CAVEATS`` says of the material; None where there is nothing."""
+    said = CAVEATS.get(stuff.name)
+    return said and f"the grains are {stuff.name!r}: {said} (docs/materials.md)"
+
+
+def _find(name: str | Path) -> Material:
+    word = str(name)
+    if word.lower() in MATERIALS:
+        return MATERIALS[word.lower()]
+    if isinstance(name, Path) or word.endswith(".toml") or "/" in word:
+        return read_material(name)
+    near = difflib.get_close_matches(word.lower(), MATERIALS, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    raise ValueError(
+        f"material = {name!r} is not known; there is {', '.join(sorted(MATERIALS))}, and files that end in .toml{hint}"
+    )

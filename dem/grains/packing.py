@@ -1,0 +1,77 @@
+"""How many grains of which size, and their first positions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from .sizes import Sizes, Uniform, sizes_of
+
+__all__ = ["RAIN_COLUMN", "draw_radii", "rain_column", "rain_positions"]
+
+RAIN_COLUMN = 2.5
+"""Upper bound of the rain's column over the depth of the levelled bed [1]: what a grain can fall."""
+
+
+def draw_radii(
+    rng: np.random.Generator, volume: float, grain: float | Sizes, spread: float | None = None
+) -> np.ndarray:
+    """Radii of grains whose volumes add up to a solid volume, but for chance.
+
+    Args:
+        volume: of solid [m3].
+        grain: a distribution of ``dem.grains.sizes``, or a mean diameter [m].
+        spread: with a mean diameter: uniform within this share of it [1]; 0.15 when None.
+
+    Returns:
+        Radii [m], shape [grain_count]; at least one.
+
+    Raises:
+        ValueError: a volume that is not positive, or what ``dem.grains.sizes.sizes_of`` refuses.
+    """
+    if not (math.isfinite(volume) and volume > 0):
+        raise ValueError(f"volume = {volume} must be positive [m3]")
+    sizes = sizes_of(grain, spread)
+    count = max(1, round(volume / (math.pi / 6 * sizes.mean_cube)))
+    if isinstance(sizes, Uniform):
+        # In this order of products since the first beds, whose bits it keeps.
+        return 0.5 * sizes.mean * (1 + sizes.spread * rng.uniform(-1, 1, count))
+    return 0.5 * sizes.draw(rng, count)
+
+
+def rain_column(sizes: Sizes) -> float:
+    """Upper bound of the rain's column over the depth of the levelled bed [1].
+
+    ``RAIN_COLUMN`` as long as sizes are alike. The lattice has a site of the largest grain's size for every grain, so a
+    wide distribution makes a column that is higher by the ratio of the largest to the mean cube over that of a uniform
+    one (spread 0.15).
+    """
+    if isinstance(sizes, Uniform):
+        return RAIN_COLUMN
+    like = Uniform(1.0)
+    return RAIN_COLUMN * max(1.0, (sizes.bounds[1] ** 3 / sizes.mean_cube) / (like.bounds[1] ** 3 / like.mean_cube))
+
+
+def rain_positions(rng: np.random.Generator, radii: np.ndarray, period: Sequence[float]) -> np.ndarray:
+    """Centres of grains in a loose jittered column above z = 0, none touching, periodic in x and y.
+
+    Layers are one and a half of the largest diameters apart, so that the grains fall as rain rather than as a block.
+
+    Args:
+        radii: [m], shape [grain_count].
+        period: (x, y) [m].
+
+    Returns:
+        Centres [m], shape [grain_count, 3].
+    """
+    largest = 2 * float(radii.max())
+    nx, ny = (max(1, int(length / (1.02 * largest))) for length in period)
+    cell = (period[0] / nx, period[1] / ny, 1.5 * largest)
+    k, rest = np.divmod(np.arange(len(radii)), nx * ny)
+    j, i = np.divmod(rest, nx)
+    lattice = np.column_stack([i + 0.5, j + 0.5, k + 0.5]) * cell
+    # A grain may go as far from its site as its own radius leaves room.
+    play = 0.5 * (np.array(cell) - 2 * radii[:, None]) * 0.98
+    return lattice + rng.uniform(-1, 1, lattice.shape) * play

@@ -1,0 +1,259 @@
+"""Distributions of grain diameters: uniform, normal, log-normal, and a sieve table.
+
+Each says its mean, its bounds, its mean cube and draws diameters; all have bounds, because the smallest grain sets the
+time step and the largest the cells of the neighbour search. The normal and the log-normal count grains, as a microscope
+does; a sieve table weighs them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+__all__ = ["Json", "LogNormal", "Normal", "Sieve", "Sizes", "Uniform", "describe", "sizes_of"]
+
+
+Json = dict[str, Any]
+"""Plain values by name, as JSON takes them."""
+
+
+def _refuse(kind: str, key: str, value: Any, bounds: str) -> None:
+    raise ValueError(f"{kind}: {key} = {value} must be {bounds}")
+
+
+def _check_mean(kind: str, mean: float) -> None:
+    if not (math.isfinite(mean) and mean > 0):
+        _refuse(kind, "mean", mean, "a positive diameter [m]")
+
+
+def _between(rng: np.random.Generator, cut: float, count: int) -> np.ndarray:
+    """Standard normal numbers between -cut and cut."""
+    low = ndtr(-cut)
+    return ndtri(low + (1 - 2 * low) * rng.uniform(0, 1, count))
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """By number, uniform within mean (1 +- spread). ``mean`` [m], ``spread`` [1], at most 0.5."""
+
+    mean: float
+    spread: float = 0.15
+
+    def __post_init__(self):
+        _check_mean("Uniform", self.mean)
+        if not 0 <= self.spread <= 0.5:
+            _refuse("Uniform", "spread", self.spread, "between 0 and 0.5 of the mean diameter")
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Smallest and largest diameter [m]."""
+        return self.mean * (1 - self.spread), self.mean * (1 + self.spread)
+
+    @property
+    def mean_cube(self) -> float:
+        """Of the diameter [m3]."""
+        return self.mean**3 * (1 + self.spread**2)
+
+    def draw(self, rng: np.random.Generator, count: int) -> np.ndarray:
+        """Diameters [m], shape [count]."""
+        return self.mean * (1 + self.spread * rng.uniform(-1, 1, count))
+
+
+@dataclass(frozen=True)
+class Normal:
+    """By number, normal about ``mean`` [m] and cut off on both sides.
+
+    Attributes:
+        deviation: standard deviation before the cut over the mean [1].
+        cut: where it is cut off, in standard deviations; deviation times cut stays below 0.9.
+    """
+
+    mean: float
+    deviation: float
+    cut: float = 2.0
+
+    def __post_init__(self):
+        _check_mean("Normal", self.mean)
+        _check_cut("Normal", self.deviation, self.cut)
+        if not self.deviation * self.cut < 0.9:
+            _refuse(
+                "Normal",
+                "deviation",
+                self.deviation,
+                f"below {0.9 / self.cut:g} with cut = {self.cut:g}, or the smallest grains vanish",
+            )
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Smallest and largest diameter [m]."""
+        return self.mean * (1 - self.deviation * self.cut), self.mean * (1 + self.deviation * self.cut)
+
+    @property
+    def mean_cube(self) -> float:
+        """Of the diameter [m3]: 1 + 3 s^2 E z^2 for a symmetric z, E z^2 = 1 - 2 c phi(c) / (2 Phi(c) - 1)."""
+        density = math.exp(-0.5 * self.cut**2) / math.sqrt(2 * math.pi)
+        square = 1 - 2 * self.cut * density / (1 - 2 * float(ndtr(-self.cut)))
+        return self.mean**3 * (1 + 3 * self.deviation**2 * square)
+
+    def draw(self, rng: np.random.Generator, count: int) -> np.ndarray:
+        """Diameters [m], shape [count]."""
+        return self.mean * (1 + self.deviation * _between(rng, self.cut, count))
+
+
+@dataclass(frozen=True)
+class LogNormal:
+    """By number, log-normal with the mean diameter ``mean`` [m] and cut off on both sides.
+
+    Attributes:
+        deviation: standard deviation of ln(diameter) before the cut [1].
+        cut: where it is cut off, in those standard deviations.
+    """
+
+    mean: float
+    deviation: float
+    cut: float = 2.0
+
+    def __post_init__(self):
+        _check_mean("LogNormal", self.mean)
+        _check_cut("LogNormal", self.deviation, self.cut)
+
+    @property
+    def median(self) -> float:
+        """Half the grains are smaller [m]."""
+        return self.mean / self._moment(1)
+
+    def _moment(self, power: int) -> float:
+        """Mean of (diameter / median)^power."""
+        shift = power * self.deviation
+        share = ndtr(self.cut - shift) - ndtr(-self.cut - shift)
+        return math.exp(0.5 * shift**2) * float(share) / (1 - 2 * float(ndtr(-self.cut)))
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Smallest and largest diameter [m]."""
+        factor = math.exp(self.deviation * self.cut)
+        return self.median / factor, self.median * factor
+
+    @property
+    def mean_cube(self) -> float:
+        """Of the diameter [m3]."""
+        return self.median**3 * self._moment(3)
+
+    def draw(self, rng: np.random.Generator, count: int) -> np.ndarray:
+        """Diameters [m], shape [count]."""
+        return self.median * np.exp(self.deviation * _between(rng, self.cut, count))
+
+
+@dataclass(frozen=True)
+class Sieve:
+    """By mass, from a sieve table; the grading curve is straight over ln(diameter) between two sieves.
+
+    Attributes:
+        openings: of the sieves [m], ascending, two at least.
+        passing: share of the mass that passes each [1]; 0 at the first, 1 at the last.
+        scale: how much larger than the table's the grains are [1].
+    """
+
+    openings: tuple[float, ...]
+    passing: tuple[float, ...]
+    scale: float = 1.0
+
+    def __post_init__(self):
+        object.__setattr__(self, "openings", tuple(float(d) for d in self.openings))
+        object.__setattr__(self, "passing", tuple(float(p) for p in self.passing))
+        if len(self.openings) < 2:
+            _refuse("Sieve", "openings", self.openings, "two or more diameters [m]")
+        if len(self.passing) != len(self.openings):
+            _refuse("Sieve", "passing", self.passing, f"as many shares as there are openings, {len(self.openings)}")
+        if not (self.openings[0] > 0 and math.isfinite(self.openings[-1]) and _ascending(self.openings, strictly=True)):
+            _refuse("Sieve", "openings", self.openings, "positive and ascending [m]")
+        if not (_ascending(self.passing, strictly=False) and self.passing[0] == 0 and self.passing[-1] == 1):
+            _refuse("Sieve", "passing", self.passing, "shares of the mass that rise from 0 to 1")
+        if not (math.isfinite(self.scale) and self.scale > 0):
+            _refuse("Sieve", "scale", self.scale, "positive")
+
+    def _classes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Bounds [m], mass shares, and numbers of grains per mass of sizes cubed [1/m3] of the classes between sieves.
+
+        Within a class the mass lies evenly over ln d, so numbers go as d^-3 over ln d.
+        """
+        d = self.scale * np.array(self.openings)
+        low, high = d[:-1], d[1:]
+        mass = np.diff(self.passing)
+        number = mass * (low**-3 - high**-3) / (3 * np.log(high / low))
+        return low, high, mass, number
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Smallest and largest diameter [m] that there is mass of."""
+        low, high, mass, _ = self._classes()
+        return float(low[mass > 0][0]), float(high[mass > 0][-1])
+
+    @property
+    def mean_cube(self) -> float:
+        """Of the diameter, over the grains by number [m3]."""
+        return float(1 / self._classes()[3].sum())
+
+    @property
+    def mean(self) -> float:
+        """Of the diameter, over the grains by number [m]."""
+        low, high, mass, number = self._classes()
+        first = mass * (low**-2 - high**-2) / (2 * np.log(high / low))
+        return float(first.sum() / number.sum())
+
+    def draw(self, rng: np.random.Generator, count: int) -> np.ndarray:
+        """Diameters [m], shape [count]."""
+        low, high, _, number = self._classes()
+        ends = np.cumsum(number / number.sum())
+        ends[-1] = 1.0
+        which = np.searchsorted(ends, rng.uniform(0, 1, count), side="right")
+        a, b = low[which] ** -3, high[which] ** -3
+        return (a - (a - b) * rng.uniform(0, 1, count)) ** (-1 / 3)
+
+
+Sizes = Uniform | Normal | LogNormal | Sieve
+
+
+def _check_cut(kind: str, deviation: float, cut: float) -> None:
+    if not 0 <= deviation <= 1:
+        _refuse(kind, "deviation", deviation, "between 0 and 1")
+    if not 0 < cut <= 4:
+        _refuse(kind, "cut", cut, "above 0 and at most 4 standard deviations")
+
+
+def _ascending(values: Sequence[float], *, strictly: bool) -> bool:
+    steps = np.diff(values)
+    return bool((steps > 0).all() if strictly else (steps >= 0).all())
+
+
+def sizes_of(grain: float | Sizes, spread: float | None = None) -> Sizes:
+    """The distribution that ``grain`` is, or the uniform one about that mean diameter [m] (spread 0.15 when None).
+
+    Raises:
+        ValueError: a grain that is neither, or a spread beside a distribution, which has one of its own.
+    """
+    if isinstance(grain, Sizes):
+        if spread is not None:
+            raise ValueError(f"spread = {spread} is for a mean diameter; {type(grain).__name__} has a width of its own")
+        return grain
+    spread = 0.15 if spread is None else spread
+    if isinstance(grain, bool) or not isinstance(grain, (int, float, np.number)):
+        raise ValueError(f"grain = {grain!r} must be a mean diameter [m] or one of Uniform, Normal, LogNormal, Sieve")
+    if not (math.isfinite(grain) and grain > 0):
+        raise ValueError(f"grain = {grain} must be a positive diameter [m]")
+    if not 0 <= spread <= 0.5:
+        raise ValueError(f"spread = {spread} must be between 0 and 0.5 of the mean diameter")
+    return Uniform(float(grain), float(spread))
+
+
+def describe(sizes: DataclassInstance) -> Json:
+    """A distribution, or ``dem.Graded``, in plain values that JSON takes."""
+    return {"kind": type(sizes).__name__} | asdict(sizes)

@@ -1,0 +1,241 @@
+"""A bed on its way through the stages of its preparation, with a report of what each of them left."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dem.engine.values import BedFailure
+from dem.grains.graded import Graded
+from dem.grains.sizes import Json
+from dem.measure.grading import measure_grading
+from dem.measure.lid import Lid
+
+from .recipe import FLUFF, Stage
+from .report import ENERGY_RATIO, StageReport, measure_stage
+from .specification import BEARING
+from .stages import DRAG, PAST, SHORT, B, Preparation
+
+__all__ = ["Laboratory"]
+
+# Nearly at rest, as a bed is that is cut level before it has settled.
+_ROUGH_ENERGY_RATIO = 1e-2
+# A bed that is tilted moves while it settles anew; it flows once it still does so after this many fall times.
+_FLOWS = 15.0
+
+
+class Laboratory(Preparation[B]):
+    """A bed on its way through stages that can be kept between any two pieces of the work."""
+
+    def __init__(
+        self,
+        bed: B,
+        *,
+        stages: Sequence[Stage],
+        grain: float,
+        progress: Any,
+        path: Path | None,
+        recipe: Json | None = None,
+        graded: Graded | None = None,
+        sticking: Callable[[B], B] | None = None,
+        reporting: bool = True,
+        labels: dict[str, str] | None = None,
+    ):
+        """A preparation at its beginning.
+
+        Args:
+            path: as for ``Preparation``. recipe: what was kept at ``path`` is continued only for the same recipe.
+            graded: where sizes belong; every stage's report then contains how they lie.
+            sticking: returns the same grains, which touch as their material says (the stage 'stick').
+            reporting: whether stages have reports. labels: what progress calls a stage where not as it is written.
+        """
+        super().__init__(bed, grain=grain, progress=progress, path=path)
+        self.stages = list(stages)
+        self.reports: list[StageReport] = []
+        self.done = 0
+        self._recipe, self._graded, self._sticking = recipe, graded, sticking
+        self._reporting, self._labels = reporting, labels or {}
+
+    def run(self) -> B:
+        """Go on to the end; the bed. Raises as ``prepare_as`` does.
+
+        After a KeyboardInterrupt out of ``progress.update``, between two pieces of the work, it is kept first.
+        """
+        work = {
+            "rain": self._rain_down,
+            "stick": self._stick,
+            "level": self._level,
+            "fluff": self._loosen,
+            "compact": self._compact,
+            "packing": self._to_packing,
+            "cut": self._cut,
+            "tilt": self._tilt,
+        }
+        while self.done < len(self.stages):
+            stage = self.stages[self.done]
+            if self._progress is not None:
+                self._progress.stage(self._labels.get(stage.name, str(stage)), 1.0)
+            notes = work[stage.name](stage)
+            self.bed.measure_surface()
+            if self._reporting:
+                if self._graded is not None:
+                    notes["grading"] = asdict(measure_grading(self.bed, self._graded))
+                across = self._left
+                self.reports.append(measure_stage(self.bed, str(stage), grain=self._grain, across=across, notes=notes))
+            self.notes = {}
+            self.done += 1
+            self.keep()
+        return self.bed
+
+    @property
+    def _left(self) -> tuple[float, float] | None:
+        """The middle of what a cut has left, from and to [m]; None without a cut."""
+        widths = [s.value for s in self.stages[: self.done + 1] if s.name == "cut" and s.value is not None]
+        if not widths:
+            return None
+        block = self.bed.size[0] - max(widths)
+        margin = min(self.bed.size[2], 0.3 * block)
+        return 0.5 * max(widths) + margin, self.bed.size[0] - 0.5 * max(widths) - margin
+
+    # ------------------------------------------------------------------ kept and found again
+
+    def _to_keep(self) -> Json:
+        return {"recipe": self._recipe, "done": self.done, "reports": [asdict(report) for report in self.reports]}
+
+    def _recall(self, kept: Json) -> bool:
+        if kept["recipe"] != json.loads(json.dumps(self._recipe)):
+            return False
+        self.reports, self.done = [StageReport(**report) for report in kept["reports"]], int(kept["done"])
+        return True
+
+    # ------------------------------------------------------------------ the stages
+
+    def _rain_down(self, stage: Stage) -> Json:
+        if "settle" not in self.notes:
+            self._fall()
+            self.notes = {"settle": {}}
+        self._settle(_ROUGH_ENERGY_RATIO if stage.by == "rough" else ENERGY_RATIO, self.notes["settle"])
+        return {}
+
+    def _stick(self, stage: Stage) -> Json:
+        assert self._sticking is not None
+        notes = self.notes
+        if not notes:
+            notes |= {"before": self.bed.packing_fraction, "settle": {}}
+            self.bed = self._sticking(self.bed)
+        self._settle(ENERGY_RATIO, notes["settle"])
+        return {"before": notes["before"]}
+
+    def _level(self, stage: Stage) -> Json:
+        notes = self.notes
+        if not notes:
+            height = self.bed.size[2] if stage.value is None else stage.value
+            above = self.bed.grains().position[:, 2] > height
+            notes |= {"removed": int(above.sum()), "settle": {}}
+            if above.any():
+                self.bed = self.bed.without(above)
+        self._settle(ENERGY_RATIO, notes["settle"])
+        return {"removed": notes["removed"]}
+
+    def _loosen(self, stage: Stage) -> Json:
+        self._fluff(FLUFF if stage.value is None else stage.value, self.notes)
+        return {}
+
+    def _to_packing(self, stage: Stage) -> Json:
+        assert stage.value is not None
+        self._reach(stage.value, self.notes)
+        return self._said()
+
+    def _compact(self, stage: Stage) -> Json:
+        found, wanted = self.bed.packing_fraction, stage.value
+        if not self.notes and wanted is not None and found > wanted + PAST:
+            raise ValueError(
+                f"stages: {str(stage)!r} cannot be reached: the bed lies at {found:.4f} already and compacting only "
+                f"makes it denser; 'packing:{wanted:g}' loosens it from below first, or ask for more"
+            )
+        if stage.by == "lid":
+            assert wanted is not None
+            self._press_to(wanted)
+        else:
+            self._tap_to(wanted, self.notes)
+        return self._said()
+
+    def _said(self) -> Json:
+        """What a stage that compacts tells of itself."""
+        return {key: self.notes[key] for key in ("taps", "pressure", "packing_under_it", "trace") if key in self.notes}
+
+    def _press_to(self, packing: float) -> None:
+        """Press a lid on the bed and take it off, ever harder, until its packing fraction is reached."""
+        bed, notes = self.bed, self.notes
+        weight = bed.weight / (bed.size[0] * bed.size[1])
+        most = BEARING * weight
+        if "pressure" not in notes:
+            notes |= {"pressure": 0.0, "trace": [bed.packing_fraction], "settle": None}
+        while notes["settle"] is not None or bed.packing_fraction < packing - SHORT:
+            if notes["settle"] is None:
+                if "body" not in notes:
+                    if notes["pressure"] >= most:
+                        raise ValueError(
+                            f"packing = {packing:g} cannot be reached: a lid pressed to {most:.4g} Pa, {BEARING:g} "
+                            f"times what lies on the floor, brought the bed from {notes['trace'][0]:.4f} to "
+                            f"{bed.packing_fraction:.4f}; taps do more, or ask for less"
+                        )
+                    notes["pressure"] = min(most, max(weight, 2 * notes["pressure"]))
+                lid = Lid(bed, notes, grain=self._grain, fall_time=self._fall_time, drag_time=DRAG * self._fall_time)
+                while not lid.piece(notes["pressure"], lambda: self._energy):
+                    self._pause(0.0)
+                notes["settle"] = {}
+            self._settle(ENERGY_RATIO, notes["settle"])
+            bed.measure_surface()
+            notes["trace"].append(bed.packing_fraction)
+            notes["settle"] = None
+            way = max(1e-9, packing - notes["trace"][0])
+            self._pause(min(1.0, max(0.0, (bed.packing_fraction - notes["trace"][0]) / way)))
+
+    def _cut(self, stage: Stage) -> Json:
+        """Dig a strip out about x = 0 and let the faces do what they do: without drag first, so that they may fall."""
+        assert stage.value is not None
+        notes, half = self.notes, 0.5 * stage.value
+        if not notes:
+            x = np.mod(self.bed.grains().position[:, 0], self.bed.size[0])
+            gone = (x < half) | (x > self.bed.size[0] - half)
+            notes |= {"removed": int(gone.sum()), "height": self.bed.surface, "settle": {}}
+            self.bed = self.bed.without(gone)
+            notes["began"] = self.bed.time
+        bed, fall = self.bed, self._fall_time
+        while (bed.time - notes["began"]) < 5 * fall:
+            bed.advance(max(1, round(0.05 * fall / bed.time_step)))
+            self._pause(min(1.0, (bed.time - notes["began"]) / (5 * fall)))
+        self._settle(ENERGY_RATIO, notes["settle"])
+        x = np.mod(bed.grains().position[:, 0], bed.size[0])
+        fallen = int(((x < half) | (x > bed.size[0] - half)).sum())
+        return {"removed": notes["removed"], "fallen": fallen, "height": notes["height"]}
+
+    def _tilt(self, stage: Stage) -> Json:
+        """Turn gravity towards +x by a degree at a time, at rest after each."""
+        assert stage.value is not None
+        bed, notes = self.bed, self.notes
+        g = math.hypot(*bed.gravity)
+        notes.setdefault("held", math.degrees(math.atan2(bed.gravity[0], -bed.gravity[2])))
+        notes.setdefault("settle", None)
+        while notes["held"] < stage.value or notes["settle"] is not None:
+            angle = min(stage.value, notes["held"] + 1.0)
+            if notes["settle"] is None:
+                bed.set_gravity((g * math.sin(math.radians(angle)), 0.0, -g * math.cos(math.radians(angle))))
+                notes["settle"] = {}
+            try:
+                self._settle(ENERGY_RATIO, notes["settle"], longest=_FLOWS)
+            except BedFailure:
+                raise ValueError(
+                    f"stages: {str(stage)!r} cannot be held: the bed flows at {angle:g} degrees; "
+                    f"{notes['held']:g} would do"
+                ) from None
+            notes |= {"held": angle, "settle": None}
+            self._pause(min(1.0, angle / stage.value))
+        return {"angle": notes["held"]}

@@ -1,0 +1,224 @@
+"""Prepares a bed as in a laboratory: through stages of your choice, or by the usual recipe, with a cache of beds."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Unpack
+
+from dem.engine import runtime
+from dem.engine.core import BedCore
+from dem.engine.values import BedFailure
+from dem.grains.graded import Graded
+from dem.grains.materials import Material
+from dem.grains.sizes import Json, Uniform
+
+from .bedfile import load_prepared, save_prepared
+from .laboratory import Laboratory
+from .pouring import poured, poured_on, touching_as
+from .recipe import DENSEST_UNIFORM, Stage, check_packing, check_stages, parse_stage
+from .report import Prepared
+from .specification import (
+    B,
+    BedOptions,
+    Specification,
+    bound_of_mean,
+    cache_folder,
+    check_options,
+    fingerprint,
+    kept_in_cache,
+    soft_enough,
+)
+
+__all__ = [
+    "bound_of_mean",
+    "cache_folder",
+    "check_options",
+    "fingerprint",
+    "prepare_as",
+    "prepare_bed",
+    "soft_enough",
+]
+
+# More is rained in than is kept, for a level surface: this much higher, and at least this many diameters.
+_SURPLUS, _SURPLUS_DIAMETERS = 0.06, 2.0
+
+
+def prepare_as(
+    material: str | Material,
+    *,
+    stages: Sequence[str | Stage],
+    make: type[B] = BedCore,
+    keep: str | Path | None = None,
+    cache: bool = False,
+    progress: Any = None,
+    **options: Unpack[BedOptions],
+) -> Prepared[B]:
+    """A bed that went through these stages, at rest after each of them, or the same one from the cache.
+
+    Args:
+        material: as for ``prepare_bed``.
+        stages: as ``dem.prepare.recipe.parse_stage`` reads them: ``["rain", "fluff", "level", "compact:0.6"]``.
+        make: the class of the bed; ``dem.Bed.prepare_as`` passes its own.
+        keep: a file (.npz; a .json comes beside it) where unfinished work is kept every minute and after every stage;
+            the next call with it continues from there, bitwise reproducibly.
+        cache: whether to look in the cache of ``prepare_bed``, and to leave the bed there, finished or not.
+        progress: anything with ``stage(name, total)`` and ``update(done)``, or None. A KeyboardInterrupt out of
+            ``update`` stops the preparation where it can be continued.
+        options: see ``dem.prepare.specification.BedOptions``.
+
+    The rain is more than is wanted, so that a bed that is levelled last has its depth up to a packing fraction of 0.64.
+
+    Raises:
+        ValueError: what ``prepare_bed`` refuses; stages that cannot be; a packing, or a slope, that is out of reach;
+            both ``keep`` and ``cache``.
+        BedFailure: the bed did not come to rest.
+    """
+    wanted = Specification.of(material, **options)
+    stuff, (x, y, z) = wanted.material, wanted.size
+    plan = [parse_stage(stage) if isinstance(stage, str) else stage for stage in stages]
+    check_stages(plan, size=wanted.size, grain=wanted.sizes.mean, sizes=wanted.local, cohesive=stuff.cohesion != "none")
+    recipe = wanted.recipe() | {"stages": [str(stage) for stage in plan]}
+    if cache and keep is not None:
+        raise ValueError(f"keep = {str(keep)!r} beside cache: the cache has a place of its own for what is under way")
+    dense = DENSEST_UNIFORM if isinstance(wanted.local, Uniform) else 0.70
+    volume = (z + _SURPLUS_DIAMETERS * wanted.coarsest) * dense * x * y
+    first = wanted
+    if plan[0].dry:
+        first = replace(wanted, material=poured(stuff, friction=plan[0].value), floor=poured_on(wanted.floor))
+    return _prepared(
+        wanted, plan, recipe, lambda: _rain(first, volume, make), make=make, cache=cache, save=save_prepared,
+        keep=None if keep is None else Path(keep), progress=progress,
+    )  # fmt: skip
+
+
+def prepare_bed(
+    material: str | Material,
+    *,
+    packing: float | None = None,
+    make: type[B] = BedCore,
+    cache: bool = True,
+    progress: Any = None,
+    **options: Unpack[BedOptions],
+) -> B:
+    """A bed rained in, levelled and settled under gravity, or the same one from the cache.
+
+    It is the recipe ``rain, level`` of ``prepare_as``, with ``packing:...`` behind it where a packing is asked for, but
+    for two things that keep beds bitwise as they have always been: less is rained in, and the rain is cut level as soon
+    as it is nearly at rest (mean kinetic energy of a grain below 1e-2 m g d). There are no reports.
+
+    Args:
+        material: a name, the file of a material or a Material; its surface energy is taken for these grains, where it
+            states for which it holds (``Material.for_grain``).
+        packing: bulk packing fraction [1]; the bed is tapped until it is reached, and where it is denser than that
+            loosened from below first. As rained when None.
+        make: the class of the bed; ``dem.Bed.prepare`` passes its own.
+        cache: whether to look in the cache, and to leave the bed there. What is unfinished is kept there every minute,
+            and the next call continues from it.
+        progress, options: as for ``prepare_as``.
+
+    The grains fall as a loose column from rest, come to rest in a drag that stands in for the long ringing of a soft
+    bed, lose what lies above the level, and settle again, at the end without drag. Settled means: mean kinetic energy
+    of a grain below 1e-5 m g d, and floor force within 1 % of the weight.
+
+    Raises:
+        ValueError: an unknown material, a size or grain that is not positive, grains too large for the bed, a spread
+            outside 0 to 0.5 or beside a distribution, a packing that cannot be reached, a time step too long.
+        BedFailure: the bed did not come to rest.
+    """
+    wanted = Specification.of(material, **options)
+    sizes, (x, y, z) = wanted.sizes, wanted.size
+    plan = [Stage("rain", by="rough"), Stage("level")]
+    if packing is not None:
+        check_packing(packing, wanted.local, cohesive=wanted.material.cohesion != "none")
+        plan.append(Stage("packing", packing))
+    recipe = wanted.recipe() | {
+        "grain": float(sizes.mean),
+        "spread": sizes.spread if isinstance(sizes, Uniform) else None,
+        "packing": packing,
+    }
+    volume = 0.60 * max(z * (1 + _SURPLUS), z + _SURPLUS_DIAMETERS * wanted.coarsest) * x * y
+    return _prepared(
+        wanted, plan, recipe, lambda: _rain(wanted, volume, make), make=make, cache=cache, save=_save_plain,
+        progress=progress, labels={"level": "settle", "packing": "tap"}, failed=cache_folder() / "failed",
+    ).whole  # fmt: skip
+
+
+def _rain(wanted: Specification, volume: float, make: type[B]) -> B:
+    """The grains in the air, at rest, in a loose column."""
+    return wanted.rain(volume, make)
+
+
+def _prepared(
+    wanted: Specification,
+    plan: list[Stage],
+    recipe: Json,
+    rain: Callable[[], B],
+    *,
+    make: type[B],
+    cache: bool,
+    save: Callable[[Prepared[B], Path], Any],
+    progress: Any,
+    keep: Path | None = None,
+    labels: dict[str, str] | None = None,
+    failed: Path | None = None,
+) -> Prepared[B]:
+    """The bed from the cache, or made and left there. A recipe with ``labels`` has no reports.
+
+    ``save`` writes it; ``failed``: the folder where a bed that did not come to rest is saved.
+    """
+    runtime.start(arch=wanted.arch, threads=wanted.threads, precision=wanted.precision)
+    own = wanted.material.softened(wanted.young)
+    shelf, unfinished = kept_in_cache(recipe)
+    if cache:
+        keep = unfinished
+        if shelf.exists():
+            try:
+                found = load_prepared(shelf, arch=wanted.arch, threads=wanted.threads, make=make)
+            except ValueError as problem:
+                _warn(f"the cached bed {shelf.name} cannot be read and is made anew: {problem}")
+            else:
+                found.whole.material, found.whole.recipe = own, found.recipe or recipe
+                return found
+    work = Laboratory(
+        rain(),
+        stages=plan,
+        grain=wanted.sizes.mean,
+        progress=progress,
+        path=keep,
+        recipe=recipe,
+        graded=wanted.sizes if isinstance(wanted.sizes, Graded) else None,
+        sticking=lambda bed: touching_as(bed, own, floor=wanted.floor),
+        reporting=labels is None,
+        labels=labels,
+    )
+    work.find(arch=wanted.arch, threads=wanted.threads)
+    try:
+        bed = work.run()
+    except BedFailure as failure:
+        if failed is None:
+            raise
+        kept = work.bed.save(failed / shelf.name)
+        raise BedFailure(f"{failure.reason}; the bed as it was is in {kept}") from None
+    prepared = Prepared(wanted.finish(bed, recipe), recipe, work.reports)
+    if cache:
+        try:
+            save(prepared, shelf)
+        except OSError as problem:
+            _warn(f"the bed could not be kept in the cache: {problem}")
+        else:
+            work.forget()
+    return prepared
+
+
+def _warn(text: str) -> None:
+    warnings.warn(text, stacklevel=4)
+
+
+def _save_plain(prepared: Prepared, path: Path) -> None:
+    """A bed without reports, as ``Bed.save`` writes it; its recipe beside it."""
+    prepared.whole.save(path)
+    path.with_suffix(".json").write_text(json.dumps(prepared.recipe, indent=1))

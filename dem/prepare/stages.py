@@ -1,0 +1,311 @@
+"""What stages are made of: falling, settling, loosening, tapping; kept between any two pieces of the work."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from dem.engine.core import BedCore
+from dem.engine.values import BedFailure, State
+from dem.grains.sizes import Json
+
+from .recipe import FLUFF
+from .report import ENERGY_RATIO, FLOOR_RATIO
+
+__all__ = ["ENERGY_RATIO", "FLOOR_RATIO", "Preparation", "lift_apart"]
+
+B = TypeVar("B", bound=BedCore)
+
+# Time constant of the drag while settling, in the time that a grain takes to fall the bed's depth.
+DRAG = 0.1
+_LONGEST = 60.0  # settling gives up after this many fall times
+_MOST_TAPS = 40
+# A tap is this many g high, or, where one would overshoot, half as high again and again, but not below the last.
+_TAP, _SOFTEST_TAP = 3.0, 0.2
+# The packing asked for is reached from this much below, and not passed by more than that.
+SHORT, PAST = 0.0005, 0.002
+# Taps gain less and less (as the logarithm of their number): so many tell what the others can still bring; a bed that
+# gains less than this in so many is called the densest that taps reach.
+_TELLING_TAPS, _NOTHING_GAINED = 8, 0.002
+# A fluffed bed sinks back at this share of sqrt(g d) at most.
+_SINK = 0.1
+# The energy of grains that sink is half the square of that; below this they have sunk [m g d a grain].
+_SUNK = 1e-3
+# It is stirred first: velocities at random, of this standard deviation over sqrt(g d), for the time in which a grain
+# with that speed goes so many diameters. Without, it comes down in the order in which it was.
+_STIR, _STIR_WAY = 1.0, 2.0
+_KEEP_INTERVAL = 60.0  # between two times that it is kept [s of waiting]
+
+
+class Preparation(Generic[B]):
+    """A bed on its way from a loose column in the air to one at rest, and what its stages are made of.
+
+    What a stage remembers is in ``notes`` (plain values, as JSON takes them), so that a preparation that was kept goes
+    on bitwise reproducibly.
+    """
+
+    def __init__(self, bed: B, *, grain: float, progress: Any, path: Path | None):
+        """``path``: where it is kept now and then (.npz, and .json beside it); None: nowhere."""
+        self.bed = bed
+        self.notes: Json = {}
+        self._grain = grain
+        self._progress = progress
+        self._path = path
+        self._kept = time.monotonic()
+        self._densest: State = {}  # state of the bed where taps had it densest
+
+    # ------------------------------------------------------------------ kept and found again
+
+    def keep(self) -> None:
+        """Write it down as it is."""
+        if self._path is not None:
+            self.bed.save(self._path)
+            if self._densest:
+                np.savez(self._path.with_suffix(".densest.npz"), **self._densest)  # type: ignore[arg-type]
+            kept = self._to_keep() | {"notes": self.notes, "steps": self.bed.steps}
+            self._path.with_suffix(".json").write_text(json.dumps(kept))
+            self._kept = self._now()
+
+    def find(self, **options: Any) -> None:
+        """Go back to what was kept, if there is something whole; options are those of ``Bed.load``."""
+        if self._path is None or not self._path.exists():
+            return
+        try:
+            kept = json.loads(self._path.with_suffix(".json").read_text())
+            bed, notes = type(self.bed).load(self._path, **options), dict(kept["notes"])
+            if kept["steps"] != bed.steps or not self._recall(kept):  # ended between the two files, or another's
+                return
+            if (densest := self._path.with_suffix(".densest.npz")).exists():
+                with np.load(densest) as file:
+                    self._densest = {key: file[key] for key in file.files}
+        except (OSError, ValueError, KeyError, TypeError, AttributeError):
+            return
+        self.bed, self.notes = bed, notes
+
+    def _to_keep(self) -> Json:
+        """What is kept beside the bed, its steps and the notes."""
+        raise NotImplementedError
+
+    def _recall(self, kept: Json) -> bool:
+        """Take up again what ``_to_keep`` returned; whether it is of this work. Nothing changes where it raises."""
+        raise NotImplementedError
+
+    def forget(self) -> None:
+        """Remove what was kept."""
+        if self._path is not None:
+            for path in (self._path, self._path.with_suffix(".json"), self._path.with_suffix(".densest.npz")):
+                path.unlink(missing_ok=True)
+
+    @staticmethod
+    def _now() -> float:
+        return time.monotonic()
+
+    def _pause(self, done: float) -> None:
+        """Between two pieces of the work: say how far it is, keep it if it is time."""
+        try:
+            if self._progress is not None:
+                self._progress.update(done)
+        except KeyboardInterrupt:
+            self.keep()
+            raise
+        if self._now() - self._kept >= _KEEP_INTERVAL:
+            self.keep()
+
+    # ------------------------------------------------------------------ the stages
+
+    @property
+    def _energy(self) -> float:
+        """Mean kinetic energy of a grain over m g d [1]."""
+        bed = self.bed
+        return bed.kinetic_energy / bed.weight / self._grain
+
+    @property
+    def _floor_share(self) -> float:
+        """What the floor carries over the weight, of both the part across the floor [1]."""
+        bed = self.bed
+        return bed.floor_force / (bed.weight * (-bed.gravity[2] / math.hypot(*bed.gravity)))
+
+    @property
+    def _fall_time(self) -> float:
+        """The time that a grain takes to fall the bed's depth [s]."""
+        return math.sqrt(2 * self.bed.size[2] / math.hypot(*self.bed.gravity))
+
+    def _fall(self) -> None:
+        """Advance until the rain is down: the grains' energy has passed its peak and is a tenth of m g d a grain."""
+        bed, notes = self.bed, self.notes
+        if not notes:
+            top = bed.grains().position[:, 2].max()
+            notes |= {"peak": 0.0, "fall": math.sqrt(2 * top / math.hypot(*bed.gravity))}
+        fall = notes["fall"]
+        steps = max(1, round(0.03 * fall / bed.time_step))
+        while True:
+            bed.advance(steps)
+            energy = self._energy
+            notes["peak"] = max(notes["peak"], energy)
+            if energy < 0.1 and energy < 0.5 * notes["peak"]:
+                return
+            if bed.time > _LONGEST * fall:
+                raise BedFailure(f"the rain was not down after {bed.time:.3g} s: energy {energy:.2g} m g d a grain")
+            self._pause(min(1.0, bed.time / fall))
+
+    def _settle(self, ratio: float, notes: Json, *, pausing: bool = True, longest: float | None = None) -> None:
+        """Advance until the bed is at rest by ``ratio`` and the floor carries the weight; ``longest`` in fall times.
+
+        Soft grains in a deep bed ring as one spring for long. So the grains settle as in a fluid until they are at
+        rest; then, without it, they must still be.
+        """
+        bed, fall = self.bed, self._fall_time
+        steps = max(1, round(0.05 * fall / bed.time_step))
+        tolerance = FLOOR_RATIO if ratio == ENERGY_RATIO else 0.5
+        if not notes:
+            notes |= {"began": bed.time, "drag": 1.0, "first": 0.0}
+        while True:
+            bed.advance(steps, drag_time=DRAG * fall if notes["drag"] else math.inf)
+            energy = self._energy
+            floor = abs(self._floor_share - 1)
+            notes["first"] = notes["first"] or math.log(max(energy / ratio, math.e))
+            if energy < ratio and floor < tolerance:
+                if not notes["drag"]:
+                    return
+                notes["drag"] = 0.0
+            waited = bed.time - notes["began"]
+            if waited > (_LONGEST if longest is None else longest) * fall:
+                raise BedFailure(
+                    f"the bed did not come to rest in {waited:.3g} s: energy {energy:.2g} m g d (below {ratio:g} "
+                    f"was wanted), floor force off by {100 * floor:.2g} % of the weight"
+                )
+            if pausing:
+                self._pause(1 - min(1.0, max(0.0, math.log(max(energy / ratio, 1.0)) / notes["first"])))
+
+    def _reach(self, packing: float, notes: Json) -> None:
+        """To a packing fraction from either side: loosened from below where the bed is denser, then tapped."""
+        bed = self.bed
+        notes.setdefault("start", bed.packing_fraction)
+        if "fluff" in notes or (not notes.get("taps") and bed.packing_fraction > packing + PAST):
+            self._fluff(FLUFF, notes.setdefault("fluff", {}))
+            if bed.packing_fraction > packing + PAST:
+                raise ValueError(
+                    f"packing = {packing:g} cannot be reached: this material rains in at {notes['start']:.4f} and "
+                    f"loosened from below still lies at {bed.packing_fraction:.4f}; ask for that or more, or give the "
+                    f"grains more friction, rolling friction or cohesion"
+                )
+            notes["fluffed"] = notes.pop("fluff")
+        self._tap_to(packing, notes)
+
+    def _fluff(self, times: float, notes: Json) -> None:
+        """Lift the bed apart to ``times`` its height, as a flow through the floor does, and let it sink back slowly.
+
+        It sinks in a drag in which grains fall at a tenth of sqrt(g d) at most, and must then be at rest without it.
+        """
+        bed, g = self.bed, math.hypot(*self.bed.gravity)
+        drag = _SINK * math.sqrt(self._grain / g)
+        if not notes:
+            height = bed.surface
+            lift_apart(bed, times, speed=_STIR * math.sqrt(g * self._grain), seed=bed.seed or 0)
+            gravity, way = bed.gravity, _STIR_WAY * math.sqrt(self._grain / g) / _STIR
+            bed.set_gravity(0.0)  # the flow carries them
+            bed.advance(round(way / bed.time_step))
+            bed.set_gravity(gravity)
+            notes |= {"began": bed.time, "lasts": (times - 1) * height / (g * drag), "settle": {}}
+        steps = max(1, round(0.02 * notes["lasts"] / bed.time_step))
+        while not notes["settle"]:
+            bed.advance(steps, drag_time=drag)
+            share = (bed.time - notes["began"]) / notes["lasts"]
+            if share > 1 and self._energy < _SUNK:
+                break
+            if share > _LONGEST:
+                raise BedFailure(f"the loosened bed did not sink back in {bed.time - notes['began']:.3g} s")
+            self._pause(min(1.0, share))
+        self._settle(ENERGY_RATIO, notes["settle"])
+        bed.measure_surface()
+
+    def _tap_to(self, packing: float | None, notes: Json) -> None:
+        """Tap the bed until its packing fraction is reached, or (None) until taps gain nothing more.
+
+        The surface sinks meanwhile and stays nearly level. A tap is half a sine of acceleration of the bed's frame, 3 g
+        high, as long as a grain falls for its diameter; one that goes too far is taken back and made half as high.
+        With None the bed is left as it was densest. Taps of 3 g throw it up, and what sticks may come down in looser
+        lumps: such grains are tapped half as hard from there, and again, until that gains nothing either.
+        """
+        bed = self.bed
+        if "taps" not in notes:
+            notes |= {"taps": 0, "height": _TAP, "trace": [bed.packing_fraction], "round": 0}
+            self._densest = bed.state() if packing is None else {}
+        trace = notes["trace"]
+        while packing is None or bed.packing_fraction < packing - SHORT:
+            tapped = len(trace) - 1 - notes["round"]
+            gained = trace[-1] - trace[-1 - _TELLING_TAPS] if tapped >= _TELLING_TAPS else math.inf
+            if packing is None and (gained < _NOTHING_GAINED or notes["taps"] >= 2 * _MOST_TAPS):
+                if bed.packing_fraction < max(trace):
+                    bed.restore(self._densest)
+                softer = notes["height"] / 2
+                if bed.material.cohesion == "none" or softer < _SOFTEST_TAP or notes["taps"] >= 2 * _MOST_TAPS:
+                    self._densest = {}
+                    return
+                notes |= {"height": softer, "round": len(trace)}
+                trace.append(bed.packing_fraction)
+            if packing is not None:
+                self._refuse_dense(packing, gained / _TELLING_TAPS, notes)
+            before = bed.state()
+            self._tap_once(notes["height"])
+            self._settle(ENERGY_RATIO, {}, pausing=False)
+            bed.measure_surface()
+            notes["taps"] += 1
+            if packing is not None and bed.packing_fraction > packing + PAST and notes["height"] > _SOFTEST_TAP:
+                bed.restore(before)
+                notes["height"] /= 2
+            else:
+                trace.append(bed.packing_fraction)
+                if packing is None and trace[-1] == max(trace):
+                    self._densest = bed.state()
+            way = (packing or 1.1 * trace[0]) - trace[0]
+            self._pause(min(1.0, max(0.0, (bed.packing_fraction - trace[0]) / max(1e-9, way))))
+
+    def _refuse_dense(self, packing: float, rate: float, notes: Json) -> None:
+        """Raise ValueError where the taps left cannot bring the packing: each gains less than those before."""
+        left, found = _MOST_TAPS - notes["taps"], self.bed.packing_fraction
+        hoped = found + max(0.0, rate) * left + PAST
+        if left > 0 and hoped >= packing:
+            return
+        more = f"; the {left} left would bring it to {hoped:.4f} at most" if left > 0 else ""
+        raise ValueError(
+            f"packing = {packing:g} cannot be reached: {notes['taps']} taps brought the bed from "
+            f"{notes['trace'][0]:.4f} to {found:.4f}{more}; ask for less, or give the grains less friction"
+        )
+
+    def _tap_once(self, height: float) -> None:
+        """One tap, so many g high [1]."""
+        bed = self.bed
+        g = -bed.gravity[2]
+        length = math.sqrt(2 * self._grain / g)
+        pieces = 10
+        for k in range(pieces):
+            bed.set_gravity((0.0, 0.0, -g * (1 - height * math.sin(math.pi * (k + 0.5) / pieces))))
+            bed.advance(max(1, round(length / pieces / bed.time_step)))
+        bed.set_gravity(g)
+
+
+def lift_apart(bed: BedCore, times: float, *, speed: float, seed: int) -> None:
+    """Every grain at ``times`` its height, clear of one another, and moving at random, as in a flow from below.
+
+    ``speed``: standard deviation of each component of the velocity [m/s]; their mean is zero.
+    """
+    e = bed.engine
+    position, order = e.read("position"), e.read("id")
+    position[:, 2] *= times
+    e.write("position", position)
+    velocity = e.read("velocity")
+    random = np.random.default_rng(seed).normal(0.0, speed, (len(order), 3))
+    velocity[:, :3] = (random - random.mean(axis=0))[order]
+    e.write("velocity", velocity)
+    spin = e.read("spin")
+    spin[:, :3] = 0
+    e.write("spin", spin)
+    bed.make_lists()
+    bed.compute_forces()
+    bed.shift_velocities(-0.5)

@@ -1,0 +1,212 @@
+"""Further shapes that grains can touch: capsules, boxes, tubes; and any shape put elsewhere in a body, or turned.
+
+As ``dem.shapes.basic``: one row of six numbers each, and for points outside the exact distance. Edges and corners
+count as flat (R* the grain's radius), and so do the wall of a tube and the side of a capsule.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import taichi as ti
+
+from .basic import Ball, Cone, Cylinder, Plane, Shape, refuse_length, refuse_point
+from .mesh import Mesh, Polyhedron
+
+__all__ = ["BOX", "Box", "CAPSULE", "Capsule", "PLACE_WIDTH", "PLACED", "Placed", "TUBE", "Tube", "AnyShape"]
+
+CAPSULE, BOX, TUBE = 3, 4, 5  # mesh.MESH is 6
+# Added to the kind of a shape that has a place of its own in the body.
+PLACED = 16
+# Of a row of places: x y z of the shape's origin, its turn, and one number more of the shape's own.
+PLACE_WIDTH = 8
+_NOWHERE = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Capsule(Shape):
+    """All points within ``radius`` of the segment from ``start`` to ``end`` [m]: a cylinder with a ball at each end."""
+
+    start: tuple[float, float, float]
+    end: tuple[float, float, float]
+    radius: float
+
+    kind = CAPSULE
+
+    def __post_init__(self):
+        refuse_length("Capsule", radius=self.radius)
+        refuse_point("Capsule", start=self.start, end=self.end)
+        if not math.dist(self.start, self.end) > 0:
+            raise ValueError(f"Capsule: end = {self.end} must be another point than start; use a Ball")
+
+    def row(self) -> list[float]:
+        # The radius comes with the place.
+        return [*map(float, self.start), *(float(b) - float(a) for a, b in zip(self.start, self.end, strict=True))]
+
+    def extent(self) -> float:
+        return max(math.hypot(*self.start), math.hypot(*self.end)) + self.radius
+
+
+@dataclass(frozen=True)
+class Box(Shape):
+    """A rectangular block of the given ``size`` [m] about ``center`` [m], its sides along the body's axes.
+
+    To turn it, turn the body, or put it in a ``Placed``.
+    """
+
+    size: tuple[float, float, float]
+    center: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    kind = BOX
+
+    def __post_init__(self):
+        if len(self.size) != 3 or not all(math.isfinite(s) and s > 0 for s in self.size):
+            raise ValueError(f"Box: size = {tuple(self.size)} must be three positive lengths [m]")
+        refuse_point("Box", center=self.center)
+
+    def row(self) -> list[float]:
+        return [*map(float, self.center), *(0.5 * s for s in self.size)]
+
+    def extent(self) -> float:
+        return math.hypot(*(abs(c) + 0.5 * s for c, s in zip(self.center, self.size, strict=True)))
+
+
+@dataclass(frozen=True)
+class Tube(Shape):
+    """A hollow cylinder about the body's z axis, open at both ends: the wall of a container.
+
+    Grains may be inside it (and then keep to it: it needs a floor of its own) as well as outside.
+    """
+
+    bottom: float
+    top: float
+    inner_radius: float
+    outer_radius: float
+
+    kind = TUBE
+
+    def __post_init__(self):
+        refuse_length("Tube", inner_radius=self.inner_radius, outer_radius=self.outer_radius)
+        if not self.outer_radius > self.inner_radius:
+            raise ValueError(
+                f"Tube: outer_radius = {self.outer_radius} must be larger than inner_radius = {self.inner_radius} [m]"
+            )
+        if not (math.isfinite(self.bottom) and math.isfinite(self.top) and self.top > self.bottom):
+            raise ValueError(f"Tube: top = {self.top} must lie above bottom = {self.bottom} [m]")
+
+    def row(self) -> list[float]:
+        return [float(self.bottom), float(self.top), float(self.inner_radius), float(self.outer_radius), 0.0, 0.0]
+
+    def extent(self) -> float:
+        return math.hypot(max(abs(self.bottom), abs(self.top)), self.outer_radius)
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A shape put elsewhere in a body: its origin at ``position`` [m], ``turn`` a quaternion (scalar first)."""
+
+    shape: Plane | Ball | Cone | Cylinder | Capsule | Box | Tube | Mesh | Polyhedron
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    turn: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+
+    def __post_init__(self):
+        if isinstance(self.shape, Placed):
+            raise ValueError("Placed: shape is itself a Placed; give the one position and turn that the two make")
+        refuse_point("Placed", position=self.position)
+        if len(self.turn) != 4 or not all(map(math.isfinite, self.turn)) or not math.hypot(*self.turn) > 0:
+            raise ValueError(f"Placed: turn = {tuple(self.turn)} must be a quaternion of four numbers, scalar first")
+
+    @property
+    def kind(self) -> int:
+        """Of the shape, and that it has a place."""
+        return self.shape.kind + PLACED
+
+    def extent(self) -> float:
+        return math.hypot(*self.position) + self.shape.extent()
+
+
+AnyShape = Plane | Ball | Cone | Cylinder | Capsule | Box | Tube | Mesh | Polyhedron | Placed
+
+
+def bare(shape: AnyShape) -> Plane | Ball | Cone | Cylinder | Capsule | Box | Tube | Mesh | Polyhedron:
+    """The shape without its place."""
+    return shape.shape if isinstance(shape, Placed) else shape
+
+
+def place_row(shape: AnyShape) -> list[float]:
+    """Where the shape is in the body, and what its own row had no room for: ``PLACE_WIDTH`` numbers."""
+    place = list(_NOWHERE)
+    if isinstance(shape, Placed):
+        turn = np.array(shape.turn, dtype=float)
+        place = [*map(float, shape.position), *(turn / math.hypot(*shape.turn)).tolist()]
+    inner = bare(shape)
+    return [*place, float(inner.radius) if isinstance(inner, Capsule) else 0.0]
+
+
+# Each returns the signed distance [m], the outward unit normal and the curvature [1/m] at a point of the shape's frame.
+
+
+@ti.func
+def capsule_distance(row: ti.template(), radius, p):
+    along = ti.Vector([row[3], row[4], row[5]])
+    offset = p - ti.Vector([row[0], row[1], row[2]])
+    t = offset.dot(along) / along.norm_sqr()
+    curvature = p.x * 0.0
+    if t <= 0.0 or t >= 1.0:
+        curvature = 1.0 / radius
+    offset -= ti.min(1.0, ti.max(0.0, t)) * along
+    length = ti.max(offset.norm(), 1e-30)
+    return length - radius, offset / length, curvature
+
+
+@ti.func
+def box_distance(row: ti.template(), p):
+    local = p - ti.Vector([row[0], row[1], row[2]])
+    beyond = ti.abs(local) - ti.Vector([row[3], row[4], row[5]])
+    out = ti.max(beyond, 0.0)
+    distance = out.norm()
+    normal = out
+    if distance > 0.0:
+        normal = out / distance
+    else:
+        # Inside, or on the surface: the nearest face.
+        distance = beyond.max()
+        taken = False
+        for k in ti.static(range(3)):
+            normal[k] = 0.0
+            if beyond[k] == distance and not taken:
+                normal[k] = 1.0
+                taken = True
+    for k in ti.static(range(3)):
+        if local[k] < 0.0:
+            normal[k] = -normal[k]
+    return distance, normal
+
+
+@ti.func
+def tube_distance(row: ti.template(), p):
+    """The wall is a rectangle over (distance from the axis, z)."""
+    rho = ti.sqrt(p.x * p.x + p.y * p.y)
+    side = rho - 0.5 * (row[2] + row[3])
+    up = p.z - 0.5 * (row[0] + row[1])
+    beyond_r = ti.abs(side) - 0.5 * (row[3] - row[2])
+    beyond_z = ti.abs(up) - 0.5 * (row[1] - row[0])
+    out_r, out_z = ti.max(beyond_r, 0.0), ti.max(beyond_z, 0.0)
+    distance = ti.sqrt(out_r * out_r + out_z * out_z)
+    if distance > 0.0:
+        out_r /= distance
+        out_z /= distance
+    else:
+        distance = ti.max(beyond_r, beyond_z)
+        if beyond_r >= beyond_z:
+            out_r += 1.0
+        else:
+            out_z += 1.0
+    if side < 0.0:
+        out_r = -out_r
+    if up < 0.0:
+        out_z = -out_z
+    ux, uy = 1.0 + 0.0 * rho, 0.0 * rho
+    if rho > 1e-12:
+        ux, uy = p.x / rho, p.y / rho
+    return distance, ti.Vector([out_r * ux, out_r * uy, out_z])

@@ -1,0 +1,92 @@
+"""`hedgebed bed make`: a bed prepared as in a laboratory, in a run folder with a report of every stage."""
+
+from __future__ import annotations
+
+from dem.grains.materials import Material, material
+from experiments.grains.graded import grading_told
+from experiments.grains.kept_material import MATERIAL_COPY, keep_material
+from experiments.grains.sizes import bond_number, in_grains_of, scaling_told, sizes_table
+from experiments.runs.folder import RunFolder
+from experiments.runs.progress import Progress
+from experiments.runs.types import Json
+from experiments.runs.whole_runs import whole_run
+
+from .settings import GRADED, SPREAD_OUT, BedSettings
+from .work import check_memory, check_name, finish_bed, prepared_in, quantity
+
+__all__ = ["check", "fingerprint", "resume", "run"]
+
+
+def check(settings: BedSettings) -> None:
+    """Raise ValueError, naming key, value and what would do, for what this machine or the material cannot serve."""
+    from dem.contact.timestep import time_step_for
+    from dem.prepare.prepare import check_options, soft_enough
+
+    check_name(settings.name)
+    check_options(settings.size, settings.grain, settings.gravity, settings.seed, settings.max_overlap)
+    graded, local = settings.graded, settings.local
+    share = 1.0 if graded is None else graded.share(settings.size)
+    check_memory(settings.size, settings.grain, 0.0, share=share * settings.grain**3 / local.mean_cube)
+    sizes = local if graded is None else graded
+    stuff = material_of(settings, settings.material)
+    young = settings.young or soft_enough(
+        stuff, size=settings.size, sizes=sizes, gravity=settings.gravity, max_overlap=settings.max_overlap
+    )
+    if young > stuff.young:
+        raise ValueError(f"young = {young:g} Pa is more than {stuff.name} itself has: at most {stuff.young:g} Pa")
+    time_step_for(
+        stuff.softened(young),
+        diameter=sizes.bounds[0],
+        max_overlap=settings.max_overlap,
+        wanted=settings.time_step,
+    )
+
+
+def fingerprint() -> str:
+    """A digest of the code that computes beds: other code may give other bits."""
+    from dem.prepare.prepare import fingerprint as of_dem
+
+    return of_dem()
+
+
+def material_of(settings: BedSettings, name: str) -> Material:
+    """The material of that name or file, as the grains of this bed have it."""
+    own = material(name)
+    if settings.keep == "strength" or own.grain is None:
+        return own.for_grain(settings.grain)
+    return in_grains_of(own, settings.grain, keep=settings.keep, own=own.grain)
+
+
+def _carry_out(settings: BedSettings, folder: RunFolder, progress: Progress) -> Json:
+    options = settings.model_dump(exclude={"name", "coarse", "keep", "distribution", *SPREAD_OUT, *GRADED})
+    graded = settings.graded
+    if graded is not None:
+        options |= {"grain": graded, "spread": None}
+    elif settings.distribution != "uniform":
+        options |= {"grain": settings.local, "spread": None}
+    with folder.lock():
+        name = keep_material(settings.material, folder.path)
+        options["material"] = material_of(settings, name)
+        prepared = prepared_in(folder, progress, options, name=settings.name)
+        assert prepared.bed is not None
+        if graded is not None:
+            told = grading_told(prepared)
+        else:
+            told = {"tables": [sizes_table(prepared.bed.grains().radius, settings.local)]}
+        own = material(name)
+        if own.cohesion != "none":
+            _add_adhesion(told, settings, own, prepared.bed.material)
+        title = f"A bed of {prepared.recipe['material']['name']}: {' '.join(settings.stages)}"
+        return finish_bed(folder, prepared, progress, experiment="bed make", title=title, name=settings.name, **told)
+
+
+def _add_adhesion(told: Json, settings: BedSettings, own: Material, now: Material) -> None:
+    """Put into `told` the grains' Bond number, and what was kept of `own`, of grains of another size."""
+    bond = bond_number(now, diameter=settings.grain, gravity=settings.gravity)
+    told.setdefault("quantities", {})["bond_number"] = quantity(bond, "1", "pull-off of two grains over one's weight")
+    if own.grain != settings.grain:
+        said = scaling_told(own, now, diameter=settings.grain, gravity=settings.gravity, keep=settings.keep)
+        told.setdefault("warnings", []).append(said)
+
+
+run, resume = whole_run("bed make", BedSettings, _carry_out, check=check, material_copy=MATERIAL_COPY)

@@ -1,0 +1,148 @@
+"""Settings of `hedgebed bed make` and `hedgebed bed refine`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from dem.grains.graded import Graded
+from dem.grains.sizes import Sizes
+from dem.prepare.recipe import check_stages, parse_stage
+from experiments.grains.sizes import Distribution, Kept, distribution
+from experiments.penetrate.settings import MATERIAL, STANDARD_GRAVITY
+from experiments.runs.strict import StrictSettings
+
+from .words import say
+
+__all__ = ["GRADED", "SPREAD_OUT", "BedRefineSettings", "BedSettings"]
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+SeedNumber = Annotated[int, Field(ge=0, lt=2**31)]
+GRADED = ("footprints", "fine_depth", "growth")
+"""Settings that a graded bed alone has, beside ``coarse``."""
+SPREAD_OUT = ("deviation", "cut", "openings", "passing")
+"""Settings of ``distribution``, each of some of them."""
+_NAME = "Name under which the bed is kept on the shelf (HEDGEBED_BEDS); in the run's folder alone if not given."
+
+
+class BedSettings(StrictSettings):
+    """A bed prepared as in a laboratory, stage by stage."""
+
+    material: str = Field("sand", description=MATERIAL)
+    stages: tuple[str, ...] = Field(
+        ("rain", "level"),
+        min_length=1,
+        description="What is done, in this order: rain[:dry|:FRICTION], stick, level[:HEIGHT], fluff[:TIMES], "
+        "compact:PACKING[@lid], compact:densest, packing:PACKING, cut:WIDTH, tilt:DEGREES.",
+    )
+    size: tuple[Positive, Positive, Positive] = Field(
+        (0.04, 0.04, 0.03), description="Bed: both widths (periodic) and depth of grains [m]."
+    )
+    grain: Positive = Field(0.004, description="Mean grain diameter [m].")
+    spread: float = Field(0.15, ge=0, le=0.5, description="Grain diameters are uniform within 1 +- this [1].")
+    distribution: Distribution = Field(
+        "uniform",
+        description="Of the diameters, about `grain`: uniform, normal or log-normal by number; sieve: a table by mass, "
+        "enlarged until its grains have that mean.",
+    )
+    deviation: Positive | None = Field(
+        None, description="Standard deviation over the mean (normal), or of ln diameter (log-normal) [1]."
+    )
+    cut: Positive | None = Field(
+        None, description="Where normal and log-normal are cut off [standard deviations]; 2 if not given."
+    )
+    openings: tuple[Positive, ...] = Field((), description="A sieve table: openings, ascending [m].")
+    passing: tuple[Annotated[float, Field(ge=0, le=1)], ...] = Field(
+        (), description="A sieve table: share of the mass that passes each, from 0 to 1 [1]."
+    )
+    keep: Kept = Field(
+        "strength",
+        description="What stays the same of a material that sticks, in grains of another size than it was found for: "
+        "their strength (pull-off over d^2), their Bond number (pull-off over weight), or the surface energy.",
+    )
+    coarse: Positive | None = Field(
+        None,
+        description="A graded bed: mean diameter of the coarsest grains, away from the footprints, under which "
+        "it is `grain` [m]; one size throughout if not given.",
+    )
+    footprints: tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], ...] = Field(
+        (), description="A graded bed: along x, where each strip of fine grains begins and ends [m]."
+    )
+    fine_depth: Positive | None = Field(
+        None, description="A graded bed: how deep the fine grains reach [m]; to the floor if not given."
+    )
+    growth: Positive | None = Field(
+        None, description="A graded bed: growth of the mean diameter with distance [1]; 0.15 if not given."
+    )
+    gravity: Positive = Field(STANDARD_GRAVITY, description="Gravity of the grains [m/s2].")
+    seed: SeedNumber = Field(1, description="Seed of sizes and positions.")
+    name: str | None = Field(None, min_length=1, description=_NAME)
+    max_overlap: float = Field(0.05, gt=0, le=0.1, description="Largest overlap of grains [of a diameter].")
+    young: Positive | None = Field(
+        None, description="Young's modulus of the grains [Pa]; softened to `max_overlap` if not given."
+    )
+    time_step: Positive | None = Field(None, description="Step of the grains [s]; from the contact time if not given.")
+    precision: Literal["float64", "float32"] = Field("float64", description="Arithmetic of the bed.")
+    arch: Literal["cpu", "cuda"] = Field("cpu", description="Where the bed is computed.")
+    threads: int | None = Field(None, ge=1, le=1024, description="CPU threads; all there are if not given.")
+
+    @model_validator(mode="after")
+    def _can_be(self) -> BedSettings:
+        from dem.grains.materials import material
+
+        local = self.local
+        if (graded := self.graded) is not None:
+            graded.check(self.size)
+        stuff = material(self.material)
+        if self.keep != "strength" and stuff.grain is None:
+            why = "does not stick" if stuff.cohesion == "none" else "does not say for which grains its numbers hold"
+            raise ValueError(f"keep = {self.keep!r}: material {stuff.name!r} {why}; leave keep out")
+        check_stages(
+            [parse_stage(stage) for stage in self.stages], size=self.size, grain=self.grain, sizes=local,
+            cohesive=stuff.cohesion != "none",
+        )  # fmt: skip
+        return self
+
+    @property
+    def local(self) -> Sizes:
+        """Sizes of grains side by side, under the footprints of one that is graded. Raises ValueError for bad ones."""
+        return distribution(
+            self.distribution, grain=self.grain, spread=self.spread, deviation=self.deviation, cut=self.cut,
+            openings=self.openings, passing=self.passing,
+        )  # fmt: skip
+
+    @property
+    def graded(self) -> Graded | None:
+        """Sizes by place, where the bed is graded. Raises ValueError for what cannot be, or is given by halves."""
+        if self.coarse is None:
+            given = [name for name in GRADED if getattr(self, name) not in (None, ())]
+            if given:
+                raise ValueError(
+                    f"{', '.join(given)}: only of a graded bed; coarse = {2 * self.grain:g} would make one"
+                )
+            return None
+        if self.distribution != "uniform":
+            raise ValueError(say("graded_distribution", s=self))
+        ends = self.footprints
+        if not ends or len(ends) % 2:
+            raise ValueError(f"footprints = {list(ends)} must be pairs: where each begins and ends along x [m]")
+        return Graded(
+            fine=self.grain, coarse=self.coarse, footprints=tuple(zip(ends[::2], ends[1::2], strict=True)),
+            depth=self.fine_depth, spread=self.spread, **{} if self.growth is None else {"growth": self.growth},
+        )  # fmt: skip
+
+
+class BedRefineSettings(StrictSettings):
+    """The same bed with smaller grains: the same material, size, gravity and stages, brought to the same packing."""
+
+    bed: str = Field(description="The bed: a file, the folder of a run of bed make, or a name on the shelf.")
+    grain: Positive | None = Field(None, description="Mean grain diameter [m]; half of the bed's own if not given.")
+    keep: Kept = Field(
+        "strength",
+        description="What stays the same of grains that stick: their strength (pull-off over d^2), their Bond number "
+        "(pull-off over weight), or the surface energy.",
+    )
+    seed: SeedNumber | None = Field(None, description="Seed of sizes and positions; the bed's own if not given.")
+    name: str | None = Field(None, min_length=1, description=_NAME)
+    threads: int | None = Field(None, ge=1, le=1024, description="CPU threads; all there are if not given.")

@@ -1,0 +1,207 @@
+"""`hedgebed bed test shear`: peak and critical friction angle and cohesion of a bed, by a lid at several pressures.
+
+Peak: the largest shear stress, smoothed over half a diameter of the lid's way. Critical: the mean over the second half
+of the way, with the standard error of five parts of it. Mohr-Coulomb: a straight line through the runs' stresses.
+
+Normal stress is the lid's. Shear stress is the same at every height and the normal one grows downwards with the bed's
+own weight, so that the bed shears under the lid; what lies between lid and there feigns a cohesion, told beside it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dem import Bed
+from dem.grains.materials import caveat
+from dem.measure.shearing import Shearing, shear_bed
+from dem.prepare.bedfile import find_bed
+from experiments.runs.folder import RunFolder
+from experiments.runs.progress import Progress
+from experiments.runs.types import Json
+from experiments.runs.version import __version__
+from experiments.runs.whole_runs import whole_run
+
+from .shear_settings import BedShearSettings
+from .words import say
+
+__all__ = ["Strength", "check", "fit_line", "resume", "run", "strength_of"]
+
+_SMOOTH = 0.5
+"""Way of the lid over which the peak's stress is averaged [mean diameters]."""
+_BAND = 3.0
+"""How far below the lid it may shear [mean diameters]; a guess."""
+_PARTS = 5
+"""Parts of the second half of the way, whose scatter gives the standard error."""
+
+
+@dataclass(frozen=True)
+class Strength:
+    """Of one run: normal stress, peak and critical shear stress with its standard error [Pa], way at the peak [m]."""
+
+    normal: float
+    peak: float
+    critical: float
+    critical_error: float
+    peak_way: float
+
+
+def strength_of(run: Shearing, grain: float) -> Strength:
+    """Peak and critical shear stress of a run, at its mean normal stress.
+
+    The servo lets the normal stress vary a little, and the shear stress varies with it: their ratio is averaged.
+    """
+    normal = float(run.normal.mean())
+    count = max(1, round(_SMOOTH * grain / max(1e-12, (run.way[-1] - run.way[0]) / max(1, len(run.way) - 1))))
+    count = min(count, len(run.way))
+    kernel = np.ones(count) / count
+    smooth = np.convolve(run.shear, kernel, "valid") / np.convolve(run.normal, kernel, "valid")
+    top = int(np.argmax(smooth))
+    parts = [
+        part.mean() / other.mean()
+        for part, other in zip(
+            np.array_split(run.shear[len(run.way) // 2 :], _PARTS),
+            np.array_split(run.normal[len(run.way) // 2 :], _PARTS),
+            strict=True,
+        )
+    ]
+    return Strength(
+        normal=normal,
+        peak=normal * float(smooth[top]),
+        critical=normal * float(np.mean(parts)),
+        critical_error=normal * float(np.std(parts, ddof=1)) / math.sqrt(_PARTS),
+        peak_way=float(run.way[min(top + count // 2, len(run.way) - 1)]),
+    )
+
+
+def fit_line(normal: np.ndarray, shear: np.ndarray) -> tuple[float, float, float | None, float | None]:
+    """Least squares of shear = cohesion + tan(angle) normal: (cohesion, tan, their standard errors; None for two)."""
+    slope, start = np.polyfit(normal, shear, 1)
+    if len(normal) < 3:
+        return float(start), float(slope), None, None
+    rest = shear - start - slope * normal
+    variance = float(rest @ rest) / (len(normal) - 2)
+    spread = float(((normal - normal.mean()) ** 2).sum())
+    error = math.sqrt(variance / spread)
+    return float(start), float(slope), math.sqrt(variance * (1 / len(normal) + normal.mean() ** 2 / spread)), error
+
+
+def check(settings: BedShearSettings) -> None:
+    """Raise ValueError for what is no bed, or one that does not lie level."""
+    from dem.engine.state import read_file
+
+    stored, _, _ = read_file(find_bed(settings.bed))
+    if stored.gravity[0] or stored.gravity[1]:
+        raise ValueError(f"bed = {settings.bed!r} is tilted: a level one would do")
+
+
+def _carry_out(settings: BedShearSettings, folder: RunFolder, progress: Progress) -> Json:
+    path = find_bed(settings.bed)
+    runs: list[Shearing] = []
+    with folder.lock():
+        progress.plan({f"{p:g} times the weight": 1.0 for p in settings.pressures}, seconds={"report": 3.0})
+        grain = 0.0
+        for pressure in settings.pressures:
+            name = f"shear-{pressure:g}"
+            progress.stage(f"{pressure:g} times the weight", total=1.0)
+            prepared = Bed.load_prepared(path, threads=settings.threads)
+            bed = prepared.bed
+            assert bed is not None
+            grain = 2 * float(bed.grains().radius.mean())
+            if folder.is_done(name):
+                runs.append(_read(folder, name))
+                continue
+            runs.append(shear_bed(
+                bed, pressure=pressure * bed.weight / (bed.size[0] * bed.size[1]), way=settings.way * grain,
+                inertial_number=settings.inertial_number, grain=grain, tell=progress.update,
+            ))  # fmt: skip
+            _write(folder, name, runs[-1])
+        result = _result(settings, runs, grain, prepared.recipe, bed)
+        folder.write_result(result)
+        progress.stage("report", total=1.0)
+        from vis.bed.shear import write_shear_report
+
+        write_shear_report(folder.path, progress=progress.update)
+    return result
+
+
+_COLUMNS = {"way": "way_m", "height": "height_m", "shear": "shear_Pa", "normal": "normal_Pa"}
+_NUMBERS = ("pressure", "speed", "inertial_number", "packing_fraction", "overburden")
+
+
+def _write(folder: RunFolder, name: str, run: Shearing) -> None:
+    folder.write_series(name, {column: getattr(run, key) for key, column in _COLUMNS.items()})
+    folder.mark_done(name, {key: getattr(run, key) for key in _NUMBERS})
+
+
+def _read(folder: RunFolder, name: str) -> Shearing:
+    columns, numbers = folder.read_series(name), folder.done_data(name)
+    kept: Json = {key: columns[column] for key, column in _COLUMNS.items()}
+    return Shearing(**kept, **numbers)
+
+
+def _strengths(strengths: list[Strength], band: float, run: Shearing) -> Json:
+    """Friction angle, cohesion and stress ratio, peak and critical; `band`: share of the bed above where it shears."""
+    normal = np.array([s.normal for s in strengths])
+    found: Json = {}
+    for kind in ("peak", "critical"):
+        shear = np.array([s.peak if kind == "peak" else s.critical for s in strengths])
+        start, slope, start_error, slope_error = fit_line(normal, shear)
+        angle_error = None if slope_error is None else slope_error * (math.degrees(1) / (1 + slope**2))
+        ratios = shear / normal
+        found |= {
+            f"{kind}_friction_angle": _entry(math.degrees(math.atan(slope)), angle_error, "degrees", say("slope")),
+            f"{kind}_cohesion": _entry(start, start_error, "Pa", "where that line begins"),
+            f"{kind}_cohesion_feigned": _entry(band * run.overburden * slope, None, "Pa", say("feigned")),
+            f"{kind}_ratio": _entry(float(ratios.mean()), float(ratios.std(ddof=1)), "1", say("ratio")),
+        }
+    return found | {"packing_fraction": _entry(run.packing_fraction, None, "1", "of the bed")}
+
+
+def _entry(value: float, std: float | None, unit: str, note: str) -> Json:
+    return {"value": value, "std": std, "unit": unit, "note": note}
+
+
+def _result(settings: BedShearSettings, runs: list[Shearing], grain: float, recipe: Json, bed: Any) -> Json:
+    strengths = [strength_of(run, grain) for run in runs]
+    head = ["normal [Pa]", "peak [Pa]", "at [d]", "critical [Pa]", "+- [Pa]", "peak ratio", "critical ratio",
+            "dilates [d]"]  # fmt: skip
+    rows = [
+        [f"{s.normal:.0f}", f"{s.peak:.0f}", f"{s.peak_way / grain:.1f}", f"{s.critical:.0f}",
+         f"{s.critical_error:.0f}", f"{s.peak / s.normal:.3f}", f"{s.critical / s.normal:.3f}",
+         f"{run.height[-1] / grain:.2f}"]
+        for s, run in zip(strengths, runs, strict=True)
+    ]  # fmt: skip
+    warnings = []
+    if min(bed.size[:2]) < 12 * grain or bed.surface < 8 * grain:
+        long, wide, deep = (side / grain for side in (*bed.size[:2], bed.surface))
+        warnings.append(say("small_shear", long=long, wide=wide, deep=deep))
+    if len(runs) < 3:
+        warnings.append("fewer than three pressures: the line through them has no error that could be told")
+    if doubt := caveat(bed.material):
+        warnings.append(doubt)
+    kept = ("normal", "peak", "critical", "critical_error")
+    return {
+        "format": "hedgebed-result/1",
+        "experiment": "bed test shear",
+        "version": __version__,
+        "title": f"{settings.bed}: sheared under a lid",
+        "status": "done",
+        "quantities": _strengths(strengths, _BAND * grain / bed.surface, runs[0]),
+        "tables": [{"title": "Run by run", "head": head, "rows": rows}],
+        "runs": [
+            {"id": f"shear-{pressure:g}", "series": f"series/shear-{pressure:g}.csv"}
+            | {"pressure": run.pressure, "speed": run.speed}
+            | {name: getattr(strength, name) for name in kept}
+            for pressure, run, strength in zip(settings.pressures, runs, strengths, strict=True)
+        ],
+        "grain": grain,
+        "bed": {"file": str(settings.bed), "recipe": recipe},
+        "warnings": warnings,
+    }
+
+
+run, resume = whole_run("bed test shear", BedShearSettings, _carry_out, check=check)

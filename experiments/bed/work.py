@@ -1,0 +1,208 @@
+"""What `bed make` and `bed refine` share: the preparation with its progress, the run folder, the result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dem import Bed
+from dem.grains.materials import caveat
+from dem.prepare.bedfile import load_prepared, save_prepared, shelf_path
+from dem.prepare.prepare import prepare_as
+from dem.prepare.report import Prepared, StageReport
+from experiments.grains.box import expected_grain_count
+from experiments.runs.folder import RunFolder
+from experiments.runs.memory import memory_there
+from experiments.runs.progress import Progress
+from experiments.runs.stopping import held_back
+from experiments.runs.types import Json
+from experiments.runs.version import __version__
+
+from .words import say
+
+__all__ = ["check_memory", "check_name", "finish_bed", "prepared_in", "quantity"]
+
+BYTES_PER_GRAIN = 4000
+"""Memory of one grain with its lists and contact history, float64, measured generously [bytes]."""
+_COSTS = {"rain": 3.0, "level": 1.0, "fluff": 3.0, "compact": 6.0, "packing": 6.0, "cut": 2.0, "tilt": 2.0}
+"""What a stage costs beside others; guesses, for the time that is shown."""
+
+
+def check_memory(size: tuple[float, float, float], grain: float, spread: float, *, share: float = 1.0) -> None:
+    """Raise ValueError for more grains than there is memory for; ``share``: of those of a bed with one size, graded."""
+    count = 1.2 * share * expected_grain_count(size, grain, spread)
+    need, there = count * BYTES_PER_GRAIN, memory_there().free
+    if need > 0.8 * there:
+        least = grain * (need / (0.8 * there)) ** (1 / 3)
+        raise ValueError(say("memory", grain=grain, count=count, need=need / 1e9, free=there / 1e9, least=least))
+
+
+def check_name(name: str | None) -> None:
+    """Raise ValueError for a name that a bed cannot have, or that one on the shelf has already."""
+    if name is not None and shelf_path(name).exists():
+        raise ValueError(
+            f"name = {name!r} is taken: {shelf_path(name)} is there already; another name, or take that file away first"
+        )
+
+
+class _Stages:
+    """Shows the stages of a preparation; stops it where it can be gone on with."""
+
+    def __init__(self, progress: Progress, asked_to_stop: Callable[[], bool]) -> None:
+        self.progress, self.asked_to_stop = progress, asked_to_stop
+
+    def stage(self, name: str, total: float | None = None) -> None:
+        """The next stage begins."""
+        self.progress.stage(name, total=total)
+
+    def update(self, done: float) -> None:
+        """`done` of it, 0 to 1. Raises KeyboardInterrupt if asked to stop."""
+        self.progress.update(done)
+        if self.asked_to_stop():
+            raise KeyboardInterrupt
+
+
+def prepared_in(folder: RunFolder, progress: Progress, options: Mapping[str, Any], *, name: str | None) -> Prepared:
+    """The bed of the run: prepared now, gone on with, or that of bed.npz, where it is finished.
+
+    Raises RuntimeError where it cannot be made as asked for.
+    """
+    file = folder.path / "bed.npz"
+    if folder.is_done("bed"):
+        return load_prepared(file, threads=options.get("threads"), make=Bed)
+    stages = list(options["stages"])
+    costs: dict[str, float] = {}
+    for stage in stages:
+        costs[stage] = costs.get(stage, 0.0) + _COSTS.get(stage.partition(":")[0], 1.0)
+    progress.plan(costs, seconds={"report": 10.0})
+    keep = folder.path / "checkpoint" / "bed.npz"
+    keep.parent.mkdir(exist_ok=True)
+    try:
+        with held_back() as asked_to_stop:
+            prepared = prepare_as(**options, make=Bed, progress=_Stages(progress, asked_to_stop), keep=keep)
+    except ValueError as error:  # found while it was prepared, as a packing that cannot be reached
+        raise RuntimeError(str(error)) from error
+    save_prepared(prepared, file)
+    if name is not None:
+        save_prepared(prepared, shelf_path(name))
+    folder.mark_done("bed", {"name": name})
+    for kept in (keep, keep.with_suffix(".json")):
+        kept.unlink(missing_ok=True)
+    return prepared
+
+
+def quantity(value: Any, unit: str, note: str) -> Json:
+    """An entry of result.json's quantities; of one bed there is no spread."""
+    return {"value": value, "std": None, "unit": unit, "note": note}
+
+
+def finish_bed(
+    folder: RunFolder,
+    prepared: Prepared,
+    progress: Progress,
+    *,
+    experiment: str,
+    title: str,
+    name: str | None,
+    tables: list[Json] | None = None,
+    warnings: list[str] | None = None,
+    quantities: Json | None = None,
+) -> Json:
+    """Write series, frame, result and report of a prepared bed; return the result. ``quantities``: more of them."""
+    bed, last = prepared.bed, prepared.reports[-1]
+    assert bed is not None
+    entries = []
+    for k, report in enumerate(prepared.reports, start=1):
+        safe = f"{k}-{report.stage.replace(':', '-').replace('@', '-')}"
+        columns = {f"{key}_{_UNITS[key]}" if _UNITS[key] else key: np.array(v) for key, v in report.profile.items()}
+        entry = {key: value for key, value in asdict(report).items() if key != "profile"}
+        entries.append(entry | {"series": folder.write_series(safe, columns)})
+        if "trace" in report.notes:
+            trace = np.array(report.notes["trace"])
+            what = {"pass": np.arange(len(trace)), "packing": trace}
+            entries[-1]["trace_series"] = folder.write_series(f"{safe}.passes", what)
+    _write_frame(folder.path, bed)
+    own = {
+        "packing_fraction": quantity(last.packing_fraction, "1", "between two diameters above the floor and two below"),
+        "coordination_number": quantity(last.coordination_number, "1", "contacts of a grain, the floor's included"),
+        "surface": quantity(last.surface, "m", "height where the packing falls to half"),
+        "pressure_ratio": quantity(last.pressure_ratio, "1", "horizontal over vertical stress, away from the ends"),
+        "kinetic_energy": quantity(last.kinetic_energy, "1", "mean of a grain, over m g d"),
+        "floor_share": quantity(last.floor_share, "1", "what the floor carries over the weight"),
+        "loosest": quantity(min(r.packing_fraction for r in prepared.reports), "1", "packing after any stage"),
+        "densest": quantity(max(r.packing_fraction for r in prepared.reports), "1", "packing after any stage"),
+        "grain_count": quantity(last.grain_count, "1", "grains"),
+        "young": quantity(prepared.recipe["young"], "Pa", "of the grains, softened"),
+        "time_step": quantity(bed.time_step, "s", "of the grains"),
+        "max_overlap": quantity(max(r.max_overlap for r in prepared.reports), "1", "while it was made, over diameter"),
+    }
+    result = {
+        "format": "hedgebed-result/1",
+        "experiment": experiment,
+        "version": __version__,
+        "code": prepared.recipe["code"],
+        "title": title,
+        "status": "done",
+        "quantities": own | (quantities or {}),
+        "stages": entries,
+        "tables": [_stage_table(prepared.reports), *(tables or [])],
+        "bed": {"file": "bed.npz", "name": name, "surface": {"value": bed.surface, "unit": "m"}, **prepared.recipe},
+        "warnings": [*(warnings or []), *_warnings(prepared)],
+    }
+    folder.write_result(result)
+    progress.stage("report", total=1.0)
+    write_report(folder.path, progress)
+    return result
+
+
+_UNITS = {"height": "m", "packing": "", "stress_zz": "Pa", "stress_xx": "Pa", "stress_yy": "Pa", "stress_xz": "Pa"}
+
+
+def _stage_table(reports: list[StageReport]) -> Json:
+    rows = [
+        [
+            report.stage,
+            f"{report.packing_fraction:.4f}",
+            f"{report.coordination_number:.2f}",
+            "-" if report.pressure_ratio is None else f"{report.pressure_ratio:.2f}",
+            f"{1e3 * report.surface:.4g}",
+            str(report.grain_count),
+            f"{report.kinetic_energy:.1e}",
+            f"{report.floor_share:.4f}",
+        ]
+        for report in reports
+    ]
+    head = ["stage", "packing", "contacts", "K", "surface [mm]", "grains", "energy [m g d]", "floor / weight"]
+    return {"title": "Stage by stage", "head": head, "rows": rows}
+
+
+def _warnings(prepared: Prepared) -> list[str]:
+    bed = prepared.bed
+    assert bed is not None
+    said = []
+    grain = 2 * float(bed.grains().radius.mean())
+    if min(bed.size[:2]) < 10 * grain:
+        said.append(say("few_grains_wide", grains=min(bed.size[:2]) / grain))
+    if prepared.reports[-1].surface < 8 * grain:
+        said.append(say("few_grains_deep", grains=prepared.reports[-1].surface / grain))
+    if doubt := caveat(bed.material):
+        said.append(doubt)
+    return said
+
+
+def _write_frame(folder: Path, bed: Any) -> None:
+    from vis.pictures.frames import GRAIN_FIELDS, FrameWriter
+
+    grains = bed.grains().as_dict()
+    FrameWriter(folder, name="bed").write(0.0, {name: grains[name] for name in ("position", *GRAIN_FIELDS)})
+
+
+def write_report(folder: Path, progress: Progress) -> None:
+    """Plots, picture and report.html of the folder."""
+    from vis.bed.report import write_bed_report
+
+    write_bed_report(folder, progress=progress.update)

@@ -1,0 +1,270 @@
+"""What a calibration says: result.json, the material's file, what could not be met."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from dem.grains.materials import MATERIAL_FORMAT, MATERIALS, Material
+from experiments.runs.folder import RunFolder, toml_value
+from experiments.runs.types import Json
+from experiments.runs.version import __version__
+
+from .fit import Fit, Response
+from .settings import FREE, CalibrateSettings, Target
+from .words import say
+
+__all__ = ["Simulated", "calibration_result", "material_toml"]
+
+_CURVE = 41
+"""Points of a response's curve."""
+_UNSOURCED = ("name", "cohesion", "grain")
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """What a calibration has simulated.
+
+    Attributes:
+        points: of exploring, parameter -> value. figures: of each, figure -> value and standard error.
+        tests: all of them, the check's as well.
+        measured: figure -> value and standard error at the parameters found; None where it could not be measured.
+    """
+
+    points: list[dict[str, float]]
+    figures: list[dict[str, tuple[float, float]]]
+    tests: list[Json]
+    measured: Mapping[str, tuple[float, float | None] | None]
+
+
+def calibration_result(
+    settings: CalibrateSettings,
+    done: Simulated,
+    fit: Fit,
+    responses: Mapping[str, Response],
+    best: Mapping[str, float],
+    stuff: Material,
+    folder: RunFolder,
+) -> Json:
+    """result.json; writes the series of the responses' curves."""
+    targets, measured = list(settings.wanted.values()), done.measured
+    quantities: Json = {}
+    for k, (key, value) in enumerate(best.items()):
+        low, high = settings.free[key]
+        quantities[key] = {
+            "value": value,
+            "std": float(fit.std[k]),
+            "unit": FREE[key],
+            "note": say("found_between", low=low, high=high, lower=fit.low[k], upper=fit.high[k]),
+        }
+    if "bond_number" in best:
+        note = f"for grains of {settings.grain:g} m"
+        quantities["surface_energy"] = {"value": stuff.surface_energy, "std": None, "unit": "J/m2", "note": note}
+    reach = _reach(responses)
+    entries = [_entry(target, measured[target.name], fit, reach.get(target.name)) for target in targets]
+    warnings = _warnings(settings, fit)
+    for target, entry in zip(targets, entries, strict=True):
+        got, error, verdict = entry["measured"], entry["error"], entry["verdict"]
+        note = f"{verdict}; wanted {target.value:g} +- {target.tolerance:g}"
+        quantities[target.name] = {"value": got, "std": error, "unit": target.unit, "note": note}
+        if verdict != "met":
+            warnings.append(_unmet(target, got, error, verdict, entry["reach"]))
+    if settings.name in MATERIALS and MATERIALS[settings.name] != stuff:
+        warnings.append(say("name_ships_otherwise", s=settings))
+    over = max((test["max_overlap"] for test in done.tests), default=0.0)
+    return {
+        "format": "hedgebed-result/1",
+        "experiment": "bed calibrate",
+        "version": __version__,
+        "code": folder.code,
+        "title": f"{settings.name}: grain parameters from bulk figures",
+        "status": "done",
+        "quantities": quantities,
+        "figures": entries,
+        "tables": [_figure_table(entries), _point_table(settings, done)],
+        "points": _points(settings, done, responses, best),
+        "curves": _curves(settings, responses, best, folder),
+        "scatter": {name: response.scatter for name, response in responses.items()},
+        "correlation": fit.correlation,
+        "chi2": fit.chi2,
+        "tests": [{k: v for k, v in test.items() if "tensor" not in k} for test in done.tests],
+        "max_overlap": over,
+        "material": {f.name: getattr(stuff, f.name) for f in fields(stuff) if f.name != "sources"},
+        "warnings": warnings,
+    }
+
+
+def _entry(
+    target: Target, found: tuple[float, float | None] | None, fit: Fit, reach: tuple[float, float] | None
+) -> Json:
+    """What the result says of one figure: wanted, measured, and what the response surface expects."""
+    got, error = found if found is not None else (None, None)
+    return {
+        "name": target.name,
+        "figure": target.figure,
+        "unit": target.unit,
+        "wanted": target.value,
+        "tolerance": target.tolerance,
+        "source": target.source,
+        "plane": target.plane if "friction_angle" in target.figure or target.plane == "mohr" else None,
+        "state": target.state or None,
+        "fitted": target.fit,
+        "measured": got,
+        "error": error,
+        "expected": fit.response.get(target.name),
+        "expected_std": fit.response_std.get(target.name),
+        "reach": reach,
+        "verdict": _verdict(target, got, error),
+    }
+
+
+def _verdict(target: Target, value: float | None, error: float | None) -> str:
+    if value is None:
+        return "not measured"
+    off = abs(value - target.value)
+    if off <= target.tolerance:
+        return "met"
+    return "met within the tests' noise" if off <= target.tolerance + 2 * (error or 0.0) else "not met"
+
+
+def _unmet(
+    target: Target, value: float | None, error: float | None, verdict: str, reach: tuple[float, float] | None
+) -> str:
+    wanted = f"{target.value:g} +- {target.tolerance:g} {target.unit} was wanted"
+    if value is None:
+        return f"{target.name} could not be measured: {wanted}"
+    said = f"{target.name} = {value:.3g}{'' if error is None else f' +- {error:.2g}'} where {wanted}: {verdict}"
+    if reach is not None and verdict == "not met" and not reach[0] <= target.value <= reach[1]:
+        said += f"; within the parameters' ranges it goes from {reach[0]:.3g} to {reach[1]:.3g}"
+    return said
+
+
+def _warnings(settings: CalibrateSettings, fit: Fit) -> list[str]:
+    said = []
+    for key, end in fit.at_edge.items():
+        low, high = settings.free[key]
+        said.append(
+            f"{key} lies at the {end} end of its range, {low:g} to {high:g}: what the figures ask for may lie beyond"
+        )
+    said += [f"{key} is hardly decided by the figures: its uncertainty is that of its range" for key in fit.vague]
+    if settings.name in MATERIALS:
+        said.append(say("name_ships", s=settings))
+    return said
+
+
+def _reach(responses: Mapping[str, Response]) -> dict[str, tuple[float, float]]:
+    """From where to where each figure's surface goes over the whole box."""
+    found = {}
+    for name, response in responses.items():
+        width = len(response.length)
+        grid = np.stack(np.meshgrid(*[np.linspace(0, 1, 11)] * width), axis=-1).reshape(-1, width)
+        mean, _ = response.at(grid)
+        found[name] = (float(mean.min()), float(mean.max()))
+    return found
+
+
+def _points(
+    settings: CalibrateSettings, done: Simulated, responses: Mapping[str, Response], best: Mapping[str, float]
+) -> list[Json]:
+    """The points explored; ``moved``: each figure along the surface to the parameters found, but for the one named."""
+    ends = np.array(list(settings.free.values()))
+    at = (np.array(list(best.values())) - ends[:, 0]) / (ends[:, 1] - ends[:, 0])
+    found = []
+    for point, figures in zip(done.points, done.figures, strict=True):
+        x = (np.array(list(point.values())) - ends[:, 0]) / (ends[:, 1] - ends[:, 0])
+        moved: dict[str, dict[str, float]] = {}
+        for k, key in enumerate(settings.free):
+            there = at.copy()
+            there[k] = x[k]
+            moved[key] = {}
+            for name, response in responses.items():
+                mean, _ = response.at(np.array([x, there]))
+                moved[key][name] = float(figures[name][0] + mean[1] - mean[0])
+        found.append({"values": point, "figures": figures, "moved": moved})
+    return found
+
+
+def _curves(
+    settings: CalibrateSettings, responses: Mapping[str, Response], best: Mapping[str, float], folder: RunFolder
+) -> dict[str, str]:
+    """Each fitted figure along each parameter through the best point, as series; parameter -> file."""
+    ends = np.array(list(settings.free.values()))
+    at = (np.array(list(best.values())) - ends[:, 0]) / (ends[:, 1] - ends[:, 0])
+    files = {}
+    for k, key in enumerate(settings.free):
+        x = np.repeat(at[None, :], _CURVE, axis=0)
+        x[:, k] = np.linspace(0, 1, _CURVE)
+        columns = {key: ends[k, 0] + x[:, k] * (ends[k, 1] - ends[k, 0])}
+        for name, response in responses.items():
+            columns[name], columns[f"{name}.std"] = response.at(x)
+        files[key] = folder.write_series(f"response-{key}", columns)
+    return files
+
+
+def _figure_table(entries: list[Json]) -> Json:
+    rows = [
+        [
+            entry["name"] + (f" ({entry['plane']})" if entry["plane"] not in (None, "shear") else ""),
+            f"{entry['wanted']:g} +- {entry['tolerance']:g} {entry['unit']}",
+            "-"
+            if entry["measured"] is None
+            else f"{entry['measured']:.4g}" + ("" if entry["error"] is None else f" +- {entry['error']:.2g}"),
+            "-" if entry["expected"] is None else f"{entry['expected']:.4g} +- {entry['expected_std']:.2g}",
+            entry["verdict"],
+            entry["source"],
+        ]
+        for entry in entries
+    ]
+    return {
+        "title": "Figure by figure",
+        "head": ["figure", "wanted", "measured", "surface", "verdict", "source"],
+        "rows": rows,
+        "words": True,
+    }
+
+
+def _point_table(settings: CalibrateSettings, done: Simulated) -> Json:
+    names = [target.name for target in settings.wanted.values() if target.fit]
+    rows = [
+        [str(k + 1), *(f"{v:.4g}" for v in point.values()), *(f"{found[n][0]:.4g} +- {found[n][1]:.2g}" for n in names)]
+        for k, (point, found) in enumerate(zip(done.points, done.figures, strict=True))
+    ]
+    return {"title": "Point by point", "head": ["point", *settings.free, *names], "rows": rows, "words": False}
+
+
+def material_toml(stuff: Material, settings: CalibrateSettings, fit: Fit, figures: list[Json]) -> str:
+    """The text of material.toml, which ``dem.grains.materials.read_material`` reads."""
+    found = {"surface_energy" if key == "bond_number" else key for key in settings.free}
+    said = ", ".join(f"{t.name} {t.value:g} +- {t.tolerance:g} {t.unit}" for t in settings.wanted.values() if t.fit)
+    sources = dict(stuff.sources) | dict.fromkeys(found, f"calibrated to {said}")
+    shown = [f.name for f in fields(stuff) if f.name != "sources" and getattr(stuff, f.name) is not None]
+    if stuff.cohesion == "none":
+        shown = [key for key in shown if key not in ("cohesion", "surface_energy", "grain")]
+    lines = [
+        "# A material of hedgebed bed calibrate: `--material FILE` of penetrate and bed make takes it.",
+        f"format = {toml_value(MATERIAL_FORMAT)}",
+        *(f"{key} = {toml_value(getattr(stuff, key))}" for key in shown),
+        "",
+        "[sources]",
+        *(f"{key} = {toml_value(sources.get(key, 'not given'))}" for key in shown if key not in _UNSOURCED),
+        "",
+        "[calibration]",
+        f"version = {toml_value(__version__)}",
+        f"grain = {toml_value(settings.grain)}",
+        *(f"{key}_std = {toml_value(float(f'{std:.2g}'))}" for key, std in zip(settings.free, fit.std, strict=True)),
+    ]
+    for entry in figures:
+        value, error = entry["measured"], entry["error"]
+        lines += [
+            "",
+            f"[calibration.{entry['name']}]",
+            f"wanted = {toml_value(entry['wanted'])}",
+            f"tolerance = {toml_value(entry['tolerance'])}",
+            *([] if value is None else [f"measured = {toml_value(float(f'{value:.5g}'))}"]),
+            *([] if error is None else [f"error = {toml_value(float(f'{error:.2g}'))}"]),
+            f"verdict = {toml_value(entry['verdict'])}",
+            f"source = {toml_value(entry['source'])}",
+        ]
+    return "\n".join(lines) + "\n"

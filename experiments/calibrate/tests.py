@@ -1,0 +1,285 @@
+"""The tests behind a calibration: what a sheared sample or a drained bed says, and the bulk figures that follow.
+
+Stresses at large strain are means over the second half of the strain, their standard error that of five parts of it;
+the largest strength is that of the stress ratio averaged over a twentieth of strain.
+
+Friction angle and cohesion are those of a straight line through the tests' stresses, shear = cohesion + tan(angle)
+normal (Mohr-Coulomb), on the plane of shear; of grains that do not stick one test gives the angle, as nothing but the
+pressure has the unit of a stress. The triaxial angle is that of triaxial compression at the same
+I1 I2 / I3 = (9 - sin^2) / (1 - sin^2) (Matsuoka & Nakai 1974, Proc. JSCE 232:59), from the whole stress tensor inside,
+cohesion c added to it as c / tan(angle). Those of Mohr's circle are of the straight line through the circles of the
+largest and least principal stress, radius = cohesion cos(angle) + sin(angle) centre: what Coulomb's wedge, and with it
+a vertical cut, is reckoned with. Where volume stays, the plane of shear has c cos(angle) and tan = sin(angle) instead.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from dem.grains.materials import Material
+from dem.measure.element import ElementShear, shear_element
+from experiments.bed.repose import BEARING
+from experiments.bed.tests import stiff_enough
+from experiments.runs.types import Json
+
+from .settings import CalibrateSettings, Target
+
+__all__ = [
+    "SampleTest",
+    "figures_of",
+    "laboratory_figure",
+    "mohr_circle",
+    "run_test",
+    "summary_of",
+    "tests_for",
+    "triaxial_angle",
+]
+
+_WINDOW = 0.05
+"""Strain over which the largest strength is averaged."""
+_PARTS = 5
+_STEEPEST = math.sin(math.radians(85.0))
+"""Slope of a line through Mohr's circles, at most: chance brings few tests to 1 and more, which is no angle."""
+_COLUMNS = {"strain": "strain", "height": "height_m", "shear": "shear_Pa", "normal": "normal_Pa"}
+
+
+@dataclass(frozen=True)
+class SampleTest:
+    """One sample: in which state it is sheared, the pressure [Pa], the seed; a bed is "drained", without a pressure."""
+
+    state: str
+    pressure: float
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """For files."""
+        pressed = f"-{self.pressure:g}" if self.pressure else ""
+        return f"{self.state}{pressed}-seed{self.seed}"
+
+
+def tests_for(settings: CalibrateSettings, targets: Sequence[Target], *, seed: int) -> list[SampleTest]:
+    """The tests that these targets need, of one set of parameters and one seed."""
+    states = dict.fromkeys(target.state for target in targets if target.state)
+    pressures = settings.pressures if settings.base.cohesion != "none" else settings.pressures[-1:]
+    return [SampleTest(state, p, seed) for state in states for p in ((0.0,) if state == "drained" else pressures)]
+
+
+def run_test(
+    stuff: Material, test: SampleTest, settings: CalibrateSettings, *, tell: Callable[[float], None]
+) -> tuple[Json, dict[str, np.ndarray]]:
+    """Carry a test out: what is kept of it, of a sheared sample as ``summary_of`` gives it, and its series.
+
+    Raises BedFailure.
+    """
+    if test.state == "drained":
+        return _drain(stuff, test, settings, tell)
+    run = shear_element(
+        stuff, pressure=test.pressure, grain=settings.grain, size=settings.size,
+        pressed_friction=settings.dense_friction if test.state == "dense" else settings.loose_friction,
+        spread=settings.spread, strain=settings.strain, inertial_number=settings.inertial_number,
+        max_overlap=settings.max_overlap, seed=test.seed, threads=settings.threads, tell=tell,
+    )  # fmt: skip
+    return summary_of(run, stuff.density), {column: getattr(run, key) for key, column in _COLUMNS.items()}
+
+
+class _Preparing:
+    """Shows the preparation of a bed as the first half of a test."""
+
+    def __init__(self, tell: Callable[[float], None]) -> None:
+        self.tell, self.part = tell, 0
+
+    def stage(self, name: str, total: float | None = None) -> None:
+        """The next part begins."""
+        self.part += 1
+
+    def update(self, done: float) -> None:
+        """``done`` of it, 0 to 1."""
+        self.tell(0.5 - 0.5 ** (self.part + min(1.0, max(0.0, done))))
+
+
+def _drain(
+    stuff: Material, test: SampleTest, settings: CalibrateSettings, tell: Callable[[float], None]
+) -> tuple[Json, dict[str, np.ndarray]]:
+    """The angle of repose of one bed as rained, as ``hedgebed bed test repose`` has it."""
+    from dem import Bed
+    from dem.measure.repose import angle_of_repose
+
+    length, width, depth = (settings.grain * side for side in settings.repose_size)
+    sizes = {"grain": settings.grain, "spread": settings.spread}
+    bed = Bed.prepare(
+        stuff.with_rolling(),  # the plate is rough
+        size=(length, width, depth),
+        **sizes,
+        gravity=settings.gravity,
+        seed=test.seed,
+        young=stiff_enough(stuff, depth=depth, **sizes, gravity=settings.gravity, bearing=BEARING),
+        threads=settings.threads,
+        cache=False,
+        progress=_Preparing(tell),
+    )
+    packing = bed.packing_fraction
+    found = angle_of_repose(bed, tell=lambda share: tell(0.5 + 0.5 * share))
+    summary = {
+        "angle": found.angle,
+        "error": found.error,
+        "flanks": [asdict(flank) for flank in found.flanks],
+        "slot": found.slot,
+        "size": list(bed.size),
+        "packing_before": packing,
+        "young": bed.material.young,
+        "grain_count": bed.grain_count,
+        "max_overlap": bed.max_overlap,
+    }
+    return summary, {"x_m": found.distance, "thickness_m": found.thickness}
+
+
+def summary_of(run: ElementShear, density: float) -> Json:
+    """What is kept of a test: stresses at large strain and at the largest strength, with standard errors [Pa].
+
+    ``bulk_density``: before it was sheared [kg/m3], for grains of this ``density``.
+    ``tensor`` and ``peak_tensor``: stress tensors inside, at large strain and about the peak [Pa].
+    """
+    ratio, half = run.shear / run.normal, len(run.strain) // 2
+    parts = np.array([part.mean() for part in np.array_split(ratio[half:], _PARTS)])
+    count = max(1, min(len(ratio), round(len(ratio) * _WINDOW / run.strain[-1])))
+    smooth = np.convolve(ratio, np.ones(count) / count, "valid")
+    top = int(np.argmax(smooth))
+    normal = float(run.normal[half:].mean())
+    late = run.inside_strain >= run.strain[half]
+    away = np.abs(run.inside_strain - run.strain[top + count // 2])
+    at_peak = away <= max(_WINDOW / 2, away.min())
+    error = float(parts.std(ddof=1)) / math.sqrt(_PARTS)
+    return {
+        "normal": normal,
+        "shear": normal * float(parts.mean()),
+        "error": normal * error,
+        "peak_normal": float(run.normal[top : top + count].mean()),
+        "peak_shear": float(run.normal[top : top + count].mean() * smooth[top]),
+        "peak_strain": float(run.strain[top + count // 2]),
+        "tensor": run.stress[late].mean(axis=0).tolist(),
+        "peak_tensor": run.stress[at_peak].mean(axis=0).tolist(),
+        "bulk_density": run.packing_before * density,
+        "packing_before": run.packing_before,
+        "packing_critical": float(run.packing[late].mean()),
+        "young": run.young,
+        "grain_count": run.grain_count,
+        "max_overlap": run.max_overlap,
+    }
+
+
+def triaxial_angle(tensor: np.ndarray, *, added: float = 0.0) -> float:
+    """The angle of triaxial compression [degrees] of a stress tensor [Pa], pressure positive; see the module.
+
+    Args:
+        added: cohesion over the tangent of the angle [Pa], taken as a pressure on all sides.
+
+    Raises:
+        ValueError: a tensor that pulls.
+    """
+    tensor = np.asarray(tensor, dtype=float)
+    principal = np.linalg.eigvalsh(0.5 * (tensor + tensor.T)) + added
+    if not principal[0] > 0:
+        raise ValueError(f"the least principal stress, {principal[0]:.4g} Pa, is none that presses")
+    a, b, c = principal
+    ratio = max(9.0, (a + b + c) * (a * b + b * c + c * a) / (a * b * c))
+    return math.degrees(math.asin(math.sqrt((ratio - 9) / (ratio - 1))))
+
+
+def mohr_circle(tensor: np.ndarray) -> tuple[float, float]:
+    """Centre and radius of the circle of the largest and least principal stress [Pa]; the tensor need not press."""
+    tensor = np.asarray(tensor, dtype=float)
+    least, _, most = np.linalg.eigvalsh(0.5 * (tensor + tensor.T))
+    return 0.5 * float(most + least), 0.5 * float(most - least)
+
+
+def figures_of(
+    targets: Sequence[Target], runs: Mapping[SampleTest, Mapping[str, Any]]
+) -> dict[str, tuple[float, float]]:
+    """Value and standard error of the targets' figures, from the tests of one set of parameters and one seed.
+
+    The error is what the tests tell of themselves; that of a peak is taken to be that of its test at large strain.
+    """
+    found = {}
+    for target in targets:
+        if not target.state:
+            continue
+        kept = [summary for test, summary in runs.items() if test.state == target.state]
+        if target.state == "drained":
+            angles, errors = ([summary[name] for summary in kept] for name in ("angle", "error"))
+            found[target.name] = (float(np.mean(angles)), float(np.linalg.norm(errors)) / len(errors))
+            continue
+        key = "peak_" if target.figure.startswith("peak") else ""
+        normal = np.array([summary[f"{key}normal"] for summary in kept])
+        shear = np.array([summary[f"{key}shear"] for summary in kept])
+        if target.plane == "mohr":
+            normal, shear = np.array([mohr_circle(summary[f"{key}tensor"]) for summary in kept]).T
+        error = np.array([summary["error"] for summary in kept])
+        start, slope, start_error, slope_error = _line(normal, shear, error, origin=target.through == "origin")
+        angle = math.degrees(math.atan(slope))
+        angle_error = math.degrees(slope_error / (1 + slope**2))
+        if target.plane == "mohr":
+            sine = min(slope, _STEEPEST)
+            cosine = math.sqrt(1 - sine**2)
+            angle, angle_error = math.degrees(math.asin(sine)), math.degrees(slope_error / cosine)
+            start, start_error = start / cosine, start_error / cosine
+        if target.figure == "sample_density":
+            found[target.name] = (float(np.mean([summary["bulk_density"] for summary in kept])), 0.0)
+        elif "cohesion" in target.figure:
+            found[target.name] = (start, start_error)
+        elif target.plane in ("shear", "mohr"):
+            found[target.name] = (angle, angle_error)
+        else:
+            added = max(0.0, start) / slope
+            tensors = [summary[f"{key}tensor"] for summary in kept]
+            found[target.name] = (float(np.mean([triaxial_angle(t, added=added) for t in tensors])), angle_error)
+    return found
+
+
+def _line(
+    normal: np.ndarray, shear: np.ndarray, error: np.ndarray, *, origin: bool
+) -> tuple[float, float, float, float]:
+    """Where a straight line begins, its slope, and their standard errors; through the origin for one test, or asked."""
+    if len(normal) == 1 or origin:
+        along = normal / (normal @ normal)
+        return 0.0, float(along @ shear), 0.0, math.sqrt(float(along**2 @ error**2))
+    off = normal - normal.mean()
+    along = off / (off @ off)
+    level = 1 / len(normal) - normal.mean() * along
+    return (
+        float(level @ shear),
+        float(along @ shear),
+        math.sqrt(float(level**2 @ error**2)),
+        math.sqrt(float(along**2 @ error**2)),
+    )
+
+
+def laboratory_figure(
+    name: str, stuff: Material, settings: CalibrateSettings, *, seed: int, progress: Any
+) -> tuple[float, float | None]:
+    """A figure of a bed prepared as in a laboratory: its value and, where it tells one, its standard error.
+
+    Args:
+        progress: anything with ``stage`` and ``update``, as ``dem.prepare.prepare.prepare_as`` takes it.
+
+    Raises:
+        BedFailure: the bed did not come to rest. ValueError: a bed that cannot be.
+    """
+    from dem import Bed
+
+    stages, size = ["rain", "fluff"], settings.bed_size
+    if name.endswith("_dense"):
+        stages = ["rain", "compact:densest"]
+    prepared = Bed.prepare_as(
+        stuff, stages=stages, size=size, grain=settings.grain, spread=settings.spread, gravity=settings.gravity,
+        seed=seed, threads=settings.threads, progress=progress,
+    )  # fmt: skip
+    bed = prepared.bed
+    assert bed is not None
+    packing = prepared.reports[-1].packing_fraction
+    return (packing if name.startswith("packing") else packing * stuff.density), None

@@ -1,0 +1,198 @@
+"""`hedgebed campaign check`: is a campaign fit to be diagnosed, and what is in it?
+
+What cannot be read is refused, all of it at once, by file, line and key. What can be read but is odd is found and said,
+without a model: sensors that are missing, gaps, a marker that jumped, a clock that jumped, a trial at odds with its
+replicates. `hedgebed diagnose` finds the same and sets it aside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from experiments.campaign import Campaign, PenetrationCampaign, Recording, TumbleCampaign, read_campaign
+from experiments.campaign.tables import PenetrationTrial
+from experiments.diagnose.fit.problem import Finding
+from experiments.diagnose.report.telling import findings_in_words
+from experiments.grains.spells import spells
+from experiments.runs.folder import RunFolder
+from experiments.runs.progress import Progress
+from experiments.runs.reporting import write_report
+from experiments.runs.types import Json
+from experiments.runs.version import __version__
+from experiments.runs.whole_runs import whole_run
+
+from . import find_implausible, loud_sensors, missing_sensors, said_once, without_companions
+from .replicas import Condition, condition_of, condition_words, odd_replicates
+from .settings import CheckSettings
+
+__all__ = ["check", "find_faults", "resume", "run", "unnamed_files"]
+
+_LONG = 10.0
+"""A step of the time this many times the usual one is a gap."""
+_LISTED = 4
+"""Files that are listed by name."""
+
+
+def check(settings: CheckSettings) -> None:
+    """Raise ValueError, one sentence a line, for all that is wrong with the campaign."""
+    read_campaign(settings.campaign)
+
+
+def find_faults(campaign: Campaign) -> list[Finding]:
+    """What is odd about the recordings, each in a plain sentence that names its trial.
+
+    Raises ValueError where no diagnosis could be made: a sensor stated to have no noise, no trial that can be used.
+    """
+    with threadpool_limits(1):  # matrices are small
+        found = _faults_of_data(campaign)
+    jumped = {finding.trial for finding in found if _jumps(finding)}
+    odd = [finding for finding in odd_replicates(campaign) if finding.trial not in jumped]
+    told = [*missing_sensors(campaign), *find_implausible(campaign), *found, *odd, *loud_sensors(campaign)]
+    return without_companions(campaign, told)
+
+
+def _jumps(finding: Finding) -> bool:
+    return "jumps" in finding.what or "by a jump" in finding.what
+
+
+def unnamed_files(folder: Path, campaign: Campaign) -> list[Finding]:
+    """Recordings in the folder that no trial names: a trial forgotten, or what is left of a template."""
+    trials: Sequence[Any] = campaign.tables.trial
+    named = {(folder / file).resolve() for trial in trials for file in trial.files.values()}
+    left = [str(path.relative_to(folder)) for path in sorted(folder.rglob("*.csv")) if path.resolve() not in named]
+    if not left:
+        return []
+    shown = ", ".join(left[:_LISTED]) + (f" and {len(left) - _LISTED} more" if len(left) > _LISTED else "")
+    return [Finding(trial="", what=f"{shown}: in the folder, but no trial names {'it' if len(left) == 1 else 'them'}")]
+
+
+def _faults_of_data(campaign: Campaign) -> list[Finding]:
+    """What diagnose finds when it reads the recordings."""
+    if isinstance(campaign.tables, PenetrationCampaign):
+        from experiments.diagnose.push.data import prepare
+
+        return list(prepare(campaign)[1])
+    from experiments.diagnose.tumble.checks import checked
+    from experiments.diagnose.tumble.data import tumble_data
+
+    return findings_in_words(checked(tumble_data(campaign))[1])
+
+
+# The result -----------------------------------------------------------------------------------------------------------
+
+
+def _carry_out(settings: CheckSettings, folder: RunFolder, progress: Progress) -> Json:
+    with folder.lock():
+        campaign = read_campaign(settings.campaign)
+        progress.stage("check", total=1.0)
+        findings = [*unnamed_files(Path(settings.campaign), campaign), *find_faults(campaign)]
+        recordings = []
+        trials: Sequence[Any] = campaign.tables.trial
+        for number, trial in enumerate(trials, 1):
+            for sensor in trial.files:
+                recording = campaign.recordings[trial.id, sensor]
+                name = f"{number:03d}-{sensor}"
+                folder.write_series(name, dict(recording.columns))
+                recordings.append(
+                    {"trial": trial.id, "sensor": sensor, "series": f"series/{name}.csv"} | _facts(recording)
+                )
+        result = _result(campaign, recordings, findings)
+        folder.write_result(result)
+        progress.stage("report", total=1.0)
+        write_report(folder.path, progress)
+    return result
+
+
+def _facts(recording: Recording) -> Json:
+    """Rows, rate [Hz], first and last time [s], and gaps (from, to) [s]: long steps, and stretches of empty cells."""
+    time = recording.time
+    steps = np.diff(time)
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    gaps = [(float(time[k]), float(time[k + 1])) for k in np.flatnonzero(steps > _LONG * usual)] if usual > 0 else []
+    empty = np.zeros(len(time), dtype=bool)
+    for name, values in recording.columns.items():
+        empty |= np.isnan(values) if name != "t_s" else False
+    gaps += [(float(time[low]), float(time[high - 1])) for low, high in spells(empty)]
+    return {
+        "rows": len(time),
+        "rate": 1 / usual if usual > 0 else None,
+        "from_s": float(time[0]),
+        "to_s": float(time[-1]),
+        "empty_rows": int(empty.sum()),
+        "gaps": sorted(gaps),
+    }
+
+
+def _result(campaign: Campaign, recordings: list[Json], findings: list[Finding]) -> Json:
+    tables = campaign.tables
+    listed: Sequence[Any] = tables.trial
+    conditions: dict[str, Condition] = {trial.id: condition_of(tables, trial) for trial in listed}
+    alike = {id: sum(other == one for other in conditions.values()) for id, one in conditions.items()}
+    trials = []
+    for trial in listed:
+        own = [entry for entry in recordings if entry["trial"] == trial.id]
+        said = [finding for finding in findings if finding.trial == trial.id]
+        trials.append({
+            "id": trial.id,
+            "kind": trial.mode if isinstance(trial, PenetrationTrial) else "tumble",
+            "condition": condition_words(tables, trial),
+            "sensors": ", ".join(f"{_seen_as(tables, entry, trial)} {_rate(entry['rate'])}" for entry in own),
+            "from_s": min(entry["from_s"] for entry in own),
+            "to_s": max(entry["to_s"] for entry in own),
+            "gaps": sum(len(entry["gaps"]) for entry in own),
+            "jumps": sum(_jumps(finding) for finding in said),
+            "findings": len(said),
+            "alike": alike[trial.id],
+        })  # fmt: skip
+    head = ["trial", "condition", "sensors [Hz]", "from, to [s]", "gaps", "jumps", "found", "alike"]
+    rows = [
+        [t["id"], t["condition"], t["sensors"], f"{t['from_s']:.4g}, {t['to_s']:.4g}", t["gaps"] or "-",
+         t["jumps"] or "-", t["findings"] or "-", t["alike"]]
+        for t in trials
+    ]  # fmt: skip
+    count = len(trials)
+    return {
+        "format": "hedgebed-result/1",
+        "experiment": "campaign check",
+        "version": __version__,
+        "title": f"{tables.name}: {count} trial{'s' if count > 1 else ''}, "
+        + (f"{len(findings)} found" if findings else "nothing found"),
+        "status": "done",
+        "kind": tables.kind,
+        "quantities": {
+            "trial_count": _exact(count, ""),
+            "condition_count": _exact(len(set(conditions.values())), "trials of one condition are replicates"),
+            "row_count": _exact(sum(entry["rows"] for entry in recordings), "of all recordings together"),
+            "finding_count": _exact(len(findings), "diagnose sets aside or models what it can"),
+        },
+        "tables": [{"title": "", "head": head, "rows": rows}],
+        "trials": trials,
+        "recordings": recordings,
+        "findings": [
+            {"trial": f.trial, "what": f.what, "channel": f.channel, "from_s": f.from_s, "to_s": f.to_s}
+            for f in findings
+        ],
+        "warnings": [finding.what for finding in said_once(findings)],
+    }
+
+
+def _exact(value: int, note: str) -> Json:
+    return {"value": value, "std": 0.0, "unit": "1"} | ({"note": note} if note else {})
+
+
+def _rate(rate: float | None) -> str:
+    return "?" if rate is None else f"{rate:.3g}" if rate < 100 else f"{rate:.0f}"
+
+
+def _seen_as(tables: TumbleCampaign | PenetrationCampaign, entry: Json, trial: Any) -> str:
+    if isinstance(tables, TumbleCampaign):
+        return str(entry["sensor"])
+    return ", ".join(trial.needed)
+
+
+run, resume = whole_run("campaign check", CheckSettings, _carry_out, check=check)

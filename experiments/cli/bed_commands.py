@@ -1,0 +1,124 @@
+"""`hedgebed bed list`, `bed show`, `bed share`: the beds there are, what one of them is, and one as a file to send."""
+
+from __future__ import annotations
+
+import json as json_module
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import App, Parameter
+from rich.console import Console
+from rich.table import Table
+
+from experiments.runs.streams import refusing, say
+
+__all__ = ["add_bed_commands"]
+
+_Json = Annotated[bool, Parameter(help="Print it as JSON on stdout and nothing else.", negative="")]
+_Bed = Annotated[str, Parameter(help="A file, the folder of a run of bed make, or a name on the shelf.")]
+
+
+def add_bed_commands(home: App) -> None:
+    """Add the commands to ``hedgebed bed``."""
+    home.command(_list, name="list")
+    home.command(_show, name="show")
+    home.command(_share, name="share")
+
+
+def _list(
+    folder: Annotated[
+        Path | None, Parameter(help="Folder of bed files; the shelf (HEDGEBED_BEDS) if not given.")
+    ] = None,
+    /,
+    *,
+    json: _Json = False,
+) -> int:
+    """List the beds on the shelf, or those in a folder."""
+    from dem.prepare.bedfile import bed_shelf, list_beds
+
+    where = bed_shelf() if folder is None else folder
+    with refusing():
+        if folder is not None and not folder.is_dir():
+            raise ValueError(f"folder = {str(folder)!r} is no folder: give one that holds .npz files of beds")
+    beds = list_beds(where) if where.is_dir() else []
+    if json:
+        print(json_module.dumps(beds, indent=2))
+        return 0
+    table = Table(title=f"Beds in {where}", title_justify="left", box=None, pad_edge=False)
+    for heading in ("name", "material", "size [mm]", "grain [mm]", "grains", "packing", "g [m/s2]", "stages"):
+        table.add_column(heading)
+    for bed in beds:
+        table.add_row(*(_cells(bed) if "problem" not in bed else (bed["name"], *[""] * 6, bed["problem"])))
+    Console(file=sys.stdout, highlight=False).print(table, markup=False)
+    if not beds:
+        say("none yet: `hedgebed bed make --name NAME` puts one there")
+    return 0
+
+
+def _cells(bed: dict[str, Any]) -> tuple[str, ...]:
+    return (
+        bed["name"],
+        bed["material"],
+        " x ".join(f"{1e3 * length:g}" for length in bed["size"]),
+        f"{1e3 * bed['grain']:.3g}",
+        str(bed["grain_count"]),
+        f"{bed['packing_fraction']:.4f}",
+        f"{bed['gravity']:.4g}",
+        " ".join(bed["stages"]) or "not said",
+    )
+
+
+def _show(bed: _Bed, /, *, json: _Json = False) -> int:
+    """Show what a bed is: what it was made from, and what each stage of its preparation left."""
+    from dem.prepare.bedfile import find_bed, list_beds, read_preparation
+
+    with refusing():
+        path = find_bed(bed)
+        about = read_preparation(path)
+        entry = next(one for one in list_beds(path.parent) if one["file"] == str(path))
+        if "problem" in entry:
+            raise ValueError(entry["problem"])
+    if json:
+        from dataclasses import asdict
+
+        print(
+            json_module.dumps(entry | {"recipe": about.recipe, "reports": [asdict(r) for r in about.reports]}, indent=2)
+        )
+        return 0
+    console = Console(file=sys.stdout, highlight=False)
+    table = Table(title=str(path), title_justify="left", box=None, pad_edge=False, show_header=False)
+    heads = ("name", "material", "size [mm]", "grain [mm]", "grains", "packing", "gravity [m/s2]", "stages")
+    for head, cell in zip(heads, _cells(entry), strict=True):
+        table.add_row(head, cell)
+    for key in ("young", "seed", "max_overlap", "precision", "code"):
+        if key in about.recipe:
+            table.add_row(key, f"{about.recipe[key]}")
+    console.print(table, markup=False)
+    if about.reports:
+        stages = Table(box=None, pad_edge=False)
+        for heading in ("stage", "packing", "contacts", "K", "surface [mm]", "settled"):
+            stages.add_column(heading)
+        for report in about.reports:
+            ratio = "-" if report.pressure_ratio is None else f"{report.pressure_ratio:.2f}"
+            stages.add_row(
+                report.stage,
+                f"{report.packing_fraction:.4f}",
+                f"{report.coordination_number:.2f}",
+                ratio,
+                f"{1e3 * report.surface:.4g}",
+                report.criterion,
+            )
+        console.print(stages, markup=False)
+    return 0
+
+
+def _share(bed: _Bed, to: Annotated[Path, Parameter(help="The file to write; must not be there.")], /) -> int:
+    """Write a bed with all that is known of it to one compressed file, to be sent and used elsewhere."""
+    from dem.prepare.bedfile import find_bed, share_bed
+
+    with refusing():
+        file = share_bed(find_bed(bed), to)
+    print(f"bed: {file}")
+    say(f"`hedgebed bed show {file}` says what it is, `dem.Bed.load({str(file)!r})` reads it")
+    return 0

@@ -1,0 +1,65 @@
+"""Finding the benchmarks: they are in the repository, beside the packages, and are not installed with them.
+
+``benchmarks/<what>.py`` offers ``run(out: Path, *, progress: Progress) -> dict``: it may write into `out`, shows its
+table itself and returns what goes into bench.json, ``{"format": "hedgebed-bench/1", "what": <what>, ...}``. Further
+keyword arguments of `run`, each a str or an int with a default, are options of the command. A benchmark that can go on
+in a folder of its own offers ``continues(out: Path) -> bool`` as well.
+"""
+
+import inspect
+import sys
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from experiments.runs.reading import nearest
+
+__all__ = ["benchmark_options", "goes_on", "load_benchmark"]
+
+
+def load_benchmark(what: str, root: Path | None = None) -> Callable[..., dict[str, Any]]:
+    """The function `run` of benchmarks/`what`.py in the checkout `root` (by default the one this file is in).
+
+    Raises ValueError if this is not a checkout or there is no such benchmark.
+    """
+    root = Path(__file__).resolve().parents[2] if root is None else root
+    folder = root / "benchmarks"
+    if not (root / "pyproject.toml").is_file() or not folder.is_dir():
+        raise ValueError("bench needs a checkout of the repository (benchmarks are not installed): use `make bench`")
+    there = sorted(path.stem for path in folder.glob("[a-z]*.py") if "def run(" in path.read_text(encoding="utf-8"))
+    if not there:
+        raise ValueError(f"there are no benchmarks in {str(folder)!r}: take the folder benchmarks/ from the repository")
+    if what not in there:
+        raise ValueError(f"what = {what!r} is no benchmark; {nearest(what, there)}")
+    if str(root) not in sys.path:
+        sys.path.insert(0, str(root))
+    return import_module(f"benchmarks.{what}").run
+
+
+def benchmark_options(run: Callable[..., dict[str, Any]], given: Mapping[str, str]) -> dict[str, Any]:
+    """Options of the command as arguments of `run`. Raises ValueError for one it has not, or for no whole number."""
+    known = {
+        name: parameter.default
+        for name, parameter in inspect.signature(run).parameters.items()
+        if isinstance(parameter.default, str | int)
+    }
+    found: dict[str, Any] = {}
+    for name, text in given.items():
+        if name not in known:
+            raise ValueError(
+                f"--{name} is no option here; {nearest(name, sorted(known)) if known else 'there is none'}"
+            )
+        if isinstance(known[name], int):
+            if not text.isdigit():
+                raise ValueError(f"{name} = {text!r}: a whole number was expected")
+            found[name] = int(text)
+        else:
+            found[name] = text
+    return found
+
+
+def goes_on(run: Callable[..., dict[str, Any]], out: Path) -> bool:
+    """Whether the benchmark goes on with what it left in the folder `out`."""
+    continues = getattr(sys.modules.get(run.__module__), "continues", None)
+    return continues is not None and bool(continues(out))

@@ -1,0 +1,160 @@
+"""``hedgebed doctor``: what this machine has, and what to install where something lacks."""
+
+import json
+import os
+import platform
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from experiments.cli import probes
+from experiments.runs.memory import cores_there, memory_there
+from experiments.runs.version import __version__
+
+__all__ = ["Finding", "cache_folder", "examine", "show"]
+
+PYTHONS = ((3, 11), (3, 13))  # oldest and newest that Taichi has wheels for
+GIB = 2**30
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing looked at: whether it is there, whether nothing runs without it, and what to do if it is not."""
+
+    name: str
+    ok: bool
+    detail: str
+    remedy: str = ""
+    required: bool = False
+
+
+def cache_folder() -> Path:
+    """Where prepared beds are kept: HEDGEBED_CACHE, or ~/.cache/hedgebed."""
+    given = os.environ.get("HEDGEBED_CACHE")
+    return Path(given).expanduser() if given else Path.home() / ".cache" / "hedgebed"
+
+
+def probe(*arguments: str, timeout: float = 90.0) -> dict[str, Any]:
+    """What `experiments.cli.probes` says to `arguments`, asked in a process of its own.
+
+    A crash, a hang past `timeout` [s] or an exception comes back as ``{"ok": False, "reason": ...}``.
+    """
+    command = [sys.executable, "-P", str(Path(probes.__file__)), *arguments]
+    environment = {**os.environ, "ENABLE_TAICHI_HEADER_PRINT": "0", "TI_SKIP_VERSION_CHECK": "1"}
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=timeout, env=environment, check=False)
+    except subprocess.TimeoutExpired:
+        return {"ok": False, "reason": f"no answer within {timeout:.0f} s"}
+    if done.returncode < 0:
+        return {"ok": False, "reason": f"crashed with signal {-done.returncode}"}
+    lines = [line for line in (done.stderr if done.returncode else done.stdout).splitlines() if line.strip()]
+    if done.returncode:
+        return {"ok": False, "reason": lines[-1] if lines else f"ended with status {done.returncode}"}
+    try:
+        return json.loads(lines[-1])
+    except (IndexError, json.JSONDecodeError):
+        return {"ok": False, "reason": "gave no answer"}
+
+
+def _python() -> Finding:
+    version = sys.version_info[:2]
+    between = f"{PYTHONS[0][0]}.{PYTHONS[0][1]} to {PYTHONS[1][0]}.{PYTHONS[1][1]}"
+    return Finding(
+        "Python",
+        PYTHONS[0] <= version <= PYTHONS[1],
+        f"{platform.python_version()} (Taichi has wheels for {between})",
+        f"use Python {between}",
+        required=True,
+    )
+
+
+def _taichi(arch: str, answer: dict[str, Any]) -> Finding:
+    remedies = {
+        "cpu": "pip install taichi",
+        "cuda": "needs an NVIDIA card and its driver; the bed runs on the CPU without",
+        "vulkan": "not needed",
+    }
+    version = f"Taichi {answer['version']}" if answer.get("version") else "Taichi"
+    detail = f"{version} runs a kernel" if answer["ok"] else f"does not run here ({answer['reason']})"
+    return Finding(f"backend {arch}", answer["ok"], detail, remedies[arch], required=arch == "cpu")
+
+
+def _threads() -> Finding:
+    return Finding("threads", True, f"{cores_there()} usable of {os.cpu_count()}")
+
+
+def _memory() -> Finding:
+    memory = memory_there()
+    limited = f", limited to {memory.limit / GIB:.1f} GiB" if memory.limit is not None else ""
+    detail = f"{memory.free / GIB:.1f} GiB available of {memory.total / GIB:.1f} GiB{limited}"
+    remedy = "close something, or take a smaller bed_size or a larger grain"
+    return Finding("memory", memory.free >= GIB, detail, remedy)
+
+
+def _cache() -> Finding:
+    folder = cache_folder()
+    beds = [path for path in folder.rglob("*") if path.is_file()] if folder.is_dir() else []
+    size = sum(path.stat().st_size for path in beds)
+    there = next(path for path in [folder, *folder.parents] if path.exists())
+    writable = there.is_dir() and os.access(there, os.W_OK)
+    free = shutil.disk_usage(there).free
+    detail = f"{folder}: {len(beds)} files, {size / 2**20:.1f} MiB; {free / GIB:.1f} GiB free"
+    if not writable:
+        detail += "; cannot be written"
+    return Finding("cache of beds", writable and free >= GIB // 4, detail, "set HEDGEBED_CACHE to a folder with room")
+
+
+def _opengl(answer: dict[str, Any]) -> Finding:
+    detail = (
+        f"a picture off screen ({answer.get('renderer') or 'renderer unknown'})" if answer["ok"] else answer["reason"]
+    )
+    remedy = "apt install libegl1 libgl1-mesa-dri (runs work without it; plots stand in for the pictures)"
+    return Finding("OpenGL", answer["ok"], detail, remedy)
+
+
+def _peer(name: str, commands: Sequence[str], package: str) -> Finding:
+    found = next((path for path in map(shutil.which, commands) if path), None)
+    return Finding(name, found is not None, found or "not found", f"apt install {package} (only for bench)")
+
+
+def examine() -> list[Finding]:
+    """Look at everything. Takes a few seconds: Taichi and OpenGL are tried in processes of their own."""
+    with ThreadPoolExecutor(max_workers=2) as pool:
+        opengl = pool.submit(probe, "opengl")
+        backends = {arch: pool.submit(probe, "taichi", arch) for arch in ("cpu", "cuda", "vulkan")}
+        taichi = [_taichi(arch, answer.result()) for arch, answer in backends.items()]
+        return [
+            Finding("hedgebed", True, __version__),
+            _python(),
+            *taichi,
+            _threads(),
+            _memory(),
+            _cache(),
+            _opengl(opengl.result()),
+            _peer("LIGGGHTS", ["liggghts"], "liggghts"),
+            _peer("LAMMPS", ["lmp", "lammps"], "lammps"),
+            _peer("MPI", ["mpirun"], "openmpi-bin"),
+        ]
+
+
+def show(findings: Sequence[Finding], *, as_json: bool = False) -> None:
+    """Print the findings on stdout: a table, or JSON."""
+    if as_json:
+        ok = all(finding.ok for finding in findings if finding.required)
+        print(
+            json.dumps({"format": "hedgebed-doctor/1", "ok": ok, "findings": [asdict(f) for f in findings]}, indent=2)
+        )
+        return
+    table = Table(box=None, pad_edge=False, show_header=False)
+    for finding in findings:
+        word = "ok" if finding.ok else "MISSING" if finding.required else "no"
+        table.add_row(word, finding.name, finding.detail if finding.ok else f"{finding.detail}: {finding.remedy}")
+    Console(highlight=False, markup=False).print(table)

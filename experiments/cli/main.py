@@ -1,0 +1,345 @@
+"""The command line: ``hedgebed <experiment> [case.toml] [--option value ...] [--out DIR]``.
+
+The options of an experiment are made from its settings class: same names (with hyphens), types, defaults and units.
+Exit status: 0 done, 1 failed (state saved, reason said), 2 bad input, 3 stopped (``hedgebed resume DIR`` finishes it).
+Results go to stdout, everything else to stderr.
+"""
+
+import inspect
+import os
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_origin
+
+from cyclopts import App, CycloptsError, Parameter
+from pydantic import BaseModel
+
+from experiments.cli.options import as_typed, option_of, reserved_option
+from experiments.cli.runs import BAD_INPUT, DONE, FAILED, STOPPED, carry_out, redraw_old_report, show_folder
+from experiments.runs import registry
+from experiments.runs.folder import RunFolder, fresh_path, write_json
+from experiments.runs.progress import Progress, make_progress
+from experiments.runs.reading import Layer, find_case, option, read_case, settings_from
+from experiments.runs.registry import Experiment, find_experiment
+from experiments.runs.streams import (
+    RefusedError,
+    fault_words,
+    is_number,
+    refusing,
+    say,
+    stdout_to_stderr,
+    terminate_like_ctrl_c,
+)
+from experiments.runs.version import __version__
+
+__all__ = ["BAD_INPUT", "DONE", "FAILED", "STOPPED", "build_app", "main"]
+
+
+def main(tokens: Sequence[str] | None = None) -> int:
+    """Run the command line on `tokens` (``sys.argv[1:]`` by default) and return the exit status."""
+    # Taichi greets on stdout and has a new version looked for: neither belongs here.
+    os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
+    os.environ.setdefault("TI_LOG_LEVEL", "error")
+    os.environ.setdefault("TI_SKIP_VERSION_CHECK", "1")
+    try:
+        with terminate_like_ctrl_c():
+            tokens = sys.argv[1:] if tokens is None else list(tokens)
+            return build_app()(tokens, exit_on_error=False, print_error=False) or DONE
+    except (CycloptsError, ValueError) as error:
+        if not isinstance(error, CycloptsError | RefusedError):
+            traceback.print_exc()
+            return FAILED
+        say(fault_words(error))
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        say("stopped")
+        return STOPPED
+    except BrokenPipeError:  # the reader of stdout has gone, as `| head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DONE
+
+
+def _experiment_command(experiment: Experiment) -> Callable[..., int]:
+    """The function behind ``hedgebed <experiment>``, with one parameter per setting.
+
+    Only what was typed arrives in `given`, so that a case file can lie between the defaults and the command line.
+    """
+    settings_class = experiment.settings_class()
+    presets = experiment.presets
+
+    pair = bool(experiment.subject) and get_origin(settings_class.model_fields[experiment.subject].annotation) is tuple
+
+    def command(
+        case: Path | None = None,
+        other: Path | None = None,
+        *,
+        out: Path | None = None,
+        json: bool = False,
+        quiet: bool = False,
+        verbose: bool = False,
+        **given: Any,
+    ) -> int:
+        with refusing():
+            if pair and case is not None and other is not None:
+                case, given[experiment.subject] = None, (str(case), str(other))
+            elif experiment.subject and case is not None and (not case.is_file() or case.suffix == ".npz"):
+                case, given[experiment.subject] = None, str(case)
+            if case is not None and is_number(str(case)):
+                raise ValueError(_stray(str(case), settings_class))
+            layers = [read_case(registry.CASES / preset.case) for preset in presets if given.pop(preset.option, False)]
+            layers += [read_case(find_case(case, registry.CASES))] if case is not None else []
+            typed = Layer(None, as_typed(given, settings_class.model_fields))
+            settings = settings_from(settings_class, [*layers, typed])
+            with stdout_to_stderr():
+                experiment.check(settings)
+                code = experiment.code()
+            folder = RunFolder.create(out or fresh_path(experiment.name), experiment.name, settings, code=code)
+
+        def work(progress: Progress) -> dict[str, Any]:
+            return experiment.run(settings, folder.path, progress=progress)
+
+        return carry_out(folder, work, as_json=json, quiet=quiet, verbose=verbose)
+
+    flags = [
+        inspect.Parameter(
+            preset.option,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=False,
+            annotation=Annotated[bool, Parameter(help=preset.summary, negative="", show_default=False)],
+        )
+        for preset in presets
+    ]
+    fields = settings_class.model_fields
+    first = reserved_option("case")
+    if experiment.subject:
+        about = Parameter(help=fields[experiment.subject].description, negative="", show_default=False)
+        first = first.replace(name=experiment.subject, annotation=Annotated[Path | None, about])
+    parameters = [first]
+    if pair:
+        about = Parameter(help="The other of the two.", negative="", show_default=False)
+        parameters.append(first.replace(name="other", annotation=Annotated[Path | None, about]))
+    parameters += [option_of(name, field) for name, field in fields.items() if name != experiment.subject]
+    parameters += [*flags, *map(reserved_option, ("out", "json", "quiet"))]
+    parameters += [reserved_option("verbose")] if experiment.headline else []
+    command.__signature__ = inspect.Signature(parameters, return_annotation=int)  # type: ignore[attr-defined]
+    command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    command.__name__ = experiment.name.replace(" ", "_")
+    return command
+
+
+def _stray(word: str, settings_class: type[BaseModel]) -> str:
+    """What to do about a number that belongs to no option, as the second of ``--mu-s 0.4 0.5``."""
+    several = "; to try several values, --sweep KEY=FROM:TO:STEP" if "sweep" in settings_class.model_fields else ""
+    return f"{word} belongs to no option: an option that describes one number takes one{several}"
+
+
+# Commands ------------------------------------------------------------------------------------------------------------
+
+
+_Json = Annotated[bool, Parameter(help="Print the result as JSON on stdout and nothing else.", negative="")]
+_Quiet = Annotated[bool, Parameter(help="Show no progress.", negative="")]
+_Verbose = Annotated[bool, Parameter(help="Print every number and finding, as the report has them.", negative="")]
+
+
+def _resume(
+    folder: Annotated[Path, Parameter(help="The folder of a run that was stopped, failed or killed.")],
+    /,
+    *,
+    json: _Json = False,
+    quiet: _Quiet = False,
+    verbose: _Verbose = False,
+) -> int:
+    """Finish a run that was stopped, failed or killed, from its last checkpoint."""
+    with refusing():
+        run = RunFolder.open(folder)
+        experiment = find_experiment(run.command)
+        kept = run.status is None and (folder / "result.json").exists()  # as docs/results has them: not to be written
+        if not kept:
+            settings_from(experiment.settings_class(), [Layer(str(folder / "run.toml"), run.settings)])
+            with run.lock():
+                pass
+    if kept or (run.status == "done" and (folder / "result.json").exists()):
+        say(f"the run in {folder} is done")
+        redraw_old_report(run, quiet=quiet)
+        return show_folder(run, as_json=json, verbose=verbose)
+    if run.version != __version__:
+        say(f"warning: the run was begun by version {run.version}, this is {__version__}")
+
+    def work(progress: Progress) -> dict[str, Any]:
+        return experiment.resume(run.path, progress=progress)
+
+    return carry_out(run, work, as_json=json, quiet=quiet, verbose=verbose)
+
+
+def _bench(
+    what: Annotated[str, Parameter(help="What to measure: the name of a module in benchmarks/.")] = "bed",
+    /,
+    *,
+    out: Annotated[Path | None, Parameter(help="Folder for bench.json; runs/bench-<time> if not given.")] = None,
+    json: _Json = False,
+    quiet: _Quiet = False,
+    **options: Annotated[str, Parameter(help="What else this benchmark takes: docs say it.")],
+) -> int:
+    """Measure how fast or how good it is, beside others where they are installed (from a checkout)."""
+    from experiments.cli.benching import benchmark_options, goes_on, load_benchmark
+
+    with refusing():
+        run = load_benchmark(what)
+        settings = benchmark_options(run, options)
+        out = out or fresh_path("bench")
+        if out.exists() and (not out.is_dir() or (any(out.iterdir()) and not goes_on(run, out))):
+            raise ValueError(f"out = {str(out)!r} is in use: name a folder that is empty or does not exist yet")
+        out.mkdir(parents=True, exist_ok=True)
+    with stdout_to_stderr():
+        try:
+            with make_progress(quiet=quiet) as progress:
+                result = run(out, progress=progress, **settings)
+        except RuntimeError as error:
+            say(f"failed: {error}")
+            return FAILED
+        except ValueError as error:  # a setting that cannot be, in an option or in the environment
+            say(str(error))
+            return BAD_INPUT
+        write_json(out / "bench.json", result)
+    if json:
+        print((out / "bench.json").read_text(encoding="utf-8"), end="")
+    else:
+        print(f"bench: {out / 'bench.json'}")
+    return DONE
+
+
+def _campaign_new(
+    folder: Annotated[Path, Parameter(help="Where to write it; must be new or empty.")],
+    /,
+    *,
+    kind: Annotated[Literal["tumble", "penetration"], Parameter(help="What kind of trials.", show_default=False)],
+) -> int:
+    """Write an annotated template: campaign.toml with every key explained, and short recordings to be replaced."""
+    from experiments.campaign.templates import new_campaign
+
+    with refusing():
+        new_campaign(folder, kind=kind)
+    print(f"campaign: {folder / 'campaign.toml'}")
+    say(f"fill it in, then `hedgebed campaign check {folder}`")
+    return DONE
+
+
+def _campaign_from_run() -> Callable[..., int]:
+    """The function behind ``hedgebed campaign from-run``, with one parameter per setting of the sensors."""
+    from experiments.penetrate.recorded import SpikeSensors, write_run_campaign
+    from experiments.tumble.recorded import TumbleRecording, write_tumbles_campaign
+
+    of_spikes, of_tumbles = SpikeSensors.model_fields, TumbleRecording.model_fields
+    fields = of_spikes | of_tumbles
+
+    def command(run: Path, folder: Path, **given: Any) -> int:
+        with refusing():
+            kind = RunFolder.open(run).command
+            tumbled = kind == "tumble"
+            if kind not in ("tumble", "penetrate"):
+                raise ValueError(
+                    f"{str(run)!r} is a run of {kind!r}: one of 'penetrate', or of 'tumble' in the plane, was "
+                    f"expected; campaigns and `hedgebed diagnose` know no others"
+                )
+            stray = sorted(set(given) & (set(of_spikes) - {"seed"} if tumbled else set(of_tumbles)))
+            if stray:
+                of_what = "a tumble" if tumbled else "a spike"
+                raise ValueError(f"{option(stray[0])} is given, and {str(run)!r} is a run of {of_what}: without it")
+            typed = as_typed(given, fields)
+            if tumbled:
+                own = Layer(None, {name: value for name, value in typed.items() if name in of_tumbles})
+                recording = settings_from(TumbleRecording, [own])
+                assert isinstance(recording, TumbleRecording)
+                seed = settings_from(SpikeSensors, [Layer(None, {k: v for k, v in typed.items() if k == "seed"})])
+                assert isinstance(seed, SpikeSensors)
+                campaign = write_tumbles_campaign(run, folder, recording=recording, seed=seed.seed)
+            else:
+                sensors = settings_from(SpikeSensors, [Layer(None, typed)])
+                assert isinstance(sensors, SpikeSensors)
+                campaign = write_run_campaign(run, folder, sensors=sensors)
+        print(f"campaign: {folder / 'campaign.toml'}")
+        say(f"{len(campaign.tables.trial)} trials; `hedgebed diagnose {folder}` says what the spring-damper lacks")
+        return DONE
+
+    places = {
+        "run": "Folder of a finished run of penetrate, or of tumble.",
+        "folder": "Where to write it; must be new or empty.",
+    }
+    parameters = [
+        inspect.Parameter(
+            name, inspect.Parameter.POSITIONAL_ONLY, annotation=Annotated[Path, Parameter(help=text, negative="")]
+        )
+        for name, text in places.items()
+    ] + [option_of(name, field) for name, field in fields.items()]
+    command.__signature__ = inspect.Signature(parameters, return_annotation=int)  # type: ignore[attr-defined]
+    command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    return command
+
+
+def _effects(
+    names: Annotated[
+        tuple[str, ...], Parameter(help="Only these; with all their parameters, source and limits.", negative="")
+    ] = (),
+    /,
+) -> int:
+    """List the terms beyond the base model, as `tumble` and `campaign` take them with --effects."""
+    from experiments.cli.effects import show_effects
+
+    with refusing():
+        show_effects(names)
+    return DONE
+
+
+def _doctor(*, json: _Json = False) -> int:
+    """Say what this machine has and what to install where something lacks."""
+    from experiments.cli.doctor import examine, show
+
+    findings = examine()
+    show(findings, as_json=json)
+    return DONE if all(finding.ok for finding in findings if finding.required) else FAILED
+
+
+def build_app() -> App:
+    """The command line as a cyclopts App; a command returns its exit status."""
+    app = App(
+        name="hedgebed",
+        help="Robots that hop and tumble on asteroids: their spikes in beds of grains, the spring-damper that stands "
+        "in for those, the platform's tumbles and hops, and what measured trials lack. SI units throughout.",
+        help_format="plaintext",
+        version=__version__,
+        result_action="return_value",
+    )
+    if "bed make" in registry.EXPERIMENTS:
+        from experiments.cli.bed_commands import add_bed_commands
+
+        app.command(App(name="bed", help="Beds prepared as in a laboratory: made, listed, shown, shared, refined."))
+        add_bed_commands(app["bed"])
+        app["bed"].command(App(name="test", help="Tests as a laboratory makes them of a bed."))
+    for experiment in registry.EXPERIMENTS.values():
+        *above, name = experiment.name.split(" ")
+        home = app
+        for word in above:
+            home = home[word]
+        home.command(_experiment_command(experiment), name=name, help=experiment.summary)
+    if "campaign" in registry.EXPERIMENTS:
+        app["campaign"].command(_campaign_new, name="new")
+        app["campaign"].command(
+            _campaign_from_run(),
+            name="from-run",
+            help="Write finished runs of penetrate, or of tumble, as a campaign of trials.",
+        )
+    app.command(_resume, name="resume")
+    if "tumble" in registry.EXPERIMENTS:
+        from experiments.cli.render import render
+
+        app.command(render, name="render")
+        from experiments.suite.commands import add_suite_commands
+
+        app.command(App(name="experiments", help="The platform on grains: the cases that ship, and doing them."))
+        add_suite_commands(app["experiments"])
+    app.command(_bench, name="bench")
+    app.command(_effects, name="effects")
+    app.command(_doctor, name="doctor")
+    return app

@@ -1,0 +1,90 @@
+"""Options of the command line, made from the fields of a settings class."""
+
+import inspect
+from collections.abc import Callable
+from pathlib import Path
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from cyclopts import Parameter
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from experiments.runs.strict import may_be_empty, plain_kinds
+
+__all__ = ["as_typed", "option_of", "reserved_option"]
+
+_RESERVED = {
+    "case": (Path | None, None, "A TOML file of settings, or the name of a case that ships; options win over it."),
+    "out": (Path | None, None, "The run's folder; runs/<command>-<time> if not given."),
+    "json": (bool, False, "Print result.json on stdout and nothing else."),
+    "quiet": (bool, False, "Show no progress."),
+    "verbose": (bool, False, "Print every number and finding in the end, as the report has them."),
+}
+
+
+def _shown(value: Any) -> str:
+    """A default, as one would type it."""
+    if isinstance(value, list | tuple):
+        return " ".join(map(str, value)) or "none"
+    return str(value)
+
+
+def _bare(hint: Any) -> Any:
+    """`hint` without its bounds: pydantic checks these, and its faults become sentences in
+    `experiments.runs.reading`."""
+    origin, inside = get_origin(hint), get_args(hint)
+    if origin is Annotated:
+        return _bare(inside[0])
+    if hint is int:  # cyclopts would round 1.5 to 2; `as_typed` makes whole numbers of it again
+        return Annotated[float, Parameter(metavar="INT")]
+    if not inside or origin is Literal:
+        return hint
+    if origin in (Union, UnionType):
+        return Union[tuple(_bare(item) for item in inside)]
+    return origin[tuple(_bare(item) for item in inside)]
+
+
+def as_typed(given: dict[str, Any], fields: dict[str, FieldInfo]) -> dict[str, Any]:
+    """The values as the settings class takes them: a float that is whole is an int, a list of ``none`` is empty."""
+
+    def whole(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return tuple(whole(item) for item in value)
+        return int(value) if isinstance(value, float) and value.is_integer() else value
+
+    found = {}
+    for name, value in given.items():
+        field = fields.get(name)
+        if field is not None:
+            value = () if may_be_empty(field) and value == (None,) else value
+            kinds = plain_kinds(field.annotation)
+            value = whole(value) if int in kinds and float not in kinds else value
+        found[name] = value
+    return found
+
+
+def option_of(name: str, field: FieldInfo) -> inspect.Parameter:
+    """The command-line parameter of one setting."""
+    if name in _RESERVED:
+        raise TypeError(f"a setting cannot be called {name!r}: the command line has that already")
+    default = None if field.is_required() else field.get_default(call_default_factory=True)
+    shown: bool | Callable[[Any], str] = False if default is None or default is PydanticUndefined else _shown
+    is_flag = field.annotation is bool
+    hint = _bare(field.annotation)
+    if may_be_empty(field):
+        hint = tuple[get_args(hint)[0] | None, ...]  # type: ignore[misc]
+    more = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+    annotation = Annotated[
+        hint,  # type: ignore[valid-type]
+        Parameter(help=field.description, show_default=shown, consume_multiple=True, negative=None if is_flag else "",
+                  alias=str(more["option_alias"]) if "option_alias" in more else None),
+    ]  # fmt: skip
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+
+
+def reserved_option(name: str) -> inspect.Parameter:
+    hint, default, text = _RESERVED[name]
+    kind = inspect.Parameter.POSITIONAL_ONLY if name == "case" else inspect.Parameter.KEYWORD_ONLY
+    annotation = Annotated[hint, Parameter(help=text, negative="", show_default=False)]  # type: ignore[valid-type]
+    return inspect.Parameter(name, kind, default=default, annotation=annotation)

@@ -1,0 +1,75 @@
+"""`hedgebed render RUN`: the pictures of a finished run once more, off screen, from what its folder holds."""
+
+from __future__ import annotations
+
+import json as json_module
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from experiments.runs.folder import RunFolder
+from experiments.runs.kept_results import drawn_from, require_files, require_whole
+from experiments.runs.progress import make_progress
+from experiments.runs.streams import refusing, say, stdout_to_stderr
+
+__all__ = ["render"]
+
+
+def render(
+    run: Annotated[Path, Parameter(help="The folder of a finished run.")],
+    /,
+    *,
+    colour: Annotated[
+        Literal["displacement", "speed", "force", "coordination"],
+        Parameter(help="What grains are coloured by, of a tumble.", negative=""),
+    ] = "displacement",
+    film: Annotated[bool, Parameter(help="Whether to make the film of a tumble too.")] = True,
+    json: Annotated[bool, Parameter(help="Print the files that were drawn as JSON on stdout.", negative="")] = False,
+    quiet: Annotated[bool, Parameter(help="Show no progress.", negative="")] = False,
+) -> int:
+    """Draw the stills and the film of a run again, and its report: a tumble's from a camera that follows it."""
+    with refusing():
+        folder = RunFolder.open(run)
+        if not (run / "result.json").exists():
+            raise ValueError(
+                f"run = {str(run)!r} has no result yet: `hedgebed resume {run}` finishes it where it can be"
+            )
+        if folder.command in ("tumble", "tumble spatial"):
+            require_files(folder, drawn_from(folder), key="run")
+        else:
+            require_whole(folder, key="run")
+        with folder.lock():
+            pass
+    begun = _now(folder)
+    with folder.lock(), stdout_to_stderr(), make_progress(quiet=quiet) as progress:
+        progress.stage("pictures", total=1.0)
+        if folder.command == "tumble":
+            from vis.tumble.report import write_tumble_report
+
+            report = write_tumble_report(run, pictures=True, colour=colour, film=film, progress=progress.update)
+        elif folder.command == "tumble spatial":
+            from vis.spatial.report import write_spatial_report
+
+            report = write_spatial_report(run, colour=colour, film=film, progress=progress.update)
+        else:
+            if colour != "displacement" or not film:
+                say(f"colour and film are for runs of tumble; this one is of {folder.command}")
+            from vis.report import write_report
+
+            report = write_report(run, progress=progress.update)
+    drawn = sorted(path for path in [*run.glob("figures/*.png"), *run.glob("*.gif")] if path.stat().st_mtime >= begun)
+    if json:
+        print(json_module.dumps({"report": str(report), "pictures": [str(path) for path in drawn]}, indent=2))
+    else:
+        for path in drawn:
+            print(path)
+        print(f"report: {report}")
+    return 0
+
+
+def _now(folder: RunFolder) -> float:
+    """The time [s] by the clock of the folder's file system: what is drawn from here on is not older."""
+    lock = folder.path / "lock"
+    lock.touch()
+    return lock.stat().st_mtime

@@ -1,0 +1,205 @@
+"""Carrying a run out from the command line: its status, its exit status, and the numbers that are shown in the end."""
+
+import math
+import shutil
+import sys
+import textwrap
+import traceback
+from collections.abc import Callable
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from experiments.runs import registry
+from experiments.runs.folder import RunFolder, write_text
+from experiments.runs.headline import Headline
+from experiments.runs.kernel_cache import free_kernel_cache
+from experiments.runs.progress import Progress, make_progress
+from experiments.runs.streams import RefusedError, say, stdout_to_stderr
+from vis.page.numbers import digits_for
+
+__all__ = ["BAD_INPUT", "DONE", "FAILED", "STOPPED", "carry_out", "redraw_old_report", "show_folder"]
+
+DONE, FAILED, BAD_INPUT, STOPPED = 0, 1, 2, 3
+"""Exit statuses of the command line."""
+
+
+def carry_out(
+    folder: RunFolder,
+    work: Callable[[Progress], dict[str, Any]],
+    *,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool = False,
+) -> int:
+    """Do the `work` of a run whose folder is there; keep its status; show what came out."""
+    say(f"run folder {folder.path}")
+    fresh = not folder.has_work
+    free_kernel_cache()
+    with stdout_to_stderr():
+        try:
+            with folder.lock():
+                folder.set_status("running")
+                try:
+                    with make_progress(quiet=quiet) as progress:
+                        result = work(progress)
+                except KeyboardInterrupt:
+                    folder.set_status("stopped", "interrupted")
+                    raise
+                except BaseException as error:
+                    folder.set_status("failed", f"{type(error).__name__}: {error}")
+                    raise
+                if not (folder.path / "result.json").exists():
+                    folder.write_result(result)
+                folder.set_status("done")
+        except KeyboardInterrupt:
+            say(f"stopped; `hedgebed resume {folder.path}` finishes it")
+            return STOPPED
+        except RuntimeError as error:
+            say(f"failed: {error}")
+            say(f"what was finished is kept in {folder.path}; the same settings would fail the same way again")
+            return FAILED
+        except ValueError as error:
+            if fresh and not folder.has_work:  # refused before any work: leave nothing behind
+                _discard(folder)
+                raise RefusedError(str(error)) from error
+            write_text(folder.path / "traceback.txt", traceback.format_exc())
+            say(f"failed: {error}")
+            say(f"what was finished is kept in {folder.path}, and where it failed in traceback.txt there")
+            return FAILED
+        except Exception:
+            traceback.print_exc()
+            say(f"failed; what there was is in {folder.path}")
+            return FAILED
+    return show_folder(folder, as_json=as_json, verbose=verbose)
+
+
+def redraw_old_report(folder: RunFolder, *, quiet: bool) -> None:
+    """Make the report anew where it is older than the result that it is of."""
+    result, report = folder.path / "result.json", folder.path / "report.html"
+    if not report.exists() or report.stat().st_mtime_ns >= result.stat().st_mtime_ns:
+        return
+    from experiments.runs.reporting import write_report
+
+    say("its report is older than result.json and is made anew")
+    with folder.lock(), stdout_to_stderr(), make_progress(quiet=quiet) as progress:
+        progress.stage("report", total=1.0)
+        write_report(folder.path, progress)
+
+
+def show_folder(folder: RunFolder, *, as_json: bool, verbose: bool = False) -> int:
+    """Show the result of a finished run on stdout, as JSON or as a table; return the exit status.
+
+    The table is short where the experiment has a short one, unless `verbose`.
+    """
+    if as_json:
+        print((folder.path / "result.json").read_text(encoding="utf-8"), end="")
+    else:
+        _show_result(folder, verbose=verbose)
+    return DONE
+
+
+def _discard(folder: RunFolder) -> None:
+    """Remove a folder that holds nothing but what `RunFolder.create` has written."""
+    ours = {"run.toml", "status.json", "lock"}
+    if {item.name for item in folder.path.iterdir()} <= ours:
+        shutil.rmtree(folder.path)
+
+
+def _number(value: Any, std: Any = 0.0) -> str:
+    """A value to the digits its spread allows, to two where that is unknown (None), to four where it is exact."""
+    if not isinstance(value, float) or not math.isfinite(value):
+        return "-" if value is None else str(value)
+    if std is None:
+        whole = value.is_integer() and abs(value) < 1e15
+        return f"{value:.0f}" if whole else f"{value:.2g}" if abs(value) < 100 or abs(value) >= 1e6 else f"{value:.0f}"
+    if not std or not math.isfinite(std):
+        return f"{value:.4g}"
+    decimals = digits_for(std)
+    return f"{value:.{max(decimals, 0)}f}" if decimals <= 9 else f"{value:.4g}"
+
+
+_NARROW = 24
+"""Characters of a first column that is not broken into lines."""
+
+
+def _spread(quantity: Any) -> bool:
+    """Whether several runs tell how much a quantity varies: 0 stands for what is exact, or was computed once."""
+    std = quantity.get("std")
+    return isinstance(std, float) and math.isfinite(std) and std > 0
+
+
+def _unit(unit: str, value: Any) -> str:
+    """The unit; beside an angle in radians the same in degrees."""
+    if unit == "rad" and isinstance(value, int | float) and math.isfinite(value):
+        return f"rad   {math.degrees(value):.4g} degrees"
+    return "" if unit == "1" or value is None else unit
+
+
+def _show_result(folder: RunFolder, *, verbose: bool) -> None:
+    """The numbers of result.json in a table on stdout, findings and warnings, and where the report is."""
+    result = folder.read_result()
+    console = Console(file=sys.stdout, highlight=False)
+    console.print(result.get("title", ""), markup=False, style="italic")
+    experiment = registry.EXPERIMENTS.get(folder.command)
+    headline = experiment.headline_of(result) if experiment is not None and not verbose else None
+    if headline is not None:
+        _show_headline(headline, console)
+    else:
+        _show_all(result, console)
+    report = folder.path / "report.html"
+    if headline is not None and headline.left:
+        rest = "in the report, or with" if report.exists() else "with"
+        print(f"{headline.left} more findings and all numbers: {rest} `hedgebed resume {folder.path} --verbose`")
+    print(f"{'report' if report.exists() else 'folder'}: {report if report.exists() else folder.path}")
+
+
+def _show_headline(headline: Headline, console: Console) -> None:
+    """A short table, what to be warned of, and the findings that matter most."""
+    table = Table(box=None, pad_edge=False)
+    for place, name in enumerate(headline.head):
+        table.add_column(name, justify="left" if place == 0 else "right", no_wrap=place > 0)
+    for row in headline.rows:
+        table.add_row(*map(Text, row))
+    console.print(table, markup=False)
+    for mark, texts in (("warning: ", headline.warnings), ("- ", headline.sentences)):
+        for text in texts:
+            folded = textwrap.wrap(text, console.width, initial_indent=mark, subsequent_indent=" " * len(mark))
+            print("\n".join(folded))
+
+
+def _show_all(result: dict[str, Any], console: Console) -> None:
+    """What it comes to, every quantity, the tables, findings and warnings."""
+    for sentence in result.get("summary", []):
+        console.print(f"- {sentence}", markup=False)
+    table = Table(box=None, pad_edge=False)
+    table.add_column("quantity")
+    table.add_column("value", justify="right")
+    quantities = result.get("quantities", {})
+    spreads = any(_spread(quantity) for quantity in quantities.values())
+    if spreads:
+        fitted = result.get("experiment") == "diagnose"
+        table.add_column("standard error" if fitted else "spread (std)", justify="right")
+    table.add_column("unit")
+    for name, quantity in quantities.items():
+        value, std = quantity.get("value"), quantity.get("std")
+        cells = [_number(std, None) if std != 0 else "exact"] if spreads else []
+        table.add_row(name, _number(value, std), *cells, _unit(quantity.get("unit", ""), value))
+    if quantities:
+        console.print(table, markup=False)
+    for listed in result.get("tables", []):
+        if listed["title"]:
+            console.print(listed["title"], markup=False, style="italic")
+        shown = Table(box=None, pad_edge=False)
+        for place, heading in enumerate(listed["head"]):
+            narrow = all(len(str(row[place])) <= _NARROW for row in listed["rows"])
+            shown.add_column(heading, no_wrap=place == 0 and narrow)
+        for row in listed["rows"]:
+            shown.add_row(*(Text(str(cell)) for cell in row))
+        console.print(shown, markup=False)
+    for sentence in result.get("departures", {}).get("sentences", []):
+        console.print(f"- {sentence}", markup=False)
+    for warning in result.get("warnings", []):
+        console.print(f"warning: {warning}", markup=False)

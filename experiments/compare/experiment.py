@@ -1,0 +1,295 @@
+"""`hedgebed compare`: two finished runs in one report, their numbers with differences, what they did over time.
+
+Differences are the second less the first. Of tumbles, two in the plane or two in space, series/compared.csv holds both
+on one grid of time; what they stood on does not matter, nor does who stepped them. Where one lasts longer, numbers that
+go with that are compared over the time that both last; those of each whole run are beside. Of penetrations numbers are
+compared, and the drives both have.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from experiments.grains.settings import OF_THE_MASTER, GrainsSettings, TumbleBedSettings
+from experiments.runs.folder import RunFolder, read_json
+from experiments.runs.kept_results import PATH_AND_MOTION, require_files
+from experiments.runs.progress import Progress
+from experiments.runs.reporting import write_report
+from experiments.runs.types import Json
+from experiments.runs.version import __version__
+from experiments.runs.whole_runs import whole_run
+from experiments.spatial.settings import ON_ANY_GROUND
+
+from . import spatial as compare_spatial
+from . import tumbles as compare_tumbles
+from .common import TIMELESS, common_time, numbers_until, sinkage_of
+from .sentences import say
+from .settings import CompareSettings
+
+__all__ = ["check", "resume", "run"]
+
+IN_THE_PLANE, IN_SPACE = "tumble", "tumble spatial"
+KINDS = (IN_THE_PLANE, IN_SPACE, "penetrate")
+OF_A_BED: dict[str, tuple[type[GrainsSettings], tuple[str, ...]]] = {
+    IN_THE_PLANE: (TumbleBedSettings, OF_THE_MASTER), IN_SPACE: (GrainsSettings, ON_ANY_GROUND),
+}  # fmt: skip
+"""Settings that are of a bed of grains, and those among them that other grounds take too."""
+MOST_RELATIVE = 10.0
+"""Difference over the first run's number up to which it is stated as a share of it [1]."""
+
+
+def check(settings: CompareSettings) -> None:
+    """Raise ValueError, naming the folder and what would do, for runs that cannot be compared."""
+    first, second = (_finished(path) for path in settings.runs)
+    if first.path.resolve() == second.path.resolve():
+        raise ValueError(say("same_run", runs=settings.runs))
+    if {first.command, second.command} == {IN_THE_PLANE, IN_SPACE}:
+        raise ValueError(say("plane_and_space", runs=settings.runs, first=first, second=second))
+    if first.command != second.command:
+        raise ValueError(say("two_kinds", runs=settings.runs, first=first, second=second))
+    if first.command == IN_SPACE:  # an older folder lacks series: said before anything is written
+        for one in (first, second):
+            compare_spatial.read_moved(one.path, read_json(one.path / "result.json"))
+
+
+def _finished(path: str) -> RunFolder:
+    folder = RunFolder.open(Path(path))
+    if folder.command not in KINDS:
+        kinds = f"{', '.join(KINDS[:-1])} or {KINDS[-1]}"
+        raise ValueError(say("nothing_over_time", path=path, command=folder.command, kinds=kinds))
+    if not (folder.path / "result.json").exists():
+        raise ValueError(say("no_result", path=path, status=folder.status or "not finished"))
+    if folder.command == IN_THE_PLANE:
+        require_files(folder, PATH_AND_MOTION, key="runs")
+    return folder
+
+
+def _carry_out(settings: CompareSettings, folder: RunFolder, progress: Progress) -> Json:
+    with folder.lock():
+        first, second = (_finished(path) for path in settings.runs)
+        results = [read_json(one.path / "result.json") for one in (first, second)]
+        labels = _labels((first, second), results)
+        result: Json = {
+            "format": "hedgebed-result/1", "experiment": "compare", "version": __version__, "kind": first.command,
+            "title": f"{labels[0]} and {labels[1]}", "status": "done",
+            "runs": [
+                {"folder": os.path.relpath(one.path, folder.path), "label": label, "title": str(found.get("title", ""))}
+                for one, label, found in zip((first, second), labels, results, strict=True)
+            ],
+            "quantities": {}, "departures": {"sentences": []},
+            "compared": [], "compared_over": None, "differs": _differs(first, second, results),
+            "colour": settings.colour, "pictures": settings.pictures and first.command != "penetrate",
+            "warnings": _whose(labels, [one["warnings"] for one in results]),
+        }  # fmt: skip
+        if first.command != "penetrate":
+            progress.stage("series", total=1.0)
+            _add_motion(result, (first, second), results, labels, folder)
+        else:
+            result["compared"] = _compared(results)
+        result["tables"] = [
+            *_numbers(result, labels),
+            *([_row_sinkage(result["rows"], labels)] if result.get("rows") else []),
+            *([_differing(labels, result["differs"])] if result["differs"] else []),
+        ]
+        folder.write_result(result)
+        progress.stage("report", total=1.0)
+        write_report(folder.path, progress)
+    return result
+
+
+def _relative(first: float, second: float) -> float | None:
+    """The difference over the first; None of a first that is next to nothing, of which it says nothing."""
+    apart = abs(second - first)
+    return (second - first) / abs(first) if first and apart < MOST_RELATIVE * abs(first) else None
+
+
+def _whose(labels: Sequence[str], said: Sequence[Sequence[str]]) -> list[str]:
+    """What is said of each run, by its label; what is said of both stands once."""
+    both = [sentence for sentence in said[0] if sentence in said[1]]
+    alone = [
+        f"{label}: {sentence}"
+        for label, sentences in zip(labels, said, strict=True)
+        for sentence in sentences
+        if sentence not in both
+    ]
+    return [f"both: {sentence}" for sentence in both] + alone
+
+
+def _add_motion(
+    result: Json,
+    runs: tuple[RunFolder, RunFolder],
+    results: list[Json],
+    labels: tuple[str, str],
+    folder: RunFolder,
+) -> None:
+    """series/compared.csv, the gaps between both as quantities, and sentences."""
+    module: Any = compare_spatial if result["kind"] == IN_SPACE else compare_tumbles
+    moved = [module.read_moved(one.path, found) for one, found in zip(runs, results, strict=True)]
+    _compare_numbers(result, runs, results, moved)
+    columns = module.compared_columns(*moved)
+    folder.write_series("compared", columns)
+    result["series"] = "series/compared.csv"
+    if result["kind"] == IN_SPACE:
+        result["spikes"] = list(dict.fromkeys(spike for one in moved for spike in one.spikes))
+    else:
+        result["spike_count"] = min(one.count for one in moved)
+        result["rows"] = compare_tumbles.row_sinkage(columns, result["spike_count"])
+    result["weights"] = [one.weight for one in moved]
+    result["quantities"] = module.gaps(columns)
+    result["departures"]["sentences"] = module.told_apart(columns, labels, moved)
+    result["warnings"] += _whose(labels, [one.notes for one in moved])
+
+
+def _compare_numbers(result: Json, runs: tuple[RunFolder, RunFolder], results: list[Json], moved: list[Any]) -> None:
+    """`compared`, over the time that both last where one lasts longer, and how long that is: `compared_over` [s]."""
+    whole = [one["quantities"] for one in results]
+    if result["kind"] == IN_THE_PLANE:
+        whole = [sinkage_of(one) | own for one, own in zip(moved, whole, strict=True)]
+    named = [one | {"quantities": own} for one, own in zip(results, whole, strict=True)]
+    end = common_time(moved)
+    if end is None:
+        result["compared"] = _compared(named)
+        return
+    parts = [numbers_until(end, one, own, run.path) for one, own, run in zip(moved, named, runs, strict=True)]
+    result["compared_over"], result["lasts"] = end, [float(one.time[-1]) for one in moved]
+    result["compared"] = _compared(named, parts)
+
+
+def _labels(folders: tuple[RunFolder, RunFolder], results: list[Json]) -> tuple[str, str]:
+    """What to call the two: by their ground where that differs, else by their folders."""
+    words = [_ground(one) for one in results]
+    if words[0] == words[1]:
+        words = [one.path.name or str(one.path) for one in folders]
+    if words[0] == words[1]:
+        words = [str(one.path) for one in folders]
+    return words[0], words[1]
+
+
+def _ground(result: Mapping[str, Any]) -> str:
+    ground = str(result.get("ground", ""))
+    named = {"bed": f"bed of {result.get('surface', 'grains')}", "": "bed of grains"}.get(ground, ground)
+    return named if result.get("method") != "paper" else f"{named}, the paper's step"
+
+
+def _compared(results: list[Json], parts: list[dict[str, float | None]] | None = None) -> list[Json]:
+    """Every quantity of either, with the difference where both have a value.
+
+    `parts`: those that go with how long a run lasts, over the time that both last; they are compared in place of the
+    whole runs' own, which are kept as `first_whole` and `second_whole`.
+    """
+    first, second = (result.get("quantities", {}) for result in results)
+    rows = []
+    for name in dict.fromkeys([*first, *second]):
+        one, other = first.get(name, {}), second.get(name, {})
+        whole = [entry.get("value") for entry in (one, other)]
+        shared = parts is not None and any(name in part for part in parts)
+        values: list[Any] = [part.get(name) for part in parts] if parts is not None and shared else whole
+        both = all(isinstance(value, int | float) for value in values)
+        spreads = [entry.get("std") for entry in (one, other)]
+        row = {
+            "name": name, "unit": one.get("unit", other.get("unit", "")), "first": values[0], "second": values[1],
+            "difference": values[1] - values[0] if both else None,
+            "relative": _relative(*values) if both else None,
+            "first_std": spreads[0], "second_std": spreads[1],
+        }  # fmt: skip
+        if parts is not None:
+            over = "shared time" if shared or name in TIMELESS else "whole runs"
+            row |= {"over": over, "first_whole": whole[0], "second_whole": whole[1]}
+        rows.append(row)
+    return rows
+
+
+def _differs(first: RunFolder, second: RunFolder, results: list[Json]) -> list[Json]:
+    """Settings and numbers of the trial in which the two differ: key, both values as they are written."""
+    rows = []
+    for key in dict.fromkeys([*first.settings, *second.settings]):
+        one, other = _used(first, key, results[0]), _used(second, key, results[1])
+        if one != other and "" not in (one, other):
+            rows.append({"key": key, "first": _written(one), "second": _written(other), "unit": ""})
+    trials = [result.get("trial", {}) for result in results]
+    known = {row["key"] for row in rows}
+    for key in dict.fromkeys([*trials[0], *trials[1]]):
+        one, other = (trial.get(key, {}).get("value") for trial in trials)
+        if one != other and key not in known:
+            unit = trials[0].get(key, trials[1].get(key, {})).get("unit", "")
+            rows.append({"key": key, "first": _written(one), "second": _written(other), "unit": unit})
+    return rows
+
+
+def _used(folder: RunFolder, key: str, result: Mapping[str, Any]) -> Any:
+    """A setting as it took part in a run; "" where it is of the bed, and there was none."""
+    if folder.command == IN_THE_PLANE and key == "method":
+        return result["method"]
+    bed, others = OF_A_BED.get(folder.command, (None, ()))
+    if bed is not None and result["ground"] != "bed" and key in bed.model_fields and key not in others:
+        return ""
+    return folder.settings.get(key)
+
+
+def _written(value: Any) -> str:
+    if value is None:
+        return "not set"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _numbers(result: Json, labels: tuple[str, str]) -> list[Json]:
+    """For the terminal: one table, or those of the time that both last and of each run as a whole."""
+    rows, end = result["compared"], result["compared_over"]
+    less = f"{labels[1]} less {labels[0]}"
+    if end is None:
+        return [_table(f"Numbers of both, and {less}", labels, rows)]
+    lasts = " and ".join(f"{time:.4g}" for time in result["lasts"])
+    shared = [row for row in rows if row["over"] == "shared time"]
+    whole = [
+        row | {"first": row["first_whole"], "second": row["second_whole"]}
+        for row in rows
+        if (row["first_whole"], row["second_whole"]) != (row["first"], row["second"]) or row["over"] != "shared time"
+    ]
+    return [
+        _table(f"Numbers over the first {end:.4g} s, which both last, and {less}", labels, shared),
+        _table(f"Numbers of each run as a whole, over its own {lasts} s", labels, whole, differences=False),
+    ]
+
+
+def _row_sinkage(rows: list[Json], labels: tuple[str, str]) -> Json:
+    shown = [[str(row["row"]), *(f"{1e3 * row[key]:.3g}" for key in ("first", "second"))] for row in rows]
+    return {
+        "title": "Sinkage of each row of spikes while both last, deepest [mm]", "head": ["row", *labels], "rows": shown,
+    }  # fmt: skip
+
+
+def _table(title: str, labels: tuple[str, str], rows: list[Json], *, differences: bool = True) -> Json:
+    """For the terminal: angles in degrees."""
+    shown = []
+    for row in rows:
+        scale, unit = (
+            (180 / math.pi, "degrees") if row["unit"] == "rad" else (1.0, row["unit"] if row["unit"] != "1" else "")
+        )
+        numbers = [_number(row[key], scale, False) for key in ("first", "second")]
+        if differences:
+            relative = f"{100 * row['relative']:+.3g} %" if row["relative"] is not None else ""
+            numbers += [_number(row["difference"], scale, True), relative]
+        shown.append([row["name"], *numbers, unit])
+    return {
+        "title": title,
+        "head": ["quantity", *labels, *(["less", ""] if differences else []), "unit"],
+        "rows": shown,
+    }
+
+
+def _number(value: Any, scale: float, signed: bool) -> str:
+    if not isinstance(value, int | float) or not math.isfinite(value):
+        return "-"
+    return f"{scale * value:+.4g}" if signed and value else f"{scale * value:.4g}"
+
+
+def _differing(labels: tuple[str, str], rows: list[Json]) -> Json:
+    shown = [[row["key"], row["first"], row["second"], row["unit"]] for row in rows]
+    return {"title": "Settings and numbers that differ", "head": ["key", *labels, "unit"], "rows": shown}
+
+
+run, resume = whole_run("compare", CompareSettings, _carry_out, check=check)

@@ -1,0 +1,513 @@
+"""From a problem to a diagnosis: split, fit, gate, search, verdict. Knows nothing of what kind of trials these are."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from experiments.diagnose.fit.bounds import is_strained
+from experiments.diagnose.fit.evidence import Hypothesis, excess, held_out_fit, score, signature_matrix
+from experiments.diagnose.fit.fitting import Fit, Model, Whitener, by_beginnings, fit, settled
+from experiments.diagnose.fit.gate import Verdict, held_out_gate, open_gate
+from experiments.diagnose.fit.problem import Finding, Problem
+from experiments.diagnose.noise.astray import allowed
+from experiments.diagnose.noise.colour import Colour
+from experiments.diagnose.noise.jitter import Jitter
+from experiments.diagnose.noise.lone_beds import lone_finding
+from experiments.diagnose.noise.replicates import Scatter, exchanged, groups_of, odd_trials, split_trials, trends
+from experiments.diagnose.noise.unrest import Unrest
+
+from .deciding import explains_nothing, unscattered, verdict_of
+from .outcome import Diagnosis, Told
+from .own_ways import all_astray, held_out_ways, missed, own_ways
+from .renoised import (
+    calmed,
+    coloured,
+    colours_of,
+    differ,
+    doubted,
+    jittered,
+    leaves_much,
+    lone_scatter_of,
+    plain,
+    recoloured,
+    rescattered,
+    scatter_apart,
+    scatter_of,
+    unrest_of,
+    whitened_fit,
+)  # fmt: skip
+from .search import Choice, choose
+
+__all__ = ["diagnose"]
+
+Tell = Callable[[str, float], None]
+
+_DRAWS, _REFITS = 600, 400
+"""Made-up campaigns of a null, and of a thorough one, each of them refitted."""
+_MARGIN = 1.5
+"""Standard deviations beyond the gate that something without a name must reach: no effect speaks for it."""
+_MOST_LEFT = 2.5
+"""Chi-square a sample up to which a name is near enough to the motion for rows to be weighed by it."""
+_ON = 1.0
+"""Chi-square by which a fit must go on to be taken instead."""
+_OUT_OF_THE_WAY = 0.5
+"""Share of what the base model leaves from which on a name has not taken the motion out of the way."""
+
+
+def diagnose(
+    problem: Problem, *, thorough: bool = False, seed: int = 0, tell: Tell | None = None, gates: Path | None = None
+) -> Diagnosis:
+    """Diagnose a campaign. `tell(what, share done)` hears of progress; the same campaign gives the same answer.
+
+    `thorough`: nulls by full refits, which takes as long as it takes; they are kept in the folder `gates`, if given,
+    for the next campaign of the same design.
+    """
+    return _Course(problem, _Asked(thorough, seed, tell or (lambda what, done: None), gates)).run()
+
+
+@dataclass(frozen=True)
+class _Begun:
+    """What is known of a campaign before any trial is set aside or held out in another's place."""
+
+    base: Fit
+    jitters: tuple[Jitter, ...]
+    odd: list[Finding]
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """How a campaign is looked at."""
+
+    thorough: bool
+    seed: int
+    tell: Tell
+    gates: Path | None
+    aside: Sequence[Finding] = ()
+    """Fitted trials that are to take no part (`astray`)."""
+    looked_at: Sequence[str] = ()
+    """Trials that must not be held out, others are in their place: the base model explains all but these."""
+    restless: bool = False
+    """What replicates differ by each in its own way (`unrest`) counts as noise; asked only whether a name that stands
+    beside something unknown is there for certain."""
+    begun: _Begun | None = None
+    """What the same campaign's first fits have told."""
+    patient: bool = False
+    """Look for further names before a trial is asked whether it goes its own way."""
+
+
+class _Course:
+    """One way through: what is known so far, and the steps in their order."""
+
+    def __init__(self, problem: Problem, asked: _Asked) -> None:
+        self.problem, self.asked, self.tell = problem, asked, asked.tell
+        self.findings: list[Finding]
+        self.held_out: tuple[str, ...]
+        self.begun: _Begun
+        self.base: Fit
+        self.jitters: tuple[Jitter, ...]
+        self.colours: dict[str, Colour]
+        self.unrest = Unrest({})
+        self.model_std: Mapping[str, float] = {}
+        self.first: Verdict
+        """The gate on the base model."""
+        self.alone: Fit | None = None
+        """The base model's fit as its own weights have it."""
+
+    def run(self) -> Diagnosis:
+        """All steps; some findings begin the course anew."""
+        asked = self.asked
+        self._fit_base()
+        self._look_at_noise()
+        self._ask_gate()
+        if self.first.passed:
+            return self._nothing()
+        own = None
+        if not (asked.aside or asked.patient):
+            own = partial(all_astray, held_out=self.held_out, seed=asked.seed, recoloured=self._recoloured())
+        begun = self.base
+        choice = self._chosen(own_ways=own)
+        if self.base.objective < begun.objective - _ON and not choice.astray:
+            self.first = self._gate_of_base()  # what it left was a branch that the search has found
+            if self.first.passed:
+                return self._nothing()
+        if choice.astray:
+            self.tell("a trial goes its own way: once more without it", 0.0)
+            anew = self._again(aside=choice.astray, looked_at=asked.looked_at)
+            if self._stands(anew, choice.astray):
+                return anew
+            return self._again(looked_at=asked.looked_at, patient=True)
+        for step in (
+            self._reweighed, self._scattered, self._scattered_beside, self._scattered_alone, self._timed,
+            self._recoloured_choice, self._doubted,
+        ):  # fmt: skip
+            choice = step(choice)
+        if asked.thorough and choice.best.effects:
+            choice = replace(choice, left=self._thorough_gate(choice.best.fit))
+        strained, least = is_strained(self.base), choice.left.threshold + _MARGIN
+        if not choice.best.effects and not strained and choice.left.score < least:
+            return self._nothing(choice.left)
+        return self._decided(choice)
+
+    # The base model ---------------------------------------------------------------------------------------------------
+
+    def _fit_base(self) -> None:
+        """Split and fitted, trials at odds with their replicates, and those that are to take no part, aside."""
+        problem, asked = self.problem, self.asked
+        if hasattr(problem, "prepare"):
+            problem.prepare(self.tell)
+        self.tell("fitting the base model", 0.0)
+        self.findings = list(problem.findings)
+        fitted, self.held_out = split_trials(problem.trials)
+        if hasattr(problem, "shake"):
+            problem.shake({})
+        if hasattr(problem, "calm"):
+            problem.calm({})
+        begun = asked.begun
+        if begun is None or begun.jitters or not (asked.aside or asked.looked_at):  # or else all is fitted anew below
+            base, jitters = jittered(whitened_fit(Model(problem, Whitener.white(problem), fitted)), self.held_out)
+            odd = []
+            if any(len(ids) > 2 for ids in groups_of(problem.trials).values()) or not hasattr(problem, "follows"):
+                odd = odd_trials(whitened_fit(base.model.on([t.id for t in problem.trials])))
+            begun = _Begun(base, jitters, odd)
+        self.begun, self.jitters, base = begun, begun.jitters, begun.base
+        if begun.odd:
+            self.findings += begun.odd
+            at_odds = {finding.trial for finding in begun.odd}
+            fitted, self.held_out = split_trials([t for t in problem.trials if t.id not in at_odds])
+            base = whitened_fit(base.model.on(fitted))
+        if asked.looked_at:
+            fitted, self.held_out = exchanged(problem.trials, fitted, self.held_out, asked.looked_at)
+            base = whitened_fit(base.model.on(fitted))
+        if asked.aside:
+            self.findings += asked.aside
+            gone = {finding.trial for finding in asked.aside}
+            fitted = tuple(trial for trial in fitted if trial not in gone)
+            base = whitened_fit(base.model.on(fitted), beginnings=True)
+        self.base = base
+
+    def _look_at_noise(self) -> None:
+        """What replicates differ by, readings in doubt, and the noise's colour."""
+        scatter = scatter_of(self.base, self.held_out)
+        self.findings += trends(scatter, self.problem.trials)
+        self.model_std = scatter.model_std
+        base = rescattered(self.base, scatter) if scatter.parameters else self.base
+        if self.asked.restless:
+            self.unrest = unrest_of(base, self.held_out)
+        base = doubted(calmed(base, self.unrest), self.held_out)
+        self.colours = colours_of(base)
+        self.base = coloured(base, self.colours)
+
+    def _ask_gate(self) -> None:
+        """Whether the base model leaves anything; where it is rough and leaves little, once more from the beginnings: a
+        small effect may make up for a branch of the motion that its fit has missed."""
+        self.tell("is anything left?", 0.0)
+        self.first = self._gate_of_base()
+        if self.first.passed or not hasattr(self.problem, "follows") or leaves_much(self.base):
+            return
+        other = by_beginnings(self.base)
+        if other is not self.base:
+            self.base = other
+            self.first = self._gate_of_base()
+
+    def _gate_of_base(self) -> Verdict:
+        columns, _ = signature_matrix(self.base, self.problem.forms)
+        asked = self.asked
+        return open_gate(
+            self.base, signatures=columns, seed=asked.seed, refit=asked.thorough,
+            draws=_REFITS if asked.thorough else _DRAWS, folder=asked.gates,
+            tell=lambda done: self.tell("making the gate's null", done),
+        )[1]  # fmt: skip
+
+    # What is missing --------------------------------------------------------------------------------------------------
+
+    def _recoloured(self) -> Callable[[Fit], Fit]:
+        return partial(recoloured, colours=self.colours)
+
+    def _chosen(self, **more: Any) -> Choice:
+        """A search from the base model, which may find a better fit of that, too."""
+        choice = choose(self.base, tell=self.tell, seed=self.asked.seed, recoloured=self._recoloured(), **more)
+        if not choice.astray:
+            self.base = choice.base.fit
+        return choice
+
+    def _reweighed(self, choice: Choice) -> Choice:
+        """With rows weighed as the best model has it: what the error of a path does to a force goes with the model, and
+        one that lacks something plain bends its numbers."""
+        best = choice.best
+        if self.asked.restless or not (best.effects and getattr(self.problem, "by_path", False)):
+            return choice
+        loud = best.fit.chi_square > _MOST_LEFT * best.fit.count
+        if loud or excess(best.fit) >= _OUT_OF_THE_WAY * excess(self.base):
+            return choice
+        self.alone = fit(replace(self.base.model, scatter=()), unscattered(self.base))
+        self.problem.rewhiten(best.fit.values, best.fit.model.forms)
+        self.base = fit(self.base.model, self.base.values)
+        found = fit(best.fit.model, best.fit.values)
+        choice = self._moved(choice, found)
+        if not choice.left.passed and (other := self._recoloured()(found)) is not found:
+            choice = replace(choice, left=open_gate(other, seed=self.asked.seed)[1])
+        if choice.left.passed and len(best.effects) == 1 and not choice.alternatives:
+            return choice
+        self.tell("rows are weighed otherwise beside what was found: choosing again", 0.0)
+        return self._chosen()
+
+    def _scattered(self, choice: Choice) -> Choice:
+        """With the motion out of the way replicates are compared once more."""
+        best = choice.best
+        if not best.effects or excess(best.fit) >= _OUT_OF_THE_WAY * excess(self.base):
+            return choice
+        scatter = scatter_of(best.fit, self.held_out)
+        wandering = unrest_of(best.fit, self.held_out) if self.asked.restless else self.unrest
+        if set(scatter.model_std) == set(self.model_std) and not wandering.other_than(self.unrest):
+            return choice
+        self.tell("replicates are found to differ otherwise: choosing again", 0.0)
+        self.model_std, self.unrest = scatter.model_std, wandering
+        self.base = coloured(calmed(rescattered(self.base, scatter), wandering), self.colours)
+        return self._chosen()
+
+    def _scattered_beside(self, choice: Choice) -> Choice:
+        """Where something is left, replicates are compared by what each has of its own."""
+        if not self._compares(choice):
+            return choice
+        fits, named = (choice.best.fit, choice.base.fit), choice.left.passed
+        for kinds, beside in itertools.product(("", "zero_scatter", "force_scatter"), fits[1:] if named else fits):
+            if choice.left.passed and not named:
+                break
+            scatter = scatter_apart(beside, self.held_out, kinds=kinds)
+            if not scatter.parameters or set(scatter.model_std) == set(self.model_std):
+                continue
+            if named:
+                if other := self._without_name(scatter, choice):
+                    return other
+                continue
+            self.tell("replicates are found to differ beside what is left: choosing again", 0.0)
+            stands = _explains if kinds == "force_scatter" else partial(_leaves_less, than=choice)
+            choice = self._chosen_with(scatter, stands) or choice
+        return choice
+
+    def _scattered_alone(self, choice: Choice) -> Choice:
+        """Where no trial repeats another, and something is left: whether beds, or zeros, differ without going with
+        anything."""
+        if not self._compares(choice):
+            return choice
+        found: list[tuple[Scatter, Fit]] = []
+        fits, asked = (choice.best.fit, choice.base.fit), getattr(self.problem, "lone_scatter", ())
+        for beside, kinds in itertools.product(fits[1:] if choice.left.passed else fits, asked):
+            scatter, findings = lone_scatter_of(beside, self.held_out, kinds=kinds)
+            self.findings += [finding for finding in findings if finding not in self.findings]
+            if scatter.parameters and all(scatter.model_std != other.model_std for other, _ in found):
+                found.append((scatter, rescattered(plain(self.base), scatter)))
+        # Zeros of depth and force are next to the same in a stiff bed: the likeliest is asked first.
+        for scatter, beside in sorted(found, key=lambda one: one[1].objective):
+            self.tell("trials are found to differ without a rule: choosing again", 0.0)
+            other = (
+                self._without_name(scatter, choice, beside) if choice.left.passed
+                else self._chosen_with(scatter, _explains, beside)
+            )  # fmt: skip
+            if other:
+                self.findings.append(lone_finding(scatter))
+                return other
+        return choice
+
+    def _chosen_with(
+        self, scatter: Scatter, stands: Callable[[Choice], bool], base: Fit | None = None
+    ) -> Choice | None:
+        """A choice anew beside `scatter`, kept where it `stands`; else None, and all is as before. `base`: the base
+        model's fit with it, the noise white, where that is known."""
+        before = self._beside(scatter, base)
+        other = self._chosen()
+        if stands(other):
+            self.model_std = scatter.model_std
+            return other
+        self.base, self.colours = before
+        return None
+
+    def _without_name(self, scatter: Scatter, choice: Choice, base: Fit | None = None) -> Choice | None:
+        """Of a name that explains the fitted trials and not those held out: no name, where the base model beside
+        `scatter` explains both; else None, and all is as before."""
+        before = self._beside(scatter, base)
+        left, held = self._gate_of_base(), self._held_out_gate(self.base)
+        if left.passed and (held is None or held.passed):
+            self.model_std = scatter.model_std
+            nothing = Hypothesis(self.base, score(self.base))
+            return Choice(nothing, nothing, (), choice.table, left)
+        self.base, self.colours = before
+        return None
+
+    def _beside(self, scatter: Scatter, base: Fit | None) -> tuple[Fit, dict[str, Colour]]:
+        """Take `scatter` into the base model; the fit and the colours as they were. With what differs out of the way a
+        colour may show."""
+        before = self.base, self.colours
+        base = base or rescattered(plain(self.base), scatter)
+        self.colours = {**self.colours, **colours_of(base)}
+        self.base = coloured(base, self.colours)
+        return before
+
+    def _compares(self, choice: Choice) -> bool:
+        """Whether trials are to be compared with one another once more (pushes and drops only)."""
+        asked = not self.asked.restless and getattr(self.problem, "by_path", False)
+        return asked and not self._settled(choice)
+
+    def _settled(self, choice: Choice) -> bool:
+        """Whether the best leaves nothing of trials that were fitted and, where it has a name, of those held out."""
+        if not choice.left.passed or not choice.best.effects:
+            return choice.left.passed
+        held = self._held_out_gate(choice.best.fit)
+        return held is None or held.passed
+
+    def _timed(self, choice: Choice) -> Choice:
+        """Times that jitter, at the slopes of the motion as it is now known."""
+        if not choice.best.effects:
+            return choice
+        best, jitters = jittered(choice.best.fit, self.held_out, self.jitters)
+        if not jitters:
+            return choice
+        known = {jitter.channels for jitter in self.jitters}
+        self.jitters, self.base = jitters, fit(self.base.model, self.base.values)
+        if {jitter.channels for jitter in jitters} != known:
+            self.tell("times are found to jitter: choosing again", 0.0)
+            return self._chosen()
+        left = open_gate(best, seed=self.asked.seed)[1]
+        base = Hypothesis(self.base, score(self.base))
+        return replace(choice, base=base, best=Hypothesis(best, score(best)), left=left)
+
+    def _recoloured_choice(self, choice: Choice) -> Choice:
+        """A colour that is seen only now that the motion is out of the way."""
+        white = plain(choice.best.fit)
+        fresh = colours_of(white)
+        if not differ(fresh, self.colours):
+            return choice
+        best = coloured(white, fresh)
+        self.base, self.colours = coloured(plain(self.base), fresh), fresh
+        return self._moved(choice, best)
+
+    def _doubted(self, choice: Choice) -> Choice:
+        """With readings in doubt that the best model makes so."""
+        if not choice.best.effects:
+            return choice
+        best = doubted(choice.best.fit, self.held_out)
+        if best is choice.best.fit:
+            return choice
+        self.base = fit(self.base.model, self.base.values)
+        return self._moved(choice, best)
+
+    def _moved(self, choice: Choice, best: Fit) -> Choice:
+        """The base model's fit and the best one as they are now; scores stay those by which all were weighed."""
+        left = open_gate(best, seed=self.asked.seed)[1]
+        base = replace(choice.base, fit=self.base)
+        return replace(choice, base=base, best=replace(choice.best, fit=best), left=left)
+
+    def _thorough_gate(self, best: Fit) -> Verdict:
+        return open_gate(
+            best, seed=self.asked.seed, refit=True, draws=_REFITS, folder=self.asked.gates,
+            tell=lambda done: self.tell("making the null of what is left", done),
+        )[1]  # fmt: skip
+
+    # The verdict ------------------------------------------------------------------------------------------------------
+
+    def _decided(self, choice: Choice) -> Diagnosis:
+        """Named, ambiguous or unknown; a trial that goes its own way, or replicates that do, are asked for first."""
+        asked, held_out = self.asked, self.held_out
+        self.tell("verdict", 0.0)
+        choice = self._ended(choice)
+        if choice.best.effects and hasattr(self.problem, "follows") and explains_nothing(choice, held_out):
+            return self._nothing(choice.left)
+        held = self._held_out_gate(choice.best.fit)
+        verdict = verdict_of(choice, held, held_out, asked.seed, set_aside=bool(asked.aside))
+        # Where a second name was called for, trials were asked before it.
+        before = verdict == "unknown" and choice.left.passed and len(choice.best.effects) > 1
+        if not (asked.aside or before):
+            gone = own_ways(
+                self.base, choice, verdict, held_out=held_out, seed=asked.seed, recoloured=self._recoloured()
+            )
+            if gone:
+                self.tell("a trial goes its own way: once more without it", 0.0)
+                anew = self._again(aside=gone, looked_at=asked.looked_at)
+                if self._stands(anew, gone):
+                    return anew
+        explains = verdict == "unknown" and bool(choice.best.effects) and choice.left.passed
+        if explains and not (asked.looked_at or asked.aside):
+            # What no fitted trial shows of a form may show in these: a name then has to explain all of them.
+            others = missed(choice.best.fit, held_out, asked.seed)
+            if others:
+                self.tell("what the name leaves shows in trials that were held out: others are held out", 0.0)
+                anew = self._again(looked_at=others)
+                if anew.verdict != "unknown":
+                    return anew
+        sure: tuple[str, ...] = ()
+        model_std = self.model_std
+        if verdict == "unknown" and not asked.restless and choice.best.effects:
+            wander = unrest_of(choice.best.fit, held_out)
+            if wander:
+                self.tell("replicates differ each in its own way: once more, against that", 0.0)
+                anew = self._again(
+                    deepcopy(self.problem), aside=asked.aside, looked_at=asked.looked_at, restless=True, begun=None
+                )
+                if anew.verdict == "named" and anew.choice is not None:
+                    # Fitted, and the gap taken, with the sensors' noise alone.
+                    sure = anew.effects
+                    best = settled(fit(self.base.model.with_forms(anew.forms), unscattered(anew.best)))
+                    # The table of candidates is of the likelihood in which they were weighed, its base model's with it.
+                    choice = replace(anew.choice, best=Hypothesis(best, score(best)), left=choice.left)
+                    held = self._held_out_gate(best)
+                model_std = {**model_std, **wander.model_std}
+        if verdict in ("named", "ambiguous") and held is not None and not held.passed:
+            self.findings += held_out_ways(choice.best.fit, held_out, asked.seed)
+        told = self._told({**model_std, **self.unrest.model_std})
+        return told.finish(self.base, choice, verdict, held=held, sure=sure)
+
+    def _stands(self, anew: Diagnosis, gone: Sequence[Finding]) -> bool:
+        """Whether what was found without the trials that are `gone` stands. A whole condition is set aside for a name
+        only: where nothing is missing without it, what is missing shows in it."""
+        few = len(gone) <= allowed(len(self.base.model.trials))
+        return anew.verdict != "unknown" and (few or anew.verdict != "none")
+
+    def _ended(self, choice: Choice) -> Choice:
+        """The best fit once more from where it is: one that a bend of the model had stopped may go on, above all along
+        the valley in which a number that is shared and every trial's own factor on it make up for one another."""
+        best = choice.best.fit
+        again = fit(best.model, best.values)
+        if again.objective < best.objective - _ON:
+            choice = self._moved(choice, again)
+        return replace(choice, best=replace(choice.best, fit=settled(choice.best.fit)))
+
+    def _nothing(self, last: Verdict | None = None) -> Diagnosis:
+        """None is missing as far as the fitted trials tell; once more with others held out where these tell more."""
+        asked = self.asked
+        if others := () if asked.looked_at else missed(self.base, self.held_out, asked.seed):
+            self.tell("what is left shows in trials that were held out: others are held out", 0.0)
+            return self._again(aside=asked.aside, looked_at=others)
+        self.findings += held_out_ways(self.base, self.held_out, asked.seed)
+        told = self._told({**self.model_std, **self.unrest.model_std})
+        return told.finish(self.base, None, "none", last=last)
+
+    def _told(self, model_std: Mapping[str, float]) -> Told:
+        model_std = {**getattr(self.problem, "known_std", {}), **model_std}
+        return Told(self.problem, self.first, self.findings, self.held_out, self.jitters, self.colours, model_std,
+                    self.alone)  # fmt: skip
+
+    def _held_out_gate(self, found: Fit) -> Verdict | None:
+        """The gate on trials that took no part, with the scatter of replicates where it was found."""
+        if not self.held_out:
+            return None
+        values = held_out_fit(found.model, self.held_out, found.values)
+        return held_out_gate(found, self.held_out, values, seed=self.asked.seed)
+
+    def _again(self, problem: Problem | None = None, **changes: Any) -> Diagnosis:
+        """The whole course once more, with other trials aside or held out."""
+        usual: dict[str, Any] = {"aside": (), "looked_at": (), "patient": False, "begun": self.begun}
+        return _Course(problem or self.problem, replace(self.asked, **{**usual, **changes})).run()
+
+
+def _explains(choice: Choice) -> bool:
+    return choice.left.passed
+
+
+def _leaves_less(choice: Choice, *, than: Choice) -> bool:
+    return choice.left.score < than.left.score

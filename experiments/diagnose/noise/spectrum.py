@@ -1,0 +1,278 @@
+"""Lines in the spectrum of what a model leaves: a floor that shakes, a wheel out of balance, a mass that is loose.
+
+Method: residuals over the noise, channel by channel and trial by trial, tapered (Hann) against the slow misfit, give
+Lomb's periodogram (Lomb 1976, Astrophys. Space Sci. 39:447; Scargle 1982, ApJ 263:835). What is left beside a line has
+a colour of its own, so each power is taken over what its neighbours in frequency let expect (a power law, fitted to
+their logarithms). Such ratios are summed over trials and channels, for a line has one frequency but no common phase,
+and judged by their own spread over all frequencies, so that a misfit that is loud everywhere makes no line.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy import signal, stats
+
+from experiments.diagnose.fit.gaps import unit_of
+from experiments.diagnose.fit.localise import phases_of
+from experiments.diagnose.fit.problem import Array, Form, Problem, Values
+
+__all__ = ["Line", "Part", "Piece", "line_rows", "line_sentence", "lines_of", "spectral_lines"]
+
+_CYCLES = 1.5
+"""Periods that a recording must hold for a frequency to count as a neighbour: slower is a misfit."""
+_OF_RATE = 0.49
+_HIGHEST = 150.0
+"""Share of a channel's rate, and frequency [Hz], up to which is looked."""
+_PER_WIDTH = 3
+"""Frequencies a resolution of the longest recording."""
+_NEIGHBOURS, _LOBE, _BESIDE = 9.0, 2.5, 4.0
+"""Resolutions on either side from which the background is taken; those next to a line that are not: Hann's lobe; and
+how many there must be on each side: a background from one side is guessed."""
+_MEAN_LOG = 0.5772
+"""Of an exponential law's logarithm, below that of its mean."""
+_CHANCE = 1e-3
+"""Probability, over all frequencies, below which a line is one."""
+_IN_CHANNEL, _IN_TRIALS = 4.0, 0.5
+"""Mean ratio to the background from which a channel has the line, and share of the trials that must show it."""
+_ODD = 5.0
+"""Robust standard deviations at which residuals are cut: a touch at another moment is no line."""
+_MOST, _SHOWN, _FEWEST = 3, 3, 60
+"""Lines that are looked for, channels that are said of each; rows below which a recording tells nothing."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A line in one channel: amplitude, its error (in the channel's unit), and the amplitude by phase where the model
+    stays in it for two periods."""
+
+    channel: str
+    amplitude: float
+    std: float
+    phases: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line: frequency and its error [Hz], the probability that noise of that colour shows it, where it is."""
+
+    frequency: float
+    std: float
+    chance: float
+    parts: tuple[Part, ...]
+    """The plainest channel first."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Residuals of one channel of one trial, over the noise, shapes [n]."""
+
+    trial: str
+    channel: str
+    time: Array
+    rest: Array
+    unit: float
+    """The noise in the channel's unit."""
+    phase: Array
+
+    @property
+    def span(self) -> float:
+        return float(np.ptp(self.time))
+
+
+def lines_of(problem: Problem, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> list[Line]:
+    """Lines in what the model of these numbers and forms leaves of `trials`, the plainest first; mostly none."""
+    return spectral_lines([piece for trial in trials for piece in _pieces(problem, values, forms, trial)])
+
+
+def _pieces(problem: Problem, values: Values, forms: Sequence[Form], trial: str) -> list[Piece]:
+    samples, found = problem.samples(trial), []
+    phases = phases_of(problem, values, forms, trial)
+    for channel, shown in problem.compare(values, forms, trial).items():
+        mine = samples.channel == channel
+        if len(shown["t_s"]) != int(mine.sum()):
+            continue
+        rest = (shown["measured"] - shown["model"]) / samples.std[mine]
+        found.append(Piece(trial, channel, shown["t_s"], rest, float(np.median(samples.std[mine])), phases[mine]))
+    return found
+
+
+def spectral_lines(pieces: Sequence[Piece]) -> list[Line]:
+    """Lines that the pieces have in common."""
+    kept = [cleaned for piece in pieces if (cleaned := _cleaned(piece)) is not None]
+    if not kept:
+        return []
+    longest = max(piece.span for piece in kept)
+    lowest = min(_CYCLES / piece.span for piece in kept)
+    highest = min(max(_OF_RATE * _rate(piece) for piece in kept), _HIGHEST)
+    grid = np.arange(lowest, highest, 1 / (_PER_WIDTH * longest))
+    if len(grid) < 4 * _NEIGHBOURS * _PER_WIDTH:
+        return []
+    ratio = np.stack([_ratio(piece, grid) for piece in kept])  # NaN where a piece says nothing
+    if not np.isfinite(ratio).any():
+        return []
+    score = _scores(ratio)
+    found: list[Line] = []
+    free = np.isfinite(score)
+    for _ in range(_MOST):
+        if not free.any():
+            break
+        at = int(np.argmax(np.where(free, score, -np.inf)))
+        chance = float(min(1.0, len(grid) / _PER_WIDTH * stats.norm.sf(score[at])))
+        if chance > _CHANCE:
+            break
+        if line := _line(kept, ratio, grid, at, chance):
+            found.append(line)
+        free &= np.abs(grid - grid[at]) > 2 * _LOBE / longest
+    return found
+
+
+def _cleaned(piece: Piece) -> Piece | None:
+    """Finite rows, without what is far out; None of too few."""
+    good = np.isfinite(piece.rest) & np.isfinite(piece.time)
+    if good.sum() < _FEWEST or np.ptp(piece.time[good]) <= 0:
+        return None
+    time, rest = piece.time[good], piece.rest[good]
+    rest = rest - np.polyval(np.polyfit(time, rest, 2), time)
+    size = 1.4826 * float(np.median(np.abs(rest)))
+    if size == 0:
+        return None
+    return Piece(piece.trial, piece.channel, time, np.clip(rest, -_ODD * size, _ODD * size), piece.unit,
+                  piece.phase[good])  # fmt: skip
+
+
+def _rate(piece: Piece) -> float:
+    return (len(piece.time) - 1) / piece.span
+
+
+def _taper(piece: Piece) -> Array:
+    return np.sin(math.pi * (piece.time - piece.time[0]) / piece.span) ** 2
+
+
+def _ratio(piece: Piece, grid: Array) -> Array:
+    """The piece's power over that of its neighbours in frequency, shape as `grid`; NaN outside its band."""
+    found = np.full(len(grid), np.nan)
+    inside = np.flatnonzero((grid >= _CYCLES / piece.span) & (grid <= _OF_RATE * _rate(piece)))
+    if len(inside) < 4 * _NEIGHBOURS * _PER_WIDTH:
+        return found
+    here = grid[inside]
+    power = signal.lombscargle(piece.time, _taper(piece) * piece.rest, 2 * math.pi * here)
+    told, log_f = np.log(np.maximum(power, 1e-300)), np.log(here)
+    edge = (_LOBE + _BESIDE) / piece.span
+    for k, place in enumerate(inside):
+        if here[k] - here[0] < edge or here[-1] - here[k] < edge:
+            continue
+        off = np.abs(here - here[k]) * piece.span
+        near = (off > _LOBE) & (off <= _NEIGHBOURS)
+        x = log_f[near] - log_f[k]
+        _, level = np.polyfit(x, told[near], 1)
+        found[place] = power[k] / math.exp(level + _MEAN_LOG)
+    return found
+
+
+def _scores(ratio: Array) -> Array:
+    """How far the ratios' sum at each frequency stands out, in standard deviations of its spread over frequencies."""
+    count = np.isfinite(ratio).sum(axis=0)
+    total = np.nansum(ratio, axis=0)
+    seen = count > 0
+    tail = stats.gamma.logsf(total[seen], count[seen])
+    score = np.full(ratio.shape[1], np.nan)
+    score[seen] = _normal(tail)
+    middle = float(np.nanmedian(score))
+    spread = 1.4826 * float(np.nanmedian(np.abs(score - middle)))
+    return (score - middle) / max(spread, 1.0)
+
+
+def _normal(log_tail: Array) -> Array:
+    """Standard normal scores of the logarithms of tail probabilities, far out by the tail's asymptote."""
+    near = stats.norm.isf(np.exp(np.maximum(log_tail, -600.0)))
+    return np.where(log_tail > -600.0, near, np.sqrt(np.maximum(-2 * log_tail, 0.0)))
+
+
+def _line(pieces: Sequence[Piece], ratio: Array, grid: Array, at: int, chance: float) -> Line | None:
+    """The line near one frequency, in the channels that have it; None where no channel has it in half of its trials."""
+    having: dict[str, list[int]] = {}
+    for channel in dict.fromkeys(piece.channel for piece in pieces):
+        own = [k for k, piece in enumerate(pieces) if piece.channel == channel and np.isfinite(ratio[k, at])]
+        if own and ratio[own, at].mean() >= _IN_CHANNEL and np.mean(ratio[own, at] > 2.0) >= _IN_TRIALS:
+            having[channel] = own
+    if not having:
+        return None
+    every = [k for own in having.values() for k in own]
+    fine = grid[at] + np.linspace(-1, 1, 41) / max(pieces[k].span for k in every)
+    sizes = {k: _amplitudes(pieces[k], fine) for k in every}
+    # The background is power / ratio; power goes with the amplitude's square, 4 times a component's variance.
+    noise = {k: max(float(sizes[k][20]) / math.sqrt(2 * max(float(ratio[k, at]), 1e-9)), 1e-12) for k in every}
+    best = int(np.argmax(sum((sizes[k] / noise[k]) ** 2 for k in every)))
+    # The bound of Cramer and Rao for a sine in noise; a half more for the taper.
+    weight = sum((float(sizes[k][best]) / noise[k] * math.pi * pieces[k].span / 3.0) ** 2 for k in every)
+    parts = []
+    for channel, own in having.items():
+        square = [(pieces[k].unit ** 2) * (float(sizes[k][best]) ** 2 - 2 * noise[k] ** 2) for k in own]
+        std = math.sqrt(float(np.mean([(pieces[k].unit * noise[k]) ** 2 for k in own])) / len(own))
+        told = [(name, size * pieces[k].unit, n) for k in own for name, size, n in _by_phase(pieces[k], fine[best])]
+        phases = {}
+        for phase in dict.fromkeys(name for name, _, _ in told):
+            mine = [(size, n) for name, size, n in told if name == phase]
+            phases[phase] = math.sqrt(sum(n * size * size for size, n in mine) / sum(n for _, n in mine))
+        plain = float(ratio[own, at].mean())
+        parts.append((plain, Part(channel, math.sqrt(max(float(np.mean(square)), 0.0)), std, phases)))
+    parts.sort(key=lambda pair: -pair[0])
+    return Line(float(fine[best]), 1 / math.sqrt(weight), chance, tuple(part for _, part in parts))
+
+
+def _amplitudes(piece: Piece, frequencies: Array) -> Array:
+    """Of sines of these frequencies in the tapered piece."""
+    taper = _taper(piece)
+    turned = np.exp(-2j * math.pi * frequencies[:, None] * piece.time)
+    return 2 * np.abs(turned @ (taper * piece.rest)) / taper.sum()
+
+
+def _by_phase(piece: Piece, frequency: float) -> list[tuple[str, float, int]]:
+    """Amplitude in each stretch of one phase that lasts two periods, beside a straight line: phase, size, rows."""
+    found = []
+    edges = [0, *(np.flatnonzero(piece.phase[1:] != piece.phase[:-1]) + 1).tolist(), len(piece.time)]
+    for low, high in pairwise(edges):
+        time = piece.time[low:high]
+        if high - low < 12 or np.ptp(time) < 2 / frequency:
+            continue
+        turn = 2 * math.pi * frequency * time
+        columns = np.column_stack([np.cos(turn), np.sin(turn), np.ones_like(time), time - time.mean()])
+        answer = np.linalg.lstsq(columns, piece.rest[low:high], rcond=None)[0]
+        found.append((str(piece.phase[low]), float(np.hypot(answer[0], answer[1])), high - low))
+    return found
+
+
+def line_rows(lines: Sequence[Line]) -> list[dict[str, Any]]:
+    """``latent.lines`` of diagnosis.json, amplitudes in the units in which channels are told."""
+    rows = []
+    for line in lines:
+        channels = []
+        for part in line.parts:
+            unit, factor = unit_of(part.channel)
+            phases = {name: factor * size for name, size in part.phases.items()}
+            channels.append({"channel": part.channel, "amplitude": factor * part.amplitude, "std": factor * part.std,
+                             "unit": unit, "phases": phases})  # fmt: skip
+        rows.append({"frequency_hz": line.frequency, "std_hz": line.std, "chance": line.chance, "channels": channels})
+    return rows
+
+
+def line_sentence(row: Mapping[str, Any]) -> str:
+    """A row of ``latent.lines`` in words."""
+    shown = row["channels"][:_SHOWN]
+    told = ", ".join(f"{p['channel']} {p['amplitude']:.2g} +- {p['std']:.1g} {p['unit']}".rstrip() for p in shown)
+    more = len(row["channels"]) - len(shown)
+    also = f" and in {more} more" if more else ""
+    loud = sorted(shown[0]["phases"].items(), key=lambda pair: -pair[1])
+    where = ", ".join(f"{size:.2g} in phase {name}" for name, size in loud) if len(loud) > 1 else ""
+    odds = "below 1e-6" if row["chance"] < 1e-6 else f"{row['chance']:.1g}"
+    return (
+        f"Its spectrum has a line at {row['frequency_hz']:.4g} +- {row['std_hz']:.1g} Hz: amplitudes {told}{also}"
+        + (f" ({shown[0]['channel']}: {where})" if where else "")
+        + f"; by chance, in noise of that colour, {odds}."
+    )

@@ -1,0 +1,453 @@
+"""Trials of penetration made ready for fits: gaps left out, faults found and set aside, depth smoothed."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+from scipy.stats import norm
+
+from experiments.campaign import Campaign, PenetrationCampaign, Recording
+from experiments.campaign.tables import PenetrationTrial
+from experiments.diagnose.fit.problem import Array, Finding, TrialInfo
+from experiments.diagnose.noise.colour import Colour, colour_of
+from experiments.diagnose.noise.replicates import parted
+from experiments.diagnose.noise.stuck import clipped, cut_rows, stuck_rows
+from experiments.diagnose.noise.words import together
+
+from .depth import SmoothDepth, smooth_depth
+from .drive import Holds, Weights
+
+__all__ = ["Prepared", "prepare"]
+
+_FEWEST = 12
+"""Rows that a trial must have to say anything."""
+_AROUND = 20
+"""Rows on either side of a gap that tell whether the clock has jumped."""
+_LONG = 0.02
+"""Share of a recording from which on a stretch without rows is said."""
+_SMOOTH, _ROUGH = 1.7, 3.0
+"""Chi-square a row up to which a polynomial goes through both sides of a gap, and beyond which it does not."""
+_LOUDER = 1.2
+"""Power of a depth sensor's slow noise, over what is stated, from which on its pushes are smoothed once more."""
+_AS_TAKEN = 3.0
+"""Standard errors within which what is left is what it was taken for."""
+_OF_MEDIAN = 1.8
+"""Relative standard error of a median of n absolute third differences, times the root of n: 1.17 of independent normal
+numbers, and sqrt(1 + 2 (0.75^2 + 0.3^2 + 0.05^2)) for those of neighbours."""
+_OUTLIER = 8.0
+"""Noise standard deviations beyond which a lone reading is a fault (once in 1e15 by chance)."""
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """One trial. Driven: rows with a depth, on which the force of a law with a memory depends whether or not the sensor
+    read it. Drop: all rows. And which rows have what."""
+
+    table: PenetrationTrial
+    info: TrialInfo
+    diameter: float
+    """[m]"""
+    time: Array
+    """[s], shape [n]"""
+    depth: Array
+    """As measured [m], shape [n]."""
+    other: Array
+    """Force [N] or acceleration [m/s2], NaN where there is none, shape [n]."""
+    has_depth: NDArray[np.bool_]
+    has_other: NDArray[np.bool_]
+    smooth: SmoothDepth | None = None
+    """Of a driven trial."""
+    findings: tuple[Finding, ...] = field(default=())
+
+    @property
+    def driven(self) -> bool:
+        """Whether its depth was prescribed."""
+        return self.table.mode == "driven"
+
+
+def prepare(campaign: Campaign) -> tuple[list[Prepared], list[Finding]]:
+    """The trials that can be used, and what was wrong with the data.
+
+    Raises ValueError where no trial is left, or a sensor that is scored has no noise.
+    """
+    tables = campaign.tables
+    assert isinstance(tables, PenetrationCampaign)
+    trials: list[Prepared] = []
+    findings: list[Finding] = []
+    louder = _louder(campaign)
+    cuts = _cuts(campaign, tables)
+    for table in tables.trial:
+        recording = campaign.recording(table.id, "data")
+        assert recording is not None
+        colour = louder if table.mode == "driven" else None
+        trial, found = _one(tables, table, recording, colour=colour, cut=cuts.get(table.id))
+        findings += found
+        if trial is not None:
+            trials.append(trial)
+    if not trials:
+        said = "; ".join(finding.what for finding in findings)
+        raise ValueError(f"no trial of {tables.name!r} can be used: {said}")
+    campaign = _without(campaign, cuts)
+    trials, colours = _recoloured(campaign, trials, louder)
+    if colours:
+        findings.append(Finding(trial="", channel="depth", what=together(list(dict.fromkeys(colours.values())))))
+    trials = _alike(campaign, trials, colours)
+    infos = parted([trial.info for trial in trials], {trial.info.id: _path(trial) for trial in trials})
+    return [replace(trial, info=info) for trial, info in zip(trials, infos, strict=True)], findings
+
+
+def _cuts(campaign: Campaign, tables: PenetrationCampaign) -> dict[str, NDArray[np.int64]]:
+    """Rows of each push at which the amplifier shows 0 for all that is less."""
+    forces = {
+        table.id: recording["force_N"] for table in tables.trial
+        if table.mode == "driven" and (recording := campaign.recording(table.id, "data")) is not None
+    }  # fmt: skip
+    if not forces:
+        return {}
+    rows = cut_rows(list(forces.values()), stds(tables, True)[1])
+    return {id: own for id, own in zip(forces, rows, strict=True) if len(own)}
+
+
+def _without(campaign: Campaign, cuts: Mapping[str, NDArray[np.int64]]) -> Campaign:
+    """The same with gaps in the place of forces that are cut off."""
+    recordings = dict(campaign.recordings)
+    for id, rows in cuts.items():
+        columns = {name: column.copy() for name, column in recordings[id, "data"].columns.items()}
+        columns["force_N"][rows] = np.nan
+        recordings[id, "data"] = replace(recordings[id, "data"], columns=columns)
+    return replace(campaign, recordings=recordings) if cuts else campaign
+
+
+def _louder(campaign: Campaign) -> Colour | None:
+    """How loud the depth sensor of the pushes is, where it is louder than stated; else None.
+
+    Third differences know nothing of a smooth motion: those of white noise s have the variance 20 s^2. A curve smoothed
+    at a noise that is too small would follow the noise, and what it leaves would tell too little of it. Of noise that
+    is correlated they tell less than there is: that is looked for in what is left (`_recoloured`).
+    """
+    assert isinstance(campaign.tables, PenetrationCampaign)
+    sizes, count = [], 0
+    for table in campaign.tables.trial:
+        recording = campaign.recording(table.id, "data") if table.mode == "driven" else None
+        depth = recording["depth_m"] if recording is not None else np.zeros(0)
+        third = np.diff(depth[np.isfinite(depth)], 3)
+        if len(third) >= _FEWEST:
+            sizes.append(float(np.median(np.abs(third))) / (np.sqrt(20.0) * float(norm.ppf(0.75))))
+            count += len(third)
+    std = stds(campaign.tables, True)[0] if sizes else 0.0
+    louder = float(np.median(sizes)) / std if std > 0 else 1.0
+    chance = 3 * _OF_MEDIAN / np.sqrt(max(count, 1))
+    return Colour("depth", louder, 0.0) if louder**2 > _LOUDER and louder > 1 + chance else None
+
+
+def _recoloured(
+    campaign: Campaign, trials: list[Prepared], louder: Colour | None
+) -> tuple[list[Prepared], dict[str, Colour]]:
+    """Smoothed once more where the noise of the depths is not as it was taken, and its colour by trial.
+
+    One sensor reads all pushes; rows at another rate are as long apart as they are, so that each rate has its own.
+    `louder`: what the noise was taken for; None: as stated.
+    """
+    assert isinstance(campaign.tables, PenetrationCampaign)
+    std = stds(campaign.tables, True)[0] if any(trial.smooth is not None for trial in trials) else 0.0
+    rates: dict[int, list[Prepared]] = {}
+    for trial in trials if std > 0 else ():
+        if trial.smooth is not None:
+            rates.setdefault(round(5 * float(np.log(np.median(np.diff(trial.time))))), []).append(trial)
+    colours: dict[str, Colour] = {}
+    anew: set[str] = set()
+    for alike in rates.values():
+        left = [(trial.depth - trial.smooth.depth) / std for trial in alike if trial.smooth is not None]
+        colour = colour_of("depth", left)
+        slow = float(colour.power(np.zeros(1))[0]) if colour is not None else 1.0
+        if colour is not None and louder is not None and 1 / _LOUDER < slow / louder.std**2 < _LOUDER:
+            colour = louder  # as it was taken
+        elif colour is not None and slow > _LOUDER:
+            anew |= {trial.info.id for trial in alike}
+        else:
+            colour = louder
+        if colour is not None:
+            colours |= {trial.info.id: colour for trial in alike}
+    found = {t.info.id: _again(campaign, t, colours) if t.info.id in anew else t for t in trials}
+    for rate, alike in rates.items():
+        if any(trial.info.id in colours for trial in alike) or not colours:
+            continue
+        # Few rows tell little of it, least of all where a curve has followed the noise: then as at the rate next to
+        # it, unless what is left is not that.
+        near = min((r for r in rates if rates[r][0].info.id in colours), key=lambda r: abs(r - rate))
+        said = colours[rates[near][0].info.id]
+        own = [_again(campaign, trial, {trial.info.id: said}) for trial in alike]
+        left = [(trial.depth - trial.smooth.depth) / std / said.std for trial in own if trial.smooth is not None]
+        rows = np.concatenate([Weights(np.ones(len(one)), said.persistence)(one) for one in left])
+        if abs(float((rows**2).mean()) - 1) < _AS_TAKEN * np.sqrt(2 / len(rows)):
+            colours |= {trial.info.id: said for trial in alike}
+            found |= {trial.info.id: trial for trial in own}
+    return [found[trial.info.id] for trial in trials], colours
+
+
+def _again(campaign: Campaign, trial: Prepared, colours: Mapping[str, Colour], alike: Holds = ()) -> Prepared:
+    """The same, smoothed with what is known now."""
+    recording = campaign.recording(trial.info.id, "data")
+    assert recording is not None and isinstance(campaign.tables, PenetrationCampaign)
+    found, _ = _one(campaign.tables, trial.table, recording, alike=alike, colour=colours.get(trial.info.id))
+    return found or trial
+
+
+def _alike(campaign: Campaign, trials: list[Prepared], colours: Mapping[str, Colour]) -> list[Prepared]:
+    """Smoothed once more where the holds of a push are not those of most: one machine makes all of them."""
+    holds = Counter(trial.smooth.holds for trial in trials if trial.smooth is not None and trial.smooth.holds)
+    if not holds:
+        return trials
+    usual, count = holds.most_common(1)[0]
+    if count < 2:
+        return trials
+    found = []
+    for trial in trials:
+        if trial.smooth is not None and trial.smooth.holds and trial.smooth.holds != usual:
+            trial = _again(campaign, trial, colours, usual)
+        found.append(trial)
+    return found
+
+
+def _path(trial: Prepared) -> tuple[float, ...]:
+    """What makes another path of a drive at the same nominal speed: depth, way back and duration; of a drop how long it
+    is looked at. Nothing of pushes by hand, of which each goes its own."""
+    lasted = float(np.ptp(trial.time))
+    if trial.smooth is None:
+        return (lasted,)
+    if trial.table.speed is None:
+        return ()
+    deepest = max(float(trial.smooth.depth.max()), 1e-9)
+    return deepest, 2.0 - float(trial.smooth.depth[-1]) / deepest, lasted
+
+
+def stds(tables: PenetrationCampaign, driven: bool) -> tuple[float, float]:
+    """Noise of depth [m] and of the other sensor. Raises ValueError for 0 where it is divided by."""
+    name = "force" if driven else "accel"
+    sensor = getattr(tables.sensors, name)
+    depth = tables.sensors.depth
+    if sensor is None or depth is None:
+        raise ValueError(f"[sensors.{name}] or [sensors.depth] is missing: its std was expected")
+    if sensor.std[0] <= 0 or (depth.std[0] <= 0 and not driven):
+        which = name if sensor.std[0] <= 0 else "depth"
+        raise ValueError(f"[sensors.{which}] std = [0.0]: more than 0 was expected, residuals are divided by it")
+    return depth.std[0], sensor.std[0]
+
+
+def _one(
+    tables: PenetrationCampaign, table: PenetrationTrial, recording: Recording, *, alike: Holds = (),
+    colour: Colour | None = None, cut: NDArray[np.int64] | None = None,
+) -> tuple[Prepared | None, list[Finding]]:  # fmt: skip
+    driven = table.mode == "driven"
+    channel, key = ("force", "force_N") if driven else ("accel", "accel_m_s2")
+    std_depth, std_other = stds(tables, driven)
+    loud = max(colour.std, 1.0) if colour is not None else 1.0
+    findings: list[Finding] = []
+    time, depth, other = recording.time.copy(), recording["depth_m"].copy(), recording[key].copy()
+
+    def say(what: str, *, where: str | None = None, rows: NDArray[np.int64] | None = None) -> None:
+        span = (float(time[rows[0]]), float(time[rows[-1]])) if rows is not None and len(rows) else (None, None)
+        findings.append(Finding(trial=table.id, what=f"trial {table.id}: {what}", channel=where, from_s=span[0],
+                                to_s=span[1], set_aside=rows is not None))  # fmt: skip
+
+    blind = np.isin(np.arange(len(time)), cut) if cut is not None else np.zeros(len(time), dtype=bool)
+    keep = np.concatenate([[True], np.diff(time) > 0])  # a coarse clock repeats itself: the first reading rules
+    if not keep.all():
+        say(f"{int((~keep).sum())} rows repeat the time before them and are left out")
+        time, depth, other, blind = time[keep], depth[keep], other[keep], blind[keep]
+    for name, values in (("depth", depth), (channel, other)):
+        missing = int(np.isnan(values).sum())
+        if missing == len(values):
+            say(f"not one of {missing} readings of {name} is a number")
+        elif missing > 0.02 * len(values):
+            say(f"{missing} of {len(values)} readings of {name} are gaps; the rest is used")
+    jump = _clock_jump(time, depth, loud * std_depth) or (None if driven else _clock_jump(time, other, std_other))
+    if jump is not None:
+        rows = np.arange(jump, len(time))
+        say(f"the clock jumps by {time[jump] - time[jump - 1]:.3g} s where the motion goes on as if it had not; all "
+            f"that follows is set aside", rows=rows)  # fmt: skip
+        time, depth, other, blind = time[:jump], depth[:jump], other[:jump], blind[:jump]
+    if blind.any():
+        say(f"{int(blind.sum())} readings of force are cut off at 0 or next to it: it reads exactly 0 and never less, "
+            f"which its noise would, so that it shows nothing that pulls (adhesion would be hidden): an amplifier for "
+            f"both signs is needed, or another zero; they are left out", where="force",
+            rows=np.flatnonzero(blind))  # fmt: skip
+        findings[-1] = replace(findings[-1], doubt=True)
+        other[blind] = np.nan
+    steps = np.diff(time)
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    for k in np.flatnonzero(steps > np.maximum(10 * usual, _LONG * float(np.ptp(time)) if len(time) else 0.0)):
+        findings.append(Finding(
+            trial=table.id, from_s=float(time[k]), to_s=float(time[k + 1]),
+            what=f"trial {table.id}: there is no row from {time[k]:.4g} to {time[k + 1]:.4g} s, where one every "
+            f"{usual:.3g} s is usual: kept as a gap",
+        ))  # fmt: skip
+    for name, values, std in (("depth", depth, loud * std_depth), (channel, other, std_other)):
+        # A depth cannot jump; a force can, where a tip touches for a moment, but not beyond all that it is elsewhere.
+        known = values[np.isfinite(values)]
+        range_ = float(np.ptp(np.percentile(known, [0.5, 99.5]))) if name != "depth" and len(known) else 0.0
+        lone = _lone_readings(values, max(std, 0.15 * range_))
+        if len(lone):
+            several = f"{len(lone)} readings of {name} lie far from their neighbours and are set aside"
+            one = f"one reading of {name} lies far from its neighbours and is set aside"
+            say(several if len(lone) > 1 else one, where=name, rows=lone)
+            values[lone] = np.nan
+        for end in clipped(values) if not driven or name != "depth" else ():  # a machine may stop at its end
+            if name == "accel" and abs(end.value - table.gravity) < 1e-3 * table.gravity:
+                continue  # free flight
+            say(f"{len(end.rows)} readings of {name} {end.words}", where=name, rows=end.rows)
+            values[end.rows] = np.nan
+        stuck = stuck_rows(values) if not driven or name != "depth" else lone[:0]  # a machine may stand still
+        if len(stuck):
+            say(f"{len(stuck)} readings of {name} repeat the one before where it never does otherwise: the sensor is "
+                f"stuck, they are set aside", where=name, rows=stuck)  # fmt: skip
+            values[stuck] = np.nan
+    step = _step(time, depth, loud * std_depth)
+    while step is not None:
+        size = depth[step] - depth[step - 1]
+        back = _step(time, depth, loud * std_depth, after=step)
+        while back is not None and abs(depth[back] - depth[back - 1] + size) > 0.5 * abs(size):
+            back = _step(time, depth, loud * std_depth, after=back)  # until one takes it back
+        rows = np.arange(step, len(depth) if back is None else back)
+        stays = "stays there, as where a marker is lost; it is set aside from there on"
+        comes = f"comes back {len(rows)} rows later, as where a marker is lost for a while; these are set aside"
+        say(f"the depth jumps by {1e3 * size:.3g} mm between two readings and {stays if back is None else comes}",
+            where="depth", rows=rows)  # fmt: skip
+        depth[rows] = np.nan
+        step = None if back is None else _step(time, depth, loud * std_depth, after=back)
+    if driven:
+        held = _held(other)
+        if held is not None:
+            say(f"the force is held: {int((~held).sum())} of {len(other)} readings repeat the one before; only fresh "
+                f"ones are used", where="force")  # fmt: skip
+            other[~held] = np.nan
+        return _driven(tables, table, time, depth, other, std_depth, findings, alike, colour)
+    has_depth, has_other = np.isfinite(depth), np.isfinite(other)
+    has_other &= np.abs(time) > 1e-9  # the force jumps at the touch: neither side is wrong
+    if has_depth.sum() + has_other.sum() < _FEWEST:
+        say("too few readings are left: it is set aside", rows=np.arange(0))
+        return None, findings
+    info = _info(tables, table, abs(float(table.speed or 0.0)))
+    return Prepared(table, info, tables.diameter_of(table), time, depth, other, has_depth, has_other), findings
+
+
+def _driven(
+    tables: PenetrationCampaign, table: PenetrationTrial, time: Array, depth: Array, other: Array, std: float,
+    findings: list[Finding], alike: Holds, colour: Colour | None,
+) -> tuple[Prepared | None, list[Finding]]:  # fmt: skip
+    known = np.isfinite(depth)
+    if known.sum() < _FEWEST or (known & np.isfinite(other)).sum() < _FEWEST:
+        what = f"trial {table.id}: fewer than {_FEWEST} rows hold both depth and force: it is set aside"
+        findings.append(Finding(trial=table.id, what=what, set_aside=True))
+        return None, findings
+    louder, persistence = (max(colour.std, 1.0), colour.persistence) if colour is not None else (1.0, 0.0)
+    smooth = smooth_depth(time[known], depth[known], louder * std, alike=alike, persistence=persistence)
+    smooth = replace(smooth, inflation=louder * float(np.sqrt((1 + persistence) / (1 - persistence))))
+    speed = float(table.speed) if table.speed else float(np.percentile(np.abs(smooth.speed), 80))
+    time, depth, other = time[known], depth[known], other[known]
+    return Prepared(
+        table, _info(tables, table, speed), tables.diameter_of(table), time, depth, other, np.isfinite(depth),
+        np.isfinite(other), smooth,
+    ), findings  # fmt: skip
+
+
+def _info(tables: PenetrationCampaign, table: PenetrationTrial, speed: float) -> TrialInfo:
+    gravity = table.gravity
+    grains = gravity if table.grain_gravity is None else table.grain_gravity
+    diameter = tables.diameter_of(table)
+    alike = f"{table.speed:.6g}" if table.speed is not None else "by hand"
+    return TrialInfo(
+        id=table.id,
+        condition=(table.mode, diameter, gravity, grains, alike),
+        settings={"speed_m_s": speed, "diameter_m": diameter, "gravity_m_s2": gravity},
+    )
+
+
+# Faults ---------------------------------------------------------------------------------------------------------------
+
+
+def _lone_readings(values: Array, std: float) -> NDArray[np.int64]:
+    """Rows that lie far from the median of the seven around them, while those seven agree among themselves."""
+    known = np.flatnonzero(np.isfinite(values))
+    if len(known) < 9:
+        return known[:0]
+    v = values[known]
+    middle = median_filter(v, 7, mode="nearest")
+    away = np.abs(v - middle)
+    spread = median_filter(away, 15, mode="nearest")
+    suspect = away > np.maximum(_OUTLIER * std, 12 * spread)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], suspect.astype(int), [0]])))
+    for low, high in zip(edges[::2], edges[1::2], strict=True):
+        # A touch or a turn is sharp as well, but what is before it and after it differs.
+        alike = low > 0 and high < len(v) and abs(v[low - 1] - v[high]) < 0.3 * away[low:high].min()
+        if high - low > 3 or not alike:
+            suspect[low:high] = False
+    return known[suspect] if suspect.sum() <= 0.05 * len(v) else known[:0]
+
+
+def _step(time: Array, depth: Array, std: float, *, after: int = 0) -> int | None:
+    """The first row beyond `after` at which the depth becomes another, the speeds on both sides agreeing; else None."""
+    known = np.flatnonzero(np.isfinite(depth))
+    t, d = time[known], depth[known]
+    if len(t) < 20 or np.any(np.diff(t) <= 0):
+        return None
+    first = int(np.searchsorted(known, after)) if after else 0
+    for k in range(max(3, first + 3), len(t) - 3):
+        if abs(d[k] - d[k - 1]) < 12 * std:
+            continue
+        low, high = max(first, k - 6), min(len(t), k + 6)
+        if t[k] - t[k - 1] > 4 * np.median(np.diff(t[low:high])):
+            continue
+        left, right = (np.polyfit(t[side] - t[k], d[side], 1) for side in (slice(low, k), slice(k, high)))
+        bend = abs(left[0] - right[0]) * (t[k] - t[k - 1])
+        if abs(right[1] - left[1]) > 12 * std + 3 * bend + 0.8 * abs(left[0]) * (t[k] - t[k - 1]):
+            return int(known[k])
+    return None
+
+
+def _clock_jump(time: Array, values: Array, std: float) -> int | None:
+    """The row at which the clock jumps forward while the motion does not; None where it never does.
+
+    One polynomial is laid through the rows on both sides of a gap, once with the times as they stand and once with the
+    gap closed, of the lowest degree up to 3 that fits the second: where the clock jumped, it does not fit the first.
+    A few rows tell that of a fast motion, as many as the gap is long of a slow one.
+    """
+    known = np.flatnonzero(np.isfinite(values))
+    t, v = time[known], values[known]
+    if len(t) < 2 * _AROUND:
+        return None
+    gaps = np.diff(t)
+    usual = float(np.median(gaps))
+    for k in np.flatnonzero(gaps > 4 * usual) + 1:
+        most = min(k, len(t) - k)
+        if most < _AROUND:
+            continue
+        for around in dict.fromkeys((_AROUND, min(most, max(_AROUND, round(gaps[k - 1] / usual))))):
+            near = slice(k - around, k + around)
+            as_read = t[near] - t[k]
+            closed = as_read + np.where(as_read < 0, gaps[k - 1] - usual, 0.0)
+            for degree in (1, 2, 3):
+                stands, shut = (_beyond(degree, clock, v[near], std) for clock in (as_read, closed))
+                if shut < _SMOOTH:
+                    break
+            if stands > max(_ROUGH, 2.5 * shut) and shut < _SMOOTH:
+                return int(known[k])
+    return None
+
+
+def _beyond(degree: int, time: Array, values: Array, std: float) -> float:
+    """Chi-square a row that the best polynomial leaves."""
+    fitted = np.polynomial.Polynomial.fit(time, values, degree)
+    return float(np.mean((values - fitted(time)) ** 2)) / max(std, 1e-300) ** 2
+
+
+def _held(values: Array) -> NDArray[np.bool_] | None:
+    """Which readings are fresh where most repeat the one before to the last digit; None where that is not so."""
+    fresh = np.concatenate([[True], np.diff(values) != 0])
+    known = np.isfinite(values)
+    return fresh if known.sum() > 20 and fresh[known].mean() < 0.6 else None

@@ -1,0 +1,404 @@
+"""The force of a bed on a spike that goes straight down, with every effect of the library, compiled by Taichi.
+
+Base: F = K z + C max(0, v) for depth z > 0, and 0 above; v = dz/dt, downwards positive; F positive upwards. A drop
+obeys m z'' = m g - F. Each effect adds to the loading curve h(z), which is K z in the base model, to what is left of it
+when the spike comes back (`top` is the deepest depth since it last entered, `deepest` the deepest ever), or to what
+depends on the rate; the effects' own files say how (`rigid.terms.candidate.Push`), and the sum over them is written out
+as text. At amplitude 0 an effect changes nothing. `SLOTS` names the numbers of a lane; D is `reference`, a depth
+typical of the campaign, so that amplitudes of one effect's forms compare.
+
+A drop is integrated by the classical Runge-Kutta method, each step cut where the spike turns, leaves or comes back
+(found by halving), since friction and damper jump there. At a turning point the forces of both directions are tried:
+where neither moves the spike, it rests for good.
+
+Friction that is mobilised over a way (`Push.turning`) is a share w of its bound, dw = (sign(dz) - w) |dz| / reach
+(Dahl,
+A solid friction model, TOR-0158(3107-18)-1, Aerospace Corp., 1968, with exponent 1): it stays while the spike is held.
+From where the way last turned on, w is an exponential of the depth.
+"""
+
+# Taichi reads the annotations and the source of kernels: no `from __future__ import annotations` here.
+import inspect
+import linecache
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.diagnose.fit.own import OwnEffect
+from rigid.batch.runtime import ensure
+from rigid.model.model import _for_taichi as for_taichi
+from rigid.terms import CANDIDATES, STATE_FIELDS, Term
+from rigid.terms.candidate import Push
+from rigid.terms.mobilised import mobilised
+
+__all__ = ["PHASES", "SLOTS", "fall", "push", "slot_places", "slot_table"]
+
+_HERE = ("z", "v", "x", "way", "share", "most", "ever", "reference", "radius_depth")
+_VALUES: Mapping[str, tuple[str, ...]] = {
+    "loading": ("grown", "depth", "x"), "unload": ("at", "stiff", "bent", "z", "ever", "stiffness"),
+    "damper": ("factor", "spring"), "force": ("total", *_HERE), "pull": ("total", *_HERE),
+}  # fmt: skip
+"""What each hook of `Push.law` may ask for beside its effect's slots."""
+
+
+def _slots_of(law: Push) -> tuple[str, ...]:
+    """Numbers of one trial that an effect's hooks ask for, in their order."""
+    asked = [name for hook, function in law.law.items() for name in inspect.signature(function).parameters
+             if name not in _VALUES[hook]]  # fmt: skip
+    return tuple(dict.fromkeys((*asked, *(law.turning or ()))))
+
+
+_LIBRARY = tuple(
+    push for _, _, push in sorted((c.push.rank, id, c.push) for id, c in CANDIDATES.items() if c.push is not None)
+)
+SLOTS = (
+    "mass", "gravity", "stiffness", "damping", "reference", "speed_scale", "radius_depth",
+    *(slot for effect in _LIBRARY for slot in _slots_of(effect)), "shift_depth", "shift_row", "shift_speed",
+)  # fmt: skip
+"""Numbers of a lane, in order. `radius_depth`: depth at which the tip is wholly in; `speed_scale`: below it the
+direction of a driven spike is not certain; shifts: added to a driven spike's path, for derivatives (`shift_row`: to the
+depth of each row alone, all that came before it as it was)."""
+PHASES = ("free", "in", "rest", "out")
+
+_SLOT = {name: place for place, name in enumerate(SLOTS)}
+_NEVER_ZERO = {"reference": 0.01, "speed_scale": 1e-4, "radius_depth": 1e-4}
+_HELD, _REACH = next(effect.turning for effect in _LIBRARY if effect.turning is not None)
+_STEP = 5e-4
+"""Longest step of a drop [s]: sqrt(m / K) of a spike on sand is tens of ms, so the error is below 1e-8 of the depth;
+`fall` takes shorter ones where a lane is stiffer."""
+
+_SETTLED = 1e-3
+"""Speed [m/s] at which a spike that comes back to a surface that bears it stays there: it would hop by 5e-8 m."""
+
+
+def slot_places(own: Sequence[OwnEffect] = ()) -> dict[str, int]:
+    """Slot -> its place in a lane; those of effects from files stand behind `SLOTS`, in order."""
+    names = [name for effect in own for name, _ in _own_slots(effect)]
+    return _SLOT | {name: len(SLOTS) + place for place, name in enumerate(names)}
+
+
+def _own_slots(effect: OwnEffect) -> list[tuple[str, float]]:
+    """Numbers of an effect from a file: slot, and its value where the effect is off."""
+    if effect.push is not None:
+        return [(slot, effect.push.lengths.get(slot, 0.0)) for slot in _slots_of(effect.push)]
+    return [(f"{effect.id}.{p.name}", effect.neutral(p.name)) for p in effect.term.parameters]
+
+
+def slot_table(count: int, own: Sequence[OwnEffect] = ()) -> NDArray[np.float64]:
+    """Numbers of `count` lanes, shape [count, slot_count] (`slot_places`): nothing acts, and no length is zero."""
+    off = [value for effect in own for _, value in _own_slots(effect)]
+    table = np.zeros((count, len(SLOTS) + len(off)))
+    table[:, len(SLOTS) :] = off
+    lengths = [effect.lengths for effect in _LIBRARY]
+    for name, value in [pair for given in (_NEVER_ZERO, *lengths) for pair in given.items()]:
+        table[:, _SLOT[name]] = value
+    return table
+
+
+def push(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDArray[np.int32],
+         depth: NDArray[np.float64], speed: NDArray[np.float64],
+         own: tuple[OwnEffect, ...] = ()) -> NDArray[np.float64]:  # fmt: skip
+    """Forces [N] of driven spikes along given paths.
+
+    Args:
+        numbers: Shape [lane_count, slot_count].
+        lane_path: Which path a lane follows, shape [lane_count].
+        starts: First row of each path and the row after the last, shape [path_count + 1].
+        depth, speed: The paths [m, m/s], one after another.
+        own: Effects from files, whose parameters `numbers` holds.
+
+    Returns:
+        Shape [lane_count, longest path]; 0 beyond a path's end.
+    """
+    ensure()
+    longest = int(np.diff(starts).max())
+    out = np.zeros((len(numbers), longest))
+    kernel = _kernels(tuple((effect.term, effect.push) for effect in own))[0]
+    kernel(np.ascontiguousarray(numbers), lane_path.astype(np.int32), starts.astype(np.int32), depth, speed, out)
+    return out
+
+
+def fall(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDArray[np.int32],
+         times: NDArray[np.float64], speeds: NDArray[np.float64],
+         own: tuple[OwnEffect, ...] = ()) -> NDArray[np.float64]:  # fmt: skip
+    """Motions of dropped spikes, at depth 0 at t = 0.
+
+    Args:
+        numbers: Shape [lane_count, slot_count].
+        lane_path: Which trial a lane is, shape [lane_count].
+        starts: As of `push`.
+        times: The trials' sample times [s], rising, one trial after another; before 0 in free flight.
+        speeds: Speed at the surface of each trial [m/s].
+        own: As of `push`.
+
+    Returns:
+        Depth [m], speed [m/s], acceleration [m/s2] and phase (place in `PHASES`), shape [lane_count, longest, 4]. NaN
+        depths where a motion leaves all bounds.
+    """
+    ensure()
+    longest = int(np.diff(starts).max())
+    out = np.zeros((len(numbers), longest, 4))
+    held = np.abs(numbers[:, _SLOT[_HELD]]) / numbers[:, _SLOT[_REACH]]
+    rate = np.sqrt((np.maximum(numbers[:, _SLOT["stiffness"]], 1e-9) + held) / numbers[:, _SLOT["mass"]])
+    rate += np.abs(numbers[:, _SLOT["damping"]]) / numbers[:, _SLOT["mass"]]
+    steps = np.minimum(_STEP, 0.05 / rate)
+    _kernels(tuple((effect.term, effect.push) for effect in own))[1](
+        np.ascontiguousarray(numbers), lane_path.astype(np.int32), starts.astype(np.int32), times, speeds, steps, out
+    )
+    return out
+
+
+_Own = tuple[tuple[Term, Push | None], ...]
+"""Effects from files: the term, and what its file says of the law of a push in the place of the term's hooks."""
+
+
+def _compiled(lines: Mapping[str, Sequence[str]], hooks: Mapping[str, Callable[..., Any]], name: str) -> list[Any]:
+    """Functions written out as text, a line a hook, as `rigid.model.model` does it for tumbles, compiled by Taichi.
+
+    `lines`: head of each function -> its lines; `hooks`: what they call.
+    """
+    import taichi as ti
+
+    names = {"ti": ti} | {key: for_taichi(hook, mobilised=for_taichi(mobilised)) for key, hook in hooks.items()}
+    text = "".join(f"def {head}:\n" + "".join(f"    {line}\n" for line in body) for head, body in lines.items())
+    file = f"<effects {name} {id(hooks):x}>"
+    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)  # where Taichi reads it
+    exec(compile(text, file, "exec"), names)
+    return [ti.func(names[head.partition("(")[0]]) for head in lines]
+
+
+def _changes(own: _Own) -> list[Any]:
+    """What the effects make of the loading curve, of where it is read on the way back, of the damper and the force."""
+    parts = [(effect, _SLOT) for effect in _LIBRARY]
+    at = len(SLOTS)
+    for term, law in own:
+        slots = [p.name for p in term.parameters] if law is None else _slots_of(law)
+        if law is not None:
+            parts.append((law, {slot: at + place for place, slot in enumerate(slots)}))
+        at += len(slots)
+    hooks: dict[str, Callable[..., Any]] = {}
+    calls: dict[str, list[str]] = {hook: [] for hook in _VALUES}
+    for place, (effect, columns) in enumerate(parts):
+        for hook, function in effect.law.items():
+            asked = inspect.signature(function).parameters
+            told = ", ".join(name if name in _VALUES[hook] else f"n[k, {columns[name]}]" for name in asked)
+            hooks[f"{hook}_{place}"] = function
+            calls[hook].append(f"{hook}_{place}({told})")
+    n = "n: ti.template(), k"
+    return _compiled({
+        f"loading_changed(before, depth, x, {n})":
+            ["grown = before", *(f"grown = {call}" for call in calls["loading"]), "return grown"],
+        f"unload_changed(z, ever, stiffness, {n})":
+            ["at = z", "stiff = 0.0", "bent = 1.0", *(f"at, stiff, bent = {call}" for call in calls["unload"]),
+             "return at, stiff, bent"],
+        f"damper_changed(spring, {n})":
+            ["factor = 1.0", *(f"factor = factor * {call}" for call in calls["damper"]), "return factor"],
+        f"force_changed(before, {', '.join(_HERE)}, {n})":
+            ["total = before", *(f"total = total + {call}" for call in calls["force"]),
+             *(f"total = total - {call}" for call in calls["pull"]), "return total"],
+    }, hooks, "of the library" + "".join(f"+{term.id}" for term, _ in own))  # fmt: skip
+
+
+def _own_changes(own: _Own) -> list[Any]:
+    """What the terms of effects from files make of the spring's force, and the force that they add."""
+    hooks: dict[str, Callable[..., Any]] = {}
+    spring, force = ["force = spring"], ["total = 0.0"]
+    at = len(SLOTS)
+    for place, (term, law) in enumerate(own):
+        if law is not None:
+            at += len(_slots_of(law))
+            continue
+        column = {p.name: f"n[k, {at + number}]" for number, p in enumerate(term.parameters)}
+        at += len(term.parameters)
+        for hook, function in term.hooks.items():
+            hooks[f"{hook}_{place}"] = function
+            told = "".join(f", {column[argument]}" for argument in term.arguments(hook))
+            if hook == "stiffen":
+                spring.append(f"force, work = stiffen_{place}(z, force, 0.0{told})")
+            elif hook == "rate_force":
+                force.append(f"total = total + rate_force_{place}(s, z, v{told})")
+            else:
+                force += [f"pull, held = hold_{place}(s, z, most{told})", "total = total - pull"]
+    return _compiled({
+        "own_spring(s, z, spring, n: ti.template(), k)": [*spring, "return force"],
+        "own_force(s, z, v, most, n: ti.template(), k)": [*force, "return total"],
+    }, hooks, "+".join(term.id for term, _ in own) or "none")  # fmt: skip
+
+
+def _functions(own: _Own) -> tuple[Any, Any]:
+    """The force on a spike, and the share of its bound that a friction has which takes a way to turn round."""
+    import taichi as ti
+
+    State = ti.types.struct(**dict.fromkeys(STATE_FIELDS, ti.f64))
+    loading_changed, unload_changed, damper_changed, force_changed = _changes(own)
+    own_spring, own_force = _own_changes(own)
+    OWN = any(law is None for _, law in own)
+    MASS, GRAVITY, STIFFNESS, DAMPING = (_SLOT[name] for name in ("mass", "gravity", "stiffness", "damping"))
+    REFERENCE, RADIUS_DEPTH, HELD, REACH = (_SLOT[name] for name in ("reference", "radius_depth", _HELD, _REACH))
+
+    @ti.func
+    def loading(z: ti.f64, n: ti.template(), k: ti.i32) -> ti.f64:
+        depth = ti.max(z, 0.0)
+        grown = loading_changed(n[k, STIFFNESS] * depth, depth, depth / n[k, REFERENCE], n, k)
+        return grown if depth > 0.0 else 0.0
+
+    @ti.func
+    def taken(z: ti.f64, way: ti.f64, turn_z: ti.f64, turn_w: ti.f64, n: ti.template(), k: ti.i32) -> ti.f64:
+        """Share of the friction's bound at z, from `turn_w` at `turn_z` on, where the way last turned."""
+        return way + (turn_w - way) * ti.exp(-ti.abs(z - turn_z) / n[k, REACH])
+
+    @ti.func
+    def force(
+        z: ti.f64, v: ti.f64, way: ti.f64, top: ti.f64, deepest: ti.f64, turn_z: ti.f64, turn_w: ti.f64,
+        n: ti.template(), k: ti.i32,
+    ) -> ti.f64:  # fmt: skip
+        total = 0.0
+        if z > 0.0:
+            most, ever = ti.max(top, z), ti.max(deepest, z)
+            # Where the loading curve is read, what is taken off it, and by how much it bends.
+            at, stiff, bent = unload_changed(z, ever, n[k, STIFFNESS], n, k)
+            spring = ti.max(loading(at, n, k) * bent - stiff, 0.0)
+            if ti.static(OWN):
+                s = State(mass=n[k, MASS], gravity=n[k, GRAVITY], weight=n[k, MASS] * n[k, GRAVITY], y=-z, vy=-v)
+                spring = own_spring(s, z, spring, n, k)
+            total = spring
+            total += n[k, DAMPING] * ti.max(v, 0.0) * damper_changed(spring, n, k)
+            share = 0.0
+            if n[k, HELD] != 0.0:
+                share = taken(z, way, turn_z, turn_w, n, k)
+            reference, radius_depth = n[k, REFERENCE], n[k, RADIUS_DEPTH]
+            total = force_changed(total, z, v, z / reference, way, share, most, ever, reference, radius_depth, n, k)
+            if ti.static(OWN):
+                s = State(mass=n[k, MASS], gravity=n[k, GRAVITY], weight=n[k, MASS] * n[k, GRAVITY], y=-z, vy=-v)
+                total += own_force(s, z, v, most, n, k)
+        return total
+
+    return force, taken
+
+
+@lru_cache(maxsize=8)
+def _kernels(own: _Own) -> tuple[Any, Any]:
+    import taichi as ti
+
+    force, taken = _functions(own)
+    MASS, GRAVITY, SPEED_SCALE, SETTLED = _SLOT["mass"], _SLOT["gravity"], _SLOT["speed_scale"], _SETTLED
+    SHIFT_DEPTH, SHIFT_ROW, SHIFT_SPEED = (_SLOT[name] for name in ("shift_depth", "shift_row", "shift_speed"))
+    Table = ti.types.ndarray(dtype=ti.f64, ndim=2)
+    Line = ti.types.ndarray(dtype=ti.f64, ndim=1)
+    Whole = ti.types.ndarray(dtype=ti.i32, ndim=1)
+    Cube = ti.types.ndarray(dtype=ti.f64, ndim=3)
+
+    @ti.kernel
+    def push_all(numbers: Table, lane_path: Whole, starts: Whole, depth: Line, speed: Line, out: Table):
+        for k in range(numbers.shape[0]):  # type: ignore[attr-defined]
+            path = lane_path[k]
+            top, deepest = 0.0, 0.0
+            before, share = 0.0, 0.0
+            for row in range(starts[path], starts[path + 1]):
+                z, v = depth[row] + numbers[k, SHIFT_DEPTH], speed[row] + numbers[k, SHIFT_SPEED]
+                if z <= 0.0:
+                    top, before, share = 0.0, 0.0, 0.0
+                else:
+                    share = taken(z, 1.0 if z > before else -1.0, before, share, numbers, k)
+                    before = z
+                top, deepest = ti.max(top, z), ti.max(deepest, z)
+                way = ti.tanh(v / numbers[k, SPEED_SCALE])
+                here = z + numbers[k, SHIFT_ROW]
+                out[k, row - starts[path]] = force(here, v, way, top, deepest, z, share, numbers, k)
+
+    @ti.kernel
+    def fall_all(numbers: Table, lane_path: Whole, starts: Whole, times: Line, speeds: Line, steps: Line, out: Cube):
+        for k in range(numbers.shape[0]):  # type: ignore[attr-defined]
+            path = lane_path[k]
+            m, g = numbers[k, MASS], numbers[k, GRAVITY]
+            z, v, t, way = 0.0, speeds[path], 0.0, 1.0
+            top, deepest = 0.0, 0.0
+            turn_z, turn_w = 0.0, 0.0
+            inside, resting = 1, 0
+            for row in range(starts[path], starts[path + 1]):
+                until, at = times[row], row - starts[path]
+                if until < 0.0:
+                    out[k, at, 0] = speeds[path] * until + 0.5 * g * until * until
+                    out[k, at, 1] = speeds[path] + g * until
+                    out[k, at, 2] = g
+                else:
+                    # A step is tried; where something happens within it, halving finds when, and the step ends there.
+                    low, high, halvings, turns = 0.0, 0.0, 0, 0
+                    while resting == 0 and (halvings > 0 or until - t > 1e-12) and turns < 1000000:
+                        turns += 1
+                        dt = 0.5 * (low + high)
+                        if halvings == 0:
+                            dt = ti.min(steps[k], until - t)
+                        elif halvings > 40:
+                            dt = high
+                        # One Runge-Kutta step.
+                        zs, vs, z1, v1, share = z, v, z, v, 0.0
+                        for stage in range(4):
+                            a = g
+                            if inside == 1:
+                                a = g - force(ti.max(zs, 1e-300), vs, way, top, deepest, turn_z, turn_w, numbers, k) / m
+                            weight = dt / 6.0 if stage == 0 or stage == 3 else dt / 3.0
+                            z1 += weight * vs
+                            v1 += weight * a
+                            share = dt if stage == 2 else 0.5 * dt
+                            zs, vs = z + share * vs, v + share * a
+                        turned = inside == 1 and way * v1 < 0.0 and way * v >= 0.0
+                        crossed = (inside == 1 and z1 < 0.0) or (inside == 0 and z1 > 0.0)
+                        ended = True
+                        if halvings <= 40:
+                            if turned or crossed:
+                                high, ended = dt, False
+                            elif halvings > 0:
+                                low, ended = dt, False
+                            if not ended:
+                                halvings += 1
+                        if ended:
+                            found = halvings > 40
+                            z, v = z1, v1
+                            t += dt
+                            low, high, halvings = 0.0, 0.0, 0
+                            if inside == 1:
+                                top, deepest = ti.max(top, z), ti.max(deepest, z)
+                            if found and crossed:
+                                z = 0.0
+                                if inside == 1:
+                                    inside, top = 0, 0.0
+                                else:
+                                    inside, way = 1, 1.0
+                                    # On what bears it at the surface it would hop for ever, ever less.
+                                    bears = force(1e-300, 0.0, 1.0, 0.0, deepest, 0.0, 0.0, numbers, k)
+                                    if v < SETTLED and bears > m * g:
+                                        v, resting = 0.0, 1
+                                turn_z, turn_w = 0.0, 0.0
+                            elif found and turned:
+                                v = 0.0
+                                turn_z, turn_w = z, taken(z, way, turn_z, turn_w, numbers, k)
+                                down, up = 0.0, 0.0
+                                for side in range(2):
+                                    tried = 1.0 - 2.0 * side
+                                    a = g - force(z, 0.0, tried, top, deepest, turn_z, turn_w, numbers, k) / m
+                                    if side == 0:
+                                        down = a
+                                    else:
+                                        up = a
+                                if down <= 0.0 and up >= 0.0:
+                                    resting = 1
+                                else:
+                                    way = -1.0 if up < 0.0 and (way > 0.0 or down <= 0.0) else 1.0
+                            if not (ti.abs(z) < 1e3 and ti.abs(v) < 1e4):
+                                resting = 2
+                    if resting == 2:
+                        out[k, at, 0] = ti.math.nan
+                    else:
+                        pushed = 0.0
+                        if inside == 1 and resting == 0:
+                            pushed = force(z, v, way, top, deepest, turn_z, turn_w, numbers, k)
+                        out[k, at, 0] = z
+                        out[k, at, 1] = v
+                        out[k, at, 2] = 0.0 if resting == 1 else g - pushed / m
+                        out[k, at, 3] = 2.0 if resting == 1 else (0.0 if inside == 0 else (1.0 if v > 0.0 else 3.0))
+
+    return push_all, fall_all

@@ -1,0 +1,76 @@
+"""What an engineer also says of driven trials: K and its spread, how it goes with the diameter, if C can be told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.diagnose.fit.gaps import numeral
+from experiments.diagnose.fit.problem import Array
+
+__all__ = ["Push", "remarks"]
+
+
+@dataclass(frozen=True)
+class Push:
+    """One driven trial: where it was, what it felt, and what the model without a damper says; shapes [n]."""
+
+    diameter: float
+    depth: Array
+    speed: Array
+    force: Array
+    spring: Array
+    """Force of the best model with C = 0 [N]."""
+
+
+def remarks(pushes: Sequence[Push], added: Sequence[str]) -> list[str]:
+    """Sentences. `added`: names of what the best model has beyond the base."""
+    if not pushes:
+        return []
+    said = _stiffness(pushes)
+    straight = [_two(push, lambda p: np.maximum(p.depth, 0.0)) for push in pushes]
+    bent = [_two(push, lambda p: p.spring) for push in pushes] if added else []
+    unsure = len({c > 0 for _, c, _ in straight + bent}) > 1 or any(abs(c) < 2 * s for _, c, s in straight + bent)
+    if not unsure:
+        return said
+    said.append(
+        "C cannot be told from these pushes: fitted to each alone beside a straight spring it is "
+        + _range([c for _, c, _ in straight])
+        + (f", and beside {' and '.join(added)} {_range([c for _, c, _ in bent])}" if bent else "")
+        + ". A drop, or the same push at a tenth and at ten times the speed, would tell."
+    )
+    return said
+
+
+def _stiffness(pushes: Sequence[Push]) -> list[str]:
+    by_size: dict[float, list[float]] = {}
+    for push in pushes:
+        z = np.maximum(push.depth, 0.0)
+        by_size.setdefault(push.diameter, []).append(float(z @ push.force / max(float(z @ z), 1e-300)))
+    parts = []
+    for size, found in sorted(by_size.items()):
+        spread = f" +- {numeral(float(np.std(found, ddof=1)), 2)}" if len(found) > 1 else ""
+        parts.append(f"{numeral(float(np.mean(found)), 4)}{spread} N/m at {1e3 * size:g} mm ({len(found)})")
+    said = [f"K of a straight spring, push by push (number of pushes): {', '.join(parts)}."]
+    if len(by_size) > 2:
+        sizes = np.log(sorted(by_size))
+        means = np.log([max(float(np.mean(by_size[size])), 1e-300) for size in sorted(by_size)])
+        said.append(f"It goes with the diameter to the power {np.polyfit(sizes, means, 1)[0]:.2f}.")
+    return said
+
+
+def _two(push: Push, spring: Callable[[Push], Array]) -> tuple[float, float, float]:
+    """Factor on the spring, C [N s/m] and its standard error, by least squares; the error from what is left."""
+    columns = np.column_stack([spring(push), np.maximum(push.speed, 0.0)])
+    found, _, _, _ = np.linalg.lstsq(columns, push.force, rcond=None)
+    rest = push.force - columns @ found
+    covariance = np.linalg.pinv(columns.T @ columns) * float(rest @ rest) / max(len(rest) - 2, 1)
+    return float(found[0]), float(found[1]), float(np.sqrt(max(covariance[1, 1], 0.0)))
+
+
+def _range(values: Sequence[float]) -> str:
+    low, high = min(values), max(values)
+    signs = "negative in every one" if high < 0 else "positive in every one" if low > 0 else "of either sign"
+    return f"{numeral(low)} to {numeral(high)} N s/m, {signs}"

@@ -1,0 +1,254 @@
+"""A diagnosis as files: diagnosis.json, model.toml, latent.csv, and the series and tables that the report is made of.
+
+```
+diagnosis.json       the contract (diagnosis.schema.json beside this file), and how sure, in `evidence` and `gate`
+model.toml           the model with what was added: `hedgebed tumble --model` and `penetrate --model` run it
+latent.csv           where the verdict is unknown: what the model lacks, row by row
+evidence.csv         every candidate: its score, and the chi-square a sample that it leaves beyond what noise makes
+series/<trial>.<channel>.csv    t_s,measured,before,after,std,std_after,phase (as the gap takes it) and scatter
+```
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.diagnose.core.effect_equations import SYMBOLS, equations_of, with_comments
+from experiments.diagnose.core.outcome import Diagnosis
+from experiments.diagnose.core.scatter_gap import gap_with_scatter, scatter_std, sensor_std
+from experiments.diagnose.core.sizes import effect_sizes
+from experiments.diagnose.fit.evidence import excess, inflation
+from experiments.diagnose.fit.fitting import Fit
+from experiments.diagnose.fit.gaps import Gaps
+from experiments.diagnose.fit.localise import phases_of
+from experiments.diagnose.fit.problem import Form
+from experiments.diagnose.noise.spectrum import line_rows
+from experiments.runs.folder import write_json, write_series, write_text
+
+from .candidates import candidate_rows
+from .telling import PhaseTable, valid_residuals
+
+__all__ = ["document", "write_diagnosis"]
+
+
+def document(found: Diagnosis) -> dict[str, Any]:
+    """diagnosis.json."""
+    effects = [{"id": effect, "parameters": found.parameters(effect)} for effect in found.effects]
+    settings = {trial.id: dict(trial.settings) for trial in found.problem.trials}
+    said: dict[str, Any] = {
+        "format": "hedgehog-diagnosis/1",
+        "verdict": found.verdict,
+        "effects": effects,
+        "alternatives": list(found.alternatives) if found.verdict == "ambiguous" else [],
+        "where": [
+            {"trial": p.trial, "channel": p.channel, "phase": p.phase, "from_s": p.from_s, "to_s": p.to_s,
+             "excess": p.excess, "settings": settings[p.trial]}
+            for p in found.where
+        ],
+        "gap": {
+            "before": {"fit": found.before.fit, "held_out": found.before.held_out},
+            "after": {"fit": found.after.fit, "held_out": found.after.held_out},
+            "held_out_trials": list(found.held_out),
+        },
+    }  # fmt: skip
+    weighed = gap_with_scatter(found)
+    if weighed is not None:
+        said["gap_with_scatter"] = {
+            stage: {"fit": pair[0], "held_out": pair[1]}
+            for stage, pair in (("before", weighed.before), ("after", weighed.after))
+        } | {
+            "after_std": {"fit": weighed.after_std[0], "held_out": weighed.after_std[1]},
+            "freedom": weighed.freedom,
+        }  # fmt: skip
+    if found.verdict == "unknown":
+        said["leading"] = _leading(found)
+        said["left"] = [
+            {"trial": p.trial, "channel": p.channel, "phase": p.phase, "from_s": p.from_s, "to_s": p.to_s,
+             "excess": p.excess}
+            for p in found.left
+        ]  # fmt: skip
+        said["latent"] = {"file": "latent.csv", "depends_on": found.depends_on, "explained": dict(found.shares),
+                          "lines": line_rows(found.lines)}  # fmt: skip
+    said["base"] = _base_values(found)
+    said["gate"] = {
+        "before": {"passed": found.gate_before.passed, "score": found.gate_before.score,
+                   "threshold": found.gate_before.threshold},
+        "after": {"passed": found.gate_after.passed, "score": found.gate_after.score,
+                  "threshold": found.gate_after.threshold},
+    }  # fmt: skip
+    if found.gate_held_out is not None:
+        said["gate"]["held_out"] = {"passed": found.gate_held_out.passed, "score": found.gate_held_out.score,
+                                    "threshold": found.gate_held_out.threshold}  # fmt: skip
+    said["at_bounds"] = {
+        stage: [{"parameter": b.parameter, "value": b.value, "unit": b.unit, "sigmas": b.sigmas, "at_bound": b.at_bound}
+                for b in bounds]
+        for stage, bounds in (("before", found.bounds_before), ("after", found.bounds_after))
+    }  # fmt: skip
+    said["evidence"] = _evidence(found)
+    said["evidence_base"] = _evidence_base(found)
+    said["sizes"] = effect_sizes(found)
+    said["remarks"] = list(found.remarks)
+    said["equations"] = _equations(found)
+    said["symbols"] = SYMBOLS if found.problem.kind == "penetration" and found.forms else ""
+    said["equivalence"] = _equivalence(found)
+    said["candidates"] = candidate_rows(said)
+    said["noise"] = _noise(found)
+    said["model_std"] = dict(found.model_std)
+    said["findings"] = [
+        {"trial": f.trial, "what": f.what, "channel": f.channel, "from_s": f.from_s, "to_s": f.to_s,
+         "set_aside": f.set_aside, "doubt": f.doubt}
+        for f in found.findings
+    ]  # fmt: skip
+    said["next_experiment"] = found.next_experiment
+    return said
+
+
+def _equations(found: Diagnosis) -> list[dict[str, Any]]:
+    """The laws of the best model's effects, and the units of their parameters."""
+    problem, values = found.problem, found.best_values
+
+    def units(form: Form) -> dict[str, str]:
+        return {name: unit for name, (_, unit) in problem.reported(values, form).items()}
+
+    return equations_of(problem.kind, found.forms, units)
+
+
+def _equivalence(found: Diagnosis) -> list[dict[str, Any]]:
+    """The first effect against the nearest other names: what the evidence, the design and prediction say."""
+    if not found.equivalence:
+        return []
+    first = found.best.model.forms[0]
+    mine = found.predicted
+    rows = [{"effect": found.effects[0], "left_out": None if mine is None else mine.per_sample}]
+    for rival in found.equivalence:
+        form = next(f for f in rival.hypothesis.forms if f.effect == rival.effect)
+        rows.append({
+            "effect": rival.effect, "told_apart": not rival.same, "evidence_behind": rival.behind,
+            "left_out_behind": rival.behind_left_out,
+            "left_out": None if rival.predicted is None else rival.predicted.per_sample,
+            "angle_deg": rival.angle, "distance": rival.distance, "expected": rival.expected,
+            "what_would_tell": found.problem.next_experiment(first, form, found.best.values),
+        })  # fmt: skip
+    return rows
+
+
+def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
+    """Write all files into `folder` and return diagnosis.json."""
+    problem = found.problem
+    said = document(found)
+    if found.verdict == "unknown":
+        write_series(folder / "latent.csv", found.latent())
+    path = folder / "model.toml"
+    problem.write_model(str(path), found.best_values, found.forms)
+    commented = with_comments(path.read_text(encoding="utf-8"), said["equations"], problem.kind)
+    write_text(path, commented)
+    rows = _evidence(found)
+    if rows:
+        write_series(folder / "evidence.csv", {
+            "candidate": np.array([r["candidate"] for r in rows]),
+            "effects": np.array([" + ".join(r["effects"]) for r in rows]),
+            "score": np.array([r["score"] for r in rows]),
+            "excess_per_sample": np.array([r["left"] for r in rows]),
+        })  # fmt: skip
+    phase_table, gaps = PhaseTable(), Gaps()
+    for trial in problem.trials:
+        before = problem.compare(found.base_values, (), trial.id)
+        after = problem.compare(found.best_values, found.forms, trial.id)
+        samples = problem.samples(trial.id)
+        phases = phases_of(problem, found.base_values, (), trial.id)
+        wide = scatter_std(problem, found.model_std, found.best_values, found.forms, trial.id)
+        noises = [sensor_std(problem, found.base_values, (), trial.id),
+                  sensor_std(problem, found.best_values, found.forms, trial.id)]  # fmt: skip
+        for channel, columns in before.items():
+            if not len(columns["t_s"]):  # a sensor that recorded nothing
+                continue
+            rows_here = samples.channel == channel
+            columns = {"t_s": columns["t_s"], "measured": columns["measured"], "before": columns["model"],
+                       "after": after[channel]["model"]}  # fmt: skip
+            if len(columns["t_s"]) == int(rows_here.sum()):
+                first, last = (noise[channel] for noise in noises)
+                columns |= {"std": first, "std_after": last, "phase": phases[rows_here]}
+                if found.model_std:
+                    columns["scatter"] = wide[channel]
+                rest = [columns["measured"] - columns[stage] for stage in ("before", "after")]
+                held = trial.id in found.held_out
+                phase_table.add(channel, phases[rows_here], valid_residuals(rest[0], first),
+                                valid_residuals(rest[1], last), held_out=held)  # fmt: skip
+                gaps.add(trial.id, channel, columns["t_s"], rest[0], rest[1], first, last, settings=trial.settings,
+                         held_out=held)  # fmt: skip
+            write_series(folder / "series" / f"{trial.id}.{channel}.csv", columns)
+    said["by_phase"] = phase_table.rows
+    said["by_channel"], said["by_condition"], said["parted"] = gaps.by_channel, gaps.by_condition, gaps.parted
+    write_json(folder / "diagnosis.json", said)
+    return said
+
+
+def _noise(found: Diagnosis) -> dict[str, dict[str, float]]:
+    """Of the channels whose noise is not as stated: its size over the stated one, how it persists, and its clock."""
+    noise = {c.channel: {"std": c.std, "persistence": c.persistence} for c in found.colours.values()}
+    for jitter in found.jitters:
+        for channel in jitter.channels:
+            noise.setdefault(channel, {"std": 1.0, "persistence": 0.0})["time_jitter_s"] = jitter.std
+    return noise
+
+
+def _base_values(found: Diagnosis) -> dict[str, Any]:
+    """The base parameters before and after, with their standard errors."""
+    result = {}
+    for stage, fit in (("before", found.base), ("after", found.best)):
+        variance = np.diag(fit.covariance(inflation=inflation(fit)))
+        names = [p.name for p in fit.model.parameters]
+        result[stage] = {
+            p.name: {"value": fit.values[p.name], "std": float(np.sqrt(max(variance[names.index(p.name)], 0.0))),
+                     "unit": p.unit}
+            for p in found.problem.base if p.trial is None and p.name in names
+        }  # fmt: skip
+    return result
+
+
+def _evidence(found: Diagnosis) -> list[dict[str, Any]]:
+    """Every candidate that was tried, the likeliest first; scores relative to the base model [nats]."""
+    if found.choice is None:
+        return []
+    zero, whole = found.choice.base.score, _beyond_noise(found.choice.base.fit)
+    seen: dict[tuple[str, ...], dict[str, Any]] = {}
+    for _, hypothesis in found.choice.table:
+        ids = [form.id for form in hypothesis.forms]
+        key = tuple(sorted(ids))  # in whatever order they were added
+        row = {"candidate": " + ".join(ids), "effects": list(hypothesis.effects), "score": hypothesis.score - zero,
+               "left": _beyond_noise(hypothesis.fit),
+               "closes": 1 - _beyond_noise(hypothesis.fit) / whole if whole > 0 else None}  # fmt: skip
+        if key not in seen or row["score"] > seen[key]["score"]:
+            seen[key] = row
+    return sorted(seen.values(), key=lambda row: -row["score"])
+
+
+def _beyond_noise(fit: Fit) -> float:
+    """Chi-square a sample beyond the noise that a fit leaves of the fitted trials."""
+    return float(excess(fit) / fit.count)
+
+
+def _evidence_base(found: Diagnosis) -> dict[str, Any]:
+    """What the base model leaves in the same units; were candidates weighed against what replicates differ by?"""
+    if found.choice is None:
+        return {}
+    base = found.choice.base.fit
+    return {"left": _beyond_noise(base), "with_scatter": bool(getattr(base.model.problem, "calmed", {}))}
+
+
+def _leading(found: Diagnosis) -> dict[str, Any]:
+    """The candidate that explains most where something has no name: what it closes, and how sure it is."""
+    if found.choice is None or not found.choice.best.effects:
+        return {"effects": [], "certain": [], "nearest": None}
+    rivals = found.choice.rivals
+    near = min(rivals, key=lambda rival: rival.behind) if rivals else None
+    return {
+        "effects": list(found.choice.best.effects), "certain": list(found.effects),
+        "parameters": {effect: found.parameters(effect) for effect in found.choice.best.effects},
+        "nearest": None if near is None else {
+            "effect": near.effect, "evidence_behind": near.behind, "angle_deg": near.angle,
+            "told_apart": not near.same},
+    }  # fmt: skip

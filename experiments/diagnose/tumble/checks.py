@@ -1,0 +1,270 @@
+"""Data that are wrong: found, said, and set aside before anything is fitted.
+
+Looked at without a model: the marker of the camera that jumps for a while or for good (a step that no motion makes),
+a clock that jumps forward, long gaps. What needs the model (a trial at odds with its replicates) is the
+statistics' affair.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from experiments.diagnose.fit.problem import Finding
+from experiments.diagnose.noise.lags import find_lag, pieces
+from experiments.diagnose.noise.stuck import clipped, clipped_wheel, stuck_rows
+
+from .data import CHANNELS, TrialData, TumbleData
+from .spikes import spikes
+
+__all__ = ["checked"]
+
+_FAR = 12.0  # stds of the sensor: white noise does not get there
+_SHARE = 0.5  # of a channel's rows; more of them are not set aside
+_NEAR = 8  # rows on either side that tell how much a row usually changes
+_STEEP = 6.0  # times the usual change
+_AROUND = 8  # rows at least, on either side of a gap, from which a slope is taken
+_SPAN = 0.08  # s that they cover
+_SURE = 25.0  # squared standard deviations by which a clock that is right must be off
+_SENSORS = {"the camera": ("theta", "x", "y"), "the IMU": ("gyro",), "the wheel": ("wheel",)}  # what is smooth
+_ALL = {"the camera": ("theta", "x", "y"), "the IMU": ("gyro", "ax", "ay"), "the wheel": ("wheel",)}
+_END = 0.1  # s by which a channel must be shorter than the others to be said
+_MOVED = 0.02  # s by which a clock must have jumped to be told from the motion on either side
+_OFTEN = 4  # times that a marker may be lost before nothing is set aside where half of the rows would be
+
+
+def checked(data: TumbleData) -> tuple[TumbleData, list[Finding]]:
+    """The data without rows that cannot be, and what was found."""
+    findings: list[Finding] = []
+    trials = []
+    alone, said = spikes(data.trials)
+    findings += said
+    for trial in data.trials:
+        keep = np.ones(len(trial.time), dtype=bool)
+        keep[alone.get(trial.id, [])] = False
+        _clocks(trial, keep, findings)
+        for number, name in enumerate(CHANNELS):
+            mine = np.flatnonzero((trial.channel == number) & keep)
+            if len(mine) < 8:
+                continue
+            _gaps(trial, name, mine, findings)
+            _ends(trial, name, keep, findings)
+            values = trial.value[mine]
+            for end in clipped(values) if name != "wheel" else clipped_wheel(values, float(trial.std[mine[0]])):
+                keep[mine[end.rows]] = False
+                findings.append(Finding(
+                    trial=trial.id, channel=name, from_s=float(trial.time[mine[end.rows[0]]]),
+                    to_s=float(trial.time[mine[end.rows[-1]]]), set_aside=True,
+                    what=f"{len(end.rows)} readings of {name} {end.words}",
+                ))  # fmt: skip
+            mine = mine[keep[mine]]
+            if len(mine) < 8:
+                continue
+            stuck = stuck_rows(trial.value[mine]) if name != "wheel" else mine[:0]  # in a hop it turns evenly
+            if len(stuck):
+                keep[mine[stuck]] = False
+                findings.append(Finding(
+                    trial=trial.id, channel=name, from_s=float(trial.time[mine[stuck[0]]]),
+                    to_s=float(trial.time[mine[stuck[-1]]]), set_aside=True,
+                    what=f"{len(stuck)} rows of {name} repeat the one before where it never does otherwise: the sensor "
+                    f"is stuck, they are set aside",
+                ))  # fmt: skip
+                mine = np.delete(mine, stuck)
+            if name in ("x", "y", "theta"):
+                _jumps(trial, name, mine, keep, findings)
+        lost = {name: trial.time[trial.of(name) & ~keep] for name in ("x", "y", "theta")}
+        together = np.unique(np.concatenate(list(lost.values())))
+        if len(together):  # a marker that is lost for one is lost for all three
+            camera = trial.of("x") | trial.of("y") | trial.of("theta")
+            keep &= ~(camera & np.isin(trial.time, together))
+        kept = {field: getattr(trial, field)[keep] for field in ("time", "value", "std", "channel")}
+        trials.append(trial if keep.all() else replace(trial, **kept))
+    return replace(data, trials=tuple(trials)), findings
+
+
+def _jumps(
+    trial: TrialData, name: str, mine: NDArray[np.intp], keep: NDArray[np.bool_], findings: list[Finding]
+) -> None:
+    """Rows between two opposite steps that no motion makes, however far apart, and the shorter side of a step that is
+    never taken back."""
+    time, value, std = trial.time[mine], trial.value[mine], trial.std[mine[0]]
+    steps_in_time = np.diff(time)
+    lost = np.maximum(steps_in_time / max(float(np.median(steps_in_time)), 1e-12), 1.0)
+    change = np.diff(value) / lost  # where rows are missing the motion has gone on
+    size = np.abs(change)
+    usual = median_filter(size, size=2 * _NEAR + 1, mode="nearest")
+    steps = np.flatnonzero(size > _FAR * np.sqrt(2) * std + _STEEP * usual)
+    odd = np.zeros(len(mine), dtype=bool)
+    k = times = 0
+    while k < len(steps):
+        here = steps[k]
+        back = next((e for e in steps[k + 1 :] if abs(change[e] + change[here]) < 0.5 * size[here]), None)
+        times += 1
+        if back is None:
+            after = time > time[here]
+            odd |= after if after.mean() <= 0.5 else ~after
+            k += 1
+        else:
+            odd[here + 1 : back + 1] = True
+            k = int(np.searchsorted(steps, back)) + 1
+    if not odd.any():
+        return
+    if odd.mean() > _SHARE and times > _OFTEN:
+        findings.append(
+            Finding(
+                trial=trial.id,
+                channel=name,
+                what=f"{name} jumps so often that {100 * odd.mean():.0f} % of its rows would be lost: kept",
+            )
+        )
+        return
+    keep[mine[odd]] = False
+    when = time[odd]
+    findings.append(
+        Finding(
+            trial=trial.id,
+            channel=name,
+            from_s=float(when[0]),
+            to_s=float(when[-1]),
+            set_aside=True,
+            what=f"{int(odd.sum())} row(s) of {name} stand apart by a jump that no motion makes (the camera lost its "
+            f"marker): set aside",
+        )
+    )
+
+
+def _clocks(trial: TrialData, keep: NDArray[np.bool_], findings: list[Finding]) -> None:
+    """All rows of a sensor from the moment on at which its clock jumps forward while the motion does not.
+
+    On either side of a gap a straight line is fitted to each of the sensor's channels that are smooth. A clock that is
+    right takes the value on by slope x gap; one that jumped, by slope x the usual step.
+    """
+    for sensor, names in _SENSORS.items():
+        told = [np.flatnonzero(trial.of(name)) for name in names if trial.of(name).sum() > 2 * _AROUND]
+        if not told:
+            continue
+        clock = np.unique(trial.time[told[0]])
+        if len(clock) < 3:
+            continue
+        steps = np.diff(clock)
+        usual = float(np.median(steps))
+        for k in np.flatnonzero(steps > max(4 * usual, 2e-3)):
+            surprise = np.array([_surprise(trial, mine, clock[k], clock[k + 1], usual) for mine in told])
+            good = np.isfinite(surprise).all(axis=1)
+            right, jumped = surprise[good].sum(axis=0) if good.any() else (0.0, 0.0)
+            if right < _SURE or jumped > 0.05 * right or jumped > 16.0 * good.sum():
+                continue
+            whole = np.isin(trial.channel, [CHANNELS.index(name) for name in _ALL[sensor]])
+            keep &= ~(whole & (trial.time > clock[k]))
+            findings.append(Finding(
+                trial=trial.id, channel=names[0], from_s=float(clock[k + 1]), to_s=float(clock[-1]), set_aside=True,
+                what=f"the clock of {sensor} jumps forward by {steps[k] - usual:.3g} s while the motion goes on as if "
+                f"it had not: all that follows is set aside",
+            ))  # fmt: skip
+            break
+    _clocks_apart(trial, keep, findings)
+
+
+def _clocks_apart(trial: TrialData, keep: NDArray[np.bool_], findings: list[Finding]) -> None:
+    """The same for camera and IMU, told from one another: the angle is late against the gyro from a gap on."""
+    angle, rate = (np.flatnonzero(trial.of(name) & keep) for name in ("theta", "gyro"))
+    if not len(angle) or not len(rate):
+        return
+    std = (float(trial.std[angle[0]]), float(trial.std[rate[0]]))
+
+    def between(angle: NDArray[np.intp], rate: NDArray[np.intp], near: float) -> tuple[float, bool]:
+        """The lag, and whether it is another than `near`, which it else is."""
+        found = find_lag(
+            trial.time[angle], trial.value[angle], trial.time[rate], trial.value[rate], std=std, near=near
+        )  # fmt: skip
+        return (near, False) if found is None or not found.is_another else (found.value, True)
+
+    for sensor, rows, sign in (("the IMU", rate, -1.0), ("the camera", angle, 1.0)):
+        parts = [rows[low:high] for low, high in pieces(trial.time[rows])]
+        first: float | None = None
+        for number, part in enumerate(parts):
+            seen, felt = (angle, part) if sensor == "the IMU" else (part, rate)
+            lag, another = between(seen, felt, first or 0.0)
+            if first is None:
+                first = lag
+                continue
+            jumped = sign * (lag - first)
+            if not another or jumped < _MOVED:
+                continue
+            start = float(trial.time[part[0]])
+            before = float(trial.time[parts[number - 1][-1]])
+            whole = np.isin(trial.channel, [CHANNELS.index(name) for name in _ALL[sensor]])
+            keep &= ~(whole & (trial.time > before))
+            other = "camera's angle" if sensor == "the IMU" else "gyro"
+            findings.append(Finding(
+                trial=trial.id, channel=_SENSORS[sensor][0], from_s=start, to_s=float(trial.time[rows].max()),
+                set_aside=True,
+                what=f"the clock of {sensor} jumps forward by about {jumped:.2g} s while the motion, as the {other} "
+                f"has it, goes on as if it had not: all that follows is set aside",
+            ))  # fmt: skip
+            return
+
+
+def _surprise(
+    trial: TrialData, mine: NDArray[np.intp], before: float, after: float, usual: float
+) -> tuple[float, float]:
+    """Squared standard deviations by which the value after a gap is off, for a clock that is right and one that jumped.
+
+    NaN where the slopes on either side differ: then the gap tells nothing.
+    """
+    time, value, std = trial.time[mine], trial.value[mine], float(trial.std[mine[0]])
+    around = max(_AROUND, int(_SPAN / usual))
+    left, right = np.flatnonzero(time <= before)[-around:], np.flatnonzero(time >= after)[:around]
+    if min(len(left), len(right)) < around:
+        return np.nan, np.nan
+    one, two = np.polyfit(time[left] - before, value[left], 1), np.polyfit(time[right] - after, value[right], 1)
+    doubt = std * np.sqrt(12 / around) / (around * usual)  # of a slope
+    if abs(one[0] - two[0]) > 0.3 * max(abs(one[0]), abs(two[0])) + 4 * doubt:
+        return np.nan, np.nan
+    slope, moved = 0.5 * (one[0] + two[0]), two[1] - one[1]
+    place = 2 * std * np.sqrt(2 / around)  # of a line's end
+
+    def off(gap: float) -> float:
+        bend = 0.5 * abs(one[0] - two[0]) * gap
+        return float((moved - slope * gap) ** 2 / (place**2 + (doubt * gap) ** 2 + bend**2))
+
+    return off(after - before), off(usual)
+
+
+def _ends(trial: TrialData, name: str, keep: NDArray[np.bool_], findings: list[Finding]) -> None:
+    """A channel that begins later or ends earlier than what is kept of the others; not one whose clock is off, which
+    does both."""
+    time, whole = trial.time[trial.of(name)], trial.time[keep]
+    longest = max(float(np.ptp(own)) for other in CHANNELS if len(own := trial.time[trial.of(other) & keep]))
+    least = max(10 * float(np.median(np.diff(time))), _END)
+    first, last = float(whole.min()), float(whole.max())
+    if name == "wheel":  # before the torque it turns as is stated: a tachometer that starts with it misses nothing
+        first = max(first, 0.0)
+    for low, high, words in (
+        (first, float(time[0]), f"before {time[0]:.3g} s, others begin at {first:.3g} s"),
+        (float(time[-1]), last, f"after {time[-1]:.3g} s, others go on to {last:.3g} s"),
+    ):
+        if min(high - low, longest - float(np.ptp(time))) > least:
+            findings.append(Finding(trial=trial.id, channel=name, from_s=low, to_s=high,
+                                    what=f"{name} has no valid row {words}: the rest is used"))  # fmt: skip
+
+
+def _gaps(trial: TrialData, name: str, mine: NDArray[np.intp], findings: list[Finding]) -> None:
+    """Stretches without rows."""
+    time = trial.time[mine]
+    steps = np.diff(time)
+    usual = float(np.median(steps))
+    for k in np.flatnonzero(steps > max(10 * usual, 0.02)):
+        findings.append(
+            Finding(
+                trial=trial.id,
+                channel=name,
+                from_s=float(time[k]),
+                to_s=float(time[k + 1]),
+                what=f"{name} has no valid row for {steps[k]:.3g} s, where one every {usual:.3g} s is usual: kept as a "
+                f"gap (a clock that jumped forward looks the same)",
+            )
+        )

@@ -1,0 +1,68 @@
+"""What the model of a tumble lacks, as a force and a torque over time: `latent_columns`.
+
+At every row of the IMU, measured less modelled specific force, turned into the surface's axes by the measured attitude,
+times the inertia that resists (m along the surface, m + m_b along the normal in the rig); and J times the difference
+in angular acceleration, the slope of the gyro's difference over a few rows. Beside them stand the modelled motion, its
+state and the wheel, for whoever looks for what it depends on. Where model and measurement have gone apart, their states
+differ, and it is the sum of what is missing and of what follows from it; the first seconds tell most. A trial without
+an IMU has it from the camera's rows: inertia times the second derivative of measured less modelled place and angle.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.diagnose.fit.slopes import acceleration, slope
+
+from .data import CHANNELS, TrialData
+from .forward import Prediction
+
+__all__ = ["latent_columns"]
+
+Array = NDArray[np.float64]
+_ROWS = 5  # over which the slope of the gyro is taken
+
+
+def latent_columns(data: TrialData, prediction: Prediction, *, mass: float, inertia: float) -> dict[str, Array]:
+    """Columns of latent.csv for one trial, one row an IMU's row with all three readings, or the camera's where there is
+    none; empty without either.
+
+    Args:
+        data: the trial.
+        prediction: of one set of parameters, with its motion.
+        mass: of the platform [kg].
+        inertia: of the platform [kg m2].
+    """
+    shared, gap, rows = _gaps(data, prediction.value[0], ("gyro", "ax", "ay"))
+    felt = len(shared) > 0
+    if not felt:
+        shared, gap, rows = _gaps(data, prediction.value[0], ("x", "y", "theta"))
+    state, moved = prediction.state[0][rows], prediction.motion[0][rows]
+    if felt:
+        sine, cosine = np.sin(moved[:, 2]), np.cos(moved[:, 2])
+        # Body x in the world is (cos, -sin), body y (sin, cos).
+        along = gap["ax"] * cosine + gap["ay"] * sine
+        normal = gap["ay"] * cosine - gap["ax"] * sine
+        turning = slope(shared, gap["gyro"], rows=_ROWS)
+    else:
+        along, normal, turning = (acceleration(shared, gap[name]) for name in ("x", "y", "theta"))
+    names = ("x_m", "y_m", "theta_rad", "vx_m_s", "vy_m_s", "omega_rad_s", "wheel_rad_s")
+    return {
+        "t_s": shared,
+        "latent_force_x_N": mass * along,
+        "latent_force_y_N": (mass + data.counterweight) * normal,
+        "latent_torque_N_m": inertia * turning,
+        **{name: moved[:, k] for k, name in enumerate(names)},
+        "state": state.astype(float),
+    }
+
+
+def _gaps(data: TrialData, value: Array, names: tuple[str, ...]) -> tuple[Array, dict[str, Array], NDArray[np.intp]]:
+    """The times at which all of these channels were read, measured less modelled there, and the first one's rows."""
+    rows = {name: np.flatnonzero(data.channel == CHANNELS.index(name)) for name in names}
+    shared = data.time[rows[names[0]]]
+    for name in names[1:]:
+        shared = np.intersect1d(shared, data.time[rows[name]])
+    at = {name: own[np.searchsorted(data.time[own], shared)] for name, own in rows.items()}
+    return shared, {name: data.value[own] - value[own] for name, own in at.items()}, at[names[0]]

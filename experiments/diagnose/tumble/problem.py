@@ -1,0 +1,497 @@
+"""Tumbles as the statistics of `hedgebed diagnose` see them (`experiments.diagnose.fit.problem`).
+
+A trial's own nuisance is its simulated gravity. The camera's zero is no parameter: it is marginalised in the whitening
+(`tumble_fit.whiten`) and, for the gap that a person reads, put at its most probable value.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.campaign import Campaign, EffectTable, TumbleModel, write_model
+from experiments.diagnose.core.effect_words import advice
+from experiments.diagnose.fit.own import OwnEffect
+from experiments.diagnose.fit.problem import Finding, Form, Parameter, Samples, TrialInfo, Values
+from experiments.diagnose.fit.together import each
+from experiments.diagnose.noise.jitter import Shaken
+from experiments.diagnose.noise.replicates import parted
+from rigid.planar.trajectory import STATES
+from rigid.terms import EFFECTS
+
+from .data import CHANNELS, TumbleData, tumble_data
+from .follow import followed_until
+from .forms import TumbleForm, shaped, tumble_forms
+from .forward import OWN_TO_A_TRIAL, SHARED, Forward, Prediction
+from .guess import Guesser
+from .latent import latent_columns
+from .steps import LOST, ZERO_STD, whiten
+
+__all__ = ["TumbleProblem", "make_problem"]
+
+Array = NDArray[np.float64]
+
+_UNITS = {"mass": "kg", "inertia": "kg m2", "stiffness": "N/m", "damping": "N s/m", "mu_s": "1", "mu_d": "1"}
+_STEP = 0.02  # of finite differences, in sigmas: contacts make smaller ones rough
+_SCAN = np.linspace(-3.0, 3.0, 25)
+"""Standard deviations of a trial's simulated gravity that are looked at where it goes its own way."""
+_SWITCH = 5e-4
+"""From the moment of a reading [s] within which a model that jumps leaves it in doubt: one step of the integration."""
+_SEEN = 3.0
+"""Standard deviations of the noise from which on a change of what the model reads is a jump."""
+_IMU = tuple(CHANNELS.index(name) for name in ("gyro", "ax", "ay"))
+_SCATTER_STD = 0.1
+"""How far replicates may differ, in each kind, while they are asked whether they do [1]."""
+
+
+class TumbleProblem:
+    """One campaign of tumbles: a `Problem`."""
+
+    kind = "tumble"
+    whole = "the platform, the rig or the surface"
+    clocks = (("x", "y", "theta"), ("gyro", "ax", "ay"), ("wheel",))
+    """Channels whose times come from one clock."""
+    least_scatter = 0.01
+    """Contact makes each trial's friction and bed uncertain by some tenths of a percent; less is not asked for."""
+
+    left_by_forms = 0.1
+    """Share of what the base model leaves that a right name's form may leave, where the gate sees it: of 70 right names
+    in five counts none left more than 0.05 and more than 1.025 a sample."""
+
+    def __init__(
+        self, data: TumbleData, *, findings: Sequence[Finding] = (), threads: int | None = None,
+        own: Sequence[OwnEffect] = (),
+    ) -> None:  # fmt: skip
+        for effect in own:
+            inner = [hook for hook in effect.term.hooks if hook.startswith("inner_")]
+            if inner:
+                raise ValueError(f"effect_file = {str(effect.file)!r}: the hook {inner[0]!r} cannot be fitted yet")
+            _ = effect.tumble  # refused here where it has no forms
+        self.data = data
+        self.own = {effect.id: effect for effect in own}
+        self.forward = Forward(data, threads=threads, own=own)
+        self.findings = tuple(findings)
+        self._index = {trial.id: k for k, trial in enumerate(data.trials)}
+        self._shaken: dict[str, Shaken] = {}
+        self._along: Mapping[str, Array] = {}
+        self._switches: dict[str, Array] = {}
+
+    @cached_property
+    def trials(self) -> tuple[TrialInfo, ...]:
+        """In the campaign's order."""
+        told = [
+            TrialInfo(
+                id=trial.id,
+                condition=trial.condition,
+                settings={"torque_N_m": trial.torque, "gravity_m_s2": trial.gravity_sim},
+            )
+            for trial in self.data.trials
+        ]
+        return parted(told, {trial.id: (max(trial.end, 1e-9),) for trial in self.data.trials})
+
+    @cached_property
+    def base(self) -> tuple[Parameter, ...]:
+        """Shared numbers that are uncertain, and each trial's gravity."""
+        told = self.data.tables.uncertainty
+        found = []
+        for name in SHARED:
+            value, sigma = self.forward.nominal[name], getattr(told, name)
+            if sigma > 0 and value > 0:
+                size = sigma * value
+                lowest, highest = value * max(1 - 6 * sigma, 0.05), value * (1 + 6 * sigma)
+                found.append(
+                    Parameter(
+                        name=name,
+                        unit=_UNITS[name],
+                        value=value,
+                        std=size,
+                        scale=size,
+                        lowest=lowest,
+                        highest=highest,
+                        step=_STEP * size,
+                    )
+                )
+        if told.gravity_sim > 0:
+            for trial in self.data.trials:
+                size = told.gravity_sim * trial.gravity_sim
+                found.append(
+                    Parameter(
+                        name=f"gravity_sim[{trial.id}]",
+                        unit="m/s2",
+                        value=trial.gravity_sim,
+                        std=size,
+                        scale=size,
+                        lowest=trial.gravity_sim * max(1 - 6 * told.gravity_sim, 0.05),
+                        trial=trial.id,
+                        highest=trial.gravity_sim * (1 + 6 * told.gravity_sim),
+                        kind="gravity_sim",
+                        step=_STEP * size,
+                    )
+                )
+        return tuple(found)
+
+    @cached_property
+    def scatter(self) -> dict[str, tuple[Parameter, ...]]:
+        """What may differ between replicates beyond the sensors: kind -> one nuisance a trial, mostly not fitted."""
+        return {
+            kind: tuple(
+                Parameter(name=f"{kind}[{trial.id}]", unit="1", value=0.0, std=_SCATTER_STD, scale=0.02, lowest=-0.5,
+                          highest=1.0, trial=trial.id, kind=kind, step=1e-3)
+                for trial in self.data.trials
+            )
+            for kind in OWN_TO_A_TRIAL[1:]
+        }  # fmt: skip
+
+    @cached_property
+    def forms(self) -> tuple[TumbleForm, ...]:
+        """The library, scaled to this campaign."""
+        weights = [
+            (self.forward.nominal["mass"] + trial.counterweight) * trial.gravity_sim for trial in self.data.trials
+        ]
+        weight = float(np.mean(weights))
+        wheel_inertia = self.data.tables.wheel.inertia
+        wheel = [
+            trial.wheel_speed_0
+            if trial.actuator == "brake"
+            else trial.wheel_speed_0 + trial.torque * min(trial.torque_until, trial.end) / wheel_inertia
+            for trial in self.data.trials
+        ]
+        stiffness = self.forward.nominal["stiffness"]
+        carried = self.forward.nominal["mass"] + float(np.mean([trial.counterweight for trial in self.data.trials]))
+        return tumble_forms(
+            rig=self.forward.rig,
+            sinkage=0.5 * weight / stiffness,
+            lift_speed=0.5 * weight / math.sqrt(stiffness * carried),
+            weight=weight,
+            wheel_speed=max(10.0, 0.5 * float(np.mean(wheel))),
+            own=tuple(self.own.values()),
+        )
+
+    @cached_property
+    def shapes(self) -> dict[str, tuple[TumbleForm, ...]]:
+        """Forms of another shape, to go on to from the plain ones, by the id of these."""
+        return shaped(self.forms)
+
+    @cached_property
+    def design(self) -> str:
+        """Digest of sampling, conditions, noise and priors."""
+        tables = self.data.tables
+        told = {
+            "tables": tables.model_dump(mode="json", exclude={"name", "notes", "trial"}),
+            "trials": [
+                [*map(str, trial.condition), trial.end] + np.bincount(trial.channel, minlength=len(CHANNELS)).tolist()
+                for trial in self.data.trials
+            ],
+        }
+        return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]
+
+    def samples(self, trial: str) -> Samples:
+        """Times, channels and std of a trial's samples."""
+        data = self.data.trials[self._index[trial]]
+        return Samples(time=data.time, channel=np.array(CHANNELS)[data.channel], std=data.std)
+
+    def evaluate(
+        self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[str]
+    ) -> list[dict[str, Array]]:
+        """Whitened residuals of each trial at each point."""
+        return self.evaluate_until(points, forms, trials, 1.0)
+
+    def evaluate_until(
+        self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[str], share: float
+    ) -> list[dict[str, Array]]:
+        """The same of the first share of each trial's time, which alone is simulated; 0 after it."""
+        found = self._predict(points, forms, trials, states=False, horizon=share)
+
+        def whitened(place: int) -> Array:
+            data, value = self.data.trials[self._index[trials[place]]], found[place].value
+            until = share * data.end if share < 1 else np.inf
+            if (shaken := self._shaken.get(data.id)) is None:
+                return whiten(data, value, until=until)
+            rest = np.where(data.time <= until, (data.value - value) / data.std, 0.0)
+            good = np.isfinite(rest).all(axis=1, keepdims=True)
+            return np.where(good, shaken.whitened(np.where(good, rest, LOST)), LOST)
+
+        residuals = each(whitened, range(len(trials)), threads=self.forward.threads)
+        return [{trial: rows[k] for trial, rows in zip(trials, residuals, strict=True)} for k in range(len(points))]
+
+    def rewhiten(self, values: Values, forms: Sequence[Form]) -> None:
+        """Take readings at a switch of the contact for doubtful, where this model switches."""
+        self.doubt(values, forms)
+
+    def doubt(self, values: Values, forms: Sequence[Form]) -> bool:
+        """Count readings of the IMU next to which the model jumps, where a spike touches or a slip ends, with an error
+        as large as the jump: on which side of it they were taken no fit can tell. Says whether any has changed."""
+        before = self._switches
+        self._switches = self.switches(values, forms, tuple(self._index))
+        self._take_in()
+        return any((self._switches[id] != before[id]).any() if id in before else self._switches[id].any()
+                   for id in self._switches)  # fmt: skip
+
+    def switches(self, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> dict[str, Array]:
+        """By how much the model jumps within `_SWITCH` of each reading of the IMU, over its noise, by trial, shape
+        [sample_count]; 0 where it does not, and of the other channels."""
+        late, now, early = (self.readings(values, forms, trials, shift) for shift in (_SWITCH, 0.0, -_SWITCH))
+        found = {}
+        for trial in trials:
+            after, before = late[trial] - now[trial], now[trial] - early[trial]
+            jumps = np.abs(after - before) > np.maximum(_SEEN, 0.5 * np.abs(after + before))
+            imu = np.isin(self.data.trials[self._index[trial]].channel, _IMU)
+            found[trial] = np.where(jumps & imu & np.isfinite(after + before), after + before, 0.0)
+        return found
+
+    def readings(self, values: Values, forms: Sequence[Form], trials: Sequence[str], late: float) -> dict[str, Array]:
+        """What the model reads `late` seconds after each sample's time, over the stated noise, shape [sample_count]."""
+        moved = replace(self.data, trials=tuple(replace(trial, time=trial.time + late) for trial in self.data.trials))
+        forward = Forward(moved, threads=self.forward.threads, own=self.forward.own) if late else self.forward
+        found = self._predict([values], forms, trials, states=False, forward=forward)
+        return {
+            trial: one.value[0] / self.data.trials[self._index[trial]].std
+            for trial, one in zip(trials, found, strict=True)
+        }
+
+    def shake(self, along: Mapping[str, Array]) -> None:
+        """Take times that jitter into the whitening from now on.
+
+        `along`: what one standard deviation of jitter changes in each sample, over its stated noise, by trial; {} for
+        times as they stand. Readings of one clock with one time share an error.
+        """
+        self._along = dict(along)
+        self._take_in()
+
+    def _take_in(self) -> None:
+        """Times that jitter and readings at a switch into the whitening."""
+        self._shaken = {}
+        for id in self._index:
+            data = self.data.trials[self._index[id]]
+            own = self._along.get(id, np.zeros(len(data.time)))
+            jump = self._switches.get(id, np.zeros(len(data.time)))
+            own = np.where(np.abs(jump) > np.abs(own), jump, own)
+            if own.any():
+                clock = np.array([next(k for k, names in enumerate(self.clocks) if name in names) for name in CHANNELS])
+                at = np.column_stack([clock[data.channel], data.time])
+                row = np.unique(at, axis=0, return_inverse=True)[1].reshape(-1)
+                zeros = [ZERO_STD * data.of(name) for name in ("x", "y", "theta")]
+                self._shaken[id] = Shaken.of(own, row, np.column_stack(zeros))
+
+    def chi_square(self, values: Values, forms: Sequence[Form], trial: str) -> tuple[float, int]:
+        """With the camera's zero at its most probable value; readings at a switch of the contact say nothing."""
+        data = self.data.trials[self._index[trial]]
+        residual = self._residual(values, forms, trial)
+        valid = self.switches(values, forms, [trial])[trial] == 0
+        residual = (residual - self._zero(data.channel, residual))[valid]
+        return float(residual @ residual), len(residual)
+
+    def noise(self, random: np.random.Generator, trial: str) -> Array:
+        """White."""
+        return random.standard_normal(len(self.data.trials[self._index[trial]].time))
+
+    def phases(self, values: Values, forms: Sequence[Form], trial: str) -> NDArray[np.str_]:
+        """stand, pivot, slip or hop at each sample."""
+        return np.array(STATES)[self._predict([values], forms, [trial])[0].state[0]]
+
+    def reported(self, values: Values, form: Form) -> dict[str, tuple[float, str]]:
+        """The term's parameters under the fixed names of docs/diagnose.md."""
+        term = self.own[form.effect].term if form.effect in self.own else EFFECTS[form.effect]
+        units = {f"{form.effect}.{p.name}": p.unit for p in term.parameters}
+        physical = self._physical(values, form)
+        return {name.partition(".")[2]: (value, units[name]) for name, value in physical.items()}
+
+    def form_std(self, form: Form) -> dict[str, float]:
+        """Relative uncertainty of what is reported of a form, for nature's law is not the form's: name -> std."""
+        assert isinstance(form, TumbleForm)
+        return {form.amplitude.partition(".")[2]: form.form_std} if form.form_std else {}
+
+    def remarks(self, values: Values, forms: Sequence[Form]) -> tuple[str, ...]:
+        """What of the forms' numbers no rig and no platform has, a sentence each."""
+        said = []
+        for form in forms:
+            if form.effect != "rig-friction" or form.effect in self.own:
+                continue
+            force = self.reported(values, form)["force"][0]
+            trial = min(self.data.tables.trial, key=self.data.tables.weight_of)
+            weight = self.data.tables.weight_of(trial)
+            if force > weight:
+                said.append(
+                    f"rig-friction of {force:.3g} N is more than the {weight:.3g} N that stand on the surface (trial "
+                    f"{trial.id}): a rig with it would hold the platform up wherever it is. So it is hardly the "
+                    f"pulleys, but something that resists when the platform rises and falls"
+                )
+        return tuple(said)
+
+    def prepare(self, tell: Callable[[str, float], None]) -> None:
+        """Compile the kernels, which takes a while where that was not done before, and says so."""
+        for place, forward in enumerate((self.forward, self._guesser.forward)):
+            tell("compiling the kernels (kept for the next time)", 0.5 * place)
+            forward.predict({}, trials=[0], horizon=0.01)
+            forward.predict({"com-offset.x": np.zeros(1)}, trials=[0], horizon=0.01)
+
+    def latent(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
+        """Force and torque that the model lacks, and what they might depend on (`tumble_latent`)."""
+        data = self.data.trials[self._index[trial]]
+        prediction = self._predict([values], forms, [trial], motion=True)[0]
+        mass = values.get("mass", self.forward.nominal["mass"])
+        inertia = values.get("inertia", self.forward.nominal["inertia"])
+        return latent_columns(data, prediction, mass=mass, inertia=inertia)
+
+    def compare(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, dict[str, Array]]:
+        """Measured and modelled, by channel, the camera's zero put right in the model."""
+        data = self.data.trials[self._index[trial]]
+        value = self._predict([values], forms, [trial])[0].value[0]
+        value = value + self._zero(data.channel, (data.value - value) / data.std) * data.std
+        told = {}
+        for number, name in enumerate(CHANNELS):
+            mine = data.channel == number
+            if mine.any():
+                told[name] = {"t_s": data.time[mine], "measured": data.value[mine], "model": value[mine]}
+        return told
+
+    def write_model(self, path: str, values: Values, forms: Sequence[Form]) -> None:
+        """model.toml, which `hedgebed tumble --model` runs."""
+        tables = self.data.tables
+        numbers = {name: float(values.get(name, self.forward.nominal[name])) for name in SHARED}
+        numbers["mu_d"] = min(numbers["mu_d"], numbers["mu_s"])
+        kept = tables.model_dump(include={"format", "kind", "name", "notes"})
+        used = {trial.id for trial in self.data.trials}
+        model = TumbleModel(
+            **kept,
+            platform=tables.platform.model_copy(update={name: numbers[name] for name in ("mass", "inertia")}),
+            wheel=tables.wheel,
+            rig=tables.rig,
+            surface=tables.surface.model_copy(
+                update={name: numbers[name] for name in ("stiffness", "damping", "mu_s", "mu_d")}
+            ),
+            uncertainty=tables.uncertainty,
+            sensors=tables.sensors,
+            trial=tuple(
+                trial.model_copy(update={"gravity_sim": float(values.get(f"gravity_sim[{trial.id}]", stated))})
+                for trial in tables.trial
+                if trial.id in used
+                for stated in (trial.gravity_sim,)
+            ),
+            effect=tuple(
+                EffectTable(
+                    id=effect,
+                    file=self.own[effect].file.name if effect in self.own else None,
+                    parameters={
+                        name.partition(".")[2]: value
+                        for form in forms
+                        if form.effect == effect
+                        for name, value in self._physical(values, form).items()
+                        if math.isfinite(value)
+                    },
+                )
+                for effect in dict.fromkeys(form.effect for form in forms)
+            ),
+        )
+        write_model(path, model)
+
+    def next_experiment(self, first: Form, second: Form, values: Values) -> str:
+        """What would tell two effects apart."""
+        return advice(first.effect, second.effect)
+
+    def guess(
+        self, forms: Sequence[Form], trials: Sequence[str], values: Values, *, held: bool = False,
+        apart: Sequence[Parameter] = (),
+    ) -> dict[str, float]:  # fmt: skip
+        """Values near the best, from which a local fit may begin (`tumble_guess`)."""
+        return self._guesser.guess(_ours(forms), trials, values, held=held, apart=_of(apart, trials))
+
+    def refine(
+        self, asked: Sequence[tuple[Sequence[Form], Values]], trials: Sequence[str], *, apart: Sequence[Parameter] = ()
+    ) -> list[dict[str, float]]:
+        """The same for several sets of forms at once, all of whose values are given (`tumble_guess`)."""
+        mine = [(_ours(forms), values) for forms, values in asked]
+        return self._guesser.refine(mine, trials, apart=_of(apart, trials))
+
+    def follows(self, values: Values, forms: Sequence[Form], trial: str) -> float | None:
+        """The moment [s] up to which the model follows a trial, with the simulated gravity that takes it farthest; None
+        where that is no good part of it (`tumble_follow`)."""
+        data, sigma = self.data.trials[self._index[trial]], self.data.tables.uncertainty.gravity_sim
+        scan = 1 + sigma * _SCAN if sigma > 0 else np.ones(1)
+        points = [values, *({**values, f"gravity_sim[{trial}]": data.gravity_sim * float(g)} for g in scan)]
+        found = self._predict(points, forms, [trial])[0]
+        moments = [
+            followed_until(data, np.where(np.isfinite(value), (data.value - value) / data.std, LOST), state)
+            for value, state in zip(found.value, found.state, strict=True)
+        ]
+        return max((moment for moment in moments if moment is not None), default=None)
+
+    @cached_property
+    def _guesser(self) -> Guesser:
+        return Guesser(self.forward, self.forms)
+
+    # Helpers ----------------------------------------------------------------------------------------------------------
+
+    def gravity(self, points: Sequence[Values]) -> Array:
+        """Of each trial over its stated one, shape [point_count, trial_count]."""
+        return np.array(
+            [
+                [values.get(f"gravity_sim[{t.id}]", t.gravity_sim) / t.gravity_sim for t in self.data.trials]
+                for values in points
+            ]
+        )
+
+    def _predict(
+        self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[str], *, states: bool = True,
+        motion: bool = False, forward: Forward | None = None, horizon: float = 1.0,
+    ) -> list[Prediction]:  # fmt: skip
+        columns = {
+            name: np.array([values.get(name, value) for values in points])
+            for name, value in self.forward.nominal.items()
+        }
+        columns["gravity"] = self.gravity(points)
+        for kind in OWN_TO_A_TRIAL[1:]:
+            columns[kind] = np.array(
+                [[1 + values.get(f"{kind}[{t.id}]", 0.0) for t in self.data.trials] for values in points]
+            )
+        for form in forms:
+            assert isinstance(form, TumbleForm)
+            own = {p.name: np.array([values.get(p.name, p.value) for values in points]) for p in form.parameters}
+            columns |= form.physical(own)
+        chosen = [self._index[trial] for trial in trials]
+        return (forward or self.forward).predict(columns, trials=chosen, states=states, motion=motion, horizon=horizon)
+
+    def _residual(self, values: Values, forms: Sequence[Form], trial: str) -> Array:
+        data = self.data.trials[self._index[trial]]
+        residual = (data.value - self._predict([values], forms, [trial])[0].value[0]) / data.std
+        return np.where(np.isfinite(residual), residual, LOST)
+
+    @staticmethod
+    def _zero(channel: NDArray[np.int8], residual: Array) -> Array:
+        """The most probable zero of the camera in units of its noise, at each sample."""
+        zero = np.zeros(len(residual))
+        for number, name in enumerate(CHANNELS):
+            mine = np.flatnonzero(channel == number)
+            if name in ("x", "y", "theta") and len(mine):
+                most = len(mine) / (len(mine) + ZERO_STD**-2)
+                zero[mine] = np.clip(most * residual[mine].mean(), -3.0, 3.0)
+        return zero
+
+    @staticmethod
+    def _physical(values: Mapping[str, float], form: Form) -> dict[str, float]:
+        assert isinstance(form, TumbleForm)
+        own = {p.name: np.array([values.get(p.name, p.value)]) for p in form.parameters}
+        return {name: float(array[0]) for name, array in form.physical(own).items()}
+
+
+def _of(apart: Sequence[Parameter], trials: Sequence[str]) -> list[Parameter]:
+    return [p for p in apart if p.trial in trials]
+
+
+def _ours(forms: Sequence[Form]) -> list[TumbleForm]:
+    return [form for form in forms if isinstance(form, TumbleForm)]
+
+
+def make_problem(campaign: Campaign, *, own: Sequence[OwnEffect] = ()) -> TumbleProblem:
+    """The problem of one campaign, `own` among its candidates. Raises ValueError as `tumble_data` does."""
+    from .checks import checked
+
+    data, findings = checked(tumble_data(campaign))
+    return TumbleProblem(data, findings=findings, own=own)

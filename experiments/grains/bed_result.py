@@ -1,0 +1,96 @@
+"""What results of a platform on a bed of grains have in common: the bed's numbers, its series, and warnings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from coupling import MOST_REVERSAL, CoupledTumble, Master, SpatialRun
+from dem import Bed
+from dem.grains.materials import caveat
+from experiments.platform.surfaces import find_surface
+from experiments.runs.folder import write_series
+from experiments.runs.types import Json
+
+from .sentences import say
+from .settings import GrainsSettings
+from .softening import Softening, stable_overlap
+
+__all__ = [
+    "bed_numbers", "bed_warnings", "overlap_warning", "residual_warning", "reversal_warning", "unsettled_warning",
+    "write_bed_series",
+]  # fmt: skip
+
+PACKING_OFF = 0.02
+"""A bed whose packing differs by more from that at which its grains were calibrated is worth a warning [1]."""
+MOST_RESIDUAL = 0.01
+"""A larger energy_residual is worth a warning [1]."""
+BED_COLUMNS = {
+    "time": "t_s", "momentum_error": "momentum_error_N_s", "angular_momentum_error": "angular_momentum_error_N_m_s",
+    "grain_steps": "grain_steps",
+}  # fmt: skip
+"""Sample of a run -> column of series/bed.csv, where it is no energy."""
+
+
+def write_bed_series(folder: Path, run: CoupledTumble | SpatialRun) -> None:
+    """series/bed.csv: energies of the bed, what its grains lost, momentum that is not accounted for, grain steps."""
+    samples = run.samples | {f"{name}_lost": values for name, values in run.losses.items()}
+    columns = {BED_COLUMNS.get(name, f"{name}_J"): values for name, values in samples.items()}
+    write_series(folder / "series" / "bed.csv", columns)
+
+
+def bed_numbers(
+    settings: GrainsSettings, run: CoupledTumble | SpatialRun, bed: Bed, softening: Softening, *, in_rig: bool
+) -> Json:
+    """What ``grains`` of result.json says of any bed under a platform, and how many grain steps were computed."""
+    done = run.samples["grain_steps"]
+    steps = (run.master.count - run.placing_steps) * settings.substeps
+    return {
+        "mode": "rig: grains at 1 g" if in_rig else "flight: grains at the platform's gravity",
+        "grain_count": int(bed.grain_count), "packing_fraction": float(bed.packing_fraction),
+        "surface": float(bed.surface), "young": softening.young, "softer_than_real": softening.factor,
+        "time_step": float(bed.time_step), "max_overlap": float(bed.max_overlap), "seed": settings.seed,
+        "sleep": settings.sleep, "grain_steps": float(done[-1] - done[0]),
+        "grain_steps_all_awake": float(steps * int(bed.grain_count)),
+    }  # fmt: skip
+
+
+def bed_warnings(bed: Bed, surface: str, *, across: float) -> Iterator[str]:
+    """That spikes are few grains across, the packing is not that of the calibration, the grains are doubtful.
+
+    `across`: a spike's diameter over the grains' [1].
+    """
+    if across < 10:
+        yield say("few_grains_across", across=across)
+    own = find_surface(surface)
+    if own.packing is not None and abs(bed.packing_fraction - own.packing) > PACKING_OFF:
+        yield say("packing_off", packing=bed.packing_fraction, surface=own)
+    if doubt := caveat(bed.material):
+        yield doubt
+
+
+def overlap_warning(bed: Bed, softening: Softening, max_overlap: float) -> str | None:
+    """That grains overlapped by more than was meant."""
+    return softening.overlapping(float(bed.max_overlap), max_overlap, stable_overlap(bed.material, max_overlap))
+
+
+def residual_warning(residual: float) -> str | None:
+    """That the energy balance does not close, where `energy_residual` is too large."""
+    above = {"value": _above(residual, MOST_RESIDUAL), "limit": MOST_RESIDUAL}
+    return say("residual", **above) if residual > MOST_RESIDUAL else None
+
+
+def reversal_warning(made: float) -> str | None:
+    """That the bed made energy, where `dissipation_reversal` is too large."""
+    return say("reversal", value=_above(made, MOST_REVERSAL), limit=MOST_REVERSAL) if made > MOST_REVERSAL else None
+
+
+def unsettled_warning(master: Master) -> str | None:
+    """That macro steps were iterated as often as allowed without converging, where some were."""
+    return say("unsettled", many=master.exchange.unsettled, master=master) if master.exchange.unsettled else None
+
+
+def _above(value: float, limit: float) -> str:
+    """A value with as many digits, two at least, as show that it is above the limit."""
+    texts = (f"{value:.{digits}g}" for digits in range(2, 18))
+    return next((text for text in texts if float(text) > limit), f"{value:g}")

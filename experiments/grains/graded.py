@@ -1,0 +1,165 @@
+"""What a graded bed adds to results of `bed make` and `bed refine`; where a tumble wants fine grains, which it met."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupling import CoupledTumble
+from dem.grains.graded import THROAT, Graded
+from dem.measure.grading import MOST_DRAINED, MOST_STRAYED
+from dem.prepare.report import Prepared
+from experiments.platform.tips import tip_angles, tip_depth
+from experiments.runs.types import Json
+from rigid.planar.trajectory import Trajectory
+
+from .sentences import say
+from .spells import spells
+
+__all__ = ["coarsest_touched", "grading_told", "graded_under", "places_touched", "tips_in_ground"]
+
+
+def grading_told(prepared: Prepared) -> Json:
+    """Tables, quantities and warnings of a graded bed, for `finish_bed`; from the notes of its last stage."""
+    found = prepared.reports[-1].notes["grading"]
+    last = prepared.reports[-1].stage
+    zones = [
+        [zone["name"], str(zone["grain_count"]), f"{100 * zone['share']:.1f}", *(_mm(zone[key]) for key in _DIAMETERS)]
+        + [_or_none(zone["packing"], ".4f")]
+        for zone in found["zones"]
+    ]
+    layers = [
+        [f"{1e3 * layer['bottom']:.3g} to {1e3 * layer['top']:.3g}", _mm(layer["under"]), _mm(layer["elsewhere"])]
+        for layer in reversed(found["layers"])
+    ]
+    stages = [
+        [report.stage, *(f"{100 * report.notes['grading'][key]:.3g}" for key in ("strayed_share", "drained_share"))]
+        + [f"{report.notes['grading']['farthest']:.2f}"]
+        for report in prepared.reports
+    ]
+    quantities = {
+        "fine_count": (found["fine_count"], "1", "grains of as much solid, had all the size of those under footprints"),
+        "largest_under_footprints": (found["zones"][0]["largest"], "m", "the largest grain under the footprints"),
+        "strayed_share": (found["strayed_share"], "1", "solid in grains too small for where they lie, by a diameter"),
+        "drained_share": (found["drained_share"], "1", "solid in grains that fit through the gaps where they lie"),
+    }
+    warnings = []
+    if not (found["strayed_share"] <= MOST_STRAYED and found["drained_share"] <= MOST_DRAINED):
+        warnings.append(
+            f"the grading did not hold: after {last!r} {100 * found['strayed_share']:.2g} % of the grains' volume lies "
+            f"farther out than it belongs, {100 * found['drained_share']:.2g} % could fall through"
+        )
+    zone_head = ["zone", "grains", "solid [%]", "wanted [mm]", "mean [mm]", "smallest [mm]", "largest [mm]", "packing"]
+    return {
+        "tables": [
+            {"title": "Sizes by place, at the end", "head": zone_head, "rows": zones},
+            {
+                "title": "Mean diameter by height",
+                "head": ["height [mm]", "under footprints [mm]", "elsewhere [mm]"],
+                "rows": layers,
+            },
+            {
+                "title": f"Small grains among large ones: farther out than they belong by a diameter, and below "
+                f"{THROAT:.3f} of the largest there, so that they could drain",
+                "head": ["after", "strayed [% of solid]", "could drain [% of solid]", "farthest [diameters]"],
+                "rows": stages,
+            },
+        ],
+        "quantities": {
+            key: {"value": value, "std": None, "unit": unit, "note": note}
+            for key, (value, unit, note) in quantities.items()
+        },
+        "warnings": warnings,
+    }
+
+
+_DIAMETERS = ("wanted", "mean", "smallest", "largest")
+
+
+def _or_none(value: float | None, form: str) -> str:
+    return "-" if value is None else format(value, form)
+
+
+def _mm(value: float | None) -> str:
+    return _or_none(None if value is None else 1e3 * value, ".3g")
+
+
+def places_touched(trajectory: Trajectory, *, reach: float) -> list[tuple[float, float]]:
+    """Where the tips of a planar platform are in the ground, along the motion from its start.
+
+    Args:
+        reach: a tip counts from this height above the surface on [m].
+
+    Returns:
+        (from, to) of each stretch [m], ascending, none meeting another.
+    """
+    trial = trajectory.trial
+    count, length = trial.spike_count, trial.spike_length
+    x = trajectory.x[:, None] - length * np.sin(tip_angles(count, trajectory.theta))
+    low, stretches = tip_depth(trajectory.theta, trajectory.y, count=count, length=length) > -reach, []
+    for tip in range(trial.spike_count):
+        stretches += [(float(x[a:b, tip].min()), float(x[a:b, tip].max())) for a, b in spells(low[:, tip])]
+    return merged(stretches)
+
+
+def merged(stretches: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """The same length in stretches that do not meet, ascending [m]."""
+    found: list[tuple[float, float]] = []
+    for low, high in sorted(stretches):
+        if found and low <= found[-1][1]:
+            found[-1] = (found[-1][0], max(found[-1][1], high))
+        else:
+            found.append((low, high))
+    return found
+
+
+def graded_under(
+    trajectory: Trajectory,
+    *,
+    length: float,
+    origin: float,
+    spike_diameter: float,
+    grain: float,
+    spread: float,
+    coarse: float,
+    margin: float = 1.5,
+    **options: Any,
+) -> Graded:
+    """Fine grains where the tips of a forecast come down, coarse ones elsewhere.
+
+    Args:
+        length: of the bed [m]. origin: x in the bed of the platform's start [m].
+        grain, spread, coarse: as ``fine``, ``spread`` and ``coarse`` of ``dem.Graded``.
+        margin: fine sand on either side of a tip's way, from its axis, over the spike's diameter [1].
+        options: ``depth`` and ``growth`` of ``dem.Graded``.
+
+    Raises:
+        ValueError: grains of more than a fifth of the spike; what ``dem.Graded`` refuses.
+    """
+    if grain > spike_diameter / 5 * (1 + 1e-9):
+        raise ValueError(say("fine_for_footprints", grain=grain, spike=spike_diameter, fifth=spike_diameter / 5))
+    ways = places_touched(trajectory, reach=0.5 * spike_diameter)
+    beside = margin * spike_diameter
+    strips = [(max(0.0, origin + low - beside), min(length, origin + high + beside)) for low, high in ways]
+    return Graded(fine=grain, coarse=coarse, footprints=tuple(merged(strips)), spread=spread, **options)
+
+
+def coarsest_touched(run: CoupledTumble, graded: Graded, *, size: Sequence[float]) -> float:
+    """The largest mean diameter that belongs where tips of a tumble on such a bed were [m].
+
+    Args:
+        size: of the bed, both widths and the depth [m].
+    """
+    ground: Any = run.ground
+    x, depth = tips_in_ground(run)
+    return float(graded.diameter(ground.origin[0] + x, ground.origin[2] - depth, size).max(initial=graded.fine))
+
+
+def tips_in_ground(run: CoupledTumble) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where tips of a tumble were below the surface: along the motion from its start, and how deep [m], shape [n]."""
+    trial, rows, depth = run.trial, run.columns, run.feet[:, 3]
+    x = rows["x"][:, None] - trial.spike_length * np.sin(tip_angles(trial.spike_count, rows["theta"]))
+    return x[depth > 0], depth[depth > 0]

@@ -1,0 +1,30 @@
+"""A material that is given as a file: the run's folder has a copy, for who reads it and for `hedgebed resume`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from experiments.runs.folder import write_text
+
+__all__ = ["BASE_COPY", "MATERIAL_COPY", "keep_material"]
+
+MATERIAL_COPY = "material.toml"
+"""The copy's name in the run's folder."""
+BASE_COPY = "base.toml"
+"""Its name in that of a calibration, whose material.toml is what it found."""
+
+
+def keep_material(name: str, folder: Path, *, copy: str = MATERIAL_COPY) -> str:
+    """What the run takes its material from: ``name`` of one that ships, or ``copy`` in ``folder``, made if it lacks.
+
+    Raises ValueError for a name that is none and a file that will not do, unless the copy is there.
+    """
+    from dem.grains.materials import MATERIALS, material
+
+    kept = folder / copy
+    if name.lower() in MATERIALS:
+        return name
+    if not kept.exists():
+        material(name)
+        write_text(kept, Path(name).read_text(encoding="utf-8"))
+    return str(kept)

@@ -1,0 +1,298 @@
+"""A platform on a bed of grains: all that a run in the plane and a run in space have in common.
+
+A variant of `PlatformOnBed` defines the members that stand on the bed, how far they go and how they are stepped. From
+that follow the size of the bed, the stiffness of its grains, the prepared bed, the run and its result. The same trial
+on the spring-damper is computed first: its `Forecast` says how far and how deep the bed must reach.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from coupling import BedGround, CoupledTumble, SpatialRun
+from coupling.members import Member
+from dem import Bed, Graded, Sleep
+from dem.grains.materials import Material
+from dem.grains.materials import material as find_material
+from experiments.platform.surfaces import find_surface, surface_names
+from experiments.runs.folder import RunFolder
+from experiments.runs.progress import Progress
+from experiments.runs.reporting import write_report
+from experiments.runs.stopping import held_back
+from experiments.runs.types import Json
+from rigid.platform.rig import STANDARD_GRAVITY
+
+from .bed_progress import BedProgress
+from .box import carried_height, expected_grain_count
+from .following import CHECKPOINT, Frames, follow
+from .sentences import say
+from .settings import GrainsSettings
+from .softening import Softening, check_young, run_limit, soften_material
+from .staged import staged_bed
+from .where import check_where
+
+__all__ = ["MARGIN", "RAIN", "TOUCH", "Forecast", "PlatformOnBed", "PlatformRun", "finish_run"]
+
+MARGIN = 3.0
+"""Sand beyond the outermost footprint, over a spike's diameter [1]."""
+RAIN = 2.5
+"""Height of the loose column that a bed is rained from, over the bed's depth [1]."""
+TOUCH = 1e-3
+"""Force on a row, or in space on all spikes, that counts as touching for the torque, over the weight [1]."""
+MOST_GRAINS = 3e6
+"""More are refused: the run would take days."""
+
+PlatformRun = CoupledTumble | SpatialRun
+Run = TypeVar("Run", bound=PlatformRun)
+Settings = TypeVar("Settings", bound=GrainsSettings)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Forecast:
+    """What the same trial on the spring-damper says of the bed."""
+
+    deepest: float
+    """Depth of the deepest tip [m]."""
+    fastest: float
+    """Largest speed of a tip in the ground [m/s]."""
+    rise: float
+    """Of the centre above its start, at most [m]."""
+    margin: float = 1.5
+    """What grains may do beyond it: depth and speed for which their modulus is chosen, over these [1]."""
+    on: str = "on the spring-damper"
+    """What the forecast is computed on, for refusals."""
+
+
+Expected = TypeVar("Expected", bound=Forecast)
+
+
+class PlatformOnBed(ABC, Generic[Settings, Run, Expected]):
+    """One run of a platform on a bed of grains; the abstract members are what differs in the plane and in space."""
+
+    settings: Settings
+    duration: float
+    """How long the run lasts [s]."""
+    surface: str
+    """Name of the surface whose grains the bed is made of."""
+    gravity: float
+    """Gravity of the platform [m/s2]."""
+    counterweight: float
+    """Of the rig [kg]; 0 in flight."""
+    spike_diameter: float
+    """[m]."""
+    reach: float
+    """From the centre to the farthest tip [m]."""
+    repeats = 1
+    """How often the prepared bed is laid end to end [1]."""
+    stages: tuple[str, ...] | None = None
+    """How the bed is prepared; None: rained and levelled."""
+
+    # What differs
+
+    @property
+    @abstractmethod
+    def forecast(self) -> Expected:
+        """The same trial on the spring-damper, computed when first asked for."""
+
+    @property
+    @abstractmethod
+    def pressure(self) -> float:
+        """What the load alone presses with under a tip [Pa]."""
+
+    @property
+    @abstractmethod
+    def lowering_speed(self) -> float | None:
+        """Speed at which the platform is set down [m/s]; None where it is not."""
+
+    @abstractmethod
+    def members(self) -> list[Member]:
+        """The spikes and the hull that grains meet. Raises ValueError for a platform that no bed takes."""
+
+    @abstractmethod
+    def check_extent(self) -> None:
+        """Raise ValueError for a bed too short or too narrow for the forecast."""
+
+    @abstractmethod
+    def ground(self, bed: Bed) -> BedGround:
+        """The platform on the prepared bed, the expected footprints in its middle."""
+
+    @abstractmethod
+    def run_on(self, ground: BedGround) -> Run:
+        """The run, ready to be stepped."""
+
+    @abstractmethod
+    def announce(self, progress: Progress) -> None:
+        """State settings, defaults and warnings before the bed is made."""
+
+    @abstractmethod
+    def frames(self, run: Run, folder: Path, resumed: bool) -> Frames | None:
+        """What writes the frames; None where none are wanted."""
+
+    @abstractmethod
+    def conclude(self, run: Run, softening: Softening, folder: RunFolder) -> Json:
+        """The result, its series written."""
+
+    @property
+    def graded(self) -> Graded | None:
+        """Sizes by place; None: one size throughout."""
+        return None
+
+    def check_layout(self) -> None:
+        """Raise ValueError for a bed that is laid out as the platform cannot use it."""
+
+    def thrown(self) -> float:
+        """How high over the surface thrown grains are followed [m]."""
+        return 0.0
+
+    # What follows
+
+    @cached_property
+    def material(self) -> Material:
+        """The grains of the surface; one that holds for one grain size is scaled when the bed is made."""
+        grains = find_surface(self.surface).grains if self.surface in surface_names() else None
+        if grains is None:
+            known = ", ".join(name for name in surface_names() if find_surface(name).grains)
+            raise ValueError(say("no_grains", surface=self.surface, known=known))
+        return find_material(grains)
+
+    @property
+    def grain_gravity(self) -> float:
+        """Gravity of the grains [m/s2]: the true one in the rig."""
+        return STANDARD_GRAVITY if self.counterweight > 0 else self.gravity
+
+    @property
+    def first_gravity(self) -> float:
+        """Gravity of the grains when their bed is made and the platform is set down [m/s2]."""
+        return self.grain_gravity
+
+    def check(self) -> None:
+        """Raise ValueError, naming key, value and what would do, for a bed that does not suit this trial."""
+        self.material, self.members()
+        check_where(arch=self.settings.arch, threads=self.settings.threads)
+        self.check_bed()
+
+    def check_bed(self) -> None:
+        """Raise ValueError for a bed too small for the forecast, or of too many or too large grains, or too soft."""
+        s, spike, forecast = self.settings, self.spike_diameter, self.forecast
+        self.check_extent()
+        least = forecast.deepest + 2 * spike
+        if s.bed_size[2] < least:
+            raise ValueError(say("too_shallow", depth=s.bed_size[2], f=forecast, least=least))
+        self.check_layout()
+        if s.grain > spike:
+            raise ValueError(say("larger_than_spike", grain=s.grain, spike=spike))
+        count = self.grain_count()
+        if count > MOST_GRAINS:
+            larger = s.grain * (count / MOST_GRAINS) ** (1 / 3)
+            raise ValueError(say("too_many_grains", grain=s.grain, count=count, larger=larger))
+        check_young(s.young, chosen=self.softening(chosen=True).young, max_overlap=s.max_overlap)
+
+    def grain_count(self) -> float:
+        """About how many grains the whole bed will have."""
+        s = self.settings
+        return self.repeats * expected_grain_count(s.bed_size, s.grain, s.spread)
+
+    def softening(self, *, chosen: bool = False) -> Softening:
+        """The modulus of the grains for this run: the one that is set, unless `chosen`, else that of `softening`."""
+        s, forecast = self.settings, self.forecast
+        return soften_material(
+            self.material, young=None if chosen else s.young, max_overlap=s.max_overlap, grain=s.grain,
+            spread=s.spread, gravity=self.first_gravity, bed_height=s.bed_size[2],
+            depth=forecast.margin * forecast.deepest,
+            speed=max(forecast.margin * forecast.fastest, self.lowering_speed or 0.0), pressure=self.pressure,
+            fall=RAIN * s.bed_size[2], fastest="the fastest tip's speed",
+        )  # fmt: skip
+
+    def bed(self, softening: Softening, progress: Progress) -> Bed:
+        """The bed, laid out for the run. Raises RuntimeError where it cannot be prepared."""
+        try:
+            return self.laid_out(self.prepare(softening, progress))
+        except RuntimeError as error:
+            raise RuntimeError(say("not_prepared", error=error)) from error
+
+    def prepare(self, softening: Softening, progress: Progress) -> Bed:
+        """The bed as it is prepared, from the cache where it is there."""
+        s, graded = self.settings, self.graded
+        options: Json = {
+            "size": s.bed_size, "grain": s.grain if graded is None else graded,
+            "spread": s.spread if graded is None else None, "gravity": self.first_gravity, "seed": s.seed,
+            "young": softening.young, "max_overlap": s.max_overlap, "arch": s.arch, "threads": s.threads,
+            "cache": s.cache,
+        }  # fmt: skip
+        with held_back() as asked_to_stop:
+            if self.stages is None:
+                return Bed.prepare(self.material, **options, progress=BedProgress(progress, "bed", asked_to_stop))
+            return staged_bed(self.material, self.stages, **options, progress=progress, asked_to_stop=asked_to_stop)
+
+    def laid_out(self, bed: Bed) -> Bed:
+        """The bed as often as it is repeated, in a box as high as its grains may be thrown or carried."""
+        rise = self.forecast.rise
+        carried = carried_height(self.material, reach=self.reach, rise=rise, grain=self.settings.grain)
+        top = bed.surface + max(self.thrown(), carried)
+        return bed.repeated(self.repeats, height=top) if self.repeats > 1 or top > bed.height else bed
+
+    def stepper(self, bed: Bed) -> Run:
+        """The run on the prepared bed, its bound on overlaps set and, with `sleep`, its grains let sleep."""
+        s = self.settings
+        ground = self.ground(bed)
+        bed.max_overlap, bed.overlap_limit = 0.0, run_limit(s.max_overlap)
+        bed.mark_origin()
+        if s.sleep:
+            bed.let_sleep(Sleep(force=s.sleep_force, share=s.sleep_share))
+        return self.run_on(ground)
+
+    def stepping(self) -> Mapping[str, Any]:
+        """How the master steps the run, as every stepper takes it."""
+        s = self.settings
+        return {
+            "duration": self.duration, "substeps": s.substeps, "body_steps": s.body_steps,
+            "extrapolation": s.extrapolation, "iterations": s.iterations, "lowering_speed": self.lowering_speed,
+        }  # fmt: skip
+
+    def carry_out(
+        self,
+        folder: RunFolder,
+        progress: Progress,
+        *,
+        sinkage: Callable[[Run], float],
+        write_series: Callable[[Path, Run], Any],
+    ) -> Json:
+        """Prepare the bed, follow the run in `folder`, from its checkpoint where there is one; the result."""
+        self.announce(progress)
+        progress.plan({"bed": 1.0, "tumble": self.duration + 0.3}, seconds={"report": 10.0})  # with the setting down
+        softening = self.softening()
+        run = self.stepper(self.bed(softening, progress))
+        return finish_run(
+            run, folder, progress, checkpoint_interval=self.settings.checkpoint_interval,
+            frames=lambda resumed: self.frames(run, folder.path, resumed), sinkage=sinkage, write_series=write_series,
+            conclude=lambda: self.conclude(run, softening, folder),
+        )  # fmt: skip
+
+
+def finish_run(
+    run: Run,
+    folder: RunFolder,
+    progress: Progress,
+    *,
+    checkpoint_interval: float,
+    frames: Callable[[bool], Frames | None],
+    sinkage: Callable[[Run], float],
+    write_series: Callable[[Path, Run], Any],
+    conclude: Callable[[], Json],
+) -> Json:
+    """Follow `run` to its end, write result and report, and drop the checkpoint; the result."""
+    follow(
+        run, folder, progress, frames=frames, checkpoint_interval=checkpoint_interval, sinkage=lambda: sinkage(run),
+        write_series=lambda: write_series(folder.path, run),
+    )  # fmt: skip
+    result = conclude()
+    folder.write_result(result)
+    progress.stage("report", total=1.0)
+    write_report(folder.path, progress)
+    folder.drop_checkpoint(CHECKPOINT)
+    return result

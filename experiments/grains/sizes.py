@@ -1,0 +1,108 @@
+"""How large the grains of `bed make` are, what adhesion becomes in grains of another size, and what reports say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from dem.grains.materials import Material
+from dem.grains.sizes import LogNormal, Normal, Sieve, Sizes, Uniform
+from experiments.runs.types import Json
+
+from .sentences import say
+
+__all__ = ["KEPT", "Distribution", "Kept", "bond_number", "distribution", "in_grains_of", "scaling_told", "sizes_table"]
+
+Distribution = Literal["uniform", "normal", "log-normal", "sieve"]
+Kept = Literal["strength", "bond", "surface-energy"]
+KEPT: dict[str, tuple[str, int]] = {
+    "strength": ("strength (pull-off over d^2)", 1),
+    "bond": ("Bond number (pull-off over weight)", 2),
+    "surface-energy": ("surface energy", 0),
+}
+"""What can stay the same of grains that stick: in words; the power of d with which surface energy goes."""
+_OF = {"normal": ("deviation", "cut"), "log-normal": ("deviation", "cut"), "sieve": ("openings", "passing")}
+_SPREAD = 0.15  # the default of the setting
+_SHARES = (0.1, 0.3, 0.5, 0.6, 0.9)
+
+
+def distribution(
+    kind: str,
+    *,
+    grain: float,
+    spread: float,
+    deviation: float | None,
+    cut: float | None,
+    openings: Sequence[float],
+    passing: Sequence[float],
+) -> Sizes:
+    """The distribution of that name about the mean diameter `grain` [m]; a sieve table is enlarged, or reduced, to it.
+
+    Raises ValueError for what belongs to another distribution, what is lacking, and what ``dem.grains.sizes`` refuses.
+    """
+    given = {"deviation": deviation, "cut": cut, "openings": openings or None, "passing": passing or None}
+    for key, value in given.items():
+        if value is not None and key not in _OF.get(kind, ()):
+            owners = " or ".join(f"{name!r}" for name, keys in _OF.items() if key in keys)
+            raise ValueError(say("of_another", key=key, value=value, kind=kind, owners=owners))
+    if kind == "uniform":
+        return Uniform(grain, spread)
+    if spread != _SPREAD:
+        raise ValueError(say("spread_of_uniform", spread=spread, kind=kind))
+    if kind == "sieve":
+        if not openings or not passing:
+            raise ValueError(say("sieve_needs"))
+        table = Sieve(tuple(openings), tuple(passing))
+        return replace(table, scale=grain / table.mean)
+    if deviation is None:
+        raise ValueError(say("needs_deviation", kind=kind))
+    made = Normal if kind == "normal" else LogNormal
+    return made(grain, deviation) if cut is None else made(grain, deviation, cut)
+
+
+def in_grains_of(stuff: Material, diameter: float, *, keep: str, own: float) -> Material:
+    """`stuff`, whose surface energy holds for grains of `own` [m], in grains of `diameter` [m]."""
+    power = KEPT[keep][1]
+    return replace(stuff, surface_energy=stuff.surface_energy * (diameter / own) ** power, grain=diameter)
+
+
+def bond_number(stuff: Material, *, diameter: float, gravity: float) -> float:
+    """Pull-off force of two like grains over one's weight [1]: DMT 4 pi gamma R*, JKR 3 pi gamma R*, R* = d / 4."""
+    pull = np.pi * stuff.surface_energy * diameter * (0.75 if stuff.cohesion == "jkr" else 1.0)
+    return float(pull / (stuff.density * np.pi / 6 * diameter**3 * gravity))
+
+
+def scaling_told(before: Material, now: Material, *, diameter: float, gravity: float, keep: str) -> str:
+    """A sentence: what is kept of the adhesion of grains that are larger or smaller than those it was found for."""
+    bond = f"Bond number {bond_number(now, diameter=diameter, gravity=gravity):.3g}"
+    if before.grain is None:
+        return say("taken_as_it_stands", now=now, bond=bond)
+    times, grain = diameter / before.grain, 1e3 * before.grain
+    return say("scaled", times=times, before=before, grain=grain, kept=KEPT[keep][0], now=now, bond=bond)
+
+
+def sizes_table(radii: np.ndarray, sizes: Sizes) -> Json:
+    """The bed's grading by mass: beside the sieve table where there is one, else D10 to D90.
+
+    Args:
+        radii: of the bed's grains [m], shape [grain_count].
+    """
+    diameters = np.sort(2 * np.asarray(radii, dtype=float))
+    mass = np.cumsum(diameters**3)
+    mass /= mass[-1]
+    if isinstance(sizes, Sieve):
+        openings = sizes.scale * np.array(sizes.openings)
+        found = np.append(0.0, mass)[np.searchsorted(diameters, openings, side="right")]
+        rows = [
+            [f"{1e3 * real:.4g}", f"{1e3 * opening:.4g}", f"{100 * wanted:.3g}", f"{100 * share:.3g}"]
+            for real, opening, wanted, share in zip(sizes.openings, openings, sizes.passing, found, strict=True)
+        ]
+        head = ["sieve [mm]", "enlarged [mm]", "passing, wanted [%]", "passing, of this bed [%]"]
+        return {"title": f"Grading by mass, grains {sizes.scale:.4g} times the table's", "head": head, "rows": rows}
+    at = {share: float(np.interp(share, mass, diameters)) for share in _SHARES}
+    rows = [[f"D{100 * share:.0f} [mm]", f"{1e3 * value:.4g}"] for share, value in at.items()]
+    rows.append(["D60 / D10", f"{at[0.6] / at[0.1]:.3g}"])
+    return {"title": "Grading by mass", "head": ["finer by mass", ""], "rows": rows}

@@ -1,0 +1,238 @@
+"""How soft the grains may be: Young's modulus from the overlap that a run allows itself.
+
+The step of a DEM run goes with 1 / sqrt(E), so grains are made as soft as the largest overlap `max_overlap` (share of a
+grain's diameter) allows at the pressures and speeds of *this* run; where not even the real grains are stiff enough,
+that is refused.
+
+1. Pressure under the tip, from 3D-RFT (Agarwal et al. 2023, arXiv 2205.14920), a flat plate going straight down:
+       p = 0.876 xi_n z + lambda rho_b v^2,   xi_n = rho_b g (894 mu^3 - 386 mu^2 + 89 mu), mu held to 0.3-0.9,
+   rho_b the bulk density, lambda = 1.1, plus the weight of the bed itself, rho_b g H, and at least load / area,
+   which in flight is what the torque presses with (`PUSHED`).
+2. Mean contact force from the stress of an assembly (Rothenburg), F = pi d^2 p / (Z phi), which is d^2 p within 5 % at
+   Z = 5, phi = 0.6. Forces in a loaded bed fall off exponentially from the mean, so that the largest of n loaded
+   contacts would be ln n times the mean. Soft grains share the load: `chain` is 1.4 times what was
+   measured, 2.8 among some 400 contacts at 3.9 % of a diameter (ln 400 = 6; docs/results/penetrate; 3.4 in another
+   drive) and 5.2 among some 1600 at 1.02 % (ln 1600 = 7.4; ten grains across the tip, at 0.2 m/s).
+3. Hertz between two grains, F = (2/3) E* d^2 (delta/d)^1.5, E* = E / (2 (1 - nu^2)), so
+       delta/d = (1.5 chain p / E*)^(2/3).
+4. Apart from that, a grain of mass m that hits something rigid at speed v: delta = (5 m v^2 / 4 k)^(2/5),
+   k = (4/3) E* sqrt(R), E* = E / (1 - nu^2). It is the spike at its speed, within `max_overlap`; and the floor after
+   the fall in which the bed was rained in, v^2 = 2 g h, within `RAIN_OVERLAP` if that is more: what a grain does to the
+   floor before there is a bed leaves no trace in it, and would make the grains of a fine run three times as stiff.
+5. Cohesion presses a grain onto a plane with its pull-off force as well, at most 4 pi gamma R (DMT): as a pressure 2 pi
+   gamma / d, which no chain of grains makes larger: it is added in 3 without `chain`.
+
+The estimate is a choice made beforehand; the bed measures its largest overlap, and the result states it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from dem.contact.timestep import CHAIN
+
+from .sentences import say
+
+__all__ = [
+    "PUSHED", "Softening", "bearing_gradient", "chain", "check_young", "drop_depth", "run_limit", "soften",
+    "soften_material", "stable_overlap",
+]  # fmt: skip
+
+RAIN_OVERLAP = 0.05
+"""Overlap that a grain may have with the floor at the end of its fall, while the bed is made [of a diameter]."""
+INERTIA = 1.1
+"""lambda: dynamic pressure over rho v^2 [1] (Agarwal et al. 2023)."""
+
+PUSHED = {"motor": 1.0, "brake": 3.0}
+"""Force on a platform's rows in flight that grains are made stiff enough for, over the spring-damper's largest [1].
+
+There a bed's own weight says nothing of what a torque presses with. 0.7 to 0.8 (motor) and 2.9 to 4.9 (brake, whose
+spring-damper is not yet pressed in when a tip has its speed in grains) were met (docs/results/grains2-flight-*)."""
+SMALL = 0.05
+"""Overlap that grains meant to be hard may have [of a diameter]: the default of `max_overlap`, past which a drive of
+a spike fails, and a platform's run at `run_limit`. A run that had more is told so."""
+STIFF, STIFF_CHAIN = 0.01, 7.4
+"""Overlap [of a diameter] at and below which a chain of grains carries as much as it does among stiff ones [1]."""
+SOFTEST = 0.1
+"""Of the modulus chosen for `max_overlap`, below which one that is set is refused [1]: grains would overlap by
+10^(2/3) = 4.6 times as much. The estimate has a factor of some 3 to spare in the modulus (`chain`, and depth and speed
+beyond the forecast), and the softest case that ships has half of what is chosen."""
+SOFT = 0.05
+"""Overlap at and above which grains share the load: `CHAIN`, as `dem` has it."""
+
+
+@dataclass(frozen=True)
+class Softening:
+    """What was chosen and why."""
+
+    young: float
+    """Young's modulus of the softened grains [Pa]."""
+    pressure: float
+    """Largest pressure expected under the tip [Pa]."""
+    speed: float
+    """Largest speed of the spike [m/s]."""
+    real: float
+    """Young's modulus of the real grains [Pa]."""
+
+    @property
+    def factor(self) -> float:
+        """How many times softer than the real grains."""
+        return self.real / self.young
+
+    def stiffer(self, overlap: float, wanted: float) -> float:
+        """Young's modulus [Pa] that would bring this overlap to the one wanted (Hertz: F goes with E overlap^1.5)."""
+        return self.young * (overlap / wanted) ** 1.5
+
+    def overlapping(self, overlap: float, bound: float = SMALL, stable: float | None = None) -> str | None:
+        """A warning that grains overlapped by more than was meant, with the modulus that would keep it; or None.
+
+        ``bound``: `max_overlap`, which a platform's run may pass (`run_limit`); ``stable``: `stable_overlap` of it.
+        """
+        meant = min(bound, SMALL)
+        if overlap <= meant:
+            return None
+        how = "as max_overlap allowed" if overlap <= bound else f"past max_overlap = {100 * bound:g} %"
+        lost = ""
+        if stable is not None and overlap > stable:
+            lost = say("made_energy", stable=100 * stable)
+        are, young = "are small" if meant == SMALL else "were meant", self.stiffer(overlap, meant)
+        return say("overlapped", overlap=100 * overlap, how=how, meant=100 * meant, are=are, young=young, lost=lost)
+
+
+def run_limit(max_overlap: float) -> float:
+    """Overlap past which a platform's run on a bed made for `max_overlap` ends [of a diameter]: twice it, at most 0.2.
+
+    The step is chosen for grains all of whose contacts are at `max_overlap` (`dem.contact.timestep`); that holds up to
+    `stable_overlap`, some 1.2 times it. Beyond, single contacts are still followed: at twice the bound the step is
+    1/6.7 of the half-period of a grain on a wall, which is lost at 1/1.6 (`dem.contact.timestep.stable_step`, a pair
+    alone).
+    Whether more than a few were there, and made energy, the books tell (`energy_residual`, `dissipation_reversal`): the
+    result warns.
+    """
+    return max(max_overlap, min(2 * max_overlap, 0.2))
+
+
+def stable_overlap(material: Any, max_overlap: float) -> float:
+    """Largest overlap [of a diameter] at which the step of a bed made for `max_overlap` is stable for a whole lattice.
+
+    The longest stable step goes with the overlap to the power -1/4 (S_n = 2 E* a, a = sqrt(R* delta)):
+    max_overlap (longest / step)^4, by `dem.contact.timestep.longest_step` and `time_step_for`, whatever the
+    diameter; never below `max_overlap`.
+    """
+    from dem.contact.timestep import longest_step, time_step_for
+
+    of_like_grains = {"diameter": 1.0, "max_overlap": max_overlap}
+    longest, own = longest_step(material, **of_like_grains), time_step_for(material, **of_like_grains)
+    return float(max_overlap * (longest / own) ** 4)
+
+
+def bearing_gradient(bulk_density: float, gravity: float, friction: float) -> float:
+    """Growth of the pressure under a flat plate going straight down [Pa/m] (3D-RFT, see the module)."""
+    mu = min(0.9, max(0.3, friction))
+    return 0.876 * bulk_density * gravity * (894 * mu**3 - 386 * mu**2 + 89 * mu)
+
+
+def check_young(young: float | None, *, chosen: float, max_overlap: float) -> None:
+    """Raise ValueError for a modulus that is set [Pa] and could not hold the bed; `chosen`: what is without it [Pa]."""
+    if young is not None and young < SOFTEST * chosen:
+        raise ValueError(say("too_soft", young=young, max_overlap=max_overlap, chosen=chosen))
+
+
+def drop_depth(speed: float, mass: float, load: float, stiffness: float) -> float:
+    """Where a drop stops on a spring: K z^2 / 2 - W z = m v^2 / 2 [m]."""
+    return (load + math.sqrt(load**2 + stiffness * mass * speed**2)) / stiffness
+
+
+def chain(max_overlap: float) -> float:
+    """Largest over mean force of the loaded contacts [1], at a bound of the overlap [of a diameter]; measured.
+
+    Between the two overlaps at which it was measured it goes with the logarithm (see the module, 2).
+    """
+    share = math.log(SOFT / max_overlap) / math.log(SOFT / STIFF)
+    return CHAIN + (STIFF_CHAIN - CHAIN) * min(1.0, max(0.0, share))
+
+
+def soften(
+    *,
+    max_overlap: float,
+    grain: float,
+    density: float,
+    poisson: float,
+    friction: float,
+    real_young: float,
+    gravity: float,
+    bed_height: float,
+    depth: float,
+    speed: float,
+    pressure: float = 0.0,
+    fall: float = 0.0,
+    packing: float = 0.6,
+    surface_energy: float = 0.0,
+    fastest: str = "speed",
+) -> Softening:
+    """Young's modulus that keeps overlaps below `max_overlap` (see the module). All SI; `grain` is the mean diameter.
+
+    `depth` is the deepest the tip goes, `speed` its fastest, `pressure` what the load alone presses with, `fall` how
+    deep a grain fell when the bed was made, `surface_energy` that of the grains [J/m2], 0 without cohesion; `fastest`
+    is the key that set the speed. Raises ValueError for an overlap that is no share of a diameter, and where the real
+    grains, `real_young`, are too soft to keep it.
+    """
+    if not 0 < max_overlap <= 0.2:
+        raise ValueError(f"max_overlap is {max_overlap}: it must be above 0 and at most 0.2 of a diameter")
+    bulk = packing * density
+    under_tip = bearing_gradient(bulk, gravity, friction) * depth + INERTIA * bulk * speed**2
+    highest = max(under_tip, pressure) + bulk * gravity * bed_height
+    pulled = 2 * math.pi * surface_energy / grain
+    pair = 1.5 * (chain(max_overlap) * highest + pulled) / max_overlap**1.5
+    static = 2 * (1 - poisson**2) * pair
+    mass = density * math.pi * grain**3 / 6
+    struck, landed = (
+        0.75 * 1.25 * mass * squared / (bound * grain) ** 2.5 / math.sqrt(0.5 * grain) * (1 - poisson**2)
+        for squared, bound in ((speed**2, max_overlap), (2 * gravity * fall, max(max_overlap, RAIN_OVERLAP)))
+    )
+    if struck > real_young:
+        most = 0.99 * speed * math.sqrt(real_young / struck)
+        raise ValueError(
+            say("too_fast", fastest=fastest, speed=speed, max_overlap=max_overlap, real=real_young, most=most)
+        )
+    if static > real_young:
+        would = max_overlap * (static / real_young) ** (2 / 3)
+        raise ValueError(
+            say("too_deep", max_overlap=max_overlap, highest=highest, static=static, real=real_young, would=would)
+        )
+    return Softening(min(real_young, max(static, struck, landed)), highest, speed, real_young)
+
+
+def soften_material(
+    material: Any,
+    *,
+    young: float | None,
+    max_overlap: float,
+    grain: float,
+    spread: float,
+    fastest: str = "speed",
+    **case: float,
+) -> Softening:
+    """`soften` for the grains of a material; where `young` [Pa] is set, that, with what presses and how fast.
+
+    Diameters are uniform within 1 +- `spread`: where that is wide, the mean grain is held to less than `max_overlap`,
+    so that the smallest keep it (`dem.prepare.prepare.bound_of_mean`). `case` are the options of `soften` that are
+    not the material's. Raises ValueError as `soften` does.
+    """
+    from dem.grains.sizes import Uniform
+    from dem.prepare.prepare import bound_of_mean
+
+    chosen = soften(
+        max_overlap=bound_of_mean(Uniform(grain, spread), max_overlap),
+        grain=grain,
+        density=material.density,
+        poisson=material.poisson,
+        friction=material.friction,
+        real_young=material.young,
+        surface_energy=material.surface_energy,
+        fastest=fastest,
+        **case,
+    )
+    return chosen if young is None else Softening(young, chosen.pressure, chosen.speed, material.young)

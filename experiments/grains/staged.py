@@ -1,0 +1,95 @@
+"""A bed that goes through stages before an experiment, from the cache where it is there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from dem import Bed, Graded
+from dem.grains.materials import Material
+from dem.grains.sizes import sizes_of
+from dem.prepare.prepare import prepare_as
+from dem.prepare.recipe import check_stages, parse_stage
+from experiments.platform.surfaces import Surface
+from experiments.runs.progress import Progress
+
+from .sentences import say
+
+__all__ = ["check_bed_stages", "packing_warning", "staged_bed"]
+
+
+def check_bed_stages(
+    words: Sequence[str], material: Material, *, size: tuple[float, float, float], grain: float, spread: float
+) -> None:
+    """Raise ValueError, naming ``bed_stages``, for stages that cannot be, or leave no level bed to stand on."""
+    try:
+        plan = [parse_stage(stage) for stage in words]
+        sizes = sizes_of(grain, spread)
+        check_stages(plan, size=size, grain=grain, sizes=sizes, cohesive=material.cohesion != "none")
+    except ValueError as error:
+        raise ValueError(f"bed_stages: {error}") from error
+    spoilt = [str(stage) for stage in plan if stage.name in ("cut", "tilt")]
+    if spoilt:
+        raise ValueError(say("spoilt", stage=spoilt[0]))
+    if plan[-1].name != "level":
+        raise ValueError(say("not_level", stage=str(plan[-1])))
+
+
+def packing_warning(surface: Surface, material: Material, stages: Sequence[str] | None) -> str | None:
+    """That a bed without `stages` will not have the packing its grains were calibrated at, and which stages would do.
+
+    None where stages are given, or that packing is not known. `material` is that of the surface's grains.
+    """
+    if stages is not None or surface.packing is None:
+        return None
+    compact = f"compact:{surface.packing:g}"
+    would_do = f"rain {compact} level" if material.cohesion == "none" else f"rain:dry {compact} stick level"
+    return say("not_packed", surface=surface, stages=would_do)
+
+
+class _OneStage:
+    """Shows the stages of a preparation as one of the experiment; stops it where it can be gone on with."""
+
+    def __init__(self, progress: Progress, name: str, count: int, asked_to_stop: Callable[[], bool]) -> None:
+        self.progress, self.count, self.asked_to_stop, self.index = progress, count, asked_to_stop, -1
+        progress.stage(name, total=1.0)
+
+    def stage(self, name: str, total: float | None = None) -> None:
+        self.index += total is not None
+
+    def update(self, done: float) -> None:
+        self.progress.update(min(1.0, (max(self.index, 0) + min(max(done, 0.0), 1.0)) / self.count))
+        if self.asked_to_stop():
+            raise KeyboardInterrupt
+
+
+def staged_bed(
+    material: Material,
+    stages: Sequence[str],
+    *,
+    size: tuple[float, float, float],
+    grain: float | Graded,
+    spread: float | None,
+    gravity: float,
+    seed: int,
+    young: float,
+    max_overlap: float,
+    arch: str,
+    threads: int | None,
+    cache: bool,
+    progress: Progress,
+    asked_to_stop: Callable[[], bool],
+) -> Bed:
+    """The bed that `hedgebed bed make` with these stages would make; kept under ``HEDGEBED_CACHE``, as rained ones are.
+
+    Raises RuntimeError where it cannot be made as asked for, and what ``dem.prepare.prepare.prepare_as`` does.
+    """
+    try:
+        prepared = prepare_as(
+            material, make=Bed, stages=stages, size=size, grain=grain, spread=spread, gravity=gravity, seed=seed,
+            young=young, max_overlap=max_overlap, arch=arch, threads=threads, cache=cache,
+            progress=_OneStage(progress, "bed", len(stages), asked_to_stop),
+        )  # fmt: skip
+    except ValueError as error:  # found while it was prepared, as a packing that cannot be reached
+        raise RuntimeError(str(error)) from error
+    assert prepared.bed is not None
+    return prepared.bed

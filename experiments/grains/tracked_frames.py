@@ -1,0 +1,106 @@
+"""Frames of a platform for ParaView: the bed and its surface, the platform, contact forces, one file a moment.
+
+A frame has the meshes `spikes` and `hull`; `row_forces`, the force on each row or spike that touches, as points with a
+vector `force` [N]; on a bed the grains, `contact_forces` (of each grain on a spike, that of the normal spring), and
+`surface`, a height map on a grid of half a grain with `height` and `change` [m] since the first frame.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from pathlib import Path
+from typing import Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupling import BedGround, CoupledTumble, SpatialRun
+from coupling.members import HULL, Member
+from dem import Grains
+from experiments.runs.types import Json
+from rigid.platform.solids import Mesh
+from rigid.spatial.quaternions import to_matrix
+from vis.pictures.frames import GRAIN_FIELDS, FrameWriter, HeightMap, read_frames
+from vis.pictures.meshes import revolve, spike_mesh
+from vis.pictures.tracks import height_map, lying
+
+from .settings import GrainsSettings
+
+__all__ = ["NAME", "PlatformFrames", "member_mesh"]
+
+NAME = "tumble"
+
+Array = NDArray[np.float64]
+Run = TypeVar("Run", bound=CoupledTumble | SpatialRun)
+
+
+class PlatformFrames(ABC, Generic[Run]):
+    """Writes frames/tumble.pvd, and goes on with it where it was stopped. `meshes`, in body axes, are the variant's."""
+
+    meshes: dict[str, Mesh]
+
+    def __init__(self, run: Run, folder: Path, settings: GrainsSettings, *, duration: float, resumed: bool) -> None:
+        self.interval = max(duration / max(1, settings.frame_count), run.master.macro_step)
+        self._untouched: HeightMap | None = None
+        self._spacing = 0.5 * settings.grain
+        if resumed:
+            half = 0.5 * run.master.macro_step
+            self.writer = FrameWriter(folder, name=NAME, resume=True, keep_until=max(run.time, 0.0) - half)
+            if self.writer.times:
+                self._untouched = read_frames(folder, NAME)[0].maps.get("surface")
+        else:
+            self.writer = FrameWriter(folder, name=NAME)
+
+    @abstractmethod
+    def values(self, run: Run) -> dict[str, float]:
+        """Numbers of a frame."""
+
+    @abstractmethod
+    def row_forces(self, run: Run, origin: Array) -> tuple[Array, dict[str, Array]]:
+        """Where rows or spikes touch [m], with `origin` of the bed, and `force` [N] and `row` there."""
+
+    def write(self, run: Run) -> None:
+        """One frame of what there is now; without a bed it has no grains."""
+        ground, pose = run.ground, run.body.pose
+        turn = to_matrix(pose.turn).T
+        origin = ground.origin if isinstance(ground, BedGround) else np.zeros(3)
+        grains: Json = {"position": np.zeros((0, 3)), "radius": np.zeros(0)}
+        clouds: Json = {"row_forces": self.row_forces(run, origin)}
+        maps = {}
+        if isinstance(ground, BedGround):
+            seen = ground.bed.grains()
+            arrays = seen.as_dict()
+            grains = {name: arrays[name] for name in ("position", *GRAIN_FIELDS)}
+            points, pushes = ground.pushes()
+            clouds["contact_forces"] = (points + origin, {"force": pushes})
+            maps["surface"] = self._surface(ground, seen)
+        self.writer.write(
+            run.time, grains,
+            {name: (origin + pose.position + mesh.vertices @ turn, mesh.faces) for name, mesh in self.meshes.items()},
+            values=self.values(run), clouds=clouds, maps=maps,
+        )  # fmt: skip
+
+    def _surface(self, ground: BedGround, grains: Grains) -> HeightMap:
+        """The height map of what there is now."""
+        size = ground.bed.size
+        found = height_map(
+            grains.position, grains.radius, (float(size[0]), float(size[1])), spacing=self._spacing,
+            lies=lying(grains.position, grains.radius),
+        )  # fmt: skip
+        if self._untouched is None:
+            self._untouched = found
+        found.fields["change"] = found.fields["height"] - self._untouched.fields["height"]
+        return found
+
+
+def member_mesh(member: Member, *, segments: int) -> Mesh:
+    """A spike, of `segments` around, or the hull's cylinder, in body axes."""
+    if member.row == HULL:
+        ends = (-member.below, member.length)
+        profile = [(0.0, ends[0]), (member.radius, ends[0]), (member.radius, ends[1]), (0.0, ends[1])]
+        points, triangles = revolve(np.array(profile), segments=64)
+    else:
+        length = member.radius + member.length
+        points, triangles = spike_mesh("sphere", diameter=2 * member.radius, length=length, segments=segments)
+        points = points - np.array([0.0, 0.0, member.radius])
+    return Mesh(member.at + points @ to_matrix(member.turn).T, triangles)

@@ -1,0 +1,208 @@
+"""Hop theory as a tool: the wheel speed that a hop over a distance takes, the launch, the flight, how near escape is.
+
+The launch is that of `rigid.hop`, on rigid ground. Under a brake the torque is known and the wheel's speed is sought,
+under a motor the torque; a motor's wheel then turns as fast as it has become when the platform leaves. The planar model
+then does the same hop from ground that gives (`experiments.hop.on_surface`): both stand in the result.
+"""
+
+from __future__ import annotations
+
+from experiments.platform.kept_platform import keep_platform
+from experiments.runs.folder import RunFolder, write_series
+from experiments.runs.progress import Progress
+from experiments.runs.reporting import write_report
+from experiments.runs.types import Json
+from experiments.runs.version import __version__
+from experiments.runs.whole_runs import whole_run
+from experiments.tumble.result import trajectory_columns
+from rigid.hop import Flight, Launch, escape_speed, impulsive_launch, launch_speed_for, least_viable_angle
+from rigid.model.trial import Trial
+from rigid.planar.simulate import simulate
+
+from .numbers import HopPlan
+from .on_surface import SurfaceHop, flight_path, hop_on_surface, hop_trial, wheel_speed_on_surface
+from .search import Hop, find_hop, longest_flight
+from .sentences import say
+from .settings import HopSettings
+from .words import sentences, warnings
+
+__all__ = ["check", "resume", "run"]
+
+
+def check(settings: HopSettings) -> None:
+    """Raise ValueError, naming key, value and what would do, for a platform there is not or a hop that cannot be."""
+    plan, hop = find_hop(settings)
+    trial = _trial(settings, plan, hop)
+    if trial is not None:
+        simulate(trial, duration=1e-3)  # that it can stand on this ground
+
+
+def _carry_out(settings: HopSettings, folder: RunFolder, progress: Progress) -> Json:
+    with folder.lock():
+        plan, hop = find_hop(settings, keep_platform(settings.platform, folder.path, progress.message))
+        for sentence in plan.sentences():
+            progress.message(sentence)
+        progress.stage("hop", total=1.0)
+        given, wanted = _on_surface(settings, plan, hop)
+        progress.update(1.0)
+        _write_series(settings, folder, hop, given)
+        result = _result(settings, plan, hop, given, wanted)
+        folder.write_result(result)
+        progress.stage("report", total=1.0)
+        write_report(folder.path, progress)
+    return result
+
+
+# On ground that gives -------------------------------------------------------------------------------------------------
+
+
+def _trial(settings: HopSettings, plan: HopPlan, hop: Hop) -> Trial | None:
+    return hop_trial(plan, torque=hop.torque, wheel_speed=hop.effort if settings.actuator == "brake" else None)
+
+
+def _on_surface(settings: HopSettings, plan: HopPlan, hop: Hop) -> tuple[SurfaceHop | None, float | None]:
+    """The same hop by the planar model, and the braked wheel's speed that would go the distance there.
+
+    None for a platform that the model does not take; None for a motor, where no distance is asked for, and where no
+    wheel speed does.
+    """
+    trial = _trial(settings, plan, hop)
+    if trial is None:
+        return None, None
+    longest, radius = longest_flight(plan, hop.launch), settings.body_radius
+    given = hop_on_surface(trial, expected_time=hop.launch.time, longest=longest, radius=radius)
+    if settings.actuator == "motor" or plan.distance is None:
+        return given, None
+    most = plan.wheel.max_speed
+    return given, wheel_speed_on_surface(
+        trial, given, distance=plan.distance, max_speed=most, longest=longest, radius=radius
+    )
+
+
+def _write_series(settings: HopSettings, folder: RunFolder, hop: Hop, given: SurfaceHop | None) -> None:
+    """The flights of theory and model, and the model's way on the ground."""
+    flights: dict[str, tuple[Launch, Flight]] = {}
+    if hop.flight is not None:
+        flights["flight"] = hop.launch, hop.flight
+    if given is not None:
+        write_series(folder.path / "trajectory.csv", trajectory_columns(given.trajectory))
+        if given.launch is not None and given.flight is not None:
+            flights["flight.model"] = given.launch, given.flight
+    for name, (left, flown) in flights.items():
+        along, height = flight_path(left, flown, gravity=settings.gravity, radius=settings.body_radius)
+        folder.write_series(name, {"along_m": along, "height_m": height})
+
+
+# The result -----------------------------------------------------------------------------------------------------------
+
+
+def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | None, sought: float | None) -> Json:
+    left, flown, wheel, tumbler, torque = hop.launch, hop.flight, plan.wheel, plan.tumbler, hop.torque
+    by_brake = settings.actuator == "brake"
+    speed = hop.effort if by_brake else min(torque * left.time / wheel.inertia, wheel.max_speed)
+    radius = settings.body_radius
+    escape = escape_speed(settings.gravity, radius) if radius is not None else None
+    sudden = impulsive_launch(tumbler, wheel.inertia)
+    wanted = None
+    if flown is not None:
+        wanted = launch_speed_for(flown.distance, sudden.angle, gravity=settings.gravity, radius=radius)
+    driven = min(left.time, wheel.inertia * speed / torque)
+    lands = "" if flown is not None else "it escapes"
+    when = "before the brake" if by_brake else "reached when it leaves"
+    quantities = {
+        "wheel_speed": _quantity(speed, "rad/s", say("of_wheel", when=when)),
+        "model_wheel_speed": _quantity(sought, "rad/s", _model_speed_note(plan, given, sought, by_brake=by_brake)),
+        "wheel_speed_impulsive": _quantity(wanted / sudden.speed if wanted else None, "rad/s", lands or say("closed")),
+        "torque": _quantity(torque, "N m", "on the platform, constant"),
+        "torque_time": _quantity(driven, "s", say("of_torque_time")),
+        "rotation": _quantity(left.rotation, "rad", say("of_rotation")),
+        "launch_speed": _quantity(left.speed, "m/s", say("of_launch_speed")),
+        "launch_angle": _quantity(left.angle, "rad", say("of_launch_angle")),
+        "least_viable_angle": _quantity(least_viable_angle(tumbler.mu_s), "rad", say("of_viable")),
+        "spin": _quantity(left.spin, "rad/s", "turning rate in flight"),
+        "flight_time": _quantity(flown.time if flown else None, "s", lands or say("of_flight_time")),
+        "peak_height": _quantity(flown.height if flown else None, "m", lands or say("of_height")),
+        "distance": _quantity(flown.distance if flown else None, "m", lands or say("of_distance")),
+        "escape_speed": _quantity(escape, "m/s", "sqrt(2 g R)" if escape else "unknown without body_radius"),
+        "escape_ratio": _quantity(left.speed / escape if escape else None, "1", say("of_escape")),
+    } | _model_quantities(plan, left, flown, given, escape)
+    said = sentences(plan, left, flown, given, torque=torque, speed=speed, by_brake=by_brake, sought=sought)
+    return {
+        "format": "hedgebed-result/1",
+        "experiment": "hop",
+        "version": __version__,
+        "title": f"{plan.platform.name}: a hop {_asked(settings, plan)} at {settings.gravity:g} m/s2"
+        + (_wheel_words(plan, given, speed, sought) if by_brake and plan.distance is not None else ""),
+        "status": "done",
+        "quantities": quantities,
+        "numbers": {
+            name: {"value": number.value, "unit": number.unit, "origin": number.origin}
+            for name, number in plan.numbers.items()
+        },
+        "actuator": settings.actuator,
+        "asks_for": settings.asks_for,
+        "surface": plan.surface,
+        "departures": {"sentences": said},
+        "platform": {
+            "name": plan.platform.name, "mass": plan.platform.mass, "inertia": tumbler.inertia,
+            "spike_length": tumbler.spike_length, "lean": tumbler.lean, "wheel_inertia": wheel.inertia,
+            "max_wheel_speed": wheel.max_speed, "sources": dict(plan.platform.sources),
+        },
+        "warnings": [*plan.warnings, *warnings(plan, left, flown, given, escape)],
+    }  # fmt: skip
+
+
+def _asked(settings: HopSettings, plan: HopPlan) -> str:
+    if plan.distance is not None:
+        return f"of {plan.distance:g} m"
+    if settings.wheel_speed_0 is not None:
+        return f"from {settings.wheel_speed_0:g} rad/s"
+    return f"by {settings.torque:g} N m"
+
+
+def _wheel_words(plan: HopPlan, given: SurfaceHop | None, speed: float, sought: float | None) -> str:
+    """The answer for a distance, on either ground: the one of rigid ground alone is no plan for a hop."""
+    said = f", by a wheel at {speed:.4g} rad/s from rigid ground"
+    if given is None:
+        return said
+    return said + (f", {sought:.4g} from {plan.surface}" if sought is not None else f", none from {plan.surface}")
+
+
+def _model_speed_note(plan: HopPlan, given: SurfaceHop | None, sought: float | None, *, by_brake: bool) -> str:
+    if plan.distance is None:
+        return "no distance was asked for"
+    if given is None:
+        return say("not_sought_here")
+    if not by_brake:
+        return say("not_sought", plan=plan)
+    return say("sought" if sought is not None else "none_goes", plan=plan)
+
+
+def _model_quantities(
+    plan: HopPlan, left: Launch, flown: Flight | None, given: SurfaceHop | None, escape: float | None
+) -> dict[str, Json]:
+    """What the planar model makes of the same wheel and torque, and how many times theory's that is."""
+    other = given.launch if given is not None else None
+    flight_of = given.flight if given is not None else None
+    no = "it does not leave the ground" if other is None else "it escapes" if flight_of is None else ""
+    no = "not for this platform" if given is None else no
+    where = f"planar model, on {plan.surface}" + (f": {no}" if no else "")
+    further = flight_of.distance / flown.distance if flight_of and flown else None
+    near = other.speed / escape if other and escape else None
+    return {
+        "model_launch_speed": _quantity(other.speed if other else None, "m/s", where),
+        "model_launch_angle": _quantity(other.angle if other else None, "rad", where),
+        "model_flight_time": _quantity(flight_of.time if flight_of else None, "s", where),
+        "model_peak_height": _quantity(flight_of.height if flight_of else None, "m", where),
+        "model_distance": _quantity(flight_of.distance if flight_of else None, "m", where),
+        "speed_factor": _quantity(other.speed / left.speed if other else None, "1", say("of_speed_factor")),
+        "distance_factor": _quantity(further, "1", say("of_distance_factor")),
+        "model_escape_ratio": _quantity(near, "1", say("of_model_escape")),
+    }
+
+
+def _quantity(value: float | None, unit: str, note: str) -> Json:
+    return {"value": value, "std": None if value is None else 0.0, "unit": unit, "note": note}
+
+
+run, resume = whole_run("hop", HopSettings, _carry_out, check=check)

@@ -1,0 +1,124 @@
+"""From the settings of a hop to its numbers, each with where it comes from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from experiments.platform.lengths import check_spike_length
+from experiments.platform.numbers import platform_numbers
+from experiments.platform.settled import (
+    Number,
+    Settled,
+    brake_words,
+    check_actuation,
+    check_body,
+    defaults_said,
+    of_other_spikes,
+    settle_limits,
+    settle_platform,
+    settle_surface,
+)
+from experiments.runs.types import Json
+from rigid.hop import Tumbler
+from rigid.model.trial import Trial
+from rigid.platform.actuation import Flywheel
+from rigid.platform.files import find_platform
+from rigid.platform.platform import Platform
+
+from .settings import DEFAULT_DISTANCE, HopSettings
+
+__all__ = ["HopPlan", "plan_hop"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class HopPlan:
+    """The platform and the ground of a hop, and what is said of them."""
+
+    platform: Platform
+    wheel: Flywheel
+    brake: str
+    """What slows the wheel, in words."""
+    tumbler: Tumbler
+    surface: str
+    stiffness: float
+    """K of a row [N/m]."""
+    damping: float
+    """C of a row [N s/m]."""
+    spike_count: int | None
+    """Rows of tips for the planar model; None where they are not at equal angles."""
+    distance: float | None
+    """How far to hop [m]; None where that is what is asked."""
+    numbers: Mapping[str, Number]
+    choices: Mapping[str, str]
+    """What else stands at its default: name -> value."""
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def ground(self) -> str:
+        """The ground that gives, in words."""
+        return f"{self.surface} (K = {self.stiffness:g} N/m, C = {self.damping:g} N s/m a row)"
+
+    def sentences(self) -> list[str]:
+        """One line for each number and choice that was not given: every default is said."""
+        return defaults_said(self.choices, self.numbers)
+
+
+def plan_hop(settings: HopSettings, platform_file: Path | None = None) -> HopPlan:
+    """The numbers that `settings` stand for; `platform_file` stands in for ``settings.platform``, where copied.
+
+    Raises ValueError, naming the setting, for a platform or a surface there is not, a torque beyond the motor, a wheel
+    speed beyond the wheel's, and numbers that cannot be.
+    """
+    platform = find_platform(platform_file or settings.platform)
+    of_platform = platform_numbers(settings.platform, file=platform_file, in_plane=False)
+    numbers = Settled(settings)
+    given = settings.model_fields_set
+    numbers["gravity"] = Number(settings.gravity, "m/s2", "given" if "gravity" in given else "default")
+    if settings.asks_for == "distance":
+        numbers.settle("distance", DEFAULT_DISTANCE, "default")
+    for name in ("body_radius", "wheel_speed_0"):
+        if getattr(settings, name) is not None:
+            numbers.settle(name, math.nan, "given")
+    settle_platform(numbers, of_platform)
+    check_spike_length(numbers)
+    numbers.settle("lean", of_platform.lean, f"platform {of_platform.name}")
+    settle_limits(numbers, of_platform)
+    own, brake = platform.wheel(), brake_words(of_platform)
+    if settings.actuator == "brake":
+        numbers.settle("torque", own.brake_torque, f"{brake} of platform {of_platform.name}, at its largest")
+    elif settings.torque is not None:
+        numbers.settle("torque", settings.torque, "given")
+    surface, warnings = settle_surface(numbers, settings.surface)
+    whose = f"platform {of_platform.name}"
+    warnings += of_other_spikes(numbers, surface, diameter=of_platform.spike_diameter, whose=whose)
+    wheel = replace(
+        own, inertia=numbers.value("wheel_inertia"), max_speed=numbers.value("max_wheel_speed"),
+        motor_torque=numbers.value("max_motor_torque"),
+    )  # fmt: skip
+    _check(settings, numbers)
+    warnings += check_actuation(settings.actuator, of_platform, numbers) + check_body(numbers, of_platform)
+    tumbler = Tumbler(
+        mass=numbers.value("mass"), inertia=numbers.value("inertia"), spike_length=numbers.value("spike_length"),
+        lean=of_platform.lean, gravity=settings.gravity, mu_s=numbers.value("mu_s"), mu_d=numbers.value("mu_d"),
+    )  # fmt: skip
+    choices = {name: str(getattr(settings, name)) for name in ("platform", "actuator") if name not in given}
+    if settings.surface is None:
+        choices["surface"] = surface
+    if settings.body_radius is None:
+        choices["body_radius"] = "none, a flat ground"
+    return HopPlan(
+        platform=platform, wheel=wheel, brake=brake, tumbler=tumbler, surface=surface,
+        stiffness=numbers.value("stiffness"), damping=numbers.value("damping"), spike_count=of_platform.spike_count,
+        distance=numbers.value("distance") if settings.asks_for == "distance" else None, numbers=numbers,
+        choices=choices, warnings=tuple(warnings),
+    )  # fmt: skip
+
+
+def _check(settings: HopSettings, numbers: Settled) -> None:
+    """Refuse numbers that no body can have, as a tumble does."""
+    body = ("mass", "inertia", "spike_length", "wheel_inertia", "stiffness", "damping", "mu_s", "mu_d")
+    own: Json = {name: numbers.value(name) for name in body}
+    Trial(gravity_sim=settings.gravity, gravity=settings.gravity, **own)

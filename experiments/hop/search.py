@@ -1,0 +1,216 @@
+"""The hop that is asked for: the least means that go a distance on rigid ground, or how far given means go.
+
+Under a brake the torque is known and the wheel's speed is sought, under a motor the torque. A distance that rigid
+ground does not let it go is refused with what each ground allows.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rigid.hop import Flight, Launch, brake_launch, flight, impulsive_launch, launch, launch_speed_for
+
+from .numbers import HopPlan, plan_hop
+from .on_surface import hop_on_surface, hop_trial
+from .sentences import say
+from .settings import HopSettings
+
+__all__ = ["Hop", "find_hop", "longest_flight"]
+
+SCAN = 80
+"""Points between the least and the most that the actuator can do, to find where the distance lies."""
+SURFACE_SCAN = 6
+"""Points among which the planar model's longest hop is found, for a refusal."""
+HALVINGS = 8
+"""How often the stretch between two of them is halved, where the distance lies in it."""
+BEYOND = 10.0
+"""How many times what a distance takes at once, or from the energy, is looked through where no limit is known."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hop:
+    """One hop: what the actuator did, how the platform left, how it flew (None: it does not come down)."""
+
+    effort: float
+    """Wheel speed of a brake [rad/s], torque of a motor [N m]."""
+    torque: float
+    """On the platform [N m]."""
+    launch: Launch
+    flight: Flight | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Means:
+    """What the actuator can do."""
+
+    leave: Callable[[float], Launch | None]
+    torque: Callable[[float], float]
+    """Of an effort [N m]."""
+    least: float
+    most: float
+    what: str
+    """In words, at its most."""
+    unit: str
+
+
+def find_hop(settings: HopSettings, platform_file: Path | None = None) -> tuple[HopPlan, Hop]:
+    """The numbers, and the hop over the distance or by the means given.
+
+    `platform_file` stands in for ``settings.platform``, where that was copied.
+
+    Raises ValueError for numbers that cannot be, and for a distance or means with which there is no hop.
+    """
+    plan = plan_hop(settings, platform_file)
+    means = _by_brake(plan, settings) if settings.actuator == "brake" else _by_motor(plan, settings)
+    if settings.asks_for == "distance":
+        return plan, _search(settings, plan, means)
+    key, effort = ("wheel_speed_0", settings.wheel_speed_0) if settings.wheel_speed_0 else ("torque", settings.torque)
+    assert effort is not None
+    found = _hop(settings, means, effort)
+    if found is None:
+        efforts = [float(each) for each in np.geomspace(means.least, means.most, SCAN)]
+        enough = next((each for each in efforts if _hop(settings, means, each) is not None), None)
+        would = "nor does any other" if enough is None else f"from some {enough:.3g} {means.unit} on it does"
+        where = say("where", t=plan.tumbler)
+        raise ValueError(say("no_hop", key=key, effort=effort, unit=means.unit, where=where, would=would))
+    return plan, found
+
+
+def longest_flight(plan: HopPlan, left: Launch) -> float:
+    """When to give up following the planar model [s], by the flight from rigid, flat ground."""
+    return 2 * left.time + 0.5 + 0.5 * flight(left.speed, left.angle, gravity=plan.tumbler.gravity).time  # type: ignore[union-attr]
+
+
+# What the actuator can do ---------------------------------------------------------------------------------------------
+
+
+def _by_brake(plan: HopPlan, settings: HopSettings) -> _Means:
+    tumbler, wheel, torque = plan.tumbler, plan.wheel, plan.numbers["torque"].value
+    if torque <= tumbler.tipping_torque:
+        raise ValueError(say("does_not_tip", key="torque", torque=torque, t=tumbler))
+    most, limit = wheel.max_speed, "its largest speed"
+    if math.isinf(most):
+        most, limit = max(BEYOND * _impulsive_speed(plan, settings), settings.wheel_speed_0 or 0.0), "no limit known"
+    return _Means(
+        leave=lambda speed: brake_launch(tumbler, wheel.inertia * speed, torque), torque=lambda speed: torque,
+        least=1e-4 * most, most=most, unit="rad/s",
+        what=say("brake_means", plan=plan, torque=torque, most=most, limit=limit),
+    )  # fmt: skip
+
+
+def _by_motor(plan: HopPlan, settings: HopSettings) -> _Means:
+    tumbler, wheel = plan.tumbler, plan.wheel
+    most, limit = wheel.motor_torque, "its largest"
+    if math.isinf(most):
+        # The work H omega / 2 of a launch that takes no time, done over the lean, and as much as tips it.
+        speed = _impulsive_speed(plan, settings)
+        work = 0.5 * wheel.inertia * speed * impulsive_launch(tumbler, wheel.inertia).spin * speed
+        most, limit = BEYOND * (work / tumbler.lean + tumbler.tipping_torque), "no limit known"
+    if most <= tumbler.tipping_torque:
+        raise ValueError(say("does_not_tip", key="the motor's torque", torque=most, t=tumbler))
+    if settings.torque is not None and settings.torque <= tumbler.tipping_torque:
+        raise ValueError(say("does_not_tip", key="torque", torque=settings.torque, t=tumbler))
+    return _Means(
+        leave=lambda torque: launch(tumbler, torque, wheel.inertia * wheel.max_speed / torque),
+        torque=lambda torque: torque, least=tumbler.tipping_torque * (1 + 1e-6), most=most,
+        what=say("motor_means", most=most, limit=limit), unit="N m",
+    )  # fmt: skip
+
+
+def _wanted(plan: HopPlan) -> float:
+    """The distance [m]; where none is asked for, one that bounds what is looked through."""
+    return plan.distance if plan.distance is not None else 1.0
+
+
+def _impulsive_speed(plan: HopPlan, settings: HopSettings) -> float:
+    """The wheel's speed for the distance by a brake that takes no time [rad/s]."""
+    sudden = impulsive_launch(plan.tumbler, plan.wheel.inertia)
+    gravity, radius = settings.gravity, settings.body_radius
+    return launch_speed_for(_wanted(plan), sudden.angle, gravity=gravity, radius=radius) / sudden.speed
+
+
+# The hop --------------------------------------------------------------------------------------------------------------
+
+
+def _hop(settings: HopSettings, means: _Means, effort: float) -> Hop | None:
+    """The hop by this effort; None where it does not leave rigid ground."""
+    try:
+        left = means.leave(effort)
+    except RuntimeError as error:
+        raise ValueError(str(error)) from error
+    if left is None or left.angle <= 0:
+        return None
+    return Hop(
+        effort=effort, torque=means.torque(effort), launch=left,
+        flight=flight(left.speed, left.angle, gravity=settings.gravity, radius=settings.body_radius),
+    )  # fmt: skip
+
+
+def _search(settings: HopSettings, plan: HopPlan, means: _Means) -> Hop:
+    """The least effort whose hop goes the distance on rigid ground. Raises ValueError where none does."""
+    distance = plan.distance
+    assert distance is not None
+
+    def missed(effort: float) -> float:
+        found = _hop(settings, means, effort)
+        if found is None:
+            return -distance
+        return (found.flight.distance if found.flight else math.inf) - distance
+
+    efforts = np.geomspace(means.least, means.most, SCAN)
+    beyond = [missed(float(effort)) for effort in efforts]
+    first = next((k for k, over in enumerate(beyond) if over >= 0), None)
+    where = say("where", t=plan.tumbler)
+    if first is None:
+        reach = max(beyond) + distance
+        way = f"hops {reach:.4g} m at most" if reach > 0 else "does not make it leave the ground"
+        there = _on_surface(settings, plan, means)
+        raise ValueError(say("too_far", distance=distance, what=means.what, way=way, where=where, on_surface=there))
+    low, high = float(efforts[max(first - 1, 0)]), float(efforts[first])
+    while high - low > 1e-13 * high and low < (middle := 0.5 * (low + high)) < high:  # halving gets over jumps too
+        low, high = (middle, high) if missed(middle) < 0 else (low, middle)
+    found = _hop(settings, means, high)
+    assert found is not None
+    if abs(missed(high)) > 1e-6 * distance:
+        shortest = found.flight.distance if found.flight else math.inf
+        if shortest == math.inf:
+            raise ValueError(say("next_escapes", distance=distance))
+        raise ValueError(say("too_short", distance=distance, shortest=shortest, where=where))
+    return found
+
+
+def _on_surface(settings: HopSettings, plan: HopPlan, means: _Means) -> str:
+    """What the planar model says of a distance that rigid ground does not allow."""
+    by_brake, distance = settings.actuator == "brake", plan.distance
+    assert distance is not None
+    if plan.spike_count is None:
+        return say("not_taken", plan=plan)
+
+    def reach(effort: float) -> float:
+        left = means.leave(effort)
+        trial = hop_trial(plan, torque=means.torque(effort), wheel_speed=effort if by_brake else None)
+        if trial is None or left is None or left.angle <= 0:
+            return 0.0
+        longest = longest_flight(plan, left)
+        there = hop_on_surface(trial, expected_time=left.time, longest=longest, radius=settings.body_radius)
+        if there.launch is None:
+            return 0.0
+        return there.flight.distance if there.flight is not None else math.inf
+
+    efforts = [float(effort) for effort in np.geomspace(0.1 * means.most, means.most, SURFACE_SCAN)]
+    far = [reach(effort) for effort in efforts]
+    if max(far) <= 0:
+        return say("not_on_surface", plan=plan)
+    if max(far) < distance:
+        return say("most_on_surface", plan=plan, most=max(far))
+    first = next(k for k, gone in enumerate(far) if gone >= distance)
+    low, high = (efforts[first - 1] if first else 0.0), efforts[first]
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if reach(middle) < distance else (low, middle)
+    return say("brake_on_surface" if by_brake else "motor_on_surface", plan=plan, effort=high)

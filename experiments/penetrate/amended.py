@@ -1,0 +1,286 @@
+"""The spring-damper with what it lacked: penetration's model.toml, as `hedgebed diagnose` writes it, on any settings.
+
+Driven spikes follow the path that they are given; drops are integrated with their touches and turns located
+(`experiments.diagnose.push.law`); what is set down is stepped on the law as a ground. The numbers of an effect
+are those of the model's diameter: on another one forces on a section go with its square, forces on a shaft with it, and
+what belongs to the spring with the K that the model gives.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from coupling import Penetration
+from experiments.campaign import PenetrationModel, read_model
+from experiments.campaign.tables import EffectTable
+from experiments.diagnose.fit.own import OwnEffect, load_own
+from experiments.diagnose.push.forms import Scales, make_library
+from experiments.diagnose.push.law import PHASES, SLOTS, fall, push, slot_places, slot_table
+from experiments.runs.types import Json
+from rigid import SpringDamper
+from rigid.ground.reaction import Reaction
+
+from .settings import PenetrateSettings
+from .units import Unit, make_run
+from .words import say
+
+__all__ = ["AmendedGround", "AmendedLaw", "read_law"]
+
+Array = NDArray[np.float64]
+
+_SLOT = {name: place for place, name in enumerate(SLOTS)}
+_POWERS = {"area": 2, "drag": 2, "perimeter": 1, "viscous": 1}
+"""With which power of the diameter a number goes, by how it enters the law."""
+_CREEP = 1e-4
+"""Below this share of a set-down's lowering speed the direction of the motion is not certain."""
+
+
+def read_law(path: str | Path, settings: PenetrateSettings) -> AmendedLaw:
+    """The law in the model.toml at `path`, for the spike of `settings`.
+
+    Raises ValueError, naming file and key, for a file that is no model of penetration, and for an effect or a
+    parameter that the law does not know.
+    """
+    path = Path(path)
+    model = read_model(path)
+    if not isinstance(model, PenetrationModel):
+        raise ValueError(f"{path}: kind = {model.kind!r}: 'penetration' was expected")
+    known = _hows()
+    own: list[OwnEffect] = []
+    slots: dict[str, float] = {}
+    size = 1.0 if model.spike.diameter is None else settings.tip_diameter / model.spike.diameter
+    for number, effect in enumerate(model.effect, 1):
+        if effect.file is not None:
+            own.append(_own(path, number, effect))
+            continue
+        for name, value in effect.parameters.items():
+            if name not in known and name != "reference":
+                place = {"path": path, "number": number, "id": effect.id}
+                raise ValueError(
+                    say("unknown_number", **place, name=name, value=value, allowed=", ".join(sorted(known)))
+                )
+            slots[name] = value
+    law = AmendedLaw(settings, model, {}, tuple(own))
+    stiffer = law.pair[0] / model.surface.stiffness if model.surface.stiffness > 0 else 1.0
+    factors = {
+        name: stiffer if known.get(name, "").startswith("spring") else size ** _POWERS.get(known.get(name, ""), 0)
+        for name in slots
+    }
+    return replace(law, slots={name: value * factors[name] for name, value in slots.items()})
+
+
+def _hows() -> dict[str, str]:
+    """Slot of the law -> how it goes with the diameter, of every form in the library."""
+    library = make_library(Scales(depth=1.0, speed=1.0, force=1.0), retreats=True, speeds_differ=True)
+    return {slot.name: slot.how for table in library.slots.values() for slot in table.values()}
+
+
+def _own(path: Path, number: int, effect: EffectTable) -> OwnEffect:
+    own = load_own(path.parent / str(effect.file))
+    needed = () if own.push is not None else own.term.parameters
+    missing = [parameter.name for parameter in needed if parameter.name not in effect.parameters]
+    if missing or own.id != effect.id:
+        what = f"{missing[0]} is missing" if missing else f"its file is of {own.id!r}"
+        raise ValueError(f"{path}: [[effect]] {number} (id {effect.id!r}): {what}")
+    return own
+
+
+_SPEED = 1.1
+"""Factor beyond the speeds that a model was fitted to from which on it is extrapolated."""
+
+
+def _range(speeds: Sequence[float]) -> str:
+    low, high = min(speeds), max(speeds)
+    return f"{low:g}" if math.isclose(low, high) else f"{low:g} to {high:g}"
+
+
+@dataclass(frozen=True)
+class AmendedLaw:
+    """K, C and the effects of a model, for the spike of `settings`. Made by `read_law`."""
+
+    settings: PenetrateSettings
+    model: PenetrationModel
+    slots: Mapping[str, float]
+    """Numbers of the library's effects, of this spike's diameter."""
+    own: tuple[OwnEffect, ...] = ()
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The names of what was added, each once."""
+        return tuple(dict.fromkeys(effect.id for effect in self.model.effect))
+
+    @property
+    def words(self) -> str:
+        """The same in words."""
+        return " and ".join(self.effects) or "nothing added"
+
+    @cached_property
+    def pair(self) -> tuple[float, float]:
+        """K [N/m] and C [N s/m]: those that were fitted to this diameter where the model has several, else its own."""
+        fitted = self.model.notes.get("fitted_by_diameter")
+        found = fitted.get(f"{self.settings.tip_diameter:g}") if isinstance(fitted, Mapping) else None
+        if isinstance(found, Mapping):
+            return float(found["stiffness"]), float(found["damping"])
+        return self.model.surface.stiffness, self.model.surface.damping
+
+    def warnings(self) -> list[str]:
+        """What a reader must know: a spike that is not the model's, and speeds that it was not fitted to."""
+        own, spike = self.settings, self.model.spike
+        said = []
+        if spike.diameter is not None and not math.isclose(spike.diameter, own.tip_diameter, rel_tol=0.01):
+            several = self.pair != (self.model.surface.stiffness, self.model.surface.damping)
+            of_k = "K and C are those fitted to this diameter" if several else "K and C are that one's"
+            said.append(
+                say("other_tip", model_mm=1e3 * spike.diameter, own_mm=1e3 * own.tip_diameter, of_k=of_k, spike=spike)
+            )
+        if spike.tip != own.tip:
+            said.append(f"the model is of a {spike.tip} tip, this one is a {own.tip}; --tip {spike.tip} is its own")
+        drops = (*own.drop_speeds, *own.other_drop_speeds)
+        if drops and spike.mass is not None and not math.isclose(spike.mass, own.mass, rel_tol=1e-3):
+            said.append(say("other_mass", spike=spike, own=own))
+        return [*said, *self._extrapolated()]
+
+    @property
+    def fitted_to(self) -> str:
+        """The speeds of the trials that the model was fitted to, in words; empty where the file has none."""
+        driven, dropped, by_hand = self._speeds
+        parts = [f"pushes at {_range(driven)} m/s"] if driven else []
+        parts += ["pushes by hand"] if by_hand else []
+        parts += [f"drops at {_range(dropped)} m/s"] if dropped else []
+        return " and ".join(parts)
+
+    @property
+    def _speeds(self) -> tuple[list[float], list[float], bool]:
+        """Of pushes and drops that the model was fitted to [m/s], and whether some pushes have no nominal one."""
+        driven = [trial.speed for trial in self.model.trial if trial.mode == "driven"]
+        dropped = [trial.speed for trial in self.model.trial if trial.mode == "drop" and trial.speed is not None]
+        return [speed for speed in driven if speed], dropped, None in driven or 0.0 in driven
+
+    def _extrapolated(self) -> list[str]:
+        """Speeds of these runs beyond those of the model's trials; a drop has every speed below its own."""
+        own, (driven, dropped, by_hand) = self.settings, self._speeds
+        drops = {*own.drop_speeds, *own.other_drop_speeds}
+        if by_hand or not (driven or dropped):
+            return []
+        least, most = 0.0 if dropped else min(driven), max(driven + dropped)
+        pushes = {*own.speeds, *own.other_speeds, *([own.retreat_speed] if own.speeds or own.other_speeds else [])}
+        far = sorted(v for v in pushes | drops if not least / _SPEED <= v <= most * _SPEED)
+        said = []
+        if far:
+            said.append(say("extrapolated", s=self, far=", ".join(f"{v:g}" for v in far)))
+        if drops and not dropped:
+            said.append("the model was fitted to pushes alone: what it says of drops is extrapolated")
+        return said
+
+    def plain(self, time_step: float) -> SpringDamper:
+        """The spring-damper of the model without its effects, as a ground."""
+        stiffness, damping = self.pair
+        return SpringDamper(stiffness=stiffness, damping=damping, time_step=time_step)
+
+    def numbers(self, *, speed: float = 1.0, creep: float = 0.02) -> Array:
+        """One lane of the law, shape [1, slot_count]. Below `creep` times `speed` [m/s] friction lets go."""
+        settings, (stiffness, damping) = self.settings, self.pair
+        table = slot_table(1, self.own)
+        values = {
+            "mass": settings.mass,
+            "gravity": settings.weight / settings.mass,
+            "stiffness": stiffness,
+            "damping": damping,
+            "speed_scale": creep * speed,
+            "radius_depth": max(settings.tip_height, 1e-4 * settings.tip_diameter),
+        }
+        for name, value in (values | dict(self.slots)).items():
+            table[0, _SLOT[name]] = value
+        places = slot_places(self.own)
+        for effect in self.own:
+            (told,) = (table_of.parameters for table_of in self.model.effect if table_of.id == effect.id)
+            for name, value in told.items():
+                table[0, places[name if effect.push is not None else f"{effect.id}.{name}"]] = value
+        return table
+
+    def run(self, unit: Unit, like: Penetration) -> Penetration:
+        """The run of `unit` on the law, at the times of `like` (the same run on another ground) and from its start."""
+        if unit.kind == "driven":
+            return self._driven(like)
+        if unit.kind == "drop":
+            return self._dropped(unit, like)
+        ground = AmendedGround(self, time_step=like.macro_step / self.settings.substeps, speed=unit.speed)
+        return make_run(self.settings, unit, ground, start_depth=like.settings.get("start_depth")).run()
+
+    def _driven(self, like: Penetration) -> Penetration:
+        numbers = self.numbers(speed=float(np.abs(like.velocity).max()))
+        path = np.array([0, len(like.time)], dtype=np.int32)
+        (force,) = push(numbers, np.zeros(1, np.int32), path, like.depth, like.velocity, self.own)
+        return replace(like, force=force)
+
+    def _dropped(self, unit: Unit, like: Penetration) -> Penetration:
+        path = np.array([0, len(like.time)], dtype=np.int32)
+        (motion,) = fall(
+            self.numbers(speed=unit.speed), np.zeros(1, np.int32), path, like.time, np.array([unit.speed]), self.own
+        )
+        depth, velocity, acceleration, phase = motion.T
+        carried = like.time < 0  # before the surface it goes at its speed
+        force = self.settings.weight - self.settings.mass * acceleration
+        return replace(
+            like,
+            depth=np.where(carried, like.depth, depth),
+            velocity=np.where(carried, like.velocity, velocity),
+            force=np.where(carried, 0.0, force),
+            phase=np.where(carried, "free", np.array(PHASES)[np.clip(phase.astype(int), 0, 3)]),
+        )
+
+
+class AmendedGround:
+    """The law as a *ground* (see `coupling.ground`): it remembers how deep it was since it was entered, and ever.
+
+    A step answers with the force at its middle, exact to the second order of its length. A bed that holds on may pull.
+    """
+
+    name = "spring-damper, amended"
+    surface = 0.0
+    """Height of the surface [m]."""
+    centre = (0.0, 0.0)
+    """Where a body is put [m]: the surface is the same everywhere."""
+    clearance = 0.0
+    """The surface is flat [m]."""
+    depth_limit = math.inf
+    """There is no floor [m]."""
+
+    def __init__(self, law: AmendedLaw, *, time_step: float, speed: float) -> None:
+        self.time_step = time_step
+        """The step it is to be driven at [s]."""
+        self._own = law.own
+        self._numbers = law.numbers(speed=speed, creep=_CREEP)
+        self._top = self._ever = 0.0
+
+    def describe(self) -> Json:
+        """What it is, in plain numbers."""
+        return {name: float(self._numbers[0, place]) for name, place in _SLOT.items() if self._numbers[0, place]}
+
+    def step(self, position: ArrayLike, velocity: ArrayLike, dt: float) -> Reaction:
+        """Reaction at the middle of `dt` [s] on a body whose tip starts at `position` [m], at constant `velocity`."""
+        start, sinking = self.surface - float(np.asarray(position)[2]), -float(np.asarray(velocity)[2])
+        middle, end = start + 0.5 * sinking * dt, start + sinking * dt
+        # The way that the law has to know, in four rows: how deep ever, out, how deep since then, and here.
+        depth = np.array([self._ever, 0.0, self._top, middle])
+        speed = np.array([0.0, 0.0, 0.0, sinking])
+        lane, path = np.zeros(1, np.int32), np.array([0, 4], np.int32)
+        force = float(push(self._numbers, lane, path, depth, speed, self._own)[0, 3])
+        self._top = max(self._top, start, end) if end > 0 else 0.0
+        self._ever = max(self._ever, end, 0.0)
+        return Reaction(np.array([0.0, 0.0, force]), np.zeros(3))
+
+    def state(self) -> Json:
+        """What it remembers."""
+        return {"top": np.array(self._top), "ever": np.array(self._ever)}
+
+    def restore(self, state: Json) -> None:
+        """Take back what `state` gave."""
+        self._top, self._ever = float(state["top"]), float(state["ever"])

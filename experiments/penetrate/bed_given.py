@@ -1,0 +1,81 @@
+"""The settings of `penetrate` that a bed's file decides, where one is given."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from experiments.runs.types import Json
+
+__all__ = ["settings_of_bed"]
+
+
+def settings_of_bed(given: Json) -> Json:
+    """`given` with what its ``bed`` says of material, size, grains, gravity, seed and softness.
+
+    Raises ValueError for what is no bed, a bed that is tilted or cut, a material that has no name here, and where
+    `given` contradicts the bed.
+    """
+    from dem.engine.state import read_file
+    from dem.grains.materials import MATERIALS, material
+    from dem.prepare.bedfile import find_bed, read_preparation
+
+    name = str(given["bed"])
+    path = find_bed(name)
+    settings, state, precision = read_file(path)
+    stages = [report.stage for report in read_preparation(path).reports]
+    if settings.gravity[0] or settings.gravity[1] or any(s.startswith("cut") for s in stages):
+        raise ValueError(f"bed = {name!r} was cut or tilted: a spike needs a level one, prepared without these stages")
+    stuff = settings.material
+    radii = state["position"][:, 3].astype(float)
+    grain = _plain(2 * radii.mean())
+    known = material(given["material"]) if "material" in given else MATERIALS.get(stuff.name)
+    if known is None or not _alike(known, stuff, read_preparation(path).recipe):
+        raise ValueError(
+            f"bed = {name!r} is of a material {stuff.name!r} whose numbers are not those of "
+            + (
+                f"material = {given['material']!r}: the file that the bed was made with would do"
+                if "material" in given
+                else f"one that ships ({', '.join(sorted(MATERIALS))}): give --material with the file that it was made "
+                "with"
+            )
+        )
+    said = {
+        "material": given.get("material", stuff.name),
+        "bed_size": settings.size,
+        "grain": grain,
+        "spread": min(0.5, _plain((radii.max() - radii.min()) / (radii.max() + radii.min()))),
+        "packing": None,
+        "gravity": -settings.gravity[2],
+        "seeds": (settings.seed if settings.seed is not None else 1,),
+        "young": stuff.young,
+        "max_overlap": settings.max_overlap,
+        "time_step": settings.time_step,
+        "precision": precision,
+    }
+    for key, value in said.items():
+        if key in given and not _same(given[key], value):
+            raise ValueError(
+                f"{key} = {given[key]!r} beside bed = {name!r}, whose own is {value!r}: leave {key} out, or the bed"
+            )
+    return given | said
+
+
+def _alike(known: Any, stuff: Any, recipe: Json) -> bool:
+    """Whether a bed's grains are of the material `known`, in the size for which the bed was prepared."""
+    kept = recipe.get("material", {}).get("grain")
+    known = known.softened(stuff.young) if kept is None else known.for_grain(kept).softened(stuff.young)
+    return bool(known == stuff)
+
+
+def _plain(value: float) -> float:
+    """To six digits: a mean of many."""
+    return float(f"{float(value):.6g}")
+
+
+def _same(a: Any, b: Any) -> bool:
+    if isinstance(b, tuple):
+        return isinstance(a, list | tuple) and len(a) == len(b) and all(map(_same, a, b))
+    if isinstance(b, float) and isinstance(a, int | float) and not isinstance(a, bool):
+        return math.isclose(a, b, rel_tol=1e-9)
+    return bool(a == b)

@@ -1,0 +1,186 @@
+"""The main experiment: a spike driven into, dropped on and set down on beds of grains, beside the spring-damper.
+
+For each seed a bed is prepared (or taken from the cache), and every run starts from that same bed. A finished run is
+kept in the folder and never computed again; a run under way is kept every `checkpoint_interval`, the bed with its
+contacts included, so that a run that was stopped or killed continues bitwise. Then the spring-damper is fitted,
+the same runs are made on it, and the two are compared.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from coupling import BedGround, Run
+from experiments.campaign.target import place_campaign
+from experiments.grains.kept_material import MATERIAL_COPY, keep_material
+from experiments.grains.softening import Softening
+from experiments.runs.folder import RunFolder
+from experiments.runs.progress import Progress
+from experiments.runs.reporting import PictureCosts, write_report
+from experiments.runs.stopping import held_back
+from experiments.runs.types import Json
+
+from . import beds
+from .amended_runs import keep_model, run_without_bed
+from .beds import fingerprint
+from .findings import BedFacts
+from .frames import Frames
+from .plan import PenetratePlan
+from .recorded import campaign_of, sensors_of
+from .refusals import check
+from .remarks import softening_note
+from .result import conclude
+from .settings import PenetrateSettings
+from .units import Unit, expected_time, make_run, make_spike, plan_units, share_done, shown_units
+from .words import say
+
+__all__ = ["check", "fingerprint", "resume", "run"]
+
+
+def run(settings: PenetrateSettings, folder: str | Path, *, progress: Progress | None = None) -> Json:
+    """Carry the experiment out into `folder` and return the result, as result.json has it.
+
+    Takes up what the folder already holds of the same settings. Raises ValueError for settings that will not do,
+    before any work; RuntimeError (the bed's) where a run cannot go on, its state saved in checkpoint/.
+    """
+    check(settings)
+    kept = RunFolder.ensure(Path(folder), "penetrate", settings, code=beds.fingerprint())
+    return _carry_out(settings, kept, progress or Progress())
+
+
+def resume(folder: str | Path, *, progress: Progress | None = None) -> Json:
+    """Finish the run in `folder`. Raises ValueError where there is none; otherwise as `run`."""
+    kept = RunFolder.open(Path(folder))
+    copy = kept.path / MATERIAL_COPY
+    given = kept.settings | ({"material": str(copy)} if copy.exists() else {})
+    return _carry_out(PenetrateSettings(**given), kept, progress or Progress())
+
+
+def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Json:
+    if settings.ground == "spring-damper":
+        return run_without_bed(settings, folder, progress)
+    settings = settings.model_copy(update={"material": keep_material(settings.material, folder.path)})
+    softening = beds.choose_softness(settings)
+    units = plan_units(settings)
+    with folder.lock():
+        keep_model(settings, folder.path)
+        progress.message(softening_note(settings, softening))
+        dropped = f", a dropped spike moves {settings.mass:.4g} kg" if settings.drop_speeds else ""
+        progress.message(f"the load is {settings.weight:.4g} N{dropped}")
+        step, stiffness = beds.bed_step(settings, softening.young), beds.expected_stiffness(settings)
+        plan = PenetratePlan(settings, units, folder, progress, step=step, stiffness=stiffness)
+        work = _Work(settings, units, softening, folder, progress, plan)
+        for seed in settings.seeds:
+            work.run_seed(seed)
+        result = conclude(settings, units, softening, folder, progress)
+        folder.write_result(result)
+        if settings.campaign is not None:
+            campaign = campaign_of(settings, result, folder, sensors_of(settings))
+            target = place_campaign(settings.campaign, campaign, keep_out=folder.path)
+            progress.message(f"campaign {target}: `hedgebed diagnose {target}` says what the spring-damper lacks")
+        progress.stage("report", total=1.0)
+        write_report(folder.path, progress, _picture_costs(folder.path, result))
+    return result
+
+
+def _picture_costs(folder: Path, result: Json) -> PictureCosts:
+    """What the report has to draw, by the frames that are there."""
+    from vis.pictures.frames import frame_names, read_frames
+
+    frames = {}
+    for name in frame_names(folder):
+        with suppress(ValueError, OSError):  # the report says what it cannot read
+            frames[name] = len(read_frames(folder, name))
+    return PictureCosts(frames, result["quantities"]["grain_count"]["value"])
+
+
+@dataclass(frozen=True)
+class _Work:
+    """The runs of one folder: all of them, and how each is carried out and kept."""
+
+    settings: PenetrateSettings
+    units: Sequence[Unit]
+    softening: Softening
+    folder: RunFolder
+    progress: Progress
+    plan: PenetratePlan
+
+    def run_seed(self, seed: int) -> None:
+        """All runs of one seed that are not finished yet, each from the same bed."""
+        todo = [unit for unit in self.units if unit.seed == seed and not self.folder.is_done(unit.id)]
+        if not todo and self.folder.is_done(f"bed-{seed}"):
+            return
+        try:
+            bed = beds.prepare_bed(self.settings, seed, self.softening.young, self.progress)
+        except ValueError as error:  # found while it was prepared, as a packing that cannot be reached
+            raise RuntimeError(f"the bed of seed {seed}: {error}") from error
+        except RuntimeError as error:
+            raise RuntimeError(f"the bed of seed {seed} could not be prepared: {error}; {_remedy(error)}") from error
+        self.plan.bed_is_there()
+        facts = BedFacts.of(bed, seed, self.softening)
+        ground = BedGround(bed, make_spike(self.settings))
+        start = ground.state()
+        self.folder.mark_done(f"bed-{seed}", asdict(facts))
+        self.progress.message(say("bed_made", facts=facts))
+        for unit in todo:
+            ground.restore(start)
+            bed.max_overlap = 0.0
+            bed.mark_origin()
+            self.run_unit(unit, ground)
+
+    def run_unit(self, unit: Unit, ground: BedGround) -> None:
+        """One run to its end, from its checkpoint where there is one."""
+        settings, folder, bed = self.settings, self.folder, ground.bed
+        stepper = make_run(settings, unit, ground)
+        expected, sure = self.plan.expected_time(unit), False
+        kept = folder.load_checkpoint(unit.id)
+        if kept is not None:
+            stepper.restore(kept)
+            self.progress.message(f"{unit.title}: goes on at {stepper.time:.4g} s")
+        frames = None
+        if unit.id in shown_units(self.units):
+            lasts = expected_time(settings, unit, beds.expected_stiffness(settings))
+            frames = Frames(settings, unit, stepper, folder, expected=lasts, resumed=kept is not None)
+        self.progress.stage(unit.title, total=1.0)
+        saved = time.monotonic()
+
+        def on_step(stepper: Run) -> None:
+            nonlocal saved, expected, sure
+            if unit.kind == "drop" and stepper.at_bottom:  # from its first stop on the end is known
+                expected, sure = stepper.time + settings.after_stop, True
+            self.progress.update(share_done(stepper, expected, sure=sure))
+            stop = asked_to_stop()
+            if not stepper.done and (stop or time.monotonic() - saved >= settings.checkpoint_interval):
+                folder.save_checkpoint(unit.id, stepper.state())
+                saved = time.monotonic()
+            if stop and not stepper.done:
+                raise KeyboardInterrupt
+
+        try:
+            with held_back() as asked_to_stop:
+                series = stepper.run(
+                    on_step=on_step,
+                    on_frame=frames.write if frames else None,
+                    frame_interval=frames.interval if frames else None,
+                )
+        except RuntimeError as error:  # the bed's: a NaN, a grain lost, an overlap past its bound
+            folder.save_checkpoint(f"{unit.id}.failed", stepper.state())
+            raise RuntimeError(say("failed", unit=unit, error=error, remedy=_remedy(error))) from error
+        self.plan.is_over(unit, stepper.time)
+        folder.write_series(unit.id, series.columns())
+        kept_of_bed = {"max_overlap": float(bed.max_overlap), "code": beds.fingerprint()}
+        folder.mark_done(unit.id, series.facts() | kept_of_bed)
+        folder.drop_checkpoint(unit.id)
+
+
+def _remedy(error: RuntimeError) -> str:
+    """What to change where the bed has failed."""
+    if "overlap" in str(error):
+        return "change young (stiffer grains), the speeds or max_overlap"
+    if "rest" in str(error) or "rain" in str(error):
+        return "change gravity, bed_size or the seed"
+    return "change time_step (shorter), young or the speeds"

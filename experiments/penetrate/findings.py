@@ -1,0 +1,269 @@
+"""From finished runs to the result: fits, the same runs on the spring-damper, departures, and what is said of the bed.
+
+Spread between seeds is that of the runs which every seed has (same kind, same speed), each seed fitted by itself; the
+value is fitted to all runs of all seeds. A quantity that no second seed has gets the std null, one that is exact 0.
+
+Grains stick out of the surface, depth 0, so that some of them carry a spike before it: neither the fit nor the law
+include that, and `experiments.penetrate.remarks` reports how much it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from coupling import Penetration
+from experiments.grains.softening import Softening
+from experiments.runs.types import Json
+from rigid import SpringDamper
+
+from .fit import Fit, drag_gap, fit_spring_damper, moments_of, spread
+from .settings import STANDARD_GRAVITY, PenetrateSettings
+from .units import Unit, make_run
+from .words import say
+
+__all__ = ["BedFacts", "Findings", "bed_entry", "bed_quantities", "drop_note", "model_run"]
+
+Runs = Mapping[str, Penetration]
+
+
+@dataclass(frozen=True)
+class BedFacts:
+    """What the result says of one bed, taken before the first run; SI units."""
+
+    seed: int
+    grain_count: int
+    packing_fraction: float
+    coordination_number: float
+    surface: float
+    young: float
+    time_step: float
+
+    @classmethod
+    def of(cls, bed: Any, seed: int, softening: Softening) -> BedFacts:
+        """The facts of `bed`, whose grains are softened to `softening`."""
+        return cls(
+            seed=seed, grain_count=int(bed.grain_count), packing_fraction=float(bed.packing_fraction),
+            coordination_number=float(bed.coordination_number), surface=float(bed.surface),
+            young=float(softening.young), time_step=float(bed.time_step),
+        )  # fmt: skip
+
+
+def drop_note(settings: PenetrateSettings) -> str:
+    """What a drop is, and what it is not."""
+    return say("drop", s=settings, free=settings.mass * STANDARD_GRAVITY)
+
+
+class Findings:
+    """All that is read off the finished runs of one experiment.
+
+    `units` and `beds` are the runs and their series in the bed; `fit` is the law fitted to all of them, `seed_fits`
+    those of the seeds, `models` (id -> series) the same runs on the law.
+    """
+
+    def __init__(self, settings: PenetrateSettings, units: Sequence[Unit], beds: Runs, time_step: float) -> None:
+        self.settings, self.units, self.beds, self.time_step = settings, list(units), dict(beds), time_step
+        self.fit: Fit = fit_spring_damper(self.beds)
+        self.seed_fits: dict[int, Fit] = self._fit_seeds()
+        self.models: dict[str, Penetration] = {
+            unit.id: model_run(settings, unit, self.beds[unit.id], self.fit, time_step) for unit in self.units
+        }
+
+    def of(self, kind: str, seed: int | None = None) -> list[Penetration]:
+        """The bed's runs of a kind, of one seed or of all."""
+        return [self.beds[unit.id] for unit in self.units if unit.kind == kind and seed in (None, unit.seed)]
+
+    def shared_conditions(self) -> set[tuple[str, float]]:
+        """Kinds and speeds that every seed has."""
+        per_seed = [{unit.condition for unit in self.units if unit.seed == seed} for seed in self.seeds]
+        return set.intersection(*per_seed)
+
+    @property
+    def seeds(self) -> list[int]:
+        """The seeds in their order."""
+        return list(dict.fromkeys(unit.seed for unit in self.units))
+
+    def _fit_seeds(self) -> dict[int, Fit]:
+        """Each seed by itself, on the runs that every seed has."""
+        shared = self.shared_conditions()
+        fits = {}
+        for seed in self.seeds:
+            own = {u.id: self.beds[u.id] for u in self.units if u.seed == seed and u.condition in shared}
+            if any(run.kind != "set_down" for run in own.values()):
+                fits[seed] = fit_spring_damper(own)
+        return fits
+
+    def quantities(self) -> dict[str, Json]:
+        """The headline numbers: name -> value, std between seeds, unit, note."""
+        fits, load, drops = list(self.seed_fits.values()), self.settings.weight, self.of("drop")
+        sunk, model_sunk = self.sinkages(self.beds), self.sinkages(self.models)
+        shared_runs = self.shared_conditions()
+        gaps = [
+            drag_gap([run for unit, run in self._runs("driven", seed) if unit.condition in shared_runs], self.fit)
+            for seed in self.seeds
+        ]
+        law_sinkages = [load / fit.stiffness if fit.stiffness > 0 else None for fit in fits]
+        shared, error = say("shared_spread"), say("jackknife")
+        return {
+            "stiffness": _quantity(self.fit.stiffness, spread([fit.stiffness for fit in fits]), "N/m", shared),
+            "damping": _quantity(self.fit.damping, spread([fit.damping for fit in fits]), "N s/m", shared),
+            "stiffness_error": _quantity(self.fit.stiffness_error, None, "N/m", error),
+            "damping_error": _quantity(self.fit.damping_error, None, "N s/m", error),
+            "sinkage_dem": _quantity(_mean(sunk), spread(sunk), "m", "depth at rest under the load"),
+            "sinkage_spring_damper": _quantity(_mean(model_sunk), spread(law_sinkages), "m", "the same on the law"),
+            "drag_gap": _quantity(drag_gap(self.of("driven"), self.fit), spread(gaps), "1", say("drag_gap")),
+            **self._work_returned,
+            "load": _quantity(load, 0.0, "N", "on the spike, set down and dropped; (m + m_b) g_sim / 4 unless set"),
+            **({"drop_mass": _quantity(self.settings.mass, 0.0, "kg", drop_note(self.settings))} if drops else {}),
+            **self.standing_stiffness(),
+            **self.at_surface(),
+        }
+
+    def standing_stiffness(self) -> dict[str, Json]:
+        """The stiffness that gives the sinkage at rest, load / sinkage: for a foot that stands."""
+        depths = self.sinkages(self.beds)
+        own, sunk = [self.settings.weight / depth if depth and depth > 0 else None for depth in depths], _mean(depths)
+        if sunk is None or sunk <= 0:
+            return {}
+        note = "load over sinkage at rest: the K for a foot that stands under this load"
+        return {"stiffness_standing": _quantity(self.settings.weight / sunk, spread(own), "N/m", note)}
+
+    def at_surface(self) -> dict[str, Json]:
+        """How far grains stick out under the tip, and what the bed pushes back with at depth 0."""
+        forces, heights = [], []
+        for seed in self.seeds:
+            runs = self.of("driven", seed)
+            forces.append(_mean([force_at_surface(run, 0.1 * self.settings.grain) for run in runs]))
+            starts = [run.settings.get("start_depth") for run in runs]
+            heights.append(_mean([-start for start in starts if start is not None]))
+        found = {}
+        notes = {"surface_force": say("surface_force"), "surface_roughness": say("surface_roughness")}
+        for name, values, unit in (("surface_force", forces, "N"), ("surface_roughness", heights, "m")):
+            if (mean := _mean(values)) is not None:
+                found[name] = _quantity(mean, spread(values), unit, notes[name])
+        return found
+
+    def deepest(self) -> float:
+        """How deep the runs went that were fitted [m]."""
+        return max(self.beds[name].max_depth for name in self.fit.runs)
+
+    def sinkages(self, runs: Runs) -> list[float | None]:
+        """Depth at rest of every set-down [m]; None where it did not come to rest."""
+        return [runs[unit.id].resting_depth for unit in self.units if unit.kind == "set_down"]
+
+    def _runs(self, kind: str, seed: int) -> list[tuple[Unit, Penetration]]:
+        return [(unit, self.beds[unit.id]) for unit in self.units if (unit.kind, unit.seed) == (kind, seed)]
+
+    @cached_property
+    def _work_returned(self) -> dict[str, Json]:
+        """Mean share of the work put in that driven runs give back, of the bed and of the law.
+
+        Beds tell a spread where all were driven at the same speeds; the laws fitted to each bed always do: each makes
+        all the runs.
+        """
+        driven = [unit for unit in self.units if unit.kind == "driven"]
+        alike = {unit.condition for unit in driven} <= self.shared_conditions()
+        own = [_mean([_returned(run) for run in self.of("driven", seed)]) for seed in self.seeds]
+        laws = [
+            _mean([_returned(model_run(self.settings, u, self.beds[u.id], fit, self.time_step)) for u in driven])
+            for fit in self.seed_fits.values()
+        ]
+        bed, law = (_mean([_returned(runs[unit.id]) for unit in driven]) for runs in (self.beds, self.models))
+        note = "work of the way out over work in, driven runs"
+        return {
+            "work_returned_dem": _quantity(bed, spread(own) if alike else None, "1", note),
+            "work_returned_spring_damper": _quantity(
+                law, spread(laws), "1", "the same on the fitted law; spread: on the laws fitted to each bed"
+            ),
+        }
+
+    def run_entries(self, notes: Mapping[str, Mapping[str, Any]]) -> list[Json]:
+        """The entry "runs": one per run, the model's numbers under model_*; `notes` are what was kept of each."""
+        entries = []
+        for unit in self.units:
+            bed, model = self.beds[unit.id], self.models[unit.id]
+            numbers = bed.quantities() | {f"model_{name}": value for name, value in model.quantities().items()}
+            kept = {"ended": bed.ended, "max_overlap": notes.get(unit.id, {}).get("max_overlap"), "quantities": numbers}
+            files = {"series": f"series/{unit.id}.csv", "model_series": f"series/{unit.id}.model.csv"}
+            entries.append({name: getattr(unit, name) for name in ("id", "kind", "seed", "speed")} | files | kept)
+            if (moments := moments_of(bed)) is not None:
+                entries[-1]["moments"] = asdict(moments)
+        return entries
+
+    def fit_entries(self) -> list[Json]:
+        """The entry "fits": each seed by itself, on the runs that all seeds have."""
+        numbers = ("stiffness", "damping", "stiffness_error", "damping_error", "correlation")
+        return [
+            {"seed": seed}
+            | {name: getattr(fit, name) for name in numbers}
+            | {"drag_gap": drag_gap([self.beds[name] for name in fit.runs], fit), "runs": list(fit.runs)}
+            for seed, fit in self.seed_fits.items()
+        ]
+
+
+def _returned(run: Penetration) -> float | None:
+    """Share of the work put in that the way out gives back."""
+    return run.work_out / run.work_in if run.work_in > 0 else None
+
+
+def force_at_surface(run: Penetration, reach: float) -> float | None:
+    """Mean force of the last `reach` [m] above depth 0 on the way in [N]; None where no row is there."""
+    rows = (run.depth <= 0) & (run.depth >= -reach) & (run.velocity > 0)
+    return float(run.force[rows].mean()) if rows.any() else None
+
+
+def model_run(settings: PenetrateSettings, unit: Unit, bed: Penetration, fit: Fit, time_step: float) -> Penetration:
+    """The run of `unit` on the fitted spring-damper: same start, same steps; a drop lasts as long as in the bed."""
+    ground = SpringDamper(stiffness=fit.stiffness, damping=fit.damping, time_step=time_step)
+    long = float(bed.time[-1]) + 0.5 * bed.macro_step if len(bed.time) else settings.drop_time
+    start = bed.settings.get("start_depth")
+    return make_run(settings, unit, ground, start_depth=start, drop_time=max(long, bed.macro_step)).run()
+
+
+def bed_entry(facts: Sequence[BedFacts], settings: PenetrateSettings, softening: Softening) -> Json:
+    """The entry "bed": what was prepared, seed by seed, and how soft it was made."""
+    return {
+        "material": settings.material,
+        "size": list(settings.bed_size),
+        **{name: getattr(settings, name) for name in ("grain", "spread", "gravity", "max_overlap")},
+        "softening": asdict(softening) | {"factor": softening.factor},
+        "seeds": [asdict(entry) for entry in facts],
+    }
+
+
+def bed_quantities(facts: Sequence[BedFacts], overlap: float | None) -> dict[str, Json]:
+    """Numbers of the beds, means over seeds; what is exact gets the std 0, what one bed does not tell null."""
+    found: dict[str, Json] = {}
+    for name, unit, note in (
+        ("grain_count", "1", ""),
+        ("packing_fraction", "1", "bulk, before the first run"),
+        ("coordination_number", "1", "before the first run"),
+        ("surface", "m", "height of the undisturbed surface above the floor"),
+        ("young", "Pa", "of the softened grains"),
+        ("time_step", "s", "of the grains"),
+    ):
+        values = [float(getattr(entry, name)) for entry in facts]
+        alike = all(value == values[0] for value in values)
+        mean = values[0] if alike else float(np.mean(values))
+        found[name] = _quantity(mean, 0.0 if alike and name in _CHOSEN else spread(values), unit, note)
+    if overlap is not None:
+        found["max_overlap"] = _quantity(overlap, None, "1", "largest overlap of grains in any run, of a diameter")
+    return found
+
+
+_CHOSEN = ("young",)
+"""What is set, and so exact; of the rest one bed does not tell how much it differs from bed to bed."""
+
+
+def _quantity(value: float | None, std: float | None, unit: str, note: str = "") -> Json:
+    entry: Json = {"value": value, "std": std, "unit": unit}
+    return entry | {"note": note} if note else entry
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else None

@@ -1,0 +1,103 @@
+"""What a run of `penetrate` shows on the terminal in the end: a short table, and the findings that matter most.
+
+Everything else is in the report and in result.json, and with ``--verbose`` on the terminal too.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from statistics import fmean, stdev
+from typing import Any
+
+from experiments.runs.headline import Headline
+from vis.page.numbers import foldable, quote
+
+__all__ = ["penetrate_headline"]
+
+_SAID, _OF_FINDINGS = 4, 2
+"""Sentences shown, warnings first; but all warnings, and at least so many findings."""
+
+Pair = tuple[str, str]
+
+
+def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
+    """The short form of the result of `penetrate`; None where it has no bed beside a spring-damper."""
+    numbers = result.get("quantities", {})
+    if "sinkage_dem" not in numbers or "stiffness" not in numbers:
+        return None
+    load = f" under {quote(numbers['load']['value'], unit='N')}" if "load" in numbers else ""
+    rows = [(f"sinkage at rest{load}", *_both(numbers["sinkage_dem"], numbers["sinkage_spring_damper"]))]
+    rows += _drag(result.get("departures", {}).get("table", []))
+    rows += _fastest_drop(result.get("runs", []))
+    given, back = (numbers.get(f"work_returned_{side}") for side in ("dem", "spring_damper"))
+    if given and back and given["value"] is not None:
+        rows.append(("work given back, pulled out", *_both(given, back, "%")))
+    for name, words in (("stiffness", "stiffness K, fitted"), ("damping", "damping C, fitted")):
+        rows.append((words, "", _quoted(numbers[name])))
+    if "drag_gap" in numbers:
+        rows.append(("its drag is off by (rms, way in)", "", _quoted(numbers["drag_gap"], "%")))
+    warnings, said = list(result.get("warnings", [])), list(result.get("departures", {}).get("sentences", []))
+    moved = _moved(result.get("reference", {}).get("moved", {}))
+    # Of a finding that goes on, as to how far beds differ, the first sentence.
+    own = [re.split(r"(?<=\.)\s+(?=[A-Z])", text)[0] for text in said if not text.startswith("Against the reference")]
+    shown = [*own[: max(_OF_FINDINGS, _SAID - len(warnings)) - len(moved)], *moved]
+    return Headline(
+        ("", "bed", "spring-damper"), tuple(tuple(foldable(cell) for cell in row) for row in rows),
+        tuple(map(foldable, warnings)), tuple(map(foldable, shown)), len(said) - len(shown),
+    )  # fmt: skip
+
+
+def _moved(moved: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """How far K, C and sinkage are from those of the reference, in one sentence; none without one."""
+    parts = [
+        f"{words} {100 * moved[name]['change']:+.0f} %"
+        for name, words in (("stiffness", "K"), ("damping", "C"), ("sinkage_dem", "the sinkage"))
+        if moved.get(name, {}).get("change") is not None
+    ]
+    return [f"Against the reference, {', '.join(parts)}."] if parts else []
+
+
+def _drag(table: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str]]:
+    """Mean force in the deepest band, driven at the slowest and at the fastest speed."""
+    if not table:
+        return []
+    bottom = max(row["depth_from"] for row in table)
+    deep = sorted((row for row in table if row["depth_from"] == bottom), key=lambda row: row["speed"])
+    shown = [deep[0], deep[-1]] if len(deep) > 1 else deep
+    return [
+        (
+            f"drag at {row['speed']:g} m/s, {1e3 * row['depth_from']:.3g}-{1e3 * row['depth_to']:.3g} mm deep",
+            quote(row["bed_force"], unit="N"),
+            quote(row["model_force"], unit="N"),
+        )
+        for row in shown
+    ]
+
+
+def _fastest_drop(runs: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str]]:
+    """Peak force and deepest point of the fastest drop, means where several beds have it."""
+    drops = [run for run in runs if run.get("kind") == "drop"]
+    if not drops:
+        return []
+    speed = max(run["speed"] for run in drops)
+    fastest = [run["quantities"] for run in drops if run["speed"] == speed]
+    rows = []
+    for name, words, unit in (("peak_force", "peak force", "N"), ("max_depth", "deepest", "m")):
+        sides = []
+        for key in (name, f"model_{name}"):
+            values = [numbers[key]["value"] for numbers in fastest if numbers.get(key, {}).get("value") is not None]
+            std = stdev(values) if len(values) > 1 else None
+            mean = fmean(values) if values else None
+            sides.append(_quoted({"value": mean, "std": std, "unit": unit}))
+        rows.append((f"{words}, dropped at {speed:g} m/s", sides[0], sides[1]))
+    return rows
+
+
+def _both(bed: Mapping[str, Any], law: Mapping[str, Any], unit: str = "") -> Pair:
+    return _quoted(bed, unit), _quoted(law, unit)
+
+
+def _quoted(entry: Mapping[str, Any], unit: str = "") -> str:
+    # A law computed once has no spread, and is no more exact for that.
+    return "-" if entry["value"] is None else quote(entry["value"], entry["std"] or None, unit or entry["unit"])

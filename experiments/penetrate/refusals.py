@@ -1,0 +1,126 @@
+"""Settings of a penetrate run that this machine or the grains' material cannot serve, refused before any work."""
+
+from __future__ import annotations
+
+import math
+
+from experiments.campaign.target import check_target
+from experiments.grains.box import expected_grain_count
+from experiments.grains.softening import check_young, drop_depth
+from experiments.grains.where import check_where
+from experiments.runs.memory import memory_there
+
+from . import beds
+from .amended import read_law
+from .reference import read_reference
+from .settings import PenetrateSettings
+from .units import deepest, expected_time, plan_units
+from .words import say
+
+__all__ = ["check"]
+
+BYTES_PER_GRAIN = 4000
+"""Memory of one grain with its lists and contact history, float64, measured generously [bytes]."""
+MOST_GRAINS = 2**26
+"""More are refused."""
+MOST_STEPS = 1e9
+"""Of the grains, in all runs; more are refused."""
+
+
+def check(settings: PenetrateSettings) -> None:
+    """Raise ValueError, naming key, value and what would do, for what this machine or the material cannot serve."""
+    if settings.model is not None:
+        read_law(settings.model, settings)
+    if settings.campaign is not None:
+        check_target(settings.campaign)
+    if settings.ground == "spring-damper":
+        return
+    beds.find_material(settings)
+    for seeds, speeds in ((settings.seeds[:1], settings.speeds), (settings.seeds[1:], settings.other_speeds)):
+        if seeds and not speeds:
+            raise ValueError("other_speeds is empty: at least one speed would do, so that every seed has a fit")
+    _check_grain_count(settings)
+    check_where(arch=settings.arch, threads=settings.threads, precision=settings.precision)
+    _check_young(settings)
+    _check_reach(settings)
+    step = beds.bed_step(settings, beds.choose_softness(settings).young)
+    found = settings.crossing(step, beds.find_material(settings).young)
+    if found:
+        raise ValueError(found)
+    _check_step_count(settings, step)
+    if settings.reference not in (None, "shipped"):
+        read_reference(str(settings.reference))
+
+
+def _check_grain_count(settings: PenetrateSettings) -> None:
+    count = expected_grain_count(settings.bed_size, settings.grain, settings.spread)
+    need, there = count * BYTES_PER_GRAIN, memory_there().free
+    if need > 0.8 * there:
+        least = settings.grain * (need / (0.8 * there)) ** (1 / 3)
+        raise ValueError(say("memory", s=settings, count=count, need=need / 1e9, free=there / 1e9, least=least))
+    if count > MOST_GRAINS:
+        raise ValueError(say(
+            "grain_count", s=settings, count=count, most=MOST_GRAINS,
+            least=settings.grain * (count / MOST_GRAINS) ** (1 / 3),
+        ))  # fmt: skip
+
+
+def _check_young(settings: PenetrateSettings) -> None:
+    if settings.young is None:
+        return
+    most = beds.find_material(settings).young
+    chosen = beds.choose_softness(settings.model_copy(update={"young": None})).young
+    if settings.young > most:
+        raise ValueError(
+            f"young = {settings.young:g} Pa is more than {settings.material} itself has: at most {most:g} Pa would do"
+        )
+    check_young(settings.young, chosen=chosen, max_overlap=settings.max_overlap)
+
+
+def _check_reach(settings: PenetrateSettings) -> None:
+    """Refuse what would end near the floor."""
+    stiffness, floor = beds.expected_stiffness(settings), deepest(settings)
+    deeper = f"{floor:.3g} m, one tip's diameter above the floor"
+    rests = settings.weight / stiffness
+    if rests > floor:
+        key = "load" if settings.load is not None else "platform_mass"
+        value = f"{settings.load:g} N" if settings.load is not None else f"{settings.platform_mass:g} kg"
+        on = "" if settings.load is not None else f", {settings.weight:.3g} N on a spike,"
+        most = settings.weight * floor / rests
+        raise ValueError(say("rests_deep", key=key, value=value, on=on, rests=rests, deeper=deeper, most=most))
+    for key in ("drop_speeds", "other_drop_speeds"):
+        for speed in getattr(settings, key):
+            depth = drop_depth(speed, settings.mass, settings.weight, stiffness)
+            if depth > floor:
+                room = stiffness * floor**2 - 2 * settings.weight * floor
+                slower = f"at most {math.sqrt(room / settings.mass):.2g} m/s" if room > 0 else "a smaller load"
+                raise ValueError(
+                    say("drops_deep", key=key, speed=speed, s=settings, depth=depth, deeper=deeper, slower=slower)
+                )
+
+
+def _check_step_count(settings: PenetrateSettings, step: float) -> None:
+    stiffness = beds.expected_stiffness(settings)
+    times = {unit: expected_time(settings, unit, stiffness) for unit in plan_units(settings)}
+    count = sum(times.values()) / step
+    if count <= MOST_STEPS:
+        return
+    unit = max(times, key=lambda unit: times[unit])
+    if unit.kind == "driven":
+        parts = {
+            f"speeds = {unit.speed:g} m/s": settings.depth / unit.speed,
+            f"hold = {settings.hold:g} s": settings.hold,
+            f"retreat_speed = {settings.retreat_speed:g} m/s": settings.depth / settings.retreat_speed,
+        }
+    elif unit.kind == "drop":
+        parts = {f"after_stop = {settings.after_stop:g} s": settings.after_stop, f"mass = {settings.mass:g} kg": 0.0}
+    else:
+        sinking = times[unit] - settings.rest_time
+        parts = {
+            f"lowering_speed = {unit.speed:g} m/s": sinking,
+            f"rest_time = {settings.rest_time:g} s": settings.rest_time,
+        }
+    key = max(parts, key=lambda part: parts[part])
+    raise ValueError(
+        say("steps", key=key, own=times[unit] / step, step=step, count=count, most=MOST_STEPS, by=key.split()[0])
+    )

@@ -1,0 +1,304 @@
+"""Settings of the experiments: every option of the command line, every key of a case file, the same names.
+
+SI units. What is wrong in a single value or between two of them is refused here, before any work; what needs to look at
+the machine or the grains' material is refused by the experiment's `check`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from experiments.runs.strict import StrictSettings
+
+from .words import say
+
+__all__ = ["STANDARD_GRAVITY", "PenetrateSettings"]
+
+STANDARD_GRAVITY = 9.80665
+"""Unit of `rig` [m/s2]."""
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+SeedNumber = Annotated[int, Field(ge=0, lt=2**31)]
+MATERIAL = (
+    "Grain material: sand, sand-calibrated, jsc-1a-loose-heights or another that ships (docs/materials.md), or a "
+    "material.toml."
+)
+
+
+class PenetrateSettings(StrictSettings):
+    """A spike driven into, dropped on and set down on a bed of grains, beside the spring-damper fitted to it."""
+
+    # The bed
+    bed: str | None = Field(
+        None,
+        min_length=1,
+        description="A bed of `hedgebed bed make`: its file, its run's folder, or its name on the shelf. Decides "
+        "material, bed_size, grain, spread, gravity, seeds and softness; a bed is prepared if not given.",
+    )
+    material: str = Field("sand", description=MATERIAL)
+    bed_size: tuple[Positive, Positive, Positive] = Field(
+        (0.072, 0.072, 0.0508), description="Bed: both widths (periodic) and depth of grains [m]."
+    )
+    grain: Positive = Field(0.0024, description="Mean grain diameter [m].")
+    spread: float = Field(0.15, ge=0, le=0.5, description="Grain diameters are uniform within 1 +- this [1].")
+    packing: float | None = Field(
+        None, gt=0.5, le=0.64, description="Packing fraction to prepare the bed to [1]; as it settles if not given."
+    )
+    gravity: Positive = Field(STANDARD_GRAVITY, description="Gravity of the grains [m/s2]; 1 g even in the rig.")
+    seeds: tuple[SeedNumber, ...] = Field((1, 2, 3), min_length=1, description="Seeds: one bed each.")
+
+    # The spike
+    tip: Literal["sphere", "cone", "flat"] = Field("sphere", description="Shape of the tip.")
+    tip_diameter: Positive = Field(0.012, description="Diameter of the tip [m].")
+    shaft_diameter: Positive | None = Field(
+        None,
+        description="Diameter of the shaft [m]: at most the tip's and at least a grain, with a flat tip the tip's own; "
+        "the tip's if not given.",
+    )
+    shaft_length: Positive = Field(0.06, description="Length of the shaft above the tip's widest point [m].")
+    cone_angle: float = Field(60.0, ge=1, lt=180, description="Full angle of a conical tip [degrees].")
+    spike_friction: NotNegative = Field(0.5, description="Friction coefficient of spike and grains [1].")
+    spike_restitution: float = Field(0.5, ge=0.01, le=1, description="Restitution of spike and grains [1].")
+
+    # What rests on it
+    platform_mass: Positive = Field(5.3, description="Mass of the platform [kg]; a spike carries a quarter.")
+    rig: NotNegative = Field(
+        0.0085, lt=1, description="Simulated gravity of the offloading rig [9.80665 m/s2]; 0: no rig, `gravity` rules."
+    )
+    load: Positive | None = Field(
+        None,
+        description="Weight on the spike, set down and dropped [N]. If not given, a quarter of the platform's: in the "
+        "rig (m + m_b) g_sim / 4, which is (5.3 kg platform + 5.2 kg counterweight) x 0.0085 g / 4 = 0.219 N by "
+        "default; without a rig m g / 4.",
+    )
+    mass: Positive = Field(
+        0.1,
+        description="Mass that a drop moves, under `load` [kg]. The shipped 0.1 kg stops within a shallow bed; the "
+        "platform's own share in the rig, (m + m_b) / 4, is 2.63 kg, and a free drop in a laboratory has load = m g.",
+    )
+
+    # What is done with it
+    speeds: tuple[Positive, ...] = Field((0.1, 0.2, 0.4), min_length=1, description="Speeds of driven runs [m/s].")
+    depth: Positive = Field(0.012, description="Depth of driven runs [m].")
+    hold: NotNegative = Field(0.01, description="How long a driven spike is held at depth [s].")
+    retreat_speed: Positive = Field(0.4, description="Speed of the pull-out [m/s].")
+    drop_speeds: tuple[Positive, ...] = Field(
+        (0.1, 0.15, 0.2),
+        description="Speeds at the surface of dropped runs [m/s]; none: no drops, on no seed unless other_drop_speeds "
+        "is given.",
+    )
+    after_stop: Positive = Field(0.03, description="How long a drop is followed after its first stop [s].")
+    drop_time: Positive = Field(0.8, description="A drop that has not come to rest ends after this [s].")
+    lowering_speed: Positive = Field(0.1, description="Speed at which a spike is lowered to be set down [m/s].")
+    rest_time: Positive = Field(0.04, description="For how long the signs of rest must hold [s].")
+    other_speeds: tuple[Positive, ...] = Field((0.4,), description="Speeds driven on the seeds after the first [m/s].")
+    other_drop_speeds: tuple[Positive, ...] = Field((0.15,), description="Drops on the seeds after the first [m/s].")
+
+    # Beside it
+    ground: Literal["bed", "spring-damper"] = Field(
+        "bed", description="What the spike goes into: the bed, or, without a bed, the spring-damper of `model`."
+    )
+    model: str | None = Field(
+        None,
+        min_length=1,
+        description="A model.toml of penetration, as diagnose writes it: its law, effects and all, is run beside bed "
+        "and spring-damper. Without a bed its spike, mass and load are taken where they are not given.",
+    )
+    campaign: str | None = Field(
+        None,
+        min_length=1,
+        description="Folder for the bed's runs as a campaign of measured trials, seen through noisy sensors.",
+    )
+    campaign_rate: Positive = Field(1000.0, description="Rate of the campaign's samples [Hz].")
+    campaign_depth_std: Positive = Field(5e-5, description="Noise of the campaign's depth [m].")
+    campaign_force_std: Positive = Field(0.02, description="Noise of the campaign's force, driven [N].")
+    campaign_accel_std: Positive = Field(0.2, description="Noise of the campaign's acceleration, dropped [m/s2].")
+    campaign_seed: SeedNumber = Field(1, description="Seed of the campaign's noise.")
+
+    # How it is computed
+    max_overlap: float = Field(0.05, gt=0, le=0.1, description="Largest overlap of grains [of a diameter].")
+    young: Positive | None = Field(
+        None, description="Young's modulus of the grains [Pa]; softened to `max_overlap` if not given."
+    )
+    time_step: Positive | None = Field(None, description="Step of the grains [s]; from the contact time if not given.")
+    substeps: int = Field(10, ge=1, le=1000, description="Steps of the grains in one macro step of the spike [1].")
+    precision: Literal["float64", "float32"] = Field("float64", description="Arithmetic of the bed.")
+    arch: Literal["cpu", "cuda"] = Field("cpu", description="Where the bed is computed.")
+    threads: int | None = Field(None, ge=1, le=1024, description="CPU threads; all there are if not given.")
+    allow_coarse: bool = Field(False, description="Take a tip of less than five grains across, for a quick look.")
+    cache: bool = Field(True, description="Keep prepared beds and use those kept.")
+
+    # What is kept
+    frame_count: int = Field(30, ge=0, le=2000, description="Frames of each shown run [1]; 0 for none.")
+    checkpoint_interval: Positive = Field(20.0, description="Time between checkpoints [s of waiting].")
+    reference: str | None = Field(
+        None,
+        description="A result.json to compare stiffness, damping and sinkage with, or 'shipped' for that of the case "
+        "that ships; none if not given.",
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _bed_decides(cls, given: Any) -> Any:
+        """A bed that is there already has a size, grains and a gravity."""
+        if isinstance(given, dict) and isinstance(given.get("bed"), str) and given["bed"]:
+            from .bed_given import settings_of_bed
+
+            return settings_of_bed(given)
+        return given
+
+    @model_validator(mode="before")
+    @classmethod
+    def _model_decides(cls, given: Any) -> Any:
+        """Without a bed nothing but the model says what the spike is."""
+        if isinstance(given, dict) and given.get("ground") == "spring-damper" and given.get("model"):
+            from .model_given import settings_of_model
+
+            return settings_of_model(given)
+        return given
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_drops_are_none(cls, given: Any) -> Any:
+        """Who leaves the drops out leaves them out on every seed."""
+        if isinstance(given, dict) and given.get("drop_speeds", True) in ((), []):
+            return {"other_drop_speeds": ()} | given
+        return given
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> PenetrateSettings:
+        bed = None if self.ground == "spring-damper" else self._bed()  # there is none then
+        for finding in (self._spike(), bed, self._runs(), self._beside()):
+            if finding:
+                raise ValueError(finding + self._perhaps_millimetres())
+        return self
+
+    def _perhaps_millimetres(self) -> str:
+        """What to ask of a length above a metre; empty where there is none."""
+        for key in ("tip_diameter", "shaft_diameter", "shaft_length", "grain", "depth", "bed_size"):
+            value = getattr(self, key)
+            for length in value if isinstance(value, tuple) else (value,):
+                if length is not None and length > 1:
+                    shown = _plain(value) if isinstance(value, tuple) else f"{value:g}"
+                    return say("millimetres", key=key, value=shown, length=length, metres=1e-3 * length)
+        return ""
+
+    def _spike(self) -> str | None:
+        if self.ground == "spring-damper":  # which has no grains, and no floor
+            return self._shaft()
+        across = self.tip_diameter / self.grain
+        if across < 1:
+            return say("tip_thin", s=self, least=5 * self.grain, most=self.tip_diameter / 5)
+        if across < 4.999 and not self.allow_coarse:
+            return say("tip_coarse", s=self, across=across, least=5 * self.grain, most=self.tip_diameter / 5)
+        shaft = self.shaft_diameter
+        if finding := self._shaft():
+            return finding
+        if shaft is not None and shaft < self.grain:
+            return say("shaft_thin", shaft=shaft, s=self)
+        if self.tip == "cone":
+            there = 2 * self.depth * math.tan(math.radians(0.5 * self.cone_angle))
+            if there < self.grain:
+                least = 2 * math.degrees(math.atan(0.5 * self.grain / self.depth))
+                return say("cone_thin", s=self, there=there, least=least)
+        # A drop or a set-down is ended one tip's diameter above the floor.
+        reach = max(self.depth, self.bed_size[2] - self.tip_diameter)
+        if self.tip_height + self.shaft_length < reach * (1 - 1e-9):
+            return say("shaft_short", s=self, reach=reach, least=reach - self.tip_height)
+        return None
+
+    def _shaft(self) -> str | None:
+        shaft = self.shaft_diameter
+        if shaft is not None and (shaft > self.tip_diameter or (self.tip == "flat" and shaft != self.tip_diameter)):
+            bound = "equal" if self.tip == "flat" else "be at most"
+            return f"shaft_diameter = {shaft:g} m must {bound} tip_diameter, {self.tip_diameter:g} m"
+        return None
+
+    def _bed(self) -> str | None:
+        width, height = min(self.bed_size[:2]), self.bed_size[2]
+        wide, deep = 4 * self.tip_diameter, self.depth + self.tip_diameter
+        if width < wide * (1 - 1e-9):
+            return say("bed_narrow", size=_plain(self.bed_size), s=self, wide=wide)
+        if self.depth < self.grain:
+            return say("depth_of_grain", s=self)
+        if height < deep * (1 - 1e-9):
+            return say("bed_shallow", size=_plain(self.bed_size), s=self, deep=deep)
+        if min(self.bed_size) < 5 * self.grain:
+            return say("bed_of_few_grains", size=_plain(self.bed_size), s=self, least=5 * self.grain)
+        return None
+
+    def _runs(self) -> str | None:
+        for key in ("speeds", "drop_speeds", "other_speeds", "other_drop_speeds", "seeds"):
+            values = getattr(self, key)
+            if len(set(values)) < len(values):
+                return f"{key} = {_plain(values)} holds a value twice: each once would do"
+        return None
+
+    def _beside(self) -> str | None:
+        if self.ground == "spring-damper" and self.model is None:
+            return "ground = 'spring-damper' needs model, the model.toml whose K and C it has: none is given"
+        if self.ground == "spring-damper" and self.campaign is not None:
+            return say("campaign_without_bed", s=self)
+        return None
+
+    def crossing(self, time_step: float, stiffest: float = math.inf) -> str | None:
+        """What is wrong where a speed is too great for a step of the grains [s]; None if nothing is.
+
+        Blames what was set: time_step, young (up to `stiffest` [Pa]), substeps; else the speed.
+        """
+        macro = self.substeps * time_step
+        limit = 0.5 * self.grain / macro
+        key, value = self.fastest
+        if value <= limit:
+            return None
+        ratio = value / limit
+        told = {"s": self, "time_step": time_step, "key": key, "value": value, "grains": 0.5 * ratio}
+        if self.time_step is not None:
+            return say("time_step_crossing", **told, most=time_step / ratio)
+        if self.young is not None and self.young * ratio**2 <= stiffest:
+            return say("young_crossing", **told, least=self.young * ratio**2)
+        if self.substeps > 10 and self.substeps / ratio >= 1:
+            return say("substeps_crossing", **told, most=math.floor(self.substeps / ratio + 1e-9))
+        return say("speed_crossing", **told, limit=limit)
+
+    @property
+    def fastest(self) -> tuple[str, float]:
+        """The key and the value of the largest speed that is set [m/s]."""
+        keys = ("speeds", "drop_speeds", "other_speeds", "other_drop_speeds", "retreat_speed", "lowering_speed")
+        listed = [(key, getattr(self, key)) for key in keys]
+        every = [(key, v) for key, value in listed for v in (value if isinstance(value, tuple) else (value,))]
+        return max(every, key=lambda pair: pair[1])
+
+    @property
+    def tip_height(self) -> float:
+        """Height over which the tip widens to its full diameter [m]."""
+        if self.tip == "sphere":
+            return 0.5 * self.tip_diameter
+        if self.tip == "cone":
+            return 0.5 * self.tip_diameter / math.tan(math.radians(0.5 * self.cone_angle))
+        return 0.0
+
+    @property
+    def weight(self) -> float:
+        """What rests on the spike [N]: `load`, or (m + m_b) g_sim / 4.
+
+        The counterweight that makes the pair fall at g_sim is m_b = m (g - g_sim) / (g + g_sim) (planar model, Atwood).
+        """
+        if self.load is not None:
+            return self.load
+        return self.share * (self.rig * STANDARD_GRAVITY if self.rig else self.gravity)
+
+    @property
+    def share(self) -> float:
+        """The mass that a spike's quarter of the platform moves [kg]: (m + m_b) / 4, without a rig m / 4."""
+        counterweight = self.platform_mass * (1 - self.rig) / (1 + self.rig) if self.rig else 0.0
+        return (self.platform_mass + counterweight) / 4
+
+
+def _plain(values: tuple[float, ...]) -> str:
+    """The values as one would type them."""
+    return "[" + ", ".join(f"{value:g}" for value in values) + "]"

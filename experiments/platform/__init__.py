@@ -1,0 +1,4 @@
+"""The platform of an experiment: its numbers with where they come from, surfaces, lengths that are refused.
+
+Imports `experiments.runs`, `rigid` and `vis.page` only.
+"""

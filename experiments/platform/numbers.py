@@ -1,0 +1,139 @@
+"""What a platform gives a tumble: its numbers in the plane, and a motor's torque that ends at the wheel's limit.
+
+The wheel's limit is one rule, here as in `rigid.spatial.spatial`: a start above it is refused, and a motor whose
+wheel comes to it gives no more torque.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rigid.model.trial import Trial
+from rigid.planar.simulate import simulate
+from rigid.planar.trajectory import Trajectory
+from rigid.platform.files import find_platform
+from rigid.platform.platform import Platform
+
+from .sentences import say
+
+__all__ = ["PlatformNumbers", "platform_numbers", "torque_within_limit"]
+
+SPIKE_LENGTHS = {"hedgehog": 0.2}
+"""l [m] where the paper gives it: its octagon is 0.4 m across, and the edge of 0.153 m is rounded."""
+
+
+@dataclass(frozen=True)
+class PlatformNumbers:
+    """What the planar model takes from a platform, and what its wheel can do."""
+
+    name: str
+    mass: float
+    inertia: float
+    spike_length: float
+    lean: float
+    """Angle from the vertical of the line from the leading tips to the centre, at rest [rad]."""
+    spike_count: int | None
+    """Rows of tips at equal angles; None where they are not."""
+    wheel_inertia: float
+    motor_torque: float
+    brake_torque: float
+    max_wheel_speed: float
+    spike_diameter: float
+    """Of shafts and ball tips [m]; 0 where it has no spikes."""
+    spike_clear: float
+    """How far a spike stands out of the hull, along itself [m]; 0 where it has none."""
+
+    @property
+    def max_motor_torque(self) -> float:
+        """What the motor gives at most [N m], by the name of the setting."""
+        return self.motor_torque
+
+
+def platform_numbers(name: str, *, file: Path | None = None, in_plane: bool = True) -> PlatformNumbers:
+    """The numbers of a platform that ships, by name, or of the TOML file `name`; `file` stands in for a copied one.
+
+    Raises ValueError for one there is not and, unless `in_plane` is false, for one that is no regular polygon seen from
+    the side.
+    """
+    platform = find_platform(name if file is None else file)
+    wheel, stance = platform.wheel(), platform.stance()
+    try:
+        count: int | None = _spike_count(name, platform)
+    except ValueError:
+        if in_plane:
+            raise
+        count = None
+    return PlatformNumbers(
+        name=name,
+        mass=platform.mass,
+        inertia=platform.moment(),
+        spike_length=SPIKE_LENGTHS.get(name, stance.spike_length),
+        lean=stance.lean,
+        spike_count=count,
+        wheel_inertia=wheel.inertia,
+        motor_torque=wheel.motor_torque,
+        brake_torque=wheel.brake_torque,
+        max_wheel_speed=wheel.max_speed,
+        spike_diameter=2 * platform.tip_radius,
+        spike_clear=platform.spike_clear,
+    )
+
+
+def _spike_count(name: str, platform: Platform) -> int:
+    """Rows of tips on the circle about the wheel's axis. Raises ValueError where they are not at equal angles."""
+    across, lean = platform.tips[:, [0, 2]], platform.stance().lean
+    far = np.hypot(across[:, 0], across[:, 1])
+    reach = float(far.max())
+    rows = np.unique(np.round(np.degrees(np.arctan2(across[:, 0], -across[:, 1]))[far > reach * (1 - 1e-6)] % 360, 6))
+    apart = np.diff([*rows, rows[0] + 360])
+    if np.abs(apart - 2 * math.degrees(lean)).max() > 1e-4:
+        gaps = " and ".join(f"{gap:.3g}" for gap in dict.fromkeys(np.round(apart, 3)))
+        raise ValueError(say("uneven_rows", name=name, rows=len(rows), gaps=gaps))
+    between = far[far <= reach * (1 - 1e-6)]
+    if len(between) and between.max() > reach * math.cos(lean):
+        raise ValueError(say("tips_between", name=name, between=between.max(), reach=reach))
+    return len(rows)
+
+
+def torque_within_limit(
+    trial: Trial, *, max_wheel_speed: float, duration: float, method: Any = "located"
+) -> tuple[Trial, float | None]:
+    """`trial` with its torque ended where a motor's wheel comes to `max_wheel_speed` [rad/s], and when that is [s].
+
+    None, and the trial as it is, where the wheel does not come to it within `duration` [s]. The wheel only gains speed,
+    so that ending the torque at that moment is the same as a motor that has none left from then on.
+    """
+    gain = trial.torque / trial.wheel_inertia
+    if trial.actuator != "motor" or trial.wheel_speed_0 + gain * min(duration, trial.torque_until) <= max_wheel_speed:
+        return trial, None
+    run = simulate(trial, duration=duration, method=method, sample_interval=min(1e-3, duration))
+    if run.wheel_speed[-1] <= max_wheel_speed:
+        return trial, None
+    time = _when(run, max_wheel_speed)
+    return replace(trial, torque_until=time), time
+
+
+def _when(run: Trajectory, speed: float) -> float:
+    """When the wheel comes to `speed` [s]. Between two rows it gains evenly while a spike touches, and nothing else."""
+    last = int(np.argmax(run.wheel_speed > speed))
+    first = max(last - 1, 0)
+    changes = [(float(time), state) for time, state, _ in run.transitions if time < run.time[last]]
+    state = next((state for time, state in reversed(changes) if time <= run.time[first]), "stand")
+    edges, touching = [float(run.time[first])], [state != "hop"]
+    for time, state in changes:
+        if time > run.time[first]:
+            edges.append(time)
+            touching.append(state != "hop")
+    spans = np.diff([*edges, float(run.time[last])]) * touching
+    gained = run.wheel_speed[last] - run.wheel_speed[first]
+    left = (speed - run.wheel_speed[first]) / gained * float(spans.sum())
+    for edge, span in zip(edges, spans, strict=True):
+        if left <= span and span > 0:
+            return edge + float(left)
+        left -= span
+    return float(run.time[last])

@@ -1,0 +1,241 @@
+"""Numbers of a trial as they are settled: what is given wins over a model, a model over surface and platform.
+
+Each keeps where it comes from, so that a run can print every default.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from rigid.platform.rig import STANDARD_GRAVITY
+
+from .numbers import PlatformNumbers
+from .sentences import say
+from .surfaces import DEFAULT_SURFACE, find_surface
+
+__all__ = [
+    "UNITS",
+    "Number",
+    "Settled",
+    "brake_words",
+    "check_actuation",
+    "check_body",
+    "check_wheel_speed",
+    "defaults_said",
+    "of_other_spikes",
+    "rig_fault",
+    "settle_limits",
+    "settle_platform",
+    "settle_surface",
+]
+
+OTHER_BODY = 0.2
+"""A mass, inertia or spike length that is off the platform's by more than this share is another body's."""
+
+UNITS = {
+    "mass": "kg",
+    "inertia": "kg m2",
+    "spike_length": "m",
+    "lean": "rad",
+    "wheel_inertia": "kg m2",
+    "max_wheel_speed": "rad/s",
+    "max_motor_torque": "N m",
+    "stiffness": "N/m",
+    "damping": "N s/m",
+    "mu_s": "1",
+    "mu_d": "1",
+    "gravity_sim": "m/s2",
+    "gravity": "m/s2",
+    "counterweight": "kg",
+    "torque": "N m",
+    "torque_until": "s",
+    "wheel_speed_0": "rad/s",
+    "distance": "m",
+    "body_radius": "m",
+}
+
+
+@dataclass(frozen=True)
+class Number:
+    """One number of a trial: value, unit, and where it comes from ("given", "default", "surface steel", ...)."""
+
+    value: float
+    unit: str
+    origin: str
+
+
+class Settled(dict[str, Number]):
+    """The numbers by name, in the order in which they were settled."""
+
+    def __init__(self, settings: Any) -> None:
+        super().__init__()
+        self._settings = settings
+
+    def settle(self, name: str, default: float, origin: str, *, in_model: float | None = None) -> float:
+        """Settle `name`: as the settings give it, else as the model has it, else `default` from `origin`."""
+        given = getattr(self._settings, name, None)
+        if given is not None:
+            self[name] = Number(float(given), UNITS[name], "given")
+        elif in_model is not None:
+            self[name] = Number(in_model, UNITS[name], "model")
+        else:
+            self[name] = Number(default, UNITS[name], origin)
+        return self[name].value
+
+    def value(self, name: str) -> float:
+        """The number called `name`."""
+        return self[name].value
+
+
+def defaults_said(choices: Mapping[str, str], numbers: Mapping[str, Number]) -> list[str]:
+    """One line for each choice at its default and each number that was not given: every default is said."""
+    lines = [f"{name} = {value} (default)" for name, value in choices.items()]
+    for name, number in numbers.items():
+        if number.origin != "given":
+            lines.append(f"{name} = {_said(name, number)} ({number.origin})")
+    return lines
+
+
+def _said(name: str, number: Number) -> str:
+    if math.isinf(number.value):
+        return "no end" if name == "torque_until" else "no limit known"
+    return f"{number.value:.6g}" + ("" if number.unit == "1" else f" {number.unit}")
+
+
+def settle_platform(numbers: Settled, platform: PlatformNumbers, *, model: Any = None) -> None:
+    """Settle mass, inertia and spike length of the platform, and its wheel's inertia. `model`: a `TumbleModel`."""
+    origin = f"platform {platform.name}"
+    for name in ("mass", "inertia", "spike_length"):
+        in_model = getattr(model.platform, name) if model is not None else None
+        numbers.settle(name, getattr(platform, name), origin, in_model=in_model)
+    in_model = model.wheel.inertia if model is not None else None
+    numbers.settle("wheel_inertia", platform.wheel_inertia, origin, in_model=in_model)
+
+
+def check_body(numbers: Mapping[str, Number], platform: PlatformNumbers) -> list[str]:
+    """What has to be said where a body of another size is given, and its other numbers are still the platform's."""
+    given = {name for name in ("mass", "inertia", "spike_length") if numbers[name].origin == "given"}
+    far = any(abs(numbers[name].value / getattr(platform, name) - 1) > OTHER_BODY for name in given)
+    if not far or platform.spike_count is None:
+        return []
+    kept = [
+        f"{name} = {_said(name, numbers[name])}" for name in ("mass", "inertia", "spike_length") if name not in given
+    ]
+    kept = [*kept, f"{platform.spike_count} rows of spikes"]
+    return [say("other_body", given=", ".join(sorted(given)), kept=", ".join(kept), platform=platform)]
+
+
+def settle_limits(numbers: Settled, platform: PlatformNumbers, *, in_model: bool = False) -> None:
+    """Settle how fast the wheel may turn and what the motor gives at most: as given, else those of the platform.
+
+    They are limits of the platform's own wheel with its motor; of another wheel, or a model's, nothing is known (inf).
+    """
+    own = numbers.value("wheel_inertia") == platform.wheel_inertia
+    for name in ("max_wheel_speed", "max_motor_torque"):
+        if in_model:
+            numbers.settle(name, math.inf, "a model says nothing of it")
+        elif not own:
+            numbers.settle(name, math.inf, f"wheel_inertia is given: not the wheel of {platform.name}")
+        else:
+            numbers.settle(name, getattr(platform, name), f"platform {platform.name}")
+
+
+def settle_surface(numbers: Settled, surface: str | None, *, model: Any = None) -> tuple[str, list[str]]:
+    """Settle K, C and friction; return the material's name and what has to be said of it. `model`: a `TumbleModel`.
+
+    Raises ValueError for a surface there is not, and for more sliding than static friction.
+    """
+    material: Any
+    warnings: list[str] = []
+    if surface is None and model is not None:
+        material, name, origin = model.surface, model.surface.kind, "model"
+    else:
+        material = found = find_surface(surface or DEFAULT_SURFACE)
+        name, origin = found.name, f"surface {found.name}"
+        warnings = [say("guess", surface=found)] if found.guess else []
+    for key in ("stiffness", "damping", "mu_s"):
+        numbers.settle(key, getattr(material, key), origin)
+    if numbers["mu_s"].origin == "given":
+        numbers.settle("mu_d", 0.5 * numbers.value("mu_s"), "default: half of mu_s")
+    else:
+        sliding = material.mu_d if material.mu_d is not None else 0.5 * material.mu_s
+        numbers.settle("mu_d", sliding, origin)
+    mu_s, mu_d = numbers["mu_s"], numbers["mu_d"]
+    if mu_d.value > mu_s.value:
+        raise ValueError(say("sliding_above_static", mu_d=mu_d.value, mu_s=mu_s))
+    return name, warnings
+
+
+def of_other_spikes(numbers: Mapping[str, Number], surface: str, *, diameter: float, whose: str) -> list[str]:
+    """What has to be said where K or C is the surface's and was found with other spikes than these [m]; 0: none."""
+    taken = [name for name in ("stiffness", "damping") if numbers[name].origin.startswith("surface ")]
+    own = find_surface(surface).spike if taken else None
+    if own is None or math.isclose(diameter, own, rel_tol=1e-6):
+        return []
+    found = f"are {1e3 * diameter:.4g} mm thick" if diameter > 0 else "there are none"
+    names = " and ".join(taken)
+    return [say("other_spikes", names=names, surface=surface, own=1e3 * own, whose=whose, found=found)]
+
+
+def of_earth(
+    numbers: Mapping[str, Number], surface: str, *, weight: float, mass: float, counterweight: float
+) -> list[str]:
+    """What has to be said in flight where K is the surface's, found in grains at 1 g; `weight` in N, masses in kg."""
+    own = find_surface(surface)
+    gravity = weight / mass
+    if counterweight > 0 or own.grains is None or gravity > 0.5 * STANDARD_GRAVITY or gravity == 0:
+        return []
+    if not numbers["stiffness"].origin.startswith(("surface ", "half of")):
+        return []
+    return [say("of_earth", surface=surface, gravity=gravity, less=STANDARD_GRAVITY / gravity)]
+
+
+def rig_fault(stated: float, local: float = STANDARD_GRAVITY) -> str | None:
+    """That a rig leaves more than the local gravity [m/s2], in words; `stated` is in units of 9.80665 m/s2."""
+    here = local / STANDARD_GRAVITY
+    if stated < here:
+        return None
+    meant = stated / STANDARD_GRAVITY
+    asked = f" ({stated:g} m/s2 are {meant:.3g} g)" if meant < here else ""
+    return say("rig_too_heavy", stated=stated, here=here, asked=asked)
+
+
+def check_actuation(
+    actuator: Literal["motor", "brake"], platform: PlatformNumbers, numbers: Mapping[str, Number]
+) -> list[str]:
+    """What has to be said of torque and wheel, of a tumble and of a hop, as far as they are settled.
+
+    A brake beyond the platform's own is no more than said: it is an impulse in the limit; of another wheel's brake
+    nothing is known. Raises ValueError, naming the setting, for a torque beyond the motor, and for a wheel that starts
+    beyond its limit.
+    """
+    if "wheel_speed_0" in numbers:
+        check_wheel_speed(numbers["wheel_speed_0"].value, numbers)
+    if "torque" not in numbers:
+        return []
+    torque, strongest, wheel = numbers["torque"].value, numbers["max_motor_torque"], numbers["wheel_inertia"]
+    if actuator == "motor" and torque > strongest.value * (1 + 1e-9):
+        whose = (
+            f"the motor of platform = {platform.name!r}" if strongest.origin != "given" else "max_motor_torque (given)"
+        )
+        raise ValueError(say("beyond_motor", torque=torque, whose=whose, most=strongest.value))
+    own = wheel.origin != "model" and wheel.value == platform.wheel_inertia
+    if actuator == "brake" and own and torque > platform.brake_torque * (1 + 1e-9):
+        return [say("beyond_brake", torque=torque, brake=brake_words(platform), platform=platform)]
+    return []
+
+
+def brake_words(platform: PlatformNumbers) -> str:
+    """What slows the platform's wheel: a platform file without a brake_torque lets the motor do it."""
+    own = platform.brake_torque > platform.motor_torque or math.isinf(platform.brake_torque)
+    return "the brake" if own else "the motor"
+
+
+def check_wheel_speed(speed: float, numbers: Mapping[str, Number]) -> None:
+    """Raise ValueError for a wheel that starts beyond its limit [rad/s]."""
+    fastest = numbers["max_wheel_speed"]
+    if speed > fastest.value:
+        raise ValueError(say("beyond_wheel", speed=speed, fastest=fastest))

@@ -1,0 +1,61 @@
+"""The materials behind ``--surface``: stiffness, damping and friction of each, with where the numbers come from."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from experiments.runs.reading import nearest
+
+__all__ = ["DEFAULT_SURFACE", "Surface", "find_surface", "surface_names"]
+
+FILE = Path(__file__).parent / "surfaces.toml"
+DEFAULT_SURFACE = "brick"
+"""The surface of every command that is told none: of the paper's two hard ones the rougher, as rock is, and that
+on which most of what the paper states comes out (docs/tumble.md)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Surface:
+    """Numbers of one material, per row of two spikes."""
+
+    name: str
+    stiffness: float
+    """K [N/m]."""
+    damping: float
+    """C [N s/m], while going in."""
+    mu_s: float
+    """Coefficient of static friction [1]."""
+    mu_d: float
+    """Coefficient of sliding friction [1]."""
+    source: str
+    granular: bool = False
+    grains: str | None = None
+    """The material of `dem` whose grains a bed of it is made of."""
+    packing: float | None = None
+    """Packing fraction of the samples that those grains were calibrated with [1]; None: of no certain one."""
+    spike: float | None = None
+    """Diameter of the spikes with ball tips that K and C are of [m]; None: of no certain ones."""
+    guess: bool = False
+    """Whether nothing but judgement stands behind the numbers."""
+
+
+@cache
+def _surfaces() -> dict[str, Surface]:
+    tables = tomllib.loads(FILE.read_text(encoding="utf-8"))
+    return {name: Surface(name=name, **table) for name, table in tables.items()}
+
+
+def surface_names() -> list[str]:
+    """The names there are."""
+    return list(_surfaces())
+
+
+def find_surface(name: str) -> Surface:
+    """The surface called `name`. Raises ValueError naming those there are."""
+    surfaces = _surfaces()
+    if name not in surfaces:
+        raise ValueError(f"surface = {name!r} is not known; {nearest(name, surfaces)}")
+    return surfaces[name]

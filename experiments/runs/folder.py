@@ -1,0 +1,449 @@
+"""A run is a folder: what it holds, who is writing it, and how far it has come.
+
+Everything that is written goes to a temporary file first and is moved into place, so that a reader (or a run that
+was killed) finds either the whole of a file or none of it.
+
+```
+run.toml                  the settings, each with its meaning and unit in a comment; reads back to the same settings
+status.json               {"status": "running|stopped|failed|done", "reason", "updated", "processor_time"}
+lock                      the process that is writing the folder; the system frees it when that process dies
+result.json               the numbers a person would quote
+series/<id>.csv           time series, the unit of each column in its name
+checkpoint/<name>.npz     arrays to carry on from; checkpoint/<name>.done.json says that a piece of the work is finished
+```
+"""
+
+import fcntl
+import json
+import math
+import os
+import re
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from datetime import date, datetime, time
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+from pydantic import BaseModel
+
+from experiments.runs.version import __version__
+
+__all__ = [
+    "RunFolder",
+    "Status",
+    "fresh_path",
+    "read_json",
+    "read_series",
+    "settings_in",
+    "settings_toml",
+    "toml_value",
+    "write_json",
+    "write_series",
+    "write_text",
+]
+
+Status = Literal["running", "stopped", "failed", "done"]
+
+RUN_FORMAT = "hedgebed-run/1"
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")
+_locks: dict[Path, tuple[int, int]] = {}  # resolved folder -> (file descriptor, times taken by this process)
+
+
+# Files ---------------------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def _replacing(path: Path) -> Iterator[Path]:
+    """Yield a temporary path beside `path`; move it into place if all went well, remove it if not."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        yield temporary
+        with temporary.open("rb") as file:
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write `text` to `path` (UTF-8), all of it or nothing."""
+    with _replacing(Path(path)) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def _plain(value: Any) -> Any:
+    """`value` in terms of what JSON knows; a number that is not finite becomes null."""
+    if isinstance(value, BaseModel):
+        return _plain(value.model_dump())
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, list | tuple | set | frozenset):
+        return [_plain(item) for item in value]
+    if isinstance(value, Path):
+        return str(value)
+    return value
+
+
+def write_json(path: Path, data: Any) -> None:
+    """Write `data` to `path` as JSON, all of it or nothing.
+
+    Takes numpy scalars and arrays, paths and pydantic models as well; NaN and infinities become null. Raises TypeError
+    for what JSON cannot hold.
+    """
+    write_text(path, json.dumps(_plain(data), indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+
+
+def read_json(path: Path) -> Any:
+    """The contents of the JSON file `path`."""
+    return json.loads(Path(path).read_text(encoding="utf-8"))
+
+
+def write_series(path: Path, columns: Mapping[str, Any]) -> None:
+    """Write `columns` (name -> array of shape [n]) to the CSV file `path`, all of it or nothing.
+
+    A name carries its unit: ``depth_m``, ``force_N``. Numbers are written so that they read back to the same bits;
+    arrays of text (``phase``) are written as they are. Raises ValueError where lengths differ.
+    """
+    arrays = {name: np.asarray(values) for name, values in columns.items()}
+    lengths = {name: array.shape for name, array in arrays.items()}
+    if len(set(lengths.values())) > 1 or any(len(shape) != 1 for shape in lengths.values()):
+        raise ValueError(f"the columns of {Path(path).name} must be one-dimensional and of one length, not {lengths}")
+    lines = [",".join(arrays)]
+    as_text = [[str(v) if array.dtype.kind in "USOb" else repr(v) for v in array.tolist()] for array in arrays.values()]
+    lines += [",".join(row) for row in zip(*as_text, strict=True)]
+    write_text(path, "\n".join(lines) + "\n")
+
+
+def read_series(path: Path) -> dict[str, np.ndarray]:
+    """The columns of the CSV file `path`: name -> array of shape [n], float where all of it is numbers, else text."""
+    header, *rows = Path(path).read_text(encoding="utf-8").splitlines()
+    names = header.split(",")
+    cells = [row.split(",") for row in rows if row]
+    columns: dict[str, np.ndarray] = {}
+    for index, name in enumerate(names):
+        values = [row[index] for row in cells]
+        try:
+            columns[name] = np.array([float(value) for value in values])
+        except ValueError:
+            columns[name] = np.array(values)
+    return columns
+
+
+# run.toml ------------------------------------------------------------------------------------------------------------
+
+
+def toml_value(value: Any) -> str:
+    """`value` as TOML writes it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, float):
+        return repr(value)  # inf and nan are TOML's words too
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, date | time):  # a datetime is a date
+        return value.isoformat()
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(toml_value(item) for item in value) + "]"
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{toml_value(str(key))} = {toml_value(item)}" for key, item in value.items()) + "}"
+    raise TypeError(f"a setting of type {type(value).__name__} cannot be written to run.toml: {value!r}")
+
+
+def settings_toml(command: str, settings: BaseModel, version: str, code: str = "") -> str:
+    """The text of run.toml: each field of `settings` with its description as a comment above it."""
+    values = settings.model_dump(mode="python")
+    lines = [
+        f"# hedgebed {command}: every setting of this run, as given or by default.",
+        f"# `hedgebed {command} run.toml` does the same again.",
+        f"format = {toml_value(RUN_FORMAT)}",
+        f"version = {toml_value(version)}",
+        *([f"code = {toml_value(code)}  # digest of the code that computes beds"] if code else []),
+        f"command = {toml_value(command)}",
+        f"created = {toml_value(_now())}",
+        f"not_set = {toml_value([name for name, value in values.items() if value is None])}",
+        "",
+        "[settings]",
+    ]
+    for name, field in type(settings).model_fields.items():
+        lines += [f"# {line}" for line in (field.description or "").splitlines()]
+        value = values[name]
+        if isinstance(value, Path):
+            value = str(value)
+        lines += [f"# {name} is not set" if value is None else f"{name} = {toml_value(value)}"]
+    return "\n".join(lines) + "\n"
+
+
+def settings_in(table: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings in `table`, a run.toml read: name -> value, None for what is not set."""
+    return {**dict.fromkeys(table.get("not_set", [])), **table["settings"]}
+
+
+# The folder ----------------------------------------------------------------------------------------------------------
+
+
+def _what_else(path: Path) -> str:
+    """What may be done with the run that a folder holds, after what else would do."""
+    try:
+        done = RunFolder.open(path).status == "done"
+    except ValueError:
+        return ""
+    return "; that run is done" if done else f", or finish that run with `hedgebed resume {path}`"
+
+
+def _now() -> str:
+    return datetime.now().astimezone().isoformat(timespec="seconds")
+
+
+def _processor_time() -> float:
+    """Of this process and its children that have ended [s]."""
+    spent = os.times()
+    return spent.user + spent.system + spent.children_user + spent.children_system
+
+
+def _float(value: Any) -> float:
+    return float(value) if isinstance(value, int | float) else 0.0
+
+
+def fresh_path(command: str, root: Path = Path("runs")) -> Path:
+    """A folder under `root` that does not exist yet: ``<command>-<date>-<time>``."""
+    stem = f"{command.replace(' ', '-')}-{datetime.now():%Y%m%d-%H%M%S}"
+    path, count = root / stem, 1
+    while path.exists():
+        count += 1
+        path = root / f"{stem}-{count}"
+    return path
+
+
+def _checked(name: str) -> str:
+    if not _NAME.fullmatch(name):
+        raise ValueError(f"{name!r} cannot name a file of a run folder: use letters, digits, '.', '_', '+' and '-'")
+    return name
+
+
+class RunFolder:
+    """The folder of one run. Make one with `create`, take up an old one with `open`, or let `ensure` choose."""
+
+    def __init__(self, path: Path, command: str, version: str, settings: dict[str, Any], code: str = ""):
+        self.path = Path(path)
+        self.command = command
+        self.version = version
+        self.code = code  # digest of the code that computes, where the experiment has one
+        self.settings = settings  # as run.toml has them: name -> value, None for what is not set
+        self._spent_before = _float(self._kept_status().get("processor_time"))
+        self._began = _processor_time()
+
+    def __repr__(self) -> str:
+        return f"RunFolder({str(self.path)!r}, command={self.command!r}, status={self.status!r})"
+
+    # Making and taking up
+
+    @classmethod
+    def create(
+        cls, path: Path, command: str, settings: BaseModel, version: str = __version__, code: str = ""
+    ) -> "RunFolder":
+        """Make the folder of a new run and write its run.toml.
+
+        Raises ValueError, naming the path, if it is in use (a file, or a folder that holds something) or cannot be
+        written; and if the settings would not read back from run.toml as they are.
+        """
+        path = Path(path)
+        text = settings_toml(command, settings, version, code)
+        if type(settings)(**settings_in(tomllib.loads(text))) != settings:
+            raise ValueError(
+                f"the settings of {command} cannot be kept: they do not read back from run.toml as they are"
+            )
+        if path.exists():
+            if not path.is_dir():
+                raise ValueError(f"out = {str(path)!r} is a file: name a folder that is empty or does not exist yet")
+            held = sorted(item.name for item in path.iterdir())
+            if held:
+                what = ", ".join(held[:3]) + (", ..." if len(held) > 3 else "")
+                remedy = _what_else(path) if "run.toml" in held else ""
+                raise ValueError(
+                    f"out = {str(path)!r} is in use (it holds {what}): "
+                    f"name a folder that is empty or does not exist yet{remedy}"
+                )
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            write_text(path / "run.toml", text)
+        except OSError as error:
+            raise ValueError(
+                f"out = {str(path)!r} cannot be written ({error.strerror}): name a folder that can be"
+            ) from error
+        folder = cls.open(path)
+        folder.set_status("running")
+        return folder
+
+    @classmethod
+    def open(cls, path: Path) -> "RunFolder":
+        """Take up the folder of an earlier run. Raises ValueError if `path` is not one."""
+        path = Path(path)
+        try:
+            table = tomllib.loads((path / "run.toml").read_text(encoding="utf-8"))
+        except OSError:
+            raise ValueError(f"{str(path)!r} is not a run folder: it has no run.toml") from None
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise ValueError(f"{str(path / 'run.toml')!r} cannot be read: {error}") from None
+        if table.get("format") != RUN_FORMAT or not isinstance(table.get("settings"), dict):
+            raise ValueError(f"{str(path / 'run.toml')!r} is not of the format {RUN_FORMAT}")
+        command, version, code = (str(table.get(key, "")) for key in ("command", "version", "code"))
+        return cls(path, command, version, settings_in(table), code)
+
+    @classmethod
+    def ensure(
+        cls, path: Path, command: str, settings: BaseModel, version: str = __version__, code: str = ""
+    ) -> "RunFolder":
+        """`open` the folder if it is one of the same command with the same settings, else `create` it.
+
+        An experiment calls this first: it then works alike from the command line, which has made the folder already,
+        from a script, and when it is resumed. Raises ValueError as `create` does.
+        """
+        if (Path(path) / "run.toml").is_file():
+            folder = cls.open(path)
+            if folder.command == command and type(settings)(**folder.settings) == settings:
+                return folder
+        return cls.create(path, command, settings, version, code)
+
+    # Who is writing
+
+    @contextmanager
+    def lock(self) -> Iterator[None]:
+        """Hold the folder for this process. Within one process it can be taken again.
+
+        Raises ValueError, naming the other process, if that one is alive and has it. A process that died, however it
+        died, has left it free.
+        """
+        key = self.path.resolve()
+        descriptor, count = _locks.get(key, (-1, 0))
+        if count == 0:
+            descriptor = os.open(self.path / "lock", os.O_RDWR | os.O_CREAT, 0o644)
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                owner = os.pread(descriptor, 64, 0).decode(errors="replace").strip() or "another"
+                os.close(descriptor)
+                raise ValueError(
+                    f"{str(self.path)!r} is being written by process {owner}: wait for it or stop it first"
+                ) from None
+            os.ftruncate(descriptor, 0)
+            os.pwrite(descriptor, f"{os.getpid()}\n".encode(), 0)
+        _locks[key] = (descriptor, count + 1)
+        try:
+            yield
+        finally:
+            descriptor, count = _locks[key]
+            if count > 1:
+                _locks[key] = (descriptor, count - 1)
+            else:
+                del _locks[key]
+                os.ftruncate(descriptor, 0)
+                os.close(descriptor)
+
+    # How far
+
+    @property
+    def status(self) -> Status | None:
+        """What status.json says; None where there is none."""
+        status = self._kept_status().get("status")
+        return status if status in get_args(Status) else None
+
+    def _kept_status(self) -> dict[str, Any]:
+        """What status.json holds; nothing where there is none."""
+        try:
+            kept = read_json(self.path / "status.json")
+        except (OSError, json.JSONDecodeError):
+            return {}
+        return kept if isinstance(kept, dict) else {}
+
+    @property
+    def processor_time(self) -> float:
+        """Of this process and its children that have ended, since the folder was taken up, and of earlier spells [s].
+
+        Of a spell that was killed what its last checkpoint knew.
+        """
+        return round(self._spent_before + _processor_time() - self._began, 2)
+
+    def set_status(self, status: Status, reason: str = "") -> None:
+        """Write status.json. `reason` says why a run stopped or failed."""
+        if status not in get_args(Status):
+            raise ValueError(f"status = {status!r} is none of {', '.join(get_args(Status))}")
+        told = {"status": status, "reason": reason, "updated": _now(), "processor_time": self.processor_time}
+        write_json(self.path / "status.json", told)
+
+    # What it holds
+
+    def write_result(self, result: Mapping[str, Any]) -> None:
+        """Write result.json (see `write_json`): what the settings determine, so no times of day or of computing."""
+        write_json(self.path / "result.json", result)
+
+    def read_result(self) -> dict[str, Any]:
+        """The contents of result.json."""
+        return read_json(self.path / "result.json")
+
+    def write_series(self, name: str, columns: Mapping[str, Any]) -> str:
+        """Write series/<name>.csv (see `write_series`); return its path relative to the folder."""
+        relative = f"series/{_checked(name)}.csv"
+        write_series(self.path / relative, columns)
+        return relative
+
+    def read_series(self, name: str) -> dict[str, np.ndarray]:
+        """The columns of series/<name>.csv."""
+        return read_series(self.path / "series" / f"{_checked(name)}.csv")
+
+    def save_checkpoint(self, name: str, arrays: Mapping[str, Any]) -> None:
+        """Write `arrays` (name -> array, number or text) to checkpoint/<name>.npz, in place of what was there.
+
+        Raises TypeError for anything else: a checkpoint never holds pickled objects.
+        """
+        stored = {key: np.asarray(value) for key, value in arrays.items()}
+        for key, array in stored.items():
+            if array.dtype.hasobject:
+                raise TypeError(f"{key!r} in checkpoint {name!r} is neither numbers nor text: {arrays[key]!r}")
+        with _replacing(self.path / "checkpoint" / f"{_checked(name)}.npz") as temporary, temporary.open("wb") as file:
+            np.savez(file, **stored)  # type: ignore[arg-type]
+        if self.status == "running":  # a run that is killed has its processor time until here
+            self.set_status("running")
+
+    def load_checkpoint(self, name: str) -> dict[str, np.ndarray] | None:
+        """The arrays of checkpoint/<name>.npz; None where there is none."""
+        path = self.path / "checkpoint" / f"{_checked(name)}.npz"
+        if not path.exists():
+            return None
+        with np.load(path, allow_pickle=False) as archive:
+            return {key: archive[key] for key in archive.files}
+
+    def drop_checkpoint(self, name: str) -> None:
+        """Remove checkpoint/<name>.npz if it is there."""
+        (self.path / "checkpoint" / f"{_checked(name)}.npz").unlink(missing_ok=True)
+
+    def mark_done(self, name: str, data: Any = None) -> None:
+        """Say that the piece of work `name` is finished, with what a resumed run wants to know of it (JSON)."""
+        write_json(self.path / "checkpoint" / f"{_checked(name)}.done.json", data)
+
+    def is_done(self, name: str) -> bool:
+        """Whether `mark_done(name)` has been called, in this process or an earlier one."""
+        return (self.path / "checkpoint" / f"{_checked(name)}.done.json").exists()
+
+    def done_data(self, name: str) -> Any:
+        """What `mark_done(name, data)` was given."""
+        return read_json(self.path / "checkpoint" / f"{_checked(name)}.done.json")
+
+    def done_names(self) -> Sequence[str]:
+        """The pieces of work that are finished, sorted."""
+        return sorted(path.name.removesuffix(".done.json") for path in (self.path / "checkpoint").glob("*.done.json"))
+
+    @property
+    def has_work(self) -> bool:
+        """Whether anything but the settings has been written: a checkpoint, a series, a result."""
+        return any((self.path / name).exists() for name in ("checkpoint", "series", "frames", "result.json"))

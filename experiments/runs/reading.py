@@ -1,0 +1,142 @@
+"""Settings from a case file and from the command line, checked; what is wrong with them in one sentence each.
+
+A layer is what one source gives: name -> value. Later layers win: the defaults of the settings class, a case file,
+the command line. Every fault is a ValueError whose text names the key, the value and what would do.
+"""
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from experiments.runs.folder import RUN_FORMAT, settings_in
+from experiments.runs.strict import may_be_empty
+
+__all__ = ["Layer", "find_case", "nearest", "option", "read_case", "settings_from"]
+
+_NEAR = 4
+"""Names that are told at most of those that are spelt like one there is not."""
+
+
+@dataclass(frozen=True)
+class Layer:
+    """Values from one source. `source` is how messages call it; None means the command line."""
+
+    source: str | None
+    values: Mapping[str, Any] = field(default_factory=dict)
+
+    def called(self, name: str) -> str:
+        """How a person knows the setting `name` in this source: ``--spike-mass``, or ``spike_mass`` in a file."""
+        return option(name) if self.source is None else f"{self.source}: {name}"
+
+
+def option(name: str) -> str:
+    """The command-line option of the setting `name`."""
+    return "--" + name.replace("_", "-")
+
+
+def nearest(word: str, words: Iterable[str]) -> str:
+    """``; did you mean 'x'?`` for the word most like `word`, or where none is like it, all there are."""
+    words = list(words)
+    close = get_close_matches(word, words, n=1) or get_close_matches(word.replace("-", "_").lower(), words, n=1)
+    return f"did you mean {close[0]!r}?" if close else f"there is {', '.join(words)}"
+
+
+def find_case(given: Path, shipped: Path) -> Path:
+    """The case file that `given` means: a path, or the name of one in the folder `shipped`.
+
+    Raises ValueError naming those that ship and are spelt like it, or where none is, those of the folder itself.
+    """
+    if given.is_file():
+        return given
+    if given.parent == Path():
+        for named in (shipped / f"{given}.toml", *sorted(shipped.glob(f"*/{given.name}.toml"))):
+            if named.is_file():
+                return named
+    names = sorted(path.stem for path in shipped.glob("*.toml"))
+    below = sorted(path.stem for path in shipped.glob("*/*.toml"))
+    if close := get_close_matches(given.name.removesuffix(".toml"), [*names, *below], n=_NEAR):
+        also = f"; cases of names near it that ship are {', '.join(close)}"
+    else:
+        also = f"; the cases that ship are {', '.join(names)}" if names else ""
+        also += f", and {len(below)} that `hedgebed experiments list` names" if below else ""
+    raise ValueError(f"case = {str(given)!r} is no file: give the path of a TOML file{also}")
+
+
+def read_case(path: Path) -> Layer:
+    """The settings in the TOML file `path`: a flat table, or the ``[settings]`` of a run folder's run.toml.
+
+    Raises ValueError if it cannot be read or is not TOML.
+    """
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ValueError(f"case = {str(path)!r} cannot be read: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"case = {str(path)!r} is not TOML: {error}") from None
+    if table.get("format") == RUN_FORMAT and isinstance(table.get("settings"), dict):
+        table = settings_in(table)
+    return Layer(str(path), table)
+
+
+def settings_from(settings_class: type[BaseModel], layers: Iterable[Layer]) -> BaseModel:
+    """The settings that the `layers` give, later ones over earlier ones, over the defaults.
+
+    Raises ValueError, one sentence a line, for a name there is not (with the nearest there is) and for a value that
+    will not do (with what would). TOML has no null: "none" unsets a setting that need not be set.
+    """
+    names = list(settings_class.model_fields)
+    faults = []
+    merged: dict[str, Any] = {}
+    origin: dict[str, Layer] = {}
+    for layer in layers:
+        for name, value in layer.values.items():
+            if name not in names:
+                faults.append(f"{layer.called(name)} = {value!r} is no setting; {nearest(name, names)}")
+            else:
+                merged[name] = _unset(settings_class, name) if value == "none" else value
+                origin[name] = layer
+    if faults:
+        raise ValueError("\n".join(faults))
+    try:
+        return settings_class(**merged)
+    except ValidationError as error:
+        sentences = [_sentence(settings_class, detail, origin) for detail in error.errors() if not _follows(detail)]
+        raise ValueError("\n".join(dict.fromkeys(sentences))) from None
+
+
+def _unset(settings_class: type[BaseModel], name: str) -> Any:
+    """What "none" means for the setting `name`: None, a list of nothing, or where it must be set, the word itself."""
+    described = settings_class.model_fields[name]
+    if type(None) in get_args(described.annotation):
+        return None
+    return () if may_be_empty(described) else "none"
+
+
+def _follows(detail: ErrorDetails) -> bool:
+    """Whether a fault is but the echo of another: a list too short because one of its values would not do."""
+    return detail["type"] == "too_short" and len(detail["input"]) >= detail["ctx"]["min_length"]
+
+
+def _sentence(settings_class: type[BaseModel], detail: ErrorDetails, origin: Mapping[str, Layer]) -> str:
+    """One fault that pydantic found, as a sentence."""
+    message = detail["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
+    location = detail["loc"]
+    if not location:
+        return message  # a check of several settings together: its text names them
+    name = str(location[0])
+    called = origin[name].called(name) if name in origin else name
+    inside = "".join(f"[{part}]" for part in location[1:] if isinstance(part, int))
+    described = settings_class.model_fields[name].description if name in settings_class.model_fields else None
+    if detail["type"] == "missing":
+        said = f"{option(name)} must be given"
+    elif detail["type"] == "too_short" and not detail["input"]:
+        said = f"{called} is empty: give at least one"
+    else:
+        said = f"{called}{inside} = {detail['input']!r} will not do: {message[:1].lower() + message[1:]}"
+    return f"{said} ({described.strip().rstrip('.')})" if described else said

@@ -1,0 +1,141 @@
+"""A platform in space on a bed of grains; what a run in the plane does alike is in `experiments.grains.on_bed`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from coupling import BedGround, SpatialRun, spatial_members
+from coupling.members import Member
+from dem import Bed
+from experiments.grains.on_bed import MARGIN, TOUCH, Forecast, PlatformOnBed
+from experiments.grains.softening import PUSHED, Softening
+from experiments.platform.lengths import check_lengths
+from experiments.runs.folder import RunFolder
+from experiments.runs.progress import Progress
+from experiments.runs.types import Json
+from rigid.spatial.quaternions import to_matrix
+
+from .frames import SpatialFrames
+from .on_law import feet_count, run_on_law, start_of
+from .result import conclude
+from .sentences import say
+from .settings import SpatialSettings
+from .trial import SpatialPlan
+
+__all__ = ["SpatialForecast", "SpatialOnBed"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpatialForecast(Forecast):
+    """What the same trial on the spring-damper says of the bed."""
+
+    run: SpatialRun
+    low: tuple[float, float]
+    high: tuple[float, float]
+    """Corners of where tips come down, x and y from the start [m]."""
+
+
+class SpatialOnBed(PlatformOnBed[SpatialSettings, SpatialRun, SpatialForecast]):
+    """A platform in space on a bed."""
+
+    def __init__(self, settings: SpatialSettings, plan: SpatialPlan) -> None:
+        self.settings, self.plan, self.trial = settings, plan, plan.trial
+        self.platform = platform = plan.trial.platform
+        self.duration, self.surface = settings.duration, plan.surface
+        self.weight = float(np.linalg.norm(plan.trial.weight))
+        self.gravity = -float(plan.trial.weight[2]) / platform.mass
+        self.counterweight = plan.trial.counterweight
+        self.spike_diameter, self.reach = 2 * platform.tip_radius, platform.reach
+
+    @cached_property
+    def forecast(self) -> SpatialForecast:
+        """The same trial on the spring-damper."""
+        run = run_on_law(self.settings, self.plan)
+        rows = run.run()
+        tips = self.platform.tips - self.platform.centre_of_mass
+        centre = np.column_stack([rows[name] for name in "xyz"])
+        turns = np.array([to_matrix(turn) for turn in np.column_stack([rows[f"q{k}"] for k in range(4)])])
+        arms = np.einsum("nij,tj->nti", turns, tips)
+        places = centre[:, None] + arms
+        spins = np.column_stack([rows[name] for name in ("wx", "wy", "wz")])
+        speeds = np.column_stack([rows[name] for name in ("vx", "vy", "vz")])[:, None] + np.cross(spins[:, None], arms)
+        near = places[..., 2] < self.platform.tip_radius
+        if not near.any():  # it never comes down
+            near = places[..., 2] <= places[..., 2].min() + 1e-12
+        low, high = places[near].min(axis=0), places[near].max(axis=0)
+        return SpatialForecast(
+            run=run, low=(float(low[0]), float(low[1])), high=(float(high[0]), float(high[1])),
+            deepest=max(float(-places[..., 2].min()), 0.0),
+            fastest=float(np.linalg.norm(speeds[near], axis=1).max()), rise=float(rows["z"].max() - rows["z"][0]),
+        )  # fmt: skip
+
+    def check(self) -> None:
+        """Raise ValueError, naming key, value and what would do, for a bed that does not suit this trial."""
+        check_lengths(self.settings, self.platform.stance().spike_length)
+        try:
+            super().check()
+        except RuntimeError as error:
+            raise ValueError(say("forecast_fails", error=error)) from error
+
+    def check_extent(self) -> None:
+        """Raise ValueError for a bed too short along x or y for the forecast."""
+        margin, s, forecast = MARGIN * self.spike_diameter, self.settings, self.forecast
+        for axis, (name, low, high) in enumerate(zip("xy", forecast.low, forecast.high, strict=True)):
+            need = high - low + 2 * margin
+            if s.bed_size[axis] < need:
+                wanted = math.ceil(100 * need) / 100
+                raise ValueError(
+                    say("too_short", s=s, size=s.bed_size[axis], name=name, low=low, high=high, margin=margin,
+                        wanted=wanted)
+                )  # fmt: skip
+
+    @property
+    def pressure(self) -> float:
+        """Of the weight, in flight of what the torque presses with too, under one of the spikes that carry [Pa]."""
+        load = self.weight / feet_count(self.plan)
+        if self.counterweight == 0:
+            pushed = PUSHED[self.settings.actuator] * self.plan.numbers["stiffness"].value * self.forecast.deepest
+            load = max(load, pushed)
+        return load / (math.pi * self.platform.tip_radius**2)
+
+    @property
+    def lowering_speed(self) -> float | None:
+        """Of the placement, where there is one [m/s]."""
+        if not self.settings.placed:
+            return None
+        return self.settings.lowering_speed or math.sqrt(self.grain_gravity * self.settings.grain)
+
+    def members(self) -> list[Member]:
+        """All spikes and the ball inside the hull."""
+        return spatial_members(self.platform)
+
+    def ground(self, bed: Bed) -> BedGround:
+        """All of the platform on the bed, which is periodic along both sides."""
+        low, high, s = self.forecast.low, self.forecast.high, self.settings
+        x, y = (0.5 * (bed.size[k] - low[k] - high[k]) for k in range(2))
+        return BedGround(
+            bed, self.members(), origin=(x, y), bounded_across=True, touch=TOUCH * self.weight,
+            friction=s.spike_friction, restitution=s.spike_restitution,
+        )  # fmt: skip
+
+    def run_on(self, ground: BedGround) -> SpatialRun:
+        """Set down or let fall."""
+        return SpatialRun(self.trial, ground, **self.stepping(), **start_of(self.settings, self.platform))
+
+    def announce(self, progress: Progress) -> None:
+        """Every default, and the warnings."""
+        for sentence in self.plan.announcement():
+            progress.message(sentence)
+
+    def frames(self, run: SpatialRun, folder: Path, resumed: bool) -> SpatialFrames | None:
+        """Of all of the platform."""
+        return SpatialFrames(self.settings, run, folder, resumed=resumed) if self.settings.frame_count else None
+
+    def conclude(self, run: SpatialRun, softening: Softening, folder: RunFolder) -> Json:
+        """The result, its series written."""
+        return conclude(self.settings, self.plan, run, self.forecast.run, softening, folder.path)

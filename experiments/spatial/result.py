@@ -1,0 +1,263 @@
+"""What comes of a platform in space: its series and its result."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from coupling import BedGround, SpatialRun
+from dem.prepare.prepare import fingerprint
+from experiments.grains.bed_result import (
+    bed_numbers,
+    bed_warnings,
+    overlap_warning,
+    residual_warning,
+    reversal_warning,
+    unsettled_warning,
+    write_bed_series,
+)
+from experiments.grains.softening import Softening
+from experiments.runs.folder import write_series
+from experiments.runs.types import Json
+from experiments.runs.version import __version__
+from experiments.tumble.words import way_through
+from rigid.spatial.quaternions import to_matrix
+
+from .sentences import say
+from .settings import SpatialSettings
+from .trial import SpatialPlan
+
+__all__ = ["conclude", "sinkage_start", "write_series_of"]
+
+APART = 5e-3
+"""For how long nothing must touch that it counts as a hop [s]: sand that is only grazed lets go and takes hold."""
+SLOW = 2e-3
+"""Centre and tips of what has settled are slower [m/s]."""
+UNITS = {
+    "time": "t_s", "vx": "vx_m_s", "vy": "vy_m_s", "vz": "vz_m_s", "wx": "wx_rad_s", "wy": "wy_rad_s",
+    "wz": "wz_rad_s", "wheel_x": "wheel_x_rad_s", "wheel_y": "wheel_y_rad_s", "wheel_z": "wheel_z_rad_s",
+    "kinetic_energy": "kinetic_J", "potential_energy": "potential_J", "torque_work": "torque_work_J",
+    "stored_energy": "stored_J", "energy": "energy_J", "dissipated": "dissipated_J",
+    "given": "given_J", "taken": "taken_J", "fx": "fx_N", "fy": "fy_N", "fz": "fz_N", "sinkage": "sinkage_m",
+    "x": "x_m", "y": "y_m", "z": "z_m",
+}  # fmt: skip
+OF_THE_PATH = ("time", "x", "y", "z", "q0", "q1", "q2", "q3", "vx", "vy", "vz", "wx", "wy", "wz", "touching")
+FEET = ("normal", "N"), ("along_x", "N"), ("along_y", "N"), ("slip_x", "m_s"), ("slip_y", "m_s"), ("sinkage", "m")
+"""Of each spike in series/feet.csv, as `SpatialRun.feet` has them."""
+
+
+def write_series_of(folder: Path, run: SpatialRun) -> None:
+    """trajectory.csv and the series of a run, as far as it has come."""
+    (folder / "series").mkdir(exist_ok=True)
+    write_series(folder / "trajectory.csv", path_columns(run))
+    rows = run.columns
+    stored = run.stored_by_row
+    rows |= {"stored_energy": stored, "energy": rows["kinetic_energy"] + rows["potential_energy"] + stored}
+    rows["dissipated"] = run.dissipated_by_row
+    rest = {UNITS.get(name, name): values for name, values in rows.items() if name not in OF_THE_PATH[1:]}
+    write_series(folder / "series" / "motion.csv", rest)
+    write_series(folder / "series" / "feet.csv", feet_columns(run))
+    if isinstance(run.ground, BedGround):
+        write_bed_series(folder, run)
+
+
+def sinkage_start(run: SpatialRun) -> float:
+    """Depth of the deepest spike when time begins [m]."""
+    return float(run.columns["sinkage"][0])
+
+
+def path_columns(run: SpatialRun) -> Json:
+    """The columns of trajectory.csv."""
+    rows = run.columns
+    path = {UNITS.get(name, name): rows[name] for name in OF_THE_PATH}
+    return path | {"turn_rad": run.turned, "state": np.array(run.states)}
+
+
+def feet_columns(run: SpatialRun) -> Json:
+    """The columns of series/feet.csv: force, slip and depth of the spikes that came down, and of the hull if it did.
+
+    Those that never did are left out; so are the hull's depth, which no footing tells, and friction on a law, which
+    says only how large it may be.
+    """
+    columns: Json = {"t_s": run.columns["time"]}
+    feet, hull = run.feet, len(run.trial.platform.tips)
+    for spike in np.flatnonzero(feet.any(axis=(0, 1))):
+        name = "hull" if spike == hull else str(spike)
+        for k, (what, unit) in enumerate(FEET):
+            told = name != "hull" if what == "sinkage" else run.ground.gives_friction or not what.startswith("along")
+            if told:
+                columns[f"{what}_{name}_{unit}"] = feet[:, k, spike]
+    return columns
+
+
+def conclude(
+    settings: SpatialSettings,
+    plan: SpatialPlan,
+    run: SpatialRun,
+    beside: SpatialRun | None,
+    softening: Softening | None,
+    folder: Path,
+) -> Json:
+    """The result, its series written. `beside`: the trial on the spring-damper, where the run is on grains."""
+    write_series_of(folder, run)
+    numbers, trial = quantities_of(run), plan.trial
+    where, what = "rig" if trial.counterweight > 0 else "free", "bed of " if settings.ground == "bed" else ""
+    title = say("title", plan=plan, what=what, where=where, gravity=plan.numbers["gravity_sim"].value)
+    said = [residual_warning(run.energy_residual), unsettled_warning(run.master)]
+    warnings = [*plan.warnings, *(warning for warning in said if warning)]
+    result: Json = {
+        "format": "hedgebed-result/1", "experiment": "tumble spatial", "version": __version__,
+        "title": title, "status": "done",
+        "quantities": numbers, "departures": {"sentences": _sentences(run)},
+        "trial": {
+            name: {"value": number.value, "unit": number.unit, "origin": number.origin}
+            for name, number in plan.numbers.items()
+        } | {"weight": {"value": float(np.linalg.norm(trial.weight)), "unit": "N", "origin": "(m + m_b) g_sim"}},
+        "surface": plan.surface, "ground": settings.ground, "actuator": settings.actuator,
+        "duration": settings.duration, "spike_count": len(trial.platform.tips),
+        "transitions": passages(run), "warnings": warnings,
+        "macro_step": run.master.macro_step, "steps": run.master.count,
+        "lowering_time": run.placing_steps * run.master.macro_step,
+    }  # fmt: skip
+    if softening is not None and beside is not None:
+        write_series(folder / "series" / "spring-damper.csv", path_columns(beside))
+        _add_grains(result, settings, plan, run, beside, softening)
+    return result
+
+
+def passages(run: SpatialRun) -> list[Json]:
+    """The changes of state, as result.json holds them: `turn` is the angle of the one turn from the start."""
+    return [{"time": time, "state": state, "turn": turn} for time, state, turn in run.transitions]
+
+
+def quantities_of(run: SpatialRun) -> dict[str, Json]:
+    """The numbers that every run in space has, as result.json holds them; a value is null where there is none."""
+    rows = run.columns
+    place = np.column_stack([rows[name] for name in "xyz"])
+    way = place[-1] - place[0]
+    speed = np.linalg.norm([rows[name] for name in ("vx", "vy", "vz")], axis=0)
+    spin = np.linalg.norm([rows[name] for name in ("wx", "wy", "wz")], axis=0)
+    turns = np.column_stack([rows[f"q{k}"] for k in range(4)])
+    force = np.linalg.norm([rows[name] for name in ("fx", "fy", "fz")], axis=0)
+    up = float(to_matrix(turns[-1])[2, 2])
+    gap = rows["given"] - rows["taken"]
+    bed = isinstance(run.ground, BedGround)
+    found: dict[str, tuple[float | None, str, str]] = {
+        "displacement_x": (float(way[0]), "m", say("displacement")),
+        "displacement_y": (float(way[1]), "m", "likewise"),
+        "displacement_z": (float(way[2]), "m", "likewise, upwards"),
+        "max_speed": (float(speed.max()), "m/s", "of the centre of mass"),
+        "max_angular_velocity": (float(spin.max()), "rad/s", ""),
+        "largest_turn": (float(run.turned.max()), "rad", say("largest_turn")),
+        "tilt_end": (math.acos(min(1.0, max(-1.0, up))), "rad", say("tilt")),
+        **_landing(run),
+        **_first_entries(run),
+        "sinkage_start": (float(rows["sinkage"][0]), "m", "of the deepest spike when time begins"),
+        "sinkage_largest": (float(rows["sinkage"].max()), "m", "of any spike"),
+        "largest_spike_force": (float(run.feet[:, 0].max()), "N", say("spike_force")),
+        "largest_force": (float(force.max()), "N", say("whole_force")),
+        "energy_residual": (run.energy_residual, "1", say("residual")),
+        "coupling_residual": (float(np.abs(run.balance).max()) / run.energy_scale, "1", say("coupling")),
+        "exchange_residual": (float(np.abs(gap - gap[0]).max()) / run.energy_scale, "1", say("exchange")),
+    }
+    if bed:
+        errors = run.samples
+        found["dissipation_reversal"] = (run.dissipation_reversal, "1", say("reversal"))
+        found["momentum_residual"] = (float(errors["momentum_error"].max()), "N s", say("momentum"))
+        angular = float(errors["angular_momentum_error"].max())
+        found["angular_momentum_residual"] = (angular, "N m s", say("angular_momentum"))
+        for name, values in run.losses.items():
+            found[f"dissipated_{name}"] = (float(values[-1]), "J", say("by_grains"))
+    return {
+        name: {"value": value, "std": None, "unit": unit} | ({"note": note} if note else {})
+        for name, (value, unit, note) in found.items()
+    }
+
+
+def _first_entries(run: SpatialRun) -> dict[str, tuple[float | None, str, str]]:
+    """When and how far turned it first slips and hops, by its states; what starts in flight has not hopped yet."""
+    found: dict[str, tuple[float | None, str, str]] = {}
+    for state, way in (("slip", run.transitions), ("hop", run.transitions[1:])):
+        time, turn = next(((time, turn) for time, name, turn in way if name == state), (None, None))
+        found[f"transition_time_{state}"] = (time, "s", say("first_entry"))
+        found[f"transition_angle_{state}"] = (turn, "rad", say("turn_there"))
+    return found
+
+
+def _landing(run: SpatialRun) -> dict[str, tuple[float | None, str, str]]:
+    """When it first touches, leaves and comes to rest, and with which speeds."""
+    rows, step = run.columns, run.master.macro_step
+    free = rows["touching"] == 0
+    touched = int(np.argmin(free)) if not free.all() else None
+    left, came, share = None, None, None
+    if touched is not None:
+        came = max(float(-rows["vz"][touched]), 0.0) if touched else None
+        lasting = max(1, round(APART / step))
+        run_length = 0
+        for k in range(touched, len(free)):
+            run_length = run_length + 1 if free[k] else 0
+            if run_length == lasting:
+                left = k - lasting + 1
+                break
+        if left is not None and came and rows["vz"][left] > 0:
+            share = float(rows["vz"][left]) / came
+    speed = np.linalg.norm([rows[name] for name in ("vx", "vy", "vz")], axis=0)
+    spin = np.linalg.norm([rows[name] for name in ("wx", "wy", "wz")], axis=0)
+    moving = np.flatnonzero(np.maximum(speed, spin * run.trial.platform.reach) > SLOW)
+    if not len(moving):
+        settled: float | None = 0.0
+    else:
+        settled = None if moving[-1] == len(speed) - 1 else float(rows["time"][moving[-1] + 1])
+    return {
+        "first_touch": (None if touched is None else float(rows["time"][touched]), "s", say("first_touch")),
+        "impact_speed": (came, "m/s", say("impact")),
+        "first_hop": (None if left is None else float(rows["time"][left]), "s", say("first_hop", apart=1e3 * APART)),
+        "restitution": (share, "1", say("restitution")),
+        "settling_time": (settled, "s", say("settling")),
+    }
+
+
+def _sentences(run: SpatialRun) -> list[str]:
+    """What happened, in words."""
+    rows = run.columns
+    said = []
+    if run.placing_steps:
+        held = run.placing_steps * run.master.macro_step
+        said.append(say("placed", held=held, depth=1e3 * rows["sinkage"][0]))
+    landing = _landing(run)
+    touch, hop, rest = (landing[name][0] for name in ("first_touch", "first_hop", "settling_time"))
+    if touch is None:
+        said.append(say("touches_nothing"))
+    elif touch > 0:
+        said.append(say("comes_down", touch=touch, speed=landing["impact_speed"][0]))
+    said.append(way_through(run.transitions))
+    if hop is not None:
+        said.append(say("lets_go", hop=hop))
+    if rest:
+        said.append(say("at_rest", rest=rest))
+    return said
+
+
+def _add_grains(
+    result: Json,
+    settings: SpatialSettings,
+    plan: SpatialPlan,
+    run: SpatialRun,
+    beside: SpatialRun,
+    softening: Softening,
+) -> None:
+    """What a run on grains has beyond: the bed's numbers, warnings, the spring-damper's beside."""
+    assert isinstance(run.ground, BedGround)
+    bed, platform = run.ground.bed, plan.trial.platform
+    result["code"] = fingerprint()
+    result["grains"] = bed_numbers(settings, run, bed, softening, in_rig=plan.trial.counterweight > 0) | {
+        "origin": [float(number) for number in run.ground.origin], "beside": quantities_of(beside),
+        "beside_transitions": passages(beside),
+    }  # fmt: skip
+    warnings = [
+        reversal_warning(run.dissipation_reversal), overlap_warning(bed, softening, settings.max_overlap),
+        *bed_warnings(bed, plan.surface, across=2 * platform.tip_radius / settings.grain), say("one_bed"),
+    ]  # fmt: skip
+    result["warnings"] += [warning for warning in warnings if warning]

@@ -1,0 +1,139 @@
+"""`hedgebed experiments list`, `run` and `sinking`: the platform's experiments on grains, as named cases that ship."""
+
+from __future__ import annotations
+
+import json as json_module
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import App, Parameter
+from rich.console import Console
+from rich.table import Table
+
+from experiments.runs.progress import duration
+from experiments.runs.streams import refusing, say, stdout_to_stderr
+from experiments.runs.types import Json
+from experiments.suite.cases import EXPERIMENTS, LONGEST, Case, cases, do_case, estimate, standing
+from experiments.tumble.footfalls import Footfall, sinking_over
+
+__all__ = ["add_suite_commands"]
+
+RESULTS, WORK = Path("docs/results"), Path("runs/experiments")
+_Names = Annotated[tuple[str, ...], Parameter(help="Only these cases, or those whose names begin so.", negative="")]
+_Results = Annotated[Path, Parameter(help="Where results are kept, a folder a case.", negative="")]
+_Work = Annotated[Path, Parameter(help="Where cases run, a run folder each.", negative="")]
+
+
+def add_suite_commands(home: App) -> None:
+    """Add the commands to ``hedgebed experiments``."""
+    home.command(_list, name="list")
+    home.command(_run, name="run")
+    home.command(_sinking, name="sinking")
+
+
+def _list(
+    names: _Names = (),
+    /,
+    *,
+    results: _Results = RESULTS,
+    work: _Work = WORK,
+    json: Annotated[bool, Parameter(help="Print it as JSON on stdout and nothing else.", negative="")] = False,
+) -> int:
+    """List the cases: what each costs on two quiet cores by an estimate, and whether it has a result."""
+    with refusing(), stdout_to_stderr():
+        rows = [_row(case, results, work) for case in cases(names)]
+    if json:
+        print(json_module.dumps(rows, indent=2))
+        return 0
+    console = Console(file=sys.stdout, highlight=False)
+    for number, title in EXPERIMENTS.items():
+        own = [row for row in rows if row["experiment"] == number]
+        if not own:
+            continue
+        console.print(f"{number}  {title}", markup=False, style="italic")
+        table = Table(box=None, pad_edge=False)
+        for heading in ("case", "standing", "grains", "bed", "run"):
+            table.add_column(heading, justify="left" if heading in ("case", "standing") else "right", no_wrap=True)
+        for row in own:
+            table.add_row(row["case"], row["standing"], *row["words"])
+        console.print(table, markup=False)
+        for sentence in dict.fromkeys(row["why"] for row in own if row["why"]):
+            console.print(f"- {sentence}", markup=False)
+    return 0
+
+
+def _row(case: Case, results: Path, work: Path) -> Json:
+    found, (stands, why) = estimate(case), standing(case, results, work)
+    row: Json = {"case": case.name, "experiment": case.experiment, "standing": stands, "why": why}
+    if isinstance(found, str):
+        return row | {"standing": "done" if stands == "done" else "not yet", "why": found, "words": ["", "", ""]}
+    if stands == "to do" and found.seconds > LONGEST:
+        row |= {
+            "standing": "too long",
+            "why": "too long: more than an hour by its estimate; done only where it is named",
+        }
+    numbers = {
+        "grains": round(found.grains), "time_step": found.time_step, "grain_steps": found.grain_steps,
+        "bed_seconds": found.bed_seconds, "run_seconds": found.run_seconds,
+    }  # fmt: skip
+    return (
+        row
+        | numbers
+        | {"words": [f"{round(found.grains, -2):,.0f}", duration(found.bed_seconds), duration(found.run_seconds)]}
+    )
+
+
+def _run(names: _Names = (), /, *, results: _Results = RESULTS, work: _Work = WORK) -> int:
+    """Do the cases that have no result yet, one by one; a stopped one is gone on with, beds come from the cache.
+
+    What would take more than an hour by its estimate, or cannot be run yet, is left out unless it is named in full.
+    """
+    with refusing(), stdout_to_stderr():
+        chosen = [(case, _row(case, results, work)) for case in cases(names)]
+    failed = []
+    for case, row in chosen:
+        if row["standing"] in ("done", "not yet") or (row["standing"] == "too long" and case.name not in names):
+            say(f"{case.name}: {row['standing']}{': ' + row['why'] if row['standing'] == 'not yet' else ''}")
+            continue
+        if row["standing"] == "failed" and case.name not in names:
+            say(f"{case.name}: failed before ({row['why']}); named in full it is gone on with")
+            failed.append(case.name)
+            continue
+        status = do_case(case, results, work, say=say)
+        if status == 3:
+            say("stopped; the same command goes on")
+            return 3
+        if status:
+            failed.append(case.name)
+    if failed:
+        say(f"without a result: {', '.join(failed)}")
+    return 1 if failed else 0
+
+
+def _sinking(names: _Names = (), /, *, results: _Results = RESULTS) -> int:
+    """Say of several tumbles in a row, over the beds whose results are kept, whether the platform goes on sinking.
+
+    Cases that differ only in the seed of their bed are one group, and each group has its verdict.
+    """
+    groups: dict[str, dict[str, list[Footfall]]] = {}
+    with refusing(), stdout_to_stderr():
+        for case in cases(names):
+            kept = results / case.name / "result.json"
+            if not kept.exists():
+                continue
+            falls = json_module.loads(kept.read_text(encoding="utf-8")).get("footfalls")
+            if falls:
+                group = case.name.removesuffix(f"-seed{case.settings.seed}")
+                groups.setdefault(group, {})[case.name] = [Footfall(**fall) for fall in falls]
+    for group, beds in groups.items():
+        for name, falls in beds.items():
+            depths = " ".join(f"{1e3 * fall.deepest:.1f}{'' if fall.counts else '*'}" for fall in falls)
+            print(f"{name}: {depths} mm")
+        found = sinking_over(list(beds.values()))
+        print(f"{group}: {found.verdict if found else 'too few rows came down to tell'}")
+    if not groups:
+        say(f"no case of several tumbles has a result in {results}: `hedgebed experiments run grains3` makes them")
+        return 1
+    print("* set down by the hand, or still going down at the end: left out of the fit")
+    return 0

@@ -1,0 +1,163 @@
+"""`hedgebed tumble`: one trial of a platform that a flywheel turns over, on any ground.
+
+`ground` and `method` decide here, in one place, who computes it: a bed of grains (`on_grains`), the coupling's master
+on the spring-damper (`coupled`), or the planar model, for which a sweep and a campaign may follow. The folder holds
+trajectory.csv, series/motion.csv (accelerations, wheel, energies), result.json, figures and a report.
+"""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from experiments.campaign.files import read_model
+from experiments.platform.kept_platform import keep_platform
+from experiments.platform.numbers import PlatformNumbers, platform_numbers, torque_within_limit
+from experiments.runs.folder import RunFolder, write_series
+from experiments.runs.progress import Progress
+from experiments.runs.reporting import write_report
+from experiments.runs.types import Json
+from experiments.runs.whole_runs import whole_run
+from rigid.planar.simulate import PAPER_STEP, check_step, simulate
+from rigid.planar.trajectory import Trajectory
+
+from .result import motion_columns, result_of, trajectory_columns
+from .settings import TumbleSettings
+from .sweep import check_sweep, middle_of_sweep, run_sweep
+from .synthesis import check_tumble_campaign, write_tumble_campaign
+from .trial import TumblePlan, plan_tumble
+
+__all__ = ["check", "resume", "run"]
+
+MODEL_COPY = "model.toml"
+"""The model that was run, in the run's folder; effects of one's own lie beside it."""
+
+
+@dataclass(frozen=True)
+class _Computed:
+    """A trajectory, when the wheel comes to its limit [s], and what the result has beyond the planar model's."""
+
+    trajectory: Trajectory
+    full: float | None
+    quantities: Json = field(default_factory=dict)
+    more: Json = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+
+# The ground ----------------------------------------------------------------------------------------------------------
+
+
+def check(settings: TumbleSettings) -> None:
+    """Raise ValueError, naming key, value and what would do, for what the settings class cannot see."""
+    if settings.ground == "bed":
+        from .on_grains import check_on_grains  # loads Taichi
+
+        check_on_grains(settings)
+        return
+    check_sweep(settings)
+    plan = plan_tumble(middle_of_sweep(settings))
+    check_tumble_campaign(settings)
+    if settings.method == "coupled":
+        from .coupled import check_coupled  # loads Taichi
+
+        check_coupled(settings, plan)
+    else:
+        _check_planar(settings, plan)
+
+
+def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> Json:
+    if settings.ground == "bed":
+        from .on_grains import tumble_on_grains  # loads Taichi
+
+        return tumble_on_grains(settings, folder, progress)
+    with folder.lock():
+        return _on_law(settings, folder, progress)
+
+
+def _compute(settings: TumbleSettings, plan: TumblePlan, folder: RunFolder, progress: Progress) -> _Computed:
+    if settings.method == "coupled":
+        from .coupled import compute_coupled  # loads Taichi
+
+        return _Computed(*compute_coupled(settings, plan, folder, progress))
+    return _Computed(*_integrate(settings, plan, duration=settings.duration))
+
+
+# The planar model ----------------------------------------------------------------------------------------------------
+
+
+def _check_planar(settings: TumbleSettings, plan: TumblePlan) -> None:
+    if settings.method == "paper":
+        try:
+            check_step(plan.trial, PAPER_STEP)
+        except ValueError as error:
+            raise ValueError(f"method = 'paper': {error}; method = 'located' would do") from None
+    _integrate(settings, plan, duration=1e-3)
+
+
+def _integrate(settings: TumbleSettings, plan: TumblePlan, *, duration: float) -> tuple[Trajectory, float | None]:
+    """The trajectory, and when the wheel comes to its limit [s], where it does."""
+    method: Literal["located", "paper"] = "paper" if settings.method == "paper" else "located"
+    trial, full = torque_within_limit(
+        plan.trial, max_wheel_speed=plan.max_wheel_speed, duration=duration, method=method
+    )
+    interval = min(settings.sample_interval, duration)
+    return simulate(trial, duration=duration, method=method, sample_interval=interval), full
+
+
+def _on_law(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> Json:
+    """A tumble on the spring-damper or another law, with its sweep and its campaign where they are asked for."""
+    copied = _keep_model(settings, folder)
+    platform = platform_numbers(settings.platform, file=keep_platform(settings.platform, folder.path, progress.message))
+    middle = middle_of_sweep(settings, model_file=copied, platform=platform)
+    plan = plan_tumble(middle, model_file=copied, platform=platform)
+    for sentence in (*plan.sentences(), *(f"warning: {warning}" for warning in plan.warnings)):
+        progress.message(sentence)
+    progress.stage("tumble", total=1.0)
+    computed = _compute(settings, plan, folder, progress)
+    progress.update(1.0)
+    write_series(folder.path / "trajectory.csv", trajectory_columns(computed.trajectory))
+    folder.write_series("motion", motion_columns(computed.trajectory))
+    result = result_of(settings, plan, computed.trajectory, computed.full)
+    result["quantities"] |= computed.quantities
+    result["warnings"] += computed.warnings
+    result |= computed.more
+    if settings.sweep:
+        progress.message("the numbers above are those of one trial of the sweep, in its middle or nearest to it")
+        progress.stage("sweep")
+        _add_sweep(result, settings, folder, copied, platform)
+    made = write_tumble_campaign(settings, plan, folder.path, progress)
+    result |= {"campaign": made} if made is not None else {}
+    folder.write_result(result)
+    progress.stage("report", total=1.0)
+    write_report(folder.path, progress)
+    return result
+
+
+def _add_sweep(
+    result: Json, settings: TumbleSettings, folder: RunFolder, model: Path | None, platform: PlatformNumbers
+) -> None:
+    """Integrate the sweep and put what came out beside the trial in its middle."""
+    swept = run_sweep(settings, folder, model_file=model, platform=platform)
+    result["departures"]["sentences"] += swept["sweep"]["sentences"]
+    result["title"] += ", one trial of a sweep of " + " and ".join(settings.sweep)
+    result |= swept
+
+
+def _keep_model(settings: TumbleSettings, folder: RunFolder) -> Path | None:
+    """Copy the model and the files of its effects into the folder, once; return the copy."""
+    if settings.model is None:
+        return None
+    copy, source = folder.path / MODEL_COPY, Path(settings.model)
+    if not copy.exists():
+        for effect in read_model(source).effect:
+            if effect.file is not None:
+                target = folder.path / effect.file
+                target.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(source.parent / effect.file, target)
+        shutil.copyfile(source, copy)
+    return copy
+
+
+run, resume = whole_run("tumble", TumbleSettings, _carry_out, check=check)

@@ -1,0 +1,137 @@
+"""Rows of spikes that come down one after the other: how deep each goes, and whether the later ones go deeper."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from experiments.grains.spells import spells
+from experiments.runs.types import Json
+
+from .sentences import say
+
+__all__ = ["Footfall", "Sinking", "find_footfalls", "footfall_quantities", "footfall_table", "sinking_over"]
+
+GRAZE = 1e-3
+"""A row that goes less deep [m] has not come down."""
+
+
+@dataclass(frozen=True)
+class Footfall:
+    """One row of spikes, from where it touches to where it is out again: `time` [s], `deepest` [m], `load` [N].
+
+    `load` is the largest upward force on it (mean of one macro step); `set_down`: it was there when the record
+    began, placed; `open`: it was still going down when the record ended.
+    """
+
+    row: int
+    time: float
+    deepest: float
+    load: float
+    set_down: bool
+    open: bool
+
+    @property
+    def counts(self) -> bool:
+        """Whether it went in by itself and as deep as it goes."""
+        return not self.set_down and not self.open
+
+
+@dataclass(frozen=True)
+class Sinking:
+    """By how much each footfall goes deeper than the one before.
+
+    `slope` and its standard error `error` in m a footfall, `low` and `high` the 95 % interval; `depth` the mean [m],
+    `count` footfalls on `beds` beds.
+    """
+
+    slope: float
+    error: float
+    low: float
+    high: float
+    depth: float
+    count: int
+    beds: int
+
+    @property
+    def verdict(self) -> str:
+        """What that says, in a sentence."""
+        slope, error, low, high, depth = (1e3 * x for x in (self.slope, self.error, self.low, self.high, self.depth))
+        rate = say("sinking_rate", slope=slope, error=error, low=low, high=high)
+        of = say("sinking_of", count=self.count, beds=self.beds, s="s" if self.beds > 1 else "", depth=depth)
+        return say(
+            "sinking" if self.low > 0 else "less_deep" if self.high < 0 else "not_sinking", rate=rate, of=of
+        )  # fmt: skip
+
+
+def find_footfalls(
+    time: NDArray[np.float64], sinkage: NDArray[np.float64], load: NDArray[np.float64]
+) -> list[Footfall]:
+    """The rows that came down, in the order in which they touched.
+
+    time (n,) [s]; sinkage (n, rows) [m], 0 or less where a row is above the surface; load (n, rows) [N].
+    """
+    found = []
+    for row in range(sinkage.shape[1]):
+        for begin, end in spells(sinkage[:, row] > 0):
+            depth = sinkage[begin:end, row]
+            if depth.max() < GRAZE:
+                continue
+            still = bool(end == len(time) and depth.argmax() == len(depth) - 1)
+            most = float(load[begin:end, row].max())
+            found.append(Footfall(row, float(time[begin]), float(depth.max()), most, begin == 0, still))
+    return sorted(found, key=lambda fall: (fall.time, fall.row))
+
+
+def sinking_over(beds: Sequence[Sequence[Footfall]]) -> Sinking | None:
+    """Least squares over all beds: one slope, a mean depth for each bed. None where fewer than three are left.
+
+    What was placed and what was still going down at the end are left out. The interval is Student's, with
+    a degree of freedom less for the slope and for every bed.
+    """
+    slopes: list[NDArray[np.float64]] = []
+    depths: list[NDArray[np.float64]] = []
+    means = []
+    for falls in beds:
+        own = [(k, fall.deepest) for k, fall in enumerate(falls) if fall.counts]
+        if len(own) < 2:
+            continue
+        number, depth = np.array(own).T
+        slopes.append(number - number.mean())
+        depths.append(depth - depth.mean())
+        means.append(depth)
+    if not slopes:
+        return None
+    x, y = np.concatenate(slopes), np.concatenate(depths)
+    free = len(x) - len(slopes) - 1
+    if free < 1:
+        return None
+    slope = float(x @ y / (x @ x))
+    left = y - slope * x
+    error = float(np.sqrt(left @ left / free / (x @ x)))
+    half = float(student.ppf(0.975, free)) * error
+    return Sinking(slope, error, slope - half, slope + half, float(np.concatenate(means).mean()), len(x), len(slopes))
+
+
+def footfall_table(falls: Sequence[Footfall]) -> Json:
+    """The footfalls as a table of a result."""
+    rows = [
+        [
+            str(number), str(fall.row), f"{fall.time:.3f}", f"{1e3 * fall.deepest:.2f}", f"{fall.load:.2f}",
+            "set down by the hand" if fall.set_down else "still going down at the end" if fall.open else "",
+        ]
+        for number, fall in enumerate(falls)
+    ]  # fmt: skip
+    head = ["footfall", "row", "time [s]", "deepest [mm]", "largest load [N]", ""]
+    return {"title": "Rows that came down", "head": head, "rows": rows}
+
+
+def footfall_quantities(falls: Sequence[Footfall]) -> dict[str, Json]:
+    """`sinkage_per_footfall` of one bed, for a result; its value is None where too few rows came down."""
+    own = sinking_over([falls])
+    value, std = (own.slope, own.error) if own else (None, None)
+    return {"sinkage_per_footfall": {"value": value, "std": std, "unit": "m", "note": say("of_footfall")}}

@@ -1,0 +1,127 @@
+"""What is said of a tumble on grains before its bed is made: what was set, what follows from it, what it may lack."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from experiments.grains.softening import Softening
+from experiments.platform.numbers import torque_within_limit
+from experiments.runs.types import Json
+from rigid.planar.simulate import simulate
+from rigid.planar.trajectory import LAUNCH_DISTANCE, Trajectory
+
+from .sentences import say
+from .settings import TumbleSettings
+from .steppers import is_plain
+from .trial import TumblePlan
+
+__all__ = ["opening", "short_of_way"]
+
+LONGER = (2.0, 4.0, 8.0)
+"""Times the duration for which the spring-damper is followed until it is LAUNCH_DISTANCE away [1]."""
+STRONGER = (2.0, 4.0, 8.0)
+"""Times the wheel's speed, or the torque, of a brake that does not bring the platform that far [1]."""
+
+
+def opening(
+    settings: TumbleSettings, plan: TumblePlan, *, grains: float, softening: Softening, lowering_speed: float
+) -> list[str]:
+    """What was set and what follows from it; how many settings are at their defaults, and where those stand.
+
+    `grains`: about how many the bed will have; lowering_speed [m/s].
+    """
+    fields = TumbleSettings.model_fields
+    # A run that is taken up again has all of them set, by its run.toml.
+    given = [name for name, field in fields.items() if name in settings.model_fields_set
+             and getattr(settings, name) not in (None, (), field.get_default(call_default_factory=True))]  # fmt: skip
+    said = ["set: " + ", ".join(f"{name} = {_shown(settings, name)}" for name in given)]
+    numbers: dict[str, list[str]] = {}
+    told = {*given, "bed_size", "grain", "seed", "young", "duration", "lowering_speed"}
+    for name, number in plan.numbers.items():
+        if number.origin == "given" or number.origin.startswith("default"):
+            continue
+        told.add(name)
+        numbers.setdefault(number.origin, []).append(f"{name} = {number.value:.6g}{_unit(number.unit)}")
+    spikes = plan.spikes
+    for name, length in (("spike_diameter", spikes.diameter), ("spike_clear", spikes.clear)):
+        if name in spikes.of_platform:
+            told.add(name)
+            numbers.setdefault(f"platform {settings.platform}", []).append(f"{name} = {length:.6g} m")
+    said += [f"{listed[0]} ({origin})" if len(listed) == 1 else f"{origin}: {', '.join(listed)}"
+             for origin, listed in numbers.items()]  # fmt: skip
+    chosen = "as set" if settings.young is not None else f"from max_overlap = {settings.max_overlap:g}"
+    count, grain = round(grains, -2), 1e3 * settings.grain
+    return [
+        *said, say("the_bed", s=settings, grains=count, grain=grain, young=softening, chosen=chosen),
+        say("duration_and_lowering", s=settings, speed=lowering_speed), say("stiffness_beside"),
+        say("rest_at_default", count=sum(name not in told for name in fields)),
+    ]  # fmt: skip
+
+
+def short_of_way(settings: TumbleSettings, plan: TumblePlan, law: Trajectory) -> str | None:
+    """That a trajectory angle may not come of this duration, in words; None where `law`, the spring-damper's, has one.
+
+    A landing has none to speak of.
+    """
+    if settings.drop_speed is not None or law.trajectory_angle is not None:
+        return None
+    away = float(_away(law).max())
+    said = say("short_way", s=settings, away=1e3 * away, least=1e3 * LAUNCH_DISTANCE)
+    if not is_plain(settings):
+        return said
+    for times in LONGER:
+        duration = times * settings.duration
+        trial, _ = torque_within_limit(plan.trial, max_wheel_speed=plan.max_wheel_speed, duration=duration)
+        found = simulate(trial, duration=duration, sample_interval=min(1e-3, duration))
+        if found.trajectory_angle is not None:
+            when = float(found.time[int(np.argmax(_away(found) >= LAUNCH_DISTANCE))])
+            return said + say("longer_duration", when=math.ceil(100 * when) / 100)
+    longest = LONGER[-1] * settings.duration
+    stronger = _stronger_brake(plan, longest) if plan.trial.actuator == "brake" else say("larger_torque")
+    return said + say("nor_longer", longest=longest, stronger=stronger)
+
+
+def _stronger_brake(plan: TumblePlan, duration: float) -> str:
+    """What would bring it LAUNCH_DISTANCE away on the spring-damper, in words.
+
+    A brake gives J_w wheel_speed_0 and no more, however long it lasts, and may be too weak to tip it over: the wheel's
+    speed, within its limit, is tried alone, then the torque, then both.
+    """
+    trial = plan.trial
+    for times in STRONGER:
+        for names in (("wheel_speed_0",), ("torque",), ("wheel_speed_0", "torque")):
+            changed: Json = {name: float(f"{times * getattr(trial, name):.3g}") for name in names}
+            if changed.get("wheel_speed_0", 0.0) > plan.max_wheel_speed:
+                continue
+            found = simulate(replace(trial, **changed), duration=duration, sample_interval=min(1e-3, duration))
+            if found.trajectory_angle is not None:
+                units = {"wheel_speed_0": "rad/s", "torque": "N m"}
+                said = (f"{name} = {value:g} {units[name]}" for name, value in changed.items())
+                return say("in_that_time", changed=" with ".join(said))
+    return say("much_faster")
+
+
+def _away(trajectory: Trajectory) -> Any:
+    """Distance of the centre from its start [m], shape [n]."""
+    return np.hypot(trajectory.x - trajectory.x[0], trajectory.y - trajectory.y[0])
+
+
+def _shown(settings: TumbleSettings, name: str) -> str:
+    """A setting as one types it, and its unit as its description has it."""
+    value = getattr(settings, name)
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, tuple):
+        return " ".join(f"{part:g}" if isinstance(part, float) else str(part) for part in value)
+    unit = re.search(r"\[([A-Za-z][^\]]*)\]", TumbleSettings.model_fields[name].description or "")
+    number = f"{value:g}" if isinstance(value, float) else str(value)
+    return f"{number} {unit[1]}" if unit and isinstance(value, float) else number
+
+
+def _unit(unit: str) -> str:
+    return "" if unit == "1" else f" {unit}"

@@ -1,0 +1,145 @@
+"""Which stepper a tumble's settings ask for: one tumble, several in a row, or a landing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupling import CoupledTumble, Ground, Landing, Rest, TumblesInARow
+from experiments.runs.types import Json
+from rigid.model.trial import Trial
+
+from .footfalls import find_footfalls, footfall_quantities, footfall_table
+from .sentences import say
+from .settings import TumbleSettings
+
+__all__ = ["is_plain", "own_quantities", "own_warning", "stepper_of", "words"]
+
+
+def is_plain(settings: TumbleSettings) -> bool:
+    """Whether it is one tumble, from rest: what the planar model's own integrators do."""
+    return settings.tumbles == 1 and settings.drop_speed is None
+
+
+def stepper_of(settings: TumbleSettings, trial: Trial, ground: Ground, **options: Any) -> CoupledTumble:
+    """The stepper of `settings` on any ground; `options` as `CoupledTumble` has them."""
+    if settings.drop_speed is not None:
+        return Landing(
+            trial, ground, speed=settings.drop_speed, along=settings.drop_along, spin=settings.drop_spin,
+            theta=settings.drop_theta, **{key: value for key, value in options.items() if key != "lowering_speed"},
+        )  # fmt: skip
+    if settings.tumbles > 1:
+        return TumblesInARow(trial, ground, tumbles=settings.tumbles, turn=settings.tumble_turn, **options)
+    return CoupledTumble(trial, ground, **options)
+
+
+def words(settings: TumbleSettings, title: str) -> str:
+    """The title of a result, where it is no plain tumble."""
+    before, _, after = title.partition(":")
+    if settings.drop_speed is not None:
+        place = after.split(",")[-1].strip()
+        return f"{before.replace('A tumble', 'A landing')}: {settings.drop_speed:g} m/s down, {place}"
+    if settings.tumbles > 1:
+        return f"{before.replace('A tumble', f'{settings.tumbles} tumbles in a row')}:{after}"
+    return title
+
+
+def own_quantities(
+    run: CoupledTumble, sinkage: NDArray[np.float64], load: NDArray[np.float64]
+) -> tuple[dict[str, Json], Json]:
+    """What a row of tumbles or a landing adds to a result: quantities, and (of a row) its tables and footfalls.
+
+    sinkage [m] and load [N] of each row over the run, shape [step, row] both.
+    """
+    if isinstance(run, TumblesInARow):
+        quantities, rests = _row(run)
+        falls = find_footfalls(run.columns["time"], sinkage, load)
+        return quantities | footfall_quantities(falls), {
+            "tables": [rests, footfall_table(falls)], "footfalls": [asdict(fall) for fall in falls],
+        }  # fmt: skip
+    if isinstance(run, Landing):
+        return _landing(run), {}
+    return {}, {}
+
+
+def _quantity(value: float | None, unit: str, note: str) -> Json:
+    return {"value": value, "std": None if value is None else 0.0, "unit": unit, "note": note}
+
+
+def _row(run: TumblesInARow) -> tuple[dict[str, Json], Json]:
+    rests = run.rests
+    done = max(len(rests["time"]) - 1, 0)
+    slope = error = None
+    if done >= 2:  # the first rest is before any tumble: placed, not fallen
+        number, sinkage = np.arange(1, done + 1), rests["sinkage"][1:]
+        slope = float(np.polyfit(number, sinkage, 1)[0])
+    if done >= 3:
+        left = sinkage - np.polyval(np.polyfit(number, sinkage, 1), number)
+        error = float(np.sqrt((left @ left) / (done - 2) / ((number - number.mean()) ** 2).sum()))
+    noted = say("of_rest")
+    added = {
+        "tumbles_done": _quantity(float(run.ended), "1", say("of_done")),
+        "tumbles_at_rest": _quantity(float(rests["at_rest"][1:].sum()), "1", say("of_at_rest")),
+        "sinkage_per_tumble": _quantity(slope, "m", say("of_slope", noted=noted)) | {"std": error},
+        "sinkage_last": _quantity(
+            float(rests["sinkage"][-1]) if len(rests["sinkage"]) else None, "m",
+            say("of_last", noted=noted),
+        ),
+    }  # fmt: skip
+    head = ["after tumble", "time [s]", "rows", "x [mm]", "sinkage [mm]", "deepest [mm]", "at rest"]
+    shown = [
+        [
+            str(k), f"{rests['time'][k]:.3f}", f"{rests['rows_turned'][k]:.0f}", f"{1e3 * rests['x'][k]:.1f}",
+            f"{1e3 * rests['sinkage'][k]:.2f}", f"{1e3 * rests['deepest'][k]:.2f}",
+            "yes" if rests["at_rest"][k] else "no",
+        ]
+        for k in range(len(rests["time"]))
+    ]  # fmt: skip
+    return added, {"title": "Where it was after each tumble", "head": head, "rows": shown}
+
+
+def own_warning(run: CoupledTumble) -> str | None:
+    """Which tumbles of a row ended without the platform at rest, in words; None where there are none."""
+    if not isinstance(run, TumblesInARow):
+        return None
+    return _unrested(run.rests["at_rest"][1:].tolist(), ended=run.ended, asked=run.tumbles, rest=run.rest)
+
+
+def _unrested(at_rest: Sequence[float], *, ended: int, asked: int, rest: Rest) -> str | None:
+    moving = [str(k) for k, lay in enumerate(at_rest, start=1) if not lay]
+    said = []
+    if moving:
+        which, numbers = "tumble" if len(moving) == 1 else "tumbles", ", ".join(moving)
+        said.append(say("moving", which=which, numbers=numbers, rest=rest, speed=1e3 * rest.speed))
+    if ended > len(at_rest):
+        said.append(say("over_before", ended=ended))
+    if ended < asked:
+        said.append(say("of_asked", asked=asked, ended=ended))
+    return "; ".join(said) or None
+
+
+def _landing(run: Landing) -> dict[str, Json]:
+    rows, states = run.columns, run.states
+    touched = next((k for k, state in enumerate(states) if state != "hop"), None)
+    left = None
+    if touched is not None:
+        # Going up: sand that was only grazed is let go of on the way down too.
+        left = next((k for k in range(touched, len(states)) if states[k] == "hop" and rows["vy"][k] > 0), None)
+    came = float(-rows["vy"][touched]) if touched is not None else None
+    speed = np.maximum(np.hypot(rows["vx"], rows["vy"]), np.abs(rows["omega"]) * run.trial.spike_length)
+    slow = Rest.of(run.trial).speed
+    moving = np.flatnonzero(speed > slow)
+    settled = None if not len(moving) or moving[-1] == len(speed) - 1 else float(rows["time"][moving[-1] + 1])
+    share = None if left is None or not came else float(rows["vy"][left]) / came
+    energy = rows["kinetic_energy"]
+    kept = None if left is None or touched is None else float(energy[left] / energy[touched])
+    return {
+        "impact_speed": _quantity(came, "m/s", say("of_impact")),
+        "restitution": _quantity(share, "1", say("of_restitution")),
+        "energy_kept": _quantity(kept, "1", say("of_kept")),
+        "settling_time": _quantity(settled, "s", say("of_settling", slow=1e3 * slow)),
+    }

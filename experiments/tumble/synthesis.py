@@ -1,0 +1,337 @@
+"""`hedgebed campaign` and `hedgebed tumble --campaign`: trials that never were, with what is true of them beside what
+is said of them.
+
+DIR/campaign is a campaign as a laboratory would hand it over: stated numbers, uncertainties, noisy recordings.
+DIR/truth.toml is the model that made it: the true numbers, the terms beyond the base model, each trial's true gravity.
+A tumble's campaign goes where it is asked for, and the truth into the tumble's run folder.
+"""
+
+from __future__ import annotations
+
+import math
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.campaign import (
+    Campaign,
+    EffectTable,
+    Recording,
+    TumbleCampaign,
+    TumbleModel,
+    write_campaign,
+    write_model,
+)
+from experiments.campaign.tables import FORMAT, RigTable, TumbleSurface, TumbleTrial, TumbleUncertainty, WheelTable
+from experiments.campaign.target import check_target, place_campaign
+from experiments.platform.numbers import torque_within_limit
+from experiments.platform.surfaces import find_surface
+from experiments.runs.folder import RunFolder
+from experiments.runs.progress import Progress
+from experiments.runs.reporting import write_report
+from experiments.runs.types import Json
+from experiments.runs.version import __version__
+from experiments.runs.whole_runs import whole_run
+from experiments.tumble.settings import TrialSettings, TumbleSettings
+from experiments.tumble.trial import TumblePlan, plan_tumble, turns_of
+from rigid.model.trial import Effect, Trial
+from rigid.planar.simulate import simulate
+from rigid.sensors import Measured, Motion, SensorSet, measure, sensor_times
+
+from .campaign_settings import CampaignSettings
+from .campaign_tables import platform_table, sensor_set, sensor_tables, trial_table
+from .sentences import say
+
+__all__ = ["TRUTH", "check", "check_tumble_campaign", "record", "resume", "run", "write_tumble_campaign"]
+
+TRUTH = "truth.toml"
+"""What is true, in a run folder; never in the campaign's."""
+
+MOST_ROWS = 24
+"""Trials that the terminal shows."""
+
+MOTION = ("time", "x", "y", "theta", "vx", "vy", "omega", "wheel_speed", "ax", "ay")
+"""What sensors see of a trajectory."""
+_DRAWN = ("mass", "inertia", "stiffness", "damping", "mu_s", "mu_d")
+
+
+def check(settings: CampaignSettings) -> None:
+    """Raise ValueError, naming key, value and what would do, for what the settings class cannot see."""
+    conditions = _conditions(settings)
+    sensor_set(settings)
+    for number, condition in enumerate(conditions, 1):
+        for trial in (condition.plan.trial, _true_trial(settings, condition, number, _truth(settings, conditions))):
+            simulate(trial, duration=1e-3)  # that it can stand
+
+
+def record(
+    trial: Trial, *, duration: float, sensors: SensorSet, seed: int | tuple[int, ...] | None
+) -> tuple[Measured, Any]:
+    """Integrate `trial` and record it; the trajectory stands beside it.
+
+    The effects `clock-offset`, `camera-scale` and `slope` of the trial alter the sensors; g_loc is the rig's gravity in
+    the rig, gravity_sim without one.
+    """
+    clock, camera, slope = (trial.effect_values(name) for name in ("clock-offset", "camera-scale", "slope"))
+    sensors = replace(
+        sensors,
+        clock_offset=clock["offset"] if clock else sensors.clock_offset,
+        clock_drift=clock["drift"] if clock else sensors.clock_drift,
+        camera_scale=camera["scale"] if camera else sensors.camera_scale,
+        camera_bend=camera["bend"] if camera else sensors.camera_bend,
+    )
+    lean = slope["angle"] if slope else 0.0
+    trajectory = simulate(trial, duration=duration, times=sensor_times(sensors, duration))
+    motion = Motion(**{name: getattr(trajectory, name) for name in MOTION})
+    local = trial.gravity if trial.counterweight > 0 else trial.gravity_sim
+    measured = measure(motion, sensors, gravity_local=local, up=(math.sin(lean), math.cos(lean)), seed=seed)
+    return measured, trajectory
+
+
+@dataclass(frozen=True)
+class _Condition:
+    """One trial to be made: its id and its plan as stated."""
+
+    id: str
+    plan: TumblePlan
+
+
+def _conditions(settings: CampaignSettings) -> list[_Condition]:
+    """Every trial as stated, in the order of its id."""
+    shared = {name: getattr(settings, name) for name in TrialSettings.model_fields}
+    gravities = [{"gravity": value} for value in settings.gravity]
+    where = gravities or [{"rig": value} for value in settings.rig]
+    turns = turns_of(settings.motor_torques, settings.brake_torques, settings.brake_wheel_speed)
+    plans = [plan_tumble(TumbleSettings(**shared, **place, **turn)) for place in where for turn in turns]
+    plans = [replace(plan, trial=_within_limit(plan, settings.duration)) for plan in plans]
+    repeated = [plan for plan in plans for _ in range(settings.trials)]
+    width = max(3, len(str(len(repeated))))
+    return [_Condition(f"{number:0{width}d}", plan) for number, plan in enumerate(repeated, 1)]
+
+
+def _within_limit(plan: TumblePlan, duration: float) -> Trial:
+    """The trial with its torque ended where the wheel comes to its limit: the format knows none."""
+    return torque_within_limit(plan.trial, max_wheel_speed=plan.max_wheel_speed, duration=duration)[0]
+
+
+def _truth(settings: CampaignSettings, conditions: Sequence[_Condition]) -> Json:
+    """The true values of what all trials share, drawn within the stated uncertainties."""
+    stated = conditions[0].plan.trial
+    values: Json = {name: getattr(stated, name) for name in _DRAWN} | {"mu_d": stated.sliding_friction}
+    if settings.exact:
+        return values
+    stream = np.random.default_rng([settings.seed, 0])
+    for name in _DRAWN:
+        # Within three sigma, so that nothing that cannot be is drawn.
+        values[name] *= 1 + getattr(settings, f"sigma_{name}") * float(np.clip(stream.standard_normal(), -3, 3))
+    values["mu_d"] = min(values["mu_d"], values["mu_s"])
+    return values
+
+
+def _true_trial(settings: CampaignSettings, condition: _Condition, number: int, truth: Json) -> Trial:
+    """The trial as it truly is, its gravity drawn anew."""
+    gravity = condition.plan.trial.gravity_sim
+    if not settings.exact:
+        stream = np.random.default_rng([settings.seed, 1, number])
+        gravity *= 1 + settings.sigma_gravity_sim * float(np.clip(stream.standard_normal(), -3, 3))
+    return replace(condition.plan.trial, gravity_sim=gravity, **truth)
+
+
+def _carry_out(settings: CampaignSettings, folder: RunFolder, progress: Progress) -> Json:
+    conditions = _conditions(settings)
+    first = conditions[0].plan
+    with folder.lock():
+        for sentence in first.sentences():
+            progress.message(sentence)
+        made = _make(settings, conditions, progress)
+        target = folder.path / "campaign"
+        if target.exists():  # of a run that was stopped
+            shutil.rmtree(target)
+        write_campaign(target, made.campaign)
+        write_model(folder.path / TRUTH, made.truth)
+        result = _result(settings, first, made, folder.path)
+        folder.write_result(result)
+        progress.stage("report", total=1.0)
+        write_report(folder.path, progress)
+    return result
+
+
+@dataclass(frozen=True)
+class _Made:
+    """A campaign, what is true of it, and a row of result.json for each trial."""
+
+    campaign: Campaign
+    truth: TumbleModel
+    rows: list[Json]
+
+
+def _make(settings: CampaignSettings, conditions: Sequence[_Condition], progress: Progress) -> _Made:
+    """Draw what is true, and record every trial."""
+    first = conditions[0].plan
+    truth = _truth(settings, conditions)
+    sensors = sensor_set(settings)
+    recordings: dict[tuple[str, str], Recording] = {}
+    true_trials, rows = [], []
+    progress.stage("trials", total=float(len(conditions)))
+    for number, condition in enumerate(conditions, 1):
+        trial = _true_trial(settings, condition, number, truth)
+        measured, trajectory = record(
+            trial, duration=settings.duration, sensors=sensors, seed=(settings.seed, 2, number)
+        )
+        for sensor in ("pose", "imu", "wheel"):
+            recordings[condition.id, sensor] = Recording(getattr(measured, sensor))
+        true_trials.append(trial_table(condition.id, trial))
+        rows.append(_row(condition, trial, measured, trajectory))
+        progress.update(number)
+    campaign = Campaign(_stated(settings, conditions), recordings)
+    return _Made(campaign, _true_model(settings, first, truth, true_trials), rows)
+
+
+# A tumble's own campaign ----------------------------------------------------------------------------------------------
+
+
+def check_tumble_campaign(settings: TumbleSettings) -> None:
+    """Raise ValueError for a tumble whose campaign cannot be written, before any work."""
+    if settings.campaign is None:
+        return
+    if settings.ground != "spring-damper":
+        raise ValueError(say("campaign_on_a_law", s=settings))
+    check_target(settings.campaign)
+
+
+def write_tumble_campaign(settings: TumbleSettings, plan: TumblePlan, folder: Path, progress: Progress) -> Json | None:
+    """Write `campaign_trials` replicates of the tumble to ``settings.campaign``, and what is true of them to `folder`.
+
+    The stated numbers are the tumble's; the true ones are drawn within the uncertainties that `hedgebed campaign` has
+    by default, each trial's gravity anew. Effects are true and not stated. Returns what result.json says of it, None
+    where no campaign is asked for. Raises ValueError where the folder holds something else.
+    """
+    if settings.campaign is None:
+        return None
+    shared = {name: getattr(settings, name) for name in TrialSettings.model_fields}
+    plain = CampaignSettings()
+    noisy = sensor_set(plain, noise=settings.campaign_noise)
+    own = CampaignSettings(
+        **shared, name=f"a tumble on {plan.surface}", rig=() if settings.gravity is not None else plain.rig,
+        gravity=(settings.gravity,) if settings.gravity is not None else (), seed=settings.campaign_seed,
+        trials=settings.campaign_trials, pose_std=noisy.pose_std, imu_std=noisy.imu_std, wheel_std=noisy.wheel_std,
+    )  # fmt: skip
+    within = replace(plan, trial=_within_limit(plan, settings.duration))
+    made = _make(own, [_Condition(f"{n:03d}", within) for n in range(1, settings.campaign_trials + 1)], progress)
+    target = place_campaign(settings.campaign, made.campaign, keep_out=folder)
+    write_model(folder / TRUTH, made.truth)
+    progress.message(f"campaign {target}: {len(made.rows)} trials; what is true of them is in {folder / TRUTH}")
+    return {"folder": str(target), "truth": TRUTH, "trials": made.rows}
+
+
+def _tables(settings: CampaignSettings, plan: TumblePlan, values: Json) -> Json:
+    """What the campaign and the truth both say, with their own numbers."""
+    trial = plan.trial
+    known = find_surface(settings.surface) if settings.surface is not None else None
+    rig = RigTable(wire_length=settings.wire_length, gravity=trial.gravity) if trial.counterweight > 0 else None
+    return {
+        "format": FORMAT,
+        "kind": "tumble",
+        "name": settings.name,
+        "platform": platform_table(
+            mass=values["mass"], inertia=values["inertia"], spike_length=trial.spike_length,
+            spike_count=trial.spike_count,
+        ),
+        "wheel": WheelTable(inertia=trial.wheel_inertia),
+        "rig": rig,
+        "surface": TumbleSurface(
+            kind=plan.surface,
+            granular=known.granular if known is not None else False,
+            **{name: values[name] for name in ("stiffness", "damping", "mu_s", "mu_d")},
+        ),
+        "sensors": sensor_tables(sensor_set(settings)),
+    }  # fmt: skip
+
+
+def _stated(settings: CampaignSettings, conditions: Sequence[_Condition]) -> TumbleCampaign:
+    plan = conditions[0].plan
+    values = {name: getattr(plan.trial, name) for name in _DRAWN} | {"mu_d": plan.trial.sliding_friction}
+    sigmas = {name: getattr(settings, f"sigma_{name}") for name in (*_DRAWN, "gravity_sim")}
+    return TumbleCampaign(
+        **_tables(settings, plan, values),
+        uncertainty=TumbleUncertainty(**sigmas),
+        notes={"made_by": f"hedgebed {__version__} campaign", "seed": settings.seed},
+        trial=tuple(trial_table(condition.id, condition.plan.trial) for condition in conditions),
+    )
+
+
+def _true_model(
+    settings: CampaignSettings, plan: TumblePlan, truth: Json, trials: Sequence[TumbleTrial]
+) -> TumbleModel:
+    def table(effect: Effect) -> EffectTable:
+        file = str(Path(effect.file).resolve()) if effect.file is not None else None
+        return EffectTable(id=effect.id, parameters=dict(effect.values), file=file)
+
+    effects = tuple(map(table, plan.trial.effects))
+    return TumbleModel(**_tables(settings, plan, truth), trial=tuple(trials), effect=effects)
+
+
+def _row(condition: _Condition, trial: Trial, measured: Measured, trajectory: Any) -> Json:
+    """One trial in result.json."""
+    return {
+        "id": condition.id, "gravity_sim": condition.plan.trial.gravity_sim, "true_gravity_sim": trial.gravity_sim,
+        "torque": trial.torque, "actuator": trial.actuator, "camera_zero": list(measured.camera_zero),
+        "trajectory_angle": trajectory.trajectory_angle, "max_speed": trajectory.max_speed,
+        "max_angular_velocity": trajectory.max_angular_velocity,
+        "states": [state for _, state, _ in trajectory.transitions],
+    }  # fmt: skip
+
+
+def _table(rows: Sequence[Json]) -> Json:
+    """The trials as the terminal shows them."""
+    head = ["trial", "g_sim [m/s2]", "torque [N m]", "angle [degrees]", "speed [m/s]", "states"]
+    shown = [
+        [
+            row["id"],
+            f"{row['true_gravity_sim']:.4g}",
+            f"{row['torque']:g} {row['actuator']}",
+            "-" if row["trajectory_angle"] is None else f"{math.degrees(row['trajectory_angle']):.1f}",
+            f"{row['max_speed']:.3g}",
+            " ".join(row["states"][:4]) + (" ..." if len(row["states"]) > 4 else ""),
+        ]
+        for row in rows[:MOST_ROWS]
+    ]
+    if len(rows) > MOST_ROWS:
+        shown.append(["...", f"{len(rows) - MOST_ROWS} more, in result.json", "", "", "", ""])
+    return {"title": "What truly happens in the trials", "head": head, "rows": shown}
+
+
+def _result(settings: CampaignSettings, plan: TumblePlan, made: _Made, folder: Path) -> Json:
+    count = sum(len(recording) for recording in made.campaign.recordings.values())
+    rows = made.rows
+    return {
+        "format": "hedgebed-result/1",
+        "experiment": "campaign",
+        "version": __version__,
+        "title": f"A made-up campaign on {plan.surface}: {len(rows)} trials",
+        "status": "done",
+        "quantities": {
+            "trial_count": {"value": len(rows), "std": 0.0, "unit": "1"},
+            "row_count": {"value": count, "std": 0.0, "unit": "1", "note": "of all recordings together"},
+            "duration": {"value": settings.duration, "std": 0.0, "unit": "s", "note": "of each trial"},
+        },
+        "campaign": "campaign",
+        "truth": TRUTH,
+        "tables": [_table(rows)],
+        "departures": {
+            "sentences": [
+                f"{folder / 'campaign'} is what a laboratory would hand over, for `hedgebed diagnose`; {TRUTH} beside "
+                f"it is what made it."
+            ]
+        },
+        "effects": [{"id": effect.id, "parameters": dict(effect.values)} for effect in plan.trial.effects],
+        "trials": rows,
+        "warnings": list(plan.warnings),
+    }
+
+
+run, resume = whole_run("campaign", CampaignSettings, _carry_out, check=check)

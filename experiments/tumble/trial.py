@@ -1,0 +1,298 @@
+"""From the settings of a tumble to the numbers of its trial, each with where it comes from.
+
+What is given wins over the model, the model over the surface's numbers and over the defaults below.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from experiments.campaign import TumbleModel, read_model
+from experiments.platform.lengths import check_spike_length
+from experiments.platform.numbers import PlatformNumbers, platform_numbers
+from experiments.platform.settled import (
+    Number,
+    Settled,
+    check_actuation,
+    check_body,
+    defaults_said,
+    of_earth,
+    of_other_spikes,
+    rig_fault,
+    settle_limits,
+    settle_platform,
+    settle_surface,
+)
+from experiments.runs.types import Json
+from rigid.model.trial import Effect, Ground, Trial
+from rigid.platform.rig import STANDARD_GRAVITY, Rig
+from rigid.terms import EFFECTS
+
+from .sentences import say
+from .settings import TumbleSettings
+
+__all__ = ["DEFAULT_RIG", "Spikes", "TumblePlan", "model_trial", "plan_tumble", "spikes_of", "turns_of"]
+
+TORQUE = 0.22
+"""The paper's middle one [N m]."""
+DEFAULT_RIG = 0.0085
+"""The paper's lower gravity [9.80665 m/s2]."""
+SPIKES_PER_ROW = 2.0
+"""The platform stands on two rows of two."""
+
+
+@dataclass(frozen=True)
+class Spikes:
+    """What grains meet of a platform's spikes."""
+
+    diameter: float
+    """[m]"""
+    clear: float
+    """How far they stand out of the hull [m]."""
+    of_platform: tuple[str, ...]
+    """Which of the two were not given, and are the platform's: by the settings' names."""
+
+
+def spikes_of(settings: TumbleSettings, own: PlatformNumbers) -> Spikes:
+    """The spikes of a tumble on grains: as given, else those of the platform, `own`.
+
+    In the plane a spike stands as long as it is, also where it leans sideways. Raises ValueError, naming the setting,
+    for a platform without spikes.
+    """
+    given = {name: getattr(settings, name) for name in ("spike_diameter", "spike_clear")}
+    lacking = tuple(name for name, value in given.items() if value is None)
+    if lacking:
+        if own.spike_diameter == 0:
+            raise ValueError(say("no_spikes", platform=settings.platform, names=" and ".join(lacking)))
+        given |= {name: getattr(own, name) for name in lacking}
+    return Spikes(given["spike_diameter"], given["spike_clear"], lacking)
+
+
+@dataclass(frozen=True)
+class TumblePlan:
+    """A trial, and what is said of it."""
+
+    trial: Trial
+    numbers: Mapping[str, Number]
+    surface: str
+    """Name of the material."""
+    choices: Mapping[str, str]
+    """What else was left at its default: name -> value, as a person would type it."""
+    platform: PlatformNumbers
+    """What gives the numbers that nothing else gives."""
+    spikes: Spikes
+    """What grains meet of its spikes."""
+    warnings: tuple[str, ...] = ()
+    max_wheel_speed: float = math.inf
+    """Where a motor's torque ends [rad/s]."""
+
+    def sentences(self) -> list[str]:
+        """One line for each number and choice that was not given: every default is said."""
+        return defaults_said(self.choices, self.numbers)
+
+
+def plan_tumble(
+    settings: TumbleSettings,
+    *,
+    model_file: Path | None = None,
+    platform: PlatformNumbers | None = None,
+    spikes: Spikes | None = None,
+) -> TumblePlan:
+    """The trial that `settings` describe. `model_file` stands in for ``settings.model``, where that was copied,
+    `platform` for ``settings.platform``, where that was read, and `spikes` for the platform's.
+
+    Raises ValueError, naming the setting, for a surface, law, effect or parameter there is not, a model that cannot be
+    read, and numbers that no platform or rig can have.
+    """
+    source = model_file if model_file is not None else Path(settings.model) if settings.model is not None else None
+    model = _read(source) if source is not None else None
+    numbers = Settled(settings)
+    platform = platform_numbers(settings.platform) if platform is None else platform
+    settle_platform(numbers, platform, model=model)
+    check_spike_length(numbers)
+    surface, warnings = settle_surface(numbers, settings.surface, model=model)
+    _settle_gravity(settings, model, numbers)
+    weak = platform.motor_torque < TORQUE
+    torque, origin = (platform.motor_torque, f"motor of {platform.name}") if weak else (TORQUE, "default")
+    if settings.drop_speed is not None:
+        torque, origin = 0.0, "a landing"
+    numbers.settle("torque", torque, origin)
+    numbers.settle("torque_until", math.inf, "default: as long as the trial")
+    numbers.settle("wheel_speed_0", 0.0, "default")
+    values: Json = {name: number.value for name, number in numbers.items()}
+    settle_limits(numbers, platform, in_model=model is not None)
+    warnings += check_actuation(settings.actuator, platform, numbers)
+    warnings += check_body(numbers, platform) if model is None else []
+    ground = _ground(settings)
+    if ground is None:
+        diameter = platform.spike_diameter if spikes is None else spikes.diameter
+        whose = f"platform {platform.name}" if spikes is None else "this run"
+        warnings += of_other_spikes(numbers, surface, diameter=diameter, whose=whose)
+    assert platform.spike_count is not None  # or it would have been refused
+    trial = Trial(
+        **values,
+        spike_count=platform.spike_count if model is None else model.platform.rows,
+        actuator=settings.actuator,
+        ground=ground,
+        effects=(*_model_effects(model, source), *_given_effects(settings.effects)),
+    )
+    if ground is not None:
+        for name in ("stiffness", "damping"):
+            del numbers[name]
+        for name, value in ground.law.values(ground.parameters).items():
+            unit = next(parameter.unit for parameter in ground.law.parameters if parameter.name == name)
+            origin = "given" if name in ground.parameters else f"default of {ground.name}, of one spike"
+            numbers[name] = Number(value, unit, origin)
+    rows = f"rows of platform {platform.name}" if model is None else "model"
+    numbers["spike_count"] = Number(trial.spike_count, "1", rows)
+    warnings += _rig_warnings(trial)
+    if ground is None and model is None:
+        warnings += of_earth(numbers, surface, weight=trial.weight, mass=trial.mass, counterweight=trial.counterweight)
+    choices = _choices(settings, surface, model)
+    spikes = spikes or Spikes(platform.spike_diameter, platform.spike_clear, ("spike_diameter", "spike_clear"))
+    limit = numbers.value("max_wheel_speed")
+    return TumblePlan(trial, numbers, surface, choices, platform, spikes, tuple(warnings), limit)
+
+
+def _choices(settings: TumbleSettings, surface: str, model: TumbleModel | None) -> dict[str, str]:
+    """The settings that are no numbers of the trial and stand at their defaults."""
+    found = {"surface": surface} if settings.surface is None and model is None else {}
+    units = {"duration": " s", "sample_interval": " s"}
+    names = ["platform", "ground", "actuator", "duration", "method", "sample_interval"]
+    if settings.gravity is None:
+        names.append("rig_reading")
+        if settings.rig is None:
+            found["rig"] = f"{DEFAULT_RIG:g}"
+    for name in names:
+        if name not in settings.model_fields_set:
+            found[name] = f"{getattr(settings, name)}{units.get(name, '')}"
+    if not settings.effects and model is None:
+        found["effects"] = "none"
+    return found
+
+
+def _read(path: Path) -> TumbleModel:
+    model = read_model(path)
+    if not isinstance(model, TumbleModel):
+        raise ValueError(f"model = {str(path)!r} is of kind {model.kind!r}: one of kind 'tumble' would do")
+    return model
+
+
+def _settle_gravity(settings: TumbleSettings, model: TumbleModel | None, numbers: Settled) -> None:
+    """Settle gravity_sim, local gravity and counterweight, in the rig or free of it."""
+    if settings.gravity is not None:
+        numbers["gravity_sim"] = Number(settings.gravity, "m/s2", "given")
+        numbers["gravity"] = Number(settings.gravity, "m/s2", "free platform: the same")
+        numbers["counterweight"] = Number(0.0, "kg", "free platform")
+        return
+    if model is not None and model.rig is None and settings.rig is None:
+        raise ValueError(f"gravity must be given: the model {settings.model!r} has no [rig] (m/s2, or rig)")
+    in_model = model.rig if model is not None else None
+    local = in_model.gravity if in_model is not None else STANDARD_GRAVITY
+    stated = settings.rig if settings.rig is not None else DEFAULT_RIG
+    if fault := rig_fault(stated, local):
+        raise ValueError(fault)
+    counterweight = settings.counterweight
+    origin = "given"
+    if counterweight is None and in_model is not None and in_model.counterweight is not None:
+        counterweight, origin = in_model.counterweight, "model"
+    mass, wanted = numbers["mass"].value, stated * STANDARD_GRAVITY
+    rig = Rig.offloading(mass, wanted, reading=settings.rig_reading, counterweight=counterweight, gravity=local)
+    if counterweight is None:
+        origin = "m (g - g_sim) / (g + g_sim)" if settings.rig_reading == "pair" else "m (1 - rig g0 / g)"
+    read = f"rig = {stated:g}{'' if settings.rig is not None else ' by default'}, read as {settings.rig_reading}"
+    numbers["gravity_sim"] = Number(rig.gravity_sim, "m/s2", read)
+    numbers["gravity"] = Number(local, "m/s2", "model" if in_model is not None else "default")
+    numbers["counterweight"] = Number(rig.counterweight, "kg", origin)
+
+
+def _rig_warnings(trial: Trial) -> list[str]:
+    """What has to be said of a counterweight that does not belong to the gravity."""
+    if trial.counterweight == 0:
+        return []
+    hung = (trial.mass - trial.counterweight) * trial.gravity
+    if abs(hung - trial.weight) <= 0.02 * trial.weight:
+        return []
+    return [say("weight_off", trial=trial, hung=hung)]
+
+
+def _ground(settings: TumbleSettings) -> Ground | None:
+    """The law that is named; None for the spring-damper of K and C."""
+    if settings.ground == "spring-damper":
+        return None
+    parameters = dict(_assignment("ground_parameters", text) for text in settings.ground_parameters)
+    try:
+        return Ground(name=settings.ground, parameters=parameters, spikes_per_row=SPIKES_PER_ROW)
+    except ValueError as error:
+        raise ValueError(f"ground = {settings.ground!r}: {error}") from None
+
+
+def _assignment(key: str, text: str) -> tuple[str, float]:
+    name, equals, value = text.partition("=")
+    try:
+        return name.strip(), float(value)
+    except ValueError:
+        found = "has no number" if equals else "has no ="
+        raise ValueError(f"{key} = {text!r} {found}: name=value would do, such as exponent=1.5") from None
+
+
+def _model_effects(model: TumbleModel | None, path: Path | None) -> tuple[Effect, ...]:
+    """The effects of a model; the files of one's own are sought beside it."""
+    if model is None or path is None:
+        return ()
+    try:
+        files = [path.parent / effect.file if effect.file is not None else None for effect in model.effect]
+        return tuple(
+            Effect(id=effect.id, parameters=effect.parameters, file=file)
+            for effect, file in zip(model.effect, files, strict=True)
+        )
+    except ValueError as error:
+        raise ValueError(f"{path}: [[effect]]: {error}") from None
+
+
+def _given_effects(texts: tuple[str, ...]) -> tuple[Effect, ...]:
+    """Effects from ``id`` and ``id.parameter=value``; several parameters of one effect may stand apart."""
+    found: dict[str, dict[str, float]] = {}
+    for text in texts:
+        head, equals, _ = text.partition("=")
+        name, dot, parameter = head.partition(".")
+        values = found.setdefault(name.strip(), {})
+        if bool(dot) != bool(equals):
+            raise ValueError(f"effects = {text!r} will not do: id, or id.parameter=value such as pendulum.length=2.2")
+        if dot:
+            values[parameter.strip()] = _assignment("effects", text)[1]
+    try:
+        effects = tuple(Effect(id=name, parameters=values) for name, values in found.items())
+    except ValueError as error:
+        raise ValueError(f"effects: {error}") from None
+    for effect in effects:
+        if not found[effect.id]:  # every effect is off by its defaults
+            numbers = ", ".join(f"{effect.id}.{p.name}=... [{p.unit}]" for p in EFFECTS[effect.id].parameters)
+            raise ValueError(f"effects = {effect.id!r} alone changes nothing: give {numbers}")
+    return effects
+
+
+def turns_of(motors: Sequence[float], brakes: Sequence[float], wheel_speed: float) -> list[Json]:
+    """What turns the platform in a trial of each torque [N m], as settings have it: motors, then brakes.
+
+    `wheel_speed` [rad/s] is that of a brake's wheel at the start.
+    """
+    of_brakes: list[Json] = [{"torque": torque, "actuator": "brake", "wheel_speed_0": wheel_speed} for torque in brakes]
+    return [*({"torque": torque, "actuator": "motor"} for torque in motors), *of_brakes]
+
+
+def model_trial(tables: Any, trial: Any, *, effects: tuple[Effect, ...] = ()) -> Trial:
+    """The `Trial` of one ``[[trial]]`` of a campaign, or of a model of tumbles, with these effects."""
+    platform, surface = tables.platform, tables.surface
+    return Trial(
+        mass=platform.mass, inertia=platform.inertia, spike_length=platform.spike_length, spike_count=platform.rows,
+        stiffness=surface.stiffness, damping=surface.damping, mu_s=surface.mu_s, mu_d=surface.sliding_friction,
+        gravity_sim=trial.gravity_sim, gravity=tables.local_gravity_of(trial),
+        counterweight=tables.counterweight_of(trial), torque=trial.torque, torque_until=trial.torque_until,
+        actuator=trial.actuator, wheel_inertia=tables.wheel.inertia, wheel_speed_0=trial.wheel_speed_0,
+        effects=effects,
+    )  # fmt: skip

@@ -1,0 +1,174 @@
+"""What a case of the verification suite is: what is known, what came out, and the band between them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+
+from experiments.runs.types import Json
+
+__all__ = [
+    "Case", "Comparison", "Compute", "Curve", "Outcome", "Plot", "Tell", "compared", "near_zero", "told",
+]  # fmt: skip
+Item = TypeVar("Item")
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One number beside the one it should be.
+
+    Attributes:
+        quantity: what it is, with the case it is of ("e_t at 10 deg").
+        unit: of both; "1" for a ratio.
+        reference: from the closed form, or published.
+        ours: measured on the bed.
+        band: the largest difference that passes, over the reference's size where ``relative``.
+        relative: False where ``band`` is in the unit itself.
+    """
+
+    quantity: str
+    unit: str
+    reference: float
+    ours: float
+    band: float
+    relative: bool = True
+
+    def __post_init__(self) -> None:
+        if not self.band > 0 or (self.relative and self.reference == 0):
+            raise ValueError(f"{self.quantity}: a band of {self.band} about {self.reference} cannot be met")
+
+    @property
+    def difference(self) -> float:
+        """Ours less the reference, in its unit."""
+        return self.ours - self.reference
+
+    @property
+    def share(self) -> float:
+        """How much of the band the difference takes [1]; infinite for what is not a number."""
+        scale = self.band * (abs(self.reference) if self.relative else 1.0)
+        share = abs(self.difference) / scale
+        return float(share) if math.isfinite(share) else math.inf  # numpy's would make a bool that JSON refuses
+
+    @property
+    def passes(self) -> bool:
+        """Whether it lies in the band."""
+        return self.share <= 1
+
+    def as_dict(self) -> Json:
+        """What result.json keeps."""
+        kept = {key: getattr(self, key) for key in ("quantity", "unit", "reference", "ours", "band", "relative")}
+        return kept | {"difference": self.difference, "share": self.share, "passes": self.passes}
+
+
+def compared(
+    quantity: str,
+    labels: Sequence[Any],
+    reference: Any,
+    ours: Any,
+    *,
+    unit: str = "1",
+    band: float,
+    relative: bool = True,
+) -> list[Comparison]:
+    """A comparison for each of several numbers, called ``<quantity> at <label>``. Raises ValueError for other "
+    "lengths."""
+    rows = zip(labels, np.asarray(reference, dtype=float), np.asarray(ours, dtype=float), strict=True)
+    return [Comparison(f"{quantity} at {label}", unit, float(a), float(b), band, relative) for label, a, b in rows]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Points of a plot, shapes [n]: ``ours`` is drawn as dots, a reference as a line."""
+
+    label: str
+    x: Any
+    y: Any
+    ours: bool = True
+
+
+@dataclass(frozen=True)
+class Plot:
+    """What shows how well the case comes out. ``log``: "", "x", "y" or "xy"."""
+
+    title: str
+    x: str
+    y: str
+    curves: Sequence[Curve]
+    log: str = ""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a case found. ``skipped`` says in words what it lacks on this machine."""
+
+    comparisons: Sequence[Comparison] = ()
+    plots: Sequence[Plot] = ()
+    remarks: Sequence[str] = ()
+    skipped: str = ""
+
+    @property
+    def status(self) -> str:
+        """``pass``, ``fail`` or ``skipped``."""
+        if self.skipped:
+            return "skipped"
+        return "pass" if self.comparisons and all(one.passes for one in self.comparisons) else "fail"
+
+
+Tell = Callable[[float], None]
+"""Takes how far a case is, 0 to 1."""
+Compute = Callable[[Tell], Outcome]
+"""Computes a case."""
+
+
+def told(items: Iterable[Item], tell: Tell) -> Iterator[Item]:
+    """The items one by one; each is told as done when the next one is asked for."""
+    rows = list(items)
+    for done, item in enumerate(rows, 1):
+        yield item
+        tell(done / len(rows))
+
+
+def near_zero(quantity: str, ours: float, band: float, unit: str = "1") -> Comparison:
+    """A number that should be 0, within `band` in its unit."""
+    return Comparison(quantity, unit, 0.0, float(ours), band, False)
+
+
+@dataclass(frozen=True)
+class Case:
+    """One row of the suite.
+
+    Attributes:
+        id: for ``--only``; letters, digits and hyphens.
+        family: the heading it stands under.
+        title: what is tested.
+        reference: the closed form, or what was published.
+        source: where that is from.
+        compute: does it; told how far it is through a function of 0 to 1. None where the bed cannot do it yet.
+        slow: left out by ``--quick``.
+        seconds: expected time, for the progress [s].
+        reason: why it fails, where it is known to; shown only while it does.
+        waits_for: what the bed lacks, where ``compute`` is None.
+    """
+
+    id: str
+    family: str
+    title: str
+    reference: str
+    source: str
+    compute: Compute | None = None
+    slow: bool = False
+    seconds: float = 2.0
+    reason: str = ""
+    waits_for: str = ""
+
+    def __post_init__(self) -> None:
+        if (self.compute is None) != bool(self.waits_for):
+            raise ValueError(f"case {self.id!r} needs either compute or waits_for")
+
+    def head(self) -> Mapping[str, Any]:
+        """What result.json says of it before it has run."""
+        return {key: getattr(self, key) for key in ("id", "family", "title", "reference", "source", "slow")}

@@ -1,0 +1,212 @@
+"""Dosta et al. 2024's penetration: a steel ball of 20 mm at 5 m/s into 25,000 grains of 2 mm, here and in LIGGGHTS.
+
+Both begin when the ball, thrown down at 5 m/s from 60 mm, touches the first grain, and last 3 ms, in which it goes
+into them by more than its radius; the 100 ms of the paper take an hour on one core. The grains start where the data
+have them, without history. The walls are of what the grains are of.
+"""
+
+from __future__ import annotations
+
+import gzip
+import math
+import os
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from dem import Ball, Bed, Facing, Material, Plane
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero
+from experiments.validate.base.peers import PEERS
+from experiments.validate.base.spheres import mass_of
+
+from .words import say
+
+__all__ = ["CASES", "Setup", "first_touch", "grains"]
+
+DATA = Path(__file__).parents[1] / "dosta_data" / "25KParticles.txt.gz"
+STUFF = Material("dosta", 2500.0, 1e9, 0.2, 0.3, 0.5)
+BALL_DENSITY, BALL_YOUNG, BALL_POISSON, BALL_FRICTION, BALL_RESTITUTION = 7200.0, 210e9, 0.2, 0.2, 0.4
+BALL_RADIUS, GRAVITY = 0.01, 9.8
+SPEED, THROWN_FROM = 5.0, 0.06
+WALLS = (-0.049, 0.049, -0.03, 0.03)
+FLOOR = -0.0902431
+STEP, TIME, EVERY = 1e-6, 0.003, 100  # [s], [s], steps between two looks
+TOGETHER = 5  # steps of the grains for one of the ball, which is 3000 times heavier than one of them
+LIMIT = 3000.0  # for the other code [s]
+MARGIN = 0.004
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Grains at rest and the ball that touches the first of them; lengths in metres, in the data's frame."""
+
+    positions: np.ndarray
+    radii: np.ndarray
+    ball: np.ndarray
+    speed: float
+
+
+def grains() -> tuple[np.ndarray, np.ndarray]:
+    """Centres, shape [25000, 3], and radii [m] of the data."""
+    with gzip.open(DATA, "rt", encoding="ascii") as file:
+        rows = [line.split() for line in file.readlines()[1:]]
+    found = np.array([[float(v) for v in row] for row in rows if len(row) == 4])
+    return found[:, 1:], found[:, 0]
+
+
+def first_touch(positions: np.ndarray, radii: np.ndarray) -> float:
+    """Height of a ball that comes down the axis when it touches the first grain [m]."""
+    across = np.hypot(positions[:, 0], positions[:, 1])
+    reach = BALL_RADIUS + radii
+    under = across < reach
+    return float((positions[under, 2] + np.sqrt(reach[under] ** 2 - across[under] ** 2)).max())
+
+
+def setup() -> Setup:
+    """The case when the ball arrives."""
+    positions, radii = grains()
+    height = first_touch(positions, radii) + 1e-6
+    speed = math.sqrt(SPEED**2 + 2 * GRAVITY * (THROWN_FROM - height))
+    return Setup(positions, radii, np.array([0.0, 0.0, height]), speed)
+
+
+def ours(case: Setup, tell: Tell) -> np.ndarray:
+    """Height [m] and velocity [m/s] of the ball at each look, shape [looks, 2]."""
+    shift = np.array([MARGIN - WALLS[0], MARGIN - WALLS[2], -FLOOR])
+    width, depth = WALLS[1] - WALLS[0], WALLS[3] - WALLS[2]
+    size = (width + 2 * MARGIN, depth + 2 * MARGIN, 0.04)
+    like = {"young": STUFF.young, "poisson": STUFF.poisson}
+    bed = Bed.from_grains(
+        STUFF, positions=case.positions + shift, radii=case.radii, size=size, height=0.4, gravity=GRAVITY,
+        time_step=STEP, max_overlap=0.1, floor=Facing(**like), tensile=True,
+    )  # fmt: skip
+    for normal, x, y in (
+        ((1, 0, 0), 0.0, 0.0),
+        ((-1, 0, 0), width, 0.0),
+        ((0, 1, 0), 0.0, 0.0),
+        ((0, -1, 0), 0.0, depth),
+    ):
+        bed.add_body([Plane(normal=normal)], position=(MARGIN + x, MARGIN + y, 0.0), **like)
+    ball = bed.add_body(
+        [Ball(radius=BALL_RADIUS)], position=case.ball + shift, friction=BALL_FRICTION, restitution=BALL_RESTITUTION,
+        young=BALL_YOUNG, poisson=BALL_POISSON,
+    )  # fmt: skip
+    mass = mass_of(BALL_DENSITY, BALL_RADIUS)
+    inertia = 0.4 * mass * BALL_RADIUS**2
+    velocity, spin = np.array([0.0, 0.0, -case.speed]), np.zeros(3)
+    dt = TOGETHER * STEP
+    found = [[case.ball[2], velocity[2]]]
+    for look in range(round(TIME / STEP) // EVERY):
+        for _ in range(EVERY // TOGETHER):
+            bed.move_body(ball, velocity=velocity.tolist(), spin=spin.tolist())
+            bed.advance(TOGETHER)
+            force, torque = bed.reaction(ball)
+            velocity = velocity + dt * (force / mass + [0.0, 0.0, -GRAVITY])
+            spin = spin + dt * torque / inertia
+        found.append([bed.body_position(ball)[2] + FLOOR, velocity[2]])
+        tell((look + 1) * EVERY * STEP / TIME)
+    return np.array(found)
+
+
+def theirs(case: Setup) -> np.ndarray:
+    """The same by LIGGGHTS, in one process. Raises RuntimeError with its last lines where it fails."""
+    with tempfile.TemporaryDirectory(prefix="hedgebed-dosta-") as name:
+        folder = Path(name)
+        (folder / "grains.data").write_text(_data(case), encoding="ascii")
+        (folder / "deck").write_text(_deck(), encoding="ascii")
+        done = subprocess.run(
+            [str(PEERS["liggghts"].find()), "-in", "deck", "-log", "log.txt", "-screen", "none"],
+            cwd=folder, check=False, capture_output=True, text=True, errors="replace", timeout=LIMIT,
+            env={**os.environ, "OMP_NUM_THREADS": "1"},
+        )  # fmt: skip
+        log = folder / "log.txt"
+        if done.returncode != 0 or not (folder / "ball.txt").is_file():
+            said = (log.read_text(errors="replace") if log.exists() else "") + done.stdout + done.stderr
+            raise RuntimeError(f"LIGGGHTS failed: {' | '.join(said.splitlines()[-4:])}")
+        blocks = (folder / "ball.txt").read_text(encoding="ascii").split("ITEM: ATOMS z vz")[1:]
+    return np.array([[float(v) for v in block.splitlines()[1].split()] for block in blocks])
+
+
+def _data(case: Setup) -> str:
+    count = len(case.radii)
+    box = [f"{WALLS[0]:g} {WALLS[1]:g} xlo xhi", f"{WALLS[2]:g} {WALLS[3]:g} ylo yhi", f"{FLOOR:.7f} 0.3 zlo zhi"]
+    lines = ["grains of hedgebed\n", f"{count + 1} atoms", "2 atom types\n", *box, "\nAtoms\n"]
+    for k, (radius, place) in enumerate(zip(case.radii, case.positions, strict=True), 1):
+        lines.append(f"{k} 1 {2 * radius:.10g} {STUFF.density:g} " + " ".join(f"{v:.17g}" for v in place))
+    where = " ".join(f"{v:.17g}" for v in case.ball)
+    lines.append(f"{count + 1} 2 {2 * BALL_RADIUS:g} {BALL_DENSITY:g} {where}")
+    lines += ["\nVelocities\n", *(f"{k} 0 0 0 0 0 0" for k in range(1, count + 1))]
+    return "\n".join([*lines, f"{count + 1} 0 0 {-case.speed:.17g} 0 0 0"]) + "\n"
+
+
+def _deck() -> str:
+    e, mu = STUFF.restitution, STUFF.friction
+    law = "hertz tangential history"
+    planes = zip(("xplane",) * 2 + ("yplane",) * 2 + ("zplane",), (*WALLS, FLOOR), strict=True)
+    pairs = "peratomtypepair 2"
+    lines = [
+        "hard_particles yes", "units si", "atom_style granular", "atom_modify map array", "communicate single vel yes",
+        "boundary f f f",
+        "newton off", "read_data grains.data", "neighbor 8e-4 bin", "neigh_modify delay 0 every 1 check yes",
+        f"fix young all property/global youngsModulus peratomtype {STUFF.young:g} {BALL_YOUNG:g}",
+        f"fix poisson all property/global poissonsRatio peratomtype {STUFF.poisson:g} {BALL_POISSON:g}",
+        f"fix rebound all property/global coefficientRestitution {pairs} {e:g} {BALL_RESTITUTION:g} "
+        f"{BALL_RESTITUTION:g} {BALL_RESTITUTION:g}",
+        f"fix friction all property/global coefficientFriction {pairs} {mu:g} {BALL_FRICTION:g} {BALL_FRICTION:g} "
+        f"{BALL_FRICTION:g}",
+        f"pair_style gran model {law}", "pair_coeff * *",
+    ]  # fmt: skip
+    for k, (kind, where) in enumerate(planes):
+        lines.append(f"fix wall{k} all wall/gran model {law} primitive type 1 {kind} {where:.7f}")
+    lines += [
+        f"fix weight all gravity {GRAVITY:g} vector 0.0 0.0 -1.0",
+        "fix motion all nve/sphere",
+        "group ball type 2",
+        f"timestep {STEP:g}",
+        f"dump now ball custom {EVERY} ball.txt z vz",
+        'dump_modify now format "%.17g %.17g"',
+        "thermo 1000",
+        f"run {round(TIME / STEP)}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _compute(tell: Tell) -> Outcome:
+    if PEERS["liggghts"].find() is None:
+        return Outcome(skipped=f"LIGGGHTS is not installed (apt install {PEERS['liggghts'].package})")
+    case = setup()
+    there = theirs(case)
+    tell(0.5)
+    here = ours(case, lambda done: tell(0.5 + 0.5 * done))
+    depth, found = case.ball[2] - there[:, 0], case.ball[2] - here[:, 0]
+    time = 1e3 * STEP * EVERY * np.arange(len(there))
+    slower = -0.8 * case.speed
+    rows = [
+        Comparison(f"depth {time[-1]:g} ms after the first touch", "mm", 1e3 * depth[-1], 1e3 * found[-1], 0.05),
+        near_zero("height, largest difference over that depth", np.abs(found - depth).max() / depth[-1], 0.05),
+        Comparison("time to 0.8 of the speed", "ms", _time_to(time, there[:, 1], slower),
+                   _time_to(time, here[:, 1], slower), 0.05),
+        Comparison(f"speed after {time[len(time) // 2]:g} ms", "m/s", -there[len(time) // 2, 1],
+                   -here[len(time) // 2, 1], 0.05),
+    ]  # fmt: skip
+    curves = [
+        Curve("LIGGGHTS", time, 1e3 * (there[:, 0] - case.ball[2]), False),
+        Curve("bed", time, 1e3 * (here[:, 0] - case.ball[2])),
+    ]
+    remark = say("dosta", case=case, ms=1e3 * TIME, us=1e6 * STEP)
+    return Outcome(rows, [Plot("Height of the ball", "time since the touch [ms]", "height [mm]", curves)], [remark])
+
+
+def _time_to(time: np.ndarray, velocity: np.ndarray, wanted: float) -> float:
+    """When a velocity that rises reaches a value [ms]; NaN where it does not."""
+    if not (velocity > wanted).any():
+        return math.nan
+    k = int(np.argmax(velocity > wanted))
+    share = (wanted - velocity[k - 1]) / (velocity[k] - velocity[k - 1])
+    return float(time[k - 1] + share * (time[k] - time[k - 1]))
+
+
+CASES = {"dosta": _compute}

@@ -1,0 +1,280 @@
+"""The friction angle of a sheared sample against LAMMPS: other boundaries, another code, the same grains.
+
+Ours is ``dem.measure.element``: between rough planes, the lid servoed to its pressure. Theirs has no walls: a box
+periodic in
+all directions, sheared by its tilt (Lees & Edwards) at the volume to which our sample came at large strain, so that
+both are at the critical state of one packing fraction. The largest overlaps aside, angles do not depend on what
+differs: the stress ratio of hard grains is a matter of friction, rolling friction and inertial number alone.
+
+LAMMPS' rolling spring is of one stiffness, k = E d / 10, where ours follows the tangential one; its bound, mu_r R* F_n,
+is the same, and its twisting is Marshall's, as ours.
+
+A friction angle can be read in three ways: as shear over normal stress on the plane of shear; as that of triaxial
+compression at the same I1 I2 / I3; or, as Mohr and Coulomb have it, from the circle through the largest and the least
+principal stress of the whole tensor, sin(angle) = (s1 - s3) / (s1 + s3), which asks for no plane.
+
+Published simulations of simple shear give shear over the mean of the three normal stresses, tau / p, and the packing
+fraction where slow flow settles: Chialvo, Sun & Sundaresan 2012, spheres of one size, linear springs, periodic (case
+``friction-angle-published``). Where the normal stresses are alike the Mohr circle's angle is arcsin(tau / p). Those
+samples are as nearly theirs as can be; softer ones, whose overlaps are counted whole, lie denser (at friction 0.1 0.642
+where the spheres are ten times as soft), and sizes within 15 % and an inertial number of 0.01 make tau / p 0.421 for
+0.381 at friction 0.5.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dem.contact.timestep import time_step_for
+from dem.grains.materials import SAND, Material
+from dem.grains.packing import draw_radii
+from dem.grains.sizes import Uniform
+from dem.measure.element import ElementShear, shear_element
+from experiments.calibrate.tests import mohr_circle, summary_of, triaxial_angle
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell
+from experiments.validate.base.peers import PEERS, lammps_restitution, run_peer
+
+from .words import say
+
+__all__ = ["CASES", "Sheared", "in_lammps", "lammps_law", "mohr_angle"]
+
+GRAIN, PRESSURE, SIZE = 0.004, 1000.0, (10.0, 8.0, 10.0)  # [m], [Pa], [mean diameters]
+SPREAD, INERTIAL, STRAIN = 0.15, 0.01, 2.0
+# One sample of LAMMPS scatters by 1.5 degrees on the plane of shear (0.8 of ours): three say too little.
+SEEDS, SEEDS_AS_PUBLISHED = range(1, 13), (1, 2, 3)
+ROLLING = (0.0, 0.356)  # friction is 0.5; the second is that of sand-calibrated
+BAND = 1.5  # [degrees]
+PUBLISHED = {0.1: (0.268, 0.613), 0.5: (0.382, 0.587)}
+"""Friction: tau / p and packing fraction of slow simple shear, without rolling friction [1]. The paper's table was not
+read: the figures stand in the settings of its group's two-fluid solver (test case jetBedPU of
+gudaxia/twoPhaseEulerPimpleFoamPU on GitHub: muFriction, yieldStressRatio, alphaCritical)."""
+RATIO_BAND, PACKING_BAND = 0.025, 0.01  # [1]; the first is what 1.5 degrees are worth
+AS_PUBLISHED = {"spread": 0.01, "inertial_number": 0.003, "max_overlap": 0.01}
+"""How samples come near the published grains: hard, of one size, sheared slowly."""
+LIMIT = 600.0  # for LAMMPS [s]
+_EVERY, _PARTS = 20, 5
+
+
+@dataclass(frozen=True)
+class Sheared:
+    """Angles on the plane of shear, of triaxial compression, of Mohr's circle, standard error of the first [degrees].
+
+    Attributes:
+        over_mean: shear over the mean normal stress at large strain [1].
+        strain, ratio: shear over normal stress, shape [n]. pressure: normal stress at large strain [Pa].
+    """
+
+    angle: float
+    triaxial: float
+    mohr: float
+    error: float
+    over_mean: float
+    pressure: float
+    strain: np.ndarray
+    ratio: np.ndarray
+
+
+def lammps_law(stuff: Material, young: float, grain: float, *, friction: float | None = None) -> str:
+    """LAMMPS' words for these grains, softened to ``young`` [Pa]; with a ``friction`` of its own, a wall as rough."""
+    stiff = 0.1 * young * grain
+    mass = stuff.density * math.pi / 6 * grain**3
+    damping = 0.3 * 2 * math.sqrt(0.5 * stiff * mass)
+    return (
+        f"hertz/material {young:g} {lammps_restitution(stuff.restitution):.16g} {stuff.poisson:g} "
+        f"tangential mindlin NULL 1.0 {stuff.friction if friction is None else friction:g} "
+        f"rolling sds {stiff:g} {damping:g} {stuff.rolling_friction if friction is None else friction:g} "
+        "twisting marshall damping tsuji"
+    )
+
+
+def mohr_angle(tensor: np.ndarray) -> float:
+    """Friction angle of Mohr's circle through the largest and least principal stress [degrees]; tensor [Pa], [3, 3].
+
+    Raises ValueError for stresses of which the least is no pressure.
+    """
+    centre, radius = mohr_circle(tensor)
+    if not radius < centre:
+        raise ValueError(f"least principal stress = {centre - radius:.4g} Pa: pressures in all directions are needed")
+    return math.degrees(math.asin(radius / centre))
+
+
+def _over_mean(shear: float, tensor: np.ndarray) -> float:
+    return 3 * abs(float(shear)) / float(np.trace(tensor))
+
+
+def _stuff(rolling: float, friction: float = 0.5) -> Material:
+    return replace(SAND, name="sheared", friction=friction, rolling_friction=rolling)
+
+
+def _degrees(ratio: float) -> float:
+    return math.degrees(math.atan(ratio))
+
+
+def _here(stuff: Material, seed: int, tell: Tell, **otherwise: float) -> tuple[Sheared, ElementShear]:
+    """One sample, sheared; ``otherwise``: options of ``shear_element`` that are not those of the module."""
+    options = {"spread": SPREAD, "inertial_number": INERTIAL} | otherwise
+    run = shear_element(
+        stuff, pressure=PRESSURE, grain=GRAIN, size=SIZE, strain=STRAIN, seed=seed, threads=1, tell=tell, **options
+    )
+    said = summary_of(run, stuff.density)
+    ratio, tensor = said["shear"] / said["normal"], np.array(said["tensor"])
+    error = _degrees(ratio + said["error"] / said["normal"]) - _degrees(ratio)
+    found = Sheared(
+        _degrees(ratio), triaxial_angle(tensor), mohr_angle(tensor), error, _over_mean(tensor[0, 2], tensor),
+        said["normal"], run.strain, run.shear / run.normal,
+    )  # fmt: skip
+    return found, run
+
+
+def _packing(run: ElementShear) -> float:
+    """At large strain [1]."""
+    return float(run.packing[run.inside_strain > 0.5 * STRAIN].mean())
+
+
+def in_lammps(stuff: Material, *, young: float, packing: float, seed: int) -> Sheared:
+    """Shear grains of this material, softened to ``young`` [Pa], at a packing fraction [1].
+
+    Raises RuntimeError with LAMMPS' last lines where it fails.
+    """
+    table = np.loadtxt(io.StringIO(run_peer("lammps", *_input(stuff, young, packing, seed), "stress.txt", limit=LIMIT)))
+    strain, (xx, yy, zz, xy, xz, yz) = STRAIN * np.arange(1, len(table) + 1) / len(table), table[:, 1:].T
+    late = strain > 0.5 * STRAIN
+    parts = np.array([part.mean() for part in np.array_split((-xy / yy)[late], _PARTS)])
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])[:, :, late].mean(axis=2)
+    ratio = float(-xy[late].mean() / yy[late].mean())
+    error = float(parts.std(ddof=1)) / math.sqrt(_PARTS)
+    return Sheared(
+        _degrees(ratio), triaxial_angle(tensor), mohr_angle(tensor), _degrees(ratio + error) - _degrees(ratio),
+        _over_mean(tensor[0, 1], tensor), float(yy[late].mean()), strain, -xy / yy,
+    )  # fmt: skip
+
+
+def _input(stuff: Material, young: float, packing: float, seed: int) -> tuple[str, str]:
+    """Data file and deck: grains of a jittered lattice are pressed together in y in a drag, then sheared in xy."""
+    rng = np.random.default_rng(seed)
+    width, depth, height = (side * GRAIN for side in (SIZE[0], SIZE[1], SIZE[2]))
+    radii = draw_radii(rng, packing * width * depth * height, Uniform(GRAIN, SPREAD))
+    site = 1.25 * 2 * float(radii.max())
+    across, along = int(width / site), int(depth / site)
+    k, rest = np.divmod(np.arange(len(radii)), across * along)
+    cell = np.array([width / across, site, depth / along])
+    places = (np.column_stack([rest % across, k, rest // across]) + 0.5) * cell
+    places += rng.uniform(-0.49, 0.49, (len(radii), 3)) * (cell - 2 * radii[:, None])
+    top = (k.max() + 1) * site
+    lines = ["grains of hedgebed\n", f"{len(radii)} atoms", "1 atom types\n"]
+    lines += [
+        f"0 {width:.17g} xlo xhi",
+        f"0 {top:.17g} ylo yhi",
+        f"0 {depth:.17g} zlo zhi",
+        "0 0 0 xy xz yz\n",
+        "Atoms\n",
+    ]
+    lines += [
+        f"{i} 1 {2 * r:.17g} {stuff.density:g} " + " ".join(f"{v:.17g}" for v in place)
+        for i, (r, place) in enumerate(zip(radii, places, strict=True), 1)
+    ]
+    solid = 4 / 3 * math.pi * float((radii**3).sum())
+    soft = stuff.softened(young)
+    step = time_step_for(soft, diameter=GRAIN * (1 - SPREAD), max_overlap=0.05, wanted=None)
+    unit = GRAIN * math.sqrt(stuff.density / PRESSURE)
+    rate = INERTIAL / unit
+    mass = stuff.density * math.pi / 6 * GRAIN**3
+    squeezing = round(30 * unit / step)
+    deck = [
+        "units si", "atom_style sphere", "comm_modify vel yes", "boundary p p p", "newton off", "read_data grains.data",
+        "neighbor 4e-4 bin", "neigh_modify delay 0 every 1 check yes", "pair_style granular",
+        f"pair_coeff * * {lammps_law(stuff, young, GRAIN)}",
+        f"timestep {step:.17g}", "fix motion all nve/sphere", f"fix calm all viscous {mass / unit:.17g}",
+        f"fix squeeze all deform 1 y final 0 {solid / (packing * width * depth):.17g} remap x", "thermo 10000",
+        f"run {squeezing}", "unfix squeeze", "unfix calm", "compute stress all pressure NULL virial",
+        f"fix turn all deform 1 xy erate {rate:.17g} remap v",
+        f"fix mean all ave/time 1 {_EVERY} {_EVERY} {' '.join(f'c_stress[{i}]' for i in range(1, 7))} file stress.txt",
+        f"run {round(STRAIN / rate / step / _EVERY) * _EVERY}",
+    ]  # fmt: skip
+    return "\n".join(lines) + "\n", "\n".join(deck) + "\n"
+
+
+def _smooth(strain: np.ndarray, ratio: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """The ratio averaged over a fiftieth of the strain, at these strains."""
+    kernel = np.ones(max(1, len(ratio) // 50))
+    return np.interp(at, strain, np.convolve(ratio, kernel / len(kernel), "same"))
+
+
+def _each(found: list[Sheared]) -> str:
+    return ", ".join(f"{one.angle:.1f}" for one in found)
+
+
+def _compute(tell: Tell) -> Outcome:
+    if PEERS["lammps"].find() is None:
+        return Outcome(skipped=f"LAMMPS is not installed (apt install {PEERS['lammps'].package})")
+    rows, curves, words = [], [], []
+    parts = len(ROLLING) * len(SEEDS)
+    for k, rolling in enumerate(ROLLING):
+        stuff, here, there = _stuff(rolling), [], []
+        runs: list[ElementShear] = []
+        for m, seed in enumerate(SEEDS):
+            begin = (k * len(SEEDS) + m) / parts
+            one, run = _here(stuff, seed, lambda share, begin=begin: tell(begin + 0.7 * share / parts))  # type: ignore[misc]
+            here.append(one)
+            runs.append(run)
+        packing = float(np.mean([_packing(run) for run in runs]))
+        there = [in_lammps(stuff, young=runs[0].young, packing=packing, seed=seed) for seed in SEEDS]
+        about = f"rolling friction {rolling:g}"
+        for name, words_of in (("angle", "plane of shear"), ("triaxial", "triaxial"), ("mohr", "Mohr's circle")):
+            theirs, ours = (float(np.mean([getattr(one, name) for one in found])) for found in (there, here))
+            rows.append(Comparison(f"{about}, {words_of}", "degrees", theirs, ours, BAND, False))
+        for label, found in (("LAMMPS", there), ("bed", here)):
+            strain = np.linspace(0.05, 0.98 * STRAIN, 60)
+            ratio = np.mean([_smooth(one.strain, one.ratio, strain) for one in found], axis=0)
+            curves.append(Curve(f"{label}, {rolling:g}", strain, ratio, label == "bed"))
+        words.append(say(
+            "sheared", about=about, grain_count=runs[0].grain_count, packing=packing, here=_each(here),
+            there=_each(there), pressure=np.mean([one.pressure for one in there]), ours=PRESSURE,
+        ))  # fmt: skip
+    remark = say(
+        "samples", words="; ".join(words), spread=100 * SPREAD, inertial=INERTIAL, count=len(SEEDS),
+        from_strain=0.5 * STRAIN, to_strain=STRAIN,
+    )  # fmt: skip
+    return Outcome(rows, [Plot("Stress ratio", "shear strain [1]", "shear over normal stress [1]", curves)], [remark])
+
+
+def _published(tell: Tell) -> Outcome:
+    rows, words = [], []
+    everything: list[ElementShear] = []
+    parts = len(PUBLISHED) * len(SEEDS_AS_PUBLISHED)
+    for k, (friction, (wanted, dense)) in enumerate(PUBLISHED.items()):
+        found, runs = [], []
+        for m, seed in enumerate(SEEDS_AS_PUBLISHED):
+            begin = (k * len(SEEDS_AS_PUBLISHED) + m) / parts
+            stuff = _stuff(0.0, friction)
+            one, run = _here(stuff, seed, lambda share, b=begin: tell(b + share / parts), **AS_PUBLISHED)  # type: ignore[misc]
+            found.append(one)
+            runs.append(run)
+        everything += runs
+        ratio, circle = (float(np.mean([getattr(one, key) for one in found])) for key in ("over_mean", "mohr"))
+        packing = float(np.mean([_packing(run) for run in runs]))
+        about = f"friction {friction:g}"
+        rows += [
+            Comparison(f"{about}, Mohr's circle", "degrees", math.degrees(math.asin(wanted)), circle, BAND, False),
+            Comparison(f"{about}, shear over mean normal stress", "1", wanted, ratio, RATIO_BAND, False),
+            Comparison(f"{about}, packing fraction", "1", dense, packing, PACKING_BAND, False),
+        ]
+        late = [run.inside_strain > 0.5 * STRAIN for run in runs]
+        tensor = np.mean([run.stress[at].mean(axis=0) for run, at in zip(runs, late, strict=True)], axis=0)
+        words.append(say(
+            "circles", about=about, found=", ".join(f"{one.mohr:.1f}" for one in found),
+            found_2=", ".join(f"{one.over_mean:.3f}" for one in found), found_3=_each(found),
+            along=tensor[0, 0] / tensor[2, 2], across=tensor[1, 1] / tensor[2, 2],
+        ))  # fmt: skip
+    remark = say(
+        "as_published", words="; ".join(words), spread=100 * AS_PUBLISHED["spread"],
+        overlap=100 * max(run.max_overlap for run in everything), inertial_number=AS_PUBLISHED["inertial_number"],
+    )  # fmt: skip
+    return Outcome(rows, (), [remark])
+
+
+CASES = {"friction-angle": _compute, "friction-angle-published": _published}

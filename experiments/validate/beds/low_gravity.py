@@ -1,0 +1,223 @@
+"""One ball in like beds from 9.81 down to 1e-5 m/s2: sunk from rest, at one Froude number, dropped as in Murdoch.
+
+Without cohesion nothing but g gives hard grains a time or a stress, so depth over the ball's diameter D is a function
+of v / sqrt(g D) and of ratios of lengths and densities alone; Slonaker & Kamrin 2017 say the same of any body where
+grains are a frictional continuum, and there the grains' size is out of it too. The beds are prepared anew at each
+gravity with the stiffness, step and criteria of settling that the bed chooses by itself: a constant tuned at 1 g would
+show here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero
+from experiments.validate.base.drops import BEADS, drop, prepared
+from experiments.validate.base.parts import part
+
+from .words import say
+
+__all__ = ["CASES", "Setting", "collapsed", "power_of"]
+
+GRAIN, BALL = 0.02, 0.1  # diameters [m]: five grains across the ball
+BOX = (2.5, 2.5, 1.75)  # of the bed, over D + d
+STEEL, ALUMINIUM = 8065.0, 2700.0  # density of the ball: Katsuragi & Durian's; Murdoch's, taken as solid [kg/m3]
+PLACES = ((0.25, 0.25), (0.75, 0.75), (0.25, 0.75), (0.75, 0.25))  # where it comes down, over the bed's sides
+SWEEP = ((9.81, 1), (1e-5, 6))  # gravity [m/s2], seed: the ends of what a bed is for
+FROUDE = 2.0
+LARGER, LARGER_AT = 1.4, (0.1, 7)  # another ball over the first; its bed grows with it, the grains do not
+MURDOCH_GRAVITIES = ((1.0, 3), (0.2, 4))
+MURDOCH_SPEEDS = (0.05, 0.1, 0.2, 0.4)
+BAND = 0.1
+STRUCK = 0.08  # overlap over diameter that is let pass where the ball strikes; the bed itself stays below 0.05
+LONGEST = 8.0  # over sqrt(D / g); one that still creeps then has come as far as it is taken to
+MOSTLY = 0.9  # of its depth, for the time it takes
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One drop: SI units, ``at`` over the bed's sides."""
+
+    gravity: float
+    seed: int
+    at: tuple[float, float]
+    density: float
+    speed: float
+    ball: float = BALL
+    stiffer: float = 1.0  # than the bed would choose by itself
+
+    def run(self, tell: Tell = lambda share: None) -> dict[str, np.ndarray]:
+        """What `drop` gives, kept."""
+
+        def compute() -> dict[str, np.ndarray]:
+            size = tuple(share * (self.ball + GRAIN) for share in BOX)
+            bed = prepared(grain=GRAIN, size=size, gravity=self.gravity, seed=self.seed, stiffer=self.stiffer)
+            bed.overlap_limit = STRUCK
+            return drop(
+                bed, radius=self.ball / 2, density=self.density, speed=self.speed,
+                at=(self.at[0] * size[0], self.at[1] * size[1]), longest=LONGEST * math.sqrt(self.ball / self.gravity),
+                tell=tell,
+            )  # fmt: skip
+
+        told = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        return part("drop", told | {"grain": GRAIN, "box": BOX, "longest": LONGEST}, compute)
+
+
+def power_of(x: Sequence[float], y: Sequence[float]) -> float:
+    """b of the least squares y = a x^b in logarithms [1]."""
+    return float(np.polyfit(np.log(x), np.log(y), 1)[0])
+
+
+def collapsed(
+    runs: Sequence[dict[str, np.ndarray]], lengths: Sequence[float], times: Sequence[float], count: int = 60
+) -> tuple[np.ndarray, np.ndarray]:
+    """Depth over length of each run at the same times over its unit: times [count], depths [runs, count].
+
+    A ball that has stopped stays where it is.
+    """
+    last = max(run["time"][-1] / unit for run, unit in zip(runs, times, strict=True))
+    grid = np.linspace(0, last, count)
+    depths = [
+        np.interp(grid, run["time"] / unit, run["depth"] / length)
+        for run, length, unit in zip(runs, lengths, times, strict=True)
+    ]
+    return grid, np.array(depths)
+
+
+def _all(settings: Sequence[Setting], tell: Tell) -> list[dict[str, np.ndarray]]:
+    found = []
+    for k, one in enumerate(settings):
+        found.append(one.run())
+        tell((k + 1) / len(settings))
+    return found
+
+
+def _time_down(run: dict[str, np.ndarray]) -> float:
+    """When the ball has gone most of its way [s]."""
+    return float(np.interp(MOSTLY * run["depth"][-1], run["depth"], run["time"]))
+
+
+def _name(gravity: float, seed: int) -> str:
+    return f"{gravity:g} m/s2, bed {seed}"
+
+
+def _about() -> str:
+    across = " x ".join(f"{share * (BALL + GRAIN) / GRAIN:.3g}" for share in BOX)
+    return say("beads", beads=BEADS, across=across, grain=BALL / GRAIN)
+
+
+def _sweep(speed_over: float) -> list[Setting]:
+    return [Setting(g, seed, at, STEEL, speed_over * math.sqrt(g * BALL)) for g, seed in SWEEP for at in PLACES]
+
+
+def _means(values: Sequence[float]) -> list[float]:
+    """Of each bed's places."""
+    return [float(pair.mean()) for pair in np.asarray(values).reshape(-1, len(PLACES))]
+
+
+def _sink(tell: Tell) -> Outcome:
+    settings = _sweep(0.0)
+    runs = _all(settings, tell)
+    depths, times = [float(run["depth"][-1]) for run in runs], [_time_down(run) for run in runs]
+    creeping = sum(not run["stopped"] for run in runs)
+    gravities = [one.gravity for one in settings]
+    mean = float(np.mean(depths))
+    rows = [
+        Comparison(f"final depth over D, {_name(*bed)}", "1", mean / BALL, depth / BALL, BAND)
+        for bed, depth in zip(SWEEP, _means(depths), strict=True)
+    ]
+    rows.append(near_zero("exponent of g in the final depth", power_of(gravities, depths), 0.01))
+    rows.append(
+        Comparison(
+            f"exponent of g in the time to {MOSTLY:g} of the depth", "1", -0.5, power_of(gravities, times), 0.01, False
+        )
+    )
+    spread = np.std(depths, ddof=1) / mean
+    curves = [Curve("mean", [min(gravities), max(gravities)], [mean / BALL] * 2, False)]
+    curves.append(Curve("bed", gravities, np.array(depths) / BALL))
+    plot = Plot("How deep a ball sinks from rest", "gravity [m/s2]", "depth over the ball's diameter [1]", curves, "x")
+    remark = say(
+        "from_rest", about=_about(), steel=STEEL, spread=100 * spread, creeping=creeping, count=len(runs),
+        longest=LONGEST,
+    )  # fmt: skip
+    return Outcome(rows, [plot], [remark])
+
+
+def _one_froude(tell: Tell, others: Sequence[Setting], names: Sequence[str]) -> Outcome:
+    """The sweep at one Froude number and beside it other beds; held to the mean curve of the sweep are the others, or
+    its own beds where there are none."""
+    settings = [*_sweep(FROUDE), *others]
+    runs = _all(settings, tell)
+    lengths = [one.ball + GRAIN for one in settings]
+    units = [math.sqrt(length / one.gravity) for length, one in zip(lengths, settings, strict=True)]
+    grid, depths = collapsed(runs, lengths, units)
+    beds = depths.reshape(-1, len(PLACES), len(grid)).mean(axis=1)
+    mean = beds[: len(SWEEP)].mean(axis=0)
+    final = float(mean[-1])
+    labels = [*(_name(*bed) for bed in SWEEP), *names]
+    rows = []
+    for name, curve in list(zip(labels, beds, strict=True))[len(SWEEP) if others else 0 :]:
+        rows.append(Comparison(f"final depth over D + d, {name}", "1", final, float(curve[-1]), BAND))
+        rows.append(
+            near_zero(f"largest difference over the final depth, {name}", np.abs(curve - mean).max() / final, BAND)
+        )  # fmt: skip
+    curves = [Curve("mean of the sweep", grid, mean, False)]
+    curves += [Curve(name, grid, curve) for name, curve in zip(labels, beds, strict=True)]
+    plot = Plot("One Froude number", "t sqrt(g / (D + d)) [1]", "depth over D + d [1]", curves)
+    ends = depths[: len(SWEEP) * len(PLACES), -1]
+    remark = say(
+        "at_one_froude", about=_about(), froude=FROUDE, beds=len(SWEEP),
+        scatter=100 * float(np.std(ends, ddof=1)) / final,
+    )  # fmt: skip
+    return Outcome(rows, [plot], [remark])
+
+
+def _froude(tell: Tell) -> Outcome:
+    return _one_froude(tell, (), ())
+
+
+def _size(tell: Tell) -> Outcome:
+    # The ball as grains' centres see it, D + d, is what scales (Kumar et al. 2017), and its mass with the cube of that.
+    large = LARGER * (BALL + GRAIN) - GRAIN
+    density = STEEL * (LARGER * BALL / large) ** 3
+    speed = FROUDE * math.sqrt(LARGER_AT[0] * LARGER * BALL)
+    others = [Setting(*LARGER_AT, at, density, speed, ball=large) for at in PLACES]
+    found = _one_froude(tell, others, [f"{LARGER_AT[0]:g} m/s2, ball {LARGER:g} times larger"])
+    remark = say("larger_ball", larger=LARGER)
+    return Outcome(found.comparisons, found.plots, [*found.remarks, remark])
+
+
+def _murdoch(tell: Tell) -> Outcome:
+    settings = [
+        Setting(g, seed, at, ALUMINIUM, speed) for g, seed in MURDOCH_GRAVITIES for speed in MURDOCH_SPEEDS
+        for at in PLACES
+    ]  # fmt: skip
+    runs = _all(settings, tell)
+    shape = (len(MURDOCH_GRAVITIES), len(MURDOCH_SPEEDS))
+    depths = np.array(_means([run["depth"][-1] for run in runs])).reshape(shape)
+    times = np.array(_means([_time_down(run) for run in runs])).reshape(shape)
+    speeds = np.array(MURDOCH_SPEEDS)
+    rows, curves = [], []
+    for (g, _), row in zip(MURDOCH_GRAVITIES, depths, strict=True):
+        line = np.polyfit(speeds, row, 1)
+        left = ((row - np.polyval(line, speeds)) ** 2).sum() / ((row - row.mean()) ** 2).sum()
+        rows.append(Comparison(f"R^2 of depth over speed, {g:g} m/s2", "1", 1.0, 1 - float(left), 0.02))
+        curves += [Curve(f"line, {g:g} m/s2", speeds, 1e3 * np.polyval(line, speeds), False),
+                   Curve(f"bed, {g:g} m/s2", speeds, 1e3 * row)]  # fmt: skip
+    logs = np.log([[g] * len(speeds) for g, _ in MURDOCH_GRAVITIES]).ravel(), np.log(np.tile(speeds, shape[0]))
+    terms = np.column_stack([np.ones(depths.size), *logs])
+    of_depth = np.linalg.lstsq(terms, np.log(depths).ravel(), rcond=None)[0]
+    of_time = np.linalg.lstsq(terms, np.log(times).ravel(), rcond=None)[0]
+    rows.append(near_zero("exponent of g in the depth", of_depth[1], 0.1))
+    rows.append(near_zero("exponent of g in the duration", of_time[1], 0.1))
+    rows.append(near_zero("exponent of the speed in the duration", of_time[2], 0.1))
+    remark = say("murdoch", about=_about(), aluminium=ALUMINIUM)
+    plot = Plot("A ball of 10 cm in low gravity", "speed [m/s]", "depth [mm]", curves)
+    return Outcome(rows, [plot], [remark])
+
+
+CASES = {"sink-from-rest": _sink, "gravity-sweep": _froude, "size-collapse": _size, "murdoch": _murdoch}

@@ -1,0 +1,195 @@
+"""Many grains: the books of momentum, angular momentum and energy; the floor carries the weight."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from dem import Bed, Material
+from dem.contact.law import effective_moduli
+from experiments.validate.base import cloud
+from experiments.validate.base.case import Comparison, Compute, Curve, Outcome, Plot, Tell, near_zero, told
+from experiments.validate.base.energy import Book, keep_book
+from experiments.validate.base.spheres import RADIUS
+
+__all__ = ["CASES", "CLUSTER_SIZE", "ROUGH", "cluster", "hertz_energy", "settled_cloud"]
+
+CLUSTER_SIZE = 16
+ROUGH = Material("grain", 2600, 1e7, 0.25, 0.5, 0.6, 0.15)
+GAS = Material("gas", 2600, 1e6, 0.25, 0.0, 1.0)
+
+
+def cluster(material: Material, *, flat: bool = False, gravity: Any = 0.0, **options: Any) -> Bed:
+    """Sixteen grains of 2.5 mm near the middle of the box that fly at one another; ``flat``: a gas in one plane."""
+    rng = np.random.default_rng(5)
+    i = np.arange(CLUSTER_SIZE)
+    spins = None
+    if flat:
+        positions = np.column_stack([0.00625 + 0.0125 * (i % 4), 0.00625 + 0.0125 * (i // 4), np.full(16, 0.03)])
+        positions[:, :2] += rng.uniform(-0.003, 0.003, (16, 2))
+        velocities = rng.normal(0, 1.0, (16, 3)) * [1, 1, 0]
+    else:
+        lattice = np.column_stack([i % 2, i // 2 % 2, i // 4]) * 0.0052
+        positions = lattice + [0.0224, 0.0224, 0.02] + rng.uniform(0, 1e-4, (16, 3))
+        velocities = (positions.mean(axis=0) - positions) * 40 + rng.normal(0, 0.1, (16, 3))
+        spins = rng.normal(0, 100, (16, 3))
+    return Bed.from_grains(
+        material, positions=positions, radii=np.full(CLUSTER_SIZE, RADIUS), velocities=velocities, spins=spins,
+        size=(0.05, 0.05, 0.05), height=0.08, gravity=gravity, floor=False, max_overlap=0.2, **options,
+    )  # fmt: skip
+
+
+def hertz_energy(bed: Bed, young: float, poisson: float) -> float:
+    """2/5 k delta^2.5 over the pairs of like grains of a cluster [J], by a plain double loop."""
+    x = bed.grains().position
+    i, j = np.triu_indices(len(x), 1)
+    d = x[i] - x[j]
+    d[:, :2] -= np.array(bed.size[:2]) * np.round(d[:, :2] / bed.size[:2])
+    overlap = np.maximum(0, 2 * RADIUS - np.linalg.norm(d, axis=1))
+    k = 4 / 3 * effective_moduli(young, poisson, young, poisson)[0] * math.sqrt(RADIUS / 2)
+    return float(0.4 * k * (overlap**2.5).sum())
+
+
+def _momentum(tell: Tell) -> Outcome:
+    """A cloud with friction and rolling resistance, no gravity, no floor, in touch across the boundaries."""
+    bed = cloud.make(gravity=0.0, floor=False, shift=(0, 0, 0.03))
+    before = bed.grains()
+    bed.advance(500)
+    after = bed.grains()
+    scale = before.mass @ np.linalg.norm(before.velocity, axis=1)
+    change = before.mass @ (after.velocity - before.velocity)
+    slowest = np.linalg.norm(after.velocity - before.velocity, axis=1).min()
+    return Outcome(
+        [near_zero("change over the sum of m v", np.abs(change).max() / scale, 1e-13)],
+        remarks=[f"In these 500 steps every one of the 64 grains changes its velocity by at least {slowest:.2g} m/s."],
+    )
+
+
+def _angular_momentum(tell: Tell) -> Outcome:
+    """The sum of x x m v + I w of a cluster that reaches no boundary; pairs' torques balance at the contact point."""
+    bed = cluster(ROUGH, time_step=4e-6)
+
+    def moments() -> tuple[np.ndarray, np.ndarray]:
+        g = bed.grains()
+        orbital = np.cross(g.position, g.mass[:, None] * g.velocity)
+        return orbital, 0.4 * (g.mass * g.radius**2)[:, None] * g.spin
+
+    orbital, own = moments()
+    for part in range(5):
+        bed.advance(200)
+        tell((part + 1) / 5)
+    later = moments()
+    change = (later[0] + later[1] - orbital - own).sum(axis=0)
+    moved = np.abs(later[1] - own).max() / np.abs(own).max()
+    return Outcome(
+        [near_zero("change over the sum of |x x m v|", np.abs(change).max() / np.abs(orbital).sum(), 1e-13)],
+        remarks=[f"The grains' own angular momenta change by up to {100 * moved:.0f} % of the largest."],
+    )
+
+
+def _elastic_gas(tell: Tell) -> Outcome:
+    """Frictionless, restitution 1: kinetic and Hertz energy together; the error falls as dt^2."""
+    steps, worst, curves = (2e-5, 1e-5, 5e-6), [], []
+    for step in told(steps, tell):
+        bed = cluster(GAS, flat=True, time_step=step)
+        first, drift, times = bed.kinetic_energy, [], []
+        for _ in range(20):
+            bed.advance(round(1e-3 / step))
+            drift.append((bed.kinetic_energy + hertz_energy(bed, GAS.young, GAS.poisson)) / first - 1)
+            times.append(1e3 * bed.time)
+        worst.append(float(np.abs(drift).max()))
+        curves.append(Curve(f"dt = {1e6 * step:g} us", times, drift))
+    slope = float(np.polyfit(np.log(steps), np.log(worst), 1)[0])
+    return Outcome(
+        [
+            Comparison("order of the drift", "1", 2.0, slope, 0.5, False),
+            near_zero("largest drift at dt = 5 us, over the energy", worst[-1], 1e-4),
+        ],
+        [Plot("Energy of an elastic gas", "time [ms]", "change of the energy, relative", curves)],
+    )
+
+
+PARTS = {
+    "kinetic": "kinetic",
+    "normal": "in Hertz springs",
+    "tangential": "in tangential springs",
+    "turning": "in rolling and twisting springs",
+    "damped": "lost to normal dashpots",
+    "rubbed": "lost to tangential forces",
+    "turned": "lost to rolling and twisting",
+    "potential": "in height",
+}
+_DURATION = 0.004  # from the first collision to dispersal [s]
+_STRONG = (30.0, 0.0, -100.0)  # gravity that does as much work in that time as the collisions [m/s2]
+
+
+def _energy(material: Material, *, gravity: Any = 0.0, tensile: bool = False) -> Compute:
+    def compute(tell: Tell) -> Outcome:
+        books: list[Book] = []
+        for k, step in enumerate((4e-6, 2e-6)):
+            bed = cluster(material, gravity=gravity, time_step=step, tensile=tensile)
+            books.append(keep_book(bed, round(_DURATION / step), tensile=tensile))
+            tell((1 + 2 * k) / 3)
+        fine = books[1]
+        first = fine.parts["kinetic"][0]
+        gaps = [float(np.abs(book.gap).max() / first) for book in books]
+        off = max(book.force_error for book in books)
+        back = max(fine.given_back(part) for part in ("damped", "rubbed", "turned")) / first
+        rows = [
+            near_zero("gap of the book over the first energy, steps of 4 us", gaps[0], 1e-3),
+            Comparison("order of the gap in the step", "1", 2.0, math.log2(gaps[0] / gaps[1]), 0.5, False),
+            near_zero("force on a grain: the bed's less the law's, over the largest", off, 1e-9),
+            near_zero("what a dashpot or friction gives back, over the first energy", back, 1e-3),
+        ]
+        named = {key: name for key, name in PARTS.items() if key in fine.parts}
+        shares = {name: fine.parts[key][-1] / first for key, name in named.items()}
+        said = ", ".join(f"{100 * share:.2f} % {name}" for name, share in shares.items())
+        curves = [Curve(name, 1e3 * fine.time, fine.parts[key] / first, False) for key, name in named.items()]
+        curves.append(Curve("sum", 1e3 * fine.time, fine.total / first))
+        plot = Plot("Where the energy goes", "time [ms]", "share of the first energy [1]", curves)
+        return Outcome(rows, [plot], [f"Of the first energy at the end: {said}."])
+
+    return compute
+
+
+def settled_cloud() -> Bed:
+    """The cloud after it has fallen and come to rest, weighed over the last tenth of a second."""
+    bed = cloud.make(time_step=None)
+    for time, drag in ((0.4, 0.02), (0.1, 0.005), (0.4, math.inf)):
+        bed.advance(round(time / bed.time_step), drag_time=drag)
+    for _ in range(20):  # a grain may slide late, so rest is waited for
+        bed.advance(round(0.1 / bed.time_step))
+        if bed.kinetic_energy < 1e-9 * bed.weight * cloud.DIAMETER:
+            break
+    bed.advance(round(0.1 / bed.time_step))
+    return bed
+
+
+def _floor_weight(tell: Tell) -> Outcome:
+    bed = settled_cloud()
+    grains = bed.grains()
+    weight = cloud.STUFF.density * 4 / 3 * math.pi * float((grains.radius**3).sum()) * 9.81
+    uneven = np.abs(grains.force).max() / (weight / bed.grain_count)
+    return Outcome(
+        [
+            Comparison("floor force", "N", weight, bed.floor_force, 1e-4),
+            near_zero("largest force left on a grain over its weight", uneven, 1e-2),
+        ],
+        remarks=[f"64 grains, coordination number {bed.coordination_number:.2f}. The bulk band of the design is 1 %."],
+    )
+
+
+_ROUGH_WITHOUT_ROLLING = {"energy-hertz": (0.0, 0.6), "energy-undamped": (0.5, 1.0), "energy-friction": (0.5, 0.6)}
+"""Friction and restitution [1]."""
+CASES = {
+    "momentum": _momentum,
+    "angular-momentum": _angular_momentum,
+    "energy-elastic": _elastic_gas,
+    **{id: _energy(Material(id, 2600, 1e7, 0.25, *given)) for id, given in _ROUGH_WITHOUT_ROLLING.items()},
+    "energy-rolling": _energy(ROUGH),
+    "energy-tensile": _energy(Material("tensile", 2600, 1e7, 0.25, 0.5, 0.6), tensile=True),
+    "energy-gravity": _energy(ROUGH, gravity=_STRONG),
+    "floor-weight": _floor_weight,
+}

@@ -1,0 +1,338 @@
+"""Cohesion: force, pull-off, separation and the overlap at no load of DMT's and JKR's laws; the books with them.
+
+w = 2 gamma is the work of adhesion. The closed forms are written anew here, JKR's from the contact radius a:
+    DMT: F = 4/3 E* sqrt(R) d^1.5 - 2 pi w R;
+    JKR: F = 4 E* a^3 / 3 R - sqrt(8 pi w E* a^3), d = a^2 / R - sqrt(2 pi w a / E*).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from dem import Bed, Material
+from dem.contact.law import effective_moduli
+from dem.engine.energy import bed_energies
+from experiments.runs.types import Json
+from experiments.validate.base.case import Comparison, Compute, Curve, Outcome, Plot, Tell, near_zero
+from experiments.validate.base.spheres import RADIUS, SIXTEEN, mass_of, plane_modulus, row_of_grains
+
+__all__ = ["CASES", "Law"]
+
+YOUNG, POISSON, DENSITY, GAMMA = 1e7, 0.25, 2600.0, 0.5
+W = 2 * GAMMA
+STAR = {"plane": plane_modulus(YOUNG, POISSON), "pair": effective_moduli(YOUNG, POISSON, YOUNG, POISSON)[0]}
+REDUCED = {"plane": RADIUS, "pair": RADIUS / 2}
+MASS = mass_of(DENSITY, RADIUS)
+
+
+class Law:
+    """A law's closed forms for a pair of effective radius [m] and modulus [Pa].
+
+    Attributes:
+        pull: pull-off force [N]. load: what it adds to the load in the bound of friction [N].
+        free: overlap at no load [m]. end: overlap at which it parts [m].
+    """
+
+    def __init__(self, name: str, radius: float, young: float):
+        self.name, self.radius, self.young = name, radius, young
+        self.stiffness = 4 / 3 * young * math.sqrt(radius)
+        if name == "dmt":
+            self.pull = self.load = 2 * math.pi * W * radius
+            self.free, self.end = (self.pull / self.stiffness) ** (2 / 3), 0.0
+        else:
+            self.pull = 1.5 * math.pi * W * radius
+            self.load = 2 * self.pull
+            self.free = (9 * math.pi * W * radius**2 / (2 * young)) ** (2 / 3) / (3 * radius)
+            self._least = (math.pi * W * radius**2 / (8 * young)) ** (1 / 3)  # where d(a) is least
+            self.end = self._overlap(self._least)
+
+    def _overlap(self, a: float) -> float:
+        return a * a / self.radius - math.sqrt(2 * math.pi * W * a / self.young)
+
+    def force(self, overlap: float) -> float:
+        """At rest [N], positive where it pushes; 0 past the end."""
+        if overlap <= self.end:
+            return 0.0
+        if self.name == "dmt":
+            return self.stiffness * overlap**1.5 - self.pull
+        a = brentq(lambda a: self._overlap(a) - overlap, self._least, 1e3 * self._least, xtol=1e-18)
+        return 4 * self.young * a**3 / (3 * self.radius) - math.sqrt(8 * math.pi * W * self.young * a**3)
+
+    def stored(self, overlap: np.ndarray) -> float:
+        """Sum over pairs of the work since they met [J], elastic and of the surfaces, shape [pair]."""
+        if self.name == "dmt":
+            d = np.maximum(overlap, 0)
+            return float((0.4 * self.stiffness * d**2.5 - self.pull * d).sum())
+        # d R / a1^2 = s^4 - s and F = pi w R (8/3 s^6 - 4 s^3), a1^3 = 2 pi w R^2 / E*: integrated over d.
+        unit = (2 * math.pi * W * self.radius**2 / self.young) ** (1 / 3)
+
+        def part(s: float) -> float:
+            return 16 / 15 * s**10 - 8 / 3 * s**7 + s**4
+
+        first, total = 0.25 ** (1 / 3), 0.0
+        for d in overlap[overlap > self.end]:
+            s = brentq(lambda s: s**4 - s - d * self.radius / unit**2, first, 100.0, xtol=1e-15)  # noqa: B023
+            total += math.pi * W * unit**2 * (part(s) - part(first))
+        return total
+
+
+def _stuff(law: str, **changed: Any) -> Material:
+    given = {"friction": 0.5, "restitution": 0.5, "rolling_friction": 0.1} | changed
+    return Material("sticky", DENSITY, YOUNG, POISSON, cohesion=law, surface_energy=GAMMA, **given)
+
+
+def _bed(material: Material, heights: np.ndarray, **options: Any) -> Bed:
+    positions, radii, given = row_of_grains()
+    positions[:, 2] = heights
+    chosen: Json = {"radii": radii, "max_overlap": 0.1} | given | options
+    return Bed.from_grains(material, positions=positions, **chosen)
+
+
+def _pull_off(name: str) -> Compute:
+    def compute(tell: Tell) -> Outcome:
+        law = Law(name, RADIUS, STAR["plane"])
+        reach = law.free if name == "dmt" else -law.end
+        overlap = reach * np.concatenate([[-0.98, -0.9, -0.7, -0.4, -0.1, 0.01, 0.1], np.geomspace(0.2, 10, 9)])
+        found = _bed(_stuff(name), RADIUS - overlap).grains().force[:, 2]
+        closed = np.array([law.force(d) for d in overlap])
+        rows = [
+            near_zero(
+                "force over the floor, 16 overlaps: largest difference over the pull-off force",
+                np.abs(found - closed).max() / law.pull,
+                1e-9,
+            )
+        ]
+        tell(0.2)
+        rows += [_parting(name, law), _hanging(name)]
+        tell(0.6)
+        rows += _no_load(name)
+        tell(0.8)
+        rows += _sliding(name, law)
+        line = np.linspace(law.end - 0.1 * reach, 10 * reach, 300)
+        curves = [
+            Curve("closed form", 1e6 * line, [1e3 * law.force(d) for d in line], False),
+            Curve("bed", 1e6 * overlap, 1e3 * found),
+        ]
+        return Outcome(rows, [Plot("Force of a grain on the floor", "overlap [um]", "force [mN]", curves)])
+
+    return compute
+
+
+def _parting(name: str, law: Law) -> Comparison:
+    """Grains at overlaps about the end: halfway between the last that is held and the first that is not."""
+    scale = -law.end or law.free
+    overlap = law.end + scale * np.linspace(-4e-4, 4.1e-4, SIXTEEN)
+    held = np.abs(_bed(_stuff(name), RADIUS - overlap).grains().force[:, 2]) > 0
+    least = 0.5 * (overlap[held].min() + overlap[~held].max())
+    quantity = "overlap at which it parts, over that at no load" if name == "dmt" else "distance at which it parts"
+    if name == "dmt":
+        return near_zero(quantity, least / law.free, 1e-4)
+    return Comparison(quantity, "um", -1e6 * law.end, -1e6 * least, 1e-4)
+
+
+def _hanging(name: str) -> Comparison:
+    """Gravity upwards: sixteen radii about that whose weight is the pull-off force, each at rest where it has one."""
+    pull = 4.0 if name == "dmt" else 3.0
+    g = pull * GAMMA / (4 / 3 * RADIUS**2 * DENSITY)
+    share = 1 + 2e-3 * (np.arange(SIXTEEN) - 7.5)
+    radii = RADIUS * share
+    heights = [r - _hung(Law(name, r, STAR["plane"]), -(4 / 3) * math.pi * r**3 * DENSITY * g) for r in radii]
+    bed = _bed(_stuff(name), np.array(heights), radii=radii, gravity=(0.0, 0.0, g))
+    bed.advance(round(0.02 / bed.time_step))
+    fell = bed.grains().displacement[:, 2] > 1e-5
+    load = share**2  # of the weight over the pull-off force, as r^3 / r
+    found = 0.5 * float(load[~fell].max() + load[fell].min()) if fell.any() and not fell.all() else math.nan
+    closed = pull * math.pi * GAMMA * RADIUS
+    return Comparison(
+        "pull-off, by the heaviest that hangs and the lightest that falls", "mN", 1e3 * closed, 1e3 * closed * found,
+        3e-3,
+    )  # fmt: skip
+
+
+def _hung(law: Law, force: float) -> float:
+    """The overlap at a pull [N] that is stable; that of the strongest pull where there is none."""
+    a = (9 * math.pi * W * law.radius**2 / (8 * law.young)) ** (1 / 3)
+    peak = 0.0 if law.name == "dmt" else a * a / law.radius - math.sqrt(2 * math.pi * W * a / law.young)
+    least = peak + 1e-12 * law.free
+    return brentq(lambda d: law.force(d) - force, least, law.free) if law.force(least) < force else least
+
+
+def _no_load(name: str) -> list[Comparison]:
+    """Grains on the floor, and pairs one over the other, that touch and come to rest."""
+    pair, plane = (Law(name, REDUCED[what], STAR[what]) for what in ("pair", "plane"))
+    gap = -0.5 * pair.end if name == "jkr" else -1e-9
+    positions, radii, given = row_of_grains()
+    positions[:, 2] = RADIUS + gap
+    positions[:8:2, 2] = 0.02
+    positions[1:8:2] = positions[:8:2] + [0, 0, 2 * RADIUS + gap]
+    bed = Bed.from_grains(_stuff(name, restitution=0.3), positions=positions, radii=radii, max_overlap=0.1, **given)
+    bed.advance(round(0.08 / bed.time_step))
+    z = bed.grains().position[:, 2]
+    found = {"pair": 2 * RADIUS - (z[1:8:2] - z[:8:2]), "plane": RADIUS - z[8:]}
+    return [
+        Comparison(f"overlap at no load, {text}", "um", 1e6 * law.free, 1e6 * _furthest(found[what], law.free), 1e-5)
+        for what, law, text in (("pair", pair, "two grains"), ("plane", plane, "grain and floor"))
+    ]
+
+
+def _furthest(found: np.ndarray, wanted: float) -> float:
+    return float(found[np.argmax(np.abs(found - wanted))])
+
+
+def _sliding(name: str, law: Law) -> list[Comparison]:
+    """A weightless grain, pulled along the floor: it stays below mu times the load, x'' = g - mu load / m beyond."""
+    mu, rows = 0.2, []
+    for share, band in ((0.98, 0.02), (1.5, 2e-3)):
+        pull = share * mu * law.load / MASS
+        bed = _bed(
+            _stuff(name, friction=mu, rolling_friction=5.0),
+            np.full(SIXTEEN, RADIUS - law.free),
+            gravity=(pull, 0.0, 0.0),
+        )
+        bed.advance(round(0.02 / bed.time_step))
+        first, start = bed.grains().velocity, bed.time
+        bed.advance(round(0.02 / bed.time_step))
+        found = (bed.grains().velocity - first)[:, 0] / (bed.time - start) / pull
+        closed = max(0.0, 1 - 1 / share)
+        rows.append(Comparison(
+            f"acceleration at {share:g} of mu load, over the pull's", "1", closed, _furthest(found, closed), band,
+            False,
+        ))  # fmt: skip
+    return rows
+
+
+def _cluster(material: Material, step: float, spin: float) -> Bed:
+    """Sixteen grains that fly at one another near the middle of the box; no gravity, no floor."""
+    rng, i = np.random.default_rng(5), np.arange(SIXTEEN)
+    positions = np.column_stack([i % 2, i // 2 % 2, i // 4]) * 0.0052
+    positions = positions + [0.0224, 0.0224, 0.02] + rng.uniform(0, 1e-4, (SIXTEEN, 3))
+    velocities = (positions.mean(axis=0) - positions) * 40 + rng.normal(0, 0.1, (SIXTEEN, 3))
+    return Bed.from_grains(
+        material, positions=positions, radii=np.full(SIXTEEN, RADIUS), velocities=velocities,
+        spins=rng.normal(0, spin, (SIXTEEN, 3)) if spin else None, size=(0.05, 0.05, 0.05), height=0.08, gravity=0.0,
+        floor=False, max_overlap=0.2, time_step=step,
+    )  # fmt: skip
+
+
+def _energy(bed: Bed, law: Law) -> float:
+    x = bed.grains().position
+    i, j = np.triu_indices(len(x), 1)
+    return bed.kinetic_energy + law.stored(2 * RADIUS - np.linalg.norm(x[i] - x[j], axis=1))
+
+
+def _books(name: str) -> Compute:
+    def compute(tell: Tell) -> Outcome:
+        law, curves = Law(name, REDUCED["pair"], STAR["pair"]), []
+        drifts = []
+        steps = (2e-6, 1e-6)
+        for k, step in enumerate(steps):
+            bed = _cluster(_stuff(name, friction=0.0, restitution=1.0, rolling_friction=0.0), step, 0.0)
+            first, energies, times = _energy(bed, law), [], []
+            for _ in range(30):
+                bed.advance(round(1e-4 / step))
+                energies.append(_energy(bed, law) / first - 1)
+                times.append(1e3 * bed.time)
+            drifts.append(float(np.abs(energies).max()))
+            curves.append(Curve(f"elastic, dt = {1e6 * step:g} us", times, energies))
+            tell(0.4 * (k + 1))
+        bed = _cluster(_stuff(name), 4e-6, 100.0)
+
+        def moments() -> tuple[np.ndarray, np.ndarray, float]:
+            g = bed.grains()
+            orbital = np.cross(g.position, g.mass[:, None] * g.velocity)
+            own = 0.4 * (g.mass * g.radius**2)[:, None] * g.spin
+            return (g.mass[:, None] * g.velocity).sum(axis=0), (orbital + own).sum(axis=0), np.abs(orbital).sum()
+
+        before, energies, times = moments(), [_energy(bed, law)], [0.0]
+        speed = float((bed.grains().mass * np.linalg.norm(bed.grains().velocity, axis=1)).sum())
+        for _ in range(40):
+            bed.advance(25)
+            energies.append(_energy(bed, law))
+            times.append(1e3 * bed.time)
+        after = moments()
+        curves.append(Curve("rough and damped", times, np.array(energies) / energies[0] - 1))
+        rows = [
+            near_zero(
+                f"elastic: largest drift at dt = {1e6 * step:g} us, over the energy", drift, 2e-4 * step / steps[1]
+            )
+            for step, drift in zip(steps, drifts, strict=True)
+        ]
+        rows += [
+            near_zero(
+                "rough: change of momentum over the sum of m v",
+                float(np.abs(after[0] - before[0]).max()) / speed,
+                1e-13,
+            ),
+            near_zero(
+                "rough: change of angular momentum over the sum of |x x m v|",
+                np.abs(after[1] - before[1]).max() / before[2],
+                1e-13,
+            ),
+            near_zero(
+                "rough: largest rise of the energy in 0.1 ms, over the first",
+                max(0.0, float(np.diff(energies).max() / energies[0])),
+                1e-3,
+            ),
+        ]
+        closed, more, remark = _closed(name, tell)
+        return Outcome(
+            rows + closed,
+            [Plot("Kinetic, elastic and surface energy", "time [ms]", "change over the first", curves), more],
+            [remark],
+        )
+
+    return compute
+
+
+def _closed(name: str, tell: Tell) -> tuple[list[Comparison], Plot, str]:
+    """The bed's own book of the rough cluster: what is held and what contacts took is the first energy."""
+    gaps, steps = [], (4e-6, 2e-6)
+    for k, step in enumerate(steps):
+        bed = _cluster(_stuff(name), step, 100.0)
+        bed.track_contact_work()
+        rows = []
+        for _ in range(41):
+            held, taken = bed_energies(bed, bodies={}), bed.contact_work
+            springs = held["tangential"], held["turning"]
+            lost = taken["damping"], taken["tangential"] - springs[0], taken["turning"] - springs[1]
+            rows.append([1e3 * bed.time, held["kinetic"], held["normal"], *springs, *lost])
+            bed.advance(round(1e-4 / step))
+        time, *parts = np.array(rows).T
+        total = np.sum(parts, axis=0)
+        gaps.append(float(np.abs(total - total[0]).max() / total[0]))
+        tell(0.9 + 0.05 * (k + 1))
+    found = [
+        near_zero(
+            f"rough: gap of the book over the first energy, steps of {1e6 * step:g} us",
+            gap,
+            2e-4 * (step / steps[0]) ** 2,
+        )
+        for step, gap in zip(steps, gaps, strict=True)
+    ]
+    curves = [Curve(words, time, part / total[0], False) for words, part in zip(_PARTS, parts, strict=True)]
+    curves.append(Curve("sum", time, total / total[0]))
+    shares = ", ".join(f"{100 * part[-1] / total[0]:.2f} % {words}" for words, part in zip(_PARTS, parts, strict=True))
+    remark = f"Of the rough grains' first energy at the end (the surfaces' counted from where pairs part): {shares}."
+    return found, Plot("Book of the rough cluster, steps of 2 us", "time [ms]", "over the first energy", curves), remark
+
+
+_PARTS = (
+    "kinetic",
+    "in normal springs and surfaces",
+    "in tangential springs",
+    "in rolling and twisting springs",
+    "lost to normal dashpots",
+    "lost to tangential forces",
+    "lost to rolling and twisting",
+)
+
+CASES = {
+    "dmt": _pull_off("dmt"),
+    "jkr": _pull_off("jkr"),
+    "energy-dmt": _books("dmt"),
+    "energy-jkr": _books("jkr"),
+}

@@ -1,0 +1,214 @@
+"""The order of the integrator: collisions against the equations of motion integrated by another method."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from dem import Bed, Grains, Material
+from dem.contact.law import effective_moduli
+from experiments.validate.base.case import Comparison, Compute, Curve, Outcome, Plot, Tell, near_zero, told
+from experiments.validate.base.spheres import RADIUS, SIXTEEN, hertz, mass_of, row_of_grains
+
+from .words import say
+
+__all__ = ["CASES", "errors_of_pair", "oblique_pair"]
+
+COUNTS = (50, 100, 200, 400)
+"""Steps in seven tenths of a contact."""
+DENSITY, YOUNG, POISSON = 2600.0, 1e8, 0.25
+QUANTITIES = ("velocity", "position over contact time", "spin times radius")
+
+
+def _reference(y0: np.ndarray, time: float, m: float, r: float, star: float, shear: float) -> np.ndarray:
+    """Two like grains, elastic and with no slip: (x, v, w of both, u), shape [7, 3]; independent of the engine."""
+    radius = r / 2
+
+    def rates(_, y):
+        x1, v1, w1, x2, v2, w2, u = y.reshape(7, 3)
+        d = x1 - x2
+        length = float(np.linalg.norm(d))
+        n, overlap = d / length, max(0.0, 2 * r - length)
+        arm = r - overlap / 2
+        v = v1 - v2 - np.cross(arm * (w1 + w2), n)
+        v_t = v - (v @ n) * n
+        turn = ((v1 - v2) - ((v1 - v2) @ n) * n) / length
+        du = v_t - (u @ turn) * n
+        a = math.sqrt(radius * overlap)
+        f = 4 / 3 * star * a * overlap * n - 8 * shear * a * u
+        t = arm * np.cross(f, n)
+        return np.concatenate([v1, f / m, t / (0.4 * m * r * r), v2, -f / m, t / (0.4 * m * r * r), du])
+
+    found = solve_ivp(rates, (0, time), y0, t_eval=[time], method="DOP853", rtol=1e-11, atol=1e-14)
+    return found.y[:, -1].reshape(7, 3)
+
+
+def staggered_pair(y0: np.ndarray, time: float, steps: int, m: float, r: float, *, middle: bool) -> np.ndarray:
+    """A leapfrog for ``_reference``'s two grains, in numpy: (x, v, w of both), shape [6, 3].
+
+    Args:
+        y0: as ``_reference`` has it. time: [s].
+        middle: the slip of a step is that across the normal at its middle, where the velocity is, as the bed has it
+            (to second order in the step); else at its end.
+    """
+    star, shear = effective_moduli(YOUNG, POISSON, YOUNG, POISSON)
+    radius, inertia, dt = r / 2, 0.4 * m * r * r, time / steps
+    x1, v1, w1, x2, v2, w2, u = y0.reshape(7, 3).copy()
+    f, t = np.zeros(3), np.zeros(3)
+    for _ in range(steps):
+        before = x1 - x2
+        v1, v2, w1, w2 = v1 + dt * f / m, v2 - dt * f / m, w1 + dt * t / inertia, w2 + dt * t / inertia
+        x1, x2 = x1 + dt * v1, x2 + dt * v2
+        d = x1 - x2
+        length = float(np.linalg.norm(d))
+        n, overlap = d / length, max(0.0, 2 * r - length)
+        arm, across = r - overlap / 2, n
+        if middle:
+            across = (before + d) / np.linalg.norm(before + d)
+            arm = r - 0.5 * max(0.0, 2 * r - 0.5 * float(np.linalg.norm(before + d)))
+        v = v1 - v2 - np.cross(arm * (w1 + w2), across)
+        u = u + dt * (v - (v @ across) * across)
+        u = u - (u @ n) * n
+        a = math.sqrt(radius * overlap)
+        f = 4 / 3 * star * a * overlap * n - 8 * shear * a * u
+        t = (r - overlap / 2) * np.cross(f, n)
+    half = 0.5 * dt
+    return np.array([x1, v1 + half * f / m, w1 + half * t / inertia, x2, v2 - half * f / m, w2 + half * t / inertia])
+
+
+def _orders_of_the_scheme() -> tuple[float, float]:
+    """Order of the position's error over the two finest of ``COUNTS``, with the normal of the step's end and middle."""
+    m = mass_of(DENSITY, RADIUS)
+    star, shear = effective_moduli(YOUNG, POISSON, YOUNG, POISSON)
+    time = 0.7 * hertz(m / 2, RADIUS / 2, star, 1.0)[2]
+    start, _, _ = oblique_pair(time / COUNTS[0], steps=0)
+    y0 = np.concatenate(
+        [getattr(start, k)[i] for i in (0, 5) for k in ("position", "velocity", "spin")] + [np.zeros(3)]
+    )
+    exact = _reference(y0, time, m, RADIUS, star, shear)
+    errors = np.array(
+        [
+            [
+                np.abs(staggered_pair(y0, time, n, m, RADIUS, middle=at)[[0, 3]] - exact[[0, 3]]).max()
+                for at in (False, True)
+            ]
+            for n in COUNTS[-2:]
+        ]
+    )
+    end, middle = np.log2(errors[0] / errors[1])
+    return float(end), float(middle)
+
+
+def oblique_pair(step: float, *, steps: int, friction: float = 50.0, along: bool = False) -> tuple[Grains, Grains, int]:
+    """Two grains meet obliquely, spinning, among others that are far away; before, after, and how many lists were made.
+
+    Args:
+        step: [s]. along: without spins and slip.
+    """
+    positions, radii, options = row_of_grains(floor=False)
+    positions[:, 2] += 0.02
+    n = np.array([0.8, 0.36, 0.48])
+    positions[5] = positions[0] + 2 * RADIUS * n
+    velocities, spins = np.zeros((SIXTEEN, 3)), np.zeros((SIXTEEN, 3))
+    velocities[5] = -1.0 * n
+    if not along:
+        velocities[5] += 0.4 * np.array([-0.6, 0.48, 0.64])
+        spins[0], spins[5] = (40.0, -30.0, 25.0), (-10.0, 60.0, 5.0)
+    bed = Bed.from_grains(
+        Material("pair", DENSITY, YOUNG, POISSON, friction, 1.0), positions=positions, radii=radii,
+        velocities=velocities, spins=spins, time_step=step, **options,
+    )  # fmt: skip
+    start = bed.grains()
+    bed.advance(steps)
+    return start, bed.grains(), bed.list_count
+
+
+def _unknowns(grains: Grains) -> np.ndarray:
+    """Position, velocity and spin of the two grains, and the spring of their contact, not yet stretched."""
+    return np.concatenate([v[i] for i in (0, 5) for v in (grains.position, grains.velocity, grains.spin)] + [np.zeros(3)])
+
+
+def errors_of_pair(along: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Errors of velocity, position over contact time and spin times radius [m/s] at each of ``COUNTS``; their "
+    "orders."""
+    star, shear = effective_moduli(YOUNG, POISSON, YOUNG, POISSON)
+    m = mass_of(DENSITY, RADIUS)
+    contact = hertz(m / 2, RADIUS / 2, star, 1.0)[2]
+    errors = []
+    for count in COUNTS:
+        start, after, _ = oblique_pair(0.7 * contact / count, steps=count, along=along)
+        if count == COUNTS[0]:
+            y0 = np.concatenate(
+                [getattr(start, k)[i] for i in (0, 5) for k in ("position", "velocity", "spin")] + [np.zeros(3)]
+            )
+            y = _reference(y0, 0.7 * contact, m, RADIUS, star, shear)
+        errors.append(
+            [
+                np.abs(after.velocity[[0, 5]] - y[[1, 4]]).max(),
+                np.abs(after.position[[0, 5]] - y[[0, 3]]).max() / contact,
+                np.abs(after.spin[[0, 5]] - y[[2, 5]]).max() * RADIUS,
+            ]
+        )
+    found = np.array(errors)[:, : 2 if along else 3]
+    return found, -np.polyfit(np.log(COUNTS), np.log(found), 1)[0]
+
+
+def _order(along: bool) -> Compute:
+    def compute(tell: Tell) -> Outcome:
+        errors, slopes = errors_of_pair(along)
+        band = 0.1 if along else 0.25
+        rows = [
+            Comparison(f"order of the {name}'s error", "1", 2.0, slope, band, False)
+            for name, slope in zip(QUANTITIES, slopes, strict=False)
+        ]
+        coarsest = 2e-4 if along else 3e-4
+        rows.append(near_zero("largest error at 50 steps", errors[0].max(), coarsest, "m/s"))
+        rows.append(near_zero("largest error at 400 steps", errors[-1].max(), 6e-6, "m/s"))
+        counts = np.array(COUNTS)
+        curves = [Curve("order 2", counts, errors[0].max() * (counts[0] / counts) ** 2.0, False)]
+        curves += [Curve(name, counts, column) for name, column in zip(QUANTITIES, errors.T, strict=False)]
+        remarks = []
+        if not along:
+            end, middle = _orders_of_the_scheme()
+            remarks.append(say("scheme_order", middle=middle, end=end))
+        plot = Plot("Error at seven tenths of a contact", "steps", "error [m/s]", curves, log="xy")
+        return Outcome(rows, [plot], remarks)
+
+    return compute
+
+
+def _bouncing(tell: Tell) -> Outcome:
+    """An elastic grain in free flight and contact: the time of its second landing, from closed forms alone."""
+    speed = 1.0
+    star, _ = effective_moduli(YOUNG, POISSON, math.inf, POISSON)
+    _, _, time, _ = hertz(mass_of(DENSITY, RADIUS), RADIUS, star, speed)
+    errors, counts = [], np.array([16, 32, 64, 128, 256])
+    for count in told(counts, tell):
+        positions, radii, options = row_of_grains()
+        phase = (np.arange(SIXTEEN) + 0.5) / SIXTEEN  # where in a step the contact begins
+        step = time / count
+        positions[:, 2] += phase * step * speed
+        bed = Bed.from_grains(
+            Material("bouncing", DENSITY, YOUNG, POISSON, 0.0, 1.0), positions=positions, radii=radii,
+            velocities=np.tile([0.0, 0.0, -speed], (SIXTEEN, 1)), time_step=step, max_overlap=0.2, **options,
+        )  # fmt: skip
+        bed.advance(round(1.5 * count))
+        grains = bed.grains()
+        errors.append(float(np.abs(grains.velocity[:, 2] / speed - 1).max()))
+    order = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
+    curves = [
+        Curve("order 2.5", counts, errors[0] * (counts[0] / counts) ** 2.5, False),
+        Curve("worst of sixteen phases", counts, errors),
+    ]
+    return Outcome(
+        [
+            Comparison("order of the rebound speed's error", "1", 2.5, order, 0.2, False),
+            near_zero("largest error of the rebound at 16 steps a contact", errors[0], 2e-3),
+        ],
+        [Plot("Error of an elastic rebound", "steps in a contact", "error [1]", curves, log="xy")],
+    )
+
+
+CASES = {"order-head-on": _order(along=True), "order-oblique": _order(along=False), "order-rebound": _bouncing}

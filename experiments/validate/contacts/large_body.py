@@ -1,0 +1,123 @@
+"""A small grain on large bodies: does it roll off the neck between two of them, at any ratio of sizes?
+
+Vyas, Ottino, Lueptow & Umbanhowar 2025 (Comput. Phys. Commun. 310, 109524): with static friction and a ratio above
+about 3, velocity Verlet may hold such a grain where it should fall, as the history of the contact is summed with the
+velocity of half a step before and turned with the normal of the step's end.
+
+A sphere of radius r on two of radius R that touch lies at rho = sqrt((R + r)^2 - R^2) from their line of centres. Let
+it roll about that line without slipping at either contact: its spin is v / (r sin b), sin b = rho / (R + r), so
+    phi'' = g sin(phi) / (rho (1 + 2/5 / sin^2 b)),  phi from the top.
+Both contacts hold as long as what friction must pass on is below mu times what presses them.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from dem import Ball, Bed, Material
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell
+from experiments.validate.base.spheres import mass_of, plane_modulus
+
+__all__ = ["CASES", "RATIOS", "roll_off", "rolling_angle"]
+
+SMALL = 0.001  # r [m]
+RATIOS = (1, 3, 10, 30)
+START, END = math.radians(1.0), math.radians(10.0)
+GRAVITY, DENSITY, YOUNG, POISSON, FRICTION = 9.81, 2600.0, 1e7, 0.25, 0.5
+SAMPLES = 12
+
+
+def _geometry(ratio: float) -> tuple[float, float]:
+    """rho [m] and 1 + 2/5 / sin^2 b [1]."""
+    large = ratio * SMALL
+    rho = math.sqrt((large + SMALL) ** 2 - large**2)
+    return rho, 1 + 0.4 * ((large + SMALL) / rho) ** 2
+
+
+def rolling_angle(ratio: float, times: np.ndarray) -> np.ndarray:
+    """phi at the times [s], from rest at ``START`` [rad]."""
+    rho, factor = _geometry(ratio)
+    found = solve_ivp(
+        lambda _, y: [y[1], GRAVITY * math.sin(y[0]) / (rho * factor)], (0, times[-1]), [START, 0.0], t_eval=times,
+        rtol=1e-10, atol=1e-12,
+    )  # fmt: skip
+    return found.y[0]
+
+
+def _time_to(ratio: float, angle: float) -> float:
+    """When it has come to an angle [s]: dt = dphi / sqrt(2 g / (rho factor) (cos START - cos phi))."""
+    rho, factor = _geometry(ratio)
+    reached = lambda _, y: y[0] - angle  # noqa: E731
+    reached.terminal = True  # type: ignore[attr-defined]
+    found = solve_ivp(
+        lambda _, y: [y[1], GRAVITY * math.sin(y[0]) / (rho * factor)], (0, 10.0), [START, 0.0], events=reached,
+        rtol=1e-10,
+    )  # fmt: skip
+    return float(found.t_events[0][0])
+
+
+def roll_off(ratio: float, step: float | None = None) -> tuple[np.ndarray, np.ndarray, float]:
+    """Times [s], phi [rad] of a small grain between two fixed balls ``ratio`` times larger, and the spin over "
+    "v / (r sin b)."""
+    large = ratio * SMALL
+    rho, _ = _geometry(ratio)
+    width = max(0.02, 5 * large)
+    middle = np.array([width / 2, width / 2, 2 * large + 2 * SMALL])
+    # The overlap at which both contacts carry the weight: 2 F sin b = m g cos(START).
+    sine = rho / (large + SMALL)
+    k = 4 / 3 * plane_modulus(YOUNG, POISSON) * math.sqrt(SMALL * large / (SMALL + large))
+    overlap = (mass_of(DENSITY, SMALL) * GRAVITY * math.cos(START) / (2 * sine) / k) ** (2 / 3)
+    reach = math.sqrt((large + SMALL - overlap) ** 2 - large**2)
+    at = middle + reach * np.array([0.0, math.sin(START), math.cos(START)])
+    bed = Bed.from_grains(
+        Material("small", DENSITY, YOUNG, POISSON, FRICTION, 0.5), positions=at[None, :], radii=np.array([SMALL]),
+        size=(width, width, 0.01), height=4 * large + 8 * SMALL, gravity=GRAVITY, floor=False, time_step=step,
+    )  # fmt: skip
+    for side in (-1.0, 1.0):
+        bed.add_body([Ball(radius=large)], position=tuple(middle + [side * large, 0.0, 0.0]))
+    steps = round(_time_to(ratio, END) / bed.time_step / SAMPLES)
+    times, angles, turns = [], [], [1.0]
+    for _ in range(SAMPLES):
+        bed.advance(steps)
+        grains = bed.grains()
+        d = grains.position[0] - middle
+        times.append(bed.time)
+        angles.append(math.atan2(d[1], d[2]))
+        speed = math.hypot(*grains.velocity[0, 1:])
+        turns.append(abs(grains.spin[0, 0]) * SMALL * sine / speed if speed > 0 else 0.0)
+    return np.array(times), np.array(angles), float(turns[-1])
+
+
+def _neck(tell: Tell) -> Outcome:
+    rows, curves = [], []
+    for done, ratio in enumerate(RATIOS):
+        times, angles, turn = roll_off(ratio)
+        tell((done + 1) / len(RATIOS))
+        closed = rolling_angle(ratio, times)
+        scale = math.degrees(1.0)
+        rows.append(
+            Comparison(
+                f"way rolled, ratio {ratio}", "deg", scale * (closed[-1] - START), scale * (angles[-1] - START), 0.02
+            )
+        )
+        rows.append(Comparison(f"spin r sin b over speed, ratio {ratio}", "1", 1.0, turn, 0.01))
+        part = times / times[-1]
+        curves.append(Curve(f"closed form, {ratio}", part, scale * closed, False))
+        curves.append(Curve(f"bed, {ratio}", part, scale * angles))
+    return Outcome(
+        rows,
+        [
+            Plot(
+                "A small grain rolls off the neck of two balls",
+                "time over the whole [1]",
+                "angle from the top [deg]",
+                curves,
+            )
+        ],
+    )
+
+
+CASES = {"large-neck": _neck}

@@ -1,0 +1,4 @@
+"""Thousands of planar trials at once, compiled by Taichi (`simulate`); `kernel` has the integrator.
+
+May import `model`, `planar`, `terms`, `ground`.
+"""

@@ -1,0 +1,34 @@
+"""The batched integrator, compiled by Taichi: one trial a lane, the same terms as the accurate integrator.
+
+Method: velocity Verlet (kick, drift, kick) with the speed-dependent forces taken at the predicted end speeds, one
+evaluation a step, order 2. A step in which a spike touches, leaves, slips through zero or reaches its static bound, or
+in which the wheel or the torque stops, is cut at that moment (found to the second order), the modes change, and the
+rest of the step follows: so events cost no order. Sticking is the same constraint as in `rigid.planar.dynamics`, its
+speed taken out exactly at the end of every step.
+
+Of the spikes only the lowest and its two neighbours are looked at; a trial that sinks so deep that a fourth would touch
+is marked (`status`), and left to the accurate integrator.
+"""
+
+from functools import lru_cache
+from typing import Any
+
+from rigid.terms import Term
+
+from .advance import make_advance
+from .columns import CHANNELS, FIXED_NUMBERS, SUMMARY
+from .parts import make_parts
+from .stand import make_stand
+
+__all__ = ["CHANNELS", "FIXED_NUMBERS", "SUMMARY", "batch_kernel"]
+
+
+@lru_cache(maxsize=64)
+def batch_kernel(terms: tuple[Term, ...], ground: str, count: int) -> Any:
+    """The kernels for these effects on this ground, for platforms with `count` rows of spikes.
+
+    `stand(numbers, poses)` finds y and theta at rest (theta NaN: cannot stand); `advance(numbers, poses, times,
+    time_step, steps, end, launch, summary, series)` does the rest. See `rigid.batch.simulate`.
+    """
+    parts = make_parts(terms, ground, count)
+    return make_stand(parts), make_advance(parts)

@@ -1,0 +1,248 @@
+"""The motion of a batch from its start to the end; the package's docstring describes the method."""
+
+# Taichi reads the annotations and the source of kernels: no `from __future__ import annotations` here.
+from types import SimpleNamespace
+from typing import Any
+
+from .contacts import make_contacts
+from .events import make_events
+from .holds import make_hold
+from .samples import make_records
+
+__all__ = ["make_advance"]
+
+MOST_SPLITS = 12
+"""Cuts of one step; beyond, modes change at its end."""
+
+
+def make_advance(parts: SimpleNamespace) -> Any:
+    """The kernel `advance(numbers, poses, times, time_step, steps, end, launch, summary, series)`."""
+    import taichi as ti
+
+    vertical, applied, torque_factor, inner = parts.vertical, parts.applied, parts.torque_factor, parts.inner
+    MEMORY, HOLDS, INNER, HALF, BETA = parts.MEMORY, parts.HOLDS, parts.INNER, parts.HALF, parts.BETA
+    DIAGONAL, NAN, LAW, LAW_SIZE, count = parts.DIAGONAL, parts.NAN, parts.LAW, parts.LAW_SIZE, parts.count
+    load_parameters, state_of, trial_state = parts.load_parameters, parts.state_of, parts.trial_state
+    trial_numbers, set_mass = parts.trial_numbers, parts.set_mass
+    Motion, Forces, Modes, Event, Spikes, Tally = (
+        parts.Motion, parts.Forces, parts.Modes, parts.Event, parts.Spikes, parts.Tally,
+    )  # fmt: skip
+    start_inner, advance_inner = make_inner(parts)
+    push_spikes, hold = make_contacts(parts), make_hold(parts)
+    find_events, switch = make_events(parts)
+    record, follow, enter, summarise = make_records(parts)
+
+    @ti.kernel
+    def advance(
+        numbers: ti.types.ndarray(dtype=ti.f64, ndim=2),
+        poses: ti.types.ndarray(dtype=ti.f64, ndim=2),
+        times: ti.types.ndarray(dtype=ti.f64, ndim=2),
+        time_step: ti.f64,
+        steps: ti.i32,
+        end: ti.f64,
+        launch: ti.f64,
+        summary: ti.types.ndarray(dtype=ti.f64, ndim=2),
+        series: ti.types.ndarray(dtype=ti.f64, ndim=3),
+    ):
+        ti.loop_config(block_dim=4)
+        for i in range(numbers.shape[0]):
+            s = trial_state(numbers, i)
+            p = load_parameters(numbers, i)
+            q = ti.Vector([numbers[i, LAW + k] for k in ti.static(range(LAW_SIZE))])
+            s.up_x, s.up_y = vertical(p)
+            c = trial_numbers(numbers, i, s, p)
+            top = ti.Vector([0.0 for _ in ti.static(range(count if MEMORY else 1))])
+            held = ti.Vector([0.0 for _ in ti.static(range(count if HOLDS else 1))])
+            y_start = poses[i, 0]
+            now = Motion(y=y_start, theta=poses[i, 1], wheel=numbers[i, 11])
+            then = Motion(y=y_start)
+            last = Forces(own_holds=1.0)  # of the step before
+            f = Forces(own_holds=1.0)
+            spikes = Spikes()
+            e = Event()
+            both = 1 | (1 << (count - 1))
+            m = Modes(touch=both, stick=both)
+            t = Tally(best_angle=NAN, stand=NAN, pivot=NAN, slip=NAN, hop=NAN, longest=NAN)
+            if c.nominal == 0.0 or c.until <= 0.0:
+                m.over = 1
+            if ti.static(MEMORY):
+                for n in ti.static((0, count - 1)):
+                    angle = now.theta + HALF + n * BETA
+                    top[n] = ti.max((s.length - c.radius) * ti.cos(angle) + c.radius - now.y, 0.0)
+                    if ti.static(HOLDS):
+                        held[n] = top[n]
+            time = 0.0
+            pull = 0.0  # the torque at the step's start
+            status = 0
+            splits = 0
+            total_splits = 0
+            sample = 0
+            samples = times.shape[1]
+            row = ti.min(i, times.shape[0] - 1)
+            step = 0
+            dt = 0.0  # the first pass only finds the accelerations
+            settle_only = True
+            cut = False
+            cut_kind = 0
+            cut_spike = 0
+            step_end = 0.0
+            going = not ti.math.isnan(now.theta)
+            if not going:
+                status = 3
+            if ti.static(INNER):
+                start_inner(s, p, now, last, t)
+                if time_step > t.longest:
+                    status = 4
+                    going = False
+            while going:
+                # -- drift to the end of the step, predict the speeds --
+                hx = now.vx + 0.5 * dt * now.ax
+                hy = now.vy + 0.5 * dt * now.ay
+                ht = now.omega + 0.5 * dt * now.alpha
+                then.x, then.y, then.theta = now.x + dt * hx, now.y + dt * hy, now.theta + dt * ht
+                then.vx, then.vy, then.omega = now.vx + dt * now.ax, now.vy + dt * now.ay, now.omega + dt * now.alpha
+                # -- forces there --
+                s.time = time + dt
+                s.x, s.y, s.theta = then.x, then.y, then.theta
+                s.vx, s.vy, s.omega = then.vx, then.vy, then.omega
+                s.cosine = ti.cos(then.theta)
+                s.sine = ti.sin(then.theta)
+                driving = m.touch != 0 and m.over == 0
+                s.wheel_speed = now.wheel + dt * c.spin_up * pull
+                s.torque = 0.0
+                if driving:
+                    s.torque = c.nominal * torque_factor(p, s)
+                f = Forces(own_holds=1.0)
+                if ti.static(INNER):
+                    advance_inner(s, p, now, then, f, dt)
+                f.fx, f.fy, f.ft = applied(p, s)
+                if ti.static(not DIAGONAL):
+                    set_mass(c, p, s)
+                e = Event(ahead=1.0)
+                spikes = Spikes()
+                status = push_spikes(s, p, q, c, then, dt, f, m, e, spikes, top, held, status)
+                hold(s, p, c, then, f, m, hx, hy, ht, dt)
+                find_events(s, c, now, then, f, last, m, e, spikes, dt, driving, pull)
+                kind, which = e.kind, e.which
+                # -- an event within the step: go back and come only so far --
+                # (again where the shorter step shows that another one comes before the one it was cut at)
+                other = not cut or kind != cut_kind or which != cut_spike
+                if kind != 0 and dt > 0.0 and other and e.ahead < 0.999 and splits < MOST_SPLITS:
+                    cut = True
+                    cut_kind = kind
+                    cut_spike = which
+                    dt = ti.max(e.ahead, 0.0) * dt
+                    splits += 1
+                    total_splits += 1
+                    if dt > 0.0:
+                        continue
+                    then = now  # it is over at once: nothing moves
+                elif cut:
+                    kind = cut_kind
+                    which = cut_spike
+                # -- samples, launch, largest speeds --
+                if dt > 0.0:
+                    while sample < samples and times[row, ti.min(sample, samples - 1)] <= time + dt:
+                        share = (times[row, sample] - time) / dt
+                        record(series, i, sample, share, dt, now, then, state_of(m.touch, m.stick))
+                        sample += 1
+                    follow(t, now, then, y_start, launch)
+                    if ti.static(MEMORY):
+                        for j in ti.static(range(3)):
+                            n = (m.lowest + j - 1 + count) % count
+                            if (m.touch & (1 << n)) != 0:
+                                top[n] = ti.max(top[n], spikes.depth[j])
+                                if ti.static(HOLDS):
+                                    held[n] = ti.max(held[n], spikes.depth[j])
+                            elif spikes.depth[j] < 0.0:
+                                top[n] = 0.0  # forgotten above the surface
+                # -- accept --
+                now = then
+                last = f
+                pull = s.torque
+                time += dt
+                # -- change the modes --
+                again = False
+                if kind != 0:
+                    again = True
+                    switch(kind, which, m, now, s, c, f, spikes, top, held)
+                elif settle_only:
+                    m.fresh = 0
+                if m.over == 0 and time >= c.until:
+                    m.over = 1
+                    again = True
+                # -- the next stretch --
+                if not again or splits >= MOST_SPLITS + 8:
+                    enter(t, state_of(m.touch, m.stick), now.theta)
+                if again and splits < MOST_SPLITS + 8:
+                    dt = 0.0
+                    settle_only = True
+                    splits += 1
+                else:
+                    settle_only = False
+                    if time >= step_end - 1e-12:
+                        step += 1
+                        splits = 0
+                        step_end = ti.min(step * time_step, end)
+                        if step > steps:
+                            going = False
+                    dt = step_end - time
+                    if m.over == 0 and c.until < step_end and c.until > time:
+                        dt = c.until - time
+                cut = False
+                cut_kind = 0
+                if not (ti.abs(now.x) + ti.abs(now.y) + ti.abs(now.theta) < 1e6):
+                    status = 2
+                    going = False
+            # -- the end --
+            while sample < samples and times[row, ti.min(sample, samples - 1)] <= end * (1.0 + 1e-12):
+                record(series, i, sample, 0.0, 0.0, now, now, state_of(m.touch, m.stick))
+                sample += 1
+            t.status, t.splits = status, total_splits
+            summarise(summary, i, t, now)
+
+    return advance
+
+
+def make_inner(parts: SimpleNamespace) -> Any:
+    """Two Taichi functions for the coordinate that a term has of its own.
+
+    `start_inner` puts it where it rests, and the longest step for it [s] into the tally; `advance_inner` finds it at
+    the step's end.
+    """
+    import taichi as ti
+
+    inner_start, inner = parts.inner_start, parts.inner
+
+    @ti.func
+    def start_inner(s: ti.template(), p: ti.template(), now: ti.template(), last: ti.template(), t: ti.template()):
+        s.x = now.x
+        s.y = now.y
+        s.theta = now.theta
+        now.own = inner_start(p, s)
+        s.inner = now.own
+        mass, at_rest, last.own_holds = inner(p, s)
+        if mass > 0.0:  # as `step_bound` has it for the ground
+            s.inner = now.own + 1e-6 * s.length
+            mass, by_place, last.own_holds = inner(p, s)
+            s.inner = now.own
+            s.inner_speed = 1e-3
+            mass, by_speed, last.own_holds = inner(p, s)
+            lightest = 1.0 / mass + 1.0 / s.mass
+            t.longest = 0.2 / ti.sqrt(ti.max((at_rest - by_place) / (1e-6 * s.length) * lightest, 1e-12))
+            t.longest = ti.min(t.longest, 1.0 / ti.max((at_rest - by_speed) / 1e-3 * lightest, 1e-12))
+
+    @ti.func
+    def advance_inner(
+        s: ti.template(), p: ti.template(), now: ti.template(), then: ti.template(), f: ti.template(), dt
+    ):  # fmt: skip
+        s.inner = now.own + dt * (now.own_v + 0.5 * dt * now.own_a)
+        s.inner_speed = now.own_v + dt * now.own_a
+        then.own = s.inner
+        mass, force, f.own_holds = inner(p, s)
+        then.own_a = 0.0
+        if mass > 0.0:
+            then.own_a = force / mass
+        then.own_v = now.own_v + 0.5 * dt * (now.own_a + then.own_a)
+
+    return start_inner, advance_inner

@@ -1,0 +1,162 @@
+"""Events of a batched trial: when within a step the first one happens, and what changes then.
+
+Kinds: 1 touch, 2 lift, 3 slip through zero, 4 static bound, 5 the wheel stops, 6 and 7 pulleys and bearing come to a
+stop, 8 and 9 they give way, 10 a term's own coordinate changes its mode.
+"""
+
+# Taichi reads the annotations and the source of kernels: no `from __future__ import annotations` here.
+from types import SimpleNamespace
+from typing import Any
+
+__all__ = ["make_events"]
+
+
+def make_events(parts: SimpleNamespace) -> Any:
+    """Two Taichi functions, which change what they take as templates.
+
+    `find_events` puts the share of the step at which friction, wheel or a term's own coordinate change first into `e`,
+    where that is before what is there. `switch` changes the modes at an event.
+    """
+    import taichi as ti
+
+    MEMORY, SHEDS, HOLDS, BETA, HALF = parts.MEMORY, parts.SHEDS, parts.HOLDS, parts.BETA, parts.HALF
+    DRY, INNER, NEAR, count = parts.DRY, parts.INNER, parts.NEAR, parts.count
+
+    @ti.func
+    def earlier(e: ti.template(), share, kind):
+        if share < e.ahead or e.kind == 0:
+            e.ahead = share
+            e.kind = kind
+
+    @ti.func
+    def used_up(before, after):
+        share = 0.0
+        if before > 0.0:
+            share = before / (before - after)
+        return share
+
+    @ti.func
+    def find_events(
+        s: ti.template(), c: ti.template(), now: ti.template(), then: ti.template(), f: ti.template(),
+        last: ti.template(), m: ti.template(), e: ti.template(), spikes: ti.template(), dt, driving, pull,
+    ):  # fmt: skip
+        for j in ti.static(range(3)):
+            n = (m.lowest + j - 1 + count) % count
+            bit = 1 << n
+            if dt > 0.0 and (m.touch & bit) != 0 and (m.stick & bit) == 0:
+                slip = then.vx - then.omega * spikes.h[j]
+                sign = 1.0
+                if (m.backwards & bit) != 0:
+                    sign = -1.0
+                if sign * slip < 0.0:
+                    change = sign * (then.ax - then.alpha * spikes.h[j] + then.omega * then.omega * spikes.d[j])
+                    share = 0.0
+                    if change < 0.0:
+                        share = 1.0 - ti.min(sign * slip / (change * dt), 1.0)
+                    if share < e.ahead or e.kind == 0:
+                        e.ahead, e.kind, e.which = share, 3, n
+        f.margin = f.bound - ti.abs(f.hold)
+        if m.stick != 0 and f.margin < 0.0:
+            share = used_up(last.margin, f.margin)
+            if dt == 0.0 and f.margin > -NEAR * f.bound:
+                share = 2.0
+            if share < e.ahead or (e.kind == 0 and share <= 1.0):
+                e.ahead, e.kind = share, 4
+        then.wheel = now.wheel
+        if driving:
+            then.wheel = now.wheel + 0.5 * dt * c.spin_up * (pull + s.torque)
+            if c.braking != 0.0 and then.wheel < 0.0 and dt > 0.0:
+                earlier(e, now.wheel / (now.wheel - then.wheel), 5)
+        if ti.static(INNER):
+            if dt > 0.0 and f.own_holds < 0.0:
+                earlier(e, used_up(last.own_holds, f.own_holds), 10)
+        f.margin_v = f.bound_v - ti.abs(f.hold_v)
+        f.margin_r = f.bound_r - ti.abs(f.hold_r)
+        if ti.static(DRY):
+            find_dry_events(s, then, f, last, m, e, dt)
+
+    @ti.func
+    def find_dry_events(
+        s: ti.template(), then: ti.template(), f: ti.template(), last: ti.template(), m: ti.template(),
+        e: ti.template(), dt,
+    ):  # fmt: skip
+        if m.slide_v != 0 and dt > 0.0:
+            speed = (s.up_x * then.vx + s.up_y * then.vy) * m.slide_v
+            change = (s.up_x * then.ax + s.up_y * then.ay) * m.slide_v
+            if speed < 0.0:
+                share = 0.0
+                if change < 0.0:
+                    share = 1.0 - ti.min(speed / (change * dt), 1.0)
+                earlier(e, share, 6)
+        if m.slide_r != 0 and dt > 0.0 and then.omega * m.slide_r < 0.0:
+            share = 0.0
+            if then.alpha * m.slide_r < 0.0:
+                share = 1.0 - ti.min(then.omega / (then.alpha * dt), 1.0)
+            earlier(e, share, 7)
+        if m.slide_v == 0 and f.bound_v > 0.0 and f.margin_v < -NEAR * f.bound_v:
+            earlier(e, used_up(last.margin_v, f.margin_v), 8)
+        if m.slide_r == 0 and f.bound_r > 0.0 and f.margin_r < -NEAR * f.bound_r:
+            earlier(e, used_up(last.margin_r, f.margin_r), 9)
+
+    @ti.func
+    def switch(
+        kind, which, m: ti.template(), now: ti.template(), s: ti.template(), c: ti.template(), f: ti.template(),
+        spikes: ti.template(), top: ti.template(), held: ti.template(),
+    ):  # fmt: skip
+        bit = 1 << which
+        newcomers = m.fresh & m.stick
+        m.fresh = 0
+        if kind == 1:
+            m.touch |= bit
+            if ti.static(HOLDS):
+                held[which] = 0.0
+            reach = (s.length - c.radius) * ti.cos(now.theta + HALF + which * BETA) + c.radius
+            slip = now.vx - now.omega * reach
+            m.stick &= ~bit
+            if slip > 0.0:
+                m.backwards &= ~bit
+            else:
+                m.backwards |= bit
+        elif kind == 2:
+            m.touch &= ~bit
+            m.stick &= ~bit
+            if ti.static(MEMORY and not SHEDS):
+                top[which] = 0.0
+        elif kind == 3:
+            m.stick |= bit
+            m.fresh = bit
+        elif kind == 4:
+            leaving = m.stick
+            if newcomers != 0 and newcomers != m.stick:
+                leaving = newcomers
+            m.stick &= ~leaving
+            for j in ti.static(range(3)):
+                one = 1 << ((m.lowest + j - 1 + count) % count)
+                if (leaving & one) != 0:
+                    sign = -f.hold
+                    slip = now.vx - now.omega * spikes.h[j]  # what the constraint leaves: not its excess before
+                    if ti.abs(slip) > 1e-12:
+                        sign = slip
+                    if sign > 0.0:
+                        m.backwards &= ~one
+                    else:
+                        m.backwards |= one
+        elif kind == 5:
+            now.wheel = 0.0
+            m.over = 1
+        elif kind == 6:
+            m.slide_v = 0
+        elif kind == 7:
+            m.slide_r = 0
+        elif kind == 8:
+            m.slide_v = 1
+            if f.hold_v > 0.0:
+                m.slide_v = -1
+        elif kind == 9:
+            m.slide_r = 1
+            if f.hold_r > 0.0:
+                m.slide_r = -1
+        elif kind == 10:
+            s.inner_mode = 1.0 - s.inner_mode
+
+    return find_events, switch

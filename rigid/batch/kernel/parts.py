@@ -1,0 +1,156 @@
+"""What the kernels share: the terms' functions, the numbers that are known when they are compiled, small functions."""
+
+# Taichi reads the annotations and the source of kernels: no `from __future__ import annotations` here.
+import linecache
+import math
+from types import SimpleNamespace
+from typing import Any
+
+from rigid.model.model import assemble, parameter_names
+from rigid.terms import STATE_FIELDS, Term
+
+from .columns import FIXED_NUMBERS
+
+__all__ = ["make_parts"]
+
+_SHARED = (
+    "vertical", "tip_radius", "torque_factor", "applied", "dry_friction", "inner_start", "inner", "contact", "arms",
+    "divide", "MEMORY", "SHEDS", "HOLDS", "DRY", "INNER", "BETA", "HALF", "TURN_COS", "TURN_SIN", "TWICE_COS",
+    "TWICE_SIN", "DIAGONAL", "NAN", "NEAR", "LAW", "LAW_SIZE", "load_parameters", "small_sine", "small_cosine",
+    "state_of", "trial_state", "trial_numbers", "set_mass", "count", "Motion", "Forces", "Modes", "Event", "Spikes",
+    "Tally",
+)  # fmt: skip
+_MOTION = ("x", "y", "theta", "vx", "vy", "omega", "ax", "ay", "alpha", "wheel", "own", "own_v", "own_a")
+"""The motion at one time; `own` is the coordinate that a term has of its own, with its speed and acceleration."""
+_FORCES = (
+    "fx", "fy", "ft", "load", "bound", "mean_h", "bias", "plain_h", "hold", "hold_v", "hold_r", "bound_v", "bound_r",
+    "margin", "margin_v", "margin_r", "own_holds",
+)  # fmt: skip
+"""Applied force and torque; load, bound and mean arm of the spikes that stick; what holds them, the pulleys (v) and the
+bearing (r), their bounds and what is left of these."""
+_MODES = ("touch", "stick", "backwards", "fresh", "slide_v", "slide_r", "over", "lowest")
+"""Bits of the spikes that touch, stick, slide towards -x, may stick from now; directions in which the pulleys and the
+bearing slide; whether the torque is over; the lowest spike."""
+_NUMBERS = (
+    "nominal", "until", "spin_up", "braking", "mu_s", "mu_d", "radius", "crater", "mxx", "mxy", "myy", "mxt", "myt",
+    "mtt", "inverse_x", "inverse_y", "inverse_t",
+)  # fmt: skip
+"""A trial's torque and when it ends, the wheel's acceleration under 1 N m, friction, tips, mass matrix."""
+_TALLY = (
+    "best_angle", "largest_speed", "largest_spin", "stand", "pivot", "slip", "hop", "status", "splits", "longest",
+)  # fmt: skip
+"""What the summary gets, the end of the motion aside."""
+
+
+def make_parts(terms: tuple[Term, ...], ground: str, count: int) -> SimpleNamespace:
+    """For these effects on this ground, for platforms with `count` rows of spikes."""
+    import taichi as ti
+
+    model = assemble(terms, ground, taichi=True)
+    names = parameter_names(terms)
+    State = ti.types.struct(**dict.fromkeys(STATE_FIELDS, ti.f64))
+    Parameters = ti.types.struct(**dict.fromkeys(names, ti.f64))
+    LAW = len(FIXED_NUMBERS)
+    LAW_SIZE = len(model.law.slots)
+    load_parameters = _loader(names, Parameters, LAW + LAW_SIZE)
+    vertical, tip_radius, torque_factor = model.vertical, model.tip_radius, model.torque_factor
+    inertia, applied, dry_friction = model.inertia, model.applied, model.dry_friction
+    inner_start, inner, crater_of = model.inner_start, model.inner, model.crater
+    contact, arms, divide_mass = model.contact, model.contact_arms, model.divide_mass
+    Motion, Forces, Tally, Numbers = (
+        ti.types.struct(**dict.fromkeys(fields, ti.f64)) for fields in (_MOTION, _FORCES, _TALLY, _NUMBERS)
+    )
+    Modes = ti.types.struct(**dict.fromkeys(_MODES, ti.i32))
+    Event = ti.types.struct(ahead=ti.f64, kind=ti.i32, which=ti.i32)  # at this share of the step; 0: none (`events`)
+    Spikes = ti.types.struct(**dict.fromkeys(("h", "d", "depth"), ti.types.vector(3, ti.f64)))
+    MEMORY = model.has_memory
+    SHEDS = model.law.has_memory or model.has("crater", "unload")
+    HOLDS = model.has("hold", "rate_pull")
+    DRY = model.has("vertical_friction", "rotation_friction")
+    INNER = model.has("inner_mass")
+    BETA = 2 * math.pi / count
+    HALF = math.pi / count
+    TURN_COS = [math.cos(k * BETA) for k in (-1, 0, 1)]
+    TURN_SIN = [math.sin(k * BETA) for k in (-1, 0, 1)]
+    TWICE_COS, TWICE_SIN = math.cos(2 * BETA), math.sin(2 * BETA)
+    DIAGONAL = not model.has("mass", "up")  # then the mass matrix is the base model's, constant and diagonal
+    SINE = [(-1) ** k / math.factorial(2 * k + 1) for k in range(8)]
+    COSINE = [(-1) ** k / math.factorial(2 * k) for k in range(9)]
+    NAN = math.nan
+    NEAR = 1e-12  # of a bound: less is rounding
+
+    @ti.func
+    def small_sine(a):
+        b = a * a
+        value = SINE[7]
+        for k in ti.static(range(6, -1, -1)):
+            value = value * b + SINE[k]
+        return value * a
+
+    @ti.func
+    def small_cosine(a):
+        b = a * a
+        value = COSINE[8]
+        for k in ti.static(range(7, -1, -1)):
+            value = value * b + COSINE[k]
+        return value
+
+    @ti.func
+    def state_of(touch, stick):
+        state = 3
+        if touch != 0:
+            state = 2
+            if stick != 0:
+                state = 1
+                if (stick & (stick - 1)) != 0:
+                    state = 0
+        return state
+
+    @ti.func
+    def trial_state(numbers: ti.template(), i):
+        s = State(time=0.0)
+        s.inner_mode = 1.0
+        s.mass = numbers[i, 0]
+        s.inertia = numbers[i, 1]
+        s.length = numbers[i, 2]
+        s.stance = numbers[i, 3]
+        s.counterweight = numbers[i, 4]
+        s.gravity = numbers[i, 5]
+        s.weight = numbers[i, 6]
+        return s
+
+    @ti.func
+    def trial_numbers(numbers: ti.template(), i, s: ti.template(), p: ti.template()):
+        c = Numbers(nominal=numbers[i, 7], until=numbers[i, 8], mu_s=numbers[i, 12], mu_d=numbers[i, 13])
+        c.spin_up = numbers[i, 10] / numbers[i, 9]
+        if numbers[i, 10] < 0.0:
+            c.braking = 1.0
+        c.radius = tip_radius(p)
+        c.crater = crater_of(p)
+        set_mass(c, p, s)
+        c.inverse_x, c.inverse_y, c.inverse_t = 1.0 / c.mxx, 1.0 / c.myy, 1.0 / c.mtt
+        return c
+
+    @ti.func
+    def set_mass(c: ti.template(), p: ti.template(), s: ti.template()):
+        c.mxx, c.mxy, c.myy, c.mxt, c.myt, c.mtt = inertia(p, s)
+
+    @ti.func
+    def divide(c: ti.template(), fx, fy, ft):
+        return divide_mass(c.mxx, c.mxy, c.myy, c.mxt, c.myt, c.mtt, fx, fy, ft)
+
+    own = locals()
+    return SimpleNamespace(**{name: own[name] for name in _SHARED})
+
+
+def _loader(names: tuple[str, ...], kind: Any, first: int) -> Any:
+    """A Taichi function that reads the effects' parameters of trial i."""
+    import taichi as ti
+
+    fields = ", ".join(f"{name}=numbers[i, {first + k}]" for k, name in enumerate(names))
+    text = f"def load(numbers: ti.template(), i):\n    return Parameters({fields})\n"
+    file = f"<parameters {' '.join(names)}>"
+    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
+    scope: dict[str, Any] = {"ti": ti, "Parameters": kind}
+    exec(compile(text, file, "exec"), scope)
+    return ti.func(scope["load"])

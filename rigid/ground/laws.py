@@ -1,0 +1,298 @@
+"""Surface laws: the force on a spike by its depth, its rate of sinking and, for grains, its deepest depth.
+
+Each law is a few plain functions of numbers (`rigid.ground.law_functions`), whose very source runs as Python and,
+compiled by
+whoever wants it (`ti.func`), on thousands of trials at once. Depth z is positive downwards from the surface, rate is
+dz/dt. With `p` the law's numbers (a tuple, or a vector, in the order of `SurfaceLaw.slots`), the force, never negative,
+is
+
+    force = loading(top, p) * springback(z, top, rebound) + rate_force(z, rate, p)
+
+- `loading` is the force on the way in to new depths, and `loading_work` its integral from 0.
+- `rebound` is None for a law that gives back what it took: there top = z, and springback(z, z, .) = 1. Grains do not:
+  for them top is the deepest depth that this spike has reached here (top >= z; 0 again once it has left the surface),
+  and the force falls in a straight line to 0 while the share `rebound` of that depth is undone.
+- `rate_force` is what depends on the rate (it may be negative, never below -loading). `rate_work` is its integral over
+  depth at a constant rate.
+
+What is stored: loading_work(z) without `rebound`, else `springback_energy`. All other work of the force is dissipated:
+at every moment force * rate >= d(stored)/dt, as `tests/rigid/ground/test_laws.py` shows for each law.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from . import law_functions as fn
+from .law_functions import springback, springback_energy
+from .rft import ball_profile, stress_gradient
+
+__all__ = ["GROUNDS", "Parameter", "SurfaceLaw", "find_law", "katsuragi_durian", "springback", "springback_energy"]
+
+Numbers = Any
+"""A law's numbers: anything that p[0], p[1] ... can be read from."""
+
+MEMORY = (
+    "ours: a bed of sand computed with this package gives back nothing that can be measured (work_returned_dem of "
+    "docs/results/penetrate is below 0.01), and a twentieth is about the stiffest unloading that a 1 ms step follows"
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """One parameter of a law: what a person sets."""
+
+    name: str
+    unit: str
+    default: float
+    lowest: float
+    highest: float
+    summary: str
+    source: str
+    above_lowest: bool = False
+    """Whether it must exceed `lowest`, not only reach it."""
+
+    def check(self, value: float, law: str) -> float:
+        """`value` as a float. Raises ValueError, naming it and what would do."""
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise ValueError(f"{self.name} = {value!r} of {law}: it must be a number")
+        low_enough = value > self.lowest if self.above_lowest else value >= self.lowest
+        if not (low_enough and value <= self.highest):
+            least = "above" if self.above_lowest else "at least"
+            most = f" and at most {self.highest:g}" if math.isfinite(self.highest) else ""
+            raise ValueError(
+                f"{self.name} is {value}: in {law} it must be {least} {self.lowest:g}{most} "
+                f"({self.unit}; {self.summary})"
+            )
+        return float(value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SurfaceLaw:
+    """One law: its parameters, what turns them into numbers, and its functions (see the module)."""
+
+    name: str
+    summary: str
+    source: str
+    parameters: tuple[Parameter, ...]
+    slots: tuple[str, ...]
+    """What stands in p[0], p[1] ... of the functions."""
+    extensive: tuple[int, ...]
+    """Which of them are in proportion to the number of spikes that press side by side."""
+    make: Callable[[Mapping[str, float]], tuple[float, ...]]
+    loading: Callable[..., Any]
+    loading_work: Callable[..., Any]
+    rate_force: Callable[..., Any]
+    rate_work: Callable[..., Any]
+    has_memory: bool
+    """Whether it takes the deepest depth and the parameter `rebound`."""
+    bends: tuple[int, ...] = ()
+    """Slots that hold depths at which the functions bend [m], for those who integrate them."""
+
+    def values(self, given: Mapping[str, float]) -> dict[str, float]:
+        """All parameters, as given or by default. Raises ValueError for one there is not, or that cannot be."""
+        known = {parameter.name: parameter for parameter in self.parameters}
+        for key in given:
+            if key not in known:
+                raise ValueError(f"{key} is no parameter of {self.name}: there is {', '.join(known)}")
+        return {key: known[key].check(given.get(key, known[key].default), self.name) for key in known}
+
+    def numbers(self, given: Mapping[str, float], *, count: float = 1.0) -> tuple[float, ...]:
+        """p of the functions for these parameters, of `count` spikes side by side. Raises ValueError as `values`."""
+        p = self.make(self.values(given))
+        return tuple(count * value if k in self.extensive else value for k, value in enumerate(p))
+
+    def rebound(self, given: Mapping[str, float]) -> float | None:
+        """Share of the deepest depth that springs back [1]; None for a law that gives back all."""
+        return self.values(given)["rebound"] if self.has_memory else None
+
+    def force(self, depth: float, rate: float, p: Numbers, *, top: float | None = None, rebound: float = 1.0) -> float:
+        """Force [N] at `depth` [m] and `rate` [m/s], both positive downwards; `top` is the deepest depth so far [m].
+
+        Without `top`, `depth` is the deepest.
+        """
+        if depth <= 0.0:
+            return 0.0
+        top = depth if top is None or not self.has_memory else max(top, depth)
+        return float(self.loading(top, p) * springback(depth, top, rebound) + self.rate_force(depth, rate, p))
+
+    def stored(self, depth: float, p: Numbers, *, top: float | None = None, rebound: float = 1.0) -> float:
+        """Energy stored in the surface [J]."""
+        if not self.has_memory:
+            return float(self.loading_work(depth, p))
+        top = max(depth, 0.0) if top is None else max(top, depth, 0.0)
+        return float(springback_energy(depth, top, rebound, self.loading(top, p)))
+
+
+def find_law(name: str) -> SurfaceLaw:
+    """The law called `name`. Raises ValueError naming those there are."""
+    if name not in GROUNDS:
+        raise ValueError(f"there is no surface law {name!r}: there is {', '.join(GROUNDS)}")
+    return GROUNDS[name]
+
+
+def katsuragi_durian(
+    *, diameter: float, projectile_density: float, bulk_density: float, friction: float, gravity: float
+) -> dict[str, float]:
+    """Stiffness [N/m] and drag [kg/m] of a ball of `diameter` [m] and density in grains of `bulk_density` [kg/m3].
+
+    k D / (m g) = 12 mu (rho_g / rho_p)^(1/2) and d_1 / D = (0.25 / mu) rho_p / rho_g: Katsuragi and Durian, Physical
+    Review E 87, 052208 (2013). The scalings are those of its abstract; the prefactors 12 and 0.25 are not verified.
+    `friction` is the tangent of the angle of repose.
+    """
+    mass = math.pi / 6 * diameter**3 * projectile_density
+    return {
+        "stiffness": 12 * friction * mass * gravity / diameter * math.sqrt(bulk_density / projectile_density),
+        "drag": mass * friction * bulk_density / (0.25 * diameter * projectile_density),
+    }
+
+
+def _make_bekker(v: Mapping[str, float]) -> tuple[float, ...]:
+    pressure = v["cohesive_modulus"] / v["radius"] + v["frictional_modulus"]
+    return (math.pi * v["radius"] ** 2 * pressure, v["exponent"], v["tip_height"])
+
+
+def _make_rft(v: Mapping[str, float]) -> tuple[float, ...]:
+    gradient = stress_gradient(bulk_density=v["bulk_density"], friction=v["friction"], gravity=v["gravity"])
+    g, wall = ball_profile(v["surface_friction"])
+    ring = 2 * math.pi * v["radius"] ** 3 * gradient
+    shape = [float(gk) / ((k + 1) * (k + 2)) for k, gk in enumerate(g)]
+    slope = sum(float(gk) / (k + 1) for k, gk in enumerate(g))
+    drag = 0.5 * math.pi * v["radius"] ** 2 * v["inertia"] * v["bulk_density"]
+    return (ring, drag, v["radius"], *shape, slope, wall)
+
+
+_BIG = math.inf
+_REBOUND = Parameter(
+    name="rebound", unit="1", default=0.05, lowest=1e-3, highest=0.5,
+    summary="share of the deepest depth that springs back", source=MEMORY,
+)  # fmt: skip
+_RADIUS = Parameter(
+    name="radius", unit="m", default=0.006, lowest=0.0, highest=1.0, above_lowest=True,
+    summary="radius of the spike's ball and shaft", source="ours : 12 mm across",
+)  # fmt: skip
+_SAND = katsuragi_durian(diameter=0.012, projectile_density=7850.0, bulk_density=1500.0, friction=0.6, gravity=9.80665)
+
+_LAWS = (
+    SurfaceLaw(
+        name="spring-damper",
+        summary="K z + C dz/dt while going in: the paper's surface",
+        source="Reid et al., i-SAIRAS 2014, eqs 5 and 6",
+        parameters=(
+            Parameter(name="stiffness", unit="N/m", default=1.5e4, lowest=0.0, highest=_BIG, summary="K",
+                      source="ours, as of brick"),
+            Parameter(name="damping", unit="N s/m", default=60.0, lowest=0.0, highest=_BIG, summary="C, going in only",
+                      source="ours, as of brick"),
+        ),
+        slots=("stiffness", "damping"), extensive=(0, 1),
+        make=lambda v: (v["stiffness"], v["damping"]),
+        loading=fn.spring_damper_loading, loading_work=fn.spring_damper_loading_work,
+        rate_force=fn.spring_damper_rate_force, rate_work=fn.spring_damper_rate_work, has_memory=False,
+    ),
+    SurfaceLaw(
+        name="hunt-crossley",
+        summary="K z^n (1 + 3/2 alpha dz/dt): restitution 1 - alpha v for small v, no jump of force at first touch",
+        source="Hunt and Crossley, Journal of Applied Mechanics 42 (1975), 440",
+        parameters=(
+            Parameter(name="stiffness", unit="N/m^n", default=2.1e5, lowest=0.0, highest=_BIG, above_lowest=True,
+                      summary="K", source="ours: as stiff as the spring of brick at a depth of 5 mm"),
+            Parameter(name="dissipation", unit="s/m", default=0.2, lowest=0.0, highest=10.0,
+                      summary="alpha: how restitution falls with the speed of impact",
+                      source="0.08 to 0.32 s/m for steel, bronze, ivory: Hunt and Crossley, quoted in Drake's manual"),
+            Parameter(name="exponent", unit="1", default=1.5, lowest=1.0, highest=3.0, summary="n",
+                      source="Hertz: 3/2 for a ball on a flat"),
+        ),
+        slots=("stiffness", "dissipation", "exponent"), extensive=(0,),
+        make=lambda v: (v["stiffness"], v["dissipation"], v["exponent"]),
+        loading=fn.power_loading, loading_work=fn.power_loading_work,
+        rate_force=fn.hunt_crossley_rate_force, rate_work=fn.hunt_crossley_rate_work, has_memory=False,
+    ),
+    SurfaceLaw(
+        name="power",
+        summary="K z^n + C dz/dt while going in",
+        source="the spring-damper with another exponent; n = 3/2 is Hertz, 2 a cone in a material of constant hardness",
+        parameters=(
+            Parameter(name="stiffness", unit="N/m^n", default=2.1e5, lowest=0.0, highest=_BIG, above_lowest=True,
+                      summary="K", source="ours: as stiff as the spring of brick at a depth of 5 mm"),
+            Parameter(name="damping", unit="N s/m", default=60.0, lowest=0.0, highest=_BIG, summary="C, going in only",
+                      source="ours, as of brick"),
+            Parameter(name="exponent", unit="1", default=1.5, lowest=0.5, highest=4.0, summary="n", source="Hertz"),
+        ),
+        slots=("stiffness", "damping", "exponent"), extensive=(0, 1),
+        make=lambda v: (v["stiffness"], v["damping"], v["exponent"]),
+        loading=fn.power_loading, loading_work=fn.power_loading_work,
+        rate_force=fn.spring_damper_rate_force, rate_work=fn.spring_damper_rate_work, has_memory=False,
+    ),
+    SurfaceLaw(
+        name="katsuragi-durian",
+        summary="k z + b (dz/dt)^2 while going in: a ball that falls into grains",
+        source="Katsuragi and Durian, Nature Physics 3 (2007), 420 and Physical Review E 87, 052208 (2013)",
+        parameters=(
+            Parameter(name="stiffness", unit="N/m", default=_SAND["stiffness"], lowest=0.0, highest=_BIG,
+                      above_lowest=True, summary="k: friction that grows with depth",
+                      source="`katsuragi_durian`: a 12 mm steel ball in sand of 1500 kg/m3 and friction 0.6 at 1 g"),
+            Parameter(name="drag", unit="kg/m", default=_SAND["drag"], lowest=0.0, highest=_BIG,
+                      summary="b = m / d_1: inertia of the grains", source="as stiffness"),
+            _REBOUND,
+        ),
+        slots=("stiffness", "drag"), extensive=(0, 1),
+        make=lambda v: (v["stiffness"], v["drag"]),
+        loading=fn.spring_damper_loading, loading_work=fn.spring_damper_loading_work,
+        rate_force=fn.inertial_rate_force, rate_work=fn.inertial_rate_work, has_memory=True,
+    ),
+    SurfaceLaw(
+        name="bekker",
+        summary="A(z) (k_c / b + k_phi) z^n: pressure and sinkage of a plate, here of the spike's section",
+        source="Bekker, Introduction to Terrain-Vehicle Systems (1969); it is for far larger plates",
+        parameters=(
+            _RADIUS,
+            Parameter(name="tip_height", unit="m", default=0.006, lowest=0.0, highest=1.0,
+                      summary="depth at which the section is full: the radius for a ball, 0 for a flat end",
+                      source="geometry"),
+            Parameter(name="cohesive_modulus", unit="N/m^(n+1)", default=990.0, lowest=0.0, highest=_BIG,
+                      summary="k_c",
+                      source="dry sand: Wong, Theory of Ground Vehicles (2008), Table 2.3, at second hand"),
+            Parameter(name="frictional_modulus", unit="N/m^(n+2)", default=1.52843e6, lowest=0.0, highest=_BIG,
+                      above_lowest=True, summary="k_phi", source="as cohesive_modulus"),
+            Parameter(name="exponent", unit="1", default=1.1, lowest=0.1, highest=2.0, summary="n",
+                      source="as cohesive_modulus"),
+            _REBOUND,
+        ),
+        slots=("pressure times section", "exponent", "tip_height"), extensive=(0,), bends=(2,),
+        make=_make_bekker,
+        loading=fn.bekker_loading, loading_work=fn.bekker_loading_work,
+        rate_force=fn.no_rate_force, rate_work=fn.no_rate_work, has_memory=True,
+    ),
+    SurfaceLaw(
+        name="rft",
+        summary="3D-RFT over ball and shaft going straight down, with the inertia of the grains",
+        source="Agarwal, Goldman and Kamrin, PNAS 120 (2023), e2214017120; see rigid/ground/rft.py",
+        parameters=(
+            _RADIUS,
+            Parameter(name="bulk_density", unit="kg/m3", default=1500.0, lowest=0.0, highest=2e4, above_lowest=True,
+                      summary="rho_c of the bed", source="dry sand"),
+            Parameter(name="friction", unit="1", default=0.6, lowest=0.1, highest=0.9,
+                      summary="internal friction coefficient of the grains",
+                      source="dry sand; the fit of xi_n is for 0.3 to 0.9"),
+            Parameter(name="surface_friction", unit="1", default=0.4, lowest=0.0, highest=2.0,
+                      summary="friction coefficient of grains and spike", source="ours"),
+            Parameter(name="gravity", unit="m/s2", default=9.80665, lowest=0.0, highest=100.0, above_lowest=True,
+                      summary="gravity of the grains: 1 g even in the rig", source="docs/planar.md"),
+            Parameter(name="inertia", unit="1", default=1.1, lowest=0.0, highest=10.0,
+                      summary="lambda of the term lambda rho v_n^2",
+                      source="1.1 for plates dragged level, 1 for a wheel: Agarwal et al. (2021), see rft.py"),
+            _REBOUND,
+        ),
+        slots=("2 pi R^3 xi_n", "pi R^2 lambda rho / 2", "radius", *(f"shape {k}" for k in range(8)), "slope", "wall"),
+        extensive=(0, 1), bends=(2,),
+        make=_make_rft,
+        loading=fn.rft_loading, loading_work=fn.rft_loading_work,
+        rate_force=fn.rft_rate_force, rate_work=fn.rft_rate_work, has_memory=True,
+    ),
+)  # fmt: skip
+
+GROUNDS: dict[str, SurfaceLaw] = {law.name: law for law in _LAWS}
+"""All laws by name; `hedgebed tumble --ground NAME`."""

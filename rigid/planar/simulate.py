@@ -1,0 +1,239 @@
+"""One planar trial: `simulate` integrates it, accurately or the paper's way, and answers with a `Trajectory`."""
+
+from __future__ import annotations
+
+import bisect
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rigid.model.trial import Trial
+
+from .dynamics import LOST, OMEGA, VX, VY, WORK, Modes, System, X, Y
+from .located import integrate
+from .paper import integrate_fixed
+from .statics import inner_slopes, standing, stiffness_at_rest
+from .trajectory import LAUNCH_DISTANCE, STATES, Tally, Trajectory
+
+__all__ = ["Method", "check_step", "longest_step", "simulate", "step_bound"]
+
+Method = Literal["located", "paper"]
+PAPER_STEP = 1e-3
+"""The paper's step [s]."""
+
+
+def simulate(
+    trial: Trial,
+    *,
+    duration: float,
+    method: Method = "located",
+    sample_interval: float = 1e-3,
+    times: ArrayLike | None = None,
+    tolerance: float = 1e-8,
+    time_step: float = PAPER_STEP,
+) -> Trajectory:
+    """Integrate one trial from static equilibrium, the torque starting at t = 0.
+
+    Args:
+        trial: its numbers.
+        duration: end [s].
+        method: "located" (accurate, events located in time) or "paper" (fixed step, of order 1).
+        sample_interval: between samples [s], from 0 to `duration`, which is always one of them.
+        times: sample times [s] instead, rising, within 0 to `duration`.
+        tolerance: relative error of a step, method "located".
+        time_step: of method "paper" [s].
+
+    Raises:
+        ValueError: a number that cannot be, named; a platform that cannot stand; a time step too long for the ground.
+        RuntimeError: the motion is no longer finite.
+    """
+    if method not in get_args(Method):
+        raise ValueError(f"method = {method!r} must be one of {', '.join(get_args(Method))}")
+    _positive("duration", duration)
+    _positive("sample_interval", sample_interval)
+    _positive("tolerance", tolerance)
+    _positive("time_step", time_step)
+    if tolerance > 1e-2:
+        raise ValueError(f"tolerance = {tolerance} must be at most 0.01")
+    samples = _sample_times(duration, sample_interval, times)
+    if method == "paper":
+        check_step(trial, time_step)
+        return _simulate_fixed(trial, duration, samples, time_step)
+    return _simulate_located(trial, duration, samples, tolerance)
+
+
+def longest_step(trial: Trial) -> float:
+    """The longest step [s] that resolves the stiffest motion of the ground: 0.2 sqrt(M / K) of the heaviest load.
+
+    K is the law's own slope at the depth where it carries the weight, M the least inertia that a row's tip offers.
+    A fifth of sqrt(M / K), a thirtieth of the period, keeps the error of order 2 below half a percent; a damper adds
+    the bound M / C (explicit steps are stable to 2 M / C). The same holds for a spring and a damper that a term has of
+    its own, between its inertia and the platform's mass.
+    """
+    return min(_bounds(trial))
+
+
+def _bounds(trial: Trial) -> tuple[float, float]:
+    """The longest steps [s] for the ground, and for the spring and damper that a term has of its own."""
+    system = System(trial)
+    stiffness, damping = stiffness_at_rest(system)
+    # 1 / M of a tip at its largest lever.
+    carried = 0.0 if system.inner else trial.counterweight
+    ground = step_bound(stiffness, damping, 1 / (trial.mass + carried) + trial.spike_length**2 / trial.inertia)
+    if not system.inner:
+        return ground, math.inf
+    stiffness, damping, inertia = inner_slopes(system)
+    return ground, step_bound(stiffness, damping, 1 / inertia + 1 / trial.mass)
+
+
+def step_bound(stiffness: float, damping: float, inverse_mass: float) -> float:
+    """The longest step [s] for a row's stiffness [N/m] and damping [N s/m] under a tip of this 1 / M [1/kg]."""
+    bound = 0.2 / math.sqrt(stiffness * inverse_mass) if stiffness > 0 else math.inf
+    return min(bound, 1 / (damping * inverse_mass)) if damping > 0 else bound
+
+
+def check_step(trial: Trial, time_step: float) -> None:
+    """Raises ValueError, naming what is too stiff, where `time_step` [s] is too long for the ground or for a term."""
+    ground, inner = _bounds(trial)
+    longest = min(ground, inner)
+    if time_step > longest:
+        what = _ground_words(trial) if ground <= inner else _spring_words(trial)
+        raise ValueError(f"time_step = {time_step:g} s is too long for {what}: at most {longest:.3g} s would follow it")
+
+
+def _ground_words(trial: Trial) -> str:
+    if trial.ground is None:
+        return f"the ground, stiffness = {trial.stiffness:g} N/m and damping = {trial.damping:g} N s/m"
+    return f"ground = {trial.ground.name!r}, {_values(trial.ground.law.values(trial.ground.parameters))}"
+
+
+def _spring_words(trial: Trial) -> str:
+    own = [effect for effect in trial.effects if "inner_mass" in effect.term.hooks]
+    return " and ".join(f"effect {effect.id!r}, {_values(effect.values)}" for effect in own)
+
+
+def _values(values: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} = {value:g}" for name, value in values.items())
+
+
+def _positive(key: str, value: Any) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not (math.isfinite(value) and value > 0):
+        raise ValueError(f"{key} = {value!r} must be a number above 0")
+
+
+def _sample_times(duration: float, interval: float, times: ArrayLike | None) -> list[float]:
+    if times is None:
+        count = math.floor(duration / interval * (1 + 1e-12))
+        samples = [k * interval for k in range(count + 1)]
+        if duration - samples[-1] > 1e-9 * duration:
+            samples.append(duration)
+        samples[-1] = min(samples[-1], duration)
+        return samples
+    array = np.asarray(times, dtype=float)
+    if array.ndim != 1 or len(array) == 0 or not np.isfinite(array).all() or (np.diff(array) < 0).any():
+        raise ValueError("times must be a list of finite numbers that rise")
+    if array[0] < 0 or array[-1] > duration:
+        raise ValueError(f"times must lie within 0 to duration = {duration:g} s, not {array[0]:g} to {array[-1]:g} s")
+    return [float(t) for t in array]
+
+
+class _Recorder:
+    """Collects rows at the sample times."""
+
+    def __init__(self, system: System, samples: list[float]) -> None:
+        self.system, self.samples, self.next = system, samples, 0
+        self.rows: list[tuple[Any, ...]] = []
+
+    def sample(self, time: float, z: list[float], modes: Modes, energy: tuple[float, float, float]) -> None:
+        a = self.system.acceleration
+        self.rows.append((time, *z[:6], *a, z[6], STATES.index(modes.state), *energy, z[WORK], z[LOST]))
+
+    def build(self, method: str, transitions: Any, tally: Tally, notes: dict[str, Any]) -> Trajectory:
+        columns = np.array(self.rows, dtype=float).T
+        names = (
+            "time", "x", "y", "theta", "vx", "vy", "omega", "ax", "ay", "alpha", "wheel_speed", "state",
+            "kinetic_energy", "potential_energy", "stored_energy", "torque_work", "dissipated",
+        )  # fmt: skip
+        arrays: dict[str, Any] = dict(zip(names, columns, strict=True))
+        arrays["state"] = arrays["state"].astype(np.int8)
+        return Trajectory(
+            trial=self.system.trial, method=method, transitions=tuple(transitions), trajectory_angle=tally.angle,
+            max_speed=tally.max_speed, time_of_max_speed=tally.time_of_max_speed,
+            max_angular_velocity=tally.max_spin, energy_residual=tally.residual, notes=notes, **arrays,
+        )  # fmt: skip
+
+
+def _simulate_located(trial: Trial, duration: float, samples: list[float], tolerance: float) -> Trajectory:
+    system = System(trial)
+    recorder = _Recorder(system, samples)
+    z0, modes0 = standing(system)
+    tally = Tally(trial, z0[X], z0[Y], sum(system.energy(0.0, z0, modes0)))
+
+    def on_step(t0: float, t1: float, z1: list[float], at: Callable[[float], list[float]], modes: Modes) -> None:
+        if tally.angle is None and tally.distance(z1[X], z1[Y]) >= LAUNCH_DISTANCE:
+            low, high = t0, t1
+            for _ in range(60):
+                middle = 0.5 * (low + high)
+                z = at(middle)
+                low, high = (low, middle) if tally.distance(z[X], z[Y]) >= LAUNCH_DISTANCE else (middle, high)
+                if not low < 0.5 * (low + high) < high:
+                    break
+            z = at(high)
+            tally.launch(z[X], z[Y])
+        # Samples up to the step's end; one that falls on an event belongs to what went before it.
+        end = bisect.bisect_right(samples, t1)
+        for t in samples[recorder.next : end]:
+            z = at(t)
+            system.derivative(t, z, modes)
+            energy = system.energy(t, z, modes)
+            recorder.sample(t, z, modes, energy)
+            tally.see(t, z[VX], z[VY], z[OMEGA], sum(energy), z[WORK], z[LOST])
+        recorder.next = end
+        tally.see(t1, z1[VX], z1[VY], z1[OMEGA], sum(system.energy(t1, z1, modes)), z1[WORK], z1[LOST])
+
+    went = integrate(system, duration=duration, tolerance=tolerance, on_step=on_step, start=(z0, modes0))
+    notes = {
+        "steps": went.steps, "rejected_steps": went.rejected, "events": went.events,
+        "forced_steps": went.forced_steps, "tolerance": tolerance,
+    }  # fmt: skip
+    return recorder.build("located", went.transitions, tally, notes)
+
+
+def _simulate_fixed(trial: Trial, duration: float, samples: list[float], time_step: float) -> Trajectory:
+    system = System(trial)
+    recorder = _Recorder(system, samples)
+    tally: Tally | None = None
+    last: list[tuple[float, list[float], Modes]] = []
+
+    def on_step(time: float, z: list[float], rate: list[float], modes: Modes) -> None:
+        nonlocal tally
+        energy = system.energy(time, z, modes)
+        if tally is None:
+            tally = Tally(trial, z[X], z[Y], sum(energy))
+        tally.see(time, z[VX], z[VY], z[OMEGA], sum(energy), z[WORK], z[LOST])
+        away = tally.distance(z[X], z[Y])
+        if tally.angle is None and away >= LAUNCH_DISTANCE:
+            before = last[0][1]
+            near = tally.distance(before[X], before[Y])
+            share = (LAUNCH_DISTANCE - near) / (away - near)
+            tally.launch(before[X] + share * (z[X] - before[X]), before[Y] + share * (z[Y] - before[Y]))
+        # Samples between two steps lie on the straight line; the state is that of the step before.
+        while recorder.next < len(samples) and samples[recorder.next] <= time + 1e-9 * time_step:
+            t = samples[recorder.next]
+            if last and t < time - 1e-9 * time_step:
+                start, old, kind = last[0]
+                share = (t - start) / (time - start)
+                z_t = [a + share * (b - a) for a, b in zip(old, z, strict=True)]
+                recorder.sample(t, z_t, kind, system.energy(t, z_t, kind))
+            else:
+                recorder.sample(t, z, modes, energy)
+            recorder.next += 1
+        last[:] = [(time, list(z), modes.copy())]
+
+    steps = math.ceil(duration / time_step * (1 - 1e-12))
+    transitions = integrate_fixed(system, duration=steps * time_step, time_step=time_step, on_step=on_step)
+    assert tally is not None
+    return recorder.build("paper", transitions, tally, {"steps": steps, "time_step": time_step})

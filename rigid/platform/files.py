@@ -1,0 +1,212 @@
+"""Platforms from TOML files, those that ship and a user's own."""
+
+from __future__ import annotations
+
+import tomllib
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_args
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from .actuation import Flywheel
+from .inertia import Part, combine
+from .platform import Platform
+from .solids import box_vertices, prism_vertices, rhombicuboctahedron_vertices
+
+__all__ = ["PLATFORM_FOLDER", "find_platform", "platform_names", "read_platform"]
+
+PLATFORM_FOLDER = Path(__file__).parents[1] / "platforms"
+"""Where those are that ship."""
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
+Vector = tuple[float, float, float]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class _PartTable(_Table):
+    mass: Positive
+    shape: Literal["point", "ball", "box", "cylinder", "ring", "shell"] = "point"
+    size: tuple[Positive, ...] = ()
+    axis: Literal["x", "y", "z"] = "z"
+    position: Vector = (0.0, 0.0, 0.0)
+
+
+class _Body(_Table):
+    mass: Positive
+    inertia: tuple[Positive, Positive, Positive] | tuple[Vector, Vector, Vector] | None = None
+    part: tuple[_PartTable, ...] = ()
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> _Body:
+        if (self.inertia is None) == (not self.part):
+            raise ValueError(
+                "either inertia (three principal moments about x, y, z or a tensor) or [[body.part]] tables"
+            )
+        return self
+
+
+class _Hull(_Table):
+    shape: Literal["rhombicuboctahedron", "box", "prism"]
+    edge: Positive | None = None
+    size: tuple[Positive, Positive, Positive] | None = None
+    sides: Annotated[int, Field(ge=3, le=360, strict=True)] | None = None
+    diameter: Positive | None = None
+    height: Positive | None = None
+
+    @model_validator(mode="after")
+    def _fits_shape(self) -> _Hull:
+        wanted = {"rhombicuboctahedron": {"edge"}, "box": {"size"}, "prism": {"sides", "diameter", "height"}}[
+            self.shape
+        ]
+        given = {key for key in ("edge", "size", "sides", "diameter", "height") if getattr(self, key) is not None}
+        if given != wanted:
+            raise ValueError(
+                f"a {self.shape} has {', '.join(sorted(wanted))}, not {', '.join(sorted(given)) or 'nothing'}"
+            )
+        return self
+
+    def vertices(self) -> np.ndarray:
+        if self.shape == "rhombicuboctahedron":
+            return rhombicuboctahedron_vertices(float(self.edge or 0))
+        if self.shape == "box":
+            return box_vertices(self.size or ())
+        return prism_vertices(int(self.sides or 0), float(self.diameter or 0), float(self.height or 0))
+
+
+class _Spikes(_Table):
+    clear: Positive
+    diameter: Positive
+
+
+class _Wheels(_Table):
+    inertia: Positive
+    max_speed: Positive
+    motor_torque: Positive
+    brake_torque: Positive | None = None
+    axes: Annotated[tuple[Vector, ...], Field(min_length=1, max_length=3)]
+
+
+class _File(_Table):
+    format: Literal["hedgebed-platform/1"]
+    name: Annotated[str, Field(min_length=1)]
+    body: _Body
+    hull: _Hull
+    spikes: _Spikes | None = None
+    wheels: _Wheels
+    sources: dict[str, str] = Field(default_factory=dict)
+
+
+def platform_names() -> list[str]:
+    """The names of those that ship."""
+    return sorted(path.stem for path in PLATFORM_FOLDER.glob("*.toml"))
+
+
+def find_platform(name: str | Path) -> Platform:
+    """The platform in the TOML file `name`, or the one of that name that ships. Raises as `read_platform`."""
+    path = Path(name)
+    if path.suffix == ".toml":
+        return read_platform(path)
+    shipped = PLATFORM_FOLDER / f"{name}.toml"
+    if path.parent == Path() and shipped.is_file():
+        return read_platform(shipped)
+    raise ValueError(
+        f"platform = {str(name)!r} is none that ships ({', '.join(platform_names())}), nor the path of a .toml file"
+    )
+
+
+def read_platform(path: Path) -> Platform:
+    """The platform in the TOML file `path`.
+
+    Raises ValueError naming the file and, a line for each fault, the key, what was found and what was expected.
+    """
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: is not TOML: {error}") from None
+    try:
+        parsed = _File(**table)
+    except ValidationError as error:
+        faults = dict.fromkeys(_sentence(path, detail) for detail in error.errors())
+        raise ValueError("\n".join(faults)) from None
+    try:
+        return _build(parsed)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def _sentence(path: Path, detail: Any) -> str:
+    key = ".".join(str(part) for part in detail["loc"] if not str(part).startswith(("tuple[", "function")))
+    if detail["type"] == "missing":
+        return f"{path}: {key} is missing: it must be given"
+    if detail["type"] == "extra_forbidden":
+        names = _keys_beside(detail["loc"])
+        close = get_close_matches(str(detail["loc"][-1]), names, n=1)
+        meant = f"did you mean {close[0]!r}?" if close else f"there is {', '.join(names)}"
+        return f"{path}: {key} = {detail['input']!r} is no key of a platform; {meant}"
+    said = detail["msg"].removeprefix("Value error, ")
+    found = detail["input"] if not isinstance(detail["input"], dict) else sorted(detail["input"])
+    return f"{path}: {key} = {found!r} will not do: {said[:1].lower()}{said[1:]}"
+
+
+def _keys_beside(place: tuple[Any, ...]) -> list[str]:
+    """The keys of the table in which the key at `place` stands."""
+    model: type[BaseModel] = _File
+    for part in place[:-1]:
+        field = model.model_fields.get(str(part))
+        if field is not None:
+            models = [kind for kind in _kinds(field.annotation) if issubclass(kind, BaseModel)]
+            model = models[0] if models else model
+    return list(model.model_fields)
+
+
+def _kinds(annotation: Any) -> list[type]:
+    """The classes inside an annotation."""
+    if isinstance(annotation, type):
+        return [annotation]
+    return [kind for inner in get_args(annotation) for kind in _kinds(inner)]
+
+
+def _build(given: _File) -> Platform:
+    outline = given.hull.vertices()
+    hull, tip_radius, clear = outline, 0.0, 0.0
+    if given.spikes is not None:
+        tip_radius, clear = 0.5 * given.spikes.diameter, given.spikes.clear
+        far = float(np.linalg.norm(outline, axis=1).max())
+        if clear >= far:
+            raise ValueError(f"spikes.clear = {clear} m: the tips are only {far:.4g} m from the centre")
+        hull = outline * (1 - clear / far)
+    centre = np.zeros(3)
+    if given.body.inertia is None:
+        mass, centre, inertia = combine([Part(**part.model_dump()) for part in given.body.part])
+        if abs(mass - given.body.mass) > 1e-6 * given.body.mass:
+            raise ValueError(f"body.mass = {given.body.mass} kg: the masses of body.part add up to {mass:.6g} kg")
+    else:
+        rows = np.array(given.body.inertia, dtype=float)
+        inertia = np.diag(rows) if rows.ndim == 1 else rows
+    w = given.wheels
+    axes = np.array(w.axes, dtype=float)
+    lengths = np.linalg.norm(axes, axis=1)
+    if not (lengths > 0).all():
+        raise ValueError(f"wheels.axes = {w.axes}: an axis must have a length")
+    axes = axes / lengths[:, None]
+    if np.abs(axes @ axes.T - np.eye(len(axes))).max() > 1e-9:
+        raise ValueError(f"wheels.axes = {w.axes}: they must be orthogonal")
+    wheels = tuple(
+        Flywheel(
+            inertia=w.inertia, max_speed=w.max_speed, motor_torque=w.motor_torque,
+            brake_torque=w.brake_torque if w.brake_torque is not None else w.motor_torque,
+            axis=(float(a[0]), float(a[1]), float(a[2])),
+        )
+        for a in axes
+    )  # fmt: skip
+    return Platform(
+        name=given.name, mass=given.body.mass, inertia=inertia, tips=outline, hull_vertices=hull, wheels=wheels,
+        tip_radius=tip_radius, spike_clear=clear, centre_of_mass=centre, sources=given.sources,
+    )  # fmt: skip

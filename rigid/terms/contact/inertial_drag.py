@@ -1,0 +1,113 @@
+"""Force of the square of the tip's speed."""
+
+from rigid.terms.candidate import (
+    SETS_IN,
+    Bend,
+    Candidate,
+    Form,
+    Number,
+    Push,
+    Starts,
+    Tumble,
+    Typical,
+    amplitude,
+    between,
+    free,
+    prior,
+    times,
+)
+from rigid.terms.mobilised import mobilised
+from rigid.terms.term import Parameter, Term
+
+
+def inertial_rate_force(s, depth, rate, normal, power):
+    """b rate^2 while going in: the ground's own inertia; with another power p, b (1 m/s)^2 (rate / (1 m/s))^p."""
+    sinking = max(rate, 0.0)
+    drag = normal * sinking * sinking
+    if power != 2.0:
+        drag = normal * max(sinking, 1e-12) ** power
+    return drag
+
+
+def inertial_side_force(s, depth, slip, sideways):
+    """-b_x |u| u: the same for a tip that ploughs."""
+    return -sideways * abs(slip) * slip
+
+
+TERM = Term(
+    rank=120, id="inertial-drag", summary="force of the square of the tip's speed", acts="normal and tangential force",
+    parameters=(
+        Parameter(name="normal", unit="kg/m", default=0.0, lowest=0.0, summary="b, while the tip goes in"),
+        Parameter(name="sideways", unit="kg/m", default=0.0, lowest=0.0, summary="b_x, while the tip slides"),
+        Parameter(name="power", unit="1", default=2.0, lowest=1.0, highest=3.0,
+                  summary="of the speed of going in; where it is not 2, b is the force at 1 m/s over (1 m/s)^2"),
+    ),
+    source="Katsuragi and Durian, Nature Physics 3 (2007), 420: the inertia of displaced grains",
+    limits="b does not grow with depth",
+    hooks={"rate_force": inertial_rate_force, "side_force": inertial_side_force},
+)  # fmt: skip
+
+
+def forms(t: Typical) -> tuple[Form, ...]:
+    """While a tip goes in; while it slides, too; by any power of the speed of going in."""
+    normal, sideways = free("normal", "kg/m", 0.5, 0.0, 1e4), free("sideways", "kg/m", 0.2, 0.0, 1e4)
+    power = prior("power", "1", 0.3, 0.2, 0.01, -1.0, 1.0, typical=2.0)
+    return (
+        Form("normal", (normal,), ((1.0,), (20.0,))),
+        Form("both", (normal, sideways), ((1.0, 0.3), (10.0, 2.0))),
+        Form("any power", (normal, sideways, power), ((1.0, 0.3 * 1.0, 0.0), (10.0, 0.3 * 10.0, 0.0))),
+    )
+
+
+def push_force(z, v, x, radius_depth, drag, drag_onset, drag_reach, drag_sharpness, drag_deep, drag_tip, drag_both):
+    """b v^2 on the way in, b by the depth in one of four ways; or both ways."""
+    sinking = max(v, 0.0)
+    wide = min(z / radius_depth, 1.0)
+    share = drag + drag_deep * x + drag_tip * wide * (2.0 - wide)
+    if drag_onset != 0.0:
+        share = share + drag_onset * mobilised(z / drag_reach, drag_sharpness)
+    return share * sinking * sinking + drag_both * v * abs(v)
+
+
+def _form(
+    name: str, slot: str, equation: str, *more: Number, starts: Starts = ((0.1,),), needs: str = "speeds"
+) -> Form:
+    return Form(name, (amplitude(slot, "drag", 0.5, 0.0, 20.0), *more), starts, equation, needs)
+
+
+_ONSET = " * (1 - exp(-z / drag_reach))"
+
+CANDIDATE = Candidate(
+    meaning="the surface resists with the square of the tip's speed",
+    confirm="drop one spike at two speeds: the excess force should go with the square",
+    tumble=Tumble(
+        rank=60, forms=forms,
+        equation="+ normal * rate^power while a tip goes in (power 2 where it is not named), - sideways * u * abs(u) "
+                 "while it slides at u",
+        bench="drop one spike onto the surface at two speeds",
+    ),
+    push=Push(
+        rank=30, law={"force": push_force}, lengths={"drag_reach": 1e-3},
+        forms=(
+            _form("square", "drag", "+ drag * v^2, while it goes in", needs=""),
+            _form("with an onset", "drag_onset", f"+ drag_onset{_ONSET} * v^2, while it goes in",
+                  between("drag_reach", "depth", -3.0, 1.0), starts=((0.1, -2.0), (0.1, 0.0))),
+            _form("growing with depth", "drag_deep", "+ drag_deep * z / D * v^2, while it goes in"),
+            _form("of the tip", "drag_tip", "+ drag_tip * u * (2 - u) * v^2, u = min(z / H, 1), while it goes in"),
+            _form("both ways", "drag_both", "+ drag_both * v * abs(v)"),
+        ),
+        bends=(
+            # A tip that is in when it is in, or a stream that goes on widening.
+            Bend("{}, as sharp as it is", ("with an onset",),
+                 (between("drag_sharpness", "plain", 0.7, 8.0, value=2.5, std=2.0),), ((1.0,), (4.0,)),
+                 times(SETS_IN, "y = z / drag_reach", "q = drag_sharpness", instead=_ONSET)),
+        ),
+        apart={
+            "shaft-friction": "Push to one depth at a tenth of the speed and at the full one: drag falls to a "
+                              "hundredth, friction stays.",
+            "depth-hardening": "Push to one depth at a tenth of the speed: hardening stays.",
+            "layering": "Push to one depth at a tenth of the speed: a layer stays.",
+            "plastic-sinkage": "Push in slowly and retreat: a crater shows at any speed.",
+        },
+    ),
+)  # fmt: skip

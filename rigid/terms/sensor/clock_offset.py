@@ -1,0 +1,29 @@
+"""IMU against camera."""
+
+from rigid.terms.candidate import Candidate, Form, Tumble, bent, free, shape
+from rigid.terms.term import Parameter, Term
+
+TERM = Term(
+    rank=170, id="clock-offset", summary="IMU against camera", acts="the IMU's times", sensor=True,
+    parameters=(
+        Parameter(name="offset", unit="s", default=0.0, summary="IMU time minus true time, at t = 0"),
+        Parameter(name="drift", unit="1", default=0.0, lowest=-0.5, highest=0.5,
+                  summary="what the IMU's clock gains in a second"),
+    ),
+    source="two clocks, read apart", limits="it gains evenly, in every trial from t = 0 on",
+)  # fmt: skip
+
+
+CANDIDATE = Candidate(
+    meaning="the IMU's clock is not the camera's",
+    confirm="knock on the platform in view of the camera: both should see it that much apart",
+    tumble=Tumble(
+        rank=130,
+        forms=lambda t: (
+            Form("constant", (free("offset", "s", 1e-3, -0.5, 0.5),), ((3e-3,), (-3e-3,), (0.02,), (-0.02,))),
+        ),
+        bends=(bent("of any shape", "constant", shape("drift", 0.0, 0.01, -0.2, 0.2)),),
+        equation="the IMU's time = (1 + drift) * t + offset",
+        bench="knock on the platform: camera and IMU see the same instant",
+    ),
+)  # fmt: skip

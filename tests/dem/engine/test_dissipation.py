@@ -1,0 +1,54 @@
+"""The engine's book of what contacts take, against one kept outside it and against the first law."""
+
+import numpy as np
+import pytest
+
+from dem.engine.energy import bed_energies
+from experiments.validate.base.energy import keep_book
+from experiments.validate.contacts import cohesion
+from experiments.validate.contacts.books import ROUGH, cluster
+
+
+def accounts(bed, *, parts, every):
+    """Energy held without the springs of friction and turning, and works taken [J], by time; and those springs'."""
+    bed.track_contact_work()
+    rows = []
+    for _ in range(parts + 1):
+        held, taken = bed_energies(bed, bodies={}), bed.contact_work
+        conserved = held["kinetic"] + held["potential"] + held["normal"]
+        rows.append([conserved, *taken.values(), held["tangential"], held["turning"]])
+        bed.advance(every)
+    return np.array(rows).T
+
+
+def test_the_engines_book_is_the_one_kept_outside_it():
+    """Sixteen grains that collide, slide and roll, under gravity; a third to a tenth of the energy goes each way."""
+    outside = keep_book(cluster(ROUGH, gravity=(30.0, 0, -100.0), time_step=4e-6), 1000)
+    _, damping, sliding, turning, held, wound = accounts(
+        cluster(ROUGH, gravity=(30.0, 0, -100.0), time_step=4e-6), parts=50, every=20
+    )
+    first = outside.parts["kinetic"][0]
+    for name, own in (("damped", damping), ("rubbed", sliding - held), ("turned", turning - wound)):
+        assert outside.parts[name][-1] > 0.05 * first, name
+        assert np.abs(own - outside.parts[name]).max() < 5e-5 * first, name
+
+
+@pytest.mark.parametrize(
+    "law", ["none", pytest.param("dmt", marks=pytest.mark.slow), pytest.param("jkr", marks=pytest.mark.slow)]
+)
+def test_what_is_held_and_what_was_taken_is_the_first_energy_to_second_order(law):
+    """Kinetic, Hertz's or cohesion's energy, and the works against dashpots, friction and turning."""
+    gaps = []
+    for step in (4e-6, 2e-6):
+        bed = cluster(ROUGH, time_step=step) if law == "none" else cohesion._cluster(cohesion._stuff(law), step, 100.0)
+        conserved, *taken, _, _ = accounts(bed, parts=40, every=round(1e-4 / step))
+        total = conserved + np.sum(taken, axis=0)
+        assert sum(part[-1] for part in taken) > 0.2 * conserved[0]
+        gaps.append(np.abs(total - total[0]).max() / conserved[0])
+    assert gaps[0] < 2e-4
+    assert gaps[1] < 0.4 * gaps[0]
+
+
+def test_a_bed_without_a_book_says_how_to_open_one():
+    with pytest.raises(ValueError, match=r"tracks no contact work.*track_contact_work\(\) starts it"):
+        _ = cluster(ROUGH, time_step=4e-6).contact_work

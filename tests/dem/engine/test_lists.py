@@ -1,0 +1,144 @@
+"""Lists, chunks, periodic images and history against a plain double loop; layouts and skins agree."""
+
+from dataclasses import replace
+
+import cloud
+import numpy as np
+import pytest
+from naive_bed import NaiveBed
+
+import dem.engine.engine
+from dem import Bed
+from dem.contact.law import damping_factor
+
+STEPS = 30
+LAYOUTS = ("one chunk", "seven chunks", "a chunk a grain")
+
+
+@pytest.fixture(params=LAYOUTS)
+def layout(request, engines, monkeypatch):
+    if request.param == "seven chunks":
+        monkeypatch.setattr(dem.engine.engine, "GRAINS_PER_CHUNK", 9)
+    elif request.param == "a chunk a grain":
+        engines.overrides = {"gpu": True, "neighbours_per_grain": 30}
+    return request.param
+
+
+COHESIVE = {
+    "none": cloud.STUFF,
+    "dmt": replace(cloud.STUFF, cohesion="dmt", surface_energy=5.0),
+    "jkr": replace(cloud.STUFF, cohesion="jkr", surface_energy=5.0),
+}
+"""Laws of cohesion; at this surface energy JKR's range is 0.6 % of a diameter."""
+
+
+def computed(material):
+    """The cloud and its ball after thirty steps of the plain loop."""
+    positions, radii, velocities, spins = cloud.initial()
+    ball = {name: np.array(value, dtype=float) for name, value in cloud.BALL.items()}
+    naive = NaiveBed(
+        material,
+        positions,
+        radii,
+        velocities,
+        spins,
+        cloud.PERIOD,
+        np.array([0.0, 0.0, -9.81]),
+        cloud.STEP,
+        damping_factor(cloud.STUFF.restitution),
+        ball,
+    )
+    naive.first = naive.f.copy()
+    naive.advance(STEPS)
+    return naive
+
+
+@pytest.fixture(scope="module")
+def reference():
+    return computed(cloud.STUFF)
+
+
+def test_forces_and_motion_are_those_of_a_plain_double_loop(layout, reference):
+    """Forces of the first instant, and everything after thirty steps, to round-off; the reaction on the ball too."""
+    bed = cloud.make(ball=True)
+    assert bed.engine.chunk_count == {"one chunk": 1, "seven chunks": 7, "a chunk a grain": 64}[layout]
+    assert bed.engine.nx == 3
+    assert bed.coordination_number > 3
+    agrees(bed, reference)
+
+
+@pytest.mark.parametrize("cohesion", ["dmt", "jkr"])
+def test_forces_of_cohesive_grains_are_those_of_a_plain_double_loop(cohesion, monkeypatch):
+    """In seven chunks; JKR's equation for the contact radius is solved by bisection there."""
+    monkeypatch.setattr(dem.engine.engine, "GRAINS_PER_CHUNK", 9)
+    bed = cloud.make(ball=True, material=COHESIVE[cohesion])
+    assert bed.coordination_number > 3
+    agrees(bed, computed(COHESIVE[cohesion]))
+
+
+def agrees(bed, reference):
+    first = bed.grains()
+    assert np.abs(first.force - reference.first).max() <= 1e-11 * np.abs(reference.first).max()
+    bed.advance(STEPS - 1)
+    bed.advance(1)
+    grains = bed.grains()
+    half = 0.5 * cloud.STEP
+    wanted = {
+        "displacement": reference.x - cloud.initial()[0],
+        "force": reference.f,
+        "velocity": reference.v + half * reference.f / reference.m[:, None],
+        "spin": reference.w + half * reference.t / reference.inertia[:, None],
+    }
+    for name, value in wanted.items():
+        assert np.abs(getattr(grains, name) - value).max() <= 1e-10 * np.abs(value).max(), name
+    force, torque = bed.reaction(1)
+    assert np.linalg.norm(force) > 1e-3
+    assert force == pytest.approx(reference.on_ball, rel=1e-9, abs=1e-12)
+    assert torque == pytest.approx(reference.torque_on_ball, rel=1e-9, abs=1e-14)
+    assert bed.reaction(0)[0] == pytest.approx(reference.on_floor, rel=1e-9)
+    assert bed.floor_force == pytest.approx(-reference.on_floor[2], rel=1e-9)
+    counts = np.zeros(64, dtype=int)
+    for pair in reference.history:
+        for end in pair:
+            if not isinstance(end, str):
+                counts[end] += 1
+    assert (bed.contact_counts() == counts).all()
+
+
+def test_other_skins_give_the_same_motion(monkeypatch):
+    """New lists at every few steps, or hardly ever: the same to round-off."""
+    results, made = [], []
+    monkeypatch.setattr(Bed, "adapt_skin", lambda self: None)
+    for skin in (0.0005, 0.02, 0.15):
+        monkeypatch.setattr("dem.engine.base._SKIN", skin)
+        bed = cloud.make()
+        bed.advance(400)
+        results.append(bed.grains().as_dict())
+        made.append(bed.list_count)
+        del bed  # its engine serves the next
+    assert made[0] > 100 and made[0] > 5 * made[1] > 5 * made[2]
+    for other in results[1:]:
+        for name in ("displacement", "velocity", "spin", "force"):
+            assert np.abs(other[name] - results[0][name]).max() <= 1e-8 * np.abs(results[0][name]).max(), name
+
+
+def test_a_shift_of_the_origin_changes_nothing():
+    """Periodic: grains and ball moved by a part of a period, so that they lie across other boundaries."""
+
+    def motion(shift):
+        bed = cloud.make(ball=True, shift=shift)
+        bed.advance(100)
+        return bed.grains().as_dict(), bed.reaction(1)
+
+    (a, on_ball), (b, on_moved_ball) = motion((0.0, 0.0, 0.0)), motion((0.0091, -0.0043, 0.0))
+    for name in ("displacement", "velocity", "spin", "force"):
+        assert np.abs(a[name] - b[name]).max() <= 1e-9 * np.abs(a[name]).max(), name
+    for before, after in zip(on_ball, on_moved_ball, strict=True):
+        assert after == pytest.approx(before, rel=1e-9, abs=1e-12)
+    assert (b["position"][:, :2] >= 0).all() and (b["position"][:, :2] <= cloud.PERIOD[0]).all()
+
+
+def test_lists_that_are_too_small_are_no_secret(engines):
+    engines.overrides = {"gpu": True, "neighbours_per_grain": -7}  # one row a grain is left
+    with pytest.raises(dem.BedFailure, match=r"room for 1 pairs a chunk and \d+ are needed"):
+        cloud.make()

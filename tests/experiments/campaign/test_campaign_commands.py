@@ -1,0 +1,269 @@
+"""`hedgebed campaign new`, `check` and `from-run`: templates that hold, faults all said at once, odd data found."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from campaign_files import change, tumble_folder
+from fake_bed import FakeBed
+from penetration_campaigns import campaign_of, driven_trial, drop_trial
+
+from experiments.campaign import Campaign, Recording, read_campaign, write_campaign
+from experiments.campaign import tables as known
+from experiments.campaign.templates import new_campaign
+from experiments.check.experiment import find_faults
+from experiments.cli.main import main
+from experiments.penetrate import beds
+from experiments.penetrate import experiment as penetrate
+from experiments.penetrate.recorded import SpikeSensors, campaign_of_run
+from experiments.penetrate.settings import PenetrateSettings
+from experiments.tumble import synthesis
+from experiments.tumble.campaign_settings import CampaignSettings
+
+BOTH = pytest.mark.parametrize("kind", ["tumble", "penetration"])
+TABLES = {
+    "tumble": (
+        known.PlatformTable, known.WheelTable, known.RigTable, known.TumbleSurface, known.TumbleUncertainty,
+        known.PoseSensor, known.ImuSensor, known.TumbleTrial,
+    ),
+    "penetration": (
+        known.SpikeTable, known.PenetrationSurface, known.PenetrationUncertainty, known.DepthSensor,
+        known.PenetrationTrial,
+    ),
+}  # fmt: skip
+
+
+# new
+
+
+@BOTH
+def test_the_template_reads_as_a_campaign_and_explains_every_key(tmp_path, kind):
+    folder = new_campaign(tmp_path / "c", kind=kind)
+    campaign = read_campaign(folder)
+    assert campaign.tables.kind == kind
+    assert not [finding for finding in find_faults(campaign) if "has no recording" not in finding.what]
+    lines = [line.lstrip("# ") for line in (folder / "campaign.toml").read_text().splitlines()]
+    keys = {line.split("=")[0].strip() for line in lines if "=" in line}
+    for table in TABLES[kind]:
+        assert set(table.model_fields) <= keys, table.__name__
+
+
+@BOTH
+def test_a_template_never_overwrites(tmp_path, kind, capsys):
+    (tmp_path / "c").mkdir()
+    (tmp_path / "c" / "mine.txt").write_text("mine")
+    assert main(["campaign", "new", str(tmp_path / "c"), "--kind", kind]) == 2
+    assert "in use" in capsys.readouterr().err
+    assert [path.name for path in (tmp_path / "c").iterdir()] == ["mine.txt"]
+
+
+def test_a_new_campaign_is_checked_with_a_report(tmp_path, capsys):
+    assert main(["campaign", "new", str(tmp_path / "c"), "--kind", "penetration"]) == 0
+    assert main(["campaign", "check", str(tmp_path / "c"), "--out", str(tmp_path / "run"), "--quiet"]) == 0
+    said = capsys.readouterr().out
+    assert "drop 0.4 m/s" in said and "nothing found" in " ".join(said.split())
+    assert "Nothing odd was found" in (tmp_path / "run" / "report.html").read_text()
+    again = ["campaign", "check", str(tmp_path / "run" / "run.toml"), "--out", str(tmp_path / "again"), "--quiet"]
+    assert main([*again, "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert [trial["alike"] for trial in result["trials"]] == [1, 1, 1]
+    assert result["recordings"][2]["rate"] == pytest.approx(1000.0)
+
+
+# check: what cannot be read
+
+
+def test_all_faults_are_said_at_once_by_file_line_and_key(tmp_path, capsys):
+    folder = tumble_folder(tmp_path / "c")
+    change(folder / "campaign.toml", "mass = 5.3 ", "mas = 5.3 ")
+    change(folder / "campaign.toml", "[sensors.wheel]\nstd = [0.5]\n", "")
+    change(folder / "campaign.toml", 'id = "002"', 'id = "001"')
+    change(folder / "001-imu.csv", "0.01,0.1,", "0.01,fast,")
+    change(folder / "001-imu.csv", "0.0,0.0,0.0,9.8\n", "0.0,0.0,0.0\n")
+    change(folder / "001-wheel.csv", "0.1,0.6", "0.05,0.6")
+    (folder / "more" / "002-pose.csv").unlink()
+    assert main(["campaign", "check", str(folder), "--out", str(tmp_path / "run")]) == 2
+    said = capsys.readouterr().err
+    for part in (
+        "campaign.toml: [platform] mass is missing; kg was expected",
+        "[platform] mas = 5.3 is an unknown key; did you mean 'mass'?",
+        "[[trial]] 2 (id '001'): id = '001' is that of [[trial]] 1 too",
+        "[[trial]] 1 (id '001'): wheel is given, but [sensors.wheel] is missing",
+        "001-imu.csv, line 2: found 3 cells, expected 4",
+        "001-imu.csv, line 3: gyro_rad_s = 'fast', a number or nan was expected",
+        "001-wheel.csv, line 4: t_s runs backwards, from 0.1 s to 0.05 s",
+        "002-pose.csv: there is no such file",
+    ):
+        assert part in said
+    assert not (tmp_path / "run").exists()
+
+
+def test_of_a_thousand_faults_of_one_kind_five_are_said_and_the_number(tmp_path):
+    folder = tumble_folder(tmp_path / "c")
+    (folder / "001-wheel.csv").write_text("t_s,omega_rad_s\n" + "".join(f"{k},x\n" for k in range(1000)))
+    with pytest.raises(ValueError, match="omega_rad_s = 'x'") as error:
+        read_campaign(folder)
+    lines = str(error.value).splitlines()
+    assert len(lines) == 6 and lines[5].endswith("and 995 more lines of that kind")
+
+
+# check: what can be read but is odd
+
+
+@pytest.fixture(scope="module")
+def tumbles(tmp_path_factory):
+    """Five trials alike, of a motor on brick."""
+    settings = CampaignSettings(
+        rig=(0.0085,), motor_torques=(0.22,), brake_torques=(), duration=1.0, trials=5, surface="brick"
+    )
+    folder = tmp_path_factory.mktemp("made")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(synthesis, "write_report", lambda *given: None)
+        synthesis.run(settings, folder / "run")
+    return read_campaign(folder / "run" / "campaign")
+
+
+def altered(campaign, key, change):
+    columns = {name: values.copy() for name, values in campaign.recordings[key].columns.items()}
+    change(columns)
+    return Campaign(campaign.tables, {**campaign.recordings, key: Recording(columns)})
+
+
+def lost_marker(columns):
+    columns["x_m"][80:90] += 0.05
+    columns["y_m"][80:90] -= 0.03
+
+
+def late_clock(columns):
+    columns["t_s"][110:] += 0.4
+
+
+def silence(columns):
+    columns["gyro_rad_s"][40:70] = np.nan
+
+
+def other_way(columns):
+    columns["x_m"] += 0.1 * np.maximum(columns["t_s"], 0) ** 2
+
+
+def test_in_good_tumbles_nothing_is_found(tumbles):
+    assert find_faults(tumbles) == []
+
+
+@pytest.mark.parametrize(
+    ("key", "change", "said"),
+    [
+        (("001", "pose"), lost_marker, "jump that no motion makes (the camera lost its marker)"),
+        (("002", "pose"), late_clock, "the clock of the camera jumps forward by 0.4 s"),
+        (("003", "imu"), silence, "gyro has no valid row for 0.31 s"),
+        (("004", "pose"), other_way, "at odds with its 4 replicates, which agree with one another: in x"),
+    ],
+)
+def test_what_is_odd_in_a_tumble_is_found_where_it_is_and_nowhere_else(tumbles, key, change, said):
+    findings = find_faults(altered(tumbles, key, change))
+    assert {finding.trial for finding in findings} == {key[0]}
+    assert any(said in finding.what and f"trial {key[0]}" in finding.what for finding in findings)
+
+
+def test_a_missing_sensor_is_said(tumbles):
+    trials = tuple(t.model_copy(update={"imu": None}) if t.id == "005" else t for t in tumbles.tables.trial)
+    (finding,) = find_faults(Campaign(tumbles.tables.model_copy(update={"trial": trials}), tumbles.recordings))
+    assert finding.what == "trial 005 has no recording of imu, others have"
+
+
+def test_a_push_at_odds_and_a_depth_that_jumps_are_found():
+    pushes = [(f"{k}", "driven", 0.01, driven_trial(lambda z, v, top: 900 * z, speed=0.01, seed=k)) for k in range(3)]
+    pushes.append(("soft", "driven", 0.01, driven_trial(lambda z, v, top: 600 * z, speed=0.01, seed=8)))
+    drop = drop_trial(lambda z, v: 900 * z, speed=0.3)
+    drop["depth_m"][100:] += 0.004
+    found = find_faults(campaign_of([*pushes, ("fall", "drop", 0.3, drop)]))
+    assert {finding.trial for finding in found} == {"soft", "fall"}
+    assert any("trial fall: the depth jumps by" in finding.what for finding in found)
+    assert any("trial soft is at odds with its 3 replicates" in finding.what for finding in found)
+
+
+# from-run
+
+
+LOAD, MASS = 0.4, 0.3
+
+
+@pytest.fixture(scope="module")
+def grains(tmp_path_factory):
+    """A finished run on three stand-in beds."""
+    folder = tmp_path_factory.mktemp("grains") / "run"
+    settings = PenetrateSettings(
+        seeds=(1, 2, 3), speeds=(0.2, 0.4), other_speeds=(0.4,), drop_speeds=(0.1,), other_drop_speeds=(0.1,),
+        drop_time=0.5, depth=0.01, frame_count=0, mass=MASS, load=LOAD, lowering_speed=0.1, substeps=20,
+    )  # fmt: skip
+    sand = SimpleNamespace(name="sand", density=2650.0, young=7e10, poisson=0.25, friction=0.5, surface_energy=0.0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            beds, "prepare_bed",
+            lambda settings, seed, young, progress: FakeBed(
+                size=settings.bed_size, seed=seed, hardness=100.0 + 10 * seed, rate=0.5, unload=4000.0
+            ),
+        )  # fmt: skip
+        patch.setattr(beds, "find_material", lambda name: sand)
+        patch.setattr(penetrate, "write_report", lambda *given: None)
+        patch.setattr(beds, "bed_step", lambda settings, young: 2e-5)
+        penetrate.run(PenetrateSettings(**settings.model_dump()), folder)
+    from experiments.runs.folder import RunFolder
+
+    RunFolder.open(folder).set_status("done")
+    return folder
+
+
+def test_the_runs_of_a_bed_are_trials_as_the_format_has_them(grains, tmp_path):
+    assert main(["campaign", "from-run", str(grains), str(tmp_path / "c"), "--rate", "500"]) == 0
+    campaign = read_campaign(tmp_path / "c")
+    trials = {trial.id: trial for trial in campaign.tables.trial}
+    assert len(trials) == 10
+    drop, driven, stood = (trials[name] for name in ("seed2-drop-0.1", "seed1-driven-0.2", "seed3-set-down"))
+    # under a constant load m z'' = W - F: the body feels W / m, the grains their own weight
+    assert (drop.gravity, drop.grain_gravity) == (pytest.approx(LOAD / MASS), 9.80665)
+    assert (driven.speed, stood.mode, stood.speed) == (0.2, "driven", None)
+    recording = campaign.recording("seed2-drop-0.1", "data")
+    assert recording.time[0] > 0 and np.diff(recording.time) == pytest.approx(0.002)
+    assert campaign.tables.uncertainty.stiffness >= 1
+    again = write_campaign(tmp_path / "again", campaign)
+    assert read_campaign(again).tables == campaign.tables
+
+
+def test_what_is_recorded_is_the_run_plus_the_noise_that_is_stated(grains):
+    sensors = SpikeSensors(rate=1000, depth_std=1e-4, force_std=0.03, accel_std=0.2, seed=4)
+    noisy = campaign_of_run(grains, sensors=sensors)
+    still = campaign_of_run(grains, sensors=SpikeSensors(rate=1000, depth_std=1e-12, force_std=1e-9, accel_std=1e-9))
+    parts = {"depth_m": [], "force_N": [], "accel_m_s2": []}
+    for key, recording in noisy.recordings.items():
+        for name in list(recording.columns)[1:]:
+            parts[name].append(recording[name] - still.recordings[key][name])
+    for name, std in (("depth_m", 1e-4), ("force_N", 0.03), ("accel_m_s2", 0.2)):
+        noise = np.concatenate(parts[name]) / std
+        assert abs((noise**2).mean() - 1) < 5 * np.sqrt(2 / len(noise)), name
+    # without noise a drop's acceleration is the second derivative of its depth
+    drop = still.recordings["seed1-drop-0.1", "data"]
+    step = np.diff(drop.time).mean()
+    second = np.diff(drop["depth_m"], 2) / step**2
+    inside = drop["depth_m"][1:-1] < 0.9 * drop["depth_m"].max()  # the stand-in's force has a kink where it turns
+    assert second[inside] == pytest.approx(drop["accel_m_s2"][1:-1][inside], abs=0.02 * abs(drop["accel_m_s2"]).max())
+
+
+@pytest.mark.parametrize("more", [(), ("--also", "other")])
+def test_a_run_of_another_kind_is_refused_by_what_it_is(tmp_path, capsys, more):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("experiments.grains.on_bed.write_report", lambda *_: None)
+        spatial = ("tumble", "spatial", "--torque", "0", "0.02", "0", "--duration", "0.02", "--quiet")
+        assert main([*spatial, "--out", str(tmp_path / "run")]) == 0
+    capsys.readouterr()
+    assert main(["campaign", "from-run", str(tmp_path / "run"), str(tmp_path / "made"), *more]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "is a run of 'tumble spatial': one of 'penetrate', or of 'tumble' in the plane, was expected" in said
+
+
+def test_only_a_finished_run_of_penetrate_becomes_a_campaign(grains, tmp_path):
+    with pytest.raises(ValueError, match="has no run"):
+        campaign_of_run(tmp_path)
+    with pytest.raises(ValueError, match="a higher rate would do"):
+        campaign_of_run(grains, sensors=SpikeSensors(rate=5))

@@ -1,0 +1,361 @@
+"""The command line: options from the settings class, precedence, what is refused and how, exit statuses."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import hedgebed
+from experiments.cli.main import main
+from experiments.cli.runs import _number, show_folder
+from experiments.runs.folder import RunFolder
+from rigid.terms import EFFECTS
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def settings_of(folder: Path) -> dict:
+    return tomllib.loads((folder / "run.toml").read_text())["settings"]
+
+
+def only_run() -> Path:
+    (folder,) = Path("runs").iterdir()
+    return folder
+
+
+# Settings
+
+
+def test_help_shows_units_and_defaults_and_every_setting(dig, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "160")
+    assert main(["dig", "--help"]) == 0
+    text = capsys.readouterr().out
+    for expected in (
+        "--spike-diameter",
+        "Diameter of the spike [m].",
+        "[default: 0.02]",
+        "[default: 0.1 0.2]",
+        "--full",
+    ):
+        assert expected in text
+
+
+def test_without_out_a_run_goes_to_a_fresh_folder_each_time(dig):
+    assert main(["dig"]) == main(["dig"]) == 0
+    assert len(list(Path("runs").glob("dig-*"))) == 2
+
+
+def test_command_line_wins_over_case_wins_over_preset_wins_over_default(dig):
+    Path("case.toml").write_text("steps = 5\nspike_diameter = 0.03\n")
+    assert main(["dig", "case.toml", "--full", "--spike-diameter", "0.04", "--drive-speeds", "1", "2", "3"]) == 0
+    settings = settings_of(only_run())
+    assert settings["deep"] is True  # the preset
+    assert settings["steps"] == 5  # the case, over the preset's 7
+    assert settings["spike_diameter"] == 0.04  # the command line, over the case
+    assert settings["drive_speeds"] == [1.0, 2.0, 3.0]
+    assert settings["grain"] == "sand"  # the default
+
+
+def test_a_case_that_ships_goes_by_its_name(dig):
+    assert main(["dig", "deep"]) == 0
+    assert settings_of(only_run())["steps"] == 7
+
+
+def test_the_run_toml_of_a_run_is_a_case(dig):
+    assert main(["dig", "--steps", "4", "--out", "a"]) == 0
+    assert main(["dig", "a/run.toml", "--out", "b"]) == 0
+    assert settings_of(Path("a")) == settings_of(Path("b"))
+
+
+def test_none_unsets_what_need_not_be_set(dig):
+    Path("case.toml").write_text('load = "none"\n')
+    assert main(["dig", "case.toml", "--out", "a"]) == 0
+    assert main(["dig", "--load", "none", "--out", "b"]) == 0
+    assert main(["dig", "a/run.toml", "--out", "c"]) == 0
+    assert ["load" in settings_of(Path(name)) for name in "abc"] == [False, False, False]
+
+
+# What is refused
+
+
+@pytest.mark.parametrize(
+    ("tokens", "said"),
+    [
+        (["--spike-diametre", "1"], ["--spike-diametre", "--spike-diameter"]),
+        (["--spike-diameter", "-1"], ["--spike-diameter = -1.0", "greater than 0", "[m]"]),
+        (["--load", "-1"], ["--load = -1.0", "greater than 0"]),
+        (["--seeds", "1", "-2"], ["--seeds[1] = -2", "greater than or equal to 0"]),
+        (["--spike-diameter", "thin"], ["--spike-diameter", "thin", "float"]),
+        (["--spike-diameter", "0.2"], ["spike_diameter = 0.2", "at most 0.1"]),
+        (["--grain", "snow"], ["--grain", "snow", "sand"]),
+        (["--size", "1"], ["--size = 1 will not do: it takes 3 values, not 1 (Size of the bed [m])"]),
+        (["--seeds", "1.5"], ["--seeds[0] = 1.5", "fractional part"]),
+        (["--steps", "10.7"], ["--steps = 10.7", "fractional part"]),
+        (["--seeds"], ["--seeds is empty: give at least one (Seeds [1])"]),
+        (["--spike-diameter", "16mm"], ["16mm", "give a plain number in metres, e.g. 0.016"]),
+        (["--load", "3N"], ["3N", "give a plain number in newtons"]),
+        (["misspelt.toml"], ["misspelt.toml", "deep"]),
+        (["key.toml"], ["key.toml: spike_diametre = 0.1", "did you mean 'spike_diameter'"]),
+        (["hyphen.toml"], ["hyphen.toml: spike-diameter", "did you mean 'spike_diameter'"]),
+        (["value.toml"], ["value.toml: drive_speeds[1] = 'fast'", "valid number"]),
+        (["broken.toml"], ["broken.toml", "TOML"]),
+        (["--out", "key.toml"], ["key.toml", "file"]),
+        (["--out", "cases"], ["cases", "in use", "deep.toml"]),
+        (["--ending", "early"], ["time_step = 1 s", "at most 1e-5 s"]),
+    ],
+)
+def test_bad_input_is_refused_in_a_sentence_that_names_it(dig, capsys, tokens, said):
+    Path("key.toml").write_text("spike_diametre = 0.1\n")
+    Path("hyphen.toml").write_text("spike-diameter = 0.1\n")
+    Path("value.toml").write_text('drive_speeds = [0.1, "fast"]\n')
+    Path("broken.toml").write_text("steps = \n")
+    assert main(["dig", *tokens]) == 2
+    text = capsys.readouterr().err
+    assert all(words in text for words in said), text
+    assert "Traceback" not in text
+    assert not Path("runs").exists() or not list(Path("runs").iterdir())  # nothing is left behind
+
+
+def test_an_unknown_command_is_refused_with_the_nearest(dig, capsys):
+    assert main(["dg"]) == 2
+    assert '"dig"' in capsys.readouterr().err
+
+
+def test_a_check_of_the_experiment_refuses_before_a_folder_is_made(dig, capsys):
+    def check(settings):
+        raise ValueError("memory = 4 GiB is more than there is: at most 2 GiB")
+
+    dig.check = check
+    assert main(["dig", "--out", "a"]) == 2
+    assert "at most 2 GiB" in capsys.readouterr().err
+    assert not Path("a").exists()
+
+
+@pytest.mark.parametrize(("line", "said"), [("seeds = [1.5]", "fractional part"), ("seeds = []", "give at least one")])
+def test_one_fault_is_one_sentence(dig, capsys, line, said):
+    Path("case.toml").write_text(f"{line}\n")
+    assert main(["dig", "case.toml"]) == 2
+    (sentence,) = capsys.readouterr().err.splitlines()
+    assert said in sentence
+
+
+def test_none_empties_a_list_that_may_be_empty(dig):
+    Path("case.toml").write_text('drive_speeds = "none"\n')
+    assert main(["dig", "--drive-speeds", "none", "--out", "a"]) == 0
+    assert main(["dig", "case.toml", "--out", "b"]) == 0
+    assert settings_of(Path("a"))["drive_speeds"] == settings_of(Path("b"))["drive_speeds"] == []
+
+
+def test_a_whole_number_stays_one(dig):
+    assert main(["dig", "--steps", "4", "--seeds", "2", "3", "--out", "a"]) == 0
+    settings = settings_of(Path("a"))
+    assert (settings["steps"], settings["seeds"]) == (4, [2, 3]) and isinstance(settings["steps"], int)
+
+
+# How it ends
+
+
+def test_done_shows_the_numbers_and_the_folder(dig, capsys):
+    assert main(["dig", "--out", "a"]) == 0
+    out = capsys.readouterr().out
+    for expected in ("A hole", "depth", "0.02", "0.001", "The hole is [deep].", "warning: it is dark", "folder: a"):
+        assert expected in out
+    assert json.loads(Path("a/status.json").read_text())["status"] == "done"
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "shown"),
+    [
+        (37.616584, 2.5318, "38"), (0.0040577, 0.00036257, "0.0041"), (0.000546, None, "0.00055"),
+        (20214.0, None, "20214"), (0.219033, 0.0, "0.219"), (0.57207, 0.00058, "0.5721"), (None, None, "-"),
+        (51.2, 0.6, "51.2"),
+    ],
+)  # fmt: skip
+def test_numbers_are_shown_to_the_digits_that_are_known(value, std, shown):
+    assert _number(value, std) == shown
+
+
+def test_stopped_says_how_to_resume_and_resume_finishes(dig, capsys):
+    assert main(["dig", "--ending", "KeyboardInterrupt", "--out", "a"]) == 3
+    assert "hedgebed resume a" in capsys.readouterr().err
+    assert json.loads(Path("a/status.json").read_text())["status"] == "stopped"
+    assert main(["resume", "a"]) == 0
+    assert json.loads(Path("a/status.json").read_text())["status"] == "done"
+    assert json.loads(Path("a/result.json").read_text())["quantities"]["count"]["std"] is None
+
+
+def test_failed_says_why_without_a_traceback(dig, capsys):
+    assert main(["dig", "--ending", "RuntimeError", "--out", "a"]) == 1
+    text = capsys.readouterr().err
+    assert "a grain was lost at t = 0.1 s" in text
+    assert "Traceback" not in text and "resume" not in text
+    status = json.loads(Path("a/status.json").read_text())
+    assert status["status"] == "failed"
+    assert "a grain was lost" in status["reason"]
+
+
+def test_a_value_found_wrong_after_work_began_is_a_sentence(dig, capsys):
+    assert main(["dig", "--ending", "ValueError", "--out", "a"]) == 1
+    text = capsys.readouterr().err
+    assert "failed: " in text and "Traceback" not in text
+    assert "Traceback" in Path("a/traceback.txt").read_text()
+    assert Path("a/series/dig.csv").exists()
+
+
+def test_a_mistake_of_ours_shows_where(dig, capsys):
+    assert main(["dig", "--ending", "ZeroDivisionError", "--out", "a"]) == 1
+    assert "Traceback" in capsys.readouterr().err
+    assert Path("a/series/dig.csv").exists()
+
+
+def test_sigterm_stops_as_ctrl_c_does(dig):
+    def work(settings, folder, *, progress):
+        threading.Timer(0.05, os.kill, (os.getpid(), signal.SIGTERM)).start()
+        threading.Event().wait(5)
+        raise AssertionError("was not interrupted")
+
+    dig.run = work
+    assert main(["dig", "--out", "a"]) == 3
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+
+
+def test_json_prints_the_result_and_nothing_else(dig, capfd):
+    assert main(["dig", "--json", "--out", "a"]) == 0
+    out, err = capfd.readouterr()
+    assert json.loads(out) == json.loads(Path("a/result.json").read_text())
+    assert "a library that writes to stdout" in err
+
+
+def test_quiet_shows_no_progress(dig, capsys):
+    assert main(["dig", "--quiet", "--out", "a"]) == 0
+    assert "[   0:00]" not in capsys.readouterr().err
+
+
+def test_resume_of_a_finished_run_shows_it_again(dig, capsys):
+    assert main(["dig", "--out", "a"]) == 0
+    before = Path("a/result.json").stat().st_mtime_ns
+    capsys.readouterr()
+    assert main(["resume", "a"]) == 0
+    out, err = capsys.readouterr()
+    assert "depth" in out
+    assert "is done" in err
+    assert Path("a/result.json").stat().st_mtime_ns == before
+
+
+def test_a_run_that_another_process_is_writing_is_left_alone(dig, capsys):
+    import fcntl
+
+    assert main(["dig", "--ending", "KeyboardInterrupt", "--out", "a"]) == 3
+    with Path("a/lock").open("w") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        assert main(["resume", "a"]) == 2
+    assert "is being written" in capsys.readouterr().err
+    assert json.loads(Path("a/status.json").read_text())["status"] == "stopped"
+
+
+@pytest.mark.parametrize("path", ["nowhere", "cases"])
+def test_resume_refuses_what_is_no_run(dig, capsys, path):
+    assert main(["resume", path]) == 2
+    assert path in capsys.readouterr().err
+
+
+def test_resume_refuses_settings_it_does_not_know(dig, capsys):
+    assert main(["dig", "--out", "a"]) == 0
+    text = Path("a/run.toml").read_text().replace("\nsteps =", "\nstepps =")
+    Path("a/run.toml").write_text(text)
+    assert main(["resume", "a"]) == 2
+    assert "did you mean 'steps'" in capsys.readouterr().err
+
+
+# Bench
+
+
+def test_bench_names_what_there_is(dig, capsys, monkeypatch):
+    import experiments.cli.benching
+
+    Path("pyproject.toml").touch()
+    Path("benchmarks").mkdir()
+    Path("benchmarks/stones.py").write_text("def run(out, *, progress):\n    return {'what': 'stones'}\n")
+    monkeypatch.setattr(experiments.cli.benching, "__file__", str(Path("experiments/cli/benching.py").resolve()))
+    assert main(["bench", "stone"]) == 2
+    assert "did you mean 'stones'" in capsys.readouterr().err
+    monkeypatch.delitem(sys.modules, "benchmarks", raising=False)
+    monkeypatch.syspath_prepend(Path().resolve())
+    assert main(["bench", "stones", "--out", "b", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == json.loads(Path("b/bench.json").read_text()) == {"what": "stones"}
+    assert main(["bench", "stones", "--out", "b"]) == 2
+    assert "in use" in capsys.readouterr().err
+    sys.modules.pop("benchmarks.stones", None)
+    sys.modules.pop("benchmarks", None)
+
+
+def test_bench_without_a_checkout_says_so(dig, capsys, monkeypatch, tmp_path):
+    import experiments.cli.benching
+
+    monkeypatch.setattr(experiments.cli.benching, "__file__", str(tmp_path / "experiments" / "benching.py"))
+    assert main(["bench"]) == 2
+    assert "checkout" in capsys.readouterr().err
+
+
+def test_effects_are_listed_each_with_what_to_give(capsys):
+    assert main(["effects"]) == 0
+    shown = capsys.readouterr().out
+    for term in EFFECTS.values():
+        assert term.id in shown
+        for parameter in term.parameters:
+            assert f"{term.id}.{parameter.name}" in shown
+    assert main(["effects", "pendulum"]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert (
+        EFFECTS["pendulum"].limits in shown
+        and "[m] from the pulleys down to the shaft (infinite if not given)" in shown
+    )
+    assert main(["effects", "pendlum"]) == 2
+    assert "did you mean 'pendulum'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", [["diagnose"], ["campaign", "check"]])
+def test_a_command_about_a_campaign_asks_for_one(command, capsys):
+    assert main([*command, "--help"]) == 0
+    shown = capsys.readouterr().out
+    assert "CAMPAIGN" in shown and "CASE" not in shown
+
+
+def test_where_nothing_varies_no_spread_is_shown(dig, capsys):
+    """A spread of 0 is of what is exact, or was computed once; with several runs it says so beside the others."""
+    assert main(["dig", "--out", "a"]) == 0
+    assert "spread (std)" in capsys.readouterr().out
+    folder = RunFolder.open(Path("a"))
+    result = folder.read_result()
+    result["quantities"] |= {"length": {"value": 1.0, "std": 0.0, "unit": "m"}}
+    folder.write_result(result)
+    show_folder(folder, as_json=False)
+    assert "exact" in capsys.readouterr().out
+    result["quantities"]["depth"]["std"] = None
+    folder.write_result(result)
+    show_folder(folder, as_json=False)
+    shown = capsys.readouterr().out
+    assert "spread" not in shown and "exact" not in shown and "length" in shown
+
+
+# As a program
+
+
+def test_python_m_hedgebed_is_the_same_command():
+    done = subprocess.run([sys.executable, "-m", "hedgebed", "--version"], capture_output=True, text=True, cwd=ROOT)
+    assert (done.returncode, done.stdout.strip()) == (0, hedgebed.__version__)
+
+
+def test_help_does_not_wait_for_taichi():
+    code = (
+        "import sys; from experiments.cli.main import main; main(['penetrate', '--help']); "
+        "sys.exit('taichi' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
+    assert done.returncode == 0, done.stderr

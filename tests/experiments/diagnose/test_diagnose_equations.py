@@ -1,0 +1,112 @@
+"""The equations that are told of the library's forms are those that are computed."""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from experiments.diagnose.core.effect_equations import PENETRATION, TUMBLE, equation, equations_of, with_comments
+from experiments.diagnose.push.forms import Scales, make_library, physical
+from experiments.diagnose.push.law import SLOTS, push, slot_table
+from experiments.diagnose.tumble.forms import shaped, tumble_forms
+from rigid.terms import EFFECTS
+
+K, C, DEEPEST, SPEED, D, H = 900.0, 4.0, 0.02, 0.05, 0.015, 0.006
+SCALES = Scales(depth=D, speed=SPEED, force=K * D)
+LIBRARY = make_library(SCALES, retreats=True, speeds_differ=True)
+FORMS = {form.id: form for form in (*LIBRARY.forms, *(form for bent in LIBRARY.shapes.values() for form in bent))}
+
+
+def numbers_of(form) -> dict[str, float]:
+    """The form's slots, at a place where it changes the force by some tens of per cent."""
+    plain = next((FORMS[plain] for plain, bent in LIBRARY.shapes.items() if form in bent), form)
+    start = {p.name: p.value for p in form.parameters} | dict(plain.starts[0]) | dict((form.starts or ({},))[0])
+    start[form.amplitude] = start[form.amplitude] or 0.2
+    start |= {"depth-hardening.hardening_steeper": 0.4, "plastic-sinkage.crater_bend": 0.7}
+    slots = LIBRARY.slots[form.id]
+    return {
+        slots[p.name].name: physical(slots[p.name], start[p.name], SCALES, stiffness=K, size=1.0)
+        for p in form.parameters
+    }
+
+
+def computed(numbers: dict[str, float], depth: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """The compiled law along a path."""
+    table = slot_table(1)
+    known = {"stiffness": K, "damping": C, "reference": D, "radius_depth": H, "speed_scale": 1e-6, "mass": 1.0}
+    for name, value in (known | numbers).items():
+        table[0, SLOTS.index(name)] = value
+    return push(table, np.zeros(1, dtype=np.int32), np.array([0, len(depth)], dtype=np.int32), depth, speed)[0]
+
+
+def told(form_id: str, numbers: dict[str, float], z: float, v: float, deepest: float) -> float:
+    """The same by the equation."""
+    text = PENETRATION[form_id]
+    first, *clauses = re.split(r", (?![^(]*\))", text)  # not within parentheses
+    names = numbers | {
+        "K": K, "D": D, "H": H, "z": z, "v": v, "z_m": deepest, "r": deepest - z, "exp": math.exp, "min": min,
+        "max": max, "abs": abs, "sign": np.sign, "tanh": math.tanh,
+    }  # fmt: skip
+    if form_id.startswith("shaft-friction:mobilised over a way"):  # dw = (sign(dz) - w) |dz| / reach, solved
+        reach = numbers["shaft_reach"]
+        top = 1 - math.exp(-deepest / reach)
+        names["w"] = 1 - math.exp(-z / reach) if v > 0 else -1 + (top + 1) * math.exp(-(deepest - z) / reach)
+        clauses = [clause for clause in clauses if not clause.startswith("dw")]
+    for clause in clauses:
+        name, _, right = clause.partition(" = ")
+        if right:
+            names[name] = eval(right.split(";")[0].replace("^", "**"), {}, names)
+    value = float(eval(first.strip("+ ").replace("^", "**"), {}, names))
+    base = C * max(v, 0.0)
+    if first[0] in "+-":
+        return base + K * z + value
+    return base + (max(value, 0.0) if "way back" in text else value)
+
+
+@pytest.mark.parametrize("form_id", sorted(FORMS))
+def test_the_equation_of_a_push_is_what_is_computed(form_id):
+    numbers = numbers_of(FORMS[form_id])
+    numbers["layer_width"] = numbers.get("layer_width", 1e-3) if form_id != "layering:slope" else 1e-5
+    depth = np.concatenate([np.linspace(1e-6, DEEPEST, 2001), np.linspace(DEEPEST, 0.012, 801)[1:]])
+    speed = np.where(np.arange(len(depth)) <= 2000, SPEED, -0.4 * SPEED)
+    force = computed(numbers, depth, speed)
+    going_in = "way back" in PENETRATION[form_id] or "way out" in PENETRATION[form_id] or "r /" in PENETRATION[form_id]
+    for row in (300, 1200, 1900, 2020, 2250, 2600):
+        z, v, deepest = float(depth[row]), float(speed[row]), float(depth[: row + 1].max())
+        out = row > 2000
+        if (going_in and not out) or ("goes in" in PENETRATION[form_id] and out):
+            assert force[row] == pytest.approx(K * z + C * max(v, 0.0), rel=1e-9)  # the base model
+        else:
+            assert force[row] == pytest.approx(told(form_id, numbers, z, v, deepest), rel=2e-3, abs=1e-6)
+            assert abs(force[row] - K * z - C * max(v, 0.0)) > 0 or form_id.startswith("layering")
+
+
+def test_every_form_has_an_equation_in_the_names_of_its_parameters():
+    for form in FORMS.values():
+        said = equation("penetration", form)
+        missing = [slot.name for slot in LIBRARY.slots[form.id].values() if slot.name not in said]
+        assert said and not missing, (form.id, missing)
+    forms = tumble_forms(rig=True, sinkage=1e-3, weight=1.0)
+    for form in (*forms, *(form for bent in shaped(forms).values() for form in bent)):
+        values = {p.name: np.array(0.1) for p in form.parameters}
+        said = equation("tumble", form)
+        missing = [name for key in form.physical(values) if (name := key.partition(".")[2]) not in said]
+        assert said and not missing, (form.id, missing)
+    assert set(TUMBLE) <= set(EFFECTS)
+
+
+def test_model_toml_has_the_equation_above_each_effect_and_reads_as_before():
+    text = 'format = "x"\n\n[[effect]]\nid = "a"\n\n[[effect]]\nid = "mine"\n'
+    shaft = FORMS["shaft-friction:constant"]
+    mine = SimpleNamespace(id="mine:own", effect="mine", name="own")
+    rows = equations_of("penetration", [shaft, mine], lambda form: {"shaft": "N"})
+    commented = with_comments(text, rows, "penetration")
+    assert "# shaft-friction (constant): + shaft * sign(v); shaft [N]\n[[effect]]" in commented
+    assert "# mine (own): its equation is in its file" in commented and "# F is the force on the spike" in commented
+    assert tomllib.loads(commented) == tomllib.loads(text)
+    assert with_comments("x = 1\n", [], "penetration") == "x = 1\n"

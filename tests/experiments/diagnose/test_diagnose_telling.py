@@ -1,0 +1,288 @@
+"""What a diagnosis says in words and tables."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from experiments.diagnose.core.effect_words import confirmation
+from experiments.diagnose.core.next_steps import _follow
+from experiments.diagnose.fit.gaps import Gaps, numeral
+from experiments.diagnose.fit.localise import Place
+from experiments.diagnose.noise.colour import Colour
+from experiments.diagnose.noise.words import together
+from experiments.diagnose.report.candidates import candidate_rows, unnamed_sentence
+from experiments.diagnose.report.summary import _numbers, scatter_sentence, summary_sentences, title_words
+from experiments.diagnose.report.telling import (
+    PhaseTable,
+    remark_sentences,
+    size_sentences,
+    sure_sentences,
+    told_tables,
+    valid_residuals,
+    where_sentences,
+    worse_sentences,
+)
+
+
+def test_chi_square_by_phase_is_that_of_the_residuals_of_all_trials_of_a_kind():
+    table = PhaseTable()
+    phases = np.array(["in", "in", "out"])
+    table.add("force", phases, np.array([1.0, 3.0, 2.0]), np.array([1.0, 1.0, 0.0]), held_out=False)
+    table.add("force", phases[:1], np.array([2.0]), np.array([1.0]), held_out=False)
+    table.add("force", phases[2:], np.array([4.0]), np.array([0.5]), held_out=True)
+    rows = {(row["phase"], row["held_out"]): row for row in table.rows}
+    assert rows["in", False] | {"before": 0} == {
+        "phase": "in", "channel": "force", "held_out": False, "samples": 3, "before": 0, "after": 1.0,
+    }  # fmt: skip
+    assert rows["in", False]["before"] == pytest.approx((1 + 9 + 4) / 3)
+    assert (rows["out", True]["before"], rows["out", True]["after"]) == (16.0, 0.25)
+
+
+def test_a_reading_at_a_switch_of_the_contact_counts_in_no_table_as_in_the_gap():
+    table, gaps, rest = PhaseTable(), Gaps(), np.array([2.0, 50.0, 2.0])
+    noise, quiet = np.array([1.0, np.inf, 1.0]), np.ones(3)
+    table.add("ax", np.array(["hop"] * 3), valid_residuals(rest, noise), valid_residuals(rest, quiet), held_out=False)
+    (row,) = table.rows
+    assert (row["samples"], row["before"], row["after"]) == (2, 4.0, pytest.approx((4 + 2500 + 4) / 3))
+    gaps.add("a", "ax", np.arange(3.0), rest, rest, noise, noise, settings={}, held_out=False)
+    assert gaps.by_condition[0]["before"] == 4.0 and gaps.by_channel[0]["rms_before"] == 2.0
+
+
+def place(trial: str, channel: str, phase: str, excess: float, torque: float) -> dict:
+    return {"trial": trial, "channel": channel, "phase": phase, "from_s": 0.4, "to_s": 0.9, "excess": excess,
+            "settings": {"torque_N_m": torque, "gravity_m_s2": 0.08}}  # fmt: skip
+
+
+def test_where_the_model_fails_is_said_with_phase_channel_seconds_and_torque():
+    places = [place("001", "x", "slip", 80.0, 6.0), place("002", "gyro", "slip", 15.0, 0.22),
+              place("002", "x", "hop", 5.0, 0.22)]  # fmt: skip
+    slow = {"settings": {"torque_N_m": 0.22, "gravity_m_s2": 0.08}, "samples": 4000, "before": 2.0}
+    fast = {"settings": {"torque_N_m": 6.0, "gravity_m_s2": 0.08}, "samples": 100, "before": 5.0}
+    first, second = where_sentences({"where": places, "by_condition": [slow, fast]})
+    assert "in phase slip (95 %) and channel x (85 %)" in first
+    assert "x of trial 001 from 0.4 to 0.9 s" in first
+    # The slow trials hold 4000 of 4400 beyond noise, in forty times as many samples; the gravity is shared by all.
+    assert second == "Sample for sample most of it is at torque 6 N m (80 %)."
+    assert where_sentences({"where": []}) == []
+
+
+def cell(phase: str, channel: str, before: float, after: float, *, held_out: bool = False) -> dict:
+    return {"phase": phase, "channel": channel, "held_out": held_out, "samples": 100, "before": before, "after": after}
+
+
+def test_a_platform_that_stands_otherwise_than_the_model_has_it_is_told_from_a_camera_zero_alone():
+    said = {"where": [place("001", "x", "slip", 80.0, 6.0)], "by_phase": [cell("stand", "y", 18.0, 18.0)]}
+    zero = where_sentences(said)[-1]
+    assert zero.startswith("In phase stand, before, y are off") and "no sign that it stands otherwise" in zero
+    said["by_phase"].append(cell("stand", "ax", 5.1, 5.0))
+    stands = where_sentences(said)[-1]
+    assert "ax of the IMU" in stands and "stands otherwise than the model has it" in stands and "no sign" not in stands
+    quiet = {"where": said["where"], "by_phase": [cell("stand", "y", 1.1, 1.0), cell("stand", "ax", 5.1, 5.0)]}
+    assert not any("phase stand" in sentence for sentence in where_sentences(quiet))
+
+
+def test_what_the_best_model_explains_less_well_than_the_base_model_is_said():
+    slow = {"settings": {"torque_N_m": 0.125, "gravity_m_s2": 0.147}, "trials": ["004"], "samples": 2772,
+            "before": 224.0, "after": 395.0}  # fmt: skip
+    fast = {"settings": {"torque_N_m": 0.22, "gravity_m_s2": 0.147}, "trials": ["005"], "samples": 2772,
+            "before": 312.0, "after": 132.0}  # fmt: skip
+    cells = [cell("pivot", "x", 144.0, 222.0), cell("pivot", "y", 93.0, 4087.0, held_out=True),
+             cell("pivot", "wheel", 1.02, 1.9), cell("slip", "x", 90.0, 100.0)]  # fmt: skip
+    (told,) = worse_sentences({"by_condition": [slow, fast], "by_phase": cells})
+    assert told == (
+        "It makes worse, in chi-square per sample: trial 004 (torque 0.125 N m) from 224 to 395; y in phase pivot of "
+        "trials held out from 93 to 4,090; x in phase pivot from 144 to 222."
+    )
+    assert worse_sentences({"by_condition": [fast], "by_phase": cells[2:]}) == []
+
+
+def test_a_number_that_is_hard_to_believe_is_said_with_the_candidate():
+    assert remark_sentences({"remarks": ["rig-friction of 2 N is more than 1 N"]}) == [
+        "Hard to believe: rig-friction of 2 N is more than 1 N."
+    ]
+    assert remark_sentences({}) == []
+
+
+def test_the_table_of_candidates_has_every_name_once_and_sets_that_beat_their_parts():
+    def row(candidate: str, score: float) -> dict:
+        effects = [part.split(":")[0] for part in candidate.split(" + ")]
+        return {"candidate": candidate, "effects": effects, "score": score, "left": 1.0}
+
+    said = {
+        "verdict": "named", "effects": [{"id": "a"}, {"id": "b"}], "by_phase": [],
+        "evidence": [row("b:1 + a:1", 30.0), row("a:2 + b:1", 28.0), row("a:1 + a:2", 25.0), row("a:1", 20.0),
+                     row("b:1", 3.0), row("c:1 + b:1", 2.0), row("c:1 + a:1", 1.0), row("c:1", -1.0)],
+    }  # fmt: skip
+    (table,) = told_tables(said)
+    assert [cells[0] for cells in table["rows"]] == ["a:1 + b:1", "a:1 + 2", "b:1"]
+    assert (
+        table["rows"][1][1] == "25.0" and "no better than the base model" in table["title"] and "c)" in table["title"]
+    )
+    rows = candidate_rows(said)
+    assert (rows[0]["effects"], rows[0]["tried"], rows[0]["note"]) == (["a", "b"], 2, "told")
+
+
+def test_a_pair_with_more_evidence_than_what_is_told_is_not_passed_over_in_silence():
+    pair = {"candidate": "friction:1 + adhesion:1", "effects": ["friction", "adhesion"], "score": 33.0, "left": 0.4}
+    evidence = [pair, {"candidate": "friction:1", "effects": ["friction"], "score": 28.5, "left": 0.5}]
+    said = {"verdict": "named", "effects": [{"id": "friction"}], "evidence": evidence,
+            "gate": {"after": {"passed": False}}}  # fmt: skip
+    (sentence,) = unnamed_sentence(said)
+    for words in ("friction + adhesion has the most evidence, 4 nats more than friction", "gains 4.5 nats, 20 % of",
+                  "less than a further name must"):  # fmt: skip
+        assert words in sentence
+    (sentence,) = unnamed_sentence(said | {"gate": {"after": {"passed": True}}})
+    assert "it is not needed: friction leaves no more than noise" in sentence
+    quiet = [row | {"left": row["left"] - 0.6} for row in evidence]
+    (sentence,) = unnamed_sentence(said | {"evidence": quiet})
+    assert "it takes up noise: what friction leaves is no more" in sentence
+    assert unnamed_sentence(said | {"evidence": evidence[1:]}) == []
+    other = {"candidate": "layering:1", "effects": ["layering"], "score": 31.0, "left": 0.5}
+    nearest = [{"effect": "friction"}, {"effect": "layering", "left_out_behind": 12.0}]
+    (sentence,) = unnamed_sentence(said | {"evidence": [other, evidence[1]], "equivalence": nearest})
+    assert "layering has the most evidence" in sentence and "left out worse, by 12 nats" in sentence
+
+
+def test_how_large_an_effect_is_is_said_the_largest_first_and_a_small_one_is_called_so():
+    size = {"channel": "force", "unit": "N"}
+    large = size | {"effect": "drag", "signature": 9.0, "rms": 0.4, "most": 1.25, "share": 0.21}
+    small = size | {"effect": "crust", "signature": 1.1, "rms": 0.01, "most": 0.04, "share": 0.02}
+    (words,) = size_sentences({"sizes": [large, small]})
+    assert "drag changes force by 0.4 N (root mean square; 1.2 N at most), 21 % of it, 9 times the noise" in words
+    assert words.index("drag") < words.index("crust is small: it changes force by 0.04 N at most, 2 % of it, 1.1 times")
+    assert size_sentences({}) == []
+
+
+def test_the_gap_is_told_in_millimetres_by_condition_and_from_when_on():
+    # 3 mm where the camera has 0.5 mm, from 0.5 s on: 6 sigma a sample, the mean of nine beyond 5 at three.
+    gaps, time = Gaps(), np.linspace(0.0, 1.0, 101)
+    rest = np.where(time > 0.495, 3e-3, 0.0)
+    for trial, torque in (("a", 0.1), ("b", 0.2)):
+        before = rest if trial == "a" else 0 * rest
+        noise = np.full(101, 5e-4)
+        gaps.add(trial, "x", time, before, 0 * rest, noise, noise, settings={"torque_N_m": torque}, held_out=False)
+    (row,) = gaps.by_channel
+    assert (row["unit"], row["rms_after"]) == ("mm", 0.0)
+    assert row["rms_before"] == pytest.approx(3 * np.sqrt(51 / 202))
+    assert [(row["trials"], row["before"]) for row in gaps.by_condition] == [
+        (["a"], pytest.approx(36 * 51 / 101)), (["b"], 0.0)]  # fmt: skip
+    offset = np.where(np.linspace(-0.2, 1.0, 121) < 0.295, 2e-3, 5e-3)  # the zero alone is no parting
+    time, noise = np.linspace(-0.2, 1.0, 121), np.full(121, 5e-4)
+    gaps.add("c", "y", time, offset, 0 * offset, noise, noise, settings={}, held_out=False)
+    parted, later = gaps.parted
+    assert later["trial"] == "c" and later["at_s"] == pytest.approx(0.3, abs=0.03)
+    assert parted["trial"] == "a" and parted["at_s"] == pytest.approx(0.5, abs=0.03)
+
+
+def test_how_sure_a_name_is_stands_in_words_with_its_nearest_rival():
+    said = {
+        "verdict": "named", "effects": [{"id": "umbilical"}], "evidence": [{"effects": ["umbilical"], "score": 267.6}],
+        "gap": {"before": {"held_out": 153.0}, "after": {"held_out": 0.97}},
+        "equivalence": [{"effect": "umbilical"},
+                        {"effect": "com-offset", "evidence_behind": 209.0, "angle_deg": 9.0, "told_apart": True}],
+    }  # fmt: skip
+    what, sure = sure_sentences(said)
+    assert what == "umbilical: the cable to the platform pulls or drags on its rotation."
+    for words in ("268 nats", "from 153 to 0.97", "com-offset, is 209 nats behind", "9 degrees", "tell the two apart"):
+        assert words in sure
+    assert "remove the cable" in confirmation("umbilical")
+
+
+def unknown(**changes):
+    """diagnosis.json of an unknown, as far as words need it."""
+    gap = {"before": {"fit": 52.0, "held_out": 65.0}, "after": {"fit": 23.0, "held_out": 62.0}}
+    said = {
+        "verdict": "unknown", "effects": [{"id": "plastic-sinkage"}], "alternatives": [], "gap": gap,
+        "leading": {"effects": ["plastic-sinkage"], "certain": ["plastic-sinkage"],
+                    "nearest": {"effect": "adhesion", "evidence_behind": 41.0, "angle_deg": 34.0, "told_apart": True}},
+        "evidence": [{"effects": ["plastic-sinkage"], "score": 102.0, "left": 0.1, "closes": 0.9},
+                     {"effects": ["adhesion"], "score": 61.0, "left": 0.5, "closes": 0.5}],
+        "evidence_base": {"left": 1.0, "with_scatter": True}, "at_bounds": {"before": [], "after": []},
+        "gate": {"before": {"passed": False, "score": 90.0, "threshold": 4.0},
+                 "after": {"passed": False, "score": 22.0, "threshold": 4.0}},
+        "left": [place("b", "force", "rest", 30.0, 0.1)],
+        "latent": {"depends_on": "depth (explains 23 % of it)"}, "next_experiment": "Push once more.",
+    }  # fmt: skip
+    return said | changes
+
+
+def test_the_first_lines_of_an_unknown_name_what_leads_how_far_it_goes_and_what_is_left():
+    words = " ".join(summary_sentences(unknown()))
+    for said in (
+        "Certain: plastic-sinkage (102 nats over the base model, weighed against what replicates differ by)",
+        "from 52 to 23 on the trials that were fitted, 57 % of what is beyond the noise",  # (51 - 22) / 51
+        "from 65 to 62 on those held out, 5 %", "adhesion, is 41 nats behind",
+        "the gate stands at 22 on the fitted trials",
+        "phase rest (100 %) and channel force", "trial b from 0.4 to 0.9 s", "goes with depth", "Push once more.",
+    ):  # fmt: skip
+        assert said in words, said
+    assert "plastic-sinkage for certain" in title_words(unknown())
+
+
+def test_where_nothing_is_certain_the_candidates_are_said_with_what_each_would_close():
+    leading = {"effects": ["adhesion"], "certain": [], "nearest": None}
+    words = " ".join(summary_sentences(unknown(effects=[], leading=leading)))
+    assert "Likeliest, but not certain: adhesion (61 nats" in words and "plastic-sinkage would take away 90 %" in words
+    nothing = unknown(effects=[], leading={"effects": [], "certain": [], "nearest": None})
+    words = " ".join(summary_sentences(nothing))
+    assert "plastic-sinkage would take away 90 %, adhesion 50 %" in words
+    assert "the likeliest is adhesion, not for certain" in title_words(unknown(effects=[], leading=leading))
+
+
+def test_the_gap_with_the_beds_own_share_is_said_beside_the_gap():
+    weighed = {"before": {"fit": 4.0, "held_out": 5.0}, "after": {"fit": 1.1, "held_out": None}}
+    said = unknown(gap_with_scatter=weighed, model_std={"force": 3.7, "depth": 0.0005, "static_friction": 0.08})
+    (sentence,) = scatter_sentence(said)
+    assert "(force 3.7 N, depth 0.5 mm, static friction 8 %)" in sentence
+    assert "4 fitted (5 held out) with the base model and 1.1 fitted with the best one" in sentence
+    assert scatter_sentence(unknown()) == []
+
+
+def test_what_to_do_next_follows_the_phase_or_the_column_that_holds_what_is_left():
+    places = [Place("1", "force", "rest", 0.0, 1.0, 60.0), Place("1", "force", "in", 0.0, 1.0, 30.0)]
+    assert "hold the spike there ten times as long" in _follow(places, {"depth_m": 0.9})
+    assert "twice as deep" in _follow(places[1:], {"depth_m": 0.9, "t_s": 0.2})
+    assert "nothing that was recorded" in _follow(places[1:], {"depth_m": 0.05})
+
+
+def test_the_noise_of_one_sensor_is_one_sentence_whatever_the_number_of_its_rates():
+    slow, fast = Colour("depth", 1.003, 0.61), Colour("depth", 0.998, 0.62)
+    assert together([slow]) == (
+        "the noise of depth is as large as is stated and a sample correlates with the next by 0.61: taken into account"
+    )
+    words = together([slow, fast])
+    assert "by 0.61, at 2 sampling rates" in words or "by 0.62, at 2 sampling rates" in words
+    assert "1.40 to 2.10 times what is stated and" in together([Colour("x", 1.4, 0.3), Colour("x", 2.1, 0.3)])
+    assert (
+        together([Colour("force", 0.87, 0.001)])
+        == "the noise of force is 0.87 times what is stated: taken into account"
+    )
+
+
+def test_large_numbers_are_written_out():
+    assert [numeral(value) for value in (0.9692, 152.6, 19441.0, 9995.0, 3.2e7)] == [
+        "0.969", "153", "19,400", "10,000", "3.2e+07",
+    ]  # fmt: skip
+    assert (numeral(103.2, 2), numeral(6.54, 2), numeral(12480.0, 4)) == ("100", "6.5", "12,480")
+
+
+def test_the_title_says_that_a_second_name_is_small_and_that_another_is_as_likely():
+    size = {"channel": "force", "unit": "N", "rms": 0.1, "most": 0.2}
+    sizes = [size | {"effect": "shaft-friction", "signature": 26.0, "share": 0.055},
+             size | {"effect": "layering", "signature": 0.4, "share": 0.0009}]  # fmt: skip
+    said = {"verdict": "named", "effects": [{"id": "layering"}, {"id": "shaft-friction"}], "sizes": sizes}
+    assert title_words(said) == "Missing: shaft-friction and layering (small: 0.09 % of the force)"
+    assert title_words(said | {"sizes": sizes[:1]}) == "Missing: layering and shaft-friction"
+    near = {"effect": "plastic-sinkage", "evidence_behind": 0.3, "angle_deg": 9.0, "told_apart": False}
+    leading = {"effects": ["adhesion"], "certain": [], "nearest": near}
+    assert "the likeliest is adhesion or plastic-sinkage, not" in title_words(unknown(effects=[], leading=leading))
+
+
+def test_a_number_that_the_trials_do_not_tell_has_no_standard_error_of_round_off():
+    force = {"value": 1.841, "unit": "N"}
+    leading = {"certain": [], "parameters": {"rig-friction": {"force": force | {"std": 7.3e132}}}}
+    (told,) = _numbers(leading)
+    assert "rig-friction force 1.841 N (no standard error" in told and "e+" not in told
+    leading["parameters"]["rig-friction"]["force"]["std"] = 0.09
+    assert _numbers(leading) == ["Its numbers, should it be that: rig-friction force 1.841 +- 0.09 N."]

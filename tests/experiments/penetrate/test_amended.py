@@ -1,0 +1,214 @@
+"""`hedgebed penetrate --model`: the law with what it lacked, against closed forms, and beside a bed that is known."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from fake_bed import FakeBed
+
+from experiments.campaign import read_campaign
+from experiments.cli.main import main
+from experiments.penetrate import amended_runs, beds
+from experiments.penetrate import experiment as penetrate
+from experiments.penetrate.amended import AmendedGround, read_law
+from experiments.penetrate.settings import PenetrateSettings
+from experiments.penetrate.units import make_run, plan_units
+
+K, C, MASS, LOAD = 120.0, 0.5, 0.3, 0.4
+MODEL = f"""
+format = "hedgehog-campaign/1"
+kind = "penetration"
+name = "a crater"
+[spike]
+mass = {MASS}
+diameter = 0.012
+[surface]
+kind = "sand"
+stiffness = {K}
+damping = {C}
+"""
+CRATER = '[[effect]]\nid = "plastic-sinkage"\nparameters = {reference = 0.01, crater_share = 0.9}\n'
+QUICK = {
+    "seeds": (1, 2), "speeds": (0.2,), "other_speeds": (0.2,), "drop_speeds": (0.1,), "other_drop_speeds": (0.1,),
+    "drop_time": 0.5, "depth": 0.01, "frame_count": 0, "mass": MASS, "load": LOAD, "lowering_speed": 0.1,
+    "substeps": 20,
+}  # fmt: skip
+STEP = 2e-5
+
+
+@pytest.fixture
+def law(tmp_path):
+    """Writes a model with these effects and reads it as a law."""
+
+    def make(effects="", *, model=MODEL, **changes):
+        path = tmp_path / "model.toml"
+        path.write_text(model + effects)
+        return read_law(path, PenetrateSettings(**(QUICK | changes)))
+
+    return make
+
+
+def runs_of(law):
+    """Every run on the plain spring-damper and on the law: kind -> (plain, amended)."""
+    units = plan_units(law.settings.model_copy(update={"seeds": (1,)}))
+    plain = {unit: make_run(law.settings, unit, law.plain(STEP)).run() for unit in units}
+    return {unit.kind: (series, law.run(unit, series)) for unit, series in plain.items()}
+
+
+def test_with_nothing_added_every_run_is_that_of_the_spring_damper(law):
+    runs = runs_of(law())
+    plain, amended = runs["driven"]
+    z, v = plain.depth, plain.velocity
+    closed = np.where(z > 0, K * z + C * np.maximum(v, 0), 0.0)  # F = K z + C max(0, dz/dt)
+    assert amended.force == pytest.approx(closed, abs=1e-12)
+    plain, amended = runs["drop"]
+    assert amended.depth == pytest.approx(plain.depth, abs=1e-4 * plain.depth.max())
+    assert list(amended.phase[:200]) == list(plain.phase[:200])
+    plain, amended = runs["set_down"]
+    assert amended.resting_depth == pytest.approx(plain.resting_depth, rel=1e-3)
+
+
+def test_out_of_a_crater_the_loading_curve_is_pressed_into_what_is_left(law):
+    plain, amended = runs_of(law(CRATER))["driven"]
+    out = plain.phase == "out"
+    z, top = plain.depth[out], plain.depth.max()
+    # back from Z the curve is read at (z - s Z) / (1 - s): steep down to s Z, and nothing below
+    assert amended.force[out] == pytest.approx(np.maximum(0.0, K * (z - 0.9 * top) / 0.1), abs=1e-9)
+
+
+def test_the_ground_remembers_and_gives_the_same_bits_after_a_restart(law):
+    ground = AmendedGround(law(CRATER), time_step=STEP, speed=0.1)
+
+    def step(ground, depth, rate):
+        return float(ground.step((0.0, 0.0, -depth), (0.0, 0.0, -rate), 1e-4).force[2])
+
+    step(ground, 0.01, 0.0)
+    inside = step(ground, 0.0095, -1e-9)
+    assert inside == pytest.approx(K * 0.0005 / 0.1, rel=1e-3)
+    kept, again = ground.state(), AmendedGround(law(CRATER), time_step=STEP, speed=0.1)
+    assert step(again, 0.0095, -1e-9) > inside  # it does not know how deep the other was
+    again.restore(kept)
+    assert step(again, 0.0095, -1e-9) == step(ground, 0.0095, -1e-9)
+    assert step(ground, -0.001, 0.0) == 0.0 and step(ground, 0.005, 0.0) == 0.0  # the crater stays
+
+
+def test_on_another_tip_a_section_goes_with_the_square_of_the_diameter_and_a_shaft_with_it(law):
+    effects = '[[effect]]\nid = "inertial-drag"\nparameters = {reference = 0.01, drag = 2.0}\n'
+    effects += '[[effect]]\nid = "shaft-friction"\nparameters = {reference = 0.01, shaft = 0.3}\n'
+    wide = law(effects, tip_diameter=0.018)
+    assert dict(wide.slots) == pytest.approx({"reference": 0.01, "drag": 4.5, "shaft": 0.45})
+    assert wide.pair == (K, C)
+    (said,) = wide.warnings()
+    assert "12 mm" in said and "18 mm" in said
+    fitted = MODEL + '[notes.fitted_by_diameter."0.018"]\nstiffness = 300.0\ndamping = 2.0\n'
+    assert law(model=fitted, tip_diameter=0.018).pair == (300.0, 2.0)
+    assert law(effects).warnings() == []
+
+
+def test_speeds_that_the_model_was_not_fitted_to_are_said_and_a_drops_mass_only_where_something_drops(law):
+    pushes = "".join(
+        f'[[trial]]\nid = "{k}"\nmode = "driven"\nspeed = {speed}\ngravity = 9.81\ndata = "{k}.csv"\n'
+        for k, speed in enumerate((0.01, 0.05))
+    )
+    drop = '[[trial]]\nid = "d"\nmode = "drop"\nspeed = 0.5\ngravity = 9.81\ndata = "d.csv"\n'
+    still = {"drop_speeds": (), "other_drop_speeds": (), "other_speeds": (0.02,), "retreat_speed": 0.05}
+    assert law(CRATER + pushes, speeds=(0.05,), mass=0.2, **still).warnings() == []  # nothing drops
+    (said,) = law(CRATER + pushes, speeds=(0.2, 0.002), **still).warnings()
+    assert "pushes at 0.01 to 0.05 m/s: what it says at 0.002, 0.2 m/s is extrapolated" in said
+    assert law(CRATER + pushes + drop, speeds=(0.2, 0.002), **still).warnings() == []  # a drop has all speeds below
+    far, alone = law(CRATER + pushes, speeds=(0.05,), **(still | {"drop_speeds": (0.3,)})).warnings()
+    assert "at 0.3 m/s is extrapolated" in far and "what it says of drops" in alone
+
+
+def test_what_is_no_model_of_penetration_is_refused_by_name(law):
+    with pytest.raises(ValueError, match="crater_shape = 0"):
+        law(CRATER.replace("crater_share", "crater_shape"))
+    with pytest.raises(ValueError, match="there is no such file"):
+        penetrate.check(PenetrateSettings(**QUICK, model="nowhere.toml"))
+    with pytest.raises(ValueError, match="needs model"):
+        PenetrateSettings(**QUICK, ground="spring-damper")
+
+
+def test_without_a_bed_the_spike_the_mass_and_the_load_are_the_models_own(tmp_path):
+    path = tmp_path / "model.toml"
+    drop = '[[trial]]\nid = "1"\nmode = "drop"\nspeed = 0.2\ngravity = 2.0\ndata = "1.csv"\n'
+    cone = MODEL.replace("diameter = 0.012", 'diameter = 0.003\ntip = "cone"\ncone_angle = 40.0')
+    path.write_text(cone + CRATER + drop)
+    own = PenetrateSettings(ground="spring-damper", model=str(path))
+    assert (own.tip, own.tip_diameter, own.cone_angle, own.mass) == ("cone", 0.003, 40.0, MASS)
+    assert own.weight == pytest.approx(2.0 * MASS)  # thinner than five grains: there are none
+    typed = PenetrateSettings(ground="spring-damper", model=str(path), mass=0.2, tip_diameter=0.02)
+    assert (typed.mass, typed.tip_diameter, typed.load) == (0.2, 0.02, None)
+    beside = PenetrateSettings(model=str(path))  # beside a bed its spike is that of the bed's runs, and it is said
+    assert (beside.tip, beside.mass) == ("sphere", 0.1)
+    size, tip, mass, speeds = read_law(path, beside).warnings()
+    assert "was fitted to drops at 0.2 m/s" in speeds
+    assert "--tip-diameter 0.003" in size and "--tip cone" in tip and "--mass 0.3" in mass
+    path.write_text("nonsense")
+    with pytest.raises(ValueError, match=r"model\.toml"):
+        penetrate.check(PenetrateSettings(ground="spring-damper", model=str(path)))
+
+
+def test_without_a_bed_the_command_shows_both_laws(tmp_path, capsys):
+    (tmp_path / "model.toml").write_text(MODEL + CRATER)
+    tokens = ["penetrate", "--ground", "spring-damper", "--model", str(tmp_path / "model.toml"), "--speeds", "0.2"]
+    tokens += ["--mass", "0.3", "--load", "0.1", "--substeps", "40", "--out", str(tmp_path / "run"), "--quiet"]
+    assert main([*tokens, "--drop-speeds", "none", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    numbers = {name: entry["value"] for name, entry in result["quantities"].items()}
+    assert numbers["sinkage_amended"] == pytest.approx(0.1 / K, rel=0.01)
+    assert numbers["work_returned_amended"] < 0.2 * numbers["work_returned_spring_damper"]
+    assert "plastic-sinkage" in (tmp_path / "run" / "report.html").read_text()
+
+
+def test_beside_a_bed_that_does_not_spring_back_the_amended_law_closes_the_gap(tmp_path, monkeypatch):
+    sand = SimpleNamespace(name="sand", density=2650.0, young=7e10, poisson=0.25, friction=0.5, surface_energy=0.0)
+    unload = K / 0.1  # the stand-in's elastic line is that of a crater of nine tenths
+    monkeypatch.setattr(
+        beds, "prepare_bed",
+        lambda settings, seed, young, progress: FakeBed(
+            size=settings.bed_size, seed=seed, hardness=K, rate=C, unload=unload
+        ),
+    )  # fmt: skip
+    monkeypatch.setattr(beds, "find_material", lambda name: sand)
+    monkeypatch.setattr(beds, "bed_step", lambda settings, young: STEP)
+    monkeypatch.setattr(penetrate, "write_report", lambda *given: None)
+    monkeypatch.setattr(amended_runs, "write_report", lambda *given: None)
+    (tmp_path / "model.toml").write_text(MODEL + CRATER)
+    settings = PenetrateSettings(
+        **QUICK, model=str(tmp_path / "model.toml"), campaign=str(tmp_path / "c"), campaign_force_std=0.01
+    )
+    result = penetrate.run(settings, tmp_path / "run")
+    numbers = {name: entry["value"] for name, entry in result["quantities"].items()}
+    assert numbers["force_gap_amended"] < 0.03 < 0.3 < numbers["force_gap_spring_damper"]
+    assert numbers["sinkage_amended"] == pytest.approx(numbers["sinkage_dem"], rel=0.02)
+    assert (tmp_path / "run" / result["runs"][0]["amended_series"]).exists()
+    campaign = read_campaign(tmp_path / "c")
+    assert len(campaign.tables.trial) == 6 and campaign.tables.sensors.force.std == (0.01,)
+
+
+MUD = """
+from rigid.terms import Parameter, Term
+
+
+def drag(s, depth, rate, c):
+    return c * rate
+
+
+TERM = Term(id="mud", summary="mud drags both ways", acts="contact", source="ours", limits="slow",
+            hooks={"rate_force": drag},
+            parameters=(Parameter(name="c", unit="N s/m", default=0.0, lowest=0.0, summary="drag"),))
+FIT = {"c": {"typical": 2.0}}
+"""
+
+
+def test_an_effect_of_ones_own_is_part_of_the_law(law, tmp_path):
+    (tmp_path / "mud.py").write_text(MUD)
+    effect = '[[effect]]\nid = "mud"\nfile = "mud.py"\nparameters = {c = 3.0}\n'
+    plain, amended = runs_of(law(effect))["driven"]
+    z, v = plain.depth, plain.velocity
+    closed = np.where(z > 0, K * z + C * np.maximum(v, 0) + 3.0 * v, 0.0)
+    assert amended.force == pytest.approx(closed, abs=1e-9)
+    with pytest.raises(ValueError, match="c is missing"):
+        law(effect.replace("c = 3.0", ""))

@@ -1,0 +1,121 @@
+"""What is said of a run: forces above depth 0, which stiffness holds when, one bed, fits that cannot tell K from C."""
+
+from types import SimpleNamespace
+
+import pytest
+from fake_bed import FakeBed
+
+from experiments.grains.softening import Softening
+from experiments.penetrate import beds
+from experiments.penetrate import experiment as penetrate
+from experiments.penetrate.remarks import overlap_warning, softening_note
+from experiments.penetrate.settings import PenetrateSettings
+
+SAND = SimpleNamespace(name="sand", density=2650.0, young=7e10, poisson=0.25, friction=0.5, surface_energy=0.0)
+QUICK = {
+    "speeds": (0.2, 0.4), "other_speeds": (0.4,), "drop_speeds": (0.1,), "other_drop_speeds": (0.1,), "drop_time": 0.5,
+    "depth": 0.01, "frame_count": 0, "mass": 0.3, "load": 0.4, "lowering_speed": 0.1, "substeps": 20, "seeds": (1,),
+}  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def fake(monkeypatch):
+    """Beds in closed form: K = 100 + 10 seed N/m, C = 0.5 N s/m."""
+
+    def prepare(settings, seed, young, progress):
+        return FakeBed(size=settings.bed_size, seed=seed, hardness=100.0 + 10.0 * seed, rate=0.5, unload=4000.0)
+
+    monkeypatch.setattr(beds, "prepare_bed", prepare)
+    monkeypatch.setattr(beds, "find_material", lambda name: SAND)
+    monkeypatch.setattr(penetrate, "write_report", lambda *given: None)
+    monkeypatch.setattr(beds, "bed_step", lambda settings, young: 2e-5)
+
+
+def test_what_the_bed_pushes_with_at_its_surface_is_said_where_it_matters(tmp_path, monkeypatch):
+    """Grains that stick out push with 0.2 N from 1 mm above depth 0: half the load."""
+    settings = PenetrateSettings(**QUICK)
+    plain = penetrate.run(settings, tmp_path / "plain")
+    assert plain["quantities"]["surface_force"]["value"] == 0 and "surface" not in plain["departures"]
+    law = FakeBed.law
+    monkeypatch.setattr(FakeBed, "law", lambda bed, depth, v: law(bed, depth, v) + (0.2 if depth > -1e-3 else 0.0))
+    found = penetrate.run(settings, tmp_path / "out")
+    assert found["quantities"]["surface_force"]["value"] == pytest.approx(0.2)
+    said = found["departures"]["surface"]
+    assert said.startswith("At depth 0 the bed already pushes with 0.20 N, 50 % of the load")
+    assert said in found["departures"]["sentences"]
+
+
+def test_the_stiffness_of_a_foot_that_stands_is_load_over_sinkage(tmp_path, monkeypatch):
+    """A bed that is softer the deeper: K fitted to all of it is too soft for where a foot stands."""
+    law = FakeBed.law
+    monkeypatch.setattr(FakeBed, "law", lambda bed, depth, v: law(bed, depth, v) + (0.2 if depth > 0 else 0.0))
+    settings = PenetrateSettings(**(QUICK | {"seeds": (1, 2)}))
+    result = penetrate.run(settings, tmp_path / "run")
+    numbers = result["quantities"]
+    standing = numbers["stiffness_standing"]["value"]
+    assert standing == pytest.approx(0.4 / numbers["sinkage_dem"]["value"])
+    ratio = standing / numbers["stiffness"]["value"]
+    assert ratio > 1.1
+    assert f"overstates the sinkage at rest {ratio:.2g} times" in result["departures"]["which_stiffness"]
+    assert "held back by a hand" in result["departures"]["set_down"]
+    assert "brings its momentum, 0.3 kg times its speed" in result["departures"]["set_down"]
+
+
+def test_one_bed_tells_nothing_of_other_beds(tmp_path):
+    """Std null for what was counted or measured in one bed, 0 for what is set; and words that do not speak of more."""
+    settings = PenetrateSettings(**QUICK)
+    numbers = penetrate.run(settings, tmp_path / "run")["quantities"]
+    for name in ("grain_count", "packing_fraction", "time_step", "stiffness", "sinkage_dem", "work_returned_dem"):
+        assert numbers[name]["std"] is None, name
+    assert [numbers[name]["std"] for name in ("young", "load", "drop_mass")] == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"speeds": (0.2,), "drop_speeds": (0.1,)}, True),
+        ({"speeds": (0.2, 0.4), "drop_speeds": ()}, True),
+        ({"speeds": (0.2, 0.4), "drop_speeds": (0.1,)}, False),
+    ],
+)
+def test_a_fit_that_cannot_tell_the_two_says_so(tmp_path, given, told):
+    settings = PenetrateSettings(**(QUICK | given))
+    said = [text for text in penetrate.run(settings, tmp_path / "run")["warnings"] if "hardly tells K from C" in text]
+    assert bool(said) == told
+    assert not told or "give at least two speeds and two drop_speeds" in said[0]
+
+
+def test_a_bed_less_than_six_tips_wide_is_said(tmp_path):
+    wide = PenetrateSettings(**QUICK)
+    narrow = wide.model_copy(update={"tip_diameter": 0.016})
+    told = [
+        [text for text in penetrate.run(case, tmp_path / name)["warnings"] if "tips wide" in text]
+        for name, case in (("wide", wide), ("narrow", narrow))
+    ]
+    assert told[0] == [] and "4.5 tips wide" in told[1][0] and "bed_size of 0.096 m" in told[1][0]
+
+
+def test_drops_can_be_left_out(tmp_path):
+    """None on the first seed is none on any; the fit is then to the driven runs alone."""
+    settings = PenetrateSettings(**({k: v for k, v in QUICK.items() if "drop" not in k} | {"drop_speeds": ()}))
+    assert settings.other_drop_speeds == ()
+    assert PenetrateSettings(drop_speeds=(), other_drop_speeds=(0.1,)).other_drop_speeds == (0.1,)
+    penetrate.check(settings)
+    result = penetrate.run(settings, tmp_path / "run")
+    assert {run["kind"] for run in result["runs"]} == {"driven", "set_down"}
+    assert result["quantities"]["stiffness"]["value"] > 0
+
+
+def test_the_first_line_says_where_speed_and_pressure_come_from():
+    settings = PenetrateSettings(**QUICK, retreat_speed=0.7)
+    said = softening_note(settings, Softening(1e7, 3000.0, 0.7, 7e10))
+    assert "0.7 m/s, the speed of the pull-out" in said and "under the tip at its deepest" in said
+    assert "of a driven run" in softening_note(settings, Softening(1e7, 3000.0, 0.4, 7e10))
+
+
+def test_an_overlap_near_its_bound_names_the_modulus_that_leaves_room():
+    """Hertz: delta/d goes with E^(-2/3), so 0.048 comes down to 0.8 x 0.05 with E times (0.048 / 0.04)^1.5."""
+    settings = PenetrateSettings(**QUICK)
+    softening = Softening(1e7, 3000.0, 0.4, 7e10)
+    assert overlap_warning(0.044, settings, softening) is None
+    assert "young = 1.3e+07 Pa (here 1e+07 Pa) would leave room" in overlap_warning(0.048, settings, softening)

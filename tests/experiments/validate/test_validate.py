@@ -1,0 +1,176 @@
+"""`hedgebed validate`: what it runs, keeps, and writes."""
+
+import json
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+import vis
+from experiments.cli.main import main
+from experiments.validate import experiment
+from experiments.validate.base.case import Case, Comparison, Curve, Outcome, Plot
+from experiments.validate.beds.friction_angle import mohr_angle
+from experiments.validate.document import markdown
+from experiments.validate.settings import ValidateSettings
+from experiments.validate.suite import SUITE, chosen
+from vis.bed.validation import _COLOURS, _draw
+
+
+def good(tell):
+    tell(0.5)
+    plot = Plot(
+        "A line, drawn",
+        "x [m]",
+        "y [N]",
+        [Curve("law, closed", [0.0, 1.0], [0.0, 2.0], False), Curve("bed", [0.5], [1.0])],
+    )
+    return Outcome(
+        [Comparison("a", "N", 2.0, 2.01, 0.01), Comparison("b", "1", 0.0, 1e-9, 1e-6, False)], [plot], ["Well."]
+    )
+
+
+def bad(tell):
+    return Outcome([Comparison("c", "m", 1.0, 1.5, 0.1)])
+
+
+CASES = (
+    Case("good", "One", "A good one", "y = 2 x", "a book", good),
+    Case("bad", "One", "A bad one", "y = 1", "a paper", bad, reason="it is known to be bad"),
+    Case("long", "Two", "A long one", "y = 1", "a paper", good, slow=True),
+    Case("lacking", "Two", "One that lacks a code", "y", "a code", lambda tell: Outcome(skipped="there is no code")),
+    Case("later", "Two", "One for later", "y", "a paper", waits_for="walls"),
+)
+
+
+@pytest.fixture
+def suite(monkeypatch):
+    """A suite that computes nothing; returns how often each of its cases was run."""
+    runs: dict[str, int] = {}
+
+    def counted(case, tell=None):
+        runs[case.id] = runs.get(case.id, 0) + 1
+        return real(case, tell)
+
+    real = experiment.run_case
+    monkeypatch.setattr(experiment, "run_case", counted)
+    monkeypatch.setattr(experiment, "SUITE", CASES)
+    monkeypatch.setattr("experiments.validate.suite.SUITE", CASES)
+    return runs
+
+
+def test_a_table_and_a_page_show_every_case(suite, tmp_path, capsys):
+    document = tmp_path / "validation.md"
+    assert main(["validate", "--out", str(tmp_path / "run"), "--document", str(document), "--quiet"]) == 0
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    assert {row["id"]: row["status"] for row in result["cases"]} == {
+        "good": "pass", "bad": "fail", "long": "pass", "lacking": "skipped", "later": "not yet",
+    }  # fmt: skip
+    assert result["quantities"]["cases_fail"]["value"] == 1
+    text = document.read_text()
+    assert text == (tmp_path / "run" / "validation.md").read_text()
+    assert "| good | A good one | y = 2 x | a book | 2 N | 2.01 N | +0.5 % | ±1 % | pass |" in text
+    assert "**FAIL**" in text and "it is known to be bad" in text
+    assert "skipped: there is no code" in text and "not yet: walls" in text
+    page = (tmp_path / "run" / "report.html").read_text()
+    assert "y = 2 x (a book)" in page and "lacking (One that lacks a code): skipped, there is no code" in page
+    assert "A line, drawn" in page and "data:image/png" in page and "it is known to be bad" in page
+    assert vis.write_report(tmp_path / "run").read_text() == page  # the page of any folder, made again
+    assert "bad fails: c is 1.5, 1 was wanted" in " ".join(capsys.readouterr().out.split())
+
+
+def test_many_curves_are_told_beneath_their_plot(tmp_path):
+    """With a colour each, and where none of them runs through their names: the plot is as high, the picture higher."""
+    (tmp_path / "figures").mkdir()
+    heights = []
+    for count in (2, 9):
+        rows = [f"{name},{x},{x * k}" for k, name in enumerate("abcdefghi"[:count]) for x in (0.0, 1.0)]
+        (tmp_path / "curves.csv").write_text("\n".join(["curve,x,y", *rows]))
+        plot = {"series": "curves.csv", "title": "t", "x": "x", "y": "y", "log": "", "lines": ["a"]}
+        _draw(tmp_path, {"id": f"of-{count}"}, plot, 1)
+        heights.append(matplotlib.image.imread(tmp_path / "figures" / f"of-{count}-1.png").shape[0])
+    assert heights[1] > heights[0] + 30
+    assert len(set(_COLOURS)) == len(_COLOURS) >= 9
+
+
+def test_finished_cases_are_kept_until_their_code_changes(suite, tmp_path, monkeypatch):
+    settings = ValidateSettings(document=str(tmp_path / "validation.md"))
+    experiment.run(settings, tmp_path / "run")
+    experiment.resume(tmp_path / "run")
+    assert suite == {"good": 1, "bad": 1, "long": 1, "lacking": 2}  # what was skipped is tried again
+    monkeypatch.setattr(experiment, "fingerprint_of", lambda case: "other code")
+    experiment.resume(tmp_path / "run")
+    assert suite["good"] == 2
+
+
+def test_part_of_the_suite_leaves_the_committed_table_alone(suite, tmp_path, monkeypatch):
+    monkeypatch.setattr(experiment, "_ROOT", tmp_path)
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "pyproject.toml").touch()
+    experiment.run(ValidateSettings(only=("good",)), tmp_path / "one")
+    experiment.run(ValidateSettings(quick=True), tmp_path / "quick")
+    assert suite == {"good": 2, "bad": 1, "lacking": 1}
+    page = (tmp_path / "one" / "report.html").read_text()
+    assert "left out of this run: bad, long, lacking" in page and "later (One for later): not yet, walls" in page
+    assert not (tmp_path / "docs" / "validation.md").exists()
+    experiment.run(ValidateSettings(), tmp_path / "all")
+    assert "hedgebed validate`" in (tmp_path / "docs" / "validation.md").read_text()
+
+
+def test_a_case_run_by_itself_goes_into_the_kept_table_with_its_own_code(suite, tmp_path, monkeypatch):
+    monkeypatch.setattr(experiment, "_ROOT", tmp_path)
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "pyproject.toml").touch()
+    experiment.run(ValidateSettings(quick=True), tmp_path / "quick")
+    experiment.run(ValidateSettings(only=("long",), keep=True), tmp_path / "one")
+    table = tmp_path / "docs" / "validation.md"
+    assert "1 pass, 0 fail, 3 not run, 1 not yet." in table.read_text()
+    experiment.run(ValidateSettings(only=("bad",), keep=True), tmp_path / "two")
+    text = table.read_text()
+    assert "1 pass, 1 fail, 2 not run, 1 not yet." in text and "by `hedgebed validate --only bad`, code" in text
+    assert "- **bad** (1 of 1 numbers): it is known to be bad." in text and text.index("### bad") < text.index(
+        "### long"
+    )
+    experiment.run(ValidateSettings(), tmp_path / "all")
+    assert table.read_text() == (tmp_path / "all" / "validation.md").read_text()
+    with pytest.raises(ValueError, match="leave document out"):
+        experiment.run(ValidateSettings(keep=True, document=str(tmp_path / "x.md")), tmp_path / "four")
+
+
+def test_a_case_there_is_not_is_refused_with_the_nearest(tmp_path, capsys):
+    assert main(["validate", "--only", "free-fal", "--out", str(tmp_path / "run")]) == 2
+    assert "only = 'free-fal' is no case of the suite; did you mean 'free-fall'" in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
+    assert main(["validate", "--document", str(tmp_path / "no" / "x.md"), "--out", str(tmp_path / "run")]) == 2
+
+
+def test_the_real_suite_is_chosen_from_by_name_and_by_speed():
+    assert [case.id for case in chosen(["t2", "t1"])] == ["t1", "t2"]
+    assert {case.id for case in SUITE if case.slow} == {case.id for case in chosen()} - {
+        c.id for c in chosen(quick=True)
+    }
+
+
+def test_a_difference_that_is_not_a_number_is_said():
+    row = {"quantity": "a", "unit": "1", "reference": 1.0, "ours": None, "difference": None, "share": None,
+           "passes": False, "band": 0.1, "relative": True}  # fmt: skip
+    case = {"id": "x", "family": "f", "title": "t", "reference": "r", "source": "s", "status": "fail", "worst": row,
+            "comparisons": [row], "remarks": [], "reason": "", "date": "2026-01-01", "seconds": 1.0}  # fmt: skip
+    text = markdown(
+        {"title": "v: 1 fail", "date": "2026-01-01", "version": "0", "code": "0", "cases": [case]},
+        command="hedgebed validate",
+    )
+    assert "not a number" in text and "not looked into yet" in text
+
+
+def test_mohrs_circle_asks_for_no_plane():
+    """s1 / s3 = (1 + sin) / (1 - sin) however the axes lie; with like normal stresses its sine is tau / p."""
+    tensor = np.diag([1.0, 1.3, (1 + 0.5) / (1 - 0.5)])
+    c, s = np.cos(0.7), np.sin(0.7)
+    turn = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+    assert mohr_angle(turn @ tensor @ turn.T) == pytest.approx(30)
+    assert mohr_angle(np.array([[1, 0, 0.382], [0, 1, 0], [0.382, 0, 1]])) == pytest.approx(
+        np.degrees(np.arcsin(0.382))
+    )
+    with pytest.raises(ValueError, match="least principal stress = 0 Pa: pressures in all directions"):
+        mohr_angle(np.diag([0.0, 1.0, 1.0]))

@@ -1,0 +1,433 @@
+"""Figures of a diagnosis: measured against both models, what is left by phase, candidates, the latent force."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator, NullLocator
+from numpy.typing import NDArray
+
+from vis.page.style import BED, GREY, INK, MODEL
+from vis.page.tumble_series import STATES, state_runs
+
+__all__ = ["Channel", "draw_evidence", "draw_latent", "draw_phases", "draw_trajectories", "read_channel", "worst"]
+
+Array = NDArray[np.float64]
+
+_WIDTH = 8.6
+_MOST_ROWS = 6
+_MOST_BARS = 14
+#: channel -> (what it is, unit, factor on SI)
+_QUANTITIES: dict[str, tuple[str, str, float]] = {
+    "x": ("x", "mm", 1e3),
+    "y": ("y", "mm", 1e3),
+    "theta": ("θ", "degrees", 180 / math.pi),
+    "gyro": ("gyro", "rad/s", 1.0),
+    "ax": ("specific force, body x", "m/s²", 1.0),
+    "ay": ("specific force, body y", "m/s²", 1.0),
+    "wheel": ("wheel", "rad/s", 1.0),
+    "depth": ("depth", "mm", 1e3),
+    "force": ("force", "N", 1.0),
+    "accel": ("acceleration", "m/s²", 1.0),
+}
+_PHASES = STATES | {"free": STATES["hop"], "in": STATES["pivot"], "rest": STATES["stand"], "out": STATES["slip"]}
+"""Of a tumble the colours that its states have everywhere; of a push, never in one figure with those, the same four."""
+#: column of latent.csv -> axis label and factor; what is not here is shown under its own name
+_COLUMNS: dict[str, tuple[str, float]] = {
+    "t_s": ("time [s]", 1.0),
+    "depth_m": ("depth [mm]", 1e3),
+    "retreat_m": ("way back from the deepest point [mm]", 1e3),
+    "velocity_m_s": ("velocity, downwards [m/s]", 1.0),
+    "speed_m_s": ("nominal speed of the trial [m/s]", 1.0),
+    "diameter_m": ("diameter [mm]", 1e3),
+    "gravity_m_s2": ("gravity of the trial [m/s²]", 1.0),
+    "torque_N_m": ("torque of the trial [N m]", 1.0),
+    "x_m": ("x [mm]", 1e3),
+    "y_m": ("y [mm]", 1e3),
+    "theta_rad": ("θ [degrees]", 180 / math.pi),
+    "vx_m_s": ("velocity along the surface [m/s]", 1.0),
+    "vy_m_s": ("velocity upwards [m/s]", 1.0),
+    "omega_rad_s": ("rate of rotation [rad/s]", 1.0),
+    "wheel_rad_s": ("wheel [rad/s]", 1.0),
+    "state": ("state", 1.0),
+    "latent_force_N": ("missing force [N]", 1.0),
+    "latent_force_x_N": ("missing force along x [N]", 1.0),
+    "latent_force_y_N": ("missing force along y [N]", 1.0),
+    "latent_torque_N_m": ("missing torque [N m]", 1.0),
+}
+_NARROW = 3.0
+"""Range of chi-square up to which its axis is linear."""
+_BINS = 20
+_APART = 0.005
+"""Share of the range within which bins lie at one place."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One channel of one trial, all arrays of one shape."""
+
+    trial: str
+    name: str
+    time: Array
+    measured: Array
+    before: Array
+    after: Array
+    std: Array
+    """Of the noise as the gap takes it, beside the base model and beside the best one."""
+    std_after: Array
+    phase: NDArray[np.str_]
+    scatter: Array | None = None
+    """What replicates differ by beyond the sensors, beside the best model; None where they differ by no more."""
+
+    def residual(self, stage: str) -> Array:
+        """(measured - model) / std."""
+        return (self.measured - getattr(self, stage)) / (self.std if stage == "before" else self.std_after)
+
+
+def read_channel(path: Path) -> Channel:
+    """The series <trial>.<channel>.csv."""
+    with path.open(newline="", encoding="utf-8") as file:
+        head, *rows = list(csv.reader(file))
+    columns = dict(zip(head, zip(*rows, strict=True), strict=True)) if rows else dict.fromkeys(head, ())
+    trial, _, name = path.stem.rpartition(".")
+
+    def numbers(key: str) -> Array:
+        return np.array(columns[key], dtype=float) if key in columns else np.ones(len(rows))
+
+    phase = np.array(columns.get("phase", [""] * len(rows)), dtype=str)
+    return Channel(trial, name, numbers("t_s"), numbers("measured"), numbers("before"), numbers("after"),
+                   numbers("std"), numbers("std_after" if "std_after" in columns else "std"), phase,
+                   numbers("scatter") if "scatter" in columns else None)  # fmt: skip
+
+
+def worst(channels: Sequence[Channel], held: set[str]) -> list[Channel]:
+    """At most six channels in which the base model fails most, two of them held out where some are.
+
+    Of the fitted ones, and of those held out, no channel is shown more than its share while there are others.
+    """
+    order = sorted(channels, key=lambda c: -float(np.mean(c.residual("before") ** 2)))
+    kinds = len({c.name for c in channels})
+    each = max(2, math.ceil(_MOST_ROWS / max(1, kinds)))
+    kept = min(2, sum(c.trial in held for c in channels))
+    chosen: list[Channel] = []
+    for part, most in ((False, _MOST_ROWS - kept), (True, _MOST_ROWS)):
+        here: list[Channel] = []
+        for channel in order:
+            alike = sum(c.name == channel.name for c in here)
+            if (channel.trial in held) is part and alike < each and len(chosen) + len(here) < most:
+                here.append(channel)
+        chosen += here
+    return chosen
+
+
+# Measured, before, after ----------------------------------------------------------------------------------------------
+
+
+def draw_trajectories(channels: Sequence[Channel], held: set[str], labels: tuple[str, str]) -> Figure | None:
+    """A row a channel: measured and both models on the left, residuals over the noise on the right.
+
+    `labels`: what the models before and after are called; an empty one is not drawn.
+    """
+    if not channels:
+        return None
+    drawing = Figure(figsize=(_WIDTH, 0.8 + 1.72 * len(channels)))
+    FigureCanvasAgg(drawing)
+    axes = drawing.subplots(len(channels), 2, squeeze=False)
+    models = [("before", MODEL, (0, (4, 2)), labels[0]), ("after", BED, "-", labels[1])]
+    models = [entry for entry in models if entry[3]]
+    for (left, right), c in zip(axes, channels, strict=True):
+        what, unit, factor = _QUANTITIES.get(c.name, (c.name, "SI", 1.0))
+        quick = np.ptp(c.time) < 0.5
+        time = c.time * (1e3 if quick else 1.0)
+        step = max(1, len(time) // 160)
+        if c.scatter is not None:
+            wide = 2 * np.hypot(1.0, c.scatter / c.std_after)
+            right.fill_between(time, -wide, wide, color="#f1ead8", lw=0, zorder=0)
+        right.axhspan(-2, 2, color="#e3e8ec", lw=0)
+        for stage, colour, dash, _ in models:
+            left.plot(time, factor * getattr(c, stage), color=colour, ls=dash, lw=1.4, zorder=3)
+            right.plot(time, c.residual(stage), color=colour, lw=0.8, ls="-")
+        left.plot(time[::step], factor * c.measured[::step], ".", color=INK, ms=2.4, zorder=2)
+        for axis in (left, right):
+            low, high = axis.get_ylim()
+            axis.set_ylim(low, high + 0.07 * (high - low))  # the band along the top hides nothing
+            _strip(axis, time, c.phase)
+            axis.set_xlabel("time [ms]" if quick else "time [s]", labelpad=1)
+        left.set_title(f"trial {c.trial}, {what}" + (" (held out)" if c.trial in held else ""))
+        left.set_ylabel(f"{what.split(',')[0]} [{unit}]", fontsize=8.5)
+        right.set_ylabel("left over [std]", fontsize=8.5)
+    handles: list[Any] = [Line2D([], [], color=INK, ls="", marker=".", label="measured")]
+    handles += [Line2D([], [], color=colour, ls=dash, label=label) for _, colour, dash, label in models]
+    handles.append(Patch(color="#e3e8ec", label="± 2 std of the sensor"))
+    if any(c.scatter is not None for c in channels):
+        handles.append(Patch(color="#f1ead8", label="and of replicates"))
+    handles += _phase_handles(phase for c in channels for phase in c.phase)
+    drawing.legend(handles=handles, loc="outside upper left", ncols=4, fontsize=8)
+    return drawing
+
+
+def _strip(axis: Axes, time: Array, phase: NDArray[np.str_]) -> None:
+    """The states of the motion as a band along the panel's top."""
+    spans: dict[str, list[tuple[float, float]]] = {}
+    for low, high, name in state_runs(phase):
+        end = time[min(high, len(time) - 1)]
+        spans.setdefault(name, []).append((float(time[low]), float(end - time[low])))
+    for name, pieces in spans.items():
+        if name in _PHASES:
+            axis.broken_barh(pieces, (0.96, 0.04), transform=axis.get_xaxis_transform(), color=_PHASES[name], lw=0)
+
+
+def _phase_handles(phases: Iterable[Any]) -> list[Patch]:
+    there = {str(phase) for phase in phases}
+    return [Patch(color=colour, label=name) for name, colour in _PHASES.items() if name in there]
+
+
+# What is left, by phase and channel -----------------------------------------------------------------------------------
+
+
+def draw_phases(rows: Sequence[Mapping[str, Any]], labels: tuple[str, str]) -> Figure | None:
+    """Chi-square per sample before and after, by channel and phase, fitted trials and held-out ones side by side."""
+    if not rows:
+        return None
+    keys = list(dict.fromkeys((row["channel"], row["phase"]) for row in rows))
+    keys.sort(key=lambda key: (list(_QUANTITIES).index(key[0]) if key[0] in _QUANTITIES else 99,
+                               list(_PHASES).index(key[1]) if key[1] in _PHASES else 99))  # fmt: skip
+    parts = [(held, name) for held, name in ((False, "fitted trials"), (True, "held-out trials"))
+             if any(row["held_out"] is held for row in rows)]  # fmt: skip
+    drawing = Figure(figsize=(_WIDTH, 1.15 + 0.24 * len(keys)))
+    FigureCanvasAgg(drawing)
+    axes = drawing.subplots(1, len(parts), sharey=True, sharex=True, squeeze=False).ravel()
+    for axis, (held, title) in zip(axes, parts, strict=True):
+        axis.axvline(1.0, color=INK, lw=1.0, ls=(0, (1, 1.5)))
+        for row in rows:
+            if row["held_out"] is not held:
+                continue
+            place = keys.index((row["channel"], row["phase"]))
+            before, after = (max(float(row[stage]), 1e-3) for stage in ("before", "after"))
+            if labels[1]:
+                axis.plot([before, after], [place, place], color=GREY, lw=1.2, zorder=2)
+                axis.plot(after, place, "o", color=BED, ms=5.5, zorder=4)
+            axis.plot(before, place, "D", color=MODEL, ms=4.8, zorder=3)
+        shown = [float(row[stage]) for row in rows for stage in ("before", "after")]
+        if max(shown) < _NARROW:
+            axis.set_xlim(0.0, 1.1 * max(*shown, 1.5))
+        else:
+            axis.set_xscale("log")
+            axis.xaxis.set_major_formatter(_plain_numbers)
+        axis.set_title(title)
+        axis.set_xlabel("chi-square per sample (1: the sensors' noise)")
+    axes[0].set_yticks(range(len(keys)), [f"{channel}, {phase}" for channel, phase in keys])
+    axes[0].set_ylim(len(keys) - 0.4, -0.6)
+    handles = [Line2D([], [], color=MODEL, ls="", marker="D", ms=4.8, label=labels[0])]
+    if labels[1]:
+        handles.append(Line2D([], [], color=BED, ls="", marker="o", ms=5.5, label=labels[1]))
+    drawing.legend(handles=handles, loc="outside upper left", ncols=2, fontsize=8)
+    return drawing
+
+
+# Candidates -----------------------------------------------------------------------------------------------------------
+
+
+def draw_evidence(said: Mapping[str, Any]) -> Figure | None:
+    """Bars of evidence, and what each candidate leaves: the best form of each single name, and the best sets of names
+    that beat all of their parts."""
+    best: dict[tuple[str, ...], Mapping[str, Any]] = {}
+    orders: dict[frozenset[str], tuple[str, ...]] = {}  # one set of names, in whatever order they were added
+    for row in (*said.get("candidates", []), *said.get("evidence", [])):
+        best.setdefault(orders.setdefault(frozenset(row["effects"]), tuple(row["effects"])), row)
+    if not best:
+        return None
+    score = {names: float(row["score"]) for names, row in best.items()}
+    leading = _leading_names(said, score)
+    leading = orders.get(frozenset(leading), leading)
+    singles = [names for names in best if len(names) == 1]
+    sets = [names for names in best if len(names) > 1
+            and all(score[names] > score.get((name,), -math.inf) + 0.05 for name in names)]  # fmt: skip
+    names = sorted({*singles, *sets[:5], *([leading] if leading in best else [])}, key=lambda n: (score[n], -len(n)))
+    names = names[-_MOST_BARS:] if len(names) > _MOST_BARS else names
+    drawing = Figure(figsize=(_WIDTH, 1.3 + 0.27 * len(names)))
+    FigureCanvasAgg(drawing)
+    axis, beside = drawing.subplots(1, 2, sharey=True, width_ratios=(3, 2))
+    kinds = {name: _kind(name, leading, said) for name in names}
+    colours = {name: _KINDS[kinds[name]] for name in names}
+    places = range(len(names))
+    axis.barh(places, [score[name] for name in names], color=[colours[n] for n in names], height=0.66)
+    most = max(*(score[name] for name in names), 1.0)
+    for place, name in enumerate(names):
+        axis.annotate(f"{score[name]:z.1f}" if abs(score[name]) < 10 else f"{score[name]:.0f}",
+                      (max(score[name], 0.0), place), xytext=(3, 0), textcoords="offset points", va="center",
+                      fontsize=7.5, color=INK)  # fmt: skip
+    axis.set_xlim(
+        max(1.1 * min(score[name] for name in names), -0.3 * most) if min(score[name] for name in names) < 0 else 0.0,
+        1.12 * most,
+    )  # one that is far off does not press the others together
+    axis.axvline(0.0, color=INK, lw=0.9)
+    axis.set_yticks(places, [" + ".join(name) for name in names])
+    axis.grid(False, axis="y")
+    axis.set_xlabel("log evidence over the base model [nats]\n(left of 0: not worth its parameters)")
+    _draw_left(beside, [best[name] for name in names], [colours[name] for name in names], said)
+    shown = [kind for kind in _KINDS if kind in kinds.values()]
+    handles: list[Any] = [Patch(color=_KINDS[kind], label=kind) for kind in shown]
+    handles.append(Line2D([], [], color=INK, ls=(0, (1, 1.5)), label="the noise alone"))
+    handles.append(Line2D([], [], color=MODEL, ls=(0, (4, 2)), label="the base model"))
+    drawing.legend(handles=handles, loc="outside upper left", ncols=5, fontsize=8)
+    return drawing
+
+
+_KINDS = {"named": BED, "certain": BED, "likeliest, not certain": "#7fb8d9", "cannot be told from it": MODEL,
+          "other": "#b5b5b5"}  # fmt: skip
+"""What a candidate is -> its colour."""
+
+
+def _draw_left(
+    axis: Axes, rows: Sequence[Mapping[str, Any]], colours: Sequence[str], said: Mapping[str, Any]
+) -> None:  # fmt: skip
+    """Chi-square a sample that each candidate leaves, between that of the base model and that of the noise."""
+    base = said.get("evidence_base", {})
+    left = [max(1 + float(row["left"]), 1e-2) for row in rows]
+    axis.axvline(1.0, color=INK, lw=1.0, ls=(0, (1, 1.5)))
+    whole = 1 + float(base["left"]) if base else max(left)
+    axis.axvline(whole, color=MODEL, lw=1.0, ls=(0, (4, 2)))
+    most = max(whole, *left)
+    for place, (row, value, colour) in enumerate(zip(rows, left, colours, strict=True)):
+        axis.plot([whole, value], [place, place], color=GREY, lw=1.0, zorder=2)
+        axis.plot(value, place, "o", color=colour, ms=5.5, zorder=3)
+        closes = row.get("closes")
+        if closes is not None:
+            share = f"{100 * min(max(closes, 0.0), 1.0):.0f} %"
+            axis.annotate(share, (1.01, place), xycoords=("axes fraction", "data"), va="center", fontsize=7.5,
+                          color=INK, annotation_clip=False)  # fmt: skip
+    if most < _NARROW:
+        low = min(1.0, *left)
+        axis.set_xlim(low - 0.1 * max(most - low, 0.1), most + 0.1 * max(most - low, 0.1))
+    else:
+        axis.set_xscale("log")
+        axis.set_xlim(min(0.9, 0.9 * min(left)), 1.15 * most)
+        axis.xaxis.set_major_formatter(_plain_numbers)
+        if most < 20:
+            axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axis.xaxis.set_minor_locator(NullLocator())
+    noise = "noise and replicates" if base.get("with_scatter") else "noise"
+    axis.set_xlabel(f"chi-square per sample left\n(1: {noise}; %: gap closed)")
+    axis.grid(False, axis="y")
+
+
+def _plain_numbers(value: float, place: float) -> str:
+    return f"{value:g}" if 1e-3 <= value < 1e5 else f"{value:.0e}"
+
+
+def _leading_names(said: Mapping[str, Any], score: Mapping[tuple[str, ...], float]) -> tuple[str, ...]:
+    """The set of names that is told: named, or of an unknown the best model's, or the likeliest single one."""
+    if said["verdict"] != "unknown":
+        return tuple(effect["id"] for effect in said["effects"])
+    names = tuple(said.get("leading", {}).get("effects", ()))
+    same = next((known for known in score if sorted(known) == sorted(names)), names)
+    singles = [known for known in score if len(known) == 1 and score[known] > 0]
+    return same or max(singles, key=lambda known: score[known], default=())
+
+
+def _kind(name: tuple[str, ...], leading: tuple[str, ...], said: Mapping[str, Any]) -> str:
+    if said["verdict"] == "unknown":
+        certain = {effect["id"] for effect in said["effects"]}
+        if certain and set(name) == certain:
+            return "certain"
+        return "likeliest, not certain" if name == leading else "other"
+    if name == leading:
+        return "named"
+    swapped = [(other, *leading[1:]) for other in said["alternatives"]]
+    return "cannot be told from it" if set(name) in [set(s) for s in swapped] else "other"
+
+
+# What no effect explains ----------------------------------------------------------------------------------------------
+
+
+def draw_latent(folder: Path, said: Mapping[str, Any], channels: Sequence[Channel]) -> Figure | None:
+    """Every latent column over time, and over what it goes with most; coloured by phase, with means of equal counts."""
+    if "latent" not in said or not (folder / said["latent"]["file"]).exists():
+        return None
+    with (folder / said["latent"]["file"]).open(newline="", encoding="utf-8") as file:
+        head, *rows = list(csv.reader(file))
+    latents = [name for name in head if name.startswith("latent_")]
+    if not rows or not latents:
+        return None
+    columns = dict(zip(head, zip(*rows, strict=True), strict=True))
+    trials = np.array(columns.pop("trial"), dtype=str)
+    values = {name: np.array([float(cell or "nan") for cell in column]) for name, column in columns.items()}
+    shares = {name: share for name, share in said["latent"].get("explained", {}).items() if name in values}
+    others = [name for name in sorted(shares, key=lambda n: -shares[n]) if name != "t_s" and shares[name] > 0]
+    other = others[0] if others else next(name for name in head if name not in (*latents, "trial", "t_s"))
+    phase = _phase_at(trials, values["t_s"], channels)
+    drawing = Figure(figsize=(_WIDTH, 0.6 + 2.3 * len(latents)))
+    FigureCanvasAgg(drawing)
+    axes = drawing.subplots(len(latents), 2, squeeze=False, sharey="row")
+    for pair, latent in zip(axes, latents, strict=True):
+        for axis, column in zip(pair, ("t_s", other), strict=True):
+            label, factor = _COLUMNS.get(column, (column, 1.0))
+            across = factor * values[column]
+            for name in dict.fromkeys(phase.tolist()):
+                own = phase == name
+                axis.plot(across[own], values[latent][own], ".", ms=2.2, color=_PHASES.get(name, GREY), alpha=0.8)
+            axis.axhline(0.0, color=GREY, lw=0.8)
+            axis.plot(*_means(across, values[latent]), "-", color=INK, lw=1.3, marker="o", ms=3)
+            share = said["latent"].get("explained", {}).get(column)
+            several = "up to " if len(latents) > 1 else ""  # it is the largest of all that is missing
+            axis.set_xlabel(label + (f"; explains {several}{100 * share:.0f} %" if share is not None else ""))
+        pair[0].set_ylabel(_COLUMNS.get(latent, (latent, 1.0))[0])
+        _frame(pair[1], values[latent])
+    handles = [*_phase_handles(phase), Line2D([], [], color=INK, marker="o", ms=3, label="means of equal counts")]
+    drawing.legend(handles=handles, loc="outside upper left", ncols=5, fontsize=8)
+    return drawing
+
+
+def _frame(axis: Axes, values: Array) -> None:
+    """A range of y that a few touches do not stretch, and how many rows lie beyond it."""
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return
+    low, high = np.percentile(known, (0.5, 99.5))
+    room = 0.5 * (high - low)
+    if room <= 0 or (known.min() > low - room and known.max() < high + room):
+        return
+    axis.set_ylim(low - room, high + room)
+    beyond = int(((known < low - room) | (known > high + room)).sum())
+    axis.text(0.99, 0.97, f"{beyond} rows beyond", transform=axis.transAxes, ha="right", va="top", fontsize=7.5,
+              color="#555555")  # fmt: skip
+
+
+def _phase_at(trials: NDArray[np.str_], time: Array, channels: Sequence[Channel]) -> NDArray[np.str_]:
+    """The phase at each row of the latent force: that of the same trial's sample next in time."""
+    phase = np.full(len(trials), "", dtype="<U8")
+    for trial in dict.fromkeys(trials.tolist()):
+        source = next((c for c in channels if c.trial == trial and len(c.time)), None)
+        if source is not None:
+            own = trials == trial
+            middle = 0.5 * (source.time[1:] + source.time[:-1])
+            phase[own] = source.phase[np.searchsorted(middle, time[own])]
+    return phase
+
+
+def _means(x: Array, y: Array) -> tuple[Array, Array]:
+    """Means of y over x in bins of equal count; what is constant within a bin counts once."""
+    good = np.isfinite(x) & np.isfinite(y)
+    x, y = x[good], y[good]
+    if len(np.unique(x)) <= _BINS:
+        places = np.unique(x)
+        return places, np.array([y[x == place].mean() for place in places])
+    order = np.argsort(x, kind="stable")
+    pieces = [piece for piece in np.array_split(order, _BINS) if len(piece)]
+    counts = np.array([len(piece) for piece in pieces], dtype=float)
+    places, means = (np.array([column[piece].mean() for piece in pieces]) for column in (x, y))
+    group = np.cumsum(np.concatenate([[0], np.diff(places) > _APART * np.ptp(x)]).astype(int))  # one place is one mean
+    whole = np.bincount(group, counts)
+    return np.bincount(group, places * counts) / whole, np.bincount(group, means * counts) / whole

@@ -1,0 +1,380 @@
+"""The report of a diagnosis: reads diagnosis.json, result.json, latent.csv and series/."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from vis.diagnose.figures import draw_evidence, draw_latent, draw_phases, draw_trajectories, read_channel, worst
+from vis.page.numbers import plain, short
+from vis.page.page import Block, Page, Section, Tile, code, figure, listing, table, text, write_page
+from vis.page.style import styled
+
+__all__ = ["write_diagnosis_report"]
+
+_DPI = 130
+_MOST_PLACES = 8
+"""Stretches that are listed."""
+_DASH = "\N{EN DASH}"
+
+
+def write_diagnosis_report(folder: str | Path, *, progress: Callable[[float], None] | None = None) -> Path:
+    """Make figures/ and report.html of the folder of a diagnosis, and return the report.
+
+    Raises FileNotFoundError where the folder has no diagnosis.json or result.json.
+    """
+    tell = progress if progress is not None else lambda done: None
+    folder = Path(folder)
+    said = json.loads((folder / "diagnosis.json").read_text(encoding="utf-8"))
+    result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    channels = [read_channel(path) for path in sorted((folder / "series").glob("*.csv"))]
+    held = set(said["gap"]["held_out_trials"])
+    labels = _labels(said)
+    shown = worst([channel for channel in channels if len(channel.time)], held)
+    figures = folder / "figures"
+    figures.mkdir(exist_ok=True)
+    drawn: dict[str, Block] = {}
+    plans: list[tuple[str, str, str, Callable[[], Figure | None]]] = [
+        ("trajectories", "Measured and modelled",
+         "The channels in which the base model fails most, held-out trials last: left measured (dots) and modelled, "
+         "right what is left over the sensor's noise, and, where replicates differ by more, how far that is. The band "
+         "along the top is the phase of the base model's motion.",
+         lambda: draw_trajectories(shown, held, labels)),
+        ("residuals", "What is left, by phase and channel",
+         "Chi-square per sample with the noise that campaign.toml states. Trials held out took no part in fitting or "
+         "choosing.",
+         lambda: draw_phases(said.get("by_phase", []), labels)),
+        ("evidence", "What every candidate explains",
+         "The best form of each name, and of sets of names those that beat all of their parts. Left: log evidence over "
+         "the base model, tempered for misfit of form. Right: what each leaves of the trials that were fitted, and how "
+         "much of what the base model leaves beyond the noise it takes away.",
+         lambda: draw_evidence(said)),
+        ("latent", "What no effect explains",
+         "What the best model lacks, over time and over what it goes with most. Shares are those of the variance that "
+         "a binned mean explains, judged on rows that took no part in making it.",
+         lambda: draw_latent(folder, said, channels)),
+    ]  # fmt: skip
+    for place, (name, title, caption, draw) in enumerate(plans):
+        with styled():
+            drawing = draw()
+            if drawing is not None:
+                drawing.savefig(figures / f"{name}.png", dpi=_DPI)
+                drawn[name] = figure(figures / f"{name}.png", title=title, caption=caption)
+        tell(0.2 * (place + 1))
+    report = write_page(folder / "report.html", _page(said, result, drawn))
+    tell(1.0)
+    return report
+
+
+def _labels(said: Mapping[str, Any]) -> tuple[str, str]:
+    """What the models before and after are called; the second is empty where nothing was added."""
+    before, names = "base model, fitted", " + ".join(effect["id"] for effect in said["effects"])
+    if said["verdict"] == "none" or said["gap"]["after"] == said["gap"]["before"]:
+        return before, ""
+    likeliest = " + ".join(said.get("leading", {}).get("effects", []))
+    return before, f"with {names}" if names else f"with {likeliest}, not certain" if likeliest else "best model found"
+
+
+# The page -------------------------------------------------------------------------------------------------------------
+
+
+def _page(said: Mapping[str, Any], result: Mapping[str, Any], drawn: Mapping[str, Block]) -> Page:
+    gap = said["gap"]
+    named = ", ".join(effect["id"] for effect in said["effects"]) or "nothing"
+    which = "chi-square a sample, " + ("fitted" if gap["before"]["held_out"] is None else "held-out") + " trials"
+    tiles = [
+        Tile("Verdict", said["verdict"], " or ".join([named, *said["alternatives"]])),
+        Tile("Gap before", _gap(gap["before"]), which + _weighed(said, "before")),
+        Tile("Gap after", _gap(gap["after"]), which + _weighed(said, "after"), second=True),
+    ]
+    sections = [
+        Section("", [listing(result.get("summary", [])), *_there(drawn, "trajectories")]),
+        Section("What is left", [_gap_table(said), *_in_units(said), *_there(drawn, "residuals"), *_phase_table(said),
+                                 *_there(drawn, "latent")]),
+        Section("Where the base model fails", [*_sentences(result["departures"]["sentences"]), *_where(said)]),
+        Section("Candidates", [*_there(drawn, "evidence"), *_evidence(said)]),
+        Section("What these trials can tell apart", _told_apart(said)),
+        Section("The next experiment", [text(said["next_experiment"])] if said.get("next_experiment") else []),
+        Section("Numbers", _numbers(said)),
+        Section("What was found in the recordings", _findings(said)),
+        Section("To do this again", [
+            text(f"With hedgebed {result['version']}, where it was started from (the campaign's path is as given):"),
+            code("hedgebed diagnose THIS_FOLDER/run.toml"),
+        ]),
+    ]  # fmt: skip
+    held = ", ".join(gap["held_out_trials"]) or "none"
+    return Page(
+        title=str(result["title"]),
+        lead=[f"hedgebed {result['version']}", "diagnose", f"held out: {held}"],
+        tiles=tiles,
+        warnings=[str(warning)[:1].upper() + str(warning)[1:] for warning in result["warnings"]],
+        sections=[section for section in sections if section.blocks],
+    )
+
+
+def _weighed(said: Mapping[str, Any], stage: str) -> str:
+    """The same weighed against what replicates differ by, where that is more than the sensors."""
+    weighed = said.get("gap_with_scatter")
+    return "" if weighed is None else f"; {_gap(weighed[stage])} beside what replicates differ by"
+
+
+def _gap(gap: Mapping[str, Any]) -> str:
+    return _number(gap["fit"] if gap["held_out"] is None else gap["held_out"])
+
+
+def _number(value: float) -> str:
+    """0.97, 153, 19 400."""
+    return plain(value) if value >= 1e3 else short(value, 3)
+
+
+def _sentences(sentences: Sequence[str]) -> list[Block]:
+    return [listing(sentences)] if sentences else []
+
+
+def _gap_table(said: Mapping[str, Any]) -> Block:
+    gap, weighed = said["gap"], said.get("gap_with_scatter")
+
+    def cell(value: float | None, error: float | None = None) -> str:
+        told = _DASH if value is None else _number(value)
+        return told if error is None else f"{told} ± {short(error, 1)}"
+
+    def error(one: Mapping[str, Any], stage: str, part: str) -> float | None:
+        return one.get("after_std", {}).get(part) if stage == "after" else None
+
+    rows = [
+        (name, *(cell(one[stage][part], error(one, stage, part)) for one in (gap, weighed) if one is not None
+                 for stage in ("before", "after")))
+        for part, name in (("fit", "fitted trials"), ("held_out", "held-out trials"))
+    ]  # fmt: skip
+    head: tuple[str, ...] = ("", "base model", "best model")
+    title = "The gap, chi-square per sample (1: the sensors' noise)"
+    if weighed is not None:
+        head += ("base model, replicates' scatter added", "best model, replicates' scatter added")
+        title += "; beside it with what replicates differ by added to the variance (1: as near as another run comes"
+        freedom = weighed.get("freedom")
+        title += f"; their scatter rests on {freedom} degrees of freedom)" if freedom else ")"
+    return table(head, rows, title=title)
+
+
+def _in_units(said: Mapping[str, Any]) -> list[Block]:
+    """The gap in the channels' units, and by condition."""
+    blocks = []
+    cells = {(row["channel"], row["held_out"]): row for row in said.get("by_channel", [])}
+
+    def rms(name: str, held: bool, stage: str) -> str:
+        row = cells.get((name, held))
+        return _DASH if row is None else short(row[f"rms_{stage}"], 3)
+
+    names = dict.fromkeys((row["channel"], row["unit"]) for row in said.get("by_channel", []))
+    if names:
+        rows = [(name, unit, *(rms(name, held, stage) for held in (False, True) for stage in ("before", "after")))
+                for name, unit in names]  # fmt: skip
+        head = ("channel", "unit", "fitted: before", "after", "held out: before", "after")
+        blocks.append(table(head, rows, title="Measured less modelled, root mean square, the sensors' noise included"))
+    conditions = said.get("by_condition", [])
+    if len(conditions) > 1:
+        common = _common([row["settings"] for row in conditions])
+        lines = [(_settings(row["settings"], but=common), ", ".join(row["trials"]), _number(row["before"]),
+                  _number(row["after"])) for row in conditions]  # fmt: skip
+        title = "Chi-square per sample by condition" + (f" ({_settings(common)} in all)" if common else "")
+        blocks.append(table(("condition", "trials", "before", "after"), lines, title=title))
+    return blocks
+
+
+def _phase_table(said: Mapping[str, Any]) -> list[Block]:
+    """By phase and channel, fitted trials beside held-out ones."""
+    rows: dict[tuple[str, str], dict[bool, Mapping[str, Any]]] = {}
+    for row in said.get("by_phase", []):
+        rows.setdefault((row["phase"], row["channel"]), {})[row["held_out"]] = row
+    if not rows:
+        return []
+
+    def cells(part: Mapping[str, Any] | None) -> tuple[str, str, str]:
+        if part is None:
+            return _DASH, _DASH, _DASH
+        return str(part["samples"]), _number(part["before"]), _number(part["after"])
+
+    head = ("phase", "channel", "samples fitted", "before", "after", "samples held out", "before", "after")
+    body = [(*key, *cells(parts.get(False)), *cells(parts.get(True))) for key, parts in rows.items()]
+    return [table(head, body, title="Chi-square per sample by phase and channel")]
+
+
+def _where(said: Mapping[str, Any]) -> list[Block]:
+    if not said["where"]:
+        return []
+    places = said["where"][:_MOST_PLACES]
+    common = _common([p.get("settings", {}) for p in said["where"]])
+    rows = [
+        (p["trial"], _settings(p.get("settings", {}), but=common), p["channel"], p["phase"], f"{p['from_s']:.4g}",
+         f"{p['to_s']:.4g}", _number(p.get("excess", 0.0)))
+        for p in places
+    ]  # fmt: skip
+    more = len(said["where"]) - len(places)
+    title = "The worst stretches" + (f" (of {len(places) + more}, which diagnosis.json has)" if more else "")
+    head = ("trial", "settings", "channel", "phase", "from [s]", "to [s]", "chi-square beyond noise")
+    return [table(head, rows, title=title), *_parted(said)]
+
+
+def _common(settings: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """What is the same in several conditions."""
+    first = settings[0] if len(settings) > 1 else {}
+    return {name: value for name, value in first.items() if all(other.get(name) == value for other in settings)}
+
+
+def _parted(said: Mapping[str, Any]) -> list[Block]:
+    """When each trial parts from the base model, channel by channel, in the order in which they do."""
+    trials: dict[str, list[str]] = {}
+    for row in said.get("parted", []):
+        trials.setdefault(row["trial"], []).append(f"{row['channel']} {row['at_s']:.3g}")
+    if not trials:
+        return []
+    title = "First parts from the base model at [s]: a running mean of nine samples beyond 5 standard errors"
+    return [table(("trial", "channel and time"), [(trial, ", ".join(times)) for trial, times in trials.items()],
+                  title=title, words=True)]  # fmt: skip
+
+
+def _settings(settings: Mapping[str, float], *, but: Mapping[str, float] | None = None) -> str:
+    """torque_N_m = 0.22 as "torque 0.22 N m"; `but`: what need not be said, for all have it."""
+    left = {name: value for name, value in settings.items() if name not in (but or {})}
+    settings = left or settings
+    units = {"N_m": "N m", "m_s2": "m/s²", "m_s": "m/s", "m": "m", "kg": "kg", "rad_s": "rad/s"}
+    shown = []
+    for name, value in settings.items():
+        unit = next((u for u in sorted(units, key=len, reverse=True) if name.endswith(f"_{u}")), "")
+        what = name.removesuffix(f"_{unit}") if unit else name
+        shown.append(f"{what.replace('_', ' ')} {short(value, 4)} {units.get(unit, '')}".strip())
+    return ", ".join(shown)
+
+
+def _evidence(said: Mapping[str, Any]) -> list[Block]:
+    """A line a set of names; those no better than the base model in one sentence."""
+    plain = {"closes": None, "tried": 1, "better": True, "note": ""}  # of a folder from before there were candidates
+    rows = said.get("candidates") or [plain | dict(row) for row in said.get("evidence", [])]
+    if not rows:
+        return [text("Nothing was left that a candidate could explain: none was tried.")]
+    better = [
+        (row["candidate"], f"{row['score']:.1f}", _DASH if row["left"] is None else f"{row['left']:.3g}",
+         _DASH if row["closes"] is None else f"{100 * min(max(row['closes'], 0.0), 1.0):.0f} %", str(row["tried"]),
+         row["note"])
+        for row in rows if row["better"]
+    ]  # fmt: skip
+    worse = [" + ".join(row["effects"]) for row in rows if not row["better"]]
+    blocks: list[Block] = []
+    if better:
+        head = ("candidate (effect:form)", "evidence over the base model [nats]", "chi-square a sample beyond noise",
+                "of the gap closed", "forms tried", "what became of it")  # fmt: skip
+        title = "A line a set of names, in its best form; the likeliest first"
+        blocks.append(table(head, better, title=title, words=True))
+    if worse:
+        blocks.append(text(f"No better than the base model with its parameters fitted: {', '.join(worse)}."))
+    blocks.append(text(
+        "Every candidate in every form is in evidence.csv. Chi-square here is that of the search, beyond the noise as "
+        "it was found (its jitter, its correlation, replicates' scatter) and without those held out; the gap above "
+        "is counted with the noise that campaign.toml states, so the two are not the same number.", small=True,
+    ))  # fmt: skip
+    return blocks
+
+
+def _sizes(said: Mapping[str, Any]) -> list[Block]:
+    rows = [
+        (size["effect"], short(size["signature"], 2), size["channel"], f"{short(size['rms'], 2)} {size['unit']}",
+         f"{short(size['most'], 2)} {size['unit']}",
+         _DASH if size["share"] is None else f"{100 * size['share']:.2g} %")
+        for size in said.get("sizes", []) if size["channel"] is not None
+    ]  # fmt: skip
+    if not rows:
+        return []
+    head = ("effect", "signature [noise]", "plainest in", "change, root mean square", "at most", "of what it reads")
+    return [table(head, rows, title="How large each effect is: what the readings would lack without it, all else "
+                                    "refitted, over the sensors' noise")]  # fmt: skip
+
+
+def _numbers(said: Mapping[str, Any]) -> list[Block]:
+    ends = {stage: {bound["parameter"] for bound in bounds if bound["at_bound"]}
+            for stage, bounds in said.get("at_bounds", {}).items()}  # fmt: skip
+
+    def error(entry: Mapping[str, Any], name: str, stage: str) -> str:
+        return "at its end" if name in ends.get(stage, ()) else short(entry["std"], 2)
+
+    effects = [
+        (effect["id"], name, short(entry["value"], 4), error(entry, f"{effect['id']}.{name}", "after"),
+         _unit(entry["unit"]))
+        for effect in said["effects"] for name, entry in effect["parameters"].items()
+    ]  # fmt: skip
+    after = said["base"]["after"]
+    base = [
+        (name, short(entry["value"], 4), error(entry, name, "before"), short(after[name]["value"], 4),
+         error(after[name], name, "after"), _unit(entry["unit"]))
+        for name, entry in said["base"]["before"].items() if name in after
+    ]  # fmt: skip
+    blocks = []
+    if effects:
+        blocks.append(
+            table(("effect", "parameter", "value", "standard error", "unit"), effects, title="What was added")
+        )
+    if base:
+        head = ("parameter", "before", "standard error", "after", "standard error", "unit")
+        blocks.append(table(head, base, title="The base model's parameters"))
+    blocks = [*_sizes(said), *blocks[:1], *_equations(said), *blocks[1:]] if effects else blocks
+    if blocks:
+        blocks.append(text("Standard errors hold if the model is right and the noise is as it was found; what the form "
+                           "of an effect leaves open is not in them.", small=True))  # fmt: skip
+    return blocks
+
+
+def _equations(said: Mapping[str, Any]) -> list[Block]:
+    """The law that each number is of."""
+    rows = [row for row in said.get("equations", []) if row["equation"]]
+    if not rows:
+        return []
+    laws = [f"{row['effect']} ({row['form']}): {row['equation']}." for row in rows]
+    symbols = said.get("symbols", "")
+    return [listing(laws), *([text(f"{symbols}.", small=True)] if symbols else [])]
+
+
+def _unit(unit: str) -> str:
+    return "" if unit == "1" else unit
+
+
+def _findings(said: Mapping[str, Any]) -> list[Block]:
+    rows = [
+        (f["what"], f["trial"] or _DASH, f["channel"] or _DASH,
+         _DASH if f["from_s"] is None else f"{f['from_s']:.4g} to {f['to_s']:.4g}", "yes" if f["set_aside"] else "no")
+        for f in said.get("findings", [])
+    ]  # fmt: skip
+    return [table(("what", "trial", "channel", "seconds", "set aside"), rows, words=True)] if rows else []
+
+
+def _told_apart(said: Mapping[str, Any]) -> list[Block]:
+    """The first effect against the nearest other names, and what would tell them apart."""
+    rows = said.get("equivalence", [])
+    if len(rows) < 2:
+        return []
+    first, *others = rows
+
+    def number(value: float | None, digits: int = 3) -> str:
+        return _DASH if value is None else short(value, digits)
+
+    cells = [(first["effect"], "", "", "", "", number(first["left_out"]), "")]
+    cells += [
+        (row["effect"], f"{row['angle_deg']:.0f}", number(row["distance"]), f"{row['evidence_behind']:.1f}",
+         _DASH if row["left_out_behind"] is None else f"{row['left_out_behind']:.1f}", number(row["left_out"]),
+         "yes" if row["told_apart"] else "no")
+        for row in others
+    ]  # fmt: skip
+    head = ("name", "angle [degrees]", "distance [noise]", "evidence behind [nats]", "prediction behind [nats]",
+            "chi-square of what was left out", "told apart")  # fmt: skip
+    caption = (
+        f"Other names in the place of {first['effect']}. The angle is that between what the two change in the data "
+        "(0: these trials see them as one); conditions left out in turn are predicted, chi-square a sample"
+    )
+    close = [row["what_would_tell"] for row in others if not row["told_apart"]]
+    return [table(head, cells, title=caption), *([listing(close)] if close else [])]
+
+
+def _there(drawn: Mapping[str, Block], *names: str) -> list[Block]:
+    return [drawn[name] for name in names if name in drawn]

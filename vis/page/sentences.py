@@ -1,0 +1,34 @@
+"""The sentences of a package, kept as templates in a file of text beside its code.
+
+A package that says something to a person has a file ``sentences.toml``: ``key = "text with {name:.3g}"``. Its modules
+share ``say = Sentences(__package__)`` and write ``say("key", name=value)``. Placeholders are those of `str.format`, so
+attributes, items, conversions and format codes work: ``{settings.depth:g}``, ``{name!r}``.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from functools import cached_property
+from importlib.resources import files
+from typing import Any
+
+__all__ = ["Sentences"]
+
+
+class Sentences:
+    """The sentences of one package, read when the first one is asked for."""
+
+    def __init__(self, package: str | None) -> None:
+        self.package = package or ""
+
+    @cached_property
+    def templates(self) -> dict[str, str]:
+        """Key to template, from ``sentences.toml``."""
+        return tomllib.loads(files(self.package).joinpath("sentences.toml").read_text(encoding="utf-8"))
+
+    def __call__(self, key: str, /, **values: Any) -> str:
+        """The sentence `key`, its placeholders filled. Raises KeyError for a key or a placeholder without a value."""
+        return self.templates[key].format(**values)
+
+    def __repr__(self) -> str:
+        return f"Sentences({self.package!r})"

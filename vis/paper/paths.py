@@ -1,0 +1,198 @@
+"""Figures 5 to 7 of the paper with our model: the start on steel, states over the angle, hops as parabolas."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from vis.page.style import GREY, INK, styled
+from vis.paper.run import WIDTH, Array, Case, Drawn, PaperRun, legend_above, new_figure
+from vis.tumble.report import STATES, state_runs
+
+__all__ = ["figure_5", "figure_6", "figure_7"]
+
+_SHOWN = 0.045
+"""How far Figure 5 goes [m]: a little more than what the paper trusts."""
+
+
+def _start(paper: PaperRun, case: Case) -> tuple[Array, Array]:
+    """The path from the start to the end of the first hop [mm], as far as Figure 5 goes."""
+    numbers, states = paper.rows(case)
+    x, y = 1e3 * (numbers["x_m"] - numbers["x_m"][0]), 1e3 * (numbers["y_m"] - numbers["y_m"][0])
+    beyond = np.flatnonzero(np.hypot(x, y) > 1e3 * _SHOWN)
+    landed = [high for _, high, name in state_runs(states) if name == "hop"]
+    end = min([len(x), *beyond[:1].tolist(), *landed[:1]])
+    return x[:end], y[:end]
+
+
+def figure_5(paper: PaperRun) -> Drawn | None:
+    """Path of the centre from its start, steel, the first gravity."""
+    if "steel" not in paper.surfaces:
+        return None
+    rig, gap = paper.rigs[0], 0.0
+    with styled():
+        drawing = new_figure(WIDTH, 4.6)
+        axis = drawing.subplots()
+        for stated in (22.5, 60.0):
+            reach = 1e3 * _SHOWN
+            along = np.array([0.0, reach * math.cos(math.radians(stated))])
+            axis.plot(along, along * math.tan(math.radians(stated)), color=GREY, lw=0.9, ls=(0, (5, 3)), zorder=1)
+            top = along[1] * math.tan(math.radians(stated))
+            axis.annotate(
+                f"{stated:g}° in the text", (along[1], top), xytext=(3, 2), textcoords="offset points", color=GREY
+            )
+        for torque in paper.torques:
+            colour = paper.colour(torque)
+            low, high = (_start(paper, paper.case("steel", rig, torque, variant)) for variant in ("low", "high"))
+            ring = np.concatenate([np.stack(low, axis=1), np.stack(high, axis=1)[::-1]])
+            axis.fill(ring[:, 0], ring[:, 1], color=colour, alpha=0.25, lw=0)
+            x, y = _start(paper, paper.case("steel", rig, torque))
+            axis.plot(x, y, color=colour, lw=2.0)
+            fixed = _start(paper, paper.case("steel", rig, torque, "paper"))
+            axis.plot(*fixed, color=INK, lw=1.1, ls=(0, (1, 1.6)))
+            shared = min(len(x), len(fixed[0]))
+            gap = max(gap, float(np.hypot(x[:shared] - fixed[0][:shared], y[:shared] - fixed[1][:shared]).max()))
+        axis.plot(0, 0, "o", color=INK, ms=4)
+        axis.set_aspect("equal")
+        axis.set_xlim(-2.0, 1.25e3 * _SHOWN)
+        axis.set_ylim(-1.0, 1.02e3 * _SHOWN)
+        axis.set_xlabel("x of the centre from the start [mm]")
+        axis.set_ylabel("y of the centre from the start [mm]")
+        band = Patch(color=GREY, alpha=0.35, lw=0, label="friction band")
+        dotted = Line2D([], [], color=INK, lw=1.1, ls=(0, (1, 1.6)), label="the paper's 1 ms step")
+        legend_above(drawing, [*paper.handles(), band, dotted], columns=5)
+    caption = (
+        f"Steel, {rig:g} g, to the end of the first hop or {1e3 * _SHOWN:g} mm from the start (the paper trusts its "
+        "rig for 40 mm). Shaded: between friction at both ends of its band. Dotted: the paper's fixed step, at most "
+        f"{gap:.2g} mm from the located integrator at the same time. Dashed: the angles that the text states for low "
+        "and high torque."
+    )
+    return "Figure 5: the start on steel", caption, drawing
+
+
+# Figure 6 -------------------------------------------------------------------------------------------------------------
+
+
+_ROWS = (("low", "μ low"), ("nominal", "μ"), ("high", "μ high"), ("paper", "1 ms step"))
+
+
+def figure_6(paper: PaperRun) -> Drawn | None:
+    """State against angle, steel and brick, the first gravity, a row a torque."""
+    if not paper.hard:
+        return None
+    rig, widest = paper.rigs[0], 60.0
+    with styled():
+        drawing = new_figure(WIDTH, 0.55 + 1.35 * len(paper.torques))
+        axes = drawing.subplots(len(paper.torques), len(paper.hard), sharex=True, sharey=True, squeeze=False)
+        for i, torque in enumerate(paper.torques):
+            for j, surface in enumerate(paper.hard):
+                axis: Axes = axes[i, j]
+                axis.set_title(f"{surface}, {paper.label(torque)}")
+                for row, (variant, _) in enumerate(_ROWS):
+                    _state_bar(axis, paper, paper.case(surface, rig, torque, variant), row)
+                axis.axvline(0.0, color=GREY, lw=0.6)
+                axis.grid(False, axis="y")
+        for axis in axes[-1]:
+            axis.set_xlabel("θ [degrees]")
+        axes[0, 0].set_yticks(range(len(_ROWS)), [label for _, label in _ROWS])
+        axes[0, 0].set_ylim(len(_ROWS) - 0.4, -0.6)
+        axes[0, 0].set_xlim(-2.0, widest)
+        handles = [Line2D([], [], color=colour, lw=6, label=name) for name, colour in STATES.items()]
+        handles.append(Line2D([], [], color=INK, marker="v", ls="", ms=5, label="first hop"))
+        legend_above(drawing, handles, columns=5)
+    caption = (
+        f"State by angle at {rig:g} g, up to {widest:g} degrees or the end of the trial; in each panel friction low, "
+        "as it is and high by the located integrator, and the paper's fixed step. The text: at the brake's torque the "
+        "platform slips almost at once, and short tumbles end in a brief hop (triangle: the first one begins)."
+    )
+    return "Figure 6: pivot, slip, hop", caption, drawing
+
+
+def _state_bar(axis: Axes, paper: PaperRun, case: Case, row: int) -> None:
+    """One bar of states over the angle; a state too short to be seen is a tick."""
+    numbers, states = paper.rows(case)
+    theta = np.degrees(numbers["theta_rad"])
+    edges = [math.degrees(angle) for _, _, angle in case["transitions"]]
+    for low, high, name in state_runs(states):
+        start = theta[low] if low == 0 else _nearest(edges, theta[low], theta[low - 1])
+        last = theta[high - 1] if high == len(theta) else _nearest(edges, theta[high], theta[high - 1])
+        axis.barh(row, last - start, left=start, height=0.62, color=STATES.get(name, INK), lw=0)
+    hop = case["transition_angle_hop"]
+    if hop is not None:
+        axis.plot(math.degrees(hop), row - 0.42, marker="v", color=INK, ms=4.5, clip_on=True)
+
+
+def _nearest(edges: Sequence[float], one: float, other: float) -> float:
+    """The transition between two rows; their middle where none is listed."""
+    middle = 0.5 * (one + other)
+    between = [edge for edge in edges if min(one, other) - 1e-9 <= edge <= max(one, other) + 1e-9]
+    return min(between, key=lambda edge: abs(edge - middle)) if between else middle
+
+
+# Figure 7 -------------------------------------------------------------------------------------------------------------
+
+
+def _parabola(launch: Mapping[str, float]) -> tuple[Array, Array]:
+    """The flight from the launch [m] until it is back at the launch's height, from where it starts."""
+    g, vx, vy = launch["gravity"], launch["vx"], launch["vy"]
+    time = np.linspace(0.0, 2 * max(vy, 0.0) / g, 120)
+    return vx * time, vy * time - 0.5 * g * time**2
+
+
+def figure_7(paper: PaperRun) -> Drawn | None:
+    """The first hops extrapolated: motor trials above, all below."""
+    if not paper.hard:
+        return None
+    styles = dict(zip(paper.rigs, ("-", (0, (4, 2)), (0, (1, 1.4))), strict=False))
+    flat = []
+    with styled():
+        drawing = new_figure(WIDTH, 5.4)
+        axes = drawing.subplots(2, len(paper.hard), squeeze=False, sharey="row", sharex="row")
+        for j, surface in enumerate(paper.hard):
+            for i, chosen in enumerate((_motors(paper), paper.torques)):
+                axis: Axes = axes[i, j]
+                axis.set_title(f"{surface}, {'motor trials' if i == 0 else 'all'}")
+                for torque in chosen:
+                    for rig, style in styles.items():
+                        drawn = _draw_hop(axis, paper, surface, rig, torque, style)
+                        if not drawn and i == 0:
+                            flat.append(f"{surface}, {rig:g} g, {torque:g} N m")
+                axis.plot(0, 0, "o", color=INK, ms=4)
+        for axis in axes[-1]:
+            axis.set_xlabel("x from the launch [mm]")
+        for axis in axes[:, 0]:
+            axis.set_ylabel("y from the launch [mm]")
+        gravities = [Line2D([], [], color=INK, ls=style, lw=1.6, label=f"{rig:g} g") for rig, style in styles.items()]
+        band = Patch(color=GREY, alpha=0.35, lw=0, label="friction band")
+        legend_above(drawing, [*paper.handles(), *gravities, band], columns=6)
+    caption = (
+        "The first hop of each trial, extrapolated without a ground from where it begins until it is back at that "
+        "height; above those of the motors, below all. Shaded: friction at both ends of its band."
+        + (f" No hop that rises: {'; '.join(flat)}." if flat else "")
+    )
+    return "Figure 7: hops as parabolas", caption, drawing
+
+
+def _motors(paper: PaperRun) -> list[float]:
+    return [t for t in paper.torques if any(c["actuator"] == "motor" for c in paper.cases if c["torque"] == t)]
+
+
+def _draw_hop(axis: Axes, paper: PaperRun, surface: str, rig: float, torque: float, style: Any) -> bool:
+    """One hop with its band; False where there is none that rises."""
+    nominal, low, high = (paper.case(surface, rig, torque, v)["launch"] for v in ("nominal", "low", "high"))
+    if nominal is None or nominal["vy"] <= 0:
+        return False
+    colour = paper.colour(torque)
+    if low is not None and high is not None:
+        one, other = _parabola(low), _parabola(high)
+        ring = np.concatenate([np.stack(one, axis=1), np.stack(other, axis=1)[::-1]])
+        axis.fill(1e3 * ring[:, 0], 1e3 * ring[:, 1], color=colour, alpha=0.22, lw=0)
+    x, y = _parabola(nominal)
+    axis.plot(1e3 * x, 1e3 * y, color=colour, ls=style, lw=1.7)
+    return True

@@ -1,0 +1,305 @@
+"""Plots of driven spikes: drag against depth, where the spring-damper departs from it, work in and out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import TwoSlopeNorm
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from vis.page.folder import Run, RunFolder, Series
+from vis.page.numbers import plain, quote, short
+from vis.page.style import BED, GREY, INK, MODEL, styled
+from vis.penetrate.plot_parts import (
+    WIDTH,
+    Plot,
+    above_surface,
+    by_speed,
+    has_model,
+    legend_above,
+    new_panels,
+    number_of,
+    pair_of_handles,
+    speed_words,
+    spread_words,
+)
+from vis.penetrate.summary_words import Departure, departure_rows
+
+__all__ = ["drag_plot", "gap_plot", "work_plot"]
+
+
+def drag_plot(run: RunFolder) -> Plot | None:
+    """Drag against depth, one panel per speed; every seed of the bed, their mean and spread; the spring-damper."""
+    driven = [r for r in run.of_kind("driven") if r.bed is not None and r.speed is not None]
+    speeds = sorted({r.speed for r in driven if r.speed is not None})
+    if not speeds:
+        return None
+    with styled():
+        figure, axes = new_panels(len(speeds), height=3.0, sharex=True, sharey=True)
+        above = [part for r in driven if (part := above_surface(r.bed)) is not None]
+        for axis, speed in zip(axes, speeds, strict=True):
+            here = [r for r in driven if r.speed == speed]
+            seeds = len(here)
+            axis.set_title(f"{speed_words(speed)}   ({seeds} bed{'s' if seeds > 1 else ''})")
+            for way, shade in (("in", 1.0), ("out", 0.45)):
+                parts = [_way(r.bed, way) for r in here]
+                _band(axis, parts, BED, alpha=shade, solid=way == "in")
+                models = [_way(r.model, way) for r in here if r.model is not None]
+                if models:
+                    grid, mean, _ = _mean_by_depth(models)
+                    style = (0, (4, 2)) if way == "in" else (0, (1, 1.5))
+                    axis.plot(1e3 * grid, mean, color=MODEL, ls=style, lw=1.8)
+            for part in (above_surface(r.bed) for r in here):
+                if part is not None:
+                    axis.plot(1e3 * part.depth, part.force, color=BED, lw=0.6, alpha=0.25)
+                    grid, mean, _ = _mean_by_depth([part], bins=8)
+                    axis.plot(1e3 * grid, mean, color=BED, lw=1.6, alpha=0.4)
+            axis.axhline(0.0, color=GREY, lw=0.8)
+            if above:
+                axis.axvline(0.0, color=GREY, lw=0.8, ls=(0, (2, 2)))
+            axis.set_xlim(left=1e3 * min((float(part.depth.min()) for part in above), default=0.0))
+            axis.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
+        _label(axes, "depth of the tip [mm]", "force on the spike [N]")
+        handles = [Line2D([], [], color=BED, lw=2.2, label="bed, way in")]
+        out = any(len(_way(r.bed, "out") or ()) for r in driven)
+        handles += [Line2D([], [], color=BED, lw=2.2, alpha=0.45, label="bed, way out")] if out else []
+        handles += [Line2D([], [], color=BED, lw=0.7, alpha=0.55, label="bed, as recorded")]
+        law = has_model(driven)
+        handles += [Line2D([], [], color=MODEL, ls=(0, (4, 2)), label="spring-damper, in")] if law else []
+        handles += [Line2D([], [], color=MODEL, ls=(0, (1, 1.5)), label="spring-damper, out")] if law and out else []
+        legend_above(figure, handles)
+    many = any(sum(r.speed == s for r in driven) > 1 for s in speeds)
+    width = _bin_width([_way(r.bed, "in") for r in driven])
+    spread = f"Thick: mean over {width} of depth" if width else "Thick: mean over slices of depth"
+    spread += f"{' and over the beds' if many else ''}. Faint: as recorded{', each bed' if many else ''}. "
+    spread += "Band: one standard deviation between beds. " if many else ""
+    if above:
+        spread += (
+            "Left of 0, pale: before the tip has reached the surface it is carried by grains that stick out of it; the "
+            "fit leaves that out. "
+        )
+    if law:
+        spread += "Dashed: the fitted spring-damper in the same motion"
+        spread += "; dotted: its way out, predicted, not fitted." if out else "."
+    return Plot(
+        "drag",
+        "Drag against depth",
+        "The ground's force on the spike, upwards, while it is driven in"
+        f"{' and pulled out' if out else ''} at constant speed. {spread}".strip(),
+        figure,
+    )
+
+
+def gap_plot(run: RunFolder) -> Plot | None:
+    """Spring-damper minus bed by depth and speed, as a map with the numbers written in."""
+    table = departure_rows(run.result) or _departures_of_series(run)
+    if not table:
+        return None
+    speeds = sorted({row.speed for row in table})
+    depths = sorted({(row.depth_from, row.depth_to) for row in table})
+    difference = np.full((len(depths), len(speeds)), np.nan)
+    cells: dict[tuple[int, int], Departure] = {
+        (depths.index((row.depth_from, row.depth_to)), speeds.index(row.speed)): row for row in table
+    }
+    for at, row in cells.items():
+        difference[at] = row.difference
+    told = any(row.known for row in table)
+    bound = float(np.nanmax(np.abs(difference))) or 1.0
+    with styled():
+        figure = Figure(figsize=(WIDTH, max(2.6, 0.9 + (0.62 if told else 0.42) * len(depths))))
+        FigureCanvasAgg(figure)
+        axis = figure.add_subplot()
+        norm = TwoSlopeNorm(0.0, -bound, bound)
+        image = axis.imshow(difference, cmap="PuOr_r", norm=norm, aspect="auto")
+        axis.set_xticks(range(len(speeds)), [f"{s:.4g}" for s in speeds])
+        axis.set_yticks(range(len(depths)), [f"{short(1e3 * a)} to {short(1e3 * b)}" for a, b in depths])
+        axis.set_xlabel("speed [m/s]")
+        axis.set_ylabel("depth [mm]")
+        axis.grid(False)
+        axis.set_xticks(np.arange(len(speeds) + 1) - 0.5, minor=True)
+        axis.set_yticks(np.arange(len(depths) + 1) - 0.5, minor=True)
+        axis.grid(True, which="minor", color="white", lw=2.0)
+        axis.tick_params(which="both", length=0)
+        axis.spines[:].set_visible(False)
+        for (i, j), row in cells.items():
+            number = row.difference
+            text = f"{'+' if number > 0 else ''}{quote(number, row.bed_std, 'N', significant=2)}"
+            if row.share is not None:
+                text += f"   ({_signed(100.0 * row.share, 2)} %)"
+            if row.known:
+                text += f"\n{row.known}"
+            dark = number < -0.45 * bound or number > 0.6 * bound  # of the map, purple is the darker end
+            axis.text(j, i, text, ha="center", va="center", fontsize=8.5, color="white" if dark else INK)
+        bar = figure.colorbar(image, ax=axis, pad=0.015, fraction=0.05)
+        bar.set_label("spring-damper − bed [N]")
+        bar.outline.set_visible(False)
+    return Plot(
+        "gap",
+        "Where the spring-damper departs",
+        "Mean drag of the spring-damper minus the bed's on the way in, by depth and speed; in brackets as a share of "
+        "the bed's. Orange: the spring-damper pushes back too hard; purple: too softly."
+        + (" Below: of how many beds; ±: the standard deviation of the bed's drag between them." if told else ""),
+        figure,
+    )
+
+
+def work_plot(run: RunFolder) -> Plot | None:
+    """Work put in and got back, bed beside spring-damper, by speed."""
+    driven = [
+        r for r in run.of_kind("driven") if r.speed is not None and number_of(r.quantities, "work_in") is not None
+    ]
+    speeds = sorted({r.speed for r in driven if r.speed is not None})
+    if not speeds:
+        return None
+    with styled():
+        figure, axes = new_panels(2, height=2.7, sharey=True)
+        law = any(number_of(r.quantities, "model_work_in") is not None for r in driven)
+        sides = ((-0.2, "", BED), (0.2, "model_", MODEL)) if law else ((0.0, "", BED),)
+        for axis, key, title in zip(
+            axes, ("work_in", "work_out"), ("put in, way in", "got back, way out"), strict=True
+        ):
+            for shift, prefix, colour in sides:
+                mean, spread = by_speed(driven, speeds, prefix + key, 1e3)
+                where = np.arange(len(speeds)) + shift
+                axis.bar(where, mean, 0.36, color=colour, hatch="///" if prefix else "", edgecolor="white", lw=0.6)
+                if prefix:
+                    spread = np.zeros_like(spread)  # one law: its runs differ in where they start only
+                else:
+                    axis.errorbar(where, mean, spread, fmt="none", ecolor=INK, elinewidth=1.0, capsize=3)
+                for x, y, s in zip(where, mean, np.nan_to_num(spread), strict=True):
+                    if np.isfinite(y):
+                        _above(axis, x, max(y, 0.0) + s, plain(y, 2 if abs(y) < 0.1 else 3))
+            axis.set_title(f"Work {title}")
+            axis.set_xticks(range(len(speeds)), [f"{s:.4g}" for s in speeds])
+            axis.grid(False, axis="x")
+            axis.set_xlim(-0.7, max(len(speeds), 2) - 0.3 if len(speeds) > 1 else 0.7)
+            axis.margins(y=0.15)
+            axis.axhline(0.0, color=GREY, lw=0.8)
+        _label(axes, "speed [m/s]", "work [mJ]")
+        legend_above(figure, pair_of_handles(bars=True)[: 2 if law else 1])
+    return Plot(
+        "work",
+        "Work in and out",
+        "Work done on the ground on the way in, and got back from it on the way out; below zero, pulling out took "
+        f"work as well.{_returned_words(driven)}{spread_words(driven)}",
+        figure,
+    )
+
+
+def _label(axes: list[Axes], x: str, y: str) -> None:
+    for axis in axes:
+        place = axis.get_subplotspec()
+        axis.set_xlabel(x)
+        if place is None or place.is_first_col():
+            axis.set_ylabel(y)
+
+
+def _band(axis: Axes, parts: Iterable[Series | None], colour: str, *, alpha: float, solid: bool) -> None:
+    there = [part for part in parts if part is not None and len(part) > 1]
+    if not there:
+        return
+    grid, mean, spread = _mean_by_depth(there)
+    if len(there) > 1:
+        for part in there:
+            axis.plot(1e3 * part.depth, part.force, color=colour, lw=0.6, alpha=0.45 * alpha)
+        axis.fill_between(1e3 * grid, mean - spread, mean + spread, color=colour, alpha=0.2 * alpha, lw=0)
+    else:
+        axis.plot(1e3 * there[0].depth, there[0].force, color=colour, lw=0.7, alpha=0.55 * alpha)
+    axis.plot(1e3 * grid, mean, color=colour, alpha=alpha, lw=2.2 if solid else 1.8)
+
+
+def _way(series: Series | None, way: str) -> Series | None:
+    """The rows on the way in or out, in the ground."""
+    if series is None:
+        return None
+    part = series.part(way)
+    keep = part.depth >= 0.0
+    return Series(part.time[keep], part.depth[keep], part.velocity[keep], part.force[keep], part.phase[keep])
+
+
+def _mean_by_depth(
+    parts: Iterable[Series | None], bins: int = 40
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Depth [m], mean force [N] and its standard deviation between the parts [N], shape (bins,).
+
+    Each part is averaged within a bin first, so that noise within one bed is not taken for spread between beds.
+    """
+    there = [part for part in parts if part is not None and len(part) > 1]
+    if not there:
+        return np.zeros(0), np.zeros(0), np.zeros(0)
+    deepest = max(float(part.depth.max()) for part in there)
+    bins = _bins(there, bins)
+    lowest = min(0.0, *(float(part.depth.min()) for part in there))
+    edges = np.linspace(lowest, max(deepest, lowest + 1e-12), bins + 1)
+    rows = np.full((len(there), bins), np.nan)
+    for row, part in zip(rows, there, strict=True):
+        which = np.clip(np.digitize(part.depth, edges) - 1, 0, bins - 1)
+        count = np.bincount(which, minlength=bins)
+        row[count > 0] = np.bincount(which, part.force, bins)[count > 0] / count[count > 0]
+    filled = np.isfinite(rows).any(axis=0)
+    rows = rows[:, filled]
+    spread = np.nanstd(rows, axis=0, ddof=0) * np.sqrt(_bessel(np.isfinite(rows).sum(axis=0)))
+    return (0.5 * (edges[1:] + edges[:-1]))[filled], np.nanmean(rows, axis=0), spread
+
+
+def _bins(parts: list[Series], most: int = 40) -> int:
+    return int(np.clip(min(len(part) for part in parts) // 3, 4, most))
+
+
+def _bessel(count: NDArray[np.int64]) -> NDArray[np.float64]:
+    return np.where(count > 1, count / np.maximum(count - 1, 1), 0.0)
+
+
+def _departures_of_series(run: RunFolder) -> list[Departure]:
+    """The table of departures made from the driven series, where none is written."""
+    rows = []
+    for speed in run.speeds("driven"):
+        here = [r for r in run.of_kind("driven") if r.speed == speed and r.bed is not None and r.model is not None]
+        beds, models = [_way(r.bed, "in") for r in here], [_way(r.model, "in") for r in here]
+        if not here:
+            continue
+        grid, bed, _ = _mean_by_depth(beds, bins=5)
+        grid2, model, _ = _mean_by_depth(models, bins=5)
+        if len(grid) == len(grid2) > 1:
+            half = 0.5 * (grid[1] - grid[0])
+            rows += [
+                Departure(speed, d - half, d + half, b, m)
+                for d, b, m in zip(grid.tolist(), bed.tolist(), model.tolist(), strict=True)
+            ]
+    return rows
+
+
+def _bin_width(parts: Iterable[Series | None]) -> str:
+    """The slices of depth that `_mean_by_depth` averages over, in words; "" where they differ between speeds."""
+    there = [part for part in parts if part is not None and len(part) > 1]
+    widths = {quote(float(part.depth.max()) / _bins([part]), None, "m", significant=2) for part in there}
+    return widths.pop() if len(widths) == 1 else ""
+
+
+def _above(axis: Axes, x: float, y: float, text: str) -> None:
+    axis.annotate(text, (x, y), xytext=(0, 3), textcoords="offset points", ha="center", fontsize=7.5, color=INK)
+
+
+def _signed(number: float, significant: int = 3) -> str:
+    return ("+" if number > 0 else "") + plain(number, significant)
+
+
+def _returned_words(runs: list[Run]) -> str:
+    """What share of the work put in was got back, of bed and spring-damper: the mean over these runs."""
+    shares = []
+    for prefix, what in (("", "the bed"), ("model_", "the spring-damper")):
+        works = [
+            out / put
+            for r in runs
+            if (put := number_of(r.quantities, f"{prefix}work_in") or 0.0) > 0.0
+            and (out := number_of(r.quantities, f"{prefix}work_out")) is not None
+        ]
+        if works:
+            shares.append(f"{what} {quote(float(np.mean(works)), None, '%', significant=2)}")
+    return f" Got back over put in, mean of the driven runs: {', '.join(shares)}." if shares else ""

@@ -1,0 +1,222 @@
+"""The page around a picture of the bed: title, colour bar, depth scale. The same with OpenGL and without.
+
+A picture is 4:3. The three-dimensional image, or the cross-section that stands in for it, fills the page to the left of
+the colour bar; where a point of the bed lies on it is told by `place`, a function (n, 3) [m] -> (n, 2) in fractions of
+the page from its lower left corner.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Colormap, ListedColormap, Normalize
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike, NDArray
+
+from vis.page.style import INK, styled
+
+__all__ = ["COLOURS", "Caption", "ColourScale", "Page", "colour_values", "colourmap", "moved_since", "nice_above"]
+
+#: What grains are coloured by: name -> (label with unit, factor from SI).
+COLOURS: dict[str, tuple[str, float]] = {
+    "displacement": ("displacement since the start [mm]", 1e3),
+    "speed": ("speed [mm/s]", 1e3),
+    "force": ("net contact force [mN]", 1e3),
+    "coordination": ("contacts of the grain [1]", 1.0),
+}
+Place = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
+@dataclass(frozen=True)
+class ColourScale:
+    """A colour scale that stays the same over the pictures it is used for.
+
+    Attributes:
+        by: A key of `COLOURS`.
+        top: Upper end of the scale, in the unit of its label; the lower end is 0.
+    """
+
+    by: str
+    top: float
+
+    @property
+    def label(self) -> str:
+        return COLOURS[self.by][0]
+
+
+@dataclass(frozen=True)
+class Caption:
+    """The words on a picture: a title and a few short lines of numbers below it."""
+
+    title: str
+    lines: str
+
+
+def colourmap() -> Colormap:
+    """Pale sand for grains at rest, through orange and red to violet: perceptually uniform (magma, its light part)."""
+    return ListedColormap(colormaps["magma_r"](np.linspace(0.03, 0.80, 256)), name="sand")
+
+
+def colour_values(grains: dict[str, NDArray[Any]], by: str) -> NDArray[np.float64]:
+    """What a grain is coloured by, in the unit of the scale's label, shape (n,).
+
+    Raises:
+        ValueError: an unknown `by`, or a frame without the field it needs.
+    """
+    if by not in COLOURS:
+        raise ValueError(f"colour is {by!r}; it must be one of {', '.join(COLOURS)}")
+    name = "velocity" if by == "speed" else by
+    if name not in grains:
+        raise ValueError(f"the frame has no {name!r} to colour the grains by")
+    field = np.asarray(grains[name], dtype=np.float64)
+    return COLOURS[by][1] * (np.linalg.norm(field, axis=1) if field.ndim == 2 else np.abs(field))
+
+
+def moved_since(grains: dict[str, NDArray[Any]], first: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """The fields of a frame's grains, their displacement [m] counted from the `first` frame on, not from before it.
+
+    A bed under a platform has been pressed by the setting down when time begins. Left as it is where a frame has none.
+    """
+    if "displacement" not in grains or "displacement" not in first:
+        return grains
+    before = np.asarray(first["displacement"], dtype=np.float64)
+    if "id" in grains and "id" in first:
+        places = np.argsort(first["id"])
+        before = before[places[np.searchsorted(first["id"], grains["id"], sorter=places)]]
+    return grains | {"displacement": np.asarray(grains["displacement"], dtype=np.float64) - before}
+
+
+def nice_above(value: float) -> float:
+    """The next of 1, 1.5, 2, 3, 4, 5, 6, 8 times a power of ten not below `value`; 1 for 0 or what is no number."""
+    if not (np.isfinite(value) and value > 0.0):
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(
+        next((n * power for n in (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0) if n * power >= 0.9999 * value), 10 * power)
+    )
+
+
+class Page:
+    """A page of 4:3 for pictures that share a colour scale.
+
+    Args:
+        size: Width and height [pixels].
+        scale: The colour scale.
+    """
+
+    def __init__(self, size: tuple[int, int], scale: ColourScale) -> None:
+        self.size = size
+        self.scale = scale
+        self.norm = Normalize(0.0, scale.top)
+        self.map = colourmap()
+
+    def colours(self, values: ArrayLike) -> NDArray[np.float64]:
+        """Colours of these values, shape (n, 4)."""
+        return np.asarray(self.map(self.norm(np.asarray(values, dtype=np.float64))))
+
+    def compose(
+        self,
+        caption: Caption,
+        *,
+        image: NDArray[np.uint8] | None = None,
+        draw: Callable[[Any], None] | None = None,
+        place: Place,
+        section: tuple[float, float, float, float, float],
+        note: str = "",
+    ) -> NDArray[np.uint8]:
+        """The finished picture, shape (height, width, 3).
+
+        Args:
+            caption: Its words.
+            image: The rendered scene, shape (height, width, 3), or
+            draw: a function that draws on an axes that fills the page, in the page's fractions.
+            place: Where a point of the bed lies on the page.
+            section: Of the plane of the cut: x of its left and right end, its y, z of the floor and of the undisturbed
+                surface [m].
+            note: Small print at the foot.
+        """
+        width, height = self.size
+        dpi = width / 8.0
+        with styled():
+            figure = Figure(figsize=(8.0, 8.0 * height / width), dpi=dpi)
+            figure.set_layout_engine("none")
+            canvas = FigureCanvasAgg(figure)
+            axis = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+            axis.set_axis_off()
+            if image is not None:
+                axis.imshow(image, extent=(0.0, 1.0, 0.0, 1.0), aspect="auto", interpolation="nearest")
+            axis.set_xlim(0.0, 1.0)
+            axis.set_ylim(0.0, 1.0)
+            axis.set_autoscale_on(False)
+            if draw is not None:
+                draw(axis)
+            self._rulers(axis, place, section)
+            figure.text(0.03, 0.965, caption.title, fontsize=16, fontweight="bold", va="top")
+            figure.text(0.03, 0.905, caption.lines, fontsize=12.5, va="top", color="#444444", linespacing=1.35)
+            if note:
+                figure.text(0.03, 0.018, note, fontsize=9.5, va="bottom", color="#666666")
+            bar_axis = figure.add_axes((0.885, 0.2, 0.018, 0.5))
+            bar = figure.colorbar(ScalarMappable(self.norm, self.map), cax=bar_axis, extend="max", extendfrac=0.04)
+            bar.set_label(self.scale.label, fontsize=11.5)
+            bar.ax.tick_params(labelsize=11)
+            bar.outline.set_visible(False)  # type: ignore[operator]
+            canvas.draw()
+            return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+    def _rulers(self, axis: Any, place: Place, section: tuple[float, float, float, float, float]) -> None:
+        """Depth below the surface along the left edge of the cut, a length along its foot."""
+        left, right, y, floor, surface = section
+        step = _ruler_step(surface - floor)
+        offset = 0.025 * (right - left)
+
+        def line(points: list[tuple[float, float, float]], **style: Any) -> NDArray[np.float64]:
+            on_page = place(np.array(points))
+            axis.plot(on_page[:, 0], on_page[:, 1], solid_capstyle="butt", **style)
+            return on_page
+
+        x = left - offset
+        count = int(np.floor((surface - floor) / step + 1e-9))
+        line([(x, y, surface), (x, y, floor)], color=INK, lw=1.0)
+        for i in range(count + 1):
+            z = surface - i * step
+            ends = line([(x, y, z), (x - 0.5 * offset, y, z)], color=INK, lw=1.0)
+            axis.text(ends[1, 0] - 0.006, ends[1, 1], f"{1e3 * i * step:g}", ha="right", va="center", fontsize=11)
+        middle = place(np.array([[x - 0.5 * offset, y, 0.5 * (floor + surface)]]))[0]
+        axis.text(
+            middle[0] - 0.06,
+            middle[1],
+            "depth below the surface [mm]",
+            rotation=90,
+            ha="center",
+            va="center",
+            fontsize=11.5,
+        )
+        low = floor - 1.2 * offset
+        tick = 0.25 * offset
+        for a, b in (
+            ((left, low), (left + step, low)),
+            ((left, low - tick), (left, low + tick)),
+            ((left + step, low - tick), (left + step, low + tick)),
+        ):
+            ends = line([(a[0], y, a[1]), (b[0], y, b[1])], color=INK, lw=1.6)
+            if a[1] == b[1]:
+                axis.text(
+                    ends[:, 0].mean(),
+                    ends[:, 1].min() - 0.012,
+                    f"{1e3 * step:g} mm",
+                    ha="center",
+                    va="top",
+                    fontsize=11,
+                )
+
+
+def _ruler_step(length: float) -> float:
+    rough = max(length, 1e-9) / 4.0
+    power = 10.0 ** np.floor(np.log10(rough))
+    return float(min((n * power for n in (1.0, 2.0, 5.0, 10.0)), key=lambda step: abs(np.log(step / rough))))

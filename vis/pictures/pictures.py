@@ -1,0 +1,418 @@
+"""Pictures and an animation of a run folder's frames, off screen.
+
+With OpenGL the bed is cut open along the spike's mid-plane and rendered (`vis.pictures.scene`), in a child process:
+a driver that crashes or hangs costs the pictures, never the run. Without OpenGL, or with HEDGEBED_NO_OPENGL=1 in the
+environment, cross-sections drawn with matplotlib (`vis.pictures.sections`) stand in, and `Pictures.notes` says so.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import queue
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vis.page.folder import Run, RunFolder, read_folder
+from vis.page.numbers import quote
+from vis.pictures.canvas import colour_values, nice_above
+from vis.pictures.frames import Frame, Frames, frame_names, read_frames
+from vis.pictures.render import run_job
+
+__all__ = ["Picture", "Pictures", "make_pictures", "opengl_available", "render_apart"]
+
+_STILLS = 6
+_STILL_COSTS = 4.0  # in frames of the animation, as measured in software
+_ANIMATED = 48
+_CUT = "cut open along the spike's mid-plane: what is in front is left out, of the spike too"
+_SLAB = "shown are those up to four diameters behind the spike's mid-plane, the farther the darker"
+
+
+@dataclass(frozen=True)
+class Picture:
+    """An image file with its caption."""
+
+    file: Path
+    title: str
+    caption: str
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """What was drawn.
+
+    Attributes:
+        stills: Pictures at chosen moments.
+        animation: The animated GIF, or None.
+        method: "opengl", "sections" (drawn with matplotlib) or "none".
+        notes: Sentences on what stands in for what, and why.
+    """
+
+    stills: list[Picture] = field(default_factory=list)
+    animation: Picture | None = None
+    method: str = "none"
+    notes: list[str] = field(default_factory=list)
+
+
+def opengl_available(*, timeout: float = 60.0) -> bool:
+    """Whether a small off-screen picture comes out right, tried once in a child process of at most `timeout` seconds.
+
+    HEDGEBED_NO_OPENGL=1 in the environment says no without trying.
+    """
+    return os.environ.get("HEDGEBED_NO_OPENGL", "") in ("", "0") and _probe(timeout)
+
+
+@functools.cache
+def _probe(timeout: float) -> bool:
+    code = (
+        "import os; os.environ.setdefault('VTK_DEFAULT_OPENGL_WINDOW', 'vtkEGLRenderWindow')\n"
+        "import pyvista as pv\n"
+        "p = pv.Plotter(off_screen=True, window_size=[64, 64]); p.set_background('white')\n"
+        "p.add_mesh(pv.Sphere(), color='red'); image = p.screenshot(None, return_img=True)\n"
+        "assert image[0, 0].min() > 250 and image[32, 32, 2] < 200\n"
+    )
+    try:
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, timeout=timeout, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    return done.returncode == 0
+
+
+def make_pictures(
+    folder: str | Path,
+    *,
+    size: tuple[int, int] = (1600, 1200),
+    animation_size: tuple[int, int] = (720, 540),
+    animate: bool = True,
+    stall: float = 120.0,
+    progress: Callable[[float], None] | None = None,
+) -> Pictures:
+    """Draw the stills (`figures/bed-*.png`) and `animation.gif` of a run folder.
+
+    Args:
+        folder: The run folder.
+        size: Of the stills [pixels].
+        animation_size: Of the animation [pixels].
+        animate: Whether to make the animation.
+        stall: The child process is given up when it finishes no picture for this long [s].
+        progress: Called with the share that is done, 0 to 1.
+
+    Returns:
+        What was drawn. A folder without frames gives `method="none"` and a note; nothing that goes wrong with OpenGL
+        is raised.
+
+    Raises:
+        FileNotFoundError: there is no such folder.
+    """
+    run = read_folder(folder)
+    notes: list[str] = []
+    job, stills, animation = _plan(run, size, animation_size if animate else None, notes)
+    if not job["stills"]:
+        return Pictures(method="none", notes=[*notes, "There are no frames to draw pictures of."])
+    moving = len(job["animation"]["frames"]) if job["animation"] else 0
+    counter = _Counter([_STILL_COSTS] * len(job["stills"]) + [1.0] * moving, progress)
+    if opengl_available():
+        failure = render_apart(job, stall, counter.step)
+        if failure is None:
+            return Pictures(stills, animation, "opengl", notes)
+        notes.append(f"Rendering with OpenGL failed ({failure}); cross-sections stand in for the pictures.")
+        counter.done = 0
+    else:
+        notes.append(
+            "This machine has no OpenGL for off-screen pictures; cross-sections stand in for them (Debian: apt install "
+            "libegl1 libgl1-mesa-dri)."
+        )
+    for view in filter(None, [*job["stills"], job["animation"]]):
+        view["note"] = view["note"].replace(_CUT, _SLAB)
+    run_job(job, opengl=False, step=counter.step)
+    return Pictures(stills, animation, "sections", notes)
+
+
+class _Counter:
+    """Tells how much is done; a still costs more than a frame of the animation."""
+
+    def __init__(self, costs: list[float], progress: Callable[[float], None] | None) -> None:
+        self.costs, self.progress, self.done = costs, progress, 0
+
+    def step(self) -> None:
+        self.done += 1
+        if self.progress is not None:
+            self.progress(min(1.0, sum(self.costs[: self.done]) / sum(self.costs)))
+
+
+def render_apart(
+    job: dict[str, Any], stall: float, step: Callable[[], None], *, module: str = "vis.pictures.render"
+) -> str | None:
+    """Carry out a job in a child process, `python -m module`; None when it succeeded, else why it did not."""
+    environment = dict(os.environ)
+    root = str(Path(__file__).resolve().parents[2])
+    environment["PYTHONPATH"] = os.pathsep.join(filter(None, (root, environment.get("PYTHONPATH", ""))))
+    with tempfile.TemporaryDirectory() as scratch:
+        file, log = Path(scratch) / "job.json", Path(scratch) / "errors.txt"
+        file.write_text(json.dumps(job), encoding="utf-8")
+        with log.open("w") as errors:
+            child = subprocess.Popen(
+                [sys.executable, "-m", module, str(file)],
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                env=environment,
+                text=True,
+            )
+            lines: queue.SimpleQueue[str] = queue.SimpleQueue()
+            reader = threading.Thread(target=_pass_on, args=(child, lines), daemon=True)
+            reader.start()
+            try:
+                while line := lines.get(timeout=stall):
+                    if line.strip() == "done":
+                        step()
+                child.wait(timeout=stall)
+            except (queue.Empty, subprocess.TimeoutExpired):
+                return f"no picture within {stall:g} s"
+            finally:
+                if child.poll() is None:
+                    child.kill()
+                    child.wait()
+                reader.join(timeout=5.0)
+                if child.stdout is not None:
+                    child.stdout.close()
+        if child.returncode == 0:
+            return None
+        said = log.read_text(errors="replace").strip().splitlines()
+        return f"exit status {child.returncode}" + (f", {said[-1][:200]}" if said else "")
+
+
+def _pass_on(child: subprocess.Popen[str], lines: queue.SimpleQueue[str]) -> None:
+    assert child.stdout is not None
+    for line in child.stdout:
+        lines.put(line)
+    lines.put("")
+
+
+# ---- what to draw --------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Story:
+    """The frames of a run with what is needed to choose among them."""
+
+    name: str
+    run: Run | None
+    frames: Frames
+    depth: list[float | None]
+    force: list[float | None]
+
+    @property
+    def deepest(self) -> int:
+        """The deepest frame before the pull-out; of several as deep, the first: it is still, or was just, moving."""
+        known = np.array([d if d is not None else -np.inf for d in self.depth])
+        before = self._before_the_way_out()
+        top = known[before].max()
+        if not np.isfinite(top):
+            return len(known) - 1
+        return int(before[np.argmax(known[before] >= top - 0.002 * abs(top))])
+
+    def _before_the_way_out(self) -> NDArray[np.int64]:
+        """Indices of the frames before the run's first row of the way out; all where it has none, or no series."""
+        every = np.arange(len(self.frames))
+        if self.run is None or self.run.bed is None:
+            return every
+        out = np.flatnonzero(self.run.bed.phase == "out")
+        if self.kind != "driven" or not len(out):
+            return every
+        before = every[np.asarray(self.frames.times) < self.run.bed.time[out[0]]]
+        return before if len(before) else every
+
+    def held(self, index: int) -> bool:
+        """Whether a driven spike was held still at this frame, its force falling off from what it was on the way in."""
+        if self.run is None or self.run.bed is None or self.kind != "driven":
+            return False
+        row = int(np.searchsorted(self.run.bed.time, self.frames.times[index], side="right")) - 1
+        return bool(self.run.bed.phase[max(row, 0)] == "rest")
+
+    @property
+    def rested(self) -> bool:
+        """Whether it was set down and came to rest, so that its last frame shows it at rest."""
+        sinkage = self.run.quantities.get("sinkage") if self.run else None
+        value = sinkage.get("value") if isinstance(sinkage, dict) else sinkage
+        return self.kind == "set_down" and value is not None
+
+    @property
+    def kind(self) -> str:
+        return self.run.kind if self.run else ""
+
+    @property
+    def speed(self) -> float:
+        return (self.run.speed or 0.0) if self.run else 0.0
+
+    @property
+    def title(self) -> str:
+        if self.run is None:
+            return self.name
+        speed = f" at {self.speed:.3g} m/s"
+        words = {"driven": f"Driven{speed}", "drop": f"Dropped{speed}", "set_down": "Set down"}
+        return words.get(self.kind, self.name)
+
+    def line(self, index: int) -> str:
+        parts = [f"bed {self.run.seed}"] if self.run and self.run.seed is not None else []
+        parts.append(f"t = {float(self.frames.times[index]):.3f} s")
+        if (depth := self.depth[index]) is not None:
+            parts.append(f"depth {1e3 * depth:.1f} mm".replace("-", "\N{MINUS SIGN}"))
+        if (force := self.force[index]) is not None:
+            parts.append(f"force {quote(force, unit='N')}")
+        return "\n".join(parts)
+
+
+def _tell(run: RunFolder, name: str) -> _Story | None:
+    frames = read_frames(run.path, name)
+    if not len(frames):
+        return None
+    by_id = {r.id: r for r in run.runs}
+    match = by_id.get(name) or next((r for r in run.runs if r.id.startswith(name + "-")), None)
+    depth: list[float | None] = [None] * len(frames)
+    force: list[float | None] = [None] * len(frames)
+    if match is not None and match.bed is not None and len(match.bed):
+        depth = [float(d) for d in np.interp(frames.times, match.bed.time, match.bed.depth)]
+        force = [float(f) for f in np.interp(frames.times, match.bed.time, match.bed.force)]
+    for index, frame in enumerate(frames):
+        depth[index] = frame.values.get("depth", depth[index])
+        force[index] = frame.values.get("force", force[index])
+    return _Story(name, match, frames, depth, force)
+
+
+def _plan(
+    run: RunFolder, size: tuple[int, int], animation_size: tuple[int, int] | None, notes: list[str]
+) -> tuple[dict[str, Any], list[Picture], Picture | None]:
+    stories = []
+    for name in frame_names(run.path):
+        try:
+            story = _tell(run, name)
+        except (ValueError, OSError) as error:
+            notes.append(f"The frames of {name} cannot be read: {error}.")
+            continue
+        if story is not None:
+            stories.append(story)
+    job: dict[str, Any] = {"folder": str(run.path), "stills": [], "animation": None}
+    chosen = _choose(stories)
+    if not chosen:
+        return job, [], None
+    main = chosen[0]
+    moved = [_high(story.frames[story.deepest], "displacement") for story in chosen if not story.rested]
+    top = nice_above(max(moved, default=0.0))
+    figures = run.path / "figures"
+    stills: list[Picture] = []
+
+    def still(story: _Story, index: int, by: str, upper: float, moment: str, words: str) -> None:
+        if len(stills) >= _STILLS:
+            return
+        file = figures / f"bed-{story.name}-{moment}.png"
+        view = _view(run, story, [index], by, upper)
+        job["stills"].append({**view, "file": str(file), "size": list(size)})
+        stills.append(
+            Picture(
+                file, f"{story.title}: {words}", f"{story.line(index)}.".replace("\n", ", ").replace("bed ", "Bed ", 1)
+            )
+        )
+
+    def deep(story: _Story) -> None:
+        if story.rested:  # it moves grains far less than a drive does: its scale is its own
+            own = nice_above(_high(story.frames[len(story.frames) - 1], "displacement"))
+            still(story, len(story.frames) - 1, "displacement", own, "rest", "at rest")
+        else:
+            held = ", held still" if story.held(story.deepest) else ""
+            still(story, story.deepest, "displacement", top, "deepest", f"at its deepest{held}")
+
+    deep(main)
+    half = _half_way(main)
+    fast = _high(main.frames[half], "speed")
+    if fast > 0.0:
+        still(main, half, "speed", nice_above(fast), "speed", "the grains' speed half way in")
+    last = len(main.frames) - 1
+    if last != main.deepest and main.kind == "driven":
+        depth = main.depth[last]
+        inside = depth is not None and depth > 0.0
+        still(main, last, "displacement", top, "end", "near the end of the pull-out" if inside else "pulled out")
+    for story in chosen[1:]:
+        deep(story)
+    animation = None
+    if animation_size is not None and len(main.frames) > 1:
+        frames = np.unique(np.linspace(0, last, min(len(main.frames), _ANIMATED)).round().astype(int)).tolist()
+        file = run.path / "animation.gif"
+        view = _view(run, main, frames, "displacement", top)
+        job["animation"] = {**view, "file": str(file), "size": list(animation_size)}
+        animation = Picture(file, f"{main.title}: from the first frame to the last", f"{len(frames)} frames.")
+    return job, stills, animation
+
+
+def _choose(stories: list[_Story]) -> list[_Story]:
+    """The slowest and fastest driven run, the fastest drop and one set down; the first is animated."""
+    driven = sorted((s for s in stories if s.kind == "driven"), key=lambda s: (s.speed, -len(s.frames)))
+    drops = sorted((s for s in stories if s.kind == "drop"), key=lambda s: s.speed)
+    rest = [s for s in stories if s.kind == "set_down"]
+    wanted = [*driven[:1], *driven[-1:], *drops[-1:], *rest[:1]]
+    chosen: list[_Story] = []
+    for story in wanted or stories[:4]:
+        if story not in chosen:
+            chosen.append(story)
+    return chosen
+
+
+def _half_way(story: _Story) -> int:
+    end = story.deepest
+    deepest = story.depth[end]
+    if deepest is None or end == 0:
+        return end // 2
+    way_in = [abs((d if d is not None else 0.0) - 0.5 * deepest) for d in story.depth[:end]]
+    return int(np.argmin(way_in))
+
+
+def _high(frame: Frame, by: str) -> float:
+    """Nearly the largest value of a frame, in the unit of the scale's label; 0 where the frame has no such field."""
+    try:
+        values = colour_values(frame.grains, by)
+    except ValueError:
+        return 0.0
+    return float(np.percentile(values, 99.5)) if len(values) else 0.0
+
+
+def _view(run: RunFolder, story: _Story, frames: list[int], by: str, top: float) -> dict[str, Any]:
+    first = story.frames[0]
+    position, radius = first.grains["position"], first.grains["radius"][:, None]
+    low, high = (position - radius).min(axis=0), (position + radius).max(axis=0)
+    cut = 0.5 * float(low[1] + high[1])
+    surface = float(high[2])
+    body = next(iter(first.bodies.values()), None)
+    given = run.result.get("bed")
+    stated = given.get("surface") if isinstance(given, dict) else None
+    stated = stated.get("value") if isinstance(stated, dict) else stated
+    if body is not None:
+        cut = 0.5 * float(body[0][:, 1].min() + body[0][:, 1].max())
+    if body is not None and story.depth[0] is not None:
+        surface = float(body[0][:, 2].min()) + float(story.depth[0])
+    elif isinstance(stated, int | float):
+        surface = float(stated)
+    high[2] = max(min(high[2], surface + 0.25 * (surface - low[2])), surface)  # a grain that flies does not count
+    count = f"{len(position):,}".replace(",", "\N{NO-BREAK SPACE}")
+    return {
+        "name": story.name,
+        "frames": frames,
+        "by": by,
+        "top": top,
+        "title": story.title,
+        "lines": [story.line(index) for index in frames],
+        "note": f"{count} grains; {_CUT}",
+        "low": low.tolist(),
+        "high": high.tolist(),
+        "cut": cut,
+        "radius": float(radius.mean()),
+        "surface": surface,
+    }

@@ -1,0 +1,160 @@
+"""Draws a list of pictures. `python -m vis.pictures.render <job.json>` does it with OpenGL in a process of its own.
+
+A job is plain JSON, so that a crash or a hang of the driver costs a child process and nothing else:
+
+    {"folder", "stills": [View...], "animation": View or null}
+    View = {"name", "file", "size": [w, h], "frames": [index...], "by", "top", "title", "lines": [text per frame],
+            "note", "low", "high", "cut", "radius", "surface"}
+
+One line is printed per finished frame.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageColor
+
+from vis.page.tumble_series import STATES
+from vis.pictures.arrows import FORCE
+from vis.pictures.canvas import Caption, ColourScale, Page, colour_values, colourmap
+from vis.pictures.frames import read_frames
+
+__all__ = ["main", "replace_file", "run_job", "write_gif", "write_png"]
+
+_GIF_LIMIT = 5_500_000  # bytes
+_KEPT = tuple(ImageColor.getrgb(colour)[:3] for colour in ("#ffffff", *STATES.values(), str(FORCE["color"])))
+"""Colours that no film may change for one near it, as rare as they are: a legend's would come out alike."""
+_ROOM = 256 - len(_KEPT)
+"""Left of a film's palette for all others."""
+
+
+def run_job(job: dict[str, Any], *, opengl: bool, step: Callable[[], None] = lambda: None) -> None:
+    """Draw every picture of a job.
+
+    Args:
+        job: See the module.
+        opengl: With `vis.pictures.scene`, else with `vis.pictures.sections`.
+        step: Called after each frame.
+    """
+    folder = Path(job["folder"])
+    for view in job["stills"]:
+        for image in _images(folder, view, opengl):
+            replace_file(Path(view["file"]), functools.partial(write_png, image))
+            step()
+    if view := job.get("animation"):
+        images = []
+        for image in _images(folder, view, opengl):
+            images.append(image)
+            step()
+        replace_file(Path(view["file"]), functools.partial(write_gif, images=images))
+
+
+def _images(folder: Path, view: dict[str, Any], opengl: bool) -> Iterator[NDArray[np.uint8]]:
+    size = (int(view["size"][0]), int(view["size"][1]))
+    low, high = np.array(view["low"]), np.array(view["high"])
+    page = Page(size, ColourScale(view["by"], view["top"]))
+    frames = read_frames(folder, view["name"])
+    section = (low[0], high[0], view["cut"], low[2], view["surface"])
+    if opengl:
+        from vis.pictures.scene import Scene
+
+        scene = Scene(size, low, high, cut=view["cut"], radius=view["radius"])
+        try:
+            for index, line in zip(view["frames"], view["lines"], strict=True):
+                frame = frames[index]
+                image = scene.render(frame, page.colours(colour_values(frame.grains, view["by"])))
+                words = Caption(view["title"], line)
+                yield page.compose(words, image=image, place=scene.place, section=section, note=view["note"])
+        finally:
+            scene.close()
+    else:
+        from vis.pictures.sections import Section
+
+        cross = Section(size, low, high, cut=view["cut"], radius=view["radius"])
+        for index, line in zip(view["frames"], view["lines"], strict=True):
+            frame = frames[index]
+            draw = cross.draw(frame, page.colours(colour_values(frame.grains, view["by"])))
+            words = Caption(view["title"], line)
+            yield page.compose(words, draw=draw, place=cross.place, section=section, note=view["note"])
+
+
+def write_gif(path: Path, images: list[NDArray[np.uint8]], *, frame_ms: int = 80, limit: int = _GIF_LIMIT) -> None:
+    """Write an endless GIF that is not larger than `limit` bytes, by fewer frames where need be.
+
+    One palette and no dithering: what stands still stays the same in every frame, and costs nothing.
+    """
+    if not images:
+        raise ValueError("an animation needs at least one frame")
+    while True:
+        samples = images[:: max(1, len(images) // 6)][:8]
+        together = Image.fromarray(np.concatenate([image[::2, ::2] for image in samples], axis=0))
+        palette = _palette(_with_scale(together))
+        pages = [_indexed(image, palette) for image in images]
+        times = [frame_ms] * len(pages)
+        times[-1] = 1500
+        pages[0].save(path, "GIF", save_all=True, append_images=pages[1:], duration=times, loop=0, optimize=False)
+        if path.stat().st_size <= limit or (len(images) <= 8 and images[0].shape[1] <= 320):
+            return
+        if len(images) > 24:
+            images = [*images[:-1:2], images[-1]]
+            frame_ms = round(1.8 * frame_ms)
+        else:
+            width, height = int(0.8 * images[0].shape[1]), int(0.8 * images[0].shape[0])
+            images = [np.asarray(Image.fromarray(i).resize((width, height), Image.Resampling.LANCZOS)) for i in images]
+
+
+def _palette(image: Image.Image) -> Image.Image:
+    """An image with the 256 colours that serve this one best, those of `_KEPT` last, as they are."""
+    colours = (image.quantize(colors=_ROOM, method=Image.Quantize.MEDIANCUT).getpalette() or [])[: 3 * _ROOM]
+    kept = [part for colour in _KEPT for part in colour]
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([*colours, *[255] * (3 * _ROOM - len(colours)), *kept])
+    return palette
+
+
+def _indexed(image: NDArray[np.uint8], palette: Image.Image) -> Image.Image:
+    page = Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.NONE)
+    index = np.asarray(page).copy()
+    for place, colour in enumerate(_KEPT, _ROOM):  # Pillow's search is coarse: white would come out as a light grey
+        index[(image == colour).all(axis=2)] = place
+    exact = Image.frombytes("P", page.size, index.tobytes())
+    exact.putpalette(palette.getpalette() or [])
+    return exact
+
+
+def _with_scale(image: Image.Image) -> Image.Image:
+    """The image with the colour scale, light to shaded, beside it: rare colours count as well in the palette."""
+    colours = colourmap()(np.linspace(0.0, 1.0, image.height))[:, :3]
+    shades = np.linspace(1.0, 0.45, max(8, image.width // 4))
+    strip = np.round(255 * colours[:, None, :] * shades[None, :, None]).astype(np.uint8)
+    return Image.fromarray(np.concatenate([np.asarray(image), strip], axis=1))
+
+
+def write_png(image: NDArray[np.uint8], path: Path) -> None:
+    Image.fromarray(image).save(path, "PNG")
+
+
+def replace_file(path: Path, write: Callable[[Path], None]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(path.name + ".part")
+    write(temporary)
+    temporary.replace(path)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Carry out the job in the file that is named; exit status 0."""
+    (name,) = sys.argv[1:] if arguments is None else arguments
+    run_job(json.loads(Path(name).read_text(encoding="utf-8")), opengl=True, step=lambda: print("done", flush=True))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

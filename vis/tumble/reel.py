@@ -1,0 +1,256 @@
+"""A tumble as a sequence of frames to be pictured: of a bed of grains from its frames, of a law from its trajectory."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vis.page.tumble_series import read_columns
+from vis.pictures.canvas import colour_values, moved_since, nice_above
+from vis.pictures.frames import Frame, Frames, frame_names, read_frames
+from vis.pictures.meshes import in_place, spike_mesh
+
+__all__ = ["NAME", "Reel"]
+
+Array = NDArray[np.float64]
+NAME = "tumble"
+"""Of the frames in a run folder of a tumble on grains."""
+_SPIKE, _CLEAR, _WIDE = 0.012, 0.04, 0.06
+"""Of the platform on a law, which sees points only: diameter and length of a spike, width of the hull as they are
+drawn, all of spikes that end 0.2 m from the centre [m]."""
+_BLOCK = 0.08
+"""Depth of the ground that is drawn where there are no grains [m]."""
+
+
+@dataclass(frozen=True)
+class Reel:
+    """A run to be pictured.
+
+    Attributes:
+        folder: The run folder.
+        result: Its result.json.
+        series: The columns of trajectory.csv.
+        states: Its states, a word a row.
+        times: When there is a picture [s], increasing.
+        frames: Its frames; None: the ground is a law.
+        like: What `spikes` is where the folder does not say, as on a law: of the run that it stands beside.
+    """
+
+    folder: Path
+    result: Mapping[str, Any]
+    series: Mapping[str, Array]
+    states: NDArray[np.str_]
+    times: Array
+    frames: Frames | None
+    like: tuple[float, float] | None = None
+
+    @classmethod
+    def open(cls, folder: str | Path, *, count: int = 500, like: tuple[float, float] | None = None) -> Reel:
+        """Of the tumble in a run folder; on a law with `count` pictures to choose from.
+
+        Raises:
+            FileNotFoundError: there is no trajectory.csv or result.json.
+        """
+        home = Path(folder)
+        result = json.loads((home / "result.json").read_text(encoding="utf-8"))
+        series, states = read_columns(home / "trajectory.csv")
+        if NAME in frame_names(home):
+            frames = read_frames(home, NAME)
+            return cls(home, result, series, states, np.asarray(frames.times), frames, like)
+        end = float(series["t_s"][-1])
+        return cls(home, result, series, states, np.linspace(0.0, end, max(2, count)), None, like)
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def nearest(self, time: float) -> int:
+        """The picture nearest to this time [s]."""
+        return int(np.argmin(np.abs(self.times - time)))
+
+    def row(self, index: int) -> int:
+        """The row of the series at a picture."""
+        return int(np.argmin(np.abs(self.series["t_s"] - self.times[index])))
+
+    def state(self, index: int) -> str:
+        """The state there."""
+        return str(self.states[self.row(index)])
+
+    def line(self, index: int) -> str:
+        """Time, angle, state, as a picture says it."""
+        theta = math.degrees(float(self.series["theta_rad"][self.row(index)]))
+        return f"t = {self.times[index]:.3f} s    θ = {theta:.1f}°    {self.state(index)}".replace("-", "−")
+
+    def number(self, name: str) -> float:
+        """A number of the trial (`weight`, `spike_length` ...) in SI."""
+        return float(self.result["trial"][name]["value"])
+
+    @property
+    def ground(self) -> str:
+        """What it stands on, in words."""
+        return "bed of grains" if self.frames is not None else str(self.result.get("ground", "law"))
+
+    @cached_property
+    def spikes(self) -> tuple[float, float]:
+        """Diameter of a spike, and how far it stands out of the hull [m]."""
+        told = self.result.get("grains") or {}
+        if "spike_diameter" in told:
+            return float(told["spike_diameter"]), float(told.get("spike_clear", _CLEAR))
+        scale = self.number("spike_length") / 0.2
+        return self.like if self.like is not None else (_SPIKE * scale, _CLEAR * scale)
+
+    # Where things are -------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _first(self) -> Frame | None:
+        return self.frames[0] if self.frames is not None else None
+
+    @cached_property
+    def origin(self) -> Array:
+        """Where the trajectory's x = y = 0 is in the pictures [m], shape (3,)."""
+        if self._first is None:
+            return np.zeros(3)
+        points = self._first.bodies["spikes"][0]
+        centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        centre[[0, 2]] = points[:, [0, 2]].mean(axis=0)  # eight alike, evenly about the axis
+        start = self.row(0)
+        return centre - [self.series["x_m"][start], 0.0, self.series["y_m"][start]]
+
+    @property
+    def surface(self) -> float:
+        """Height of the undisturbed surface [m]."""
+        return float(self.origin[2])
+
+    @property
+    def cut(self) -> float:
+        """y of the plane of the spikes [m]."""
+        return float(self.origin[1])
+
+    @cached_property
+    def box(self) -> tuple[Array, Array]:
+        """Corners of the bed, or of the block of ground that stands for a law [m]."""
+        if self._first is None:
+            x = self.series["x_m"]
+            return np.array([x.min() - 1.0, 0.0, -_BLOCK]), np.array([x.max() + 1.0, 0.5 * _WIDE, 0.0])
+        position, radius = self._first.grains["position"], self._first.grains["radius"][:, None]
+        return (position - radius).min(axis=0), (position + radius).max(axis=0)
+
+    @cached_property
+    def radius(self) -> float | None:
+        """Mean radius of the grains [m]."""
+        return float(self._first.grains["radius"].mean()) if self._first is not None else None
+
+    def centres(self) -> Array:
+        """(x, z) of the platform's centre at every picture [m], shape (n, 2)."""
+        rows = [self.row(index) for index in range(len(self))]
+        return np.column_stack([self.series["x_m"][rows], self.series["y_m"][rows]]) + self.origin[[0, 2]]
+
+    def feet(self) -> Array:
+        """x of the lowest tip at every picture [m], shape (n,): of two nearly as low the leading one."""
+        rows = [self.row(index) for index in range(len(self))]
+        length, count = self.number("spike_length"), int(self.result.get("spike_count", 8))
+        angles = self.series["theta_rad"][rows][:, None] + math.pi / count + 2 * math.pi / count * np.arange(count)
+        x = self.series["x_m"][rows][:, None] - length * np.sin(angles)
+        depth = length * np.cos(angles) - self.series["y_m"][rows][:, None]
+        wanted = depth + 0.03 * (x - x.mean(axis=1, keepdims=True))
+        share = np.exp((wanted - wanted.max(axis=1, keepdims=True)) / (0.005 * length))
+        return (share * x).sum(axis=1) / share.sum(axis=1) + self.origin[0]
+
+    # What is seen -----------------------------------------------------------------------------------------------------
+
+    def frame(self, index: int) -> Frame:
+        """The frame of a picture."""
+        row = self.row(index)
+        x, y, theta = (float(self.series[name][row]) for name in ("x_m", "y_m", "theta_rad"))
+        turn = (math.cos(0.5 * theta), 0.0, math.sin(0.5 * theta), 0.0)
+        bodies = {
+            name: (in_place(points, self.origin + (x, 0.0, y), turn), faces)
+            for name, (points, faces) in self._meshes.items()
+        }
+        if self.frames is not None:  # grains touch a cylinder inside the hull: shown is the octagon
+            found = self.frames[index]
+            return replace(found, grains=self.grains(found), bodies=found.bodies | {"hull": bodies["hull"]})
+        grains: dict[str, NDArray[Any]] = {"position": np.zeros((0, 3)), "radius": np.zeros(0)}
+        return Frame(float(self.times[index]), grains, bodies, {}, {"row_forces": self._loads(row, x, y, theta)})
+
+    def grains(self, found: Frame) -> dict[str, NDArray[Any]]:
+        """The grains of a frame, displaced since the torque began: that the setting down moved them is left out."""
+        return found.grains if self._first is None else moved_since(found.grains, self._first.grains)
+
+    @cached_property
+    def _meshes(self) -> dict[str, tuple[Array, NDArray[np.int64]]]:
+        """Spikes and hull in body axes."""
+        length, count = self.number("spike_length"), int(self.result.get("spike_count", 8))
+        thick, clear = self.spikes
+        points, faces = spike_mesh("sphere", diameter=thick, length=clear + 0.5 * thick, segments=24)
+        parts, triangles = [], []
+        for row in range(count):
+            gamma = math.pi / count + 2 * math.pi / count * row
+            tip = np.array([-length * math.sin(gamma), 0.0, -length * math.cos(gamma)])
+            parts.append(in_place(points, tip, (math.cos(0.5 * gamma), 0.0, math.sin(0.5 * gamma), 0.0)))
+            triangles.append(faces + row * len(points))
+        return {"spikes": (np.concatenate(parts), np.concatenate(triangles)), "hull": self._hull(length - clear, count)}
+
+    def _hull(self, corner: float, count: int) -> tuple[Array, NDArray[np.int64]]:
+        """A prism whose corners are where the spikes begin, as wide as the bed."""
+        low, high = self.box
+        half = 0.5 * (_WIDE * self.number("spike_length") / 0.2 if self.frames is None else float(high[1] - low[1]))
+        angles = math.pi / count + 2 * math.pi / count * np.arange(count)
+        ring = np.column_stack([-corner * np.sin(angles), np.zeros(count), -corner * np.cos(angles)])
+        points = np.concatenate([ring - [0.0, half, 0.0], ring + [0.0, half, 0.0]])
+        here = np.arange(count)
+        after = (here + 1) % count
+        sides = np.concatenate(
+            [np.column_stack([here, after + count, after]), np.column_stack([here, here + count, after + count])]
+        )
+        fan = np.column_stack([np.zeros(count - 2, dtype=int), here[1:-1], here[2:]])
+        return points, np.concatenate([sides, fan, fan[:, ::-1] + count]).astype(np.int64)
+
+    def _loads(self, row: int, x: float, y: float, theta: float) -> tuple[Array, dict[str, NDArray[Any]]]:
+        """Points and forces of the rows that touch, of series/feet.csv or the law's; their friction shared by load."""
+        feet, motion = self._feet
+        length, count = self.number("spike_length"), int(self.result.get("spike_count", 8))
+        if not motion:
+            return np.zeros((0, 3)), {"force": np.zeros((0, 3))}
+        if feet:
+            at = int(np.argmin(np.abs(feet["t_s"] - self.series["t_s"][row])))
+            load = np.array([feet[f"normal_{n}_N"][at] for n in range(count)])
+        else:  # K delta + C max(0, rate of delta), docs/planar.md
+            every = theta + math.pi / count + 2 * math.pi / count * np.arange(count)
+            depth = length * np.cos(every) - y
+            rate = -self.series["vy_m_s"][row] - length * np.sin(every) * self.series["omega_rad_s"][row]
+            spring = self.number("stiffness") * depth + self.number("damping") * np.maximum(rate, 0.0)
+            load = np.where(depth > 0, spring, 0.0)
+        rows = np.flatnonzero(load > 0)
+        gamma = theta + math.pi / count + 2 * math.pi / count * rows
+        points = np.column_stack([x - length * np.sin(gamma), np.zeros(len(rows)), y - length * np.cos(gamma)])
+        push = self.number("mass") * float(motion["ax_m_s2"][row])
+        share = load[rows] / max(load[rows].sum(), 1e-300)
+        return points, {"force": np.column_stack([push * share, np.zeros(len(rows)), load[rows]])}
+
+    @cached_property
+    def _feet(self) -> tuple[dict[str, Array], dict[str, Array]]:
+        path = self.folder / "series" / "feet.csv"
+        motion = self.folder / "series" / "motion.csv"
+        feet = read_columns(path)[0] if path.exists() else {}
+        known = bool(feet) or self.result.get("ground") == "spring-damper"
+        if not known or not motion.exists() or self.result.get("effects"):
+            return {}, {}
+        return feet, read_columns(motion)[0]
+
+    def colour_top(self, by: str) -> float:
+        """Upper end of a scale for all pictures, in the unit of its label, by those grains that take part."""
+        most = 0.0
+        if self.frames is not None:
+            for index in {len(self) // 3, 2 * len(self) // 3, len(self) - 1}:
+                values = colour_values(self.grains(self.frames[index]), by)
+                taking = values[values > 0.05 * values.max()] if len(values) else values
+                most = max(most, float(np.percentile(taking, 97)) if len(taking) else 0.0)
+        return nice_above(most)

@@ -1,0 +1,162 @@
+"""States of tumbles as pictures: over time and angle, as bands of two runs, as a strip with a cursor.
+
+What they show is the same in the plane and in space; only the angle is another.
+"""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from vis.page.page import Block, table, text
+from vis.page.style import BED, GREY, INK, MODEL, styled
+from vis.page.tumble_series import STATES, state_runs
+
+__all__ = [
+    "LINES", "by_state", "draw_bands", "draw_states", "legend_of_states", "panels", "passages", "sheet", "state_strip",
+]  # fmt: skip
+
+Array = NDArray[np.float64]
+States = NDArray[np.str_]
+LINES: tuple[dict[str, Any], dict[str, Any]] = (
+    {"color": BED, "lw": 1.7},
+    {"color": MODEL, "lw": 1.4, "ls": (0, (4, 2))},
+)
+"""Of the first of two runs and of the second, which is dashed as well."""
+_WIDTH = 8.6
+_LABEL = 26
+"""Letters of a run's label in a line."""
+_LETTER = 0.0063
+"""Width of a letter beside the strip, over the picture's [1]."""
+_MOST_TOLD = 60
+_MOST_STEPS = 60
+"""Changes of state that are joined by a line; more would paint the panel grey."""
+
+
+def panels(
+    count: int, height: float, *, widths: tuple[float, ...] | None = None, right: float = 0.985
+) -> tuple[Figure, list[Axes]]:
+    """Panels side by side, placed by hand: a layout engine would take as long as all the rest."""
+    with mpl.rc_context({"figure.constrained_layout.use": False}):
+        drawing = Figure(figsize=(_WIDTH, height))
+    FigureCanvasAgg(drawing)
+    axes = drawing.subplots(1, count, width_ratios=widths)
+    drawing.subplots_adjust(left=0.09, right=right, bottom=0.5 / height, top=1 - 0.38 / height, wspace=0.23)
+    return drawing, list(np.atleast_1d(axes))
+
+
+def sheet(rows: int, columns: int, height: float, **options: Any) -> tuple[Figure, Any]:
+    """Panels in rows and columns, laid out by matplotlib; the axes have the shape (rows, columns)."""
+    with mpl.rc_context({"figure.constrained_layout.use": True}):
+        drawing = Figure(figsize=(_WIDTH, height))
+    FigureCanvasAgg(drawing)
+    return drawing, drawing.subplots(rows, columns, squeeze=False, **options)
+
+
+def legend_of_states(drawing: Figure, states: States, more: tuple[Line2D, ...] = ()) -> None:
+    """Those that occur, and what else there is."""
+    there = [name for name in STATES if name in states]
+    handles = [Line2D([], [], color=STATES[name], lw=3, label=name) for name in there]
+    drawing.legend(handles=[*handles, *more], loc="upper left", bbox_to_anchor=(0.075, 1.0), ncols=8)
+
+
+def by_state(axis: Axes, x: Array, y: Array, states: States, **style: Any) -> None:
+    """A line in the colours of the states, without gaps between them."""
+    for low, high, name in state_runs(states):
+        axis.plot(x[low : high + 1], y[low : high + 1], color=STATES.get(name, INK), **style)
+
+
+def draw_states(time: Array, angle: Array, states: States, *, label: str = "θ [degrees]") -> Figure:
+    """Left: the angle [degrees] over time. Right: state against angle, as in Figure 6 of the paper."""
+    order = list(STATES)
+    with styled():
+        drawing, (over_time, over_angle) = panels(2, 3.0)
+        by_state(over_time, time, angle, states, lw=2.4)
+        over_time.set_xlabel("time [s]")
+        over_time.set_ylabel(label)
+        stretches = state_runs(states)
+        for low, high, name in stretches:
+            last = min(high, len(angle) - 1)
+            row = order.index(name) if name in order else 0
+            here, colour = angle[low : last + 1], STATES.get(name, INK)
+            over_angle.plot(here, np.full(len(here), row), color=colour, lw=6, solid_capstyle="butt")
+            if np.ptp(here) <= 0.01 * np.ptp(angle):  # too short to be seen
+                over_angle.plot(here[:1], [row], "s", color=colour, ms=5)
+            if len(stretches) <= _MOST_STEPS and last < len(angle) - 1 and str(states[last]) in order:
+                there = [row, order.index(str(states[last]))]
+                over_angle.plot([angle[last]] * 2, there, color=GREY, lw=0.7)
+        over_angle.set_yticks(range(len(order)), order)
+        over_angle.set_ylim(-0.5, len(order) - 0.5)
+        over_angle.set_xlabel(label)
+        over_angle.locator_params(axis="x", nbins=6)
+        legend_of_states(drawing, states)
+    return drawing
+
+
+def draw_bands(
+    runs: Sequence[tuple[Array, Array, States]], labels: Sequence[str], *, label: str = "θ [degrees]"
+) -> Figure:
+    """Above: angles [degrees] of two runs over time [s]. Below: their states as bands. A run: time, angle, states."""
+    drawing, axes = sheet(2, 1, 3.8, sharex=True, height_ratios=(2.2, 1.0))
+    above, bands = axes[:, 0]
+    for number, ((time, angle, states), style) in enumerate(zip(runs, LINES, strict=True)):
+        above.plot(time, angle, **style)
+        _band(bands, 1 - number, time, states)
+    above.set_ylabel(label)
+    bands.set_yticks([1, 0], labels)
+    bands.set_ylim(-0.55, 1.55)
+    bands.set_xlim(runs[0][0][0], max(time[-1] for time, _, _ in runs))
+    bands.set_xlabel("time [s]")
+    bands.grid(False)
+    there = [name for name in STATES if any(name in states for _, _, states in runs)]
+    handles = [Line2D([], [], label=name, **style) for name, style in zip(labels, LINES, strict=True)]
+    handles += [Line2D([], [], color=STATES[name], lw=6, label=name) for name in there]
+    drawing.legend(handles=handles, loc="outside upper left", ncols=6)
+    return drawing
+
+
+def state_strip(drawing: Figure, runs: Sequence[Mapping[str, Any]], labels: Sequence[str], time: float) -> None:
+    """At the foot of a picture: the states of its runs (`t_s`, `state`) over time, a cursor at `time` [s]."""
+    count = len(runs)
+    names = ["\n".join(textwrap.wrap(label, _LABEL)) for label in labels[::-1]] if count > 1 else [""]
+    longest = max(len(line) for name in names for line in name.split("\n"))
+    left = max(0.09, 0.02 + _LETTER * longest)
+    axis = drawing.add_axes((left, 0.055, 0.87 - left, 0.045 + 0.02 * count))
+    for number, run in enumerate(runs):
+        _band(axis, count - 1 - number, run["t_s"], run["state"])
+    axis.axvline(time, color=INK, lw=2.0)
+    axis.set_xlim(0.0, max(float(run["t_s"][-1]) for run in runs))
+    axis.set_ylim(-0.5, count - 0.5)
+    axis.set_yticks(range(count), names)
+    axis.grid(False)
+    axis.set_xlabel("time [s]", labelpad=1)
+    there = [name for name in STATES if any(name in run["state"] for run in runs)]
+    for place, name in enumerate(there):
+        drawing.text(0.885, 0.125 - 0.027 * place, "■", color=STATES[name], fontsize=10)
+        drawing.text(0.898, 0.125 - 0.027 * place, name, fontsize=10)
+
+
+def passages(entries: Sequence[Mapping[str, Any]], *, angle: str, label: str) -> list[Block]:
+    """The changes of state as a table, the first of many; `angle` is the key of the angle [rad] that is shown."""
+    shown = [
+        (f"{entry['time']:.6g}", entry["state"], f"{math.degrees(entry[angle]):.4g}") for entry in entries[:_MOST_TOLD]
+    ]
+    beyond = len(entries) - len(shown)
+    more = [text(f"And {beyond} more, in result.json.", small=True)] if beyond > 0 else []
+    return [table(("time [s]", "state", label), shown), *more]
+
+
+def _band(axis: Axes, row: int, time: Array, states: States) -> None:
+    for low, high, name in state_runs(states):
+        last = time[min(high, len(time) - 1)]
+        axis.barh(row, last - time[low], left=time[low], height=0.8, color=STATES.get(name, INK))
