@@ -127,7 +127,8 @@ def oblique_pair(step: float, *, steps: int, friction: float = 50.0, along: bool
 
 def _unknowns(grains: Grains) -> np.ndarray:
     """Position, velocity and spin of the two grains, and the spring of their contact, not yet stretched."""
-    return np.concatenate([v[i] for i in (0, 5) for v in (grains.position, grains.velocity, grains.spin)] + [np.zeros(3)])
+    arrays = (grains.position, grains.velocity, grains.spin)
+    return np.concatenate([array[i] for i in (0, 5) for array in arrays] + [np.zeros(3)])
 
 
 def errors_of_pair(along: bool) -> tuple[np.ndarray, np.ndarray]:
