@@ -9,8 +9,6 @@ where it was stopped. A campaign is diagnosed again only where the code of the d
 since. With ``pip install .[bench]`` the baselines (`benchmarks/baseline/`) get the same campaigns.
 """
 
-from __future__ import annotations
-
 import ast
 import hashlib
 import json

@@ -7,8 +7,6 @@ HEDGEBED_BENCH_TRIALS (timed ones), HEDGEBED_BENCH_ROUNDS, HEDGEBED_BENCH_COMPAR
 third as many with all terms on). What agreement means is in ``benchmarks/planar_trials/agreement.py``.
 """
 
-from __future__ import annotations
-
 import os
 import statistics
 import sys

@@ -1,7 +1,5 @@
 """The base model with a learnt force added, run again on held-out trials: the gap that is left."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path

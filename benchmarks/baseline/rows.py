@@ -8,8 +8,6 @@ force (of a drop, m (g - a)) less the base model's at the smoothed depth, beside
 deepest point.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

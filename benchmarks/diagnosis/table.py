@@ -1,7 +1,5 @@
 """The figures of `hedgebed bench diagnose`, counted from cases whose answers are known, and their table."""
 
-from __future__ import annotations
-
 import json
 import math
 import sys

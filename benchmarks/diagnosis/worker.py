@@ -3,8 +3,6 @@
 This module must not import what makes campaigns up (`hidden_*`): the answers are in another process.
 """
 
-from __future__ import annotations
-
 import os
 import time
 import traceback

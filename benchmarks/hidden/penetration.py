@@ -4,8 +4,6 @@ Nothing here is shared with the code that diagnoses: the motions come from a lea
 effect has another functional form than the library's. What is hidden comes back beside the campaign, not in it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field

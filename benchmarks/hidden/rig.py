@@ -6,8 +6,6 @@ effects alike get, by chance, nuisances that are no effect: beds that differ, ze
 stated.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

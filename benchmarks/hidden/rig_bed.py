@@ -3,8 +3,6 @@
 Nothing here is shared with the code that diagnoses, nor are the laws those of `hidden_penetration`. SI throughout.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """What is done on the made-up rig of `hidden_rig`: bed, drive, conditions, and what its sensors do wrong."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import Any

@@ -5,8 +5,6 @@ beginning of a suite holds what the whole does, as nearly as whole numbers can: 
 17 %, pairs 8 %, single effects in turn; strengths are spread evenly over their logarithm from barely visible to plain.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence

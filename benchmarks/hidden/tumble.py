@@ -5,8 +5,6 @@ off them here, and every effect has another functional form than the library's w
 comes back beside the campaign, not in it: `hidden_suite.write_suite` puts campaigns and answers into two folders.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

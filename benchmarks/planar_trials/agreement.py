@@ -10,8 +10,6 @@ channel stays within `TOLERANCE`. One that does not is asked why, each time with
 - *unexplained*: neither. There should be none.
 """
 
-from __future__ import annotations
-
 import time
 from collections import Counter
 from collections.abc import Sequence

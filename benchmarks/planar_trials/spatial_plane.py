@@ -3,8 +3,6 @@
 One trial by the planar and by the spatial model, through what `rigid` offers, and how far they are apart.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

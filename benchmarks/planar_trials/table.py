@@ -5,8 +5,6 @@ the end of a tumble falls with the step, and the list of effects. Writes into do
 docs/images/planar-*.png.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from pathlib import Path

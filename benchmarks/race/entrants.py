@@ -4,8 +4,6 @@ An entrant does the same thing however often it is asked: the same grains, at re
 that are not timed, then the timed ones.
 """
 
-from __future__ import annotations
-
 import time
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace

@@ -3,8 +3,6 @@
 All of it follows from centres and radii alone, so that one measure holds for every code.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from pathlib import Path

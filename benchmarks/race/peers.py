@@ -1,7 +1,5 @@
 """LIGGGHTS and LAMMPS: what is installed, how a run is called, what its log says."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

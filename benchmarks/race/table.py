@@ -4,8 +4,6 @@ python -m benchmarks.race.table DIR/bench.json                      # prints the
 python -m benchmarks.race.table DIR/bench.json docs/performance.md  # puts it between the two marks in that file
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -1,8 +1,6 @@
 """`hedgebed bed test cone`: a cone goes down at constant speed; cone index and its gradient
 (`dem.measure.penetrometer`)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import partial

@@ -1,8 +1,6 @@
 """`hedgebed bed test cut`: gravity rises until a vertical face falls; critical height and cohesion
 (`dem.measure.cutting`)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import asdict

@@ -1,7 +1,5 @@
 """`hedgebed bed make`: a bed prepared as in a laboratory, in a run folder with a report of every stage."""
 
-from __future__ import annotations
-
 from dem.grains.materials import Material, material
 from experiments.grains.graded import grading_told
 from experiments.grains.kept_material import MATERIAL_COPY, keep_material

@@ -3,8 +3,6 @@
 Its stages are those of the bed, then the packing fraction that the bed had; a cut or a tilt come after that.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from dem.grains.graded import Graded

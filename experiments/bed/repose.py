@@ -1,7 +1,5 @@
 """`hedgebed bed test repose`: angle of repose, of the slopes that stay beside a slot (`dem.measure.repose`)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial

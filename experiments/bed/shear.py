@@ -7,8 +7,6 @@ Normal stress is the lid's. Shear stress is the same at every height and the nor
 own weight, so that the bed shears under the lid; what lies between lid and there feigns a cohesion, told beside it.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

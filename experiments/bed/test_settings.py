@@ -1,7 +1,5 @@
 """Settings of `hedgebed bed test repose`, `cone` and `cut`."""
 
-from __future__ import annotations
-
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator

@@ -1,7 +1,5 @@
 """What `bed test repose`, `cone` and `cut` share: the beds, run by run; quantities with their spread; the result."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass

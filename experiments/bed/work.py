@@ -1,7 +1,5 @@
 """What `bed make` and `bed refine` share: the preparation with its progress, the run folder, the result."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path

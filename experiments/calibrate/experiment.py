@@ -10,8 +10,6 @@
 Why this and no optimiser of a library: docs/materials.md.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields

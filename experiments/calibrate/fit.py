@@ -10,8 +10,6 @@ The fit weighs every point of the parameters' box by exp(-chi^2 / 2), chi^2 = su
 variance of y): a tolerance counts as a standard deviation, and what the surface does not know counts with it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

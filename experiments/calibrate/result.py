@@ -1,7 +1,5 @@
 """What a calibration says: result.json, the material's file, what could not be met."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 

@@ -12,8 +12,6 @@ largest and least principal stress, radius = cohesion cos(angle) + sin(angle) ce
 a vertical cut, is reckoned with. Where volume stays, the plane of shear has c cos(angle) and tan = sin(angle) instead.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass

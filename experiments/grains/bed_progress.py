@@ -1,7 +1,5 @@
 """How the preparation of a bed shows in the experiment that wants it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from experiments.runs.progress import Progress, as_expected

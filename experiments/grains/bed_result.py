@@ -1,7 +1,5 @@
 """What results of a platform on a bed of grains have in common: the bed's numbers, its series, and warnings."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The size of a bed: how many grains fill it, and how high its box must be for grains that leave the surface."""
 
-from __future__ import annotations
-
 import math
 
 from dem.grains.materials import Material

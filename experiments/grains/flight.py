@@ -11,8 +11,6 @@ flat plate (`experiments.grains.softening`) over the width that grains know of i
 While a torque acts a row may come to point straight down, and no tip is faster than on a platform that spins freely.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """A run on a ground followed to its end in a run folder: checkpoints, Ctrl-C, frames, what is kept of a failure."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol

@@ -1,7 +1,5 @@
 """What a graded bed adds to results of `bed make` and `bed refine`; where a tumble wants fine grains, which it met."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

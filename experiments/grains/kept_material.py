@@ -1,7 +1,5 @@
 """A material that is given as a file: the run's folder has a copy, for who reads it and for `hedgebed resume`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from experiments.runs.folder import write_text

@@ -5,8 +5,6 @@ that follow the size of the bed, the stiffness of its grains, the prepared bed, 
 on the spring-damper is computed first: its `Forecast` says how far and how deep the bed must reach.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

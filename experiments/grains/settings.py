@@ -1,8 +1,6 @@
 """Settings of runs on grains: the bed, how it is coupled; and of a tumble the spikes in it. They belong to
 ``ground = "bed"``."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """How large the grains of `bed make` are, what adhesion becomes in grains of another size, and what reports say."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal

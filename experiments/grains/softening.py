@@ -25,8 +25,6 @@ that is refused.
 The estimate is a choice made beforehand; the bed measures its largest overlap, and the result states it.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Where something holds without a break."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -1,7 +1,5 @@
 """A bed that goes through stages before an experiment, from the cache where it is there."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 from dem import Bed, Graded

@@ -5,8 +5,6 @@ vector `force` [N]; on a bed the grains, `contact_forces` (of each grain on a sp
 `surface`, a height map on a grid of half a grain with `height` and `change` [m] since the first frame.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import Generic, TypeVar

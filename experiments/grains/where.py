@@ -1,7 +1,5 @@
 """Where a bed is computed: on as many cores as there are, or on a GPU that is there."""
 
-from __future__ import annotations
-
 from experiments.runs.memory import cores_there
 
 from .sentences import say

@@ -1,7 +1,5 @@
 """docs/validation.md from the result: one row a case, then what lies behind each row."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

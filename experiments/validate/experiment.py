@@ -1,7 +1,5 @@
 """`hedgebed validate`: runs the verification suite into a run folder, case by case; finished cases are kept."""
 
-from __future__ import annotations
-
 import math
 import time
 import traceback

@@ -4,8 +4,6 @@ Long cases need not all be run in one go then: `hedgebed validate --only sink-fr
 table with its own date, command and code, and leaves the others as they are.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path

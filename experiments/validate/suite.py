@@ -1,7 +1,5 @@
 """Every case of the verification suite, in the order of the table."""
 
-from __future__ import annotations
-
 import ast
 import difflib
 import hashlib

@@ -1,7 +1,5 @@
 """What a case of the verification suite is: what is known, what came out, and the band between them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

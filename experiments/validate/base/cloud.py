@@ -1,7 +1,5 @@
 """A dense cloud of 64 unlike grains in a box barely wider than the lists need, in touch across every boundary."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from dem import Ball, Bed, Material

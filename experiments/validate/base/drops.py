@@ -6,8 +6,6 @@ F the mean force of the step, G its weight, and likewise its spin. Depth is coun
 to the body's lowest point; the ball starts where it first touches a grain.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

@@ -5,8 +5,6 @@ whatever the law, the change is the sum of what the parts of each contact's forc
 against 2/5 k delta^2.5, which it meets to second order in the step; what dashpots and friction take is summed.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 They lie in the folder of the cache, under what they were computed from: the bed's code, ``drops.py`` and the settings.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Callable, Mapping

@@ -13,8 +13,6 @@ LAMMPS' dashpot is a polynomial in the restitution that was fitted with the mass
 reduced one: with 0.5 it rebounds with 0.62. It is given the number whose dashpot is that of 0.5.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import shutil

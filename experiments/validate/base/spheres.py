@@ -4,8 +4,6 @@ delta = (5 m* v^2 / 4 k)^(2/5), k = 4/3 E* sqrt(R*), F = k delta^1.5, t_c = 2.94
 and 11).
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

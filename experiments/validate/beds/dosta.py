@@ -5,8 +5,6 @@ into them by more than its radius; the 100 ms of the paper take an hour on one c
 have them, without history. The walls are of what the grains are of.
 """
 
-from __future__ import annotations
-
 import gzip
 import math
 import os

@@ -21,8 +21,6 @@ where the spheres are ten times as soft), and sizes within 15 % and an inertial 
 0.381 at friction 0.5.
 """
 
-from __future__ import annotations
-
 import io
 import math
 from dataclasses import dataclass, replace

@@ -8,8 +8,6 @@ and drag goes with the diameter D + d that they see (Kumar et al. 2017, arXiv 17
 smaller that D + d is the experiment's, its mass is kept. What is left of the grains' size shows between the two.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

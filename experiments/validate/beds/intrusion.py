@@ -15,8 +15,6 @@ Dunatunga & Kamrin 2015, J. Fluid Mech. 779:483), not shear over normal stress o
 less of the same grains.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

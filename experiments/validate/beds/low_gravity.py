@@ -7,8 +7,6 @@ gravity with the stiffness, step and criteria of settling that the bed chooses b
 show here.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

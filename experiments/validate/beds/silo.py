@@ -8,8 +8,6 @@ W the weight poured in. K is not known beforehand: one W_s is fitted to the thre
 friction of the walls by mu_w times what presses on them; Janssen takes it as reached all over.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -8,8 +8,6 @@ grains.
 Grains neither slide nor roll on the floor. LAMMPS' rolling spring is of one stiffness (``friction_angle``).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Many grains: the books of momentum, angular momentum and energy; the floor carries the weight."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -5,8 +5,6 @@ w = 2 gamma is the work of adhesion. The closed forms are written anew here, JKR
     JKR: F = 4 E* a^3 / 3 R - sqrt(8 pi w E* a^3), d = a^2 / R - sqrt(2 pi w a / E*).
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Elastic collisions along the normal: Chung & Ooi's T1 to T3, and the force over the whole of a contact."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The order of the integrator: collisions against the equations of motion integrated by another method."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

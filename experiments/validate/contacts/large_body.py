@@ -10,8 +10,6 @@ it roll about that line without slipping at either contact: its spin is v / (r s
 Both contacts hold as long as what friction must pass on is below mu times what presses them.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

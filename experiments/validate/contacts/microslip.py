@@ -9,8 +9,6 @@ c = (2 - nu) / 8 G (Johnson 1985, Contact Mechanics, section 3.9). Each ring eit
 does, or slips at mu times Hertz's pressure. One spring for the whole contact, as beds have it, knows no such rings.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

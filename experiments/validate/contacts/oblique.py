@@ -5,8 +5,6 @@ impulse (1 + e) m* v_n: e_t = 1 - mu (1 + e) / tan, omega = 5 mu (1 + e) v_n / 2
 speed at the contact is above 7/2 mu (1 + e) v_n.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One grain under gravity: falling, lying, sliding, rolling, twisting; closed forms."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """The restitution asked for, at any speed: with fine steps and with the bed's own, cut at zero and tensile."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -5,8 +5,6 @@ meets to rounding, and a bed that its own meets as well as where nothing slides,
 else; how much it does stands in the remarks, and is no error of either.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

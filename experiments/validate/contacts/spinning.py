@@ -3,8 +3,6 @@
 As in `oblique`: while a contact slides from beginning to end, friction passes on mu times the normal impulse.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
