@@ -9,7 +9,7 @@ WORKERS ?= 2
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help run test slow cover validate experiments bench doctor format clean distclean
+.PHONY: help run test fast long slow tiers cover validate experiments bench doctor format clean distclean
 
 help:  ## what there is
 	@grep -E '^[a-z]+:.*##' $(firstword $(MAKEFILE_LIST)) | sed -E 's/^([a-z]+):.*## */  make \1\t/' | expand -t 18
@@ -25,8 +25,18 @@ test: $(VENV)/.installed-test  ## ruff, mypy and the tests, these in WORKERS=2 p
 	$(BIN)/mypy
 	$(PYTEST) $(ARGS)
 
-slow: $(VENV)/.installed-test  ## the tests that take longer: physics against closed forms, kill and resume
+fast: $(VENV)/.installed-test  ## the inner loop: ruff, and the tests whose files take a few seconds at most
+	$(BIN)/ruff check .
+	$(PYTEST) -m "not heavy and not long and not slow" $(ARGS)
+
+long: $(VENV)/.installed-test  ## the tests of 20 s and more, which CI runs after those of `make test`
+	$(PYTEST) -m long $(ARGS)
+
+slow: $(VENV)/.installed-test  ## the tests that take minutes: physics against closed forms, kill and resume
 	$(PYTEST) -m slow $(ARGS)
+
+tiers: $(VENV)/.installed-test  ## measure again which files of tests `make fast` may take (tests/durations.toml)
+	$(PYTEST) --write-durations $(ARGS)
 
 cover: $(VENV)/.installed-test  ## the tests of `make test`, counting the lines they reach: several times as long
 	$(PYTEST) --cov --cov-report=term $(ARGS)

@@ -1,9 +1,17 @@
-"""Puts the folder of the stand-ins that tests share on the path; the same examples in every run; one thread."""
+"""Same examples in every run; one thread; which files of tests are quick enough for `make fast`."""
 
 import os
+import tomllib
+from collections import Counter
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
+
+ROOT = Path(__file__).resolve().parent.parent
+DURATIONS = ROOT / "tests" / "durations.toml"
+FAST_BUDGET = 130.0
+"""What all tests of `make fast` may take together, as tests/durations.toml has it [s]; two processes share it."""
 
 # A suite that passes here has to pass elsewhere; HYPOTHESIS_PROFILE=search looks for new examples, and more of them.
 settings.register_profile("same", derandomize=True, deadline=None, database=None)
@@ -21,3 +29,45 @@ def one_core():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(os, "sched_getaffinity", lambda pid: {0}, raising=False)
         yield
+
+
+def heavy_files(durations: dict[str, float]) -> set[str]:
+    """The files that `make fast` leaves out: it takes the quickest ones until its budget is used up."""
+    total, heavy = 0.0, set()
+    for name, seconds in sorted(durations.items(), key=lambda item: item[1]):
+        total += seconds
+        if total > FAST_BUDGET:
+            heavy.add(name)
+    return heavy
+
+
+def pytest_addoption(parser):
+    parser.addoption("--write-durations", action="store_true", help="write tests/durations.toml after the run")
+
+
+def pytest_configure(config):
+    config.pluginmanager.register(_Stopwatch(config))
+
+
+def pytest_collection_modifyitems(items):
+    heavy = heavy_files(tomllib.loads(DURATIONS.read_text(encoding="utf-8")))
+    for item in items:
+        if item.path.relative_to(ROOT).as_posix() in heavy:
+            item.add_marker("heavy")
+
+
+class _Stopwatch:
+    """Adds up how long the tests of each file take; under pytest-xdist the process that leads the others writes."""
+
+    def __init__(self, config):
+        self.wanted = config.getoption("--write-durations") and not hasattr(config, "workerinput")
+        self.seconds = Counter()
+
+    def pytest_runtest_logreport(self, report):
+        self.seconds[report.nodeid.split("::")[0]] += report.duration
+
+    def pytest_sessionfinish(self):
+        if self.wanted:
+            lines = [f'"{name}" = {seconds:.1f}\n' for name, seconds in sorted(self.seconds.items())]
+            head = "# Seconds that each file of tests takes, set-up included: `make tiers` measures them.\n"
+            DURATIONS.write_text(head + "".join(lines), encoding="utf-8")

@@ -17,6 +17,7 @@ def test_all_terms_means_all():
         assert low < high
 
 
+@pytest.mark.long
 def test_bench_planar_writes_speed_and_agreement(tmp_path, monkeypatch):
     monkeypatch.setenv("HEDGEBED_BENCH_TRIALS", "200")
     monkeypatch.setenv("HEDGEBED_BENCH_ROUNDS", "2")

@@ -110,6 +110,7 @@ def test_the_result_converges_at_least_as_the_square_of_the_macro_step():
     assert once < 1e-5
 
 
+@pytest.mark.long
 def test_a_light_ball_on_a_grain_needs_iterated_steps_which_go_on_from_a_checkpoint_to_the_same_bits():
     """A tenth of the grain's mass, 8 of the bed's steps in one: its rebound is that of step by step, momentum kept."""
 

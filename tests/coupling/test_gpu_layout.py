@@ -17,6 +17,7 @@ def until_it_touches(run):
         run.advance()
 
 
+@pytest.mark.long
 def test_nothing_of_the_beds_size_is_read_or_written_in_a_macro_step_in_a_gpus_layout(other_layouts, monkeypatch):
     """One grain a chunk, as on a GPU; explicit and iterated. What passes is counted: poses, reactions, counters."""
     other_layouts.overrides = {"gpu": True}

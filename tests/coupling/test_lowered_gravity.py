@@ -57,6 +57,7 @@ def run_on(bed, gravity, *, torque=0.0, duration=0.1, speed=0.02, **options):
     )
 
 
+@pytest.mark.long
 def test_a_quarter_of_gravity_modulus_and_torque_is_the_same_tumble_at_half_the_speed_to_the_bit():
     """Lengths in d, times in sqrt(d / g), forces in rho g d^3: a quarter of g and E, and all numbers are those before
     times powers of two (Froude's similarity, exact for Hertz contacts whose restitution and friction are numbers)."""

@@ -91,6 +91,7 @@ def test_cohesive_grains_keep_their_bits_too(cohesion, tmp_path):
     assert finish(elsewhere_too) == digests
 
 
+@pytest.mark.long
 def test_a_body_of_meshes_and_turned_boxes_keeps_the_bits_too(tmp_path):
     """One thread elsewhere, two here; from a file of the middle; and back after the table held another mesh."""
     elsewhere_too = elsewhere("fresh", tmp_path / "other.npz", 300, 1, 100, "none", "solids")

@@ -23,6 +23,7 @@ def bits(bed):
     return {name: values.tobytes() for name, values in bed.state().items()} | {"computed": bed.grain_steps}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("layout", ["chunks", "a chunk a grain"])
 def test_a_bed_goes_on_from_what_it_held_to_the_same_bits_as_often_as_one_likes(layout, engines):
     bed = made(layout, engines)

@@ -65,6 +65,7 @@ def same_in_every_copy(piece, long, *, within):
     return own, found
 
 
+@pytest.mark.long
 def test_it_has_the_grains_of_its_piece_in_every_copy_one_length_further(pair):
     piece, long = pair
     own, found = same_in_every_copy(piece, long, within=1e-12)
@@ -125,6 +126,7 @@ def test_copies_that_nothing_reaches_sleep(pair):
     assert long.reaction(ball)[0][2] > 5 * long.weight / long.grain_count
 
 
+@pytest.mark.long
 def test_in_a_higher_box_the_grains_are_as_they_were_and_what_flies_up_comes_back(pair):
     piece, _ = pair
     higher = piece.repeated(1, height=0.2)

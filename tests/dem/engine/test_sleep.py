@@ -92,6 +92,7 @@ def test_woken_at_once_they_go_on_as_if_they_had_not_slept(layer):
     assert np.abs(after.position - before.position).max() < 1e-6 * D
 
 
+@pytest.mark.long
 def test_the_bits_depend_on_neither_threads_nor_cuts_nor_where_it_goes_on(tmp_path, monkeypatch):
     """Grains that fall, with rules under which they doze off and wake often; the book of what they lose too."""
     monkeypatch.setattr(dem.engine.engine, "GRAINS_PER_CHUNK", falling_bed.GRAINS_PER_CHUNK)
@@ -218,6 +219,7 @@ def skimmed(steps, *, wide=0.05, cut=None):
     return bed, begins
 
 
+@pytest.mark.long
 def test_where_sleepers_begin_in_memory_changes_no_bit_of_what_the_grains_do():
     """It follows the ball; grains wake, are dragged and fall asleep the same, gone on with from a state too."""
     steps = 6000

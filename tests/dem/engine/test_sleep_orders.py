@@ -8,6 +8,7 @@ wakes. The same orders of what a bed can be told, drawn by chance, once so and o
 import hashlib
 
 import numpy as np
+import pytest
 
 import dem.engine.engine
 from dem import Ball, Bed, Material, Sleep
@@ -74,6 +75,7 @@ def told(bed, chance, folder):
     return found
 
 
+@pytest.mark.long
 def test_orders_drawn_by_chance_have_the_bits_of_sorting_all_grains_every_time(tmp_path, monkeypatch):
     monkeypatch.setattr(dem.engine.engine, "GRAINS_PER_CHUNK", 20)
     sorted_ones, rearrange, all_of_them = [], Sleeper.rearrange, False

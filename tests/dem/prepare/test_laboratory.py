@@ -198,6 +198,7 @@ def test_a_report_of_a_bed_can_be_had_at_any_time(bed):
     assert isinstance(bed, Bed)
 
 
+@pytest.mark.long
 def test_taps_leave_grains_that_stick_as_they_were_densest(tmp_path, monkeypatch):
     """Full taps throw such a bed up, and lumps come down; then softer ones go on from the best. Stopped in between."""
     monkeypatch.setattr("dem.prepare.stages._TELLING_TAPS", 2)

@@ -37,6 +37,7 @@ def made(tmp_path_factory):
     return prepared, prepared.bed.state()
 
 
+@pytest.mark.long
 def test_grains_that_were_poured_dry_lie_densely_and_then_hang_on_the_floor(made):
     """Upside down under a tenth of g the bed falls by three and a half diameters if its contacts do not pull.
 

@@ -50,6 +50,7 @@ def layers():
     )  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("sleeps", [False, True])
 def test_grains_on_a_floor_under_bodies_turn_by_weight_floor_sides_sleepers_and_bodies(sleeps):
     """A ball that goes through the end of the periodic cell and a capsule that turns, both dug in; with sleep and

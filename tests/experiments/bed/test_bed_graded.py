@@ -30,6 +30,7 @@ def made(tmp_path_factory):
     return run
 
 
+@pytest.mark.long
 def test_a_graded_bed_is_made_told_of_and_refined(made):
     result = json.loads((made / "result.json").read_text())
     zones = next(t for t in result["tables"] if t["title"].startswith("Sizes by place"))["rows"]

@@ -40,6 +40,7 @@ def result_of(folder):
     return json.loads((folder / "result.json").read_text())
 
 
+@pytest.mark.long
 def test_a_tumble_on_grains_stands_beside_the_spring_damper_in_loads_sinkage_energy_and_pictures(
     runs, tmp_path, monkeypatch
 ):

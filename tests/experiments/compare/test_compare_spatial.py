@@ -68,6 +68,7 @@ def compared(runs, out, first, second, *more):
     return json.loads((out / "result.json").read_text())
 
 
+@pytest.mark.long
 def test_the_gaps_of_a_run_moved_by_a_known_amount_are_that_amount(runs, tmp_path):
     result = compared(runs, tmp_path / "out", "law", "moved", "--no-pictures")
     gaps = {name: entry["value"] for name, entry in result["quantities"].items()}

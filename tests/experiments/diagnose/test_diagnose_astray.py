@@ -56,6 +56,7 @@ def test_what_two_trials_of_six_show_is_no_affair_of_single_trials(made, moment)
     assert astray_in(gone(gone(made, "001", moment), "002", moment)) == ()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("beside_a_name", "said"), [(True, {"001", "007"}), (False, set())])
 def test_all_of_one_condition_in_three_may_part_at_a_touch_beside_a_name_and_not_without_one(
     moment, beside_a_name, said

@@ -68,6 +68,7 @@ def test_each_condition_is_left_out_once_and_replicates_together():
     assert folds_of(trials[:1]) == []
 
 
+@pytest.mark.long
 def test_two_effects_at_once_are_both_named_and_the_report_says_what_they_were_weighed_against():
     def both(z, v, top):
         left = 0.3 * top

@@ -37,6 +37,7 @@ def test_the_batch_keeps_its_published_tolerance_on_100_random_trials():
     assert_agreement([drawn(rng) for _ in range(100)])
 
 
+@pytest.mark.long
 def test_the_batch_keeps_its_published_tolerance_on_100_trials_with_random_effects():
     rng = np.random.default_rng(12)
     assert_agreement([drawn(rng, random_effects(rng)) for _ in range(100)])
