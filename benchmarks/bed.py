@@ -9,36 +9,29 @@ For quick trials, in the environment: HEDGEBED_BENCH_SIZES (as in "20000 100000"
 HEDGEBED_BENCH_STEPS (timed ones), HEDGEBED_BENCH_SHOWN=0 (nothing that is only shown).
 """
 
-from __future__ import annotations
-
 import os
 import statistics
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
-from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
-
-from rich.console import Console
+from typing import Any, Self
 
 from benchmarks.race import table
 from benchmarks.race.entrants import GRAVITY, TIME_STEP, WARM_STEPS, Entrant, Heat, Ours, Theirs
 from benchmarks.race.grains import BENCH, DIAMETER, SPREAD, Grains, coordination, prepare_grains, write_data
-from benchmarks.race.machine import count_cores, describe_machine
+from benchmarks.race.machine import busy, describe_machine, head, wide_console
 from benchmarks.race.peers import LAMMPS, LIGGGHTS, Peer, find_mpirun
-from experiments.runs.version import __version__
+from experiments.runs.memory import cores_there
+from experiments.runs.types import Json
 
 __all__ = ["Lane", "Settings", "pick_best", "run"]
 
-FORMAT = "hedgebed-bench/1"
 SKINS = (1e-4, 2e-4, 4e-4)  # of the peers' lists [m]
 _USUAL_SKIN = 2e-4  # for what is only shown [m]
 COORDINATION_BOUND, PACKING_BOUND = 0.01, 0.002  # the same work: this much off ours, at most [1]
 _CLOSE = 0.85  # a skin this near to the fastest stays in the race
-_BUSY = 0.5  # load per core at the start from which the machine is called busy
 # For the plan: grain-steps a second, and what settling takes.
 _EXPECTED_SPEED, _SETTLING_STEPS = 1e7, 40_000
 
@@ -53,22 +46,16 @@ class Settings:
     shown: bool = True
 
     @classmethod
-    def from_environment(cls) -> Settings:
+    def from_environment(cls) -> Self:
         """The defaults, or what HEDGEBED_BENCH_SIZES, _ROUNDS, _STEPS and _SHOWN say.
 
-        Raises:
-            ValueError: one of them is not a positive whole number (several for the sizes; 0 or 1 for the last).
+        Raises ValueError for one that is no positive whole number (several for the sizes; 0 or 1 for the last).
         """
         sizes, rounds, steps = _numbers("SIZES"), _numbers("ROUNDS", most=1), _numbers("STEPS", most=1)
         shown = os.environ.get("HEDGEBED_BENCH_SHOWN", "1")
         if shown not in ("0", "1"):
             raise ValueError(f"HEDGEBED_BENCH_SHOWN = {shown!r} must be 0 or 1")
-        return cls(
-            sizes=sizes or cls.sizes,
-            rounds=rounds[0] if rounds else cls.rounds,
-            steps=steps[0] if steps else None,
-            shown=shown == "1",
-        )
+        return cls(sizes or cls.sizes, *(rounds or (cls.rounds,)), *(steps or (None,)), shown == "1")
 
     def steps_for(self, count: int) -> int:
         """Timed steps of a bed of ``count`` grains."""
@@ -113,96 +100,65 @@ class Lane:
         except RuntimeError as problem:
             self.failure = str(problem)
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> Json:
         """What bench.json keeps of it."""
-        entrant, last = self.entrant, self.heats[-1] if self.heats else None
-        return {
-            "label": self.label,
-            "name": entrant.name,
-            "ours": entrant.ours,
-            "counted": entrant.counted,
-            "rolling": entrant.rolling,
-            "precision": entrant.precision,
-            "threads": entrant.threads,
-            "skin": entrant.skin,
+        heats = [asdict(heat) for heat in self.heats]
+        told = {key: getattr(self.entrant, key) for key in _TOLD}
+        return {"label": self.label} | told | {
             "speed": self.speed,
-            "heats": [
-                {key: value for key, value in asdict(heat).items() if key not in ("version", "command")}
-                for heat in self.heats
-            ],
-            "other_work": self.other_work,
-            "failure": self.failure,
-            "command": last.command if last else "",
-        }
+            "heats": [{k: v for k, v in heat.items() if k not in ("version", "command")} for heat in heats],
+            "other_work": self.other_work, "failure": self.failure, "command": heats[-1]["command"] if heats else "",
+        }  # fmt: skip
 
 
-def run(out: Path, *, progress: Any) -> dict[str, Any]:
-    """Race, show the table on stdout, and return what goes into bench.json.
+_TOLD = ("name", "ours", "counted", "rolling", "precision", "threads", "skin")
 
-    Args:
-        out: folder of bench.json; nothing else is written there.
-        progress: an ``experiments.runs.progress.Progress``.
 
-    Raises:
-        ValueError: a variable of the environment is wrong.
-        RuntimeError: our own bed failed.
+def run(out: Path, *, progress: Any) -> Json:
+    """Race, show the table on stdout, and return what goes into bench.json. Nothing is written to `out`.
+
+    `progress`: an ``experiments.runs.progress.Progress``. Raises ValueError for a wrong variable of the environment,
+    RuntimeError where our own bed failed.
     """
     settings = Settings.from_environment()
-    cores, load = count_cores(), os.getloadavg()[0]
+    cores, load = cores_there(), os.getloadavg()[0]
     peers, remarks = _find_peers()
-    if load > _BUSY * cores:
-        remarks.append(f"the machine was busy at the start (load {load:.1f} on {cores} cores): timings mean little")
+    remarks += busy(cores, load)
     for remark in remarks:
         progress.message(remark)
     progress.plan(dict(_plan(settings, with_peers=bool(peers))))
-    bench: dict[str, Any] = {
-        "format": FORMAT,
-        "what": "bed",
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "version": __version__,
+    bench = head("bed") | {
         "command": _command(),
         "machine": describe_machine(cores, load),
         "peers": {peer.name: None for peer in (LIGGGHTS, LAMMPS)},
         "unit": "grain steps per second",
         "rounds": settings.rounds,
         "case": {
-            "diameter": DIAMETER,
-            "spread": SPREAD,
+            "diameter": DIAMETER, "spread": SPREAD,
             "material": {key: value for key, value in asdict(BENCH).items() if key != "sources"},
-            "gravity": GRAVITY,
-            "time_step": TIME_STEP,
-            "warm_steps": WARM_STEPS,
+            "gravity": GRAVITY, "time_step": TIME_STEP, "warm_steps": WARM_STEPS,
         },
-        "ratios": {},
-        "beds": [],
-        "remarks": remarks,
-    }
+        "ratios": {}, "beds": [], "remarks": remarks,
+    }  # fmt: skip
     for count in settings.sizes:
         bed, lanes = _race(count, settings, peers, cores, progress)
         best = pick_best(lanes)
-        bed["best_peer"] = best.label if best else None
-        bed["entrants"] = [lane.as_dict() for lane in lanes]
-        bench["beds"].append(bed)
+        entrants = [lane.as_dict() for lane in lanes]
+        bench["beds"].append(bed | {"best_peer": best.label if best else None, "entrants": entrants})
         bench["ratios"][str(count)] = _ratio(lanes[0], best)
-        bench["peers"] |= {
-            lane.entrant.peer.name: lane.heats[-1].version
-            for lane in lanes
-            if isinstance(lane.entrant, Theirs) and lane.heats
-        }
+        ran = [(lane.entrant, lane.heats[-1]) for lane in lanes if lane.heats]
+        bench["peers"] |= {entrant.peer.name: heat.version for entrant, heat in ran if isinstance(entrant, Theirs)}
         remarks += [f"{count:,} grains: {remark}" for lane in lanes for remark in _remarks(lane)]
     progress.close()
-    table.show(bench, Console(width=None if sys.stdout.isatty() else 150, highlight=False))
+    table.show(bench, wide_console())
     return bench
 
 
 def _find_peers() -> tuple[list[Peer], list[str]]:
     """The peers that can race, and what is to be said of the others."""
     peers = [peer for peer in (LIGGGHTS, LAMMPS) if peer.find()]
-    remarks = [
-        f"{peer.name} is not installed and is left out (apt install {peer.package})"
-        for peer in (LIGGGHTS, LAMMPS)
-        if peer not in peers
-    ]
+    missing = [peer for peer in (LIGGGHTS, LAMMPS) if peer not in peers]
+    remarks = [f"{peer.name} is not installed and is left out (apt install {peer.package})" for peer in missing]
     if peers and not find_mpirun():
         names = " and ".join(peer.name for peer in peers)
         remarks.append(f"mpirun is not installed, so {names} cannot use all cores: left out (apt install openmpi-bin)")
@@ -214,55 +170,39 @@ def _plan(settings: Settings, *, with_peers: bool) -> Iterator[tuple[str, float]
     """Stages and what they are expected to take [s]."""
     for count in settings.sizes:
         heat = count * (WARM_STEPS + settings.steps_for(count)) / _EXPECTED_SPEED
-        yield _preparing(count), count * _SETTLING_STEPS / _EXPECTED_SPEED
+        yield f"{count:,} grains: bed", count * _SETTLING_STEPS / _EXPECTED_SPEED
         for k in range(1, settings.rounds + 1):
             first = 6 + 4 * settings.shown
-            yield _round(count, k), heat * (1 + with_peers * (first if k == 1 else 3))
+            yield f"{count:,} grains: round {k}", heat * (1 + with_peers * (first if k == 1 else 3))
         if settings.shown:
-            yield _alone(count), 3 * heat
+            yield f"{count:,} grains: float32, one thread", 3 * heat
 
 
-def _preparing(count: int) -> str:
-    return f"{count:,} grains: bed"
-
-
-def _round(count: int, k: int) -> str:
-    return f"{count:,} grains: round {k}"
-
-
-def _alone(count: int) -> str:
-    return f"{count:,} grains: float32, one thread"
-
-
-def _race(
-    count: int, settings: Settings, peers: list[Peer], cores: int, progress: Any
-) -> tuple[dict[str, Any], list[Lane]]:
+def _race(count: int, settings: Settings, peers: list[Peer], cores: int, progress: Any) -> tuple[Json, list[Lane]]:
     """Race on one bed: what is to be said of the bed, and the lanes, ours first."""
-    steps = settings.steps_for(count)
-    progress.stage(_preparing(count))
+    steps, of = settings.steps_for(count), f"{count:,} grains: "
+    progress.stage(f"{of}bed")
     began = time.perf_counter()
     grains = prepare_grains(count, threads=cores, progress=progress)
     preparation_time = time.perf_counter() - began
-    progress.message(f"{count:,} grains: the bed took {preparation_time:.0f} s (next to nothing where it was cached)")
+    progress.message(f"{of}the bed took {preparation_time:.0f} s (next to nothing where it was cached)")
     bed = {
-        "grain_count": count,
-        "steps": steps,
-        "period": grains.period,
-        "preparation_time": preparation_time,
+        "grain_count": count, "steps": steps, "period": grains.period, "preparation_time": preparation_time,
         "coordination_before": coordination(grains),
-    }
+    }  # fmt: skip
     ours = Lane(Ours(grains, threads=cores))
     with tempfile.TemporaryDirectory(prefix="hedgebed-bench-") as name:
         folder = Path(name)
         write_data(folder / "bed.data", grains)
-        racing = [Lane(entrant) for peer in peers for entrant in _counted(peer, grains, folder, cores)]
+        theirs = [Lane(entrant) for peer in peers for entrant in _theirs(peer, grains, folder, cores)]
+        racing = [lane for lane in theirs if lane.entrant.counted]
         rolling, shown = [], []
         if settings.shown:
             rolling = [Lane(Ours(grains, threads=cores, rolling=True))]
-            shown = [Lane(entrant) for peer in peers for entrant in _shown(peer, grains, folder, cores)]
+            shown = [lane for lane in theirs if not lane.entrant.counted]
         staying = [ours, *racing, *rolling, *shown]
         for k in range(1, settings.rounds + 1):
-            _heats(_round(count, k), staying, steps, progress)
+            _heats(f"{of}round {k}", staying, steps, progress)
             if ours.failure:
                 raise RuntimeError(f"our own bed did not get through the race: {ours.failure}")
             staying = [ours, *_leaders(racing)]
@@ -270,7 +210,7 @@ def _race(
     if settings.shown:
         # These start Taichi anew, which ends the beds of before.
         alone = [Lane(Ours(grains, threads=cores, precision="float32")), Lane(Ours(grains, threads=1))]
-        _heats(_alone(count), alone, steps, progress)
+        _heats(f"{of}float32, one thread", alone, steps, progress)
     _check_work(ours, [*alone, *racing, *(lane for lane in shown if not lane.entrant.rolling)])
     for lane in rolling:
         _check_work(lane, [lane for lane in shown if lane.entrant.rolling])
@@ -286,47 +226,28 @@ def _heats(stage: str, lanes: list[Lane], steps: int, progress: Any) -> None:
         progress.message(f"{lane.label}: {_outcome(lane)}")
 
 
-def _counted(peer: Peer, grains: Grains, folder: Path, ranks: int) -> Iterator[Theirs]:
-    """A peer's entrants that can be the best."""
-    law, variables = {
-        LIGGGHTS: ("hertz/history", {"roll": ""}),
-        LAMMPS: ("granular hertz/material", {"law": "material"}),
-    }[peer]
-    for skin in SKINS:
-        yield Theirs(
-            peer,
-            f"{peer.name} {law}",
-            grains,
-            folder=folder,
-            data="bed.data",
-            ranks=ranks,
-            skin=skin,
-            counted=True,
-            variables=variables,
-        )
+_LAWS = {
+    LIGGGHTS: (
+        ("hertz/history", False, {"roll": ""}),
+        ("hertz/history with rolling (epsd2)", True, {"roll": "rolling_friction epsd2"}),
+    ),
+    LAMMPS: (
+        ("granular hertz/material", False, {"law": "material"}),
+        ("gran/hertz/history", False, {"law": "history"}),
+        ("granular hertz/material with rolling (sds)", True, {"law": "rolling"}),
+    ),
+}
+"""Each peer's laws, whether they resist rolling, and variables of its deck; the first can be the best."""
 
 
-def _shown(peer: Peer, grains: Grains, folder: Path, ranks: int) -> Iterator[Theirs]:
-    """A peer's entrants that are shown beside."""
-    for law, rolling, variables in {
-        LIGGGHTS: [("hertz/history with rolling (epsd2)", True, {"roll": "rolling_friction epsd2"})],
-        LAMMPS: [
-            ("gran/hertz/history", False, {"law": "history"}),
-            ("granular hertz/material with rolling (sds)", True, {"law": "rolling"}),
-        ],
-    }[peer]:
-        yield Theirs(
-            peer,
-            f"{peer.name} {law}",
-            grains,
-            folder=folder,
-            data="bed.data",
-            ranks=ranks,
-            skin=_USUAL_SKIN,
-            counted=False,
-            rolling=rolling,
-            variables=variables,
-        )
+def _theirs(peer: Peer, grains: Grains, folder: Path, ranks: int) -> Iterator[Theirs]:
+    """A peer's entrants: those that can be the best, then those that are shown beside."""
+    for k, (law, rolling, variables) in enumerate(_LAWS[peer]):
+        for skin in (_USUAL_SKIN,) if k else SKINS:
+            yield Theirs(
+                peer, f"{peer.name} {law}", grains, folder=folder, data="bed.data", ranks=ranks, skin=skin,
+                counted=k == 0, rolling=rolling, variables=variables,
+            )  # fmt: skip
 
 
 def _leaders(racing: list[Lane]) -> list[Lane]:
@@ -358,12 +279,8 @@ def _check_work(ours: Lane, lanes: list[Lane]) -> None:
 
 def pick_best(lanes: list[Lane]) -> Lane | None:
     """The fastest of the peers that count and did the same work; None if there is none."""
-    fit = [
-        (lane.speed, k)
-        for k, lane in enumerate(lanes)
-        if lane.entrant.counted and lane.speed is not None and not lane.other_work
-    ]
-    return lanes[max(fit)[1]] if fit else None
+    fit = [lane for lane in lanes if lane.entrant.counted and lane.speed is not None and not lane.other_work]
+    return max(reversed(fit), key=lambda lane: lane.speed or 0.0, default=None)
 
 
 def _ratio(ours: Lane, best: Lane | None) -> float | None:

@@ -17,26 +17,25 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from datetime import UTC, datetime
 from functools import cache
 from multiprocessing import active_children, get_context
 from pathlib import Path
-from typing import Any
 
 from threadpoolctl import threadpool_limits
 
 from experiments.campaign import read_campaign, write_campaign
 from experiments.runs.progress import Progress
+from experiments.runs.types import Json
 
 from .baseline import methods as others
-from .diagnosis.records import CASES_FILE, read_cases
-from .diagnosis.table import show, summarise
+from .diagnosis.table import CASES_FILE, read_cases, show, summarise
 from .diagnosis.worker import answer, begin
 from .hidden.suite import KINDS, make_case, suite
+from .race.machine import now
 
 __all__ = ["continues", "digest", "read_cases", "run"]
 
-Ask = Callable[[str], dict[str, Any]]
+Ask = Callable[[str], Json]
 _ROOT = Path(__file__).resolve().parent.parent
 _CODE = {
     "code": ("experiments/diagnose", "experiments/campaign", "rigid"),
@@ -50,7 +49,7 @@ _SEVERAL = {"both": ("penetration", "tumble"), "all": KINDS}
 def run(
     out: Path, *, progress: Progress, kind: str = "both", count: int = 40, seed: int = 1, only: str = "",
     trials: int = 0, baselines: str = "yes", ask: Ask | None = None,
-) -> dict[str, Any]:  # fmt: skip
+) -> Json:  # fmt: skip
     """Make, diagnose and count.
 
     Args:
@@ -96,9 +95,9 @@ def run(
                     file.write(json.dumps(record) + "\n")
                 progress.message(_line(record))
                 progress.update(number)
-    result: dict[str, Any] = {"format": "hedgebed-bench/1", "what": "diagnose", "seed": seed, "count": count}
+    result: Json = {"format": "hedgebed-bench/1", "what": "diagnose", "seed": seed, "count": count}
     made_by = " ".join(sorted({digest(_maker(one)) for one in kinds}))
-    result |= {"date": _now(), "code": digest("code"), "suite": made_by, "baselines": missing or baselines}
+    result |= {"date": now(), "code": digest("code"), "suite": made_by, "baselines": missing or baselines}
     for one, cases in plans.items():
         result[one] = summarise([done[_key({"kind": one, "case": case})] for case in cases])
         show(one, result[one])
@@ -133,13 +132,12 @@ def digest(what: str) -> str:
 def _bare(source: str) -> str:
     tree = ast.parse(source)
     for node in ast.walk(tree):
-        body = getattr(node, "body", None)
-        if isinstance(body, list):  # strings that stand alone are docstrings
+        if isinstance(body := vars(node).get("body"), list):  # strings that stand alone are docstrings
             node.body = [one for one in body if not (isinstance(one, ast.Expr) and isinstance(one.value, ast.Constant))]  # type: ignore[attr-defined]
     return ast.dump(tree)
 
 
-def _one(kind: str, case: dict[str, Any], ask: Ask, before: dict[str, Any] | None, wanted: bool) -> dict[str, Any]:
+def _one(kind: str, case: Json, ask: Ask, before: Json | None, wanted: bool) -> Json:
     """One record; `before` is one that lacks the baselines only."""
     campaign, hidden = make_case(kind, case)
     record = before
@@ -149,7 +147,7 @@ def _one(kind: str, case: dict[str, Any], ask: Ask, before: dict[str, Any] | Non
         campaign = read_campaign(folder)  # in the format's units
     if record is None:
         record = {
-            "kind": kind, "case": case, "date": _now(), "code": digest("code"), "suite": digest(_maker(kind)),
+            "kind": kind, "case": case, "date": now(), "code": digest("code"), "suite": digest(_maker(kind)),
             "truth": list(hidden.effects), "outside": hidden.outside, "signature": float(hidden.signature),
             "true_parameters": hidden.parameters if kind == "tumble" else {}, "coloured": bool(hidden.coloured),
             "trials": len(campaign.tables.trial), **({"hidden": hidden.extra} if kind == "rig" else {}),
@@ -161,7 +159,7 @@ def _one(kind: str, case: dict[str, Any], ask: Ask, before: dict[str, Any] | Non
     return record
 
 
-def _finished(record: dict[str, Any] | None, wanted: bool) -> bool:
+def _finished(record: Json | None, wanted: bool) -> bool:
     if record is None:
         return False
     tried = record.get("baselines", {}).get("code") == digest("baselines")
@@ -173,19 +171,15 @@ def _maker(kind: str) -> str:
     return "rig" if kind == "rig" else "suite"
 
 
-def _current(record: dict[str, Any]) -> bool:
+def _current(record: Json) -> bool:
     return record.get("code") == digest("code") and record.get("suite") == digest(_maker(record["kind"]))
 
 
-def _key(record: dict[str, Any]) -> str:
+def _key(record: Json) -> str:
     return json.dumps([record["kind"], record["case"]], sort_keys=True)
 
 
-def _now() -> str:
-    return datetime.now(UTC).isoformat(timespec="seconds")
-
-
-def _line(record: dict[str, Any]) -> str:
+def _line(record: Json) -> str:
     truth = " + ".join(record["truth"]) or record["outside"] or "nothing"
     said = " + ".join(record["effects"]) + "".join(f" or {name}" for name in record["alternatives"])
     return (
@@ -202,7 +196,7 @@ def _asking(ask: Ask | None) -> Iterator[Ask]:
         return
     pools: list[ProcessPoolExecutor] = []
 
-    def asked(folder: str) -> dict[str, Any]:
+    def asked(folder: str) -> Json:
         if not pools:
             pools.append(ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=begin))
         try:

@@ -9,24 +9,20 @@ third as many with all terms on). What agreement means is in ``benchmarks/planar
 
 import os
 import statistics
-import sys
 import time
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from benchmarks.planar_trials.agreement import CHANNELS, SHARE_WITHIN, TOLERANCE, compare, random_trial
-from benchmarks.race.machine import count_cores, describe_machine
-from experiments.runs.version import __version__
+from benchmarks.race.machine import busy, column_table, describe_machine, head, wide_console
+from experiments.runs.memory import cores_there
+from experiments.runs.types import Json
 from rigid import Effect, Trial, simulate_batch
 
 __all__ = ["Settings", "drawn_trials", "run"]
 
-FORMAT = "hedgebed-bench/1"
 DURATION, TIME_STEP = 1.0, 1e-3
 GRAVITY = 9.80665
 AMPLITUDES = {
@@ -64,9 +60,11 @@ class Settings:
     """Numbers of trials and rounds. Raises ValueError where the environment holds no positive whole number."""
 
     def __init__(self) -> None:
-        self.trials = _number("TRIALS", 20_000)
-        self.rounds = _number("ROUNDS", 5)
-        self.compared = _number("COMPARED", 1000)
+        self.trials, self.rounds, self.compared = (
+            _number("TRIALS", 20_000),
+            _number("ROUNDS", 5),
+            _number("COMPARED", 1000),
+        )
 
 
 def _number(name: str, default: int) -> int:
@@ -116,33 +114,24 @@ def _timed(base: Trial, vary: dict[str, np.ndarray], rounds: int) -> tuple[list[
     return speeds, compiling, statistics.median(busy)
 
 
-def _agreement(count: int, *, all_terms: bool) -> dict[str, Any]:
+def _agreement(count: int, *, all_terms: bool) -> Json:
     """How near `count` random trials come to the accurate integrator (see `benchmarks.planar_trials.agreement`)."""
     rng = np.random.default_rng(2026)
     effects = tuple(AMPLITUDES) if all_terms else ()
     return compare([random_trial(rng, effects, AMPLITUDES) for _ in range(count)]).summary()
 
 
-def run(out: Path, *, progress: Any) -> dict[str, Any]:
-    """Time the batch and compare it; show the table; return what goes into bench.json.
+def run(out: Path, *, progress: Any) -> Json:
+    """Time the batch and compare it; show the table; return what goes into bench.json. Nothing is written to `out`.
 
-    Args:
-        out: folder of bench.json; nothing else is written there.
-        progress: an ``experiments.runs.progress.Progress``.
-
-    Raises:
-        ValueError: a variable of the environment is wrong.
-        RuntimeError: the batch failed.
+    `progress`: an ``experiments.runs.progress.Progress``. Raises ValueError for a wrong variable of the environment,
+    RuntimeError where the batch failed.
     """
     settings = Settings()
-    cores, load = count_cores(), os.getloadavg()[0]
-    if load > 0.5 * cores:
-        progress.message(f"the machine was busy at the start (load {load:.1f} on {cores} cores): timings mean little")
-    bench: dict[str, Any] = {
-        "format": FORMAT,
-        "what": "planar",
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "version": __version__,
+    cores, load = cores_there(), os.getloadavg()[0]
+    for remark in busy(cores, load):
+        progress.message(remark)
+    bench = head("planar") | {
         "machine": describe_machine(cores, load),
         "unit": "trials of 1 s at 1 ms a second",
         "trials": settings.trials,
@@ -174,11 +163,20 @@ def run(out: Path, *, progress: Any) -> dict[str, Any]:
     return bench
 
 
-def _show(bench: dict[str, Any]) -> None:
+def _show(bench: Json) -> None:
     cores = bench["machine"]["cores"]
-    table = Table(title=f"planar: trials of {DURATION:g} s at {1e3 * TIME_STEP:g} ms, {cores} cores")
-    for column in ("terms", "trials/s", "slowest - fastest", "by processor time", "first call [s]", "accurate [ms]"):
-        table.add_column(column, justify="right")
+    table = column_table(
+        ("terms", "trials/s", "slowest - fastest", "by processor time", "first call [s]", "accurate [ms]"),
+        title=f"planar: trials of {DURATION:g} s at {1e3 * TIME_STEP:g} ms, {cores} cores",
+    )
+    near = column_table(
+        ("terms", *CHANNELS), left=("terms",),
+        title="difference to the accurate integrator within a trial: median, 99 %, largest",
+    )  # fmt: skip
+    why = column_table(
+        ("terms", "within", "second order", "branch", "unexplained", "largest over tolerance, no branch"),
+        title=f"random trials by agreement: {100 * SHARE_WITHIN:g} % or more are to be within the tolerance",
+    )
     for name, part in bench["sets"].items():
         table.add_row(
             name,
@@ -188,31 +186,14 @@ def _show(bench: dict[str, Any]) -> None:
             f"{part['first_call_s']:.1f}",
             f"{1e3 * part['agreement']['seconds_per_accurate_trial']:.0f}",
         )
-    near = Table(title="difference to the accurate integrator within a trial: median, 99 %, largest")
-    near.add_column("terms")
-    for channel in CHANNELS:
-        near.add_column(channel, justify="right")
-    why = Table(title=f"random trials by agreement: {100 * SHARE_WITHIN:g} % or more are to be within the tolerance")
-    for column in ("terms", "within", "second order", "branch", "unexplained", "largest over tolerance, no branch"):
-        why.add_column(column, justify="right")
-    for name, part in bench["sets"].items():
         agreement = part["agreement"]
-        near.add_row(
-            f"{name} ({agreement['trials']})",
-            *(
-                f"{found['median']:.0e} {found['quantile_99']:.0e} {found['largest']:.0e}"
-                for found in agreement["differences"].values()
-            ),
-        )
-        counts = agreement["counts"].values()
-        why.add_row(
-            name,
-            *(f"{count} ({100 * count / agreement['trials']:.1f} %)" for count in counts),
-            f"{agreement['largest_over_tolerance_no_branch']:.1f}",
-        )
+        differences = agreement["differences"].values()
+        apart = (f"{one['median']:.0e} {one['quantile_99']:.0e} {one['largest']:.0e}" for one in differences)
+        near.add_row(f"{name} ({agreement['trials']})", *apart)
+        shares = (f"{count} ({100 * count / agreement['trials']:.1f} %)" for count in agreement["counts"].values())
+        why.add_row(name, *shares, f"{agreement['largest_over_tolerance_no_branch']:.1f}")
     near.add_section()
     near.add_row("tolerance", *(f"{limit:.1e}" for limit in TOLERANCE.values()))
-    console = Console(width=None if sys.stdout.isatty() else 150, highlight=False)
-    console.print(table)
-    console.print(near)
-    console.print(why)
+    console = wide_console()
+    for one in (table, near, why):
+        console.print(one)

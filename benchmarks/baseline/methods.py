@@ -77,8 +77,8 @@ def try_all(
         fitted: trials to learn from.
         held_out: trials to be predicted.
     """
-    kind = campaign.tables.kind
-    problem = import_module(f"experiments.diagnose.{kind}_problem").make_problem(campaign)
+    package = "push" if campaign.tables.kind == "penetration" else "tumble"
+    problem = import_module(f"experiments.diagnose.{package}.problem").make_problem(campaign)
     rows = make_rows(problem, values, fitted)
     before = {"fit": None, "held_out": held_out_gap(problem, values, held_out, None)}
     told = {}

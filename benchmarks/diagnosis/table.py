@@ -5,18 +5,20 @@ import math
 import sys
 from collections import defaultdict
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
-from .records import read_cases
+from benchmarks.race.machine import column_table
+from experiments.runs.types import Json
 
-__all__ = ["show", "summarise"]
+__all__ = ["CASES_FILE", "read_cases", "show", "summarise"]
 
-Case = dict[str, Any]
+CASES_FILE = "cases.jsonl"
+Case = Json
 _BINS = ((0.0, 1.0), (1.0, 3.0), (3.0, 10.0), (10.0, math.inf))
 _PLAIN = 10.0
 _GAP = 1.5
@@ -24,7 +26,24 @@ _GAP = 1.5
 _NINETY_FIVE = 1.96
 
 
-def summarise(cases: Sequence[Case]) -> dict[str, Any]:
+def read_cases(out: Path) -> list[Case]:
+    """The records in a folder's cases.jsonl, the latest last; none where there is no such file.
+
+    Raises ValueError, naming file and line, for a line that is no record; a last line that was cut short is left out.
+    """
+    path = out / CASES_FILE
+    lines = path.read_text(encoding="utf-8").split("\n") if path.is_file() else []
+    found = []
+    for number, line in enumerate(lines, 1):
+        try:
+            found += [json.loads(line)] if line.strip() else []
+        except ValueError as error:
+            if number < len(lines):  # the last has no end of line: the process ended while it wrote
+                raise ValueError(f"{path}, line {number}: {error}; a record of a case was expected") from None
+    return found
+
+
+def summarise(cases: Sequence[Case]) -> Json:
     """The figures of the aims from single cases; a share is {"share", "of"}, its share None where there was no case."""
     nulls = [c for c in cases if not c["truth"] and not c["outside"]]
     single = [c for c in cases if len(c["truth"]) == 1 and not c["outside"]]
@@ -42,7 +61,7 @@ def summarise(cases: Sequence[Case]) -> dict[str, Any]:
         "named_right_plain": _share(plain, _right),
         "named_right_when_visible": _share(seen, _right),
         "missed_when_visible": _share(seen, lambda c: c["verdict"] == "none"),
-        "called_unknown_when_plain": _share(plain, lambda c: c["verdict"] == "unknown"),
+        "called_unknown_when_plain": _share(plain, _unknown),
         "top1_by_effect": _by_effect(single),
         "sets_hold_truth": _share(named, _holds),
         "ambiguous_sets_hold_truth": _share(ambiguous, _holds),
@@ -50,10 +69,8 @@ def summarise(cases: Sequence[Case]) -> dict[str, Any]:
         "pairs_both_named": _share(pairs, lambda c: set(c["truth"]) == set(c["effects"])),
         "pairs_one_named": _share(pairs, lambda c: bool(set(c["truth"]) & set(c["effects"]))),
         "pairs_something_false": _share(pairs, lambda c: bool(set(c["effects"]) - set(c["truth"]))),
-        "unknown_recall": _share(outside, lambda c: c["verdict"] == "unknown"),
-        "unknown_recall_when_visible": _share(
-            [c for c in outside if c["signature"] >= 1], lambda c: c["verdict"] == "unknown"
-        ),
+        "unknown_recall": _share(outside, _unknown),
+        "unknown_recall_when_visible": _share([c for c in outside if c["signature"] >= 1], _unknown),
         "parameters": _parameters(right),
         "held_out_at_most_1_2": _share(right, lambda c: _after(c) <= 1.2),
         "held_out_at_most_1_2_times_what_the_truth_leaves": _share(
@@ -71,6 +88,10 @@ def _right(case: Case) -> bool:
     return case["verdict"] in ("named", "ambiguous") and case["effects"] == case["truth"]
 
 
+def _unknown(case: Case) -> bool:
+    return case["verdict"] == "unknown"
+
+
 def _holds(case: Case) -> bool:
     return case["truth"][0] in {*case["effects"], *case["alternatives"]}
 
@@ -84,7 +105,7 @@ def _by_truth(case: Case) -> float | None:
     return float(sum(total for total, _ in rows) / max(1, sum(count for _, count in rows)))
 
 
-def _gap(told: dict[str, Any] | None) -> float:
+def _gap(told: Json | None) -> float:
     """Of the held-out trials, or of the fitted ones where none are held out; nan where there is none."""
     if told is None:
         return math.nan
@@ -96,12 +117,12 @@ def _after(case: Case) -> float:
     return _gap(case.get("after"))
 
 
-def _closed(before: dict[str, Any] | None, after: dict[str, Any] | None) -> float:
+def _closed(before: Json | None, after: Json | None) -> float:
     """Share of chi-square beyond the noise that is gone: 1 all, 0 nothing, below 0 worse than before."""
     return 1 - (_gap(after) - 1) / (_gap(before) - 1)
 
 
-def _by_effect(single: Sequence[Case]) -> dict[str, dict[str, Any]]:
+def _by_effect(single: Sequence[Case]) -> dict[str, Json]:
     found: dict[str, dict[str, list[Case]]] = defaultdict(lambda: defaultdict(list))
     for case in single:
         low, high = next(edges for edges in _BINS if edges[0] <= case["signature"] < edges[1])
@@ -109,7 +130,7 @@ def _by_effect(single: Sequence[Case]) -> dict[str, dict[str, Any]]:
     return {effect: {label: _share(own, _right) for label, own in bins.items()} for effect, bins in found.items()}
 
 
-def _parameters(right: Sequence[Case]) -> dict[str, Any]:
+def _parameters(right: Sequence[Case]) -> Json:
     """How far the parameters with fixed names are off, and how often their 95 % intervals hold the truth."""
     rows: dict[str, list[tuple[float, float]]] = defaultdict(list)
     for case in right:
@@ -120,65 +141,55 @@ def _parameters(right: Sequence[Case]) -> dict[str, Any]:
                 away = abs(said["value"] - true)
                 size = abs(true - 1) if name == "camera-scale.scale" else abs(true)
                 rows[name].append((away / max(size, 1e-12), away / max(said["std"], 1e-300)))
-    pooled = [row for own in rows.values() for row in own]
-    told: dict[str, Any] = {
-        "intervals_hold_truth": _share(pooled, lambda row: row[1] <= _NINETY_FIVE),
-        "median_relative_error": _median([row[0] for row in pooled]),
-        "by_name": {name: {"median_relative_error": _median([row[0] for row in own]),
-                           "intervals_hold_truth": _share(own, lambda row: row[1] <= _NINETY_FIVE)}
-                    for name, own in sorted(rows.items())},
-    }  # fmt: skip
-    return told
+
+    def told(own: Sequence[tuple[float, float]]) -> Json:
+        error = _median([row[0] for row in own])
+        return {"median_relative_error": error, "intervals_hold_truth": _share(own, lambda row: row[1] <= _NINETY_FIVE)}
+
+    pooled = told([row for own in rows.values() for row in own])
+    return dict(reversed(pooled.items())) | {"by_name": {name: told(own) for name, own in sorted(rows.items())}}
 
 
-def _baselines(cases: Sequence[Case]) -> dict[str, Any]:
+def _baselines(cases: Sequence[Case]) -> Json:
     """The same figures for those that ran beside, and ours on the very same cases."""
     tried = [c for c in cases if "baselines" in c]
     names = sorted({name for c in tried for name in c["baselines"] if name != "code"})
-    told: dict[str, Any] = {}
-    for name in ("ours", *names) if tried else ():
-        own = [c for c in tried if name == "ours" or name in c["baselines"]]
-        nulls = [c for c in own if not c["truth"] and not c["outside"]]
-        seen = [c for c in own if (c["truth"] or c["outside"]) and c["signature"] >= 1]
-        single = [c for c in seen if len(c["truth"]) == 1]
+    return {name: _baseline(name, tried) for name in ("ours", *names)} if tried else {}
 
-        def alarm(case: Case, name: str = name) -> bool:
-            return case["verdict"] != "none" if name == "ours" else case["baselines"][name]["alarm"]
 
-        def closed(case: Case, name: str = name) -> float:
-            said = case if name == "ours" else case["baselines"][name]
-            return _closed(said["before"], said["after"])
+def _baseline(name: str, tried: Sequence[Case]) -> Json:
+    """The figures of one of them: of each case, and what it says of it."""
+    own = [(c, c if name == "ours" else c["baselines"][name]) for c in tried if name in ("ours", *c["baselines"])]
+    nulls = [said for c, said in own if not c["truth"] and not c["outside"]]
+    seen = [(c, said) for c, said in own if (c["truth"] or c["outside"]) and c["signature"] >= 1]
+    single = [(c, said) for c, said in seen if len(c["truth"]) == 1]
+    wide = [said for c, said in seen if _gap(c["before"]) > _GAP]
+    points = [c["truth"][0] in said["points_to"] for c, said in single if "points_to" in said]
+    shut = [_closed(said["before"], said["after"]) for said in wide]
 
-        wide = [c for c in seen if _gap(c["before"]) > _GAP]
-        points = [c for c in single if name != "ours" and "points_to" in c["baselines"][name]]
-        told[name] = {
-            "cases": len(own),
-            "false_alarms": _share(nulls, alarm),
-            "alarm_when_visible": _share(seen, alarm),
-            "names_right": _share(single, _right) if name == "ours" else _share(
-                points, lambda c, name=name: c["truth"][0] in c["baselines"][name]["points_to"]),
-            "median_gap_closed": _median([closed(c) for c in wide]),
-            "gap_closed_by_half": _share(wide, lambda c, closed=closed: closed(c) >= 0.5),
-            "held_out_at_most_1_2": _share(wide, lambda c, name=name: _gap(
-                c["after"] if name == "ours" else c["baselines"][name]["after"]) <= 1.2),
-            "median_seconds": _median(
-                [c["seconds"] if name == "ours" else c["baselines"][name]["seconds"] for c in own]),
-        }  # fmt: skip
-    return told
+    def alarm(said: Json) -> bool:
+        return said["alarm"] if "alarm" in said else said["verdict"] != "none"
+
+    return {
+        "cases": len(own),
+        "false_alarms": _share(nulls, alarm),
+        "alarm_when_visible": _share([said for _, said in seen], alarm),
+        "names_right": _share([_right(c) for c, _ in single] if name == "ours" else points, bool),
+        "median_gap_closed": _median(shut),
+        "gap_closed_by_half": _share(shut, lambda share: share >= 0.5),
+        "held_out_at_most_1_2": _share(wide, lambda said: _gap(said["after"]) <= 1.2),
+        "median_seconds": _median([said["seconds"] for _, said in own]),
+    }
 
 
 def _seconds(cases: Sequence[Case]) -> dict[str, float | None]:
     usual = [c for c in cases if c["trials"] == 8]
     return {
-        f"{what}_{which}{end}": (_median if which == "median" else _most)([float(c[key]) for c in own])
+        f"{what}_{which}{end}": of([float(c[key]) for c in own])
         for own, end in ((cases, ""), (usual, "_of_8_trials"))
         for what, key in (("wall", "seconds"), ("cpu", "cpu"))
-        for which in ("median", "most")
+        for which, of in (("median", _median), ("most", partial(max, default=None)))
     }
-
-
-def _most(values: Sequence[float]) -> float | None:
-    return max(values, default=None)
 
 
 def _median(values: Sequence[float]) -> float | None:
@@ -189,62 +200,45 @@ def _median(values: Sequence[float]) -> float | None:
     return found if math.isfinite(found) else None
 
 
-def _share(of: Sequence[Any], flag: Callable[[Any], bool]) -> dict[str, Any]:
+def _share(of: Sequence[Any], flag: Callable[[Any], bool]) -> Json:
     return {"share": float(np.mean([bool(flag(one)) for one in of])) if of else None, "of": len(of)}
 
 
 # Shown ----------------------------------------------------------------------------------------------------------------
 
 
-def show(kind: str, summary: dict[str, Any]) -> None:
+def show(kind: str, summary: Json) -> None:
     """Print the table of one kind of trial."""
-    table = Table(title=f"diagnose, {kind}: {summary['cases']} campaigns", title_justify="left", box=None)
-    table.add_column("figure")
-    table.add_column("value", justify="right")
-    table.add_column("of", justify="right")
-    for name, value in _rows(summary):
-        _row(table, name, value)
-    console = Console()
-    console.print(table, markup=False)
-    if summary["baselines"]:
-        console.print(_beside(summary["baselines"]), markup=False)
+    _print(f"diagnose, {kind}: {summary['cases']} campaigns", ("figure", "value", "of"),
+           [(name, *_shown(value)) for name, value in _rows(summary)])  # fmt: skip
+    if told := summary["baselines"]:
+        cells = {figure: [_shown(own[figure]) for own in told.values()] for figure in next(iter(told.values()))}
+        rows = [(key, *(f"{shown} of {of}" if of else shown for shown, of in row)) for key, row in cells.items()]
+        _print("beside the baselines, on the same campaigns", ("figure", *told), rows)
 
 
-def _rows(summary: dict[str, Any]) -> list[tuple[str, Any]]:
-    rows = [(name, value) for name, value in summary.items()
-            if name not in ("cases", "top1_by_effect", "parameters", "baselines", "seconds")]  # fmt: skip
+def _print(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    table = column_table(columns, left=("figure",), title=title, title_justify="left", box=None)
+    for name, *cells in rows:
+        table.add_row(name.replace("_", " "), *cells)
+    Console().print(table, markup=False)
+
+
+def _rows(summary: Json) -> list[tuple[str, Any]]:
+    apart = ("cases", "top1_by_effect", "parameters", "baselines", "seconds")
+    rows = [(name, value) for name, value in summary.items() if name not in apart]
     told = summary["parameters"]
     rows += [(f"parameters, {name}", told[name]) for name in ("median_relative_error", "intervals_hold_truth")]
-    for name, own in told["by_name"].items():
-        rows += [(f"{name}, error", own["median_relative_error"])]
+    rows += [(f"{name}, error", own["median_relative_error"]) for name, own in told["by_name"].items()]
     for effect, bins in sorted(summary["top1_by_effect"].items()):
         rows += [(f"{effect}, signature {label}", share) for label, share in sorted(bins.items())]
     return rows + [(f"seconds, {name}", value) for name, value in summary["seconds"].items()]
-
-
-def _row(table: Table, name: str, value: Any) -> None:
-    shown, of = _shown(value)
-    table.add_row(name.replace("_", " "), shown, of)
 
 
 def _shown(value: Any) -> tuple[str, str]:
     if isinstance(value, dict):
         return ("-" if value["share"] is None else f"{100 * value['share']:.0f} %"), str(value["of"])
     return ("-" if value is None else f"{value:.3g}"), ""
-
-
-def _beside(told: dict[str, Any]) -> Table:
-    table = Table(title="beside the baselines, on the same campaigns", title_justify="left", box=None)
-    table.add_column("figure")
-    for name in told:
-        table.add_column(name, justify="right")
-    for figure in next(iter(told.values())):
-        cells = []
-        for own in told.values():
-            shown, of = _shown(own[figure])
-            cells.append(f"{shown} of {of}" if of else shown)
-        table.add_row(figure.replace("_", " "), *cells)
-    return table
 
 
 def main(folders: Sequence[str]) -> None:

@@ -7,7 +7,8 @@ import os
 import time
 import traceback
 from pathlib import Path
-from typing import Any
+
+from experiments.runs.types import Json
 
 __all__ = ["answer", "begin"]
 
@@ -17,7 +18,7 @@ def begin() -> None:
     os.dup2(2, 1)
 
 
-def answer(folder: str) -> dict[str, Any]:
+def answer(folder: str) -> Json:
     """What `hedgebed diagnose` says of the campaign in `folder`, as plain numbers and names.
 
     A diagnosis that fails is an answer too: its verdict is "failed", and `error` says why.
@@ -30,7 +31,7 @@ def answer(folder: str) -> dict[str, Any]:
     return told | {"seconds": time.monotonic() - began, "cpu": time.process_time() - spent}
 
 
-def _diagnosed(folder: str) -> dict[str, Any]:
+def _diagnosed(folder: str) -> Json:
     from experiments.diagnose.experiment import diagnose_campaign
 
     found = diagnose_campaign(Path(folder))

@@ -8,11 +8,11 @@ import time
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from benchmarks.race.grains import BENCH, Grains, coordination, packing, wrapped
 from benchmarks.race.peers import Peer, run_peer
 from dem import Bed
+from experiments.runs.types import Json
 
 __all__ = ["TIME_STEP", "WARM_STEPS", "Entrant", "Heat", "Ours", "Theirs"]
 
@@ -77,13 +77,10 @@ class Ours(Entrant):
 
     def __init__(self, grains: Grains, *, threads: int, precision: str = "float64", rolling: bool = False):
         self.name = "hedgebed with rolling" if rolling else "hedgebed"
-        self.precision = precision
-        self.rolling = rolling
-        self.threads = threads
-        self._grains = grains
+        self.precision, self.rolling, self.threads, self._grains = precision, rolling, threads, grains
         self._material = replace(BENCH, rolling_friction=ROLLING_FRICTION) if rolling else BENCH
         self._bed: Bed | None = None
-        self._state: dict[str, Any] = {}
+        self._state: Json = {}
 
     def heat(self, steps: int) -> Heat:
         bed = self._bed or self._warmed()
@@ -107,16 +104,10 @@ class Ours(Entrant):
         """The bed after its warm-up, with everything compiled."""
         grains = self._grains
         bed = Bed.from_grains(
-            self._material,
-            positions=grains.positions,
-            radii=grains.radii,
-            size=(*grains.period, float(grains.positions[:, 2].max())),
-            gravity=GRAVITY,
-            time_step=TIME_STEP,
-            tensile=True,
-            precision=self.precision,
+            self._material, positions=grains.positions, radii=grains.radii, gravity=GRAVITY, time_step=TIME_STEP,
+            size=(*grains.period, float(grains.positions[:, 2].max())), tensile=True, precision=self.precision,
             threads=self.threads,
-        )
+        )  # fmt: skip
         # Single steps and several at once are kernels of their own.
         bed.advance(WARM_STEPS - 1)
         bed.advance(1)
@@ -129,38 +120,18 @@ class Theirs(Entrant):
     """A peer with one law and one skin [m]. ``folder`` holds the bed, in the file ``data``."""
 
     def __init__(
-        self,
-        peer: Peer,
-        name: str,
-        grains: Grains,
-        *,
-        folder: Path,
-        data: str,
-        ranks: int,
-        skin: float,
-        counted: bool,
-        rolling: bool = False,
-        variables: dict[str, str],
-    ):
-        self.name = name
-        self.counted = counted
-        self.rolling = rolling
-        self.skin = skin
-        self.threads = ranks
-        self.peer = peer
-        self._grains = grains
-        self._folder = folder
+        self, peer: Peer, name: str, grains: Grains, *, folder: Path, data: str, ranks: int, skin: float, counted: bool,
+        rolling: bool = False, variables: dict[str, str],
+    ):  # fmt: skip
+        self.peer, self.name, self.counted, self.rolling = peer, name, counted, rolling
+        self.skin, self.threads, self._grains, self._folder = skin, ranks, grains, folder
         self._variables = {"in": data, "skin": f"{skin:g}", **variables}
 
     def heat(self, steps: int) -> Heat:
         work = self._grains.count * (WARM_STEPS + steps)
-        outcome, command = run_peer(
-            self.peer,
-            self._folder,
-            ranks=self.threads,
-            variables={**self._variables, "warm": str(WARM_STEPS), "steps": str(steps)},
-            limit=_START + work / (_SLOWEST * self.threads),
-        )
+        variables = {**self._variables, "warm": str(WARM_STEPS), "steps": str(steps)}
+        limit = _START + work / (_SLOWEST * self.threads)
+        outcome, command = run_peer(self.peer, self._folder, ranks=self.threads, variables=variables, limit=limit)
         if outcome.grain_count != self._grains.count or outcome.steps != steps:
             raise RuntimeError(
                 f"{self.name} ran {outcome.steps} steps of {outcome.grain_count} grains; "

@@ -14,16 +14,8 @@ from scipy.spatial import cKDTree
 from dem import Bed, Material
 
 __all__ = [
-    "BENCH",
-    "DIAMETER",
-    "SPREAD",
-    "Grains",
-    "coordination",
-    "packing",
-    "prepare_grains",
-    "wrapped",
-    "write_data",
-]
+    "BENCH", "DIAMETER", "SPREAD", "Grains", "coordination", "packing", "prepare_grains", "wrapped", "write_data",
+]  # fmt: skip
 
 BENCH = Material("bench", density=2600.0, young=5e7, poisson=0.3, friction=0.5, restitution=0.5)
 """What the peers' decks have as well."""
@@ -65,9 +57,7 @@ class Grains:
 def prepare_grains(count: int, *, threads: int | None = None, progress: Any = None) -> Grains:
     """Exactly ``count`` grains of a bed that ``Bed.prepare`` made or had in its cache: the lowest of slightly more.
 
-    Raises:
-        ValueError: fewer than 250 grains, too few for a bed.
-        RuntimeError: the bed that was rained in had too few grains.
+    Raises ValueError for fewer than 250 grains, RuntimeError where the bed that was rained in had too few.
     """
     if count < 250:
         raise ValueError(f"a bed of {count} grains is too small to race on; take at least 250")
@@ -77,16 +67,11 @@ def prepare_grains(count: int, *, threads: int | None = None, progress: Any = No
     depth = count * share / width**2
     for attempt in range(_TRIES):
         height = depth * (1 + _SURPLUS + _FURTHER * attempt)
+        size = tuple(round(DIAMETER * length, 6) for length in (width, width, height))
         bed = Bed.prepare(
-            BENCH,
-            size=tuple(round(DIAMETER * length, 6) for length in (width, width, height)),
-            grain=DIAMETER,
-            spread=SPREAD,
-            young=BENCH.young,
-            seed=SEED,
-            threads=threads,
+            BENCH, size=size, grain=DIAMETER, spread=SPREAD, young=BENCH.young, seed=SEED, threads=threads,
             progress=progress,
-        )
+        )  # fmt: skip
         if bed.grain_count >= count:
             break
     else:
@@ -119,15 +104,9 @@ def write_data(path: Path, grains: Grains) -> None:
     A row is id, type, diameter [m], density [kg/m3], x, y, z [m].
     """
     top = float((grains.positions[:, 2] + grains.radii).max()) + 2 * DIAMETER
-    lines = [
-        "settled bed of hedgebed\n",
-        f"{grains.count} atoms",
-        "1 atom types\n",
-        f"0 {grains.period[0]:.12g} xlo xhi",
-        f"0 {grains.period[1]:.12g} ylo yhi",
-        f"0 {top:.12g} zlo zhi\n",
-        "Atoms\n",
-    ]
+    lines = ["settled bed of hedgebed\n", f"{grains.count} atoms", "1 atom types\n"]
+    lines += [f"0 {x:.12g} {axis}lo {axis}hi" for axis, x in zip("xyz", (*grains.period, top), strict=True)]
+    lines += ["\nAtoms\n"]
     lines += [
         f"{k} 1 {2 * radius:.12g} {BENCH.density:.12g} {x:.12g} {y:.12g} {z:.12g}"
         for k, (radius, (x, y, z)) in enumerate(zip(grains.radii, grains.positions, strict=True), start=1)
@@ -151,9 +130,6 @@ def coordination(grains: Grains) -> float:
 def packing(volume: float, period: tuple[float, float], mean_height: float) -> float:
     """A packing fraction that needs no surface: solid over twice the space below the mean height of the centres [1].
 
-    Args:
-        volume: of solid [m3].
-        period: (x, y) [m].
-        mean_height: of the centres [m].
+    ``volume``: of solid [m3]. ``period``: (x, y) [m]. ``mean_height``: of the centres [m].
     """
     return volume / (period[0] * period[1] * 2 * mean_height)

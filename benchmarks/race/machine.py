@@ -1,20 +1,54 @@
-"""What a benchmark ran on."""
+"""What a benchmark ran on, and the head of its bench.json."""
 
-import os
 import platform
+import sys
+from collections.abc import Sequence
+from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-__all__ = ["count_cores", "describe_machine"]
+from rich.console import Console
+from rich.table import Table
+
+from experiments.runs.types import Json
+from experiments.runs.version import __version__
+
+__all__ = ["busy", "column_table", "describe_machine", "head", "now", "wide_console"]
+
+_BUSY = 0.5  # load per core at the start from which the machine is called busy
 
 
-def count_cores() -> int:
-    """The cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+def now() -> str:
+    """The date, to the second."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
 
 
-def describe_machine(cores: int, load: float) -> dict[str, Any]:
+def head(what: str) -> Json:
+    """What the bench.json of a timing begins with."""
+    return {"format": "hedgebed-bench/1", "what": what, "date": now(), "version": __version__}
+
+
+def busy(cores: int, load: float) -> list[str]:
+    """A remark that the machine was busy at the start; none where it was not."""
+    said = f"the machine was busy at the start (load {load:.1f} on {cores} cores): timings mean little"
+    return [said] if load > _BUSY * cores else []
+
+
+def column_table(columns: Sequence[str], *, left: Sequence[str] = (), **options: Any) -> Table:
+    """A table of these columns, to the right but for those named."""
+    table = Table(**options)
+    for column in columns:
+        table.add_column(column, justify="left" if column in left else "right")
+    return table
+
+
+def wide_console() -> Console:
+    """As wide as the terminal, or wide enough for a table in a file."""
+    return Console(width=None if sys.stdout.isatty() else 150, highlight=False)
+
+
+def describe_machine(cores: int, load: float) -> Json:
     """Processor, cores, load at the start, system and the versions under us."""
     return {
         "processor": _processor(),

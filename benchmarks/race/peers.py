@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from experiments.validate.base import peers as installed
+
 __all__ = ["LAMMPS", "LIGGGHTS", "Outcome", "Peer", "PeerError", "find_mpirun", "read_log", "run_peer"]
 
 _HERE = Path(__file__).resolve().parent
@@ -23,21 +25,13 @@ class PeerError(RuntimeError):
 
 
 @dataclass(frozen=True)
-class Peer:
-    """Another code: its name, what its program may be called, its Debian package, its deck in this folder."""
+class Peer(installed.Peer):
+    """The same with its deck in this folder."""
 
-    name: str
-    programs: tuple[str, ...]
-    package: str
     deck: str
 
-    def find(self) -> str | None:
-        """The program on the PATH, or None."""
-        return next((name for name in self.programs if shutil.which(name)), None)
 
-
-LIGGGHTS = Peer("LIGGGHTS", ("liggghts",), "liggghts", "bench.liggghts")
-LAMMPS = Peer("LAMMPS", ("lmp", "lammps"), "lammps", "bench.lammps")
+LIGGGHTS, LAMMPS = (Peer(**vars(peer), deck=f"bench.{key}") for key, peer in installed.PEERS.items())
 
 
 def find_mpirun() -> str | None:
@@ -82,8 +76,7 @@ _COLUMNS = 7
 def read_log(text: str) -> Outcome:
     """What a log of either code says of its last run.
 
-    Raises:
-        PeerError: there is no finished run in it, or a number is missing or is not a number.
+    Raises PeerError where there is no finished run in it, or a number is missing or is not a number.
     """
     loops = list(_LOOP.finditer(text))
     if len(loops) < 2:
@@ -102,17 +95,10 @@ def read_log(text: str) -> Outcome:
         raise PeerError(f"the log cannot be read: its last numbers are {' '.join(row)!r}")
     _, moving, turning, contacts, heights, lx, ly = numbers
     return Outcome(
-        version="unknown" if version is None else version[1] or version[2],
-        time=time,
-        steps=steps,
-        grain_count=count,
-        list_count=int(lists[1]),
-        missed=0 if missed is None else int(missed[1]),
-        kinetic_energy=moving + turning,
-        coordination=contacts / count,
-        mean_height=heights / count,
-        period=(lx, ly),
-    )
+        version="unknown" if version is None else version[1] or version[2], time=time, steps=steps, grain_count=count,
+        list_count=int(lists[1]), missed=0 if missed is None else int(missed[1]), kinetic_energy=moving + turning,
+        coordination=contacts / count, mean_height=heights / count, period=(lx, ly),
+    )  # fmt: skip
 
 
 def command_of(peer: Peer, program: str, *, ranks: int, variables: dict[str, str]) -> list[str]:
@@ -129,12 +115,8 @@ def run_peer(
 ) -> tuple[Outcome, list[str]]:
     """Run a peer's deck in ``folder``, which holds the bed, and return what came out and the command.
 
-    Args:
-        variables: of the deck; ``in`` is a file in ``folder``.
-        limit: the run is ended after so long [s].
-
-    Raises:
-        PeerError: the peer is not there, was ended, failed (with its last lines), or its log cannot be read.
+    ``variables``: of the deck; ``in`` is a file in ``folder``. ``limit``: the run is ended after so long [s]. Raises
+    PeerError where the peer is not there, was ended, failed (with its last lines), or its log cannot be read.
     """
     program = peer.find()
     if program is None:
@@ -154,16 +136,9 @@ def run_peer(
 def _call(command: Sequence[str], folder: Path, limit: float) -> tuple[str, int | None]:
     """Run a command; its output, and its status or None if it took too long. Whatever happens, it has ended after."""
     process = subprocess.Popen(
-        command,
-        cwd=folder,
-        env={**os.environ, **_ENVIRONMENT},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        errors="replace",
-        start_new_session=True,
-    )
+        command, cwd=folder, env={**os.environ, **_ENVIRONMENT}, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT, text=True, errors="replace", start_new_session=True,
+    )  # fmt: skip
     try:
         return process.communicate(timeout=limit)[0], process.returncode
     except BaseException as stop:

@@ -7,11 +7,12 @@ python -m benchmarks.race.table DIR/bench.json docs/performance.md  # puts it be
 import json
 import sys
 from pathlib import Path
-from typing import Any
 
 from rich import box
 from rich.console import Console
 from rich.table import Table
+
+from experiments.runs.types import Json
 
 __all__ = ["HEADINGS", "MARKS", "markdown", "rows", "show"]
 
@@ -25,18 +26,15 @@ MARKS = ("<!-- bench bed: begin -->", "<!-- bench bed: end -->")
 _NONE = "-"
 
 
-def rows(bed: dict[str, Any]) -> list[tuple[str, ...]]:
+def rows(bed: Json) -> list[tuple[str, ...]]:
     """The rows of one bed of bench.json, one for each entrant, in the order of HEADINGS."""
-    ours = bed["entrants"][0]["speed"]
-    return [_row(entrant, ours, bed["best_peer"]) for entrant in bed["entrants"]]
+    return [_row(entrant, bed["entrants"][0]["speed"], bed["best_peer"]) for entrant in bed["entrants"]]
 
 
-def _row(entrant: dict[str, Any], ours: float | None, best: str | None) -> tuple[str, ...]:
-    speed = entrant["speed"]
-    name = entrant["name"] + ("" if entrant["precision"] == "float64" else f" {entrant['precision']}")
-    last = entrant["heats"][-1] if entrant["heats"] else {}
+def _row(entrant: Json, ours: float | None, best: str | None) -> tuple[str, ...]:
+    speed, last = entrant["speed"], entrant["heats"][-1] if entrant["heats"] else {}
     return (
-        name,
+        entrant["name"] + ("" if entrant["precision"] == "float64" else f" {entrant['precision']}"),
         _NONE if entrant["skin"] is None else f"{1e3 * entrant['skin']:g}",
         str(entrant["threads"]),
         _NONE if speed is None else f"{1e-6 * speed:.2f}",
@@ -50,7 +48,7 @@ def _row(entrant: dict[str, Any], ours: float | None, best: str | None) -> tuple
     )
 
 
-def _remark(entrant: dict[str, Any], best: str | None) -> str:
+def _remark(entrant: Json, best: str | None) -> str:
     if entrant["failure"]:
         return "failed"
     if entrant["other_work"]:
@@ -60,13 +58,13 @@ def _remark(entrant: dict[str, Any], best: str | None) -> str:
     return "" if entrant["counted"] or entrant["ours"] else "shown, not counted"
 
 
-def _title(bed: dict[str, Any], bench: dict[str, Any]) -> str:
+def _title(bed: Json, bench: Json) -> str:
     ratio = bench["ratios"][str(bed["grain_count"])]
     verdict = "no peer to race against" if ratio is None else f"hedgebed / best peer = {ratio:.2f}"
     return f"{bed['grain_count']:,} grains, {bed['steps']} timed steps: {verdict}"
 
 
-def show(bench: dict[str, Any], console: Console) -> None:
+def show(bench: Json, console: Console) -> None:
     """Print a table for each bed, and what was left out or went wrong."""
     for bed in bench["beds"]:
         table = Table(title=_title(bed, bench), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
@@ -80,7 +78,7 @@ def show(bench: dict[str, Any], console: Console) -> None:
         console.print(f"- {remark}", markup=False, highlight=False)
 
 
-def markdown(bench: dict[str, Any]) -> str:
+def markdown(bench: Json) -> str:
     """The same in Markdown, with date, machine, versions and command."""
     machine = bench["machine"]
     peers = ", ".join(f"{name} {version}" for name, version in bench["peers"].items() if version)
