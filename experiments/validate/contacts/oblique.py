@@ -27,14 +27,8 @@ from .microslip import tangential_restitution
 from .words import say
 
 __all__ = [
-    "ANGLES",
-    "CASES",
-    "E_N",
-    "MU",
-    "STEP",
-    "oblique",
-    "plane_contact_time",
-]
+    "ANGLES", "CASES", "E_N", "MU", "STEP", "oblique", "plane_contact_time",
+]  # fmt: skip
 
 
 MU, E_N, SPEED = 0.092, 0.98, 3.9

@@ -148,7 +148,5 @@ def _own_step(tell: Tell) -> Outcome:
 
 
 CASES = {
-    "t3-restitution": _fine(False),
-    "restitution-tensile": _fine(True),
-    "restitution-own-step": _own_step,
-}
+    "t3-restitution": _fine(False), "restitution-tensile": _fine(True), "restitution-own-step": _own_step,
+}  # fmt: skip
