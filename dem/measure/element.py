@@ -212,9 +212,7 @@ def _touch(bed: BedCore, body: int, *, friction: float | None = None, adhesive: 
     """How grains touch one another, lid and floor: as the material says on rough walls, or all with this friction."""
     stuff = bed.material
     alike = Facing(
-        friction=friction,
-        rolling_friction=None if friction is None else 0.0,
-        surface_energy=None if adhesive else 0.0,
+        friction=friction, rolling_friction=None if friction is None else 0.0, surface_energy=None if adhesive else 0.0
     )
     rough = alike if friction is not None else replace(alike, friction=_ROUGH, rolling_friction=_ROUGH)
     bed.engine.grain_pair[None] = pair_row(stuff, replace(alike, young=stuff.young, poisson=stuff.poisson))

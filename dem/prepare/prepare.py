@@ -33,15 +33,7 @@ from .specification import (
     soft_enough,
 )
 
-__all__ = [
-    "bound_of_mean",
-    "cache_folder",
-    "check_options",
-    "fingerprint",
-    "prepare_as",
-    "prepare_bed",
-    "soft_enough",
-]
+__all__ = ["bound_of_mean", "cache_folder", "check_options", "fingerprint", "prepare_as", "prepare_bed", "soft_enough"]
 
 # More is rained in than is kept, for a level surface: this much higher, and at least this many diameters.
 _SURPLUS, _SURPLUS_DIAMETERS = 0.06, 2.0

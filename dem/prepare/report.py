@@ -71,12 +71,7 @@ class Prepared(Generic[B]):
 
 
 def measure_stage(
-    bed: BedCore,
-    stage: str,
-    *,
-    grain: float,
-    across: tuple[float, float] | None = None,
-    notes: Json | None = None,
+    bed: BedCore, stage: str, *, grain: float, across: tuple[float, float] | None = None, notes: Json | None = None
 ) -> StageReport:
     """The report of a bed as it is now; ``across``: profiles of this part of its width in x only [m]."""
     grains = bed.grains()
