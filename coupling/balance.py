@@ -26,17 +26,13 @@ class EnergyBalance:
 
     ground: Ground
     master: Master
-    _free: tuple[int, ...] = (0, 1, 2)
-    """Along which axes the body can move."""
-    _turns: tuple[int, ...] = (0, 1, 2)
-    """About which axes it can turn."""
+    _free: tuple[int, ...] = (0, 1, 2)  # Along which axes the body can move
+    _turns: tuple[int, ...] = (0, 1, 2)  # About which axes it can turn
 
     def _no_samples(self) -> None:
         self._samples: list[list[float]] = []
-        self.energy_names: tuple[str, ...] = ()
-        """What the ground's energies are, in the order of `samples`."""
-        self.work_names: tuple[str, ...] = ()
-        """Likewise of what a bed's contacts took (`Bed.contact_work`)."""
+        self.energy_names: tuple[str, ...] = ()  # What the ground's energies are, in the order of `samples`
+        self.work_names: tuple[str, ...] = ()  # Likewise of what a bed's contacts took (`Bed.contact_work`)
         self._momentum, self._angular_momentum = np.zeros(3), np.zeros(3)
         self._moment = np.zeros(3)
         """Angular impulse on the body from elsewhere than the ground since the balance began [N m s]."""

@@ -25,10 +25,8 @@ from .poses import Pose, Twist, Vector, chord_share, matrices
 
 __all__ = ["BedGround", "GrainBed", "LeftTheBedError"]
 
-AWAY = 100.0
-"""How far above the bed a body waits before it is placed, or when it is not in use [m]."""
-_placed: WeakKeyDictionary[Any, dict[Spike, int]] = WeakKeyDictionary()
-"""Bed -> spike -> number of its body."""
+AWAY = 100.0  # How far above the bed a body waits before it is placed, or when it is not in use [m]
+_placed: WeakKeyDictionary[Any, dict[Spike, int]] = WeakKeyDictionary()  # Bed -> spike -> number of its body
 
 
 @runtime_checkable
@@ -96,12 +94,10 @@ class BedGround:
     ) -> None:
         self.bed, self.copies, self.touch, self.bounded = bed, copies, touch, bounded
         self._begin, self._bounded_across = begin, bounded_across
-        self.spike = body if isinstance(body, Spike) else None
-        """The body, where it is a spike."""
+        self.spike = body if isinstance(body, Spike) else None  # The body, where it is a spike
         self.members = [spike_member(body)] if isinstance(body, Spike) else list(body)
         self._height = float(bed.surface)
-        self.origin = np.array([*origin, self._height])
-        """Where the body's (0, 0, 0) is in the bed [m], shape (3,)."""
+        self.origin = np.array([*origin, self._height])  # Where the body's (0, 0, 0) is in the bed [m], shape (3,)
         self.surface, self.centre, self.clearance = 0.0, (0.0, 0.0), 0.0
         self._slots = [
             [index for index, member in enumerate(self.members) if member.slot == slot]
@@ -117,17 +113,14 @@ class BedGround:
                 )
                 for indices in self._slots
             ]  # fmt: skip
-        self._used = [indices[0] for indices in self._slots]
-        """The member that each body stood for in the last step."""
+        self._used = [indices[0] for indices in self._slots]  # The member that each body stood for in the last step
         self._at = np.array([member.at for member in self.members])
         self._turns = np.array([member.turn for member in self.members])
         self._mass = float(bed.grains().mass.sum())
-        self.impulse = np.zeros(3)
-        """Of gravity and floor on the grains since the start [N s]."""
+        self.impulse = np.zeros(3)  # Of gravity and floor on the grains since the start [N s]
         self.drag_time = math.inf
         """Of a drag that calms the grains before time begins (`Bed.advance`) [s]; no energy balance has it."""
-        self.grain_steps = 0
-        """Grains computed since the start, summed over the bed's steps (fewer where grains sleep)."""
+        self.grain_steps = 0  # Grains computed since the start, summed over the bed's steps (fewer where grains sleep)
 
     def _put_in(self, spike: Spike, at: tuple[float, float] | None) -> int:
         """The body of the bed that is this spike; positions are the bed's own."""

@@ -30,12 +30,9 @@ __all__ = [
     "CREEP", "LINE", "TOUCH_SHARE", "WINDOW", "ContactReader", "changes_of", "feet_of", "in_a_line", "state_of",
 ]  # fmt: skip
 
-WINDOW = 5e-3
-"""Over which forces and speeds are averaged [s]."""
-TOUCH_SHARE = 0.01
-"""Force on a row that touches, over the weight [1]."""
-CREEP = 2e-3
-"""Horizontal speed up to which a row counts as held [m/s]."""
+WINDOW = 5e-3  # Over which forces and speeds are averaged [s]
+TOUCH_SHARE = 0.01  # Force on a row that touches, over the weight [1]
+CREEP = 2e-3  # Horizontal speed up to which a row counts as held [m/s]
 LINE = 0.05
 """Spikes lie in a line where none is farther off than this, over the largest distance of any from the centre [1]."""
 

@@ -26,14 +26,10 @@ from .bed_ground import BedGround
 
 __all__ = ["EFOLD", "NEAR", "LoweredGravity", "pace_under"]
 
-EFOLD = 1.0
-"""Time of an e-fold of the gravity [sqrt(d / g1)]."""
-LOOKS = 50
-"""Steps of the gravity in an e-fold: each makes new lists, and a large one shakes the bed."""
-DRAG = 0.3
-"""Time of the drag meanwhile [sqrt(d / g1)]."""
-NEAR = 0.01
-"""How far anything may still go [d]."""
+EFOLD = 1.0  # Time of an e-fold of the gravity [sqrt(d / g1)]
+LOOKS = 50  # Steps of the gravity in an e-fold: each makes new lists, and a large one shakes the bed
+DRAG = 0.3  # Time of the drag meanwhile [sqrt(d / g1)]
+NEAR = 0.01  # How far anything may still go [d]
 
 
 def pace_under(gravity: float) -> float:
@@ -54,18 +50,12 @@ class LoweredGravity:
             raise ValueError(f"settle_gravity is {self.first:g} m/s2: it must not be below that of the run, {last:g}")
         self.grain = ground.grain
         decay = EFOLD * math.sqrt(self.grain / self.first)
-        self.steps = math.ceil(LOOKS * math.log(self.first / last))
-        """Of the gravity, from the first to the last."""
-        self.every = decay / LOOKS
-        """Between two of them [s]."""
-        self.sees = min(math.sqrt(self.grain / last), duration)
-        """For how long what moves is watched [s]."""
-        self.begun: float | None = None
-        """Time at which it begins to fall [s]; None: not yet."""
-        self.done = 0
-        """Steps that have been made."""
-        self.dragged = False
-        """Whether the drag acts."""
+        self.steps = math.ceil(LOOKS * math.log(self.first / last))  # Of the gravity, from the first to the last
+        self.every = decay / LOOKS  # Between two of them [s]
+        self.sees = min(math.sqrt(self.grain / last), duration)  # For how long what moves is watched [s]
+        self.begun: float | None = None  # Time at which it begins to fall [s]; None: not yet
+        self.done = 0  # Steps that have been made
+        self.dragged = False  # Whether the drag acts
 
     @property
     def at_last(self) -> bool:

@@ -37,10 +37,8 @@ from .poses import Pose, Twist, Vector, Wrench
 
 __all__ = ["Body", "Exchange", "Master"]
 
-_WEIGHTS = ((1.0,), (2.0, -1.0), (3.0, -3.0, 1.0))
-"""Of the last wrenches, the newest first, by order of extrapolation."""
-_MOST_PAIRS = 6
-"""Repeats of a step that the next one is told from: as many as a wrench has components."""
+_WEIGHTS = ((1.0,), (2.0, -1.0), (3.0, -3.0, 1.0))  # Of the last wrenches, the newest first, by order of extrapolation
+_MOST_PAIRS = 6  # Repeats of a step that the next one is told from: as many as a wrench has components
 
 
 @runtime_checkable
@@ -80,16 +78,11 @@ class Exchange:
 
     given: float = 0.0
     """Work of the body on the ground, as the body sees it: by the mean of its rates before and after each step."""
-    taken: float = 0.0
-    """The same as the ground sees it: by the twist that was held."""
-    worst_guess: float = 0.0
-    """Largest |force guessed - force found| [N]."""
-    largest_force: float = 0.0
-    """Largest force of one step [N]."""
-    repeats: int = 0
-    """Steps of the ground beyond one a macro step."""
-    unsettled: int = 0
-    """Macro steps that were repeated as often as allowed and did not settle."""
+    taken: float = 0.0  # The same as the ground sees it: by the twist that was held
+    worst_guess: float = 0.0  # Largest |force guessed - force found| [N]
+    largest_force: float = 0.0  # Largest force of one step [N]
+    repeats: int = 0  # Steps of the ground beyond one a macro step
+    unsettled: int = 0  # Macro steps that were repeated as often as allowed and did not settle
 
 
 @dataclass(slots=True)
@@ -99,8 +92,7 @@ class _Piece:
     held: Twist
     reaction: Reaction
     wrench: Wrench = field(default_factory=Wrench.none)
-    before: Twist = field(default_factory=lambda: Twist(np.zeros(3), np.zeros(3)))
-    """Of the body, before the step and"""
+    before: Twist = field(default_factory=lambda: Twist(np.zeros(3), np.zeros(3)))  # Of the body, before the step and
     after: Twist = field(default_factory=lambda: Twist(np.zeros(3), np.zeros(3)))
 
 
@@ -146,17 +138,14 @@ class Master:
         self.macro_step = substeps * ground.time_step
         self.body_steps = body_steps
         self.extrapolation, self.iterations, self.tolerance = extrapolation, iterations, tolerance
-        self.count = 0
-        """Macro steps done."""
+        self.count = 0  # Macro steps done
         self._wrenches: deque[Wrench] = deque([first_guess] if first_guess is not None else [], maxlen=3)
         self._held: Twist | None = None
         self._learnt: list[tuple[Vector, Vector]] = []
         """How the wrench that came out changed with the one that went in, when a step was last repeated."""
         self.exchange = Exchange()
-        self.last: Reaction | None = None
-        """The ground's answer in the last step."""
-        self.wrench = Wrench.none()
-        """The whole wrench of the body's last step, friction included."""
+        self.last: Reaction | None = None  # The ground's answer in the last step
+        self.wrench = Wrench.none()  # The whole wrench of the body's last step, friction included
 
     books, footing = renamed("books", "exchange"), renamed("footing", "ground")
 

@@ -23,10 +23,8 @@ __all__ = [
     "FEWEST_SLOTS", "HULL", "Member", "ball_member", "platform_members", "slots_of", "spatial_members", "spike_member",
 ]  # fmt: skip
 
-HULL = -1
-"""Row number of what is no spike."""
-FEWEST_SLOTS = 3
-"""Bodies of the bed that rows share in turn, with which those that share one are far enough apart."""
+HULL = -1  # Row number of what is no spike
+FEWEST_SLOTS = 3  # Bodies of the bed that rows share in turn, with which those that share one are far enough apart
 STILL = np.array([1.0, 0.0, 0.0, 0.0])
 
 
@@ -34,22 +32,14 @@ STILL = np.array([1.0, 0.0, 0.0, 0.0])
 class Member:
     """One piece of the platform that grains can touch: a ball, or a rod with a round end at its lower end."""
 
-    row: int
-    """Of the planar model's rows; HULL for the hull."""
-    at: Vector
-    """Its origin in body axes [m], shape (3,)."""
-    turn: Vector
-    """Unit quaternion from its axes (z along the rod) to the body's, shape (4,)."""
-    radius: float
-    """[m]."""
-    length: float = 0.0
-    """Of the rod above its origin [m]; 0: a ball."""
-    below: float = 0.0
-    """Of the rod below its origin [m]; only where there is no ball."""
-    slot: int = 0
-    """The DEM body that stands for it: that of a slot is its lowest member."""
-    sections: tuple[Section, ...] = ()
-    """Of a spike of other shape, in place of ball and rod."""
+    row: int  # Of the planar model's rows; HULL for the hull
+    at: Vector  # Its origin in body axes [m], shape (3,)
+    turn: Vector  # Unit quaternion from its axes (z along the rod) to the body's, shape (4,)
+    radius: float  # [m]
+    length: float = 0.0  # Of the rod above its origin [m]; 0: a ball
+    below: float = 0.0  # Of the rod below its origin [m]; only where there is no ball
+    slot: int = 0  # The DEM body that stands for it: that of a slot is its lowest member
+    sections: tuple[Section, ...] = ()  # Of a spike of other shape, in place of ball and rod
 
     def shapes(self) -> list[Any]:
         """As `dem.shapes.basic` has it, in its own axes."""

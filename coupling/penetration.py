@@ -34,12 +34,9 @@ from .trajectory import PHASES, Penetration
 
 __all__ = ["Drive", "Drop", "Run", "SetDown", "drive", "drop", "overdamped_below", "set_down"]
 
-SUBSTEPS = 10
-"""Steps of the ground in a macro step, by default."""
-PLACEMENT_TIME = 0.002
-"""Mass over drag of a spike that is set down [s]."""
-AT_REST = 0.003
-"""What of its load may still be missing at rest, and the mean speed there over the lowering speed [1]."""
+SUBSTEPS = 10  # Steps of the ground in a macro step, by default
+PLACEMENT_TIME = 0.002  # Mass over drag of a spike that is set down [s]
+AT_REST = 0.003  # What of its load may still be missing at rest, and the mean speed there over the lowering speed [1]
 FREE, IN, REST, OUT = range(4)
 
 
@@ -72,16 +69,11 @@ class Run(Stepper):
         self._approach = max(0, math.ceil(lift / (self.speed * self.macro_step) - 1e-9))
         """Macro steps before it is let go; they end at depth 0 exactly."""
         self._start = -self._approach * self.speed * self.macro_step
-        self.count = 0
-        """Macro steps done."""
-        self.depth = self._start
-        """Depth of the tip now [m]."""
-        self.velocity = self.speed
-        """Velocity now, positive downwards [m/s]."""
-        self.ended = ""
-        """Why it ended; empty while it goes on."""
-        self.expected_time = self.max_time
-        """How long it may well take [s], for those who show progress."""
+        self.count = 0  # Macro steps done
+        self.depth = self._start  # Depth of the tip now [m]
+        self.velocity = self.speed  # Velocity now, positive downwards [m/s]
+        self.ended = ""  # Why it ended; empty while it goes on
+        self.expected_time = self.max_time  # How long it may well take [s], for those who show progress
         self._rows: list[tuple[float, float, float, float]] = []
         self._phases: list[int] = []
 
@@ -388,8 +380,7 @@ class SetDown(Drop):
     ) -> None:
         if not (math.isfinite(lowering_speed) and lowering_speed > 0):
             raise ValueError(f"lowering_speed is {lowering_speed}: it must be above 0 (in m/s)")
-        self.drag = float(load) / lowering_speed
-        """c [N s/m]."""
+        self.drag = float(load) / lowering_speed  # c [N s/m]
         mass = self.drag * PLACEMENT_TIME if mass is None else mass
         super().__init__(spike, ground, speed=lowering_speed, mass=mass, load=load, **common)
 

@@ -30,12 +30,10 @@ from .poses import Pose, Twist, Vector, Wrench
 
 __all__ = ["PLACEMENT_STEP", "PLACEMENT_TIME", "PlanarBody", "placement_time"]
 
-PLACEMENT_TIME = 0.002
-"""Mass over drag of a body during placement [s], as in `coupling.SetDown`."""
+PLACEMENT_TIME = 0.002  # Mass over drag of a body during placement [s], as in `coupling.SetDown`
 PLACEMENT_STEP = 4e-4
 """Macro step up to which that mass is stable [s]; beyond, mass goes with the square of the step, as K H^2 / m does."""
-_OPEN = 9
-"""Mode of a row that does not touch."""
+_OPEN = 9  # Mode of a row that does not touch
 
 
 class PlanarBody:
@@ -49,21 +47,17 @@ class PlanarBody:
             named = ", ".join(effect.id for effect in trial.effects)
             raise ValueError(f"effects = {named}: on grains the base model alone is computed; leave them out")
         self.trial = trial
-        self.place = np.array([x, z, theta], dtype=float)
-        """x, z [m], theta [rad]."""
-        self.rates = np.zeros(3)
-        """Their rates, at a time lag / 2 later."""
+        self.place = np.array([x, z, theta], dtype=float)  # x, z [m], theta [rad]
+        self.rates = np.zeros(3)  # Their rates, at a time lag / 2 later
         self.wheel_speed = trial.wheel_speed_0
         self.time = 0.0
-        self.torque_work = 0.0
-        """Work of the torque since its release [J]."""
+        self.torque_work = 0.0  # Work of the torque since its release [J]
         self.max_wheel_speed = math.inf
         self.wheel_at_limit: float | None = None
         """When a motor's wheel came to `max_wheel_speed` [s], counted as `time`; None if it has not."""
         self.modes: NDArray[np.int8] = np.full(trial.spike_count, _OPEN, dtype=np.int8)
         """Of each row under a Coulomb bound: 0 sticks, +1 and -1 slides towards +x and -x, 9 does not touch."""
-        self.touching = False
-        """Whether anything touched in the last step, which is when the torque acts."""
+        self.touching = False  # Whether anything touched in the last step, which is when the torque acts
         self._free()
 
     def _free(self) -> None:
@@ -215,8 +209,7 @@ class PlanarBody:
         self.wheel_at_limit = None if math.isnan(numbers[20]) else float(numbers[20])
         self.modes = np.array(state["modes"], dtype=np.int8)
 
-    acceleration: Vector = np.zeros(3)
-    """Of x, z and theta, the mean of the last step."""
+    acceleration: Vector = np.zeros(3)  # Of x, z and theta, the mean of the last step
     _torque = 0.0
     _until_limit = math.inf
     """From the start of this step until a motor's wheel is at its limit, if the torque lasts [s]."""
@@ -260,8 +253,7 @@ class _Friction:
         centre = body.pose.position + 0.5 * dt * twist.velocity
         arms = np.array([contacts[row].point - centre for row in self.rows])
         half = 0.5 * dt * float(twist.spin[1])
-        self.h = -arms[:, 2]
-        """How far below the centre each touches at the step's middle [m]; at its end:"""
+        self.h = -arms[:, 2]  # How far below the centre each touches at the step's middle [m]; at its end:
         self.h_end = -(arms[:, 2] * math.cos(half) - arms[:, 0] * math.sin(half))
         self.push = body._applied() + _generalised(wrench)
         self.weight = body.inertia + dt * body._drag

@@ -26,19 +26,15 @@ from .stepper import Stepper
 
 __all__ = ["AT_REST", "REST_TIME", "PlatformRun"]
 
-AT_REST = 0.005
-"""What of its weight may still be missing at rest, and the mean speed there over the lowering speed [1]."""
+AT_REST = 0.005  # What of its weight may still be missing at rest, and the mean speed there over the lowering speed [1]
 SWINGS = math.sqrt(AT_REST)
 """Root of the mean square of the same in the last quarter of the time, at most [1]: what comes to rest from one side
 has less once its mean is at rest; what bounces does not."""
-FIRMER = 4.0
-"""Factor on drag and mass of the placement of what swings [1]."""
-REST_TIME = 0.04
-"""For how long the signs of rest must hold [s]."""
+FIRMER = 4.0  # Factor on drag and mass of the placement of what swings [1]
+REST_TIME = 0.04  # For how long the signs of rest must hold [s]
 PLACING_WAY = 0.02
 """Lowering speed times the time that setting down took in the first runs, without REST_TIME [m]; for progress only."""
-LONGEST_PLACING = 3.0
-"""A platform that has not come to rest after this [s] is an error."""
+LONGEST_PLACING = 3.0  # A platform that has not come to rest after this [s] is an error
 
 
 class PlatformRun(EnergyBalance, Stepper):
@@ -55,15 +51,11 @@ class PlatformRun(EnergyBalance, Stepper):
     options : of `Master`.
     """
 
-    COLUMNS: tuple[str, ...]
-    """Of a row."""
-    _prefix: str
-    """Of the keys of a state."""
-    _hull = 0
-    """Members that are no spikes."""
+    COLUMNS: tuple[str, ...]  # Of a row
+    _prefix: str  # Of the keys of a state
+    _hull = 0  # Members that are no spikes
     trial: Any
-    pace = 1.0
-    """The placement's times over those on grains at 1 g (`lowered_gravity.pace_under`) [1]."""
+    pace = 1.0  # The placement's times over those on grains at 1 g (`lowered_gravity.pace_under`) [1]
 
     def __init__(
         self,
@@ -91,13 +83,10 @@ class PlatformRun(EnergyBalance, Stepper):
             count, weight=self._weight, mu_d=trial.sliding_friction, macro_step=self.macro_step, places=places
         )
         self._every = max(1, round(energy_interval / self.macro_step))
-        self.energy_interval = self._every * self.macro_step
-        """Between measurements of what the ground holds [s]."""
+        self.energy_interval = self._every * self.macro_step  # Between measurements of what the ground holds [s]
         self.lowering_speed = lowering_speed
-        self.placed = lowering_speed is None
-        """Whether the placement is over."""
-        self.placing_steps = 0
-        """Macro steps that the placement took."""
+        self.placed = lowering_speed is None  # Whether the placement is over
+        self.placing_steps = 0  # Macro steps that the placement took
         self._members = count
         self._settling: list[Vector] = []
         self._rows: list[list[float]] = []

@@ -22,10 +22,8 @@ __all__ = ["Pose", "Twist", "Vector", "Wrench", "chord_share", "matrices", "move
 class Pose:
     """Where a body is."""
 
-    position: Vector
-    """Of its origin [m], shape (3,); z counted from the undisturbed surface."""
-    turn: Vector
-    """Unit quaternion, shape (4,)."""
+    position: Vector  # Of its origin [m], shape (3,); z counted from the undisturbed surface
+    turn: Vector  # Unit quaternion, shape (4,)
 
     @classmethod
     def of(cls, position: ArrayLike, turn: ArrayLike | None) -> Pose:
@@ -38,10 +36,8 @@ class Pose:
 class Twist:
     """How it moves: held over a macro step."""
 
-    velocity: Vector
-    """Of its origin [m/s], shape (3,)."""
-    spin: Vector
-    """[rad/s], shape (3,)."""
+    velocity: Vector  # Of its origin [m/s], shape (3,)
+    spin: Vector  # [rad/s], shape (3,)
 
     @classmethod
     def of(cls, velocity: ArrayLike, spin: ArrayLike | None) -> Twist:
@@ -53,10 +49,8 @@ class Twist:
 class Wrench:
     """Force on a body and torque about its origin, means over a macro step: times dt the exact impulses."""
 
-    force: Vector
-    """[N], shape (3,)."""
-    torque: Vector
-    """[N m], shape (3,)."""
+    force: Vector  # [N], shape (3,)
+    torque: Vector  # [N m], shape (3,)
 
     @classmethod
     def of(cls, reaction: Reaction) -> Wrench:

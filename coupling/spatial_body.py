@@ -66,24 +66,19 @@ class SpatialBody:
             raise ValueError(f"quaternion is {quaternion}: it must be four numbers of length 1")
         self.trial = trial
         platform = trial.platform
-        self.place = np.array(position, dtype=float)
-        """Of the centre of mass [m], shape (3,)."""
-        self.turn = turn / float(np.linalg.norm(turn))
-        """Unit quaternion, shape (4,)."""
+        self.place = np.array(position, dtype=float)  # Of the centre of mass [m], shape (3,)
+        self.turn = turn / float(np.linalg.norm(turn))  # Unit quaternion, shape (4,)
         self.axes = np.zeros((3, 3))
         for k, wheel in enumerate(platform.wheels):
             self.axes[k] = wheel.axis
         self.wheels = np.array([history.spin if history is not None else 0.0 for history in trial.histories])
         """Angular momentum of each wheel along its axis [N m s], shape (3,)."""
         self.time = 0.0
-        self.torque_work = 0.0
-        """Work of the torques since its release [J]."""
-        self.touching = False
-        """Whether anything touched in the last step."""
+        self.torque_work = 0.0  # Work of the torques since its release [J]
+        self.touching = False  # Whether anything touched in the last step
         self.sliding: dict[int, Vector] = {}
         """Tip under a Coulomb bound that slides -> the unit vector of its slip, shape (2,)."""
-        self.sticking: frozenset[int] = frozenset()
-        """Those that stick."""
+        self.sticking: frozenset[int] = frozenset()  # Those that stick
         self._free()
         self.momentum = self._masses * np.asarray(velocity, dtype=float)
         """(m v_x, m v_y, (m + m_b) v_z) [N s], shape (3,)."""
@@ -327,8 +322,7 @@ class _Friction:
         slowed = 1 + dt * body._drag / np.array([body._masses[0], body._inertia[0, 0]])
         momentum = (body.momentum + dt * (body.trial.weight + wrench.force)) / slowed[0]
         wheels = matrix @ (body.axes.T @ (body.wheels - dt * body._torques))
-        self.velocity = momentum / self.masses
-        """After the step without friction; likewise:"""
+        self.velocity = momentum / self.masses  # After the step without friction; likewise:
         self.spin = self.inverse @ (body.angular_momentum + dt * wrench.torque - wheels) / slowed[1]
         self.masses, self.inverse = self.masses * slowed[0], self.inverse / slowed[1]
         before = body.twist

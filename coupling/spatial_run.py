@@ -31,8 +31,7 @@ COLUMNS = (
 """Of a row: centre of mass [m], quaternion, velocity [m/s] and spin [rad/s] in world axes, absolute speeds of the
 wheels about the platform's x, y and z [rad/s], energies and works [J] as the planar rows have them, the ground's force
 [N], how many members touch, the deepest spike's depth [m]."""
-FEET = 6
-"""Numbers of a spike (`contact_state.feet_of`); of those that have none a step keeps nothing."""
+FEET = 6  # Numbers of a spike (`contact_state.feet_of`); of those that have none a step keeps nothing
 
 
 class SpatialRun(PlatformRun):

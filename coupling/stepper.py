@@ -33,8 +33,7 @@ class Stepper:
     `reporters` are called with the run after every macro step, `frame_reporters` at every frame: append to them.
     """
 
-    macro_step: float
-    """[s]"""
+    macro_step: float  # [s]
 
     def __init__(self) -> None:
         self.reporters: list[Callable[[Any], None]] = []

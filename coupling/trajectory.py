@@ -30,20 +30,13 @@ class Penetration:
     Depth and velocity are positive downwards, force is the ground's on the spike, positive upwards.
     """
 
-    kind: str
-    """"driven", "drop" or "set_down"."""
-    time: Array
-    """Middle of each macro step [s], shape [n]; 0 where the tip meets the undisturbed surface."""
-    depth: Array
-    """Depth of the tip at the middle of the step [m], shape [n]."""
-    velocity: Array
-    """Velocity held during the step [m/s], shape [n]."""
-    force: Array
-    """Mean force during the step [N], shape [n]."""
-    phase: NDArray[np.str_]
-    """"free", "in", "rest" or "out", shape [n]."""
-    macro_step: float
-    """Length of a macro step [s]."""
+    kind: str  # "driven", "drop" or "set_down"
+    time: Array  # Middle of each macro step [s], shape [n]; 0 where the tip meets the undisturbed surface
+    depth: Array  # Depth of the tip at the middle of the step [m], shape [n]
+    velocity: Array  # Velocity held during the step [m/s], shape [n]
+    force: Array  # Mean force during the step [N], shape [n]
+    phase: NDArray[np.str_]  # "free", "in", "rest" or "out", shape [n]
+    macro_step: float  # Length of a macro step [s]
     ended: str = "done"
     """Why it ended.
 

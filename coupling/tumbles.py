@@ -29,21 +29,16 @@ __all__ = ["Landing", "Rest", "TumblesInARow"]
 
 REST_SPEED = 2e-3
 """A platform whose centre and tips are slower is at rest [m/s]: the speed above which a row is said to slide."""
-REST_LASTS = 0.1
-"""For how long [s]."""
-LONGEST_WAIT = 3.0
-"""After the torque's end the next begins at the latest [s], at rest or not, which is noted."""
+REST_LASTS = 0.1  # For how long [s]
+LONGEST_WAIT = 3.0  # After the torque's end the next begins at the latest [s], at rest or not, which is noted
 
 
 class Rest(NamedTuple):
     """What counts as lying at rest, and how long it is waited for."""
 
-    speed: float
-    """Centre and tips are slower [m/s],"""
-    lasts: float
-    """for this long [s]."""
-    longest_wait: float
-    """[s]"""
+    speed: float  # Centre and tips are slower [m/s],
+    lasts: float  # for this long [s]
+    longest_wait: float  # [s]
 
     @classmethod
     def of(cls, trial: Trial) -> Rest:

@@ -37,10 +37,8 @@ What the grains' integrator and the coupling leave of a lossless collision is 3e
 (tests/coupling); here it is set against the energy of the whole tumble. One on grains that dissipate has shown less
 than 1e-6.
 """
-GRAINS_EVERY = 100
-"""Macro steps between two measurements of how fast the grains are that wait under a lowered gravity."""
-LONGEST_CALM = 10.0
-"""A platform that does not come to rest there for longer is an error [of the time watched]."""
+GRAINS_EVERY = 100  # Macro steps between two measurements of how fast the grains are that wait under a lowered gravity
+LONGEST_CALM = 10.0  # A platform that does not come to rest there for longer is an error [of the time watched]
 COLUMNS = (
     "time", "x", "y", "theta", "vx", "vy", "omega", "ax", "ay", "alpha", "wheel_speed", "kinetic_energy",
     "potential_energy", "torque_work", "given", "taken",

@@ -36,30 +36,21 @@ __all__ = [
     "launch_speed_for", "least_viable_angle",
 ]  # fmt: skip
 
-PHASES = 60
-"""A launch with more changes between stick and slip than this is given up."""
+PHASES = 60  # A launch with more changes between stick and slip than this is given up
 
 
 @dataclass(frozen=True, kw_only=True)
 class Tumbler:
     """The numbers of the planar model that a launch depends on. Raises ValueError for those that cannot be."""
 
-    mass: float
-    """m [kg]."""
-    inertia: float
-    """J, without J_w [kg m2]."""
-    spike_length: float
-    """l [m]."""
-    lean: float = math.pi / 8
-    """Angle from the vertical of the line from the tips ahead to the centre, at rest [rad]."""
-    gravity: float = 0.0
-    """The weight on the ground over `mass_y` [m/s2]: g_sim in a rig."""
-    mu_s: float = math.inf
-    """Coefficient of static friction [1]; infinite: the tips never slide."""
-    mu_d: float | None = None
-    """Coefficient of sliding friction [1]; None: half of mu_s."""
-    counterweight: float = 0.0
-    """m_b of a rig [kg]."""
+    mass: float  # m [kg]
+    inertia: float  # J, without J_w [kg m2]
+    spike_length: float  # l [m]
+    lean: float = math.pi / 8  # Angle from the vertical of the line from the tips ahead to the centre, at rest [rad]
+    gravity: float = 0.0  # The weight on the ground over `mass_y` [m/s2]: g_sim in a rig
+    mu_s: float = math.inf  # Coefficient of static friction [1]; infinite: the tips never slide
+    mu_d: float | None = None  # Coefficient of sliding friction [1]; None: half of mu_s
+    counterweight: float = 0.0  # m_b of a rig [kg]
 
     def __post_init__(self) -> None:
         for key in ("mass", "inertia", "spike_length"):
@@ -100,30 +91,21 @@ class Tumbler:
 class Launch:
     """How a platform has left the ground."""
 
-    speed: float
-    """Of the centre [m/s]."""
-    angle: float
-    """Of the velocity from the horizontal, forward and up positive [rad]."""
-    spin: float
-    """Turning rate [rad/s], clockwise positive."""
-    slid: bool
-    """Whether the tips slid when it left."""
-    rotation: float = 0.0
-    """How far it had turned [rad]."""
-    time: float = 0.0
-    """How long after the start of the torque [s]."""
+    speed: float  # Of the centre [m/s]
+    angle: float  # Of the velocity from the horizontal, forward and up positive [rad]
+    spin: float  # Turning rate [rad/s], clockwise positive
+    slid: bool  # Whether the tips slid when it left
+    rotation: float = 0.0  # How far it had turned [rad]
+    time: float = 0.0  # How long after the start of the torque [s]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Flight:
     """One ballistic flight from ground to ground of the same height."""
 
-    distance: float
-    """Along the ground [m]."""
-    time: float
-    """[s]"""
-    height: float
-    """Of the peak above launch [m]."""
+    distance: float  # Along the ground [m]
+    time: float  # [s]
+    height: float  # Of the peak above launch [m]
 
 
 # Launch ---------------------------------------------------------------------------------------------------------------

@@ -34,26 +34,16 @@ class Motion:
     Raises ValueError for arrays of other shapes, times that do not rise, or a start that is not at t = 0.
     """
 
-    time: Array
-    """[s]"""
-    x: Array
-    """Of the geometric centre [m]."""
-    y: Array
-    """[m]"""
-    theta: Array
-    """Clockwise positive [rad]."""
-    vx: Array
-    """[m/s]"""
-    vy: Array
-    """[m/s]"""
-    omega: Array
-    """d theta/dt [rad/s]."""
-    wheel_speed: Array
-    """Absolute speed of the flywheel [rad/s]."""
-    ax: Array | None = None
-    """Acceleration of the geometric centre [m/s2]; asked for only where the IMU has no window."""
-    ay: Array | None = None
-    """[m/s2]"""
+    time: Array  # [s]
+    x: Array  # Of the geometric centre [m]
+    y: Array  # [m]
+    theta: Array  # Clockwise positive [rad]
+    vx: Array  # [m/s]
+    vy: Array  # [m/s]
+    omega: Array  # d theta/dt [rad/s]
+    wheel_speed: Array  # Absolute speed of the flywheel [rad/s]
+    ax: Array | None = None  # Acceleration of the geometric centre [m/s2]; asked for only where the IMU has no window
+    ay: Array | None = None  # [m/s2]
 
     def __post_init__(self) -> None:
         for name in ("time", "x", "y", "theta", "vx", "vy", "omega", "wheel_speed", "ax", "ay"):
@@ -75,32 +65,19 @@ class SensorSet:
     Raises ValueError, naming the key, for a rate that is not above 0, a negative noise or a scale that is not above 0.
     """
 
-    camera_rate: float = 120.0
-    """[Hz]"""
-    imu_rate: float = 100.0
-    """[Hz]"""
-    wheel_rate: float = 600.0
-    """[Hz]"""
-    pose_std: tuple[float, float, float] = (0.0005, 0.0005, 0.003)
-    """Of x, y [m] and theta [rad]."""
-    imu_std: tuple[float, float, float] = (0.01, 0.02, 0.02)
-    """Of the gyro [rad/s] and both specific forces [m/s2]."""
-    wheel_std: float = 0.5
-    """[rad/s]"""
-    imu_window: float = 0.004
-    """Over which each specific force is averaged [s]."""
-    camera_scale: float = 1.0
-    """Measured over true, of x and y [1]."""
-    camera_bend: float = 0.0
-    """Added to the scale by the square of the distance from where the platform stood [1/m2]."""
-    clock_offset: float = 0.0
-    """The IMU's time minus the true time at t = 0 [s]."""
-    clock_drift: float = 0.0
-    """What the IMU's clock gains in a second [1]."""
-    lead: float = 0.2
-    """How long before t = 0 recording starts [s]."""
-    camera_zero_spread: float = 3.0
-    """The camera's zero is drawn evenly from within this many `pose_std` [1]."""
+    camera_rate: float = 120.0  # [Hz]
+    imu_rate: float = 100.0  # [Hz]
+    wheel_rate: float = 600.0  # [Hz]
+    pose_std: tuple[float, float, float] = (0.0005, 0.0005, 0.003)  # Of x, y [m] and theta [rad]
+    imu_std: tuple[float, float, float] = (0.01, 0.02, 0.02)  # Of the gyro [rad/s] and both specific forces [m/s2]
+    wheel_std: float = 0.5  # [rad/s]
+    imu_window: float = 0.004  # Over which each specific force is averaged [s]
+    camera_scale: float = 1.0  # Measured over true, of x and y [1]
+    camera_bend: float = 0.0  # Added to the scale by the square of the distance from where the platform stood [1/m2]
+    clock_offset: float = 0.0  # The IMU's time minus the true time at t = 0 [s]
+    clock_drift: float = 0.0  # What the IMU's clock gains in a second [1]
+    lead: float = 0.2  # How long before t = 0 recording starts [s]
+    camera_zero_spread: float = 3.0  # The camera's zero is drawn evenly from within this many `pose_std` [1]
 
     def __post_init__(self) -> None:
         for name in ("camera_rate", "imu_rate", "wheel_rate", "camera_scale"):
@@ -131,14 +108,10 @@ class SensorSet:
 class Measured:
     """What was recorded: name of the column -> array of shape [row_count], by sensor."""
 
-    pose: dict[str, Array] = field(repr=False)
-    """t_s, x_m, y_m, theta_rad."""
-    imu: dict[str, Array] = field(repr=False)
-    """t_s, gyro_rad_s, ax_m_s2, ay_m_s2."""
-    wheel: dict[str, Array] = field(repr=False)
-    """t_s, omega_rad_s."""
-    camera_zero: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """What was added to x, y [m] and theta [rad]."""
+    pose: dict[str, Array] = field(repr=False)  # t_s, x_m, y_m, theta_rad
+    imu: dict[str, Array] = field(repr=False)  # t_s, gyro_rad_s, ax_m_s2, ay_m_s2
+    wheel: dict[str, Array] = field(repr=False)  # t_s, omega_rad_s
+    camera_zero: tuple[float, float, float] = (0.0, 0.0, 0.0)  # What was added to x, y [m] and theta [rad]
 
 
 def sensor_times(sensors: SensorSet, duration: float, *, step: float = 1e-3) -> Array:

@@ -35,8 +35,7 @@ __all__ = [
 ]
 
 NO_COHESION, DMT, JKR = range(3)
-COHESIONS = {"none": NO_COHESION, "dmt": DMT, "jkr": JKR}
-"""The laws by name."""
+COHESIONS = {"none": NO_COHESION, "dmt": DMT, "jkr": JKR}  # The laws by name
 
 # -(s^4 - s) where it is least.
 _RANGE = 0.75 * 0.25 ** (1 / 3)

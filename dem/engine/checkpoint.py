@@ -28,8 +28,7 @@ _SLEEPERS_NUMBERS = ("awake", "mass", "slept", "leaving")
 class Checkpoint:
     """What ``Bed.hold`` gave; a bed has room for one, so the next one ends it."""
 
-    tables: tuple[Any, ...]
-    """The engine, those that sleep, the book: whose fields were copied."""
+    tables: tuple[Any, ...]  # The engine, those that sleep, the book: whose fields were copied
     numbers: Json
     sleeper: Json | None
     under: tuple[Any, ...]

@@ -56,18 +56,12 @@ class SleepyBed(Protocol):
 class Sleep:
     """When grains sleep and wake; see the module for what the numbers are shares of."""
 
-    speed: float = 5e-3
-    """A grain slower than this may fall asleep [sqrt(g d)]."""
-    calm: float = 1.0
-    """For how long it must be [sqrt(d / g)]."""
-    reach: float = 3.0
-    """No grain this near to a body sleeps [d]."""
-    force: float = 1.0
-    """Change of a contact's force that wakes [m g], and"""
-    share: float = 0.5
-    """the least of it over the force itself [1]; both must be reached."""
-    waking_speed: float = 5e-2
-    """Speed of a neighbour that wakes [sqrt(g d)]."""
+    speed: float = 5e-3  # A grain slower than this may fall asleep [sqrt(g d)]
+    calm: float = 1.0  # For how long it must be [sqrt(d / g)]
+    reach: float = 3.0  # No grain this near to a body sleeps [d]
+    force: float = 1.0  # Change of a contact's force that wakes [m g], and
+    share: float = 0.5  # the least of it over the force itself [1]; both must be reached
+    waking_speed: float = 5e-2  # Speed of a neighbour that wakes [sqrt(g d)]
     every: int = 50
     """Steps between two looks: what wakes makes new lists, and those cost as much as four steps of all grains."""
 
@@ -103,8 +97,7 @@ class Sleeper:
         self.rest_every = max(1, round(looks)) * rules.every
         self.awake = bed.grain_count
         self.mass = 0.0
-        self.slept = 0.0
-        """Mass asleep, summed over the steps of the last advance [kg]."""
+        self.slept = 0.0  # Mass asleep, summed over the steps of the last advance [kg]
         self.leaving = False
 
     def steps_to_look(self) -> int:

@@ -11,8 +11,7 @@ from dem.grains.materials import Material
 
 __all__ = ["BedFailure", "BedSettings", "Grains", "State"]
 
-State = dict[str, np.ndarray]
-"""Arrays by name: everything that the next step of a bed depends on, to the bit."""
+State = dict[str, np.ndarray]  # Arrays by name: everything that the next step of a bed depends on, to the bit
 
 
 class BedFailure(RuntimeError):  # noqa: N818 - the name in the architecture

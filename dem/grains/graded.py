@@ -23,8 +23,7 @@ from .sizes import Json, Uniform
 
 __all__ = ["THROAT", "Graded", "middles", "steepest"]
 
-THROAT = math.sqrt(2) - 1
-"""The throat of four like spheres in a square, over their diameter [1]."""
+THROAT = math.sqrt(2) - 1  # The throat of four like spheres in a square, over their diameter [1]
 DRIFT = 2.0
 """So many diameters of the larger one may grains of the field have come closer to one another than they belong [1]."""
 _WIDTHS, _DEPTHS = 6, 4  # a bed is at least so many of its coarsest grains wide and deep, as of its mean ones elsewhere

@@ -45,8 +45,7 @@ __all__ = [
 MATERIAL_FORMAT = "hedgebed-material/1"
 _NAME = re.compile(r"[a-z0-9][a-z0-9._+-]*")
 
-COHESIONS = ("none", "dmt", "jkr")
-"""The laws of cohesion, see ``dem.contact.cohesion``."""
+COHESIONS = ("none", "dmt", "jkr")  # The laws of cohesion, see ``dem.contact.cohesion``
 LEAST_RESTITUTION = 0.01
 LEAST_ROLLING = 1e-9
 """A rolling friction that resists nothing [1]: with none at all rolling is left out of a bed, on its bodies as well."""

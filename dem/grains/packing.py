@@ -11,8 +11,7 @@ from .sizes import Sizes, Uniform, sizes_of
 
 __all__ = ["RAIN_COLUMN", "draw_radii", "rain_column", "rain_positions"]
 
-RAIN_COLUMN = 2.5
-"""Upper bound of the rain's column over the depth of the levelled bed [1]: what a grain can fall."""
+RAIN_COLUMN = 2.5  # Upper bound of the rain's column over the depth of the levelled bed [1]: what a grain can fall
 
 
 def draw_radii(

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["Json", "LogNormal", "Normal", "Sieve", "Sizes", "Uniform", "describe", "sizes_of"]
 
 
-Json = dict[str, Any]
-"""Plain values by name, as JSON takes them."""
+Json = dict[str, Any]  # Plain values by name, as JSON takes them
 
 
 def _refuse(kind: str, key: str, value: Any, bounds: str) -> None:

@@ -32,15 +32,12 @@ __all__ = [
     "thickness_profile",
 ]
 
-SLOT = 6.0
-"""Width of the slot [mean diameters], wide enough that grains do not bridge it."""
-LEAST_FLANK = 10.0
-"""Least width of bed on each side of the slot [mean diameters]."""
+SLOT = 6.0  # Width of the slot [mean diameters], wide enough that grains do not bridge it
+LEAST_FLANK = 10.0  # Least width of bed on each side of the slot [mean diameters]
 # A slope is fitted between these shares of its crest's height, and above so many mean diameters: foot and crest are
 # left out. The lowest layers hold to a rough plate: five layers of sand stand at 45 degrees on it.
 _FOOT, _CREST, _LAYERS = 0.2, 0.8, 3.0
-COLUMN = 0.5
-"""Width of the columns of a profile [mean diameters]."""
+COLUMN = 0.5  # Width of the columns of a profile [mean diameters]
 _LEAST_POINTS = 6  # of them on a slope
 # At rest: kinetic energy of a grain in m g d, and nothing has drained for so many times in which a grain falls the
 # bed's height. It gives up after so many.

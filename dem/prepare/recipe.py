@@ -32,8 +32,7 @@ STAGES = {
 
 LOOSEST, DENSEST_UNIFORM, DENSEST = 0.5, 0.64, 0.74
 LOOSEST_STICKY = 0.1
-FLUFF = 1.4
-"""How many times its height a fluffed bed has before it sinks back [1]."""
+FLUFF = 1.4  # How many times its height a fluffed bed has before it sinks back [1]
 _FILLS = ("stick", "fluff", "level", "compact", "packing")
 
 

@@ -40,16 +40,12 @@ class BatchTrajectory:
     trial_count: int
     time_step: float
     stands: NDArray[np.bool_]
-    trajectory_angle: Array
-    """[rad]; NaN if the centre never gets 10 mm away."""
+    trajectory_angle: Array  # [rad]; NaN if the centre never gets 10 mm away
     max_speed: Array
     max_angular_velocity: Array
-    transition_angles: dict[str, Array]
-    """theta [rad] at the first entry into each state; NaN if it never comes."""
-    final: dict[str, Array]
-    """x, y, theta, vx, vy, omega, wheel_speed at the end."""
-    events: Array
-    """How often a step was cut at an event."""
+    transition_angles: dict[str, Array]  # theta [rad] at the first entry into each state; NaN if it never comes
+    final: dict[str, Array]  # x, y, theta, vx, vy, omega, wheel_speed at the end
+    events: Array  # How often a step was cut at an event
     time: Array
     """Sample times [s], shape [sample_count], or [trial_count, sample_count] if they differ; empty without series."""
     series: Array

@@ -29,22 +29,14 @@ difference of works, which would lose digits."""
 class _LawGround:
     """What all grounds with a surface law share. `_setting` says which law and with which parameters."""
 
-    mu_s: float = 0.5
-    """Coefficient of static friction [1]."""
-    mu_d: float | None = None
-    """Coefficient of sliding friction [1]; None: half of mu_s."""
-    surface: float = 0.0
-    """Height of the surface [m]."""
-    time_step: float = 1e-4
-    """The step it is to be driven at [s]: the law itself is exact at any."""
-    centre: tuple[float, float] = (0.0, 0.0)
-    """Where a body is put by default [m]; the surface is the same everywhere."""
-    name: str = ""
-    """What a report calls it; the law's name if not given."""
-    lag: ClassVar[float] = 0.0
-    """The mean force over a step belongs to the step's middle."""
-    gives_friction: ClassVar[bool] = False
-    """The horizontal force is a Coulomb bound, which the body resolves."""
+    mu_s: float = 0.5  # Coefficient of static friction [1]
+    mu_d: float | None = None  # Coefficient of sliding friction [1]; None: half of mu_s
+    surface: float = 0.0  # Height of the surface [m]
+    time_step: float = 1e-4  # The step it is to be driven at [s]: the law itself is exact at any
+    centre: tuple[float, float] = (0.0, 0.0)  # Where a body is put by default [m]; the surface is the same everywhere
+    name: str = ""  # What a report calls it; the law's name if not given
+    lag: ClassVar[float] = 0.0  # The mean force over a step belongs to the step's middle
+    gives_friction: ClassVar[bool] = False  # The horizontal force is a Coulomb bound, which the body resolves
     _law: SurfaceLaw = field(init=False, repr=False, compare=False)
     _numbers: tuple[float, ...] = field(init=False, repr=False, compare=False)
     _rebound: float = field(init=False, repr=False, compare=False)
@@ -198,8 +190,7 @@ class SurfaceGround(_LawGround):
     surface. Raises ValueError for a law there is not, for a parameter that cannot be, and for mu_d above mu_s.
     """
 
-    law: str
-    """Name of the law."""
+    law: str  # Name of the law
     parameters: Mapping[str, float] = field(default_factory=dict)
     """Its parameters by name, SI units; those not given have their defaults."""
 
@@ -215,10 +206,8 @@ class SpringDamper(_LawGround):
     eqs 5 and 6). It keeps no memory. Raises ValueError for a negative stiffness or damping, or mu_d above mu_s.
     """
 
-    stiffness: float
-    """K [N/m]."""
-    damping: float = 0.0
-    """C [N s/m], while going in."""
+    stiffness: float  # K [N/m]
+    damping: float = 0.0  # C [N s/m], while going in
 
     def _setting(self) -> tuple[str, Mapping[str, float]]:
         return "spring-damper", {"stiffness": self.stiffness, "damping": self.damping}

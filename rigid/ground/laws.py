@@ -32,8 +32,7 @@ from .rft import ball_profile, stress_gradient
 
 __all__ = ["GROUNDS", "Parameter", "SurfaceLaw", "find_law", "katsuragi_durian", "springback", "springback_energy"]
 
-Numbers = Any
-"""A law's numbers: anything that p[0], p[1] ... can be read from."""
+Numbers = Any  # A law's numbers: anything that p[0], p[1] ... can be read from.
 
 MEMORY = (
     "ours: a bed of sand computed with this package gives back nothing that can be measured (work_returned_dem of "
@@ -52,8 +51,7 @@ class Parameter:
     highest: float
     summary: str
     source: str
-    above_lowest: bool = False
-    """Whether it must exceed `lowest`, not only reach it."""
+    above_lowest: bool = False  # Whether it must exceed `lowest`, not only reach it
 
     def check(self, value: float, law: str) -> float:
         """`value` as a float. Raises ValueError, naming it and what would do."""
@@ -78,19 +76,15 @@ class SurfaceLaw:
     summary: str
     source: str
     parameters: tuple[Parameter, ...]
-    slots: tuple[str, ...]
-    """What stands in p[0], p[1] ... of the functions."""
-    extensive: tuple[int, ...]
-    """Which of them are in proportion to the number of spikes that press side by side."""
+    slots: tuple[str, ...]  # What stands in p[0], p[1] ... of the functions.
+    extensive: tuple[int, ...]  # Which of them are in proportion to the number of spikes that press side by side
     make: Callable[[Mapping[str, float]], tuple[float, ...]]
     loading: Callable[..., Any]
     loading_work: Callable[..., Any]
     rate_force: Callable[..., Any]
     rate_work: Callable[..., Any]
-    has_memory: bool
-    """Whether it takes the deepest depth and the parameter `rebound`."""
-    bends: tuple[int, ...] = ()
-    """Slots that hold depths at which the functions bend [m], for those who integrate them."""
+    has_memory: bool  # Whether it takes the deepest depth and the parameter `rebound`
+    bends: tuple[int, ...] = ()  # Slots that hold depths at which the functions bend [m], for those who integrate them
 
     def values(self, given: Mapping[str, float]) -> dict[str, float]:
         """All parameters, as given or by default. Raises ValueError for one there is not, or that cannot be."""
@@ -294,5 +288,4 @@ _LAWS = (
     ),
 )  # fmt: skip
 
-GROUNDS: dict[str, SurfaceLaw] = {law.name: law for law in _LAWS}
-"""All laws by name; `hedgebed tumble --ground NAME`."""
+GROUNDS: dict[str, SurfaceLaw] = {law.name: law for law in _LAWS}  # All laws by name; `hedgebed tumble --ground NAME`

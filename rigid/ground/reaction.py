@@ -16,10 +16,8 @@ from numpy.typing import NDArray
 __all__ = ["Contact", "Facts", "Reaction", "State", "Vector"]
 
 Vector = NDArray[np.float64]
-State = dict[str, Any]
-"""Everything that the next steps depend on: name -> numpy array, flat, as an .npz file holds it."""
-Facts = dict[str, Any]
-"""Name -> number, text, list or table of these, SI units: what run.toml and result.json can hold."""
+State = dict[str, Any]  # Everything that the next steps depend on: name -> numpy array, flat, as an .npz file holds it
+Facts = dict[str, Any]  # Name -> number, text, list or table of these, SI units: what run.toml and result.json can hold
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,30 +29,22 @@ class Contact:
     slips with `mu_d * normal_force`.
     """
 
-    point: Vector
-    """Where the force acts [m], shape (3,)."""
-    normal_force: float
-    """Upward force on the body [N]."""
+    point: Vector  # Where the force acts [m], shape (3,)
+    normal_force: float  # Upward force on the body [N]
     tangential_force: Vector | None = None
     """Horizontal force on the body [N], shape (3,); None where a Coulomb bound is given instead."""
-    mu_s: float | None = None
-    """Coefficient of static friction [1]; None where the tangential force is given."""
-    mu_d: float | None = None
-    """Coefficient of sliding friction [1]; None where the tangential force is given."""
-    member: int = 0
-    """Of the body that touches: a spike or a row of spikes, or -1, the hull."""
+    mu_s: float | None = None  # Coefficient of static friction [1]; None where the tangential force is given
+    mu_d: float | None = None  # Coefficient of sliding friction [1]; None where the tangential force is given
+    member: int = 0  # Of the body that touches: a spike or a row of spikes, or -1, the hull
 
 
 @dataclass(frozen=True, slots=True)
 class Reaction:
     """What the ground did to the body during one step: the mean over the step, so force * dt is the exact impulse."""
 
-    force: Vector
-    """Total force on the body [N], shape (3,), without what a Coulomb bound leaves open."""
-    torque: Vector
-    """Total torque on the body about its origin [N m], shape (3,), likewise."""
-    contacts: tuple[Contact, ...] = ()
-    """One for each member of the body that touches; empty where none does."""
+    force: Vector  # Total force on the body [N], shape (3,), without what a Coulomb bound leaves open
+    torque: Vector  # Total torque on the body about its origin [N m], shape (3,), likewise
+    contacts: tuple[Contact, ...] = ()  # One for each member of the body that touches; empty where none does
     sinkage: Mapping[int, float] = field(default_factory=dict)
     """Member -> depth of its lowest point at the step's end [m], of those near the surface."""
 

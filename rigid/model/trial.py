@@ -25,10 +25,8 @@ class Effect:
     """
 
     id: str
-    parameters: Mapping[str, float] = field(default_factory=dict)
-    """What differs from the defaults."""
-    file: str | Path | None = None
-    """The Python file that defines a term of one's own (`rigid.terms.load_effect`)."""
+    parameters: Mapping[str, float] = field(default_factory=dict)  # What differs from the defaults
+    file: str | Path | None = None  # The Python file that defines a term of one's own (`rigid.terms.load_effect`)
 
     def __post_init__(self) -> None:
         if self.file is not None and self.term.id != self.id:
@@ -91,41 +89,25 @@ class Trial:
     mu_s, and a brake without a spinning wheel.
     """
 
-    mass: float = 5.3
-    """m [kg], wheels included."""
-    inertia: float = 0.06
-    """J [kg m2] about the axis of rotation, with the wheels' mass and without their spin."""
-    spike_length: float = 0.2
-    """l [m], from the centre to a tip."""
-    spike_count: int = 8
-    """Rows of spikes, at equal angles."""
-    stiffness: float = 1.5e4
-    """K [N/m]."""
-    damping: float = 60.0
-    """C [N s/m], while a tip goes in."""
-    mu_s: float = 0.5
-    """Coefficient of static friction [1]."""
-    mu_d: float | None = None
-    """Coefficient of sliding friction [1]; None: half of mu_s."""
-    gravity_sim: float
-    """g_sim [m/s2]: the weight on the surface is (mass + counterweight) gravity_sim."""
+    mass: float = 5.3  # m [kg], wheels included
+    inertia: float = 0.06  # J [kg m2] about the axis of rotation, with the wheels' mass and without their spin
+    spike_length: float = 0.2  # l [m], from the centre to a tip
+    spike_count: int = 8  # Rows of spikes, at equal angles
+    stiffness: float = 1.5e4  # K [N/m]
+    damping: float = 60.0  # C [N s/m], while a tip goes in
+    mu_s: float = 0.5  # Coefficient of static friction [1]
+    mu_d: float | None = None  # Coefficient of sliding friction [1]; None: half of mu_s
+    gravity_sim: float  # g_sim [m/s2]: the weight on the surface is (mass + counterweight) gravity_sim
     gravity: float = STANDARD_GRAVITY
     """Local gravity [m/s2]: in the rig, what pulls at the centre of mass and on the wires."""
-    counterweight: float = 0.0
-    """m_b [kg]; 0: no rig."""
-    torque: float = 0.0
-    """tau [N m] on the platform, never negative."""
-    torque_until: float = math.inf
-    """When it ends [s]."""
+    counterweight: float = 0.0  # m_b [kg]; 0: no rig
+    torque: float = 0.0  # tau [N m] on the platform, never negative
+    torque_until: float = math.inf  # When it ends [s]
     actuator: Literal["motor", "brake"] = "motor"
-    wheel_inertia: float = 1.2e-3
-    """J_w [kg m2]."""
-    wheel_speed_0: float = 0.0
-    """Speed of the wheel at t = 0 [rad/s]."""
-    effects: tuple[Effect, ...] = ()
-    """Terms beyond the base model."""
-    ground: Ground | None = None
-    """What computes the force; None: the spring-damper of `stiffness` and `damping`."""
+    wheel_inertia: float = 1.2e-3  # J_w [kg m2]
+    wheel_speed_0: float = 0.0  # Speed of the wheel at t = 0 [rad/s]
+    effects: tuple[Effect, ...] = ()  # Terms beyond the base model
+    ground: Ground | None = None  # What computes the force; None: the spring-damper of `stiffness` and `damping`
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "effects", tuple(self.effects))

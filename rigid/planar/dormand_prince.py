@@ -15,8 +15,7 @@ from .dynamics import Modes, System
 
 __all__ = ["Interpolant", "Step", "attempt", "interpolant"]
 
-Interpolant = Callable[[float], list[float]]
-"""z at a time within a step."""
+Interpolant = Callable[[float], list[float]]  # z at a time within a step
 
 _C = (0.2, 0.3, 0.8, 8 / 9, 1.0)
 _A2 = (0.2,)

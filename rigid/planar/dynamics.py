@@ -24,8 +24,7 @@ __all__ = ["Contact", "Modes", "System"]
 
 X, Y, THETA, VX, VY, OMEGA, WHEEL, WORK, LOST = range(9)
 """Entries of the state vector z: pose, speeds, speed of the wheel, work of the torque, energy dissipated."""
-INNER, INNER_SPEED = 9, 10
-"""Two more where a term has a coordinate of its own (`System.inner`)."""
+INNER, INNER_SPEED = 9, 10  # Two more where a term has a coordinate of its own (`System.inner`)
 
 _SLIGHT = 1e-300
 _SHIFTING = 0.1
@@ -37,22 +36,14 @@ class Modes:
     """The modes of a moment (see the module)."""
 
     touching: list[int] = field(default_factory=list)
-    slip: list[int] = field(default_factory=list)
-    """Of each spike: 0 sticks, +1 and -1 slides towards +x and -x."""
-    top: list[float] = field(default_factory=list)
-    """Deepest depth of each spike [m] since it entered the ground."""
-    held: list[float] = field(default_factory=list)
-    """Deepest depth of each spike [m] since it touched; empty: as `top`."""
-    vertical: int = 0
-    """Dry friction of the rig: 0 holds, +1 and -1 slides up and down."""
-    rotation: int = 0
-    """Dry friction of the bearing: 0 holds, +1 and -1 turns clockwise and back."""
-    torque_over: bool = False
-    """Whether the torque has ended for good."""
-    resting: bool = False
-    """Whether nothing moves and nothing will."""
-    inner: int = 1
-    """Mode of the term that has a coordinate of its own: 1 at the start, else 0."""
+    slip: list[int] = field(default_factory=list)  # Of each spike: 0 sticks, +1 and -1 slides towards +x and -x
+    top: list[float] = field(default_factory=list)  # Deepest depth of each spike [m] since it entered the ground
+    held: list[float] = field(default_factory=list)  # Deepest depth of each spike [m] since it touched; empty: as `top`
+    vertical: int = 0  # Dry friction of the rig: 0 holds, +1 and -1 slides up and down
+    rotation: int = 0  # Dry friction of the bearing: 0 holds, +1 and -1 turns clockwise and back
+    torque_over: bool = False  # Whether the torque has ended for good
+    resting: bool = False  # Whether nothing moves and nothing will
+    inner: int = 1  # Mode of the term that has a coordinate of its own: 1 at the start, else 0
 
     def copy(self) -> Modes:
         """A copy that can be changed."""
@@ -96,12 +87,10 @@ class Contact:
     depth: float
     rate: float
     slip: float
-    load: float
-    """Normal force that presses [N], as friction sees it; 0 where the ground pulls."""
+    load: float  # Normal force that presses [N], as friction sees it; 0 where the ground pulls
     h: float
     d: float
-    friction_bound: float
-    """mu_s load [N]."""
+    friction_bound: float  # mu_s load [N]
 
 
 class System:
@@ -144,8 +133,7 @@ class System:
         self.stick_force = self.stick_load = self.stick_bound = 0.0
         self.vertical_force = self.vertical_bound = self.rotation_force = self.rotation_bound = 0.0
         self.inner_holds = 1.0
-        self.implicit: Any = None
-        """Makes implicit steps, where the ground asks for them (`rigid.planar.implicit`)."""
+        self.implicit: Any = None  # Makes implicit steps, where the ground asks for them (`rigid.planar.implicit`)
         self.acceleration = (0.0, 0.0, 0.0)
 
     def _remembers(self) -> bool:

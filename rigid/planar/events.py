@@ -9,10 +9,8 @@ from .dynamics import OMEGA, VX, VY, WHEEL, Modes, System, Y
 
 __all__ = ["KINKS", "Monitor", "Watch", "cubic", "monitors", "precision", "triggered"]
 
-Monitor = tuple[str, int]
-"""Kind of event and the spike (or a number of its own)."""
-Watch = dict[Monitor, tuple[float, float]]
-"""Each monitor's value and rate (NaN where it is not known)."""
+Monitor = tuple[str, int]  # Kind of event and the spike (or a number of its own)
+Watch = dict[Monitor, tuple[float, float]]  # Each monitor's value and rate (NaN where it is not known)
 
 
 def monitors(system: System, z: Sequence[float], modes: Modes) -> Watch:

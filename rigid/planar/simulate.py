@@ -21,8 +21,7 @@ from .trajectory import LAUNCH_DISTANCE, STATES, Tally, Trajectory
 __all__ = ["Method", "check_step", "longest_step", "simulate", "step_bound"]
 
 Method = Literal["located", "paper"]
-PAPER_STEP = 1e-3
-"""The paper's step [s]."""
+PAPER_STEP = 1e-3  # The paper's step [s]
 
 
 def simulate(

@@ -13,14 +13,11 @@ from rigid.model.trial import Trial
 
 __all__ = ["STATES", "LAUNCH_DISTANCE", "Trajectory", "Transition"]
 
-STATES = ("stand", "pivot", "slip", "hop")
-"""The states (docs/planar.md), in the order of `Trajectory.state`'s numbers."""
-LAUNCH_DISTANCE = 0.01
-"""How far from its start the centre is when its trajectory angle is taken [m]."""
+STATES = ("stand", "pivot", "slip", "hop")  # The states (docs/planar.md), in the order of `Trajectory.state`'s numbers
+LAUNCH_DISTANCE = 0.01  # How far from its start the centre is when its trajectory angle is taken [m]
 
 Array = NDArray[np.float64]
-Transition = tuple[float, str, float]
-"""(time [s], state entered, theta [rad])"""
+Transition = tuple[float, str, float]  # (time [s], state entered, theta [rad])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,36 +33,26 @@ class Trajectory:
     vx: Array
     vy: Array
     omega: Array
-    ax: Array
-    """Acceleration of the centre [m/s2]."""
+    ax: Array  # Acceleration of the centre [m/s2]
     ay: Array
-    alpha: Array
-    """Angular acceleration [rad/s2]."""
+    alpha: Array  # Angular acceleration [rad/s2]
     wheel_speed: Array
-    state: NDArray[np.int8]
-    """Number into STATES."""
+    state: NDArray[np.int8]  # Number into STATES
     kinetic_energy: Array
     potential_energy: Array
-    stored_energy: Array
-    """In the ground's springs [J]."""
-    torque_work: Array
-    """Work of the torque on the platform since t = 0 [J]."""
-    dissipated: Array
-    """[J] since t = 0."""
+    stored_energy: Array  # In the ground's springs [J]
+    torque_work: Array  # Work of the torque on the platform since t = 0 [J]
+    dissipated: Array  # [J] since t = 0
     transitions: tuple[Transition, ...]
     """Every change of state in order of time; the first is the state at t = 0, with the torque on."""
     trajectory_angle: float | None
     """atan2(dy, dx) of the centre from its start to the first point 10 mm away [rad]; None if never reached."""
-    max_speed: float
-    """Largest speed of the centre [m/s]."""
-    time_of_max_speed: float
-    """When it is that fast [s], to a step or a sample, whichever is nearer."""
-    max_angular_velocity: float
-    """Largest |omega| [rad/s]."""
+    max_speed: float  # Largest speed of the centre [m/s]
+    time_of_max_speed: float  # When it is that fast [s], to a step or a sample, whichever is nearer
+    max_angular_velocity: float  # Largest |omega| [rad/s]
     energy_residual: float
     """Largest |E(t) - E(0) - work of the torque + dissipated| over max(|work of the torque|, W l) [1]."""
-    notes: dict[str, Any] = field(default_factory=dict)
-    """How the integration went: steps, events."""
+    notes: dict[str, Any] = field(default_factory=dict)  # How the integration went: steps, events
 
     @property
     def state_names(self) -> list[str]:

@@ -18,14 +18,10 @@ __all__ = ["Flywheel", "TorqueHistory"]
 class Flywheel:
     """One flywheel with its motor and its brake. Raises ValueError for numbers that none can have."""
 
-    inertia: float
-    """J_w about its axis [kg m2]."""
-    max_speed: float = math.inf
-    """Largest speed [rad/s]."""
-    motor_torque: float = math.inf
-    """What the motor can give at most [N m]."""
-    brake_torque: float = math.inf
-    """What the brake can give at most [N m]."""
+    inertia: float  # J_w about its axis [kg m2]
+    max_speed: float = math.inf  # Largest speed [rad/s]
+    motor_torque: float = math.inf  # What the motor can give at most [N m]
+    brake_torque: float = math.inf  # What the brake can give at most [N m]
     axis: tuple[float, float, float] = (0.0, 1.0, 0.0)
     """Its axis in the body, of length 1; +y turns the platform towards +x."""
 

@@ -17,8 +17,7 @@ from .solids import box_vertices, prism_vertices, rhombicuboctahedron_vertices
 
 __all__ = ["PLATFORM_FOLDER", "find_platform", "platform_names", "read_platform"]
 
-PLATFORM_FOLDER = Path(__file__).parents[1] / "platforms"
-"""Where those are that ship."""
+PLATFORM_FOLDER = Path(__file__).parents[1] / "platforms"  # Where those are that ship
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
 Vector = tuple[float, float, float]

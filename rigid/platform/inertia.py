@@ -19,16 +19,13 @@ Array = NDArray[np.float64]
 class Part:
     """One homogeneous part of a body, its axes along the body's."""
 
-    mass: float
-    """Mass [kg]."""
+    mass: float  # Mass [kg]
     shape: Literal["point", "ball", "box", "cylinder", "ring", "shell"] = "point"
     """A shell is an empty ball; a cylinder and a (thin) ring have their axis along `axis`."""
     size: tuple[float, ...] = ()
     """Ball, shell, ring: (radius,); cylinder: (radius, length); box: lengths along x, y, z [m]."""
-    axis: Literal["x", "y", "z"] = "z"
-    """Axis of a cylinder or a ring."""
-    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Where its centre is, from the body's geometric centre [m]."""
+    axis: Literal["x", "y", "z"] = "z"  # Axis of a cylinder or a ring
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)  # Where its centre is, from the body's geometric centre [m]
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.mass) and self.mass > 0):

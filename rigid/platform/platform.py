@@ -28,14 +28,10 @@ Array = NDArray[np.float64]
 class Stance(NamedTuple):
     """How a platform stands ready to tumble towards +x, in the terms of the planar model."""
 
-    spike_length: float
-    """l: from the centre to the tips it tumbles over, in the plane of motion [m]."""
-    lean: float
-    """Angle of that line from the downward vertical [rad]; pi/8 for the Hedgehog."""
-    row: tuple[int, ...]
-    """The tips that it tumbles over."""
-    rear: tuple[int, ...]
-    """The other tips that it stands on."""
+    spike_length: float  # l: from the centre to the tips it tumbles over, in the plane of motion [m]
+    lean: float  # Angle of that line from the downward vertical [rad]; pi/8 for the Hedgehog
+    row: tuple[int, ...]  # The tips that it tumbles over
+    rear: tuple[int, ...]  # The other tips that it stands on
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -43,23 +39,18 @@ class Platform:
     """An internally actuated platform. Raises ValueError for a body that cannot be."""
 
     name: str
-    mass: float
-    """With its wheels [kg]."""
+    mass: float  # With its wheels [kg]
     inertia: Array
     """About the centre of mass [kg m2], shape [3, 3]: with the wheels' mass, but without J_w about their axes."""
     tips: Array
     """Where it touches the ground: the outermost points of its spikes, or its corners [m], shape [tip_count, 3]."""
-    hull_vertices: Array
-    """Corners of its convex hull, spikes left out [m], shape [n, 3]."""
+    hull_vertices: Array  # Corners of its convex hull, spikes left out [m], shape [n, 3]
     wheels: tuple[Flywheel, ...]
     tip_radius: float = 0.0
     """Radius of the balls at the ends of its spikes, and of their shafts [m]; 0 where it has none."""
-    spike_clear: float = 0.0
-    """How far each spike stands out of the hull, along itself [m]; 0 where it has none."""
-    centre_of_mass: Array = field(default_factory=lambda: np.zeros(3))
-    """From the geometric centre [m], shape (3,)."""
-    sources: Mapping[str, str] = field(default_factory=dict)
-    """Where each number comes from."""
+    spike_clear: float = 0.0  # How far each spike stands out of the hull, along itself [m]; 0 where it has none
+    centre_of_mass: Array = field(default_factory=lambda: np.zeros(3))  # From the geometric centre [m], shape (3,)
+    sources: Mapping[str, str] = field(default_factory=dict)  # Where each number comes from
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.mass) and self.mass > 0):

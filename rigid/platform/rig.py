@@ -18,11 +18,9 @@ from typing import Literal, get_args
 
 __all__ = ["STANDARD_GRAVITY", "Reading", "Rig", "counterweight_for"]
 
-STANDARD_GRAVITY = 9.80665
-"""Standard gravity [m/s2], the unit of ``--rig``."""
+STANDARD_GRAVITY = 9.80665  # Standard gravity [m/s2], the unit of ``--rig``
 
-Reading = Literal["pair", "weight"]
-"""What a stated gravity of the rig means."""
+Reading = Literal["pair", "weight"]  # What a stated gravity of the rig means
 
 
 def counterweight_for(
@@ -57,14 +55,10 @@ class Rig:
     platform (it would pull it off the ground), and for a simulated gravity that is not below the local one.
     """
 
-    mass: float
-    """Of the platform [kg]."""
-    counterweight: float
-    """m_b [kg]."""
-    gravity_sim: float
-    """Free-fall acceleration of the pair [m/s2]."""
-    gravity: float = STANDARD_GRAVITY
-    """Local gravity [m/s2]."""
+    mass: float  # Of the platform [kg]
+    counterweight: float  # m_b [kg]
+    gravity_sim: float  # Free-fall acceleration of the pair [m/s2]
+    gravity: float = STANDARD_GRAVITY  # Local gravity [m/s2]
     wire_length: float | None = None
     """From the pulley down to the shaft [m]; only the pendulum of the wires asks for it."""
 

@@ -20,10 +20,8 @@ Array = NDArray[np.float64]
 class Mesh:
     """A closed surface of triangles, counter-clockwise seen from outside; one body or several."""
 
-    vertices: Array
-    """Positions [m], shape [vertex_count, 3]."""
-    faces: NDArray[np.int64]
-    """Indices of the corners, shape [face_count, 3]."""
+    vertices: Array  # Positions [m], shape [vertex_count, 3]
+    faces: NDArray[np.int64]  # Indices of the corners, shape [face_count, 3]
 
     @property
     def volume(self) -> float:

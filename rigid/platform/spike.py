@@ -20,14 +20,10 @@ class Section:
     """One primitive of revolution about the spike's axis, heights measured up from the tip's lowest point [m]."""
 
     shape: Literal["ball", "cylinder", "cone"]
-    bottom: float
-    """Lowest height [m]."""
-    top: float
-    """Highest height [m]."""
-    bottom_radius: float
-    """Radius at the bottom [m]; a ball's radius."""
-    top_radius: float
-    """Radius at the top [m]; a ball's radius."""
+    bottom: float  # Lowest height [m]
+    top: float  # Highest height [m]
+    bottom_radius: float  # Radius at the bottom [m]; a ball's radius
+    top_radius: float  # Radius at the top [m]; a ball's radius
 
     def radius_at(self, height: float) -> float | None:
         """Radius [m] at `height` [m], None where the section has no matter."""
@@ -47,22 +43,14 @@ class Spike:
     Raises ValueError, naming the parameter, its value and what would do, for a body that cannot be.
     """
 
-    tip: Tip = "sphere"
-    """Shape of the end: "sphere", "cone" or "flat"."""
-    diameter: float = 0.012
-    """Diameter of the tip [m]."""
-    shaft_diameter: float | None = None
-    """Diameter of the shaft [m]; None: as the tip. Never thicker than the tip."""
-    length: float = 0.06
-    """From the tip's lowest point to the shaft's upper end [m]."""
-    cone_angle: float = 60.0
-    """Full angle of a conical tip [degrees]."""
-    mass: float = 0.5
-    """Mass [kg]: what falls in a drop."""
-    friction: float = 0.5
-    """Coefficient of friction of its surface [1]."""
-    restitution: float = 0.5
-    """Coefficient of restitution of its surface [1]."""
+    tip: Tip = "sphere"  # Shape of the end: "sphere", "cone" or "flat"
+    diameter: float = 0.012  # Diameter of the tip [m]
+    shaft_diameter: float | None = None  # Diameter of the shaft [m]; None: as the tip. Never thicker than the tip.
+    length: float = 0.06  # From the tip's lowest point to the shaft's upper end [m]
+    cone_angle: float = 60.0  # Full angle of a conical tip [degrees]
+    mass: float = 0.5  # Mass [kg]: what falls in a drop
+    friction: float = 0.5  # Coefficient of friction of its surface [1]
+    restitution: float = 0.5  # Coefficient of restitution of its surface [1]
 
     def __post_init__(self) -> None:
         if self.tip not in ("sphere", "cone", "flat"):

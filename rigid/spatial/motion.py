@@ -47,12 +47,10 @@ class Modes:
     """Of each touching tip that slides: the unit vector of its slip, shape (2,)."""
     frozen: set[int] = field(default_factory=set)
     """Those that slide so slowly that their direction is kept instead of followed (see `rigid.spatial.steps`)."""
-    weight: dict[int, float] = field(default_factory=dict)
-    """Share of each sticking tip in the load of all."""
+    weight: dict[int, float] = field(default_factory=dict)  # Share of each sticking tip in the load of all
     top: dict[int, float] = field(default_factory=dict)
     """Deepest depth of each touching tip [m], where the law remembers it; negative while it is on new ground."""
-    torque: tuple[float, ...] = (0.0, 0.0, 0.0)
-    """Of each wheel on the platform [N m]."""
+    torque: tuple[float, ...] = (0.0, 0.0, 0.0)  # Of each wheel on the platform [N m]
 
 
 @dataclass(slots=True)
@@ -60,16 +58,12 @@ class Tip:
     """One touching tip, as last evaluated."""
 
     index: int
-    arm: Array
-    """From the centre of mass [m]."""
+    arm: Array  # From the centre of mass [m]
     depth: float
     rate: float
-    slip: Array
-    """Horizontal velocity [m/s], shape (2,)."""
-    load: float
-    """Normal force [N]."""
-    friction: Array
-    """Force along the ground [N], shape (2,)."""
+    slip: Array  # Horizontal velocity [m/s], shape (2,)
+    load: float  # Normal force [N]
+    friction: Array  # Force along the ground [N], shape (2,)
 
 
 class Motion:
@@ -96,8 +90,7 @@ class Motion:
             self.axes[k] = wheel.axis
         self.inverse = np.linalg.inv(platform.inertia)
         self.found: list[Tip] = []
-        self.spin = np.zeros(3)
-        """Angular velocity [rad/s], world axes, as last evaluated."""
+        self.spin = np.zeros(3)  # Angular velocity [rad/s], world axes, as last evaluated
 
     # -- what a state means -------------------------------------------------------------------------------------------
 

@@ -37,20 +37,14 @@ class SpatialTrial:
     platform: Platform
     gravity: float | tuple[float, float, float]
     """g [m/s2], or the vector of it, which makes a slope: the ground is z = 0. In a rig g_sim, upright."""
-    ground: str = "spring-damper"
-    """Surface law, by name."""
+    ground: str = "spring-damper"  # Surface law, by name
     ground_parameters: Mapping[str, float] = field(default_factory=dict)
     """Of one tip, SI units: half of what a planar row of two has."""
-    mu_s: float = 0.5
-    """Coefficient of static friction [1]."""
-    mu_d: float | None = None
-    """Coefficient of sliding friction [1]; None: half of mu_s."""
-    counterweight: float = 0.0
-    """m_b of a rig [kg]; the weight is then (m + m_b) g_sim."""
-    torques: tuple[TorqueHistory, ...] = ()
-    """One for each wheel that is driven, found by its axis."""
-    torque_in_flight: bool = False
-    """Whether the wheels are driven while no tip touches; the planar model does not."""
+    mu_s: float = 0.5  # Coefficient of static friction [1]
+    mu_d: float | None = None  # Coefficient of sliding friction [1]; None: half of mu_s
+    counterweight: float = 0.0  # m_b of a rig [kg]; the weight is then (m + m_b) g_sim
+    torques: tuple[TorqueHistory, ...] = ()  # One for each wheel that is driven, found by its axis
+    torque_in_flight: bool = False  # Whether the wheels are driven while no tip touches; the planar model does not
 
     def __post_init__(self) -> None:
         gravity = np.atleast_1d(np.asarray(self.gravity, dtype=float))
@@ -121,42 +115,27 @@ class SpatialTrajectory:
     """A motion sampled at `time`, world axes, z up; SI units."""
 
     trial: SpatialTrial
-    time: Array
-    """[s], shape [sample_count]."""
-    position: Array
-    """Of the centre of mass [m], shape [sample_count, 3]."""
-    quaternion: Array
-    """Unit, scalar first, body to world, shape [sample_count, 4]."""
-    velocity: Array
-    """[m/s], shape [sample_count, 3]."""
-    angular_velocity: Array
-    """World axes [rad/s], shape [sample_count, 3]."""
-    momentum: Array
-    """(m v_x, m v_y, (m + m_b) v_z) [N s], shape [sample_count, 3]."""
-    angular_momentum: Array
-    """Of platform and wheels about the centre of mass [N m s], shape [sample_count, 3]."""
-    wheel_speed: Array
-    """Absolute, along the wheels' axes [rad/s], shape [sample_count, 3]; 0 where there is no wheel."""
-    touching: NDArray[np.int64]
-    """How many tips touch, shape [sample_count]."""
-    sticking: NDArray[np.int64]
-    """How many of them stick, shape [sample_count]."""
+    time: Array  # [s], shape [sample_count]
+    position: Array  # Of the centre of mass [m], shape [sample_count, 3]
+    quaternion: Array  # Unit, scalar first, body to world, shape [sample_count, 4]
+    velocity: Array  # [m/s], shape [sample_count, 3]
+    angular_velocity: Array  # World axes [rad/s], shape [sample_count, 3]
+    momentum: Array  # (m v_x, m v_y, (m + m_b) v_z) [N s], shape [sample_count, 3]
+    angular_momentum: Array  # Of platform and wheels about the centre of mass [N m s], shape [sample_count, 3]
+    wheel_speed: Array  # Absolute, along the wheels' axes [rad/s], shape [sample_count, 3]; 0 where there is no wheel
+    touching: NDArray[np.int64]  # How many tips touch, shape [sample_count]
+    sticking: NDArray[np.int64]  # How many of them stick, shape [sample_count]
     kinetic_energy: Array
     potential_energy: Array
     stored_energy: Array
-    torque_work: Array
-    """Work of the torques on the platform since t = 0 [J], as the next two of shape [sample_count]."""
-    dissipated: Array
-    """In ground and friction since t = 0 [J]."""
-    transitions: tuple[tuple[float, int, int], ...]
-    """(time [s], tips that touch, tips that stick) at every change."""
+    torque_work: Array  # Work of the torques on the platform since t = 0 [J], as the next two of shape [sample_count]
+    dissipated: Array  # In ground and friction since t = 0 [J]
+    transitions: tuple[tuple[float, int, int], ...]  # (time [s], tips that touch, tips that stick) at every change
     energy_residual: float
     """Largest |E(t) - E(0) - work of the torques + dissipated| over max(|work of the torques|, W reach, E(0)) [1]."""
     events: int
-    forced_steps: int
-    """Steps taken without looking for events, where too many came at once."""
-    stalls: int
-    """How often tips that crept along were made to stick or to keep their direction (`rigid.spatial.steps`)."""
+    forced_steps: int  # Steps taken without looking for events, where too many came at once
+    stalls: int  # How often tips that crept along were made to stick or to keep their direction (`rigid.spatial.steps`)
 
     @property
     def energy(self) -> Array:

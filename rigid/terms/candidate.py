@@ -20,10 +20,8 @@ __all__ = [
     "bent", "between", "fixed", "free", "logarithm", "prior", "shape", "times",
 ]  # fmt: skip
 
-LAST = 1000
-"""Rank of an effect that does not mind where it stands."""
-SETS_IN = "y / (1 + y^q)^(1 / q)"
-"""In an equation: what `mobilised` computes of a share y and a sharpness q."""
+LAST = 1000  # Rank of an effect that does not mind where it stands
+SETS_IN = "y / (1 + y^q)^(1 / q)"  # In an equation: what `mobilised` computes of a share y and a sharpness q
 Starts = tuple[tuple[float, ...], ...]
 
 
@@ -32,25 +30,19 @@ class Number:
     """One number of a form: a parameter of the term (tumbles) or a slot of the law (pushes), and how it is fitted."""
 
     name: str
-    fitted: str
-    """Its name while it is fitted, without the effect's."""
+    fitted: str  # Its name while it is fitted, without the effect's
     how: str = "same"
     """Tumbles: ``same``, ``change`` (`typical` + value), ``logarithm`` (`typical` e^value), ``inverse`` (1 / value,
     infinite at 0), ``fixed`` (always `typical`, not fitted). Pushes: see `experiments.diagnose.push.forms.Slot`."""
     typical: float = 0.0
     unit: str = "1"
-    value: float = 0.0
-    """Where fits begin, and the middle of the prior."""
-    std: float = math.inf
-    """Of the prior; infinite for none."""
-    scale: float = 1.0
-    """A change that can be seen."""
-    step: float = 0.0
-    """Of finite differences."""
+    value: float = 0.0  # Where fits begin, and the middle of the prior
+    std: float = math.inf  # Of the prior; infinite for none
+    scale: float = 1.0  # A change that can be seen
+    step: float = 0.0  # Of finite differences
     lowest: float = -math.inf
     highest: float = math.inf
-    sides: tuple[float, ...] = ()
-    """Of a bend: where fits begin, in `std`."""
+    sides: tuple[float, ...] = ()  # Of a bend: where fits begin, in `std`
 
 
 @dataclass(frozen=True)
@@ -59,46 +51,33 @@ class Form:
 
     name: str
     numbers: tuple[Number, ...]
-    starts: Starts
-    """Values of the fitted numbers to begin fits from, in their order."""
-    equation: str = ""
-    """Of pushes; tumbles have one an effect."""
-    needs: str = ""
-    """Of pushes: ``retreats`` or ``speeds``, what trials must show for it to be a candidate."""
-    form_std: float = 0.0
-    """How far nature's amplitude may differ from the form's, relative."""
-    redefines: tuple[str, ...] = ()
-    """Base parameters that mean another thing beside this form."""
+    starts: Starts  # Values of the fitted numbers to begin fits from, in their order
+    equation: str = ""  # Of pushes; tumbles have one an effect
+    needs: str = ""  # Of pushes: ``retreats`` or ``speeds``, what trials must show for it to be a candidate
+    form_std: float = 0.0  # How far nature's amplitude may differ from the form's, relative
+    redefines: tuple[str, ...] = ()  # Base parameters that mean another thing beside this form
 
 
 @dataclass(frozen=True)
 class Bend:
     """More numbers for some forms: nature's law is never quite the library's."""
 
-    name: str
-    """Of the bent form, with the plain form's for {}."""
-    of: tuple[str, ...]
-    """Names of the forms that it bends."""
+    name: str  # Of the bent form, with the plain form's for {}
+    of: tuple[str, ...]  # Names of the forms that it bends
     numbers: tuple[Number, ...]
     starts: Starts
-    equation: str | Callable[[str], str] = ""
-    """Of pushes: the bent form's, or what becomes of the plain form's."""
+    equation: str | Callable[[str], str] = ""  # Of pushes: the bent form's, or what becomes of the plain form's
 
 
 @dataclass(frozen=True, kw_only=True)
 class Typical:
     """What is typical of a campaign of tumbles."""
 
-    sinkage: float
-    """Depth of a row at rest [m]: the reference of hardening and the reach of adhesion are about this."""
-    weight: float
-    """On the surface [N]: amplitudes of forces are about a hundredth of it."""
-    friction_speed: float = 0.05
-    """Sliding speed [m/s]."""
-    wheel_speed: float = 100.0
-    """Speed of the wheel [rad/s]."""
-    lift_speed: float = 2e-3
-    """Speed of a tip that moves out [m/s]: the depth at rest times the frequency of bouncing."""
+    sinkage: float  # Depth of a row at rest [m]: the reference of hardening and the reach of adhesion are about this
+    weight: float  # On the surface [N]: amplitudes of forces are about a hundredth of it
+    friction_speed: float = 0.05  # Sliding speed [m/s]
+    wheel_speed: float = 100.0  # Speed of the wheel [rad/s]
+    lift_speed: float = 2e-3  # Speed of a tip that moves out [m/s]: the depth at rest times the frequency of bouncing
 
     @property
     def force(self) -> float:
@@ -120,14 +99,11 @@ class Typical:
 class Tumble:
     """An effect as a candidate of tumbles. Where the term needs the rig, so do its forms."""
 
-    rank: int = LAST
-    """Place among the candidates."""
+    rank: int = LAST  # Place among the candidates
     forms: Callable[[Typical], tuple[Form, ...]]
     bends: tuple[Bend, ...] = ()
-    equation: str
-    """In the names of the term's parameters."""
-    bench: str = ""
-    """The measurement that shows it beside any other."""
+    equation: str  # In the names of the term's parameters
+    bench: str = ""  # The measurement that shows it beside any other
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -152,28 +128,23 @@ class Push:
     in m/s, downwards.
     """
 
-    rank: int = LAST
-    """Place among the candidates, and in the law."""
+    rank: int = LAST  # Place among the candidates, and in the law
     forms: tuple[Form, ...]
-    bends: tuple[Bend, ...] = ()
-    """Each may be bent again by those that follow it."""
+    bends: tuple[Bend, ...] = ()  # Each may be bent again by those that follow it
     law: Mapping[str, Callable[..., Any]]
     lengths: Mapping[str, float] = field(default_factory=dict)
     """Slots that are never 0, and what they are where the effect is off."""
     turning: tuple[str, str] | None = None
     """Slots of a friction that takes a distance to turn round: its bound and that distance."""
-    apart: Mapping[str, str] = field(default_factory=dict)
-    """Another effect -> the experiment that separates the two."""
+    apart: Mapping[str, str] = field(default_factory=dict)  # Another effect -> the experiment that separates the two
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Candidate:
     """An effect among the candidates of a diagnosis."""
 
-    meaning: str
-    """What it is, a clause."""
-    confirm: str
-    """The measurement that shows it by itself, and what should be seen."""
+    meaning: str  # What it is, a clause
+    confirm: str  # The measurement that shows it by itself, and what should be seen
     tumble: Tumble | None = None
     push: Push | None = None
 

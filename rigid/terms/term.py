@@ -101,8 +101,7 @@ class Parameter:
     summary: str
     lowest: float = -math.inf
     highest: float = math.inf
-    above_lowest: bool = False
-    """Whether it must exceed `lowest`, not only reach it."""
+    above_lowest: bool = False  # Whether it must exceed `lowest`, not only reach it
 
     def check(self, value: Any, term: str) -> float:
         """`value` as a float. Raises ValueError, naming it and what would do."""
@@ -125,18 +124,14 @@ class Term:
 
     id: str
     summary: str
-    acts: str
-    """Where it acts, in words."""
+    acts: str  # Where it acts, in words
     parameters: tuple[Parameter, ...] = ()
     source: str
     limits: str
     hooks: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
-    rank: int = 1000
-    """Place in the sum over terms; those of one rank are summed by their ids."""
-    sensor: bool = False
-    """Whether it alters a sensor, not the motion."""
-    needs_rig: bool = False
-    """Whether it has a meaning in the gravity-offloading rig only."""
+    rank: int = 1000  # Place in the sum over terms; those of one rank are summed by their ids
+    sensor: bool = False  # Whether it alters a sensor, not the motion
+    needs_rig: bool = False  # Whether it has a meaning in the gravity-offloading rig only
 
     def __post_init__(self) -> None:
         own = {parameter.name for parameter in self.parameters}

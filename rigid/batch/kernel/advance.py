@@ -11,8 +11,7 @@ from .samples import make_records
 
 __all__ = ["make_advance"]
 
-MOST_SPLITS = 12
-"""Cuts of one step; beyond, modes change at its end."""
+MOST_SPLITS = 12  # Cuts of one step; beyond, modes change at its end
 
 
 def make_advance(parts: SimpleNamespace) -> Any:

@@ -15,5 +15,4 @@ SUMMARY = (
 longest step [s] for the coordinate that a term has of its own (NaN: there is none).
 
 Status: 0 done, 1 too deep, 2 no longer finite, 3 cannot stand, 4 the step is too long for a term's own coordinate."""
-CHANNELS = ("x", "y", "theta", "vx", "vy", "omega", "ax", "ay", "wheel_speed", "state")
-"""Channels of the series."""
+CHANNELS = ("x", "y", "theta", "vx", "vy", "omega", "ax", "ay", "wheel_speed", "state")  # Channels of the series
