@@ -3,8 +3,6 @@
 docs/coupling.md explains the terms.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from rigid.ground.reaction import State

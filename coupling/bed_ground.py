@@ -4,8 +4,6 @@ Every spike is a body of its own, so that its force is known. Of a planar platfo
 `copies` times (`coupling.members`).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import partial

@@ -15,8 +15,6 @@ lie in one line, and it stands on three that do not. A grain's knocks are shorte
 changes longer. Changes come late by half the window.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

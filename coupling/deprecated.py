@@ -1,7 +1,5 @@
 """Old names of attributes, which go on for one version."""
 
-from __future__ import annotations
-
 import warnings
 from typing import Any
 

@@ -5,8 +5,6 @@ reaction over the step: the contact of each of the body's members. A platform ha
 case of one. A ground may have a memory (a bed of grains does), so it can be saved and restored, to the bit.
 """
 
-from __future__ import annotations
-
 from typing import Any, Protocol, runtime_checkable
 
 from numpy.typing import ArrayLike

@@ -1,7 +1,5 @@
 """A surface law under each member of a body: `LawGround`. Heights are counted from the undisturbed surface."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 
@@ -50,7 +48,7 @@ class LawGround:
         return f"LawGround({self.name}, {len(self.tips)} members, driven at {self.time_step:g} s)"
 
     @classmethod
-    def of_trial(cls, trial: Trial) -> LawGround:
+    def of_trial(cls, trial: Trial) -> "LawGround":
         """The spring-damper of a planar trial under each of its rows. Raises ValueError for another law."""
         if trial.ground is not None:
             raise ValueError(f"ground = {trial.ground.name!r}: the master takes the spring-damper of a trial")
@@ -61,7 +59,7 @@ class LawGround:
         return cls(row_tips(trial.spike_length, trial.spike_count), grounds)
 
     @classmethod
-    def of_spatial(cls, trial: SpatialTrial) -> LawGround:
+    def of_spatial(cls, trial: SpatialTrial) -> "LawGround":
         """The surface law of a trial in space under each tip of its platform, about the centre of mass."""
         grounds = [
             SurfaceGround(

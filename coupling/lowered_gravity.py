@@ -13,8 +13,6 @@ is missing, neither platform nor grains would go further than `NEAR` d in the sh
 the run lasts.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

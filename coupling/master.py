@@ -21,8 +21,6 @@ times the mean of its rates before and after; the difference is the error of the
 (Sadjina et al. 2016, Eng. Comput. 33:607, call it the residual of a power bond).
 """
 
-from __future__ import annotations
-
 from collections import deque
 from dataclasses import astuple, dataclass, field, replace
 from typing import Protocol, runtime_checkable

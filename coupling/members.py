@@ -5,8 +5,6 @@ periodic across (y), so it is a slice of the sand as wide as a spike has for its
 body of the bed (`slot`), since only the lower one can be near the sand.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -16,8 +16,6 @@ Each run is a stepper: `advance` once or `run` to the end, `state` and `restore`
 ground's memory included, so that a run taken up again is bitwise the same.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import asdict
 from typing import Any, Unpack

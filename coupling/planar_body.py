@@ -15,8 +15,6 @@ to their loads, and their mean slip is zero at the step's end; beyond mu_s N the
 passes through zero. Events of friction are found to the step, so they are of first order in H.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -3,8 +3,6 @@
 Placement lowers the platform onto the ground against a drag until the ground carries it.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -4,8 +4,6 @@ World axes with z up; a turn is a unit quaternion, scalar first, that takes body
 about y alone.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -26,7 +24,7 @@ class Pose:
     turn: Vector  # Unit quaternion, shape (4,)
 
     @classmethod
-    def of(cls, position: ArrayLike, turn: ArrayLike | None) -> Pose:
+    def of(cls, position: ArrayLike, turn: ArrayLike | None) -> "Pose":
         """At `position` [m]; None: not turned."""
         unturned = (1.0, 0.0, 0.0, 0.0)
         return cls(np.asarray(position, dtype=float), np.asarray(unturned if turn is None else turn, dtype=float))
@@ -40,7 +38,7 @@ class Twist:
     spin: Vector  # [rad/s], shape (3,)
 
     @classmethod
-    def of(cls, velocity: ArrayLike, spin: ArrayLike | None) -> Twist:
+    def of(cls, velocity: ArrayLike, spin: ArrayLike | None) -> "Twist":
         """At `velocity` [m/s]; None: not turning."""
         return cls(np.asarray(velocity, dtype=float), np.zeros(3) if spin is None else np.asarray(spin, dtype=float))
 
@@ -53,12 +51,12 @@ class Wrench:
     torque: Vector  # [N m], shape (3,)
 
     @classmethod
-    def of(cls, reaction: Reaction) -> Wrench:
+    def of(cls, reaction: Reaction) -> "Wrench":
         """What the ground stated."""
         return cls(reaction.force, reaction.torque)
 
     @classmethod
-    def none(cls) -> Wrench:
+    def none(cls) -> "Wrench":
         """No force."""
         return cls(np.zeros(3), np.zeros(3))
 

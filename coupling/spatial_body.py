@@ -14,8 +14,6 @@ step's end their mean slip, and turning about the vertical, are zero; one beyond
 slip turns back (docs/platform.md). Events of friction are found to the step: of first order in H.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

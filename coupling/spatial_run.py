@@ -3,8 +3,6 @@
 A stepper as `coupling.CoupledTumble`, whose platform is planar.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, Unpack
 

@@ -1,7 +1,5 @@
 """What all runs share: they go on in macro steps to an end, and report on the way."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from typing import Any, Protocol, TypedDict
 

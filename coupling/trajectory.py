@@ -1,7 +1,5 @@
 """What a penetration leaves behind: one row per macro step, and the numbers read off it."""
 
-from __future__ import annotations
-
 import csv
 import itertools
 import json
@@ -109,7 +107,7 @@ class Penetration:
         return {name: getattr(self, name) for name in FACTS}
 
     @classmethod
-    def from_columns(cls, columns: Mapping[str, NDArray[Any]], facts: Mapping[str, Any]) -> Penetration:
+    def from_columns(cls, columns: Mapping[str, NDArray[Any]], facts: Mapping[str, Any]) -> "Penetration":
         """The run that `columns` and `facts` came from, to the bit; what else `facts` holds is left out."""
         time, depth, velocity, force, phase = (columns[name] for name in COLUMNS)
         known = {name: facts[name] for name in FACTS if name in facts}
@@ -124,7 +122,7 @@ class Penetration:
                 writer.writerow([*(repr(float(number)) for number in numbers), str(phase)])
 
     @classmethod
-    def read_csv(cls, path: str | Path, *, kind: str, macro_step: float, **more: Any) -> Penetration:
+    def read_csv(cls, path: str | Path, *, kind: str, macro_step: float, **more: Any) -> "Penetration":
         """Read what `write_csv` wrote; `kind`, `macro_step` and the rest are not in the file."""
         with Path(path).open(newline="", encoding="utf-8") as stream:
             rows = list(csv.DictReader(stream))

@@ -7,8 +7,6 @@ noted, and begins anew. The wheel goes on from the speed that it has. Over how m
 A landing: no placement and no torque; the platform starts just clear of the ground with the velocities of its fall.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -41,7 +39,7 @@ class Rest(NamedTuple):
     longest_wait: float  # [s]
 
     @classmethod
-    def of(cls, trial: Trial) -> Rest:
+    def of(cls, trial: Trial) -> "Rest":
         """Those above in the rig and at 1 g; in flight speeds go as sqrt(g), times as its inverse: lengths stay."""
         pace = 1.0 if trial.counterweight > 0 else pace_under(trial.gravity_sim)
         return cls(REST_SPEED / pace, REST_LASTS * pace, LONGEST_WAIT * pace)

@@ -6,8 +6,6 @@ gravity if asked to, which then is lowered (`coupling.lowered_gravity`); then ti
 energy balance starts. Every macro step leaves one row.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any, Unpack

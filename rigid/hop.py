@@ -21,8 +21,6 @@ hop angles of Koenig, Pavone, Castillo-Rogez and Nesnas (ICRA 2014), whose formu
 Flight. On a flat ground a parabola, on a round body of radius R and surface gravity g an ellipse about its centre.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -14,8 +14,6 @@ R^T a is taken by parts, [R^T v] - integral of dR^T/dt v, which asks only for v,
 motion sampled at `sensor_times` needs no acceleration at all, unless the window is 0.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

@@ -12,8 +12,6 @@ Where contacts stick, spins of one sense are stiffer: each contact slips at twic
 and a dashpot that sees the half-step velocity. There 5/3 z (K q^2 + 2 c sqrt(K) q) = 4, K = 2 (1 - nu) / (2 - nu).
 """
 
-from __future__ import annotations
-
 import math
 
 from dem.grains.materials import Material

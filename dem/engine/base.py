@@ -4,8 +4,6 @@
 state, checkpoints, stresses and energies read them (``dem.engine.core`` is what a user's ``dem.Bed`` adds to).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import asdict
 from typing import Self

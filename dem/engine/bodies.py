@@ -1,7 +1,5 @@
 """The bodies in a bed: putting them in, moving them, and the forces of the grains on them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

@@ -4,8 +4,6 @@
 often, and on a GPU without the bed leaving the device.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -3,8 +3,6 @@
 The modules of dem.engine, dem.measure and dem.prepare are written against ``BedCore``.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

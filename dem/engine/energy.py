@@ -8,8 +8,6 @@ from where the pair has parted: DMT's -2 pi w R* d, and JKR's force integrated o
 What dashpots and sliding take is ``dem.engine.dissipation``'s.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

@@ -5,8 +5,6 @@ settings it starts Taichi anew, which invalidates the fields of every earlier be
 belong to and refuse to go on after it has ended.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os

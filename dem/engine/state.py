@@ -1,7 +1,5 @@
 """A bed's state as numpy arrays: taken, put back to the bit, kept in a file, taken over by a bed of another layout."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 import zipfile

@@ -4,8 +4,6 @@ Forces are those of the springs, from overlaps and histories as the state keeps 
 what dashpots add in one that moves.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Plain values that the modules of the engine share: settings, the state, what the grains do, and the one failure."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import dataclass, fields
 

@@ -8,8 +8,6 @@ J. Fluid Mech. 189:311); four in a square leave sqrt(2) - 1 = 0.414 D. So that n
 rises no faster than ``steepest`` says. Rings of five and more leave wider ones; docs/bed.md has how much goes through.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -98,7 +96,7 @@ class Graded:
         object.__setattr__(self, "footprints", strips)
 
     @classmethod
-    def of(cls, described: Json) -> Graded:
+    def of(cls, described: Json) -> "Graded":
         """What ``dem.grains.sizes.describe`` wrote down."""
         return cls(**{field.name: described[field.name] for field in fields(cls)})
 

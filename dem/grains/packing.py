@@ -1,7 +1,5 @@
 """How many grains of which size, and their first positions."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

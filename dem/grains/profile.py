@@ -1,7 +1,5 @@
 """What one measures on a bed: packing profile, bulk packing fraction, the height of the surface."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -7,8 +7,6 @@ times its own. Critical height and cohesion (Terzaghi 1943, a plane wedge withou
     H_c = 4 c / gamma tan(45 + phi / 2),  gamma = rho_bulk g.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

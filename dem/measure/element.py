@@ -16,8 +16,6 @@ surface energy over pressure times diameter.
 Units of time below are d sqrt(density / pressure).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace

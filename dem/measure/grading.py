@@ -1,7 +1,5 @@
 """What has become of a graded bed: sizes by place and depth, packing by zone, and whether small grains have drained."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

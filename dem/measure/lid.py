@@ -1,7 +1,5 @@
 """A flat lid on the bed that a servo presses down to a pressure and lifts off again."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

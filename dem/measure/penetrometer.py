@@ -4,8 +4,6 @@ Cone index: force over the area of the cone's base (ASAE S313.3; ISSMGE's refere
 what it gains with the depth of the base [Pa/m].
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

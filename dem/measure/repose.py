@@ -6,8 +6,6 @@ where the bed is periodic: the slopes on its two sides have no side walls. What 
 below, so that no foot runs out, and the plate is rough, so that the slope is the material's own and not the plate's.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ The bed is periodic sideways, so it is sheared as one layer without ends. Lid an
 and rolling friction that the grains on them neither slide nor roll: those are the rough walls of a shear box.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 The file is what ``Bed.save`` writes (.npz, a zip archive) with ``preparation.json`` in it; ``Bed.load`` reads it too.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

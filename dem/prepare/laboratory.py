@@ -1,7 +1,5 @@
 """A bed on its way through the stages of its preparation, with a report of what each of them left."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Sequence

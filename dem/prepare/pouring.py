@@ -7,8 +7,6 @@ contacts with their histories. ``dem.measure.element`` presses its samples, to w
 same way.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from dem.contact.timestep import time_step_for

@@ -1,7 +1,5 @@
 """Prepares a bed as in a laboratory: through stages of your choice, or by the usual recipe, with a cache of beds."""
 
-from __future__ import annotations
-
 import json
 import warnings
 from collections.abc import Callable, Sequence

@@ -5,8 +5,6 @@ A stage is written as its name, with a number after a colon where it takes one: 
 ``cut:0.02``, ``tilt:20``.
 """
 
-from __future__ import annotations
-
 import difflib
 import itertools
 import math

@@ -1,7 +1,5 @@
 """What a stage of a preparation left: its report, and a bed with the reports of all its stages."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar

@@ -3,8 +3,6 @@
 The cache is keyed by everything that shapes a bed, the code included, so that nobody waits for the same rain twice.
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import json
@@ -123,7 +121,7 @@ class Specification:
         young: float | None = None,
         max_overlap: float = 0.05,
         **others: Any,
-    ) -> Specification:
+    ) -> "Specification":
         """Check the options and choose the modulus where it is None. Raises ValueError."""
         if isinstance(grain, Graded) and spread is not None:
             raise ValueError(f"spread = {spread} is for a mean diameter; Graded has a spread of its own")

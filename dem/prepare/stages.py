@@ -1,7 +1,5 @@
 """What stages are made of: falling, settling, loosening, tapping; kept between any two pieces of the work."""
 
-from __future__ import annotations
-
 import json
 import math
 import time

@@ -4,8 +4,6 @@ A mesh is refused unless a grain can tell its inside from its outside: every edg
 along it in opposite directions, and the normals point outwards. Whether the surface runs through itself is not checked.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -52,7 +50,7 @@ class Mesh:
         object.__setattr__(self, "triangles", triangles)
 
     @property
-    def mesh(self) -> Mesh:
+    def mesh(self) -> "Mesh":
         """Itself: what all shapes of triangles offer."""
         return self
 

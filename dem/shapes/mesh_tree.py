@@ -9,8 +9,6 @@ normals, and the faces' normals weighted with their angles (Baerentzen & Aanaes 
 11:243). The sign of (p - nearest) . pseudonormal is then right for every closed surface.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

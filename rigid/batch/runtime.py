@@ -5,8 +5,6 @@ arrays to kernels as numpy arrays and keeps no fields, so a bed that starts Taic
 kernels are then compiled again.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os

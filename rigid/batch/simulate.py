@@ -4,8 +4,6 @@ The terms are those of the accurate integrator. Parameters differ from trial to 
 the ground and the number of spikes are the same for all, since the kernel is compiled for them (once; it is kept).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

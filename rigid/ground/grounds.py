@@ -4,8 +4,6 @@ Depth is positive downwards from `surface`. All laws of `rigid.ground.laws` shar
 paper's law, with its two numbers as arguments. `coupling.LawGround` puts one under each member of a platform.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

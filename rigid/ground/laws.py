@@ -19,8 +19,6 @@ What is stored: loading_work(z) without `rebound`, else `springback_energy`. All
 at every moment force * rate >= d(stored)/dt, as `tests/rigid/ground/test_laws.py` shows for each law.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ These are plain values, so that the surface laws here and the bed of grains behi
 Vectors are in the world's axes, z up, SI units.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any

@@ -11,8 +11,6 @@ x3 x2^2 in f2: 0.18589 in github.com/KKKobefeng/3D-RFT, 0.18519 in the other. Wi
 straight down bears 0.8757 xi_n d, which is the 0.876 that the paper states; with the former 0.8750.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -19,8 +19,6 @@ the numbers of the ground's law:
   tangential drag, factors on mu_s and mu_d, load that friction sees beside the normal force.
 """
 
-from __future__ import annotations
-
 import linecache
 import types
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """The numbers of one trial: platform, ground, rig, torque and effects, checked by name."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field

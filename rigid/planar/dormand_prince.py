@@ -5,8 +5,6 @@ State vectors are lists of nine to eleven numbers (`rigid.planar.dynamics`): fas
 short.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -9,8 +9,6 @@ that of sum N_n slip_n / sum N_n, and this mean is what stays zero: sticking tak
 spike's is gone the constraint has become that spike's own.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -45,7 +43,7 @@ class Modes:
     resting: bool = False  # Whether nothing moves and nothing will
     inner: int = 1  # Mode of the term that has a coordinate of its own: 1 at the start, else 0
 
-    def copy(self) -> Modes:
+    def copy(self) -> "Modes":
         """A copy that can be changed."""
         return Modes(
             list(self.touching), list(self.slip), list(self.top), list(self.held), self.vertical, self.rotation,

@@ -1,7 +1,5 @@
 """What is watched for events: quantities that are positive as long as the modes hold."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -5,8 +5,6 @@ the error from the last two of order 5 and 4, as steep as the explicit pair's (H
 Differential Equations II, section IV.9). J is found by differences once for all steps that begin at one state.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -8,8 +8,6 @@ of a step. Events at one moment are taken one after the other without a step bet
 microsecond are answered with a step of a microsecond in the present modes, which is counted (`forced_steps`).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field

@@ -5,8 +5,6 @@ friction there is always one answer (no Painleve paradox): the force that would 
 contact starts to slide against it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from .dynamics import OMEGA, VX, Modes, System

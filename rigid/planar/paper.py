@@ -5,8 +5,6 @@ the pose with the new speeds), of order 1, with touch-down, lift-off, stick and 
 a step. It is here to show what that step does; the located integrator is the one to trust.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

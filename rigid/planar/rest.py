@@ -5,8 +5,6 @@ less than the integrator's own error, and would not gather speed, since the equi
 second a platform that its torque has shaken would be followed for ever, while it swings by less than an atom's width.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

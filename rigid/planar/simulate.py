@@ -1,7 +1,5 @@
 """One planar trial: `simulate` integrates it, accurately or the paper's way, and answers with a `Trajectory`."""
 
-from __future__ import annotations
-
 import bisect
 import math
 from collections.abc import Callable, Mapping

@@ -5,8 +5,6 @@ W / 2K). Elsewhere the rows carry different loads, so the platform leans by thei
 are found by Newton's method from the balance of forces along the normal and of moments.
 """
 
-from __future__ import annotations
-
 from rigid.model.trial import Trial
 
 from .dynamics import INNER, THETA, WHEEL, Modes, System, Y

@@ -1,7 +1,5 @@
 """What a simulated tumble looks like: samples, transitions, and the numbers that a person would quote."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import Any

@@ -5,8 +5,6 @@ Conventions of the planar model: a torque on the platform is the reaction of a f
 wheel is at its limit; a brake takes a wheel that turns with the platform to rest, and is at its end then.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal
@@ -75,7 +73,7 @@ class TorqueHistory:
     def constant(
         cls, wheel: Flywheel, torque: float, until: float = math.inf, *,
         actuator: Literal["motor", "brake"] = "motor", wheel_speed_0: float = 0.0,
-    ) -> TorqueHistory:  # fmt: skip
+    ) -> "TorqueHistory":  # fmt: skip
         """A constant `torque` [N m] from t = 0 to `until` [s]."""
         return cls(wheel=wheel, pieces=((until, torque),), actuator=actuator, wheel_speed_0=wheel_speed_0)
 

@@ -1,7 +1,5 @@
 """Platforms from TOML files, those that ship and a user's own."""
 
-from __future__ import annotations
-
 import tomllib
 from difflib import get_close_matches
 from pathlib import Path
@@ -41,7 +39,7 @@ class _Body(_Table):
     part: tuple[_PartTable, ...] = ()
 
     @model_validator(mode="after")
-    def _one_of_two(self) -> _Body:
+    def _one_of_two(self) -> "_Body":
         if (self.inertia is None) == (not self.part):
             raise ValueError(
                 "either inertia (three principal moments about x, y, z or a tensor) or [[body.part]] tables"
@@ -58,7 +56,7 @@ class _Hull(_Table):
     height: Positive | None = None
 
     @model_validator(mode="after")
-    def _fits_shape(self) -> _Hull:
+    def _fits_shape(self) -> "_Hull":
         wanted = {"rhombicuboctahedron": {"edge"}, "box": {"size"}, "prism": {"sides", "diameter", "height"}}[
             self.shape
         ]

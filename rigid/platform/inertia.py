@@ -1,7 +1,5 @@
 """Inertia of a body: put together from its parts, and refused where no body could have it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ spikes, or its corners where it has none. It stands on the lowest tips, and tumb
 ahead.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -10,8 +10,6 @@ pair in Reid, Roveda, Nesnas and Pavone (i-SAIRAS 2014), eqs 17 to 19, whose "0.
 The two are almost a factor of two apart.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -90,7 +88,7 @@ class Rig:
         counterweight: float | None = None,
         gravity: float = STANDARD_GRAVITY,
         wire_length: float | None = None,
-    ) -> Rig:
+    ) -> "Rig":
         """The rig that a stated gravity [m/s2] means for a platform of `mass` [kg].
 
         Without `counterweight` [kg] it is the one that gives that gravity. With one, the stated gravity still rules the

@@ -1,7 +1,5 @@
 """Solids in plain numbers: vertices, triangles, volumes, inertias. For platforms, and for whoever draws them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ The body's origin is the lowest point of its tip, its axis is z (up). The spike 
 revolution in plain numbers; what they touch is not its business.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal

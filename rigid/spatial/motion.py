@@ -15,8 +15,6 @@ force is that of these constraints, from the equations of motion: no spring, and
 weights are those of its beginning.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

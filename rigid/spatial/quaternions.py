@@ -1,7 +1,5 @@
 """Unit quaternions, scalar first, that turn body axes into world axes."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

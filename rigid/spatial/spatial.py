@@ -6,8 +6,6 @@ Momentum and angular momentum are states, so flight keeps them to round-off. Sta
 model does (`rigid.simulate`), a planar row being the tips side by side. How friction sticks: `rigid.spatial.motion`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

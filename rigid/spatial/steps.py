@@ -9,8 +9,6 @@ accuracy. Events at one moment are taken together. Two things could make it craw
   the static bound lets go start against the force that held them, and keep that direction until they are faster.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

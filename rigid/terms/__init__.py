@@ -5,8 +5,6 @@ platform, ``CANDIDATE = Candidate(...)`` what a diagnosis must know of it. Files
 is edited. An effect of one's own is such a file anywhere, read with `load_effect`; it then runs in both integrators.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import pkgutil
 import sys

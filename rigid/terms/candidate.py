@@ -7,8 +7,6 @@ is fitted as a logarithm about a typical value, with a prior of one factor of e:
 about it would not end. A bent form is fitted only after the plain one, from where that ended.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

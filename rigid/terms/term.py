@@ -41,8 +41,6 @@ event: the mode changes there, and only there. At most one term of a model has o
 Without hooks a term is a sensor's (`sensor=True`): it is declared here and applied where the sensors are.
 """
 
-from __future__ import annotations
-
 import inspect
 import math
 from collections.abc import Callable, Mapping
