@@ -61,8 +61,10 @@ class Settings:
 
     def __init__(self) -> None:
         self.trials, self.rounds, self.compared = (
-            _number("TRIALS", 20_000), _number("ROUNDS", 5), _number("COMPARED", 1000),
-        )  # fmt: skip
+            _number("TRIALS", 20_000),
+            _number("ROUNDS", 5),
+            _number("COMPARED", 1000),
+        )
 
 
 def _number(name: str, default: int) -> int:
@@ -81,11 +83,15 @@ def drawn_trials(count: int, *, seed: int, all_terms: bool) -> tuple[Trial, dict
     mass = rng.uniform(4.5, 6.5, count)
     base = Trial(gravity_sim=0.0085 * GRAVITY, counterweight=5.0, torque=0.2, effects=effects)
     vary = {
-        "gravity_sim": level, "mass": mass, "counterweight": mass * (GRAVITY - level) / (GRAVITY + level),
-        "inertia": rng.uniform(0.04, 0.09, count), "mu_s": rng.uniform(0.15, 0.8, count),
-        "stiffness": 10 ** rng.uniform(3, 4.3, count), "damping": 10 ** rng.uniform(0.5, 2.2, count),
+        "gravity_sim": level,
+        "mass": mass,
+        "counterweight": mass * (GRAVITY - level) / (GRAVITY + level),
+        "inertia": rng.uniform(0.04, 0.09, count),
+        "mu_s": rng.uniform(0.15, 0.8, count),
+        "stiffness": 10 ** rng.uniform(3, 4.3, count),
+        "damping": 10 ** rng.uniform(0.5, 2.2, count),
         "torque": rng.uniform(0.05, 0.4, count),
-    }  # fmt: skip
+    }
     if all_terms:
         for id, ranges in AMPLITUDES.items():
             for name, bounds in ranges.items():
@@ -142,10 +148,14 @@ def run(out: Path, *, progress: Any) -> Json:
         speeds, compiling, processor = _timed(base, vary, settings.rounds)
         compared = settings.compared if not all_terms else max(1, settings.compared // 3)
         bench["sets"][name] = {
-            "trials_per_s": statistics.median(speeds), "rounds": speeds, "processor_s_per_trial": processor,
-            "trials_per_s_idle_cores": cores / processor, "first_call_s": compiling,
-            "effects": [effect.id for effect in base.effects], "agreement": _agreement(compared, all_terms=all_terms),
-        }  # fmt: skip
+            "trials_per_s": statistics.median(speeds),
+            "rounds": speeds,
+            "processor_s_per_trial": processor,
+            "trials_per_s_idle_cores": cores / processor,
+            "first_call_s": compiling,
+            "effects": [effect.id for effect in base.effects],
+            "agreement": _agreement(compared, all_terms=all_terms),
+        }
     bench["trials_per_s"] = bench["sets"]["base"]["trials_per_s"]
     bench["trials_per_s_all_terms"] = bench["sets"]["all terms"]["trials_per_s"]
     progress.close()
@@ -169,10 +179,13 @@ def _show(bench: Json) -> None:
     )
     for name, part in bench["sets"].items():
         table.add_row(
-            name, f"{part['trials_per_s']:,.0f}", f"{min(part['rounds']):,.0f} - {max(part['rounds']):,.0f}",
-            f"{part['trials_per_s_idle_cores']:,.0f}", f"{part['first_call_s']:.1f}",
+            name,
+            f"{part['trials_per_s']:,.0f}",
+            f"{min(part['rounds']):,.0f} - {max(part['rounds']):,.0f}",
+            f"{part['trials_per_s_idle_cores']:,.0f}",
+            f"{part['first_call_s']:.1f}",
             f"{1e3 * part['agreement']['seconds_per_accurate_trial']:.0f}",
-        )  # fmt: skip
+        )
         agreement = part["agreement"]
         differences = agreement["differences"].values()
         apart = (f"{one['median']:.0e} {one['quantile_99']:.0e} {one['largest']:.0e}" for one in differences)

@@ -171,13 +171,15 @@ def _baseline(name: str, tried: Sequence[Case]) -> Json:
         return said["alarm"] if "alarm" in said else said["verdict"] != "none"
 
     return {
-        "cases": len(own), "false_alarms": _share(nulls, alarm),
+        "cases": len(own),
+        "false_alarms": _share(nulls, alarm),
         "alarm_when_visible": _share([said for _, said in seen], alarm),
         "names_right": _share([_right(c) for c, _ in single] if name == "ours" else points, bool),
-        "median_gap_closed": _median(shut), "gap_closed_by_half": _share(shut, lambda share: share >= 0.5),
+        "median_gap_closed": _median(shut),
+        "gap_closed_by_half": _share(shut, lambda share: share >= 0.5),
         "held_out_at_most_1_2": _share(wide, lambda said: _gap(said["after"]) <= 1.2),
         "median_seconds": _median([said["seconds"] for _, said in own]),
-    }  # fmt: skip
+    }
 
 
 def _seconds(cases: Sequence[Case]) -> dict[str, float | None]:

@@ -36,12 +36,16 @@ def _diagnosed(folder: str) -> Json:
 
     found = diagnose_campaign(Path(folder))
     return {
-        "verdict": found.verdict, "effects": list(found.effects), "alternatives": list(found.alternatives),
+        "verdict": found.verdict,
+        "effects": list(found.effects),
+        "alternatives": list(found.alternatives),
         "forms": [form.id for form in found.forms],
         "found_parameters": {effect: found.parameters(effect) for effect in found.effects},
         "before": {"fit": found.before.fit, "held_out": found.before.held_out},
-        "after": {"fit": found.after.fit, "held_out": found.after.held_out}, "fitted": list(found.fitted),
+        "after": {"fit": found.after.fit, "held_out": found.after.held_out},
+        "fitted": list(found.fitted),
         "held_out": list(found.held_out),
         "base_values": {name: float(value) for name, value in found.base_values.items()},
-        "depends_on": found.depends_on, "findings": [finding.what for finding in found.findings],
-    }  # fmt: skip
+        "depends_on": found.depends_on,
+        "findings": [finding.what for finding in found.findings],
+    }

@@ -17,12 +17,19 @@ __all__ = ["LAWS", "Bed", "Law", "Path", "draw_law", "drive", "drop", "push"]
 Array = NDArray[np.float64]
 
 LAWS: dict[str, tuple[str, ...]] = {
-    "inertial-drag": ("constant", "onset", "power"), "depth-hardening": ("power", "hyperbola", "bilinear"),
-    "plastic-sinkage": ("straight", "bent"), "adhesion": ("short", "fading", "deepest", "long"),
+    "inertial-drag": ("constant", "onset", "power"),
+    "depth-hardening": ("power", "hyperbola", "bilinear"),
+    "plastic-sinkage": ("straight", "bent"),
+    "adhesion": ("short", "fading", "deepest", "long"),
     "shaft-friction": ("corner", "exponential", "depth", "mobilised", "stribeck"),
-    "layering": ("slope", "step", "crust"), "relaxation": ("maxwell",), "collapse": ("sawtooth",),
-    "magnet": ("distance",), "cell-drift": ("warming",), "ringing": ("frame",), "rate": ("power",),
-}  # fmt: skip
+    "layering": ("slope", "step", "crust"),
+    "relaxation": ("maxwell",),
+    "collapse": ("sawtooth",),
+    "magnet": ("distance",),
+    "cell-drift": ("warming",),
+    "ringing": ("frame",),
+    "rate": ("power",),
+}
 """What a law may be, by what it stands for; the last six are in no library."""
 
 _STEP = 1.25e-5

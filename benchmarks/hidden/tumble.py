@@ -184,9 +184,11 @@ def _form(
         return {"vibration_share": 1.0}, {"vibration_speed": speed, "vibration_power": 1.0 + pick % 2}, 0.1, 0.9
     if name == "torque-fade":
         return (
-            {("fade_speed", "fade_speed_square", "fade_time")[pick]: 1.0}, {}, (2e-4, 5e-4, 0.05)[pick],
+            {("fade_speed", "fade_speed_square", "fade_time")[pick]: 1.0},
+            {},
+            (2e-4, 5e-4, 0.05)[pick],
             (0.01, 0.004, 2.0)[pick],
-        )  # fmt: skip
+        )
     if name == "inertial-drag":
         side = 0.3 if pick else 0.0
         return {"drag_normal": 1.0, "drag_side": side}, {"drag_power": 1.8}, 5.0, 400.0

@@ -264,9 +264,12 @@ def sticking(p: ti.template(), i, v, mode, N, H, Mi, load, mean_h, belt, factor,
 
 @ti.kernel
 def run(
-    p: ti.types.ndarray(dtype=ti.f64, ndim=2), dt: ti.f64, every: ti.i32, steps: ti.i32,
+    p: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    dt: ti.f64,
+    every: ti.i32,
+    steps: ti.i32,
     out: ti.types.ndarray(dtype=ti.f64, ndim=3),
-):  # fmt: skip
+):
     ti.loop_config(block_dim=1)
     for i in range(p.shape[0]):
         m = p[i, NUMBER["mass"]]

@@ -159,10 +159,13 @@ def compare(trials: Sequence[Trial], *, time_step: float = TIME_STEP) -> Agreeme
         for (k, path), fine in zip(paths.items(), finer, strict=True)
     }  # fmt: skip
     return Agreement(
-        differences=differences, kinds=tuple(why.get(k, "within") for k in kept),
-        ratios=(differences / _LIMITS).max(axis=1), seconds=seconds / len(kept), energy_residual=residual,
+        differences=differences,
+        kinds=tuple(why.get(k, "within") for k in kept),
+        ratios=(differences / _LIMITS).max(axis=1),
+        seconds=seconds / len(kept),
+        energy_residual=residual,
         strangers=strangers,
-    )  # fmt: skip
+    )
 
 
 def _batched(trials: Sequence[Trial], time_step: float) -> tuple[Array, NDArray[np.bool_]]:

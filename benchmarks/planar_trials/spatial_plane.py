@@ -39,9 +39,11 @@ def draw(path: Path) -> str:
     """Both motions, and their difference; returns a sentence with the largest."""
     flat, space = both()
     apart = {
-        "x [m]": np.abs(space.position[:, 0] - flat.x), "y [m]": np.abs(space.position[:, 2] - flat.y),
-        "theta [rad]": np.abs(space.turn - flat.theta), "out of the plane [m]": np.abs(space.position[:, 1]),
-    }  # fmt: skip
+        "x [m]": np.abs(space.position[:, 0] - flat.x),
+        "y [m]": np.abs(space.position[:, 2] - flat.y),
+        "theta [rad]": np.abs(space.turn - flat.theta),
+        "out of the plane [m]": np.abs(space.position[:, 1]),
+    }
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4))
     left.plot(flat.time, 1e3 * flat.x, color="#0072B2", lw=4, alpha=0.4, label="x, planar")
     left.plot(flat.time, 1e3 * space.position[:, 0], color="#0072B2", lw=1, label="x, spatial")

@@ -70,9 +70,11 @@ def table() -> str:
                 paper = simulate(trial, duration=DURATION, method="paper")
                 many = simulate_batch([trial], duration=DURATION)
                 batch = (
-                    float(many.trajectory_angle[0]), float(many.max_speed[0]), float(many.max_angular_velocity[0]),
+                    float(many.trajectory_angle[0]),
+                    float(many.max_speed[0]),
+                    float(many.max_angular_velocity[0]),
                     float(many.transition_angles["hop"][0]),
-                )  # fmt: skip
+                )
                 lines.append(_row(f"{level:g} g, {surface}, {torque:g} N m", run, paper, batch))
     return "\n".join(lines)
 

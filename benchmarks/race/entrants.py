@@ -93,10 +93,12 @@ class Ours(Entrant):
         period = self._grains.period
         after = Grains(wrapped(now.position, period), now.radius, period)
         return Heat(
-            speed=after.count * steps / wall, list_count=bed.list_count - lists, coordination=coordination(after),
+            speed=after.count * steps / wall,
+            list_count=bed.list_count - lists,
+            coordination=coordination(after),
             packing=packing(self._grains.solid_volume, period, float(after.positions[:, 2].mean())),
             kinetic_energy=bed.kinetic_energy,
-        )  # fmt: skip
+        )
 
     def _warmed(self) -> Bed:
         """The bed after its warm-up, with everything compiled."""
@@ -136,9 +138,12 @@ class Theirs(Entrant):
                 f"{steps} of {self._grains.count} were wanted"
             )
         return Heat(
-            speed=outcome.grain_count * outcome.steps / outcome.time, list_count=outcome.list_count,
+            speed=outcome.grain_count * outcome.steps / outcome.time,
+            list_count=outcome.list_count,
             coordination=outcome.coordination,
             packing=packing(self._grains.solid_volume, outcome.period, outcome.mean_height),
-            kinetic_energy=outcome.kinetic_energy, version=outcome.version,
-            command=" ".join(word or "''" for word in command), missed=outcome.missed,
-        )  # fmt: skip
+            kinetic_energy=outcome.kinetic_energy,
+            version=outcome.version,
+            command=" ".join(word or "''" for word in command),
+            missed=outcome.missed,
+        )

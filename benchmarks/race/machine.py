@@ -51,9 +51,13 @@ def wide_console() -> Console:
 def describe_machine(cores: int, load: float) -> Json:
     """Processor, cores, load at the start, system and the versions under us."""
     return {
-        "processor": _processor(), "cores": cores, "load": load, "system": platform.platform(),
-        "python": platform.python_version(), "taichi": version("taichi"),
-    }  # fmt: skip
+        "processor": _processor(),
+        "cores": cores,
+        "load": load,
+        "system": platform.platform(),
+        "python": platform.python_version(),
+        "taichi": version("taichi"),
+    }
 
 
 def _processor() -> str:

@@ -35,13 +35,17 @@ def _row(entrant: Json, ours: float | None, best: str | None) -> tuple[str, ...]
     speed, last = entrant["speed"], entrant["heats"][-1] if entrant["heats"] else {}
     return (
         entrant["name"] + ("" if entrant["precision"] == "float64" else f" {entrant['precision']}"),
-        _NONE if entrant["skin"] is None else f"{1e3 * entrant['skin']:g}", str(entrant["threads"]),
-        _NONE if speed is None else f"{1e-6 * speed:.2f}", str(len(entrant["heats"])),
+        _NONE if entrant["skin"] is None else f"{1e3 * entrant['skin']:g}",
+        str(entrant["threads"]),
+        _NONE if speed is None else f"{1e-6 * speed:.2f}",
+        str(len(entrant["heats"])),
         _NONE if speed is None or ours is None else f"{ours / speed:.2f}",
-        f"{last['coordination']:.3f}" if last else _NONE, f"{last['packing']:.4f}" if last else _NONE,
-        f"{1e6 * last['kinetic_energy']:.3g}" if last else _NONE, str(last["list_count"]) if last else _NONE,
+        f"{last['coordination']:.3f}" if last else _NONE,
+        f"{last['packing']:.4f}" if last else _NONE,
+        f"{1e6 * last['kinetic_energy']:.3g}" if last else _NONE,
+        str(last["list_count"]) if last else _NONE,
         _remark(entrant, best),
-    )  # fmt: skip
+    )
 
 
 def _remark(entrant: Json, best: str | None) -> str:

@@ -45,9 +45,15 @@ class Lying:
 
 
 def lies_in_flight(
-    trial: Trial, *, surface: str, material: Material, hull_radius: float, width: float, duration: float,
+    trial: Trial,
+    *,
+    surface: str,
+    material: Material,
+    hull_radius: float,
+    width: float,
+    duration: float,
     max_wheel_speed: float = math.inf,
-) -> Lying:  # fmt: skip
+) -> Lying:
     """`trial` on the grains of `surface`, its hull a cylinder of `hull_radius` and `width` [m], for `duration` [s].
 
     Raises ValueError where even the hull would sink in by its radius.

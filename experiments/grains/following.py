@@ -28,9 +28,15 @@ class Frames(Protocol):
 
 
 def follow(
-    run: Any, folder: RunFolder, progress: Progress, *, frames: Callable[[bool], Frames | None],
-    checkpoint_interval: float, sinkage: Callable[[], float], write_series: Callable[[], Any],
-) -> Any:  # fmt: skip
+    run: Any,
+    folder: RunFolder,
+    progress: Progress,
+    *,
+    frames: Callable[[bool], Frames | None],
+    checkpoint_interval: float,
+    sinkage: Callable[[], float],
+    write_series: Callable[[], Any],
+) -> Any:
     """What `run.run` gives, `run` a `CoupledTumble` or a `SpatialRun`; taken up from its checkpoint where there is one.
 
     `frames` is told whether it is taken up; `sinkage` says how deep it stands [m] once it is set down; `write_series`

@@ -115,9 +115,17 @@ def merged(stretches: Sequence[tuple[float, float]]) -> list[tuple[float, float]
 
 
 def graded_under(
-    trajectory: Trajectory, *, length: float, origin: float, spike_diameter: float, grain: float, spread: float,
-    coarse: float, margin: float = 1.5, **options: Any,
-) -> Graded:  # fmt: skip
+    trajectory: Trajectory,
+    *,
+    length: float,
+    origin: float,
+    spike_diameter: float,
+    grain: float,
+    spread: float,
+    coarse: float,
+    margin: float = 1.5,
+    **options: Any,
+) -> Graded:
     """Fine grains where the tips of a forecast come down, coarse ones elsewhere.
 
     Args:

@@ -253,9 +253,13 @@ class PlatformOnBed(ABC, Generic[Settings, Run, Expected]):
         }  # fmt: skip
 
     def carry_out(
-        self, folder: RunFolder, progress: Progress, *, sinkage: Callable[[Run], float],
+        self,
+        folder: RunFolder,
+        progress: Progress,
+        *,
+        sinkage: Callable[[Run], float],
         write_series: Callable[[Path, Run], Any],
-    ) -> Json:  # fmt: skip
+    ) -> Json:
         """Prepare the bed, follow the run in `folder`, from its checkpoint where there is one; the result."""
         self.announce(progress)
         progress.plan({"bed": 1.0, "tumble": self.duration + 0.3}, seconds={"report": 10.0})  # with the setting down
@@ -269,10 +273,16 @@ class PlatformOnBed(ABC, Generic[Settings, Run, Expected]):
 
 
 def finish_run(
-    run: Run, folder: RunFolder, progress: Progress, *, checkpoint_interval: float,
-    frames: Callable[[bool], Frames | None], sinkage: Callable[[Run], float], write_series: Callable[[Path, Run], Any],
+    run: Run,
+    folder: RunFolder,
+    progress: Progress,
+    *,
+    checkpoint_interval: float,
+    frames: Callable[[bool], Frames | None],
+    sinkage: Callable[[Run], float],
+    write_series: Callable[[Path, Run], Any],
     conclude: Callable[[], Json],
-) -> Json:  # fmt: skip
+) -> Json:
     """Follow `run` to its end, write result and report, and drop the checkpoint; the result."""
     follow(
         run, folder, progress, frames=frames, checkpoint_interval=checkpoint_interval, sinkage=lambda: sinkage(run),

@@ -46,9 +46,11 @@ class GrainsSettings(StrictSettings):
         None, description="On a bed: speed at which the platform is set down [m/s]; sqrt(g grain) if not given."
     )
     substeps: int = Field(
-        10, ge=1, le=200,
+        10,
+        ge=1,
+        le=200,
         description="On a bed, or coupled: steps of the ground from one exchange of forces to the next [1].",
-    )  # fmt: skip
+    )
     body_steps: int = Field(
         1,
         ge=1,
@@ -130,9 +132,11 @@ class TumbleBedSettings(GrainsSettings):
         "`gravity` before the torque begins [m/s2]: the same sooner; `gravity` itself if not given.",
     )
     tumbles: int = Field(
-        1, ge=1, le=20,
+        1,
+        ge=1,
+        le=20,
         description="On a bed, or coupled: tumbles in a row; a torque begins when the platform lies [1].",
-    )  # fmt: skip
+    )
     tumble_turn: Positive = Field(
         1.0, le=4, description="On a bed, or coupled: where each torque of a row of tumbles ends, over pi / rows [1]."
     )

@@ -28,9 +28,15 @@ _SHARES = (0.1, 0.3, 0.5, 0.6, 0.9)
 
 
 def distribution(
-    kind: str, *, grain: float, spread: float, deviation: float | None, cut: float | None, openings: Sequence[float],
+    kind: str,
+    *,
+    grain: float,
+    spread: float,
+    deviation: float | None,
+    cut: float | None,
+    openings: Sequence[float],
     passing: Sequence[float],
-) -> Sizes:  # fmt: skip
+) -> Sizes:
     """The distribution of that name about the mean diameter `grain` [m]; a sieve table is enlarged, or reduced, to it.
 
     Raises ValueError for what belongs to another distribution, what is lacking, and what ``dem.grains.sizes`` refuses.

@@ -153,10 +153,23 @@ def chain(max_overlap: float) -> float:
 
 
 def soften(
-    *, max_overlap: float, grain: float, density: float, poisson: float, friction: float, real_young: float,
-    gravity: float, bed_height: float, depth: float, speed: float, pressure: float = 0.0, fall: float = 0.0,
-    packing: float = 0.6, surface_energy: float = 0.0, fastest: str = "speed",
-) -> Softening:  # fmt: skip
+    *,
+    max_overlap: float,
+    grain: float,
+    density: float,
+    poisson: float,
+    friction: float,
+    real_young: float,
+    gravity: float,
+    bed_height: float,
+    depth: float,
+    speed: float,
+    pressure: float = 0.0,
+    fall: float = 0.0,
+    packing: float = 0.6,
+    surface_energy: float = 0.0,
+    fastest: str = "speed",
+) -> Softening:
     """Young's modulus that keeps overlaps below `max_overlap` (see the module). All SI; `grain` is the mean diameter.
 
     `depth` is the deepest the tip goes, `speed` its fastest, `pressure` what the load alone presses with, `fall` how
@@ -191,9 +204,15 @@ def soften(
 
 
 def soften_material(
-    material: Any, *, young: float | None, max_overlap: float, grain: float, spread: float, fastest: str = "speed",
+    material: Any,
+    *,
+    young: float | None,
+    max_overlap: float,
+    grain: float,
+    spread: float,
+    fastest: str = "speed",
     **case: float,
-) -> Softening:  # fmt: skip
+) -> Softening:
     """`soften` for the grains of a material; where `young` [Pa] is set, that, with what presses and how fast.
 
     Diameters are uniform within 1 +- `spread`: where that is wide, the mean grain is held to less than `max_overlap`,
@@ -204,8 +223,14 @@ def soften_material(
     from dem.prepare.prepare import bound_of_mean
 
     chosen = soften(
-        max_overlap=bound_of_mean(Uniform(grain, spread), max_overlap), grain=grain, density=material.density,
-        poisson=material.poisson, friction=material.friction, real_young=material.young,
-        surface_energy=material.surface_energy, fastest=fastest, **case,
-    )  # fmt: skip
+        max_overlap=bound_of_mean(Uniform(grain, spread), max_overlap),
+        grain=grain,
+        density=material.density,
+        poisson=material.poisson,
+        friction=material.friction,
+        real_young=material.young,
+        surface_energy=material.surface_energy,
+        fastest=fastest,
+        **case,
+    )
     return chosen if young is None else Softening(young, chosen.pressure, chosen.speed, material.young)

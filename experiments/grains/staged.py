@@ -61,10 +61,22 @@ class _OneStage:
 
 
 def staged_bed(
-    material: Material, stages: Sequence[str], *, size: tuple[float, float, float], grain: float | Graded,
-    spread: float | None, gravity: float, seed: int, young: float, max_overlap: float, arch: str, threads: int | None,
-    cache: bool, progress: Progress, asked_to_stop: Callable[[], bool],
-) -> Bed:  # fmt: skip
+    material: Material,
+    stages: Sequence[str],
+    *,
+    size: tuple[float, float, float],
+    grain: float | Graded,
+    spread: float | None,
+    gravity: float,
+    seed: int,
+    young: float,
+    max_overlap: float,
+    arch: str,
+    threads: int | None,
+    cache: bool,
+    progress: Progress,
+    asked_to_stop: Callable[[], bool],
+) -> Bed:
     """The bed that `hedgebed bed make` with these stages would make; kept under ``HEDGEBED_CACHE``, as rained ones are.
 
     Raises RuntimeError where it cannot be made as asked for, and what ``dem.prepare.prepare.prepare_as`` does.

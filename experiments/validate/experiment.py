@@ -118,10 +118,15 @@ def _record(folder: RunFolder, case: Case, progress: Progress) -> Json:
             }
         )
     record = {
-        "status": found.status, "skipped": found.skipped, "comparisons": [one.as_dict() for one in found.comparisons],
-        "plots": plots, "remarks": list(found.remarks), "seconds": seconds, "date": date.today().isoformat(),
+        "status": found.status,
+        "skipped": found.skipped,
+        "comparisons": [one.as_dict() for one in found.comparisons],
+        "plots": plots,
+        "remarks": list(found.remarks),
+        "seconds": seconds,
+        "date": date.today().isoformat(),
         "code": fingerprint_of(case),
-    }  # fmt: skip
+    }
     if found.status != "skipped":
         folder.mark_done(case.id, record)
     return record

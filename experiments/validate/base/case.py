@@ -63,9 +63,15 @@ class Comparison:
 
 
 def compared(
-    quantity: str, labels: Sequence[Any], reference: Any, ours: Any, *, unit: str = "1", band: float,
+    quantity: str,
+    labels: Sequence[Any],
+    reference: Any,
+    ours: Any,
+    *,
+    unit: str = "1",
+    band: float,
     relative: bool = True,
-) -> list[Comparison]:  # fmt: skip
+) -> list[Comparison]:
     """A comparison for each of several numbers, called ``<quantity> at <label>``. Raises ValueError for other "
     "lengths."""
     rows = zip(labels, np.asarray(reference, dtype=float), np.asarray(ours, dtype=float), strict=True)

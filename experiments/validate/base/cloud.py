@@ -23,8 +23,11 @@ def initial(seed=3, count=64):
 
 
 BALL: Json = {
-    "position": (0.0005, 0.0149, 0.0177), "radius": 0.003, "velocity": (0.05, 0.02, -0.2), "spin": (30.0, 0.0, -60.0),
-}  # fmt: skip
+    "position": (0.0005, 0.0149, 0.0177),
+    "radius": 0.003,
+    "velocity": (0.05, 0.02, -0.2),
+    "spin": (30.0, 0.0, -60.0),
+}
 
 
 def make(*, ball=False, gravity=(0.0, 0.0, -9.81), floor=True, shift=(0.0, 0.0, 0.0), material=STUFF, **options):

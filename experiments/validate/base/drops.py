@@ -51,9 +51,15 @@ def first_touch(bed: Bed, radius: float, at: Sequence[float]) -> float:
 
 
 def drop(
-    bed: Bed, *, radius: float, density: float, speed: float, at: Sequence[float], longest: float,
+    bed: Bed,
+    *,
+    radius: float,
+    density: float,
+    speed: float,
+    at: Sequence[float],
+    longest: float,
     tell: Tell = lambda share: None,
-) -> dict[str, np.ndarray]:  # fmt: skip
+) -> dict[str, np.ndarray]:
     """A ball let go with `speed` downwards at (x, y), until it stops for the first time. The bed is used up by it.
 
     Returns:
@@ -91,8 +97,14 @@ def drop(
 
 
 def drive_down(
-    bed: Bed, shape: Any, *, at: Sequence[float], speed: float, depth: float, tell: Tell = lambda share: None,
-) -> dict[str, np.ndarray]:  # fmt: skip
+    bed: Bed,
+    shape: Any,
+    *,
+    at: Sequence[float],
+    speed: float,
+    depth: float,
+    tell: Tell = lambda share: None,
+) -> dict[str, np.ndarray]:
     """A body whose lowest point is its origin, driven down at (x, y). The bed is used up by it.
 
     Returns: depth [m] of the lowest point in the middle of each step, mean force upwards over it [N], shape [n].

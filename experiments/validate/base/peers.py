@@ -56,7 +56,10 @@ class Peer:
         return next((name for name in self.programs if shutil.which(name)), None)
 
 
-PEERS = {"liggghts": Peer("LIGGGHTS", ("liggghts",), "liggghts"), "lammps": Peer("LAMMPS", ("lmp", "lammps"), "lammps")}
+PEERS = {
+    "liggghts": Peer("LIGGGHTS", ("liggghts",), "liggghts"),
+    "lammps": Peer("LAMMPS", ("lmp", "lammps"), "lammps"),
+}
 
 
 @dataclass(frozen=True)

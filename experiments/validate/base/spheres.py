@@ -14,9 +14,18 @@ from dem.contact.law import effective_moduli
 from experiments.runs.types import Json
 
 __all__ = [
-    "ALUMINA", "CAST_IRON", "HERTZ_TIME", "Meeting", "RADIUS", "SIXTEEN", "hertz", "mass_of", "meet_floor",
-    "plane_modulus", "row_of_grains",
-]  # fmt: skip
+    "ALUMINA",
+    "CAST_IRON",
+    "HERTZ_TIME",
+    "Meeting",
+    "RADIUS",
+    "SIXTEEN",
+    "hertz",
+    "mass_of",
+    "meet_floor",
+    "plane_modulus",
+    "row_of_grains",
+]
 
 HERTZ_TIME = 2.943275
 RADIUS = 0.0025
@@ -72,9 +81,15 @@ class Meeting:
 
 
 def meet_floor(
-    material: Material, velocities: np.ndarray, *, spins: np.ndarray | None = None, radius: float = RADIUS, step: float,
-    time: float, **options: Any,
-) -> Meeting:  # fmt: skip
+    material: Material,
+    velocities: np.ndarray,
+    *,
+    spins: np.ndarray | None = None,
+    radius: float = RADIUS,
+    step: float,
+    time: float,
+    **options: Any,
+) -> Meeting:
     """Grains of one radius that touch the floor at time 0 with these velocities, well apart.
 
     Args:

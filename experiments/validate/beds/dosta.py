@@ -160,10 +160,15 @@ def _deck() -> str:
     for k, (kind, where) in enumerate(planes):
         lines.append(f"fix wall{k} all wall/gran model {law} primitive type 1 {kind} {where:.7f}")
     lines += [
-        f"fix weight all gravity {GRAVITY:g} vector 0.0 0.0 -1.0", "fix motion all nve/sphere", "group ball type 2",
-        f"timestep {STEP:g}", f"dump now ball custom {EVERY} ball.txt z vz", 'dump_modify now format "%.17g %.17g"',
-        "thermo 1000", f"run {round(TIME / STEP)}",
-    ]  # fmt: skip
+        f"fix weight all gravity {GRAVITY:g} vector 0.0 0.0 -1.0",
+        "fix motion all nve/sphere",
+        "group ball type 2",
+        f"timestep {STEP:g}",
+        f"dump now ball custom {EVERY} ball.txt z vz",
+        'dump_modify now format "%.17g %.17g"',
+        "thermo 1000",
+        f"run {round(TIME / STEP)}",
+    ]
     return "\n".join(lines) + "\n"
 
 

@@ -165,8 +165,12 @@ def _input(stuff: Material, young: float, packing: float, seed: int) -> tuple[st
     top = (k.max() + 1) * site
     lines = ["grains of hedgebed\n", f"{len(radii)} atoms", "1 atom types\n"]
     lines += [
-        f"0 {width:.17g} xlo xhi", f"0 {top:.17g} ylo yhi", f"0 {depth:.17g} zlo zhi", "0 0 0 xy xz yz\n", "Atoms\n",
-    ]  # fmt: skip
+        f"0 {width:.17g} xlo xhi",
+        f"0 {top:.17g} ylo yhi",
+        f"0 {depth:.17g} zlo zhi",
+        "0 0 0 xy xz yz\n",
+        "Atoms\n",
+    ]
     lines += [
         f"{i} 1 {2 * r:.17g} {stuff.density:g} " + " ".join(f"{v:.17g}" for v in place)
         for i, (r, place) in enumerate(zip(radii, places, strict=True), 1)

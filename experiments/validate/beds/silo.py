@@ -72,9 +72,11 @@ def fill(depth: float, *, seed: int = 3) -> Filling:
         (1, -1, (0, -1, 0), 0.0, WIDTH),
     ):
         wall = bed.add_body(
-            [Plane(normal=normal)], position=(margin + x, margin + y, 0.0), friction=WALL_FRICTION,
+            [Plane(normal=normal)],
+            position=(margin + x, margin + y, 0.0),
+            friction=WALL_FRICTION,
             rolling_friction=0.0,
-        )  # fmt: skip
+        )
         walls.append((wall, axis, sign))
     fall = math.sqrt(2 * float(places[:, 2].max()) / GRAVITY)
     bed.advance(round((fall + SETTLED) / bed.time_step), drag_time=DRAG)

@@ -110,10 +110,15 @@ def _elastic_gas(tell: Tell) -> Outcome:
 
 
 PARTS = {
-    "kinetic": "kinetic", "normal": "in Hertz springs", "tangential": "in tangential springs",
-    "turning": "in rolling and twisting springs", "damped": "lost to normal dashpots",
-    "rubbed": "lost to tangential forces", "turned": "lost to rolling and twisting", "potential": "in height",
-}  # fmt: skip
+    "kinetic": "kinetic",
+    "normal": "in Hertz springs",
+    "tangential": "in tangential springs",
+    "turning": "in rolling and twisting springs",
+    "damped": "lost to normal dashpots",
+    "rubbed": "lost to tangential forces",
+    "turned": "lost to rolling and twisting",
+    "potential": "in height",
+}
 _DURATION = 0.004  # from the first collision to dispersal [s]
 _STRONG = (30.0, 0.0, -100.0)  # gravity that does as much work in that time as the collisions [m/s2]
 
@@ -177,9 +182,12 @@ def _floor_weight(tell: Tell) -> Outcome:
 _ROUGH_WITHOUT_ROLLING = {"energy-hertz": (0.0, 0.6), "energy-undamped": (0.5, 1.0), "energy-friction": (0.5, 0.6)}
 """Friction and restitution [1]."""
 CASES = {
-    "momentum": _momentum, "angular-momentum": _angular_momentum, "energy-elastic": _elastic_gas,
+    "momentum": _momentum,
+    "angular-momentum": _angular_momentum,
+    "energy-elastic": _elastic_gas,
     **{id: _energy(Material(id, 2600, 1e7, 0.25, *given)) for id, given in _ROUGH_WITHOUT_ROLLING.items()},
     "energy-rolling": _energy(ROUGH),
     "energy-tensile": _energy(Material("tensile", 2600, 1e7, 0.25, 0.5, 0.6), tensile=True),
-    "energy-gravity": _energy(ROUGH, gravity=_STRONG), "floor-weight": _floor_weight,
-}  # fmt: skip
+    "energy-gravity": _energy(ROUGH, gravity=_STRONG),
+    "floor-weight": _floor_weight,
+}

@@ -319,10 +319,18 @@ def _closed(name: str, tell: Tell) -> tuple[list[Comparison], Plot, str]:
 
 
 _PARTS = (
-    "kinetic", "in normal springs and surfaces", "in tangential springs", "in rolling and twisting springs",
-    "lost to normal dashpots", "lost to tangential forces", "lost to rolling and twisting",
-)  # fmt: skip
+    "kinetic",
+    "in normal springs and surfaces",
+    "in tangential springs",
+    "in rolling and twisting springs",
+    "lost to normal dashpots",
+    "lost to tangential forces",
+    "lost to rolling and twisting",
+)
 
 CASES = {
-    "dmt": _pull_off("dmt"), "jkr": _pull_off("jkr"), "energy-dmt": _books("dmt"), "energy-jkr": _books("jkr"),
-}  # fmt: skip
+    "dmt": _pull_off("dmt"),
+    "jkr": _pull_off("jkr"),
+    "energy-dmt": _books("dmt"),
+    "energy-jkr": _books("jkr"),
+}

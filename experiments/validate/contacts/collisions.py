@@ -16,7 +16,10 @@ STEPS = 1000  # in a contact
 CLOSED_BAND, PUBLISHED_BAND = 1e-5, 5e-4  # of the closed form; of figures with four digits
 UNITS = (("largest overlap", "um", 1e6), ("largest force", "kN", 1e-3), ("contact time", "us", 1e6))
 
-T1 = {"glass": (2800.0, 48e9, 0.20, (274.11, 10.697, 40.34)), "limestone": (2500.0, 20e9, 0.25, (368.30, 7.108, 54.20))}
+T1 = {
+    "glass": (2800.0, 48e9, 0.20, (274.11, 10.697, 40.34)),
+    "limestone": (2500.0, 20e9, 0.25, (368.30, 7.108, 54.20)),
+}
 T2 = {
     "aluminium alloy": (2699.0, 70e9, 0.30, (49.72, 11.370, 731.7)),
     "magnesium alloy": (1800.0, 40e9, 0.35, (52.12, 7.233, 767.1)),
@@ -158,6 +161,8 @@ def _all(measure: Callable[[str], list[Comparison]], names) -> Callable:
 
 
 CASES = {
-    "hertz-force": force_curve, "t1": _all(head_on, T1), "t2": _all(on_a_plane, T2),
+    "hertz-force": force_curve,
+    "t1": _all(head_on, T1),
+    "t2": _all(on_a_plane, T2),
     "t3-elastic": _all(small_on_a_plane, T3),
-}  # fmt: skip
+}

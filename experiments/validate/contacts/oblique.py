@@ -27,8 +27,14 @@ from .microslip import tangential_restitution
 from .words import say
 
 __all__ = [
-    "ANGLES", "CASES", "E_N", "MU", "STEP", "oblique", "plane_contact_time",
-]  # fmt: skip
+    "ANGLES",
+    "CASES",
+    "E_N",
+    "MU",
+    "STEP",
+    "oblique",
+    "plane_contact_time",
+]
 
 
 MU, E_N, SPEED = 0.092, 0.98, 3.9

@@ -24,9 +24,15 @@ def rigid_stiffness(radius: float = RADIUS) -> float:
 
 
 def sixteen(
-    *, height: float | None = None, gravity: Sequence[float] = DOWN, friction: float = 0.4, restitution: float = 0.5,
-    rolling: float = 0.0, floor: bool = True, **options: Any,
-) -> Bed:  # fmt: skip
+    *,
+    height: float | None = None,
+    gravity: Sequence[float] = DOWN,
+    friction: float = 0.4,
+    restitution: float = 0.5,
+    rolling: float = 0.0,
+    floor: bool = True,
+    **options: Any,
+) -> Bed:
     """Sixteen grains 12.5 mm apart that do not meet, at rest on the floor unless a height is given [m]."""
     if height is None:
         height = RADIUS - (MASS * -gravity[2] / rigid_stiffness()) ** (2 / 3)
@@ -171,6 +177,10 @@ def _twisting(tell: Tell) -> Outcome:
 
 
 CASES = {
-    "free-fall": _free_fall, "at-rest": _at_rest, "sliding": _sliding, "incline-rolling": _incline,
-    "incline-rest": _held, "twisting": _twisting,
-}  # fmt: skip
+    "free-fall": _free_fall,
+    "at-rest": _at_rest,
+    "sliding": _sliding,
+    "incline-rolling": _incline,
+    "incline-rest": _held,
+    "twisting": _twisting,
+}

@@ -148,5 +148,7 @@ def _own_step(tell: Tell) -> Outcome:
 
 
 CASES = {
-    "t3-restitution": _fine(False), "restitution-tensile": _fine(True), "restitution-own-step": _own_step,
-}  # fmt: skip
+    "t3-restitution": _fine(False),
+    "restitution-tensile": _fine(True),
+    "restitution-own-step": _own_step,
+}
