@@ -260,10 +260,12 @@ class BedGround:
         at = self._at[used]
         arms = chord * (at @ middle.T)
         self.bed.move_bodies(
-            self.bodies, positions=self.origin + pose.position + at @ first.T,
-            velocities=twist.velocity + np.cross(twist.spin, arms), turns=self._turns[used] @ _left(pose.turn).T,
+            self.bodies,
+            positions=self.origin + pose.position + at @ first.T,
+            velocities=twist.velocity + np.cross(twist.spin, arms),
+            turns=self._turns[used] @ _left(pose.turn).T,
             spins=np.tile(twist.spin, (len(used), 1)),
-        )  # fmt: skip
+        )
         before = self.bed.grain_steps
         self.bed.advance(steps, drag_time=self.drag_time)
         self.grain_steps += self.bed.grain_steps - before

@@ -152,10 +152,13 @@ class Run(Stepper):
     def settings(self) -> Facts:
         """What was asked for, SI units."""
         return {
-            "ground": self.ground.name, "speed": self.speed, "start_depth": self._start,
-            "substeps": round(self.macro_step / self.ground.time_step), "spike": asdict(self.spike),
+            "ground": self.ground.name,
+            "speed": self.speed,
+            "start_depth": self._start,
+            "substeps": round(self.macro_step / self.ground.time_step),
+            "spike": asdict(self.spike),
             "ground_settings": self.ground.describe() if isinstance(self.ground, Described) else {},
-        }  # fmt: skip
+        }
 
     def state(self) -> State:
         """All that the rest of the run depends on: a flat dict of numpy arrays, the ground's under "ground.*"."""

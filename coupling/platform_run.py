@@ -245,9 +245,11 @@ class PlatformRun(EnergyBalance, Stepper):
         width = sum(part.size for part in self._unrest())
         own: State = {
             "counts": np.array([self.placed, self.placing_steps, self._frames], dtype=np.int64),
-            "settling": np.array(self._settling, dtype=float).reshape(-1, width), "rows": self._row_table,
-            "states": np.array(self._states, dtype=np.int8), "feet": self._feet_table,
-        }  # fmt: skip
+            "settling": np.array(self._settling, dtype=float).reshape(-1, width),
+            "rows": self._row_table,
+            "states": np.array(self._states, dtype=np.int8),
+            "feet": self._feet_table,
+        }
         own = {f"{self._prefix}.{key}": value for key, value in own.items()}
         own |= {f"reader.{key}": value for key, value in self.reader.state().items()}
         return own | self._balance_state() | self.master.state()

@@ -133,9 +133,11 @@ class Penetration:
     def quantities(self) -> dict[str, dict[str, Any]]:
         """The numbers a person would quote, as in result.json: name -> value, std (unknown), unit."""
         values = {
-            "peak_force": (self.peak_force, "N"), "max_depth": (self.max_depth, "m"), "work_in": (self.work_in, "J"),
+            "peak_force": (self.peak_force, "N"),
+            "max_depth": (self.max_depth, "m"),
+            "work_in": (self.work_in, "J"),
             "work_out": (self.work_out, "J"),
-        }  # fmt: skip
+        }
         if self.ended == "rest":
             values["final_depth"] = (self.final_depth, "m")
             if self.kind == "set_down":

@@ -233,12 +233,20 @@ class CoupledTumble(PlatformRun):
             tally.see(rows["time"][k], rows["vx"][k], rows["vy"][k], rows["omega"][k], 0.0, rows["torque_work"][k], 0.0)
         shared = {name: rows[name] for name in COLUMNS[:14]}
         return Trajectory(
-            trial=self.trial, method="coupled", state=np.array(self._states, dtype=np.int8),
-            stored_energy=self.stored_by_row, dissipated=self.dissipated_by_row, transitions=self._transitions(),
-            trajectory_angle=tally.angle, max_speed=tally.max_speed, time_of_max_speed=tally.time_of_max_speed,
-            max_angular_velocity=tally.max_spin, energy_residual=self.energy_residual,
-            notes={"macro_step": self.master.macro_step}, **shared,
-        )  # fmt: skip
+            trial=self.trial,
+            method="coupled",
+            state=np.array(self._states, dtype=np.int8),
+            stored_energy=self.stored_by_row,
+            dissipated=self.dissipated_by_row,
+            transitions=self._transitions(),
+            trajectory_angle=tally.angle,
+            max_speed=tally.max_speed,
+            time_of_max_speed=tally.time_of_max_speed,
+            max_angular_velocity=tally.max_spin,
+            energy_residual=self.energy_residual,
+            notes={"macro_step": self.master.macro_step},
+            **shared,
+        )
 
     def _transitions(self) -> tuple[Transition, ...]:
         return changes_of((row[0] for row in self._rows), self.states, (row[3] for row in self._rows))

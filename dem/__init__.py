@@ -14,10 +14,35 @@ import os
 from typing import TYPE_CHECKING, Any
 
 __all__ = [
-    "Ball", "Bed", "BedFailure", "Box", "Capsule", "Cone", "Cylinder", "Facing", "Graded", "Grains", "LogNormal",
-    "MATERIALS", "Material", "Mesh", "Normal", "Placed", "Plane", "Polyhedron", "Prepared", "SAND", "Sieve", "Sleep",
-    "StageReport", "Tube", "Uniform", "material", "measure_grading", "mesh_from_file",
-]  # fmt: skip
+    "Ball",
+    "Bed",
+    "BedFailure",
+    "Box",
+    "Capsule",
+    "Cone",
+    "Cylinder",
+    "Facing",
+    "Graded",
+    "Grains",
+    "LogNormal",
+    "MATERIALS",
+    "Material",
+    "Mesh",
+    "Normal",
+    "Placed",
+    "Plane",
+    "Polyhedron",
+    "Prepared",
+    "SAND",
+    "Sieve",
+    "Sleep",
+    "StageReport",
+    "Tube",
+    "Uniform",
+    "material",
+    "measure_grading",
+    "mesh_from_file",
+]
 
 # Taichi greets on stdout as it is imported; what a script prints is the script's.
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
@@ -37,12 +62,18 @@ if TYPE_CHECKING:
     from .shapes.solids import Box, Capsule, Placed, Tube
 
 _MODULES = {
-    "bed": ("Bed",), "engine.sleep": ("Sleep",), "engine.values": ("BedFailure", "Grains"),
-    "grains.graded": ("Graded",), "grains.materials": ("Facing", "MATERIALS", "Material", "SAND", "material"),
-    "grains.sizes": ("LogNormal", "Normal", "Sieve", "Uniform"), "measure.grading": ("measure_grading",),
-    "prepare.report": ("Prepared", "StageReport"), "shapes.basic": ("Ball", "Cone", "Cylinder", "Plane"),
-    "shapes.mesh": ("Mesh", "Polyhedron", "mesh_from_file"), "shapes.solids": ("Box", "Capsule", "Placed", "Tube"),
-}  # fmt: skip
+    "bed": ("Bed",),
+    "engine.sleep": ("Sleep",),
+    "engine.values": ("BedFailure", "Grains"),
+    "grains.graded": ("Graded",),
+    "grains.materials": ("Facing", "MATERIALS", "Material", "SAND", "material"),
+    "grains.sizes": ("LogNormal", "Normal", "Sieve", "Uniform"),
+    "measure.grading": ("measure_grading",),
+    "prepare.report": ("Prepared", "StageReport"),
+    "shapes.basic": ("Ball", "Cone", "Cylinder", "Plane"),
+    "shapes.mesh": ("Mesh", "Polyhedron", "mesh_from_file"),
+    "shapes.solids": ("Box", "Capsule", "Placed", "Tube"),
+}
 
 
 def __getattr__(name: str) -> Any:

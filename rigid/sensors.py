@@ -175,9 +175,11 @@ def measure(
     x, y = np.interp(at, moving.time, moving.x), np.interp(at, moving.time, moving.y)
     scale = sensors.camera_scale + sensors.camera_bend * ((x - motion.x[0]) ** 2 + (y - motion.y[0]) ** 2)
     pose = {
-        "t_s": at, "x_m": scale * x + zero[0], "y_m": scale * y + zero[1],
+        "t_s": at,
+        "x_m": scale * x + zero[0],
+        "y_m": scale * y + zero[1],
         "theta_rad": np.interp(at, moving.time, moving.theta) + zero[2],
-    }  # fmt: skip
+    }
     _add_noise(pose, sensors.pose_std, streams[1])
 
     written = _imu_times(sensors, duration)
@@ -226,9 +228,16 @@ def _with_lead(motion: Motion, sensors: SensorSet) -> Motion:
     if motion.ax is not None and motion.ay is not None:
         accelerations = {"ax": still(motion.ax), "ay": still(motion.ay)}
     return _Extended(
-        time=time, x=held(motion.x), y=held(motion.y), theta=held(motion.theta), vx=still(motion.vx),
-        vy=still(motion.vy), omega=still(motion.omega), wheel_speed=held(motion.wheel_speed), **accelerations,
-    )  # fmt: skip
+        time=time,
+        x=held(motion.x),
+        y=held(motion.y),
+        theta=held(motion.theta),
+        vx=still(motion.vx),
+        vy=still(motion.vy),
+        omega=still(motion.omega),
+        wheel_speed=held(motion.wheel_speed),
+        **accelerations,
+    )
 
 
 class _Extended(Motion):

@@ -22,9 +22,17 @@ import math
 import taichi as ti
 
 __all__ = [
-    "COHESIONS", "DMT", "JKR", "NO_COHESION", "jkr_contact", "jkr_force", "jkr_range", "jkr_reach", "pull_off",
+    "COHESIONS",
+    "DMT",
+    "JKR",
+    "NO_COHESION",
+    "jkr_contact",
+    "jkr_force",
+    "jkr_range",
+    "jkr_reach",
+    "pull_off",
     "work_of_adhesion",
-]  # fmt: skip
+]
 
 NO_COHESION, DMT, JKR = range(3)
 COHESIONS = {"none": NO_COHESION, "dmt": DMT, "jkr": JKR}  # The laws by name

@@ -47,9 +47,14 @@ from dem.grains.materials import Facing, Material
 from .cohesion import DMT, JKR, jkr_force, jkr_reach, work_of_adhesion
 
 __all__ = [
-    "adhesive_range", "contact_force", "damping_factor", "effective_moduli", "pair_parameters", "turning_torque",
+    "adhesive_range",
+    "contact_force",
+    "damping_factor",
+    "effective_moduli",
+    "pair_parameters",
+    "turning_torque",
     "PAIR_WIDTH",
-]  # fmt: skip
+]
 
 # Entries of a row of pair parameters.
 PAIR_WIDTH = 8
@@ -128,9 +133,15 @@ def pair_parameters(
     ratio = math.sqrt(8 * effective_shear / (2 * effective_young))
     turning = 2 * TURNING_DAMPING_RATIO * math.sqrt(0.4) * ratio
     return [
-        2 * effective_young, 8 * effective_shear, factor, friction, rolling_friction, factor * ratio, turning,
+        2 * effective_young,
+        8 * effective_shear,
+        factor,
+        friction,
+        rolling_friction,
+        factor * ratio,
+        turning,
         math.pi * work_of_adhesion(surface_energy),
-    ]  # fmt: skip
+    ]
 
 
 def pair_row(material: Material, facing: Facing | None = None, *, tensile: bool = False) -> list[float]:
@@ -146,9 +157,11 @@ def pair_row(material: Material, facing: Facing | None = None, *, tensile: bool 
 
     names = ("restitution", "friction", "rolling_friction", "surface_energy")
     return pair_parameters(
-        effective_young=effective_young, effective_shear=effective_shear, tensile=tensile,
+        effective_young=effective_young,
+        effective_shear=effective_shear,
+        tensile=tensile,
         **{name: own_or(name) for name in names},
-    )  # fmt: skip
+    )
 
 
 @ti.func

@@ -77,12 +77,21 @@ class BedBase:
         largest = float(radii.max())
         largest_skin = _LARGEST_SKIN * self.mean_diameter + _reach(stuff, largest / 2)
         self.engine = take_engine(
-            self, grain_count=self.grain_count, period=self.size[:2], bottom=-4 * largest, height=settings.height,
-            largest_diameter=2 * largest, largest_skin=largest_skin, rolling=stuff.rolling_friction > 0,
-            tensile=settings.tensile, cohesion=COHESIONS[stuff.cohesion],
-            real=ti.f64 if precision == "float64" else ti.f32, gpu=arch == "cuda", threads=self.runtime.threads,
+            self,
+            grain_count=self.grain_count,
+            period=self.size[:2],
+            bottom=-4 * largest,
+            height=settings.height,
+            largest_diameter=2 * largest,
+            largest_skin=largest_skin,
+            rolling=stuff.rolling_friction > 0,
+            tensile=settings.tensile,
+            cohesion=COHESIONS[stuff.cohesion],
+            real=ti.f64 if precision == "float64" else ti.f32,
+            gpu=arch == "cuda",
+            threads=self.runtime.threads,
             neighbours_per_grain=_rows_per_grain(radii, largest_skin, gpu=arch == "cuda"),
-        )  # fmt: skip
+        )
         self.engine.grain_pair[None] = pair_row(stuff, tensile=settings.tensile)
         turn = np.zeros((MOST_BODIES, 4))
         turn[:, 0] = 1

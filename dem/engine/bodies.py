@@ -50,9 +50,13 @@ class BedBodies(BedBase):
         """
         self.check_valid()
         facing = Facing(
-            friction=friction, restitution=restitution, rolling_friction=rolling_friction, young=young, poisson=poisson,
+            friction=friction,
+            restitution=restitution,
+            rolling_friction=rolling_friction,
+            young=young,
+            poisson=poisson,
             surface_energy=surface_energy,
-        )  # fmt: skip
+        )
         body = self.place_body(shape, position, facing)
         kept = self.max_overlap
         self.max_overlap = 0.0

@@ -99,10 +99,15 @@ class BedCore(BedBodies):
             raise ValueError(f"max_overlap = {max_overlap} must be above 0 and at most 0.2 of a diameter")
         dt = time_step_for(stuff, diameter=2 * float(radii.min()), max_overlap=max_overlap, wanted=time_step)
         settings = BedSettings(
-            material=stuff, size=(float(size[0]), float(size[1]), float(size[2])), gravity=_vector(gravity),
-            time_step=dt, max_overlap=float(max_overlap), height=_height(height, positions, radii),
-            tensile=bool(tensile), seed=seed,
-        )  # fmt: skip
+            material=stuff,
+            size=(float(size[0]), float(size[1]), float(size[2])),
+            gravity=_vector(gravity),
+            time_step=dt,
+            max_overlap=float(max_overlap),
+            height=_height(height, positions, radii),
+            tensile=bool(tensile),
+            seed=seed,
+        )
         bed = cls(settings, radii, precision=precision, arch=arch, threads=threads)
         mass = stuff.density * 4 / 3 * math.pi * radii**3
         bed.fill(positions, velocities, spins, radii, mass)
@@ -130,10 +135,16 @@ class BedCore(BedBodies):
         position, velocity, spin, force, torque, origin = (e.read(name)[order].astype(float) for name in names)
         rates = self.rates_now(position, velocity, spin, force, torque)
         return Grains(
-            id=np.arange(self.grain_count), position=position[:, :3], radius=position[:, 3], mass=velocity[:, 3],
-            velocity=rates[0], spin=rates[1], force=force, displacement=position[:, :3] - origin,
+            id=np.arange(self.grain_count),
+            position=position[:, :3],
+            radius=position[:, 3],
+            mass=velocity[:, 3],
+            velocity=rates[0],
+            spin=rates[1],
+            force=force,
+            displacement=position[:, :3] - origin,
             coordination=self.contact_counts() if contacts else np.zeros(0, dtype=np.int32),
-        )  # fmt: skip
+        )
 
     def contact_counts(self) -> np.ndarray:
         """Contacts of each grain with grains and bodies, by id, shape [grain_count]."""
@@ -283,9 +294,13 @@ class BedCore(BedBodies):
         times = int(times)
         values = state.laid_end_to_end(self.state(), times, period=self.size[0])
         settings = replace(
-            self.settings, size=(times * self.size[0], *self.size[1:]), gravity=self.gravity, time_step=self.time_step,
-            max_overlap=self.overlap_limit, height=max(self.height, height or 0.0),
-        )  # fmt: skip
+            self.settings,
+            size=(times * self.size[0], *self.size[1:]),
+            gravity=self.gravity,
+            time_step=self.time_step,
+            max_overlap=self.overlap_limit,
+            height=max(self.height, height or 0.0),
+        )
         bed = self.alike(settings, values["position"][:, 3].astype(float))
         state.adopt(bed, values)
         bed.steps = 0

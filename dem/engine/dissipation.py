@@ -78,9 +78,11 @@ class Ledger:
     def state(self, rows: np.ndarray, near: np.ndarray) -> dict[str, np.ndarray]:
         """All that the book's next step depends on; ``rows``, ``near``: of the lists, those in use."""
         return {
-            "ledger_last": take_rows(self.last, rows), "ledger_near_last": take_rows(self.near_last, near),
-            "ledger_taken": self.taken.to_numpy(), "ledger_turned": self.turned.to_numpy(),
-        }  # fmt: skip
+            "ledger_last": take_rows(self.last, rows),
+            "ledger_near_last": take_rows(self.near_last, near),
+            "ledger_taken": self.taken.to_numpy(),
+            "ledger_turned": self.turned.to_numpy(),
+        }
 
     def restore(self, state: dict[str, np.ndarray], rows: np.ndarray, near: np.ndarray) -> None:
         """Go back to what ``state`` gave; the lists are already as they were."""

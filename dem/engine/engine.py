@@ -108,8 +108,17 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, Bookkeeping):
 
     # Fields with a row for each grain: ``read`` and ``write`` see those in use.
     GRAIN_FIELDS = (
-        "position", "velocity", "spin", "force", "torque", "origin", "listed", "id", "pair_start", "pair_end",
-    )  # fmt: skip
+        "position",
+        "velocity",
+        "spin",
+        "force",
+        "torque",
+        "origin",
+        "listed",
+        "id",
+        "pair_start",
+        "pair_end",
+    )
 
     @staticmethod
     def plan(
@@ -137,8 +146,10 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, Bookkeeping):
         """
         cell = largest_diameter + largest_skin
         cells = (
-            max(1, int(period[0] / cell)), max(1, int(period[1] / cell)), max(1, int((height - bottom) / cell) + 1),
-        )  # fmt: skip
+            max(1, int(period[0] / cell)),
+            max(1, int(period[1] / cell)),
+            max(1, int((height - bottom) / cell) + 1),
+        )
         if min(cells[:2]) < 3:
             # With fewer the same neighbour would be met through two images.
             raise ValueError(
@@ -148,11 +159,15 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, Bookkeeping):
         if chunk_count is None:
             chunk_count = grain_count if gpu else max(1, min(MOST_CHUNKS, round(grain_count / GRAINS_PER_CHUNK)))
         return {
-            "capacity": _roomy(grain_count, least=64), "cell_capacity": _roomy(math.prod(cells), least=1024),
-            "chunk_capacity": _roomy(chunk_count, least=MOST_CHUNKS), "neighbours_per_grain": neighbours_per_grain,
-            "grain_count": grain_count, "chunk_count": chunk_count, "cells": cells,
+            "capacity": _roomy(grain_count, least=64),
+            "cell_capacity": _roomy(math.prod(cells), least=1024),
+            "chunk_capacity": _roomy(chunk_count, least=MOST_CHUNKS),
+            "neighbours_per_grain": neighbours_per_grain,
+            "grain_count": grain_count,
+            "chunk_count": chunk_count,
+            "cells": cells,
             "box": (*period, bottom, height, period[0] / cells[0], period[1] / cells[1], cell),
-        }  # fmt: skip
+        }
 
     def __init__(
         self,

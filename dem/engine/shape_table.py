@@ -73,10 +73,15 @@ class ShapeTable:
         for mesh in meshes:
             tree = mesh_tree(mesh)
             parts = {
-                "low": tree.low, "high": tree.high, "skip": tree.skip + nodes,
-                "leaf": np.where(tree.leaf < 0, -1, tree.leaf + triangles), "corner": tree.corner,
-                "side_ab": tree.side_ab, "side_ac": tree.side_ac, "normal": tree.normals.reshape(-1, 3),
-            }  # fmt: skip
+                "low": tree.low,
+                "high": tree.high,
+                "skip": tree.skip + nodes,
+                "leaf": np.where(tree.leaf < 0, -1, tree.leaf + triangles),
+                "corner": tree.corner,
+                "side_ab": tree.side_ab,
+                "side_ac": tree.side_ac,
+                "normal": tree.normals.reshape(-1, 3),
+            }
             for name, array in parts.items():
                 columns.setdefault(name, []).append(array)
             nodes += len(tree.leaf)

@@ -187,13 +187,15 @@ class Sleeper:
         """All that the next steps depend on; ``rows``: of the pair lists, those in use."""
         e, rest, n = self.bed.engine, self.bed.engine.rest, self.bed.grain_count
         own: State = {
-            "rules": np.array(astuple(self.rules), dtype=float), "asleep": rest.asleep.to_numpy()[:n],
-            "quiet": rest.quiet.to_numpy()[:n], "force": take_rows(rest.force, rows),
+            "rules": np.array(astuple(self.rules), dtype=float),
+            "asleep": rest.asleep.to_numpy()[:n],
+            "quiet": rest.quiet.to_numpy()[:n],
+            "force": take_rows(rest.force, rows),
             "held": rest.held.to_numpy()[: e.chunk_count],
             "numbers": np.array([self.awake, int(e.count[CHUNKS]), self.bed.grain_steps]),
             "reals": np.array([self.mass, self.slept]),
             "order": np.array([int(rest.begins[None]), int(rest.block[None])]),
-        }  # fmt: skip
+        }
         own |= {f"store_{name}": values for name, values in self.frozen().items()}
         return {f"sleep_{name}": values for name, values in own.items()}
 

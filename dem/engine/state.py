@@ -25,9 +25,20 @@ STATE_FORMATS = ("hedgebed-bed/1", "hedgebed-bed/2", STATE_FORMAT)
 MATERIAL_NUMBERS = ("density", "young", "poisson", "friction", "restitution", "rolling_friction", "surface_energy")
 GRAIN_FIELDS = ("position", "velocity", "spin", "force", "torque", "origin", "listed", "id")
 BODY_FIELDS = (
-    "body_position", "body_velocity", "body_spin", "body_turn", "body_listed", "body_listed_turn", "body_extent",
-    "body_primitives", "body_pair", "primitive_kind", "primitive_row", "overlap", "pushes",
-)  # fmt: skip
+    "body_position",
+    "body_velocity",
+    "body_spin",
+    "body_turn",
+    "body_listed",
+    "body_listed_turn",
+    "body_extent",
+    "body_primitives",
+    "body_pair",
+    "primitive_kind",
+    "primitive_row",
+    "overlap",
+    "pushes",
+)
 LIST_NAMES = ("pair_count", "pair", "slide", "near_count", "near_grain", "near_body", "near_slide", "near_roll")
 NAMES = (*GRAIN_FIELDS, *BODY_FIELDS, *LIST_NAMES, "numbers", "reals")
 ABOUT = ("material", "material_numbers", "cohesion", "size", "height", "tensile", "seed", "precision")
@@ -133,12 +144,16 @@ def write_file(bed: BedBase, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     stuff = bed.material
     about: State = {
-        "format": np.array(STATE_FORMAT), "material": np.array(stuff.name),
+        "format": np.array(STATE_FORMAT),
+        "material": np.array(stuff.name),
         "material_numbers": np.array([getattr(stuff, key) for key in MATERIAL_NUMBERS]),
-        "cohesion": np.array(stuff.cohesion), "size": np.array(bed.size), "height": np.array(bed.settings.height),
-        "tensile": np.array(bed.settings.tensile), "seed": np.array(-1 if bed.seed is None else bed.seed),
+        "cohesion": np.array(stuff.cohesion),
+        "size": np.array(bed.size),
+        "height": np.array(bed.settings.height),
+        "tensile": np.array(bed.settings.tensile),
+        "seed": np.array(-1 if bed.seed is None else bed.seed),
         "precision": np.array(bed.runtime.precision),
-    }  # fmt: skip
+    }
     about |= {f"state.{key}": values for key, values in take(bed).items()}
     handle, name = tempfile.mkstemp(dir=path.parent, suffix=".npz")
     try:
@@ -176,10 +191,14 @@ def read_file(path: Path) -> tuple[BedSettings, State, str]:
     seed = int(stored["seed"])
     settings = BedSettings(
         material=Material(str(stored["material"]), cohesion=str(stored["cohesion"]), **numbers),
-        size=_three(stored["size"]), gravity=_three(state["reals"][2:5]), time_step=float(state["reals"][0]),
-        max_overlap=float(state["reals"][7]), height=float(stored["height"]), tensile=bool(stored["tensile"]),
+        size=_three(stored["size"]),
+        gravity=_three(state["reals"][2:5]),
+        time_step=float(state["reals"][0]),
+        max_overlap=float(state["reals"][7]),
+        height=float(stored["height"]),
+        tensile=bool(stored["tensile"]),
         seed=None if seed < 0 else seed,
-    )  # fmt: skip
+    )
     return settings, state, str(stored["precision"])
 
 

@@ -65,9 +65,13 @@ def find_contacts(bed: BedBase) -> Contacts:
     stuff = bed.material
     young, shear = effective_moduli(stuff.young, stuff.poisson, stuff.young, stuff.poisson)
     force = _spring_force(
-        stuff.cohesion, (2 * young, 8 * shear, stuff.friction, 2 * math.pi * stuff.surface_energy),
-        branch / length[:, None], overlap, radii[0] * radii[1] / (radii[0] + radii[1]), slide,
-    )  # fmt: skip
+        stuff.cohesion,
+        (2 * young, 8 * shear, stuff.friction, 2 * math.pi * stuff.surface_energy),
+        branch / length[:, None],
+        overlap,
+        radii[0] * radii[1] / (radii[0] + radii[1]),
+        slide,
+    )
     found = [Contacts(ids[first], ids[second], position[first, :3], branch, force, overlap)]
     found += [_on_plane(state, body, stuff.cohesion) for body in _planes(state)]
     return Contacts(*(np.concatenate([getattr(part, name) for part in found]) for name in Contacts.__annotations__))
@@ -90,9 +94,13 @@ def _on_plane(state: State, body: int, cohesion: str) -> Contacts:
     overlap = position[:, 3] - (position[:, :3] - point) @ normal
     two_e, eight_g, _, friction, _, _, _, pi_w = state["body_pair"][body].astype(float)
     force = _spring_force(
-        cohesion, (two_e, eight_g, friction, pi_w), np.tile(normal, (len(grain), 1)), overlap, position[:, 3],
+        cohesion,
+        (two_e, eight_g, friction, pi_w),
+        np.tile(normal, (len(grain), 1)),
+        overlap,
+        position[:, 3],
         state["near_slide"][here, :3].astype(float),
-    )  # fmt: skip
+    )
     touches = np.abs(force).sum(axis=1) > 0
     branch = (position[:, 3] - overlap)[:, None] * normal
     return Contacts(

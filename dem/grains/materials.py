@@ -30,9 +30,17 @@ from pathlib import Path
 from typing import Any
 
 __all__ = [
-    "CAVEATS", "COHESIONS", "Facing", "MATERIALS", "MATERIAL_FORMAT", "Material", "SAND", "caveat", "material",
+    "CAVEATS",
+    "COHESIONS",
+    "Facing",
+    "MATERIALS",
+    "MATERIAL_FORMAT",
+    "Material",
+    "SAND",
+    "caveat",
+    "material",
     "read_material",
-]  # fmt: skip
+]
 
 MATERIAL_FORMAT = "hedgebed-material/1"
 _NAME = re.compile(r"[a-z0-9][a-z0-9._+-]*")

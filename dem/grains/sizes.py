@@ -84,9 +84,11 @@ class Normal:
         _check_cut("Normal", self.deviation, self.cut)
         if not self.deviation * self.cut < 0.9:
             _refuse(
-                "Normal", "deviation", self.deviation,
+                "Normal",
+                "deviation",
+                self.deviation,
                 f"below {0.9 / self.cut:g} with cut = {self.cut:g}, or the smallest grains vanish",
-            )  # fmt: skip
+            )
 
     @property
     def bounds(self) -> tuple[float, float]:

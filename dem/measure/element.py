@@ -173,9 +173,17 @@ def press_element(
     runtime.start(threads=threads)
     top = float((positions[:, 2] + radii).max())
     bed = BedCore.from_grains(
-        material.with_rolling(), positions=positions, radii=radii, size=(*period, size[2] * grain),
-        height=top + 5 * grain, gravity=0.0, young=young, max_overlap=max_overlap, seed=seed, threads=threads,
-    )  # fmt: skip
+        material.with_rolling(),
+        positions=positions,
+        radii=radii,
+        size=(*period, size[2] * grain),
+        height=top + 5 * grain,
+        gravity=0.0,
+        young=young,
+        max_overlap=max_overlap,
+        seed=seed,
+        threads=threads,
+    )
     bed.overlap_limit = max(_BOUND * max_overlap, _HARMLESS)
     body = bed.add_body([Plane(normal=(0.0, 0.0, -1.0))], position=(0.0, 0.0, top + 0.01 * grain))
     _touch(bed, body, friction=pressed_friction, adhesive=False)
@@ -262,10 +270,17 @@ def shear_element(
             tell(0.1 + 0.9 * min(1.0, gone / strain))
     series = np.array(rows).T
     return ElementShear(
-        *series, inside_strain=np.array([look[0] for look in looks]), packing=np.array([look[1] for look in looks]),
-        stress=np.array([look[2] for look in looks]), pressure=pressure, inertial_number=inertial_number,
-        packing_before=looks[0][1], young=bed.material.young, grain_count=bed.grain_count, max_overlap=bed.max_overlap,
-    )  # fmt: skip
+        *series,
+        inside_strain=np.array([look[0] for look in looks]),
+        packing=np.array([look[1] for look in looks]),
+        stress=np.array([look[2] for look in looks]),
+        pressure=pressure,
+        inertial_number=inertial_number,
+        packing_before=looks[0][1],
+        young=bed.material.young,
+        grain_count=bed.grain_count,
+        max_overlap=bed.max_overlap,
+    )
 
 
 def _look(bed: BedCore, strain: float, height: float, grain: float) -> tuple[float, float, np.ndarray]:

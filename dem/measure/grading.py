@@ -90,11 +90,14 @@ def measure_grading(bed: BedCore, graded: Graded) -> Grading:
     beyond = np.maximum(distance - np.maximum(belongs, 0.0), 0.0) / place
     falls = d < THROAT * (1 + graded.spread) * place
     return Grading(
-        zones=_zones(bed, graded, x, z, d, solid, distance, place), layers=_layers(graded, x, z, d, size, bed.surface),
-        drained_share=float(solid[falls].sum()) / total, strayed_share=float(solid[beyond > _SCATTER].sum()) / total,
-        farthest=float(beyond.max()), grain_count=len(d),
+        zones=_zones(bed, graded, x, z, d, solid, distance, place),
+        layers=_layers(graded, x, z, d, size, bed.surface),
+        drained_share=float(solid[falls].sum()) / total,
+        strayed_share=float(solid[beyond > _SCATTER].sum()) / total,
+        farthest=float(beyond.max()),
+        grain_count=len(d),
         fine_count=round(total / (math.pi / 6 * graded.fine**3 * (1 + graded.spread**2))),
-    )  # fmt: skip
+    )
 
 
 def surface_under(bed: BedCore, graded: Graded) -> float:

@@ -18,9 +18,17 @@ from dem.grains.profile import packing_profile
 from dem.shapes.solids import Box
 
 __all__ = [
-    "COLUMN", "LEAST_FLANK", "SLOT", "Flank", "Repose", "angle_of_repose", "check_width", "fit_flank", "measure_flanks",
+    "COLUMN",
+    "LEAST_FLANK",
+    "SLOT",
+    "Flank",
+    "Repose",
+    "angle_of_repose",
+    "check_width",
+    "fit_flank",
+    "measure_flanks",
     "thickness_profile",
-]  # fmt: skip
+]
 
 SLOT = 6.0  # Width of the slot [mean diameters], wide enough that grains do not bridge it
 LEAST_FLANK = 10.0  # Least width of bed on each side of the slot [mean diameters]
@@ -120,10 +128,17 @@ def angle_of_repose(
     one, other = flanks
     return Repose(
         angle=0.5 * (one.angle + other.angle),
-        error=0.5 * math.sqrt(one.error**2 + other.error**2 + (one.angle - other.angle) ** 2), flanks=flanks,
-        distance=distance, thickness=thickness, height=height, crest=_crest(thickness), drained=drained, slot=slot,
-        plate=plate, bed=bed,
-    )  # fmt: skip
+        error=0.5 * math.sqrt(one.error**2 + other.error**2 + (one.angle - other.angle) ** 2),
+        flanks=flanks,
+        distance=distance,
+        thickness=thickness,
+        height=height,
+        crest=_crest(thickness),
+        drained=drained,
+        slot=slot,
+        plate=plate,
+        bed=bed,
+    )
 
 
 def check_width(width: float, *, slot: float | None, grain: float, depth: float) -> None:
@@ -273,9 +288,13 @@ def fit_flank(distance: np.ndarray, thickness: np.ndarray, *, crest: float, leas
     error = math.sqrt(float(rest @ rest) / (len(x) - 2) / float(((x - x.mean()) ** 2).sum()))
     to_degrees = math.degrees(1.0) / (1 + slope**2)
     return Flank(
-        angle=math.degrees(math.atan(slope)), error=error * to_degrees, start=float(x[0]), end=float(x[-1]),
-        points=len(x), foot=float(-start / slope) if slope else math.nan,
-    )  # fmt: skip
+        angle=math.degrees(math.atan(slope)),
+        error=error * to_degrees,
+        start=float(x[0]),
+        end=float(x[-1]),
+        points=len(x),
+        foot=float(-start / slope) if slope else math.nan,
+    )
 
 
 def _crest(thickness: np.ndarray) -> float:

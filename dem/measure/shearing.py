@@ -93,9 +93,11 @@ def shear_bed(
     fall = math.sqrt(2 * bed.size[2] / g)
     top = float((bed.grains().position[:, 2] + bed.grains().radius).max())
     body = bed.add_body(
-        [Plane(normal=(0.0, 0.0, -1.0))], position=(0.0, 0.0, top + 0.01 * grain), friction=_ROUGH,
+        [Plane(normal=(0.0, 0.0, -1.0))],
+        position=(0.0, 0.0, top + 0.01 * grain),
+        friction=_ROUGH,
         rolling_friction=_ROUGH,
-    )  # fmt: skip
+    )
     notes: dict[str, float] = {"body": body, "began": bed.time, "held": 0.0, "lifting": 0.0}
     lid = Lid(bed, notes, grain=grain, fall_time=fall, drag_time=0.1 * fall)
     while not notes["lifting"]:

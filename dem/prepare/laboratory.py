@@ -66,9 +66,15 @@ class Laboratory(Preparation[B]):
         After a KeyboardInterrupt out of ``progress.update``, between two pieces of the work, it is kept first.
         """
         work = {
-            "rain": self._rain_down, "stick": self._stick, "level": self._level, "fluff": self._loosen,
-            "compact": self._compact, "packing": self._to_packing, "cut": self._cut, "tilt": self._tilt,
-        }  # fmt: skip
+            "rain": self._rain_down,
+            "stick": self._stick,
+            "level": self._level,
+            "fluff": self._loosen,
+            "compact": self._compact,
+            "packing": self._to_packing,
+            "cut": self._cut,
+            "tilt": self._tilt,
+        }
         while self.done < len(self.stages):
             stage = self.stages[self.done]
             if self._progress is not None:

@@ -174,10 +174,17 @@ def _prepared(
                 found.whole.material, found.whole.recipe = own, found.recipe or recipe
                 return found
     work = Laboratory(
-        rain(), stages=plan, grain=wanted.sizes.mean, progress=progress, path=keep, recipe=recipe,
+        rain(),
+        stages=plan,
+        grain=wanted.sizes.mean,
+        progress=progress,
+        path=keep,
+        recipe=recipe,
         graded=wanted.sizes if isinstance(wanted.sizes, Graded) else None,
-        sticking=lambda bed: touching_as(bed, own, floor=wanted.floor), reporting=labels is None, labels=labels,
-    )  # fmt: skip
+        sticking=lambda bed: touching_as(bed, own, floor=wanted.floor),
+        reporting=labels is None,
+        labels=labels,
+    )
     work.find(arch=wanted.arch, threads=wanted.threads)
     try:
         bed = work.run()

@@ -26,9 +26,16 @@ from dem.grains.sizes import Json, Sizes, describe, sizes_of
 from dem.measure.grading import measure_grading, surface_under
 
 __all__ = [
-    "BEARING", "BedOptions", "Specification", "bound_of_mean", "cache_folder", "check_options", "fingerprint",
-    "kept_in_cache", "soft_enough",
-]  # fmt: skip
+    "BEARING",
+    "BedOptions",
+    "Specification",
+    "bound_of_mean",
+    "cache_folder",
+    "check_options",
+    "fingerprint",
+    "kept_in_cache",
+    "soft_enough",
+]
 
 _EXPECTED_PACKING = 0.57
 # Penetration resistance of sand grows with depth about sixty times as fast as its overburden (3D-RFT, Agarwal et al.
@@ -127,9 +134,15 @@ class Specification:
         if young is None:
             young = soft_enough(stuff, size=(x, y, z), sizes=sizes, gravity=gravity, max_overlap=max_overlap)
         return cls(
-            material=stuff, size=(x, y, z), sizes=sizes, gravity=float(gravity), seed=int(seed), young=float(young),
-            max_overlap=float(max_overlap), **others,
-        )  # fmt: skip
+            material=stuff,
+            size=(x, y, z),
+            sizes=sizes,
+            gravity=float(gravity),
+            seed=int(seed),
+            young=float(young),
+            max_overlap=float(max_overlap),
+            **others,
+        )
 
     @property
     def local(self) -> Sizes:
@@ -146,10 +159,17 @@ class Specification:
         return {
             "code": fingerprint(),
             "material": {f.name: getattr(self.material, f.name) for f in fields(self.material) if f.name != "sources"},
-            "size": list(self.size), "sizes": describe(self.sizes), "gravity": self.gravity, "seed": self.seed,
-            "young": self.young, "max_overlap": self.max_overlap, "time_step": self.time_step,
-            "floor": None if self.floor is None else asdict(self.floor), "precision": self.precision, "arch": self.arch,
-        }  # fmt: skip
+            "size": list(self.size),
+            "sizes": describe(self.sizes),
+            "gravity": self.gravity,
+            "seed": self.seed,
+            "young": self.young,
+            "max_overlap": self.max_overlap,
+            "time_step": self.time_step,
+            "floor": None if self.floor is None else asdict(self.floor),
+            "precision": self.precision,
+            "arch": self.arch,
+        }
 
     def rain(self, volume: float, make: type[B]) -> B:
         """Grains of this solid volume [m3] in the air, at rest, in a loose column: a bed of the class ``make``."""
@@ -161,11 +181,21 @@ class Specification:
             positions = rain_positions(rng, radii, self.size[:2])
         top = float((positions[:, 2] + radii).max())
         bed = make.from_grains(
-            self.material, positions=positions, radii=radii, size=self.size, height=top + 10 * self.sizes.mean,
-            gravity=self.gravity, young=self.young, max_overlap=self.max_overlap, time_step=self.time_step,
-            floor=True if self.floor is None else self.floor, seed=self.seed, precision=self.precision, arch=self.arch,
+            self.material,
+            positions=positions,
+            radii=radii,
+            size=self.size,
+            height=top + 10 * self.sizes.mean,
+            gravity=self.gravity,
+            young=self.young,
+            max_overlap=self.max_overlap,
+            time_step=self.time_step,
+            floor=True if self.floor is None else self.floor,
+            seed=self.seed,
+            precision=self.precision,
+            arch=self.arch,
             threads=self.threads,
-        )  # fmt: skip
+        )
         bed.overlap_limit = max(bed.overlap_limit, _RAIN_OVERLAP)
         return bed
 
@@ -217,9 +247,12 @@ def soft_enough(
     bulk = _EXPECTED_PACKING * material.density
     column = RAIN_COLUMN if isinstance(sizes, Graded) else rain_column(sizes)
     return choose_young(
-        material, pressure=(1 + BEARING) * bulk * gravity * size[2], speed=math.sqrt(2 * gravity * column * size[2]),
-        max_overlap=bound_of_mean(sizes, max_overlap), diameter=sizes.mean,
-    )  # fmt: skip
+        material,
+        pressure=(1 + BEARING) * bulk * gravity * size[2],
+        speed=math.sqrt(2 * gravity * column * size[2]),
+        max_overlap=bound_of_mean(sizes, max_overlap),
+        diameter=sizes.mean,
+    )
 
 
 def bound_of_mean(sizes: Sizes | Graded, max_overlap: float) -> float:

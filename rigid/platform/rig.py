@@ -100,9 +100,12 @@ class Rig:
             raise ValueError(f"reading = {reading!r} is neither 'pair' nor 'weight'")
         share = 1.0 if reading == "pair" else mass / (mass + counterweight)
         return cls(
-            mass=mass, counterweight=counterweight, gravity_sim=gravity_stated * share, gravity=gravity,
+            mass=mass,
+            counterweight=counterweight,
+            gravity_sim=gravity_stated * share,
+            gravity=gravity,
             wire_length=wire_length,
-        )  # fmt: skip
+        )
 
     @property
     def weight(self) -> float:

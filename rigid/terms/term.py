@@ -50,13 +50,30 @@ from typing import Any
 __all__ = ["FIXED_ARGUMENTS", "STATE_FIELDS", "Parameter", "Term"]
 
 FIXED_ARGUMENTS: dict[str, tuple[str, ...]] = {
-    "up": (), "tip_radius": (), "mass": ("s",), "potential": ("s",), "force": ("s",), "loss": ("s",),
-    "torque_factor": ("s",), "vertical_friction": ("s",), "rotation_friction": ("s",), "crater": (), "hollow": (),
-    "stiffen": ("depth", "force", "work"), "unload": ("depth", "top", "force"), "hold": ("s", "depth", "held"),
-    "grip": ("s", "depth", "held"), "rate_force": ("s", "depth", "rate"), "rate_pull": ("s", "depth", "rate", "held"),
-    "side_force": ("s", "depth", "slip"), "friction_factor": ("s", "slip"), "inner_mass": ("s",), "inner_start": ("s",),
-    "inner_force": ("s",), "inner_holds": ("s",),
-}  # fmt: skip
+    "up": (),
+    "tip_radius": (),
+    "mass": ("s",),
+    "potential": ("s",),
+    "force": ("s",),
+    "loss": ("s",),
+    "torque_factor": ("s",),
+    "vertical_friction": ("s",),
+    "rotation_friction": ("s",),
+    "crater": (),
+    "hollow": (),
+    "stiffen": ("depth", "force", "work"),
+    "unload": ("depth", "top", "force"),
+    "hold": ("s", "depth", "held"),
+    "grip": ("s", "depth", "held"),
+    "rate_force": ("s", "depth", "rate"),
+    "rate_pull": ("s", "depth", "rate", "held"),
+    "side_force": ("s", "depth", "slip"),
+    "friction_factor": ("s", "slip"),
+    "inner_mass": ("s",),
+    "inner_start": ("s",),
+    "inner_force": ("s",),
+    "inner_holds": ("s",),
+}
 """The hooks and what each gets before its parameters."""
 
 STATE_FIELDS = (
