@@ -199,8 +199,6 @@ class BedGround:
         grains = self.bed.grains(contacts=False)
         return math.sqrt(float(grains.mass @ (grains.velocity**2).sum(axis=1)) / self._mass)
 
-    # Where it may start --------------------------------------------------------------------------------------------
-
     def clear_height(self, pose: Pose, *, most: float = 0.05) -> float:
         """How far the body must be lifted from `pose` to touch no grain [m]; a hundredth of a grain is added.
 
@@ -237,8 +235,6 @@ class BedGround:
             distance = self._surface_of(member, Pose(*self._member_pose(member, pose)), raised)[0]
             worst = max(worst, (float((grains.radius - distance).max()), member.row))
         return worst
-
-    # The step ------------------------------------------------------------------------------------------------------
 
     def step(
         self,
@@ -316,8 +312,6 @@ class BedGround:
     def _member_pose(self, member: Member, pose: Pose) -> tuple[Vector, NDArray[np.float64]]:
         position = self.origin + pose.position + to_matrix(pose.turn) @ member.at
         return position, multiply(pose.turn, member.turn)
-
-    # What it holds -------------------------------------------------------------------------------------------------
 
     def energies(self) -> dict[str, float]:
         """Of the grains, `copies` times [J] (`dem.engine.energy.bed_energies`)."""

@@ -3,7 +3,7 @@
 import warnings
 from typing import Any
 
-__all__ = ["renamed"]
+__all__ = ["PlacedBody", "renamed"]
 
 
 def renamed(old: str, new: str) -> Any:
@@ -14,3 +14,11 @@ def renamed(old: str, new: str) -> Any:
         return getattr(owner, new)
 
     return property(get, doc=f"Old name of `{new}`.")
+
+
+class PlacedBody:
+    """The names that bodies gave their placement before."""
+
+    take_in_hand, let_go = renamed("take_in_hand", "begin_placement"), renamed("let_go", "release")
+    hold_more_firmly = renamed("hold_more_firmly", "slow_placement")
+    held_by_hand = renamed("held_by_hand", "in_placement")

@@ -22,6 +22,7 @@ from typing import Any, Unpack
 
 import numpy as np
 
+from rigid.checks import check_above_zero, check_not_negative
 from rigid.ground.reaction import Facts, State
 from rigid.platform.spike import Spike
 
@@ -58,9 +59,7 @@ class Run(Stepper):
         super().__init__()
         self.spike = spike
         self.ground: Ground = BedGround(ground, spike) if isinstance(ground, GrainBed) else ground
-        for key, value in {"speed": speed, "substeps": substeps, "max_time": max_time}.items():
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"{key} is {value}: it must be above 0")
+        check_above_zero(speed=speed, substeps=substeps, max_time=max_time)
         self.speed, self.max_time = float(speed), float(max_time)
         self.macro_step = int(substeps) * self.ground.time_step
         lift = -start_depth if start_depth is not None else self.ground.clearance
@@ -226,12 +225,9 @@ class Drive(Run):
     ) -> None:
         self.target, self.hold = float(depth), float(hold)
         self.retreat_speed = float(retreat_speed if retreat_speed is not None else speed)
-        if not (math.isfinite(self.target) and self.target > 0):
-            raise ValueError(f"depth is {depth}: it must be above 0 (in m)")
-        if not (math.isfinite(self.hold) and self.hold >= 0):
-            raise ValueError(f"hold is {hold}: it must be 0 or more (in s)")
-        if not (math.isfinite(self.retreat_speed) and self.retreat_speed > 0):
-            raise ValueError(f"retreat_speed is {retreat_speed}: it must be above 0 (in m/s)")
+        check_above_zero("in m", depth=self.target)
+        check_not_negative("in s", hold=self.hold)
+        check_above_zero("in m/s", retreat_speed=self.retreat_speed)
         back = self.target / self.retreat_speed if retreat else 0.0
         total = self.target / max(float(speed), 1e-9) + self.hold + back
         super().__init__(spike, ground, speed=speed, max_time=max(2 * total, 1e-9), **common)
@@ -301,9 +297,7 @@ class Drop(Run):
     ) -> None:
         self.mass = float(spike.mass if mass is None else mass)
         self.load = float(self.mass * gravity if load is None else load)
-        for key, value in {"mass": self.mass, "load": self.load}.items():
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"{key} is {value}: it must be above 0")
+        check_above_zero(mass=self.mass, load=self.load)
         super().__init__(spike, ground, speed=speed, **common)
         self.rest_time, self.rest_tolerance = float(rest_time), float(rest_tolerance)
         limit = self.ground.depth_limit
@@ -376,8 +370,7 @@ class SetDown(Drop):
         mass: float | None = None,
         **common: Any,
     ) -> None:
-        if not (math.isfinite(lowering_speed) and lowering_speed > 0):
-            raise ValueError(f"lowering_speed is {lowering_speed}: it must be above 0 (in m/s)")
+        check_above_zero("in m/s", lowering_speed=lowering_speed)
         self.drag = float(load) / lowering_speed  # c [N s/m]
         mass = self.drag * PLACEMENT_TIME if mass is None else mass
         super().__init__(spike, ground, speed=lowering_speed, mass=mass, load=load, **common)

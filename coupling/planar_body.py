@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from rigid.ground.reaction import Contact, Reaction, State
 from rigid.model.trial import Trial
 
-from .deprecated import renamed
+from .deprecated import PlacedBody
 from .poses import Pose, Twist, Vector, Wrench
 
 __all__ = ["PLACEMENT_STEP", "PLACEMENT_TIME", "PlanarBody", "placement_time"]
@@ -34,7 +34,7 @@ PLACEMENT_STEP = 4e-4
 _OPEN = 9  # Mode of a row that does not touch
 
 
-class PlanarBody:
+class PlanarBody(PlacedBody):
     """The platform of `trial`, at rest at (`x`, `z`) [m] and `theta` [rad].
 
     Raises ValueError for a trial with effects: the master has the base model only.
@@ -63,12 +63,6 @@ class PlanarBody:
         self.inertia = np.array([trial.mass, trial.mass + trial.counterweight, trial.inertia])
         self._drag = np.zeros(3)
         self.in_placement = False
-
-    take_in_hand, let_go = renamed("take_in_hand", "begin_placement"), renamed("let_go", "release")
-    hold_more_firmly, held_by_hand = (
-        renamed("hold_more_firmly", "slow_placement"),
-        renamed("held_by_hand", "in_placement"),
-    )
 
     def begin_placement(self, lowering_speed: float, *, pace: float = 1.0, step: float = 0.0) -> None:
         """It is lowered from here on: c = W / lowering_speed [m/s] resists, and its mass is 2 ms c.
@@ -100,8 +94,6 @@ class PlanarBody:
         """Free of contact, with `rates` at the time of its pose: brought to their own time."""
         self.acceleration = np.array([0.0, -self.trial.weight, 0.0]) / self.inertia
         self.rates = rates + 0.5 * lag * self.acceleration
-
-    # What a ground sees -------------------------------------------------------------------------------------------
 
     @property
     def pose(self) -> Pose:
@@ -147,8 +139,6 @@ class PlanarBody:
     def __repr__(self) -> str:
         x, z, theta = self.place
         return f"PlanarBody({self.trial.mass:g} kg at x = {x:.4g} m, z = {z:.4g} m, theta = {theta:.4g} rad)"
-
-    # What it has ---------------------------------------------------------------------------------------------------
 
     @property
     def twist(self) -> Twist:

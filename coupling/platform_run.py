@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rigid.checks import check_above_zero
 from rigid.ground.reaction import Reaction, State
 from rigid.planar.trajectory import STATES
 
@@ -101,13 +102,9 @@ class PlatformRun(EnergyBalance, Stepper):
 
     @staticmethod
     def _check(duration: float, energy_interval: float, lowering_speed: float | None) -> None:
-        for key, value in {"duration": duration, "energy_interval": energy_interval}.items():
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"{key} is {value}: it must be above 0 (in s)")
-        if lowering_speed is not None and not (math.isfinite(lowering_speed) and lowering_speed > 0):
-            raise ValueError(f"lowering_speed is {lowering_speed}: it must be above 0 (in m/s)")
-
-    # How far -------------------------------------------------------------------------------------------------------
+        check_above_zero("in s", duration=duration, energy_interval=energy_interval)
+        if lowering_speed is not None:
+            check_above_zero("in m/s", lowering_speed=lowering_speed)
 
     @property
     def done(self) -> bool:
@@ -143,8 +140,6 @@ class PlatformRun(EnergyBalance, Stepper):
     def _order(self) -> None:
         """During placement, where the body is light, the guess at the next force is the last one, whatever is asked."""
         self.master.extrapolation = self._extrapolation if self.placed else 0
-
-    # Stepping ------------------------------------------------------------------------------------------------------
 
     def advance(self) -> None:
         """One macro step; nothing once it is done. Raises RuntimeError where a placement does not come to rest."""
@@ -219,8 +214,6 @@ class PlatformRun(EnergyBalance, Stepper):
         """The state, from who sticks and who slides on a law."""
         raise NotImplementedError
 
-    # What came of it -----------------------------------------------------------------------------------------------
-
     @property
     def columns(self) -> dict[str, Vector]:
         """The rows so far, by COLUMNS."""
@@ -267,8 +260,6 @@ class PlatformRun(EnergyBalance, Stepper):
         self.reader.restore({key[7:]: value for key, value in state.items() if key.startswith("reader.")})
         self.master.restore(state)
         self._order()
-
-    # Placement -----------------------------------------------------------------------------------------------------
 
     def _lower(self, reaction: Reaction) -> None:
         """A step of the placement."""

@@ -26,8 +26,7 @@ class Pose:
     @classmethod
     def of(cls, position: ArrayLike, turn: ArrayLike | None) -> "Pose":
         """At `position` [m]; None: not turned."""
-        unturned = (1.0, 0.0, 0.0, 0.0)
-        return cls(np.asarray(position, dtype=float), np.asarray(unturned if turn is None else turn, dtype=float))
+        return cls(np.asarray(position, dtype=float), np.asarray((1.0, 0, 0, 0) if turn is None else turn, dtype=float))
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,7 +23,7 @@ from rigid.ground.reaction import Contact, Reaction, State
 from rigid.spatial.quaternions import from_turn, multiply, to_matrix
 from rigid.spatial.spatial import SpatialTrial
 
-from .deprecated import renamed
+from .deprecated import PlacedBody
 from .planar_body import placement_time
 from .poses import Pose, Twist, Vector, Wrench, moved
 
@@ -33,7 +33,7 @@ _ROUNDS = 20
 """Of the spin of a step's middle, which turns the axes that it is made from: each leaves H |w| of the error."""
 
 
-class SpatialBody:
+class SpatialBody(PlacedBody):
     """The platform of `trial` at `position` [m] with the turn `quaternion`; of the trial, the ground is not used.
 
     Parameters
@@ -90,12 +90,6 @@ class SpatialBody:
         self._drag = np.zeros(2)
         self.in_placement = False
 
-    take_in_hand, let_go = renamed("take_in_hand", "begin_placement"), renamed("let_go", "release")
-    hold_more_firmly, held_by_hand = (
-        renamed("hold_more_firmly", "slow_placement"),
-        renamed("held_by_hand", "in_placement"),
-    )
-
     def begin_placement(self, lowering_speed: float, *, pace: float = 1.0, step: float = 0.0) -> None:
         """It is lowered from here on at `lowering_speed` [m/s], as with `PlanarBody.begin_placement`. Torques wait."""
         weight, reach = float(np.linalg.norm(self.trial.weight)), self.trial.platform.reach
@@ -134,8 +128,6 @@ class SpatialBody:
     def masses(self) -> Vector:
         """(m, m, m + m_b) [kg], shape (3,); those of its placement while that lasts."""
         return self._masses
-
-    # What a ground sees --------------------------------------------------------------------------------------------
 
     @property
     def pose(self) -> Pose:
@@ -197,8 +189,6 @@ class SpatialBody:
         return (
             f"SpatialBody({self.trial.platform.name} of {self.trial.platform.mass:g} kg at {x:.4g}, {y:.4g}, {z:.4g} m)"
         )
-
-    # What it has ---------------------------------------------------------------------------------------------------
 
     @property
     def twist(self) -> Twist:

@@ -95,8 +95,6 @@ class SpatialRun(PlatformRun):
     def _pull_of_weight(self) -> Vector:
         return np.asarray(self.trial.weight)
 
-    # Stepping ------------------------------------------------------------------------------------------------------
-
     def run(self, **reporting: Unpack[Reporting]) -> dict[str, Vector]:
         """Go on to the end, with the reports of `Stepper.follow`; `columns`."""
         self.follow(**reporting)
@@ -135,8 +133,6 @@ class SpatialRun(PlatformRun):
     def _turning(self) -> Vector:
         """Angular momentum of platform and wheels about (0, 0, 0) [N m s]."""
         return np.asarray(np.cross(self.body.place, self.body.momentum) + self.body.angular_momentum)
-
-    # What came of it -----------------------------------------------------------------------------------------------
 
     @property
     def feet(self) -> Vector:

@@ -119,8 +119,6 @@ class CoupledTumble(PlatformRun):
         lowered = self.lowered
         return super()._placement_time + (lowered.steps * lowered.every + 3 * self.pace * REST_TIME if lowered else 0.0)
 
-    # Stepping ------------------------------------------------------------------------------------------------------
-
     def run(self, **reporting: Unpack[Reporting]) -> Trajectory:
         """Go on to the end, with the reports of `Stepper.follow`; frames are counted from the torque's begin."""
         self.follow(**reporting)
@@ -199,8 +197,6 @@ class CoupledTumble(PlatformRun):
         given = trial.wheel_inertia * (body.wheel_speed - trial.wheel_speed_0)
         own = body.inertia[2] * body.rates[2] - (given if trial.actuator == "motor" else -given)
         return np.asarray(np.cross(body.pose.position, body.momentum) + [0.0, own, 0.0])
-
-    # What came of it -----------------------------------------------------------------------------------------------
 
     @property
     def feet(self) -> np.ndarray:

@@ -29,6 +29,8 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from rigid.checks import check_above_zero, check_friction, check_not_negative
+
 __all__ = [
     "Flight", "Launch", "Tumbler", "brake_launch", "escape_speed", "flight", "impulsive_launch", "launch",
     "launch_speed_for", "least_viable_angle",
@@ -51,18 +53,11 @@ class Tumbler:
     counterweight: float = 0.0  # m_b of a rig [kg]
 
     def __post_init__(self) -> None:
-        for key in ("mass", "inertia", "spike_length"):
-            if not (math.isfinite(getattr(self, key)) and getattr(self, key) > 0):
-                raise ValueError(f"{key} is {getattr(self, key)}: it must be above 0")
-        for key in ("gravity", "counterweight"):
-            if not (math.isfinite(getattr(self, key)) and getattr(self, key) >= 0):
-                raise ValueError(f"{key} is {getattr(self, key)}: it must be 0 or more")
+        check_above_zero(mass=self.mass, inertia=self.inertia, spike_length=self.spike_length)
+        check_not_negative(gravity=self.gravity, counterweight=self.counterweight)
         if not 0 < self.lean < math.pi / 2:
             raise ValueError(f"lean is {self.lean}: it must be between 0 and pi / 2")
-        if not self.mu_s >= 0:
-            raise ValueError(f"mu_s is {self.mu_s}: it must be 0 or more")
-        if self.mu_d is not None and not 0 <= self.mu_d <= self.mu_s:
-            raise ValueError(f"mu_d is {self.mu_d}: it must be from 0 to mu_s, {self.mu_s}")
+        check_friction(self.mu_s, self.mu_d, endless=True)
 
     @property
     def mass_y(self) -> float:
@@ -104,9 +99,6 @@ class Flight:
     distance: float  # Along the ground [m]
     time: float  # [s]
     height: float  # Of the peak above launch [m]
-
-
-# Launch ---------------------------------------------------------------------------------------------------------------
 
 
 def least_viable_angle(mu_s: float, *, mass: float = 1.0, counterweight: float = 0.0) -> float:
@@ -281,9 +273,6 @@ class _Contact:
         return 200.0 * math.sqrt(max(slow)) if slow else math.inf
 
 
-# Flight ---------------------------------------------------------------------------------------------------------------
-
-
 def escape_speed(gravity: float, radius: float) -> float:
     """sqrt(2 g R) [m/s] at the surface of a round body."""
     return math.sqrt(2 * gravity * radius)
@@ -324,8 +313,7 @@ def launch_speed_for(distance: float, angle: float, *, gravity: float, radius: f
     escaped first, and for a distance of 0 or less.
     """
     _check_ballistics(gravity, radius)
-    if not (math.isfinite(distance) and distance > 0):
-        raise ValueError(f"distance is {distance}: it must be above 0 (m)")
+    check_above_zero("m", distance=distance)
     if not 0 < angle < math.pi / 2:
         raise ValueError(f"angle is {angle}: a hop over a distance is launched between 0 and pi / 2")
     s, c = math.sin(angle), math.cos(angle)
@@ -344,7 +332,6 @@ def launch_speed_for(distance: float, angle: float, *, gravity: float, radius: f
 
 
 def _check_ballistics(gravity: float, radius: float | None) -> None:
-    if not (math.isfinite(gravity) and gravity > 0):
-        raise ValueError(f"gravity is {gravity}: it must be above 0 (m/s2)")
-    if radius is not None and not (math.isfinite(radius) and radius > 0):
-        raise ValueError(f"radius is {radius}: it must be above 0 (m)")
+    check_above_zero("m/s2", gravity=gravity)
+    if radius is not None:
+        check_above_zero("m", radius=radius)

@@ -44,14 +44,12 @@ class Motion:
     ay: Array | None = None  # [m/s2]
 
     def __post_init__(self) -> None:
-        for name in ("time", "x", "y", "theta", "vx", "vy", "omega", "wheel_speed", "ax", "ay"):
-            value = getattr(self, name)
-            if value is None:
-                continue
-            array = np.asarray(value, dtype=float)
-            if array.shape != (len(np.atleast_1d(self.time)),) or not np.isfinite(array).all():
-                raise ValueError(f"{name} has shape {array.shape}: it must be one finite number a time")
-            object.__setattr__(self, name, array)
+        for name, value in list(vars(self).items()):
+            if value is not None:
+                array = np.asarray(value, dtype=float)
+                if array.shape != (len(np.atleast_1d(self.time)),) or not np.isfinite(array).all():
+                    raise ValueError(f"{name} has shape {array.shape}: it must be one finite number a time")
+                object.__setattr__(self, name, array)
         if len(self.time) < 2 or self.time[0] != 0.0 or not (np.diff(self.time) > 0).all():
             raise ValueError("time must begin at 0 and rise, with two samples at least")
 
@@ -120,17 +118,8 @@ def sensor_times(sensors: SensorSet, duration: float, *, step: float = 1e-3) -> 
     at = sensors.true_times(_imu_times(sensors, duration))
     half = 0.5 * sensors.imu_window
     grid = np.arange(0, math.floor(duration / step + 1e-9) + 1) * step
-    wanted = np.concatenate(
-        [
-            grid,
-            _rows(sensors.camera_rate, sensors.lead, duration),
-            _rows(sensors.wheel_rate, sensors.lead, duration),
-            at - half,
-            at,
-            at + half,
-            [0.0, duration],
-        ]
-    )
+    rows = (_rows(rate, sensors.lead, duration) for rate in (sensors.camera_rate, sensors.wheel_rate))
+    wanted = np.concatenate([grid, *rows, at - half, at, at + half, [0.0, duration]])
     kept = np.unique(wanted[(wanted >= 0) & (wanted <= duration)])
     # Two ways to the same instant differ by round-off: one of them is enough, and the ends stay exact.
     apart = np.append(np.diff(kept) > 1e-9, True)
@@ -216,28 +205,13 @@ def _with_lead(motion: Motion, sensors: SensorSet) -> Motion:
         + sensors.imu_window
         + 1.0 / min(sensors.camera_rate, sensors.imu_rate, sensors.wheel_rate)
     )
-
-    def held(values: Array) -> Array:
-        return np.concatenate([values[:1], values])
-
-    def still(values: Array) -> Array:
-        return np.concatenate([[0.0], values])
-
-    accelerations = {}
-    time = np.concatenate([[-before], motion.time])
-    if motion.ax is not None and motion.ay is not None:
-        accelerations = {"ax": still(motion.ax), "ay": still(motion.ay)}
-    return _Extended(
-        time=time,
-        x=held(motion.x),
-        y=held(motion.y),
-        theta=held(motion.theta),
-        vx=still(motion.vx),
-        vy=still(motion.vy),
-        omega=still(motion.omega),
-        wheel_speed=held(motion.wheel_speed),
-        **accelerations,
-    )
+    begin = dict.fromkeys(("vx", "vy", "omega", "ax", "ay"), 0.0) | {"time": -before}
+    whole = {
+        name: np.concatenate([[begin.get(name, values[0])], values])
+        for name, values in vars(motion).items()
+        if values is not None
+    }
+    return _Extended(**whole)
 
 
 class _Extended(Motion):

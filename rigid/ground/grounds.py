@@ -13,6 +13,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rigid.checks import check_above_zero, check_friction
+
 from .laws import SurfaceLaw, find_law
 from .reaction import Contact, Facts, Reaction, State
 
@@ -45,12 +47,8 @@ class _LawGround:
         law_name, parameters = self._setting()
         law = find_law(law_name)
         numbers = law.numbers(parameters)
-        if not (math.isfinite(self.mu_s) and self.mu_s >= 0):
-            raise ValueError(f"mu_s is {self.mu_s}: it must be 0 or more")
-        if self.mu_d is not None and not 0 <= self.mu_d <= self.mu_s:
-            raise ValueError(f"mu_d is {self.mu_d}: it must be from 0 to mu_s, {self.mu_s}")
-        if not (math.isfinite(self.time_step) and self.time_step > 0):
-            raise ValueError(f"time_step is {self.time_step}: it must be above 0 (in s)")
+        check_friction(self.mu_s, self.mu_d)
+        check_above_zero("in s", time_step=self.time_step)
         rebound = law.rebound(parameters)
         values = {"_law": law, "_numbers": numbers, "_rebound": 1.0 if rebound is None else rebound}
         values |= {"_deepest": [0.0], "_depth": [0.0], "name": self.name or law.name}

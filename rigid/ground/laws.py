@@ -1,10 +1,9 @@
 """Surface laws: the force on a spike by its depth, its rate of sinking and, for grains, its deepest depth.
 
 Each law is a few plain functions of numbers (`rigid.ground.law_functions`), whose very source runs as Python and,
-compiled by
-whoever wants it (`ti.func`), on thousands of trials at once. Depth z is positive downwards from the surface, rate is
-dz/dt. With `p` the law's numbers (a tuple, or a vector, in the order of `SurfaceLaw.slots`), the force, never negative,
-is
+compiled by whoever wants it (`ti.func`), on thousands of trials at once. Depth z is positive downwards from the
+surface, rate is dz/dt. With `p` the law's numbers (a tuple, or a vector, in the order of `SurfaceLaw.slots`), the
+force, never negative, is
 
     force = loading(top, p) * springback(z, top, rebound) + rate_force(z, rate, p)
 
@@ -21,7 +20,7 @@ at every moment force * rate >= d(stored)/dt, as `tests/rigid/ground/test_laws.p
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
 from . import law_functions as fn
@@ -38,17 +37,18 @@ MEMORY = (
 )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Parameter:
     """One parameter of a law: what a person sets."""
 
     name: str
     unit: str
     default: float
-    lowest: float
-    highest: float
+    _: KW_ONLY
     summary: str
     source: str
+    lowest: float = 0.0
+    highest: float = math.inf
     above_lowest: bool = False  # Whether it must exceed `lowest`, not only reach it
 
     def check(self, value: float, law: str) -> float:
@@ -157,15 +157,17 @@ def _make_rft(v: Mapping[str, float]) -> tuple[float, ...]:
     return (ring, drag, v["radius"], *shape, slope, wall)
 
 
-_BIG = math.inf
-_REBOUND = Parameter(
-    name="rebound", unit="1", default=0.05, lowest=1e-3, highest=0.5,
-    summary="share of the deepest depth that springs back", source=MEMORY,
-)  # fmt: skip
-_RADIUS = Parameter(
-    name="radius", unit="m", default=0.006, lowest=0.0, highest=1.0, above_lowest=True,
-    summary="radius of the spike's ball and shaft", source="ours : 12 mm across",
-)  # fmt: skip
+def _functions(loading: str, rate: str) -> dict[str, Callable[..., Any]]:
+    """The four functions of a law, by the names that `rigid.ground.law_functions` gives them."""
+    names = {"loading": f"{loading}_loading", "loading_work": f"{loading}_loading_work"}
+    names |= {"rate_force": f"{rate}_rate_force", "rate_work": f"{rate}_rate_work"}
+    return {key: getattr(fn, name) for key, name in names.items()}
+
+
+_REBOUND = Parameter("rebound", "1", 0.05, lowest=1e-3, highest=0.5,
+                     summary="share of the deepest depth that springs back", source=MEMORY)  # fmt: skip
+_RADIUS = Parameter("radius", "m", 0.006, highest=1.0, above_lowest=True,
+                    summary="radius of the spike's ball and shaft", source="ours : 12 mm across")  # fmt: skip
 _SAND = katsuragi_durian(diameter=0.012, projectile_density=7850.0, bulk_density=1500.0, friction=0.6, gravity=9.80665)
 
 _LAWS = (
@@ -174,66 +176,59 @@ _LAWS = (
         summary="K z + C dz/dt while going in: the paper's surface",
         source="Reid et al., i-SAIRAS 2014, eqs 5 and 6",
         parameters=(
-            Parameter(name="stiffness", unit="N/m", default=1.5e4, lowest=0.0, highest=_BIG, summary="K",
-                      source="ours, as of brick"),
-            Parameter(name="damping", unit="N s/m", default=60.0, lowest=0.0, highest=_BIG, summary="C, going in only",
-                      source="ours, as of brick"),
+            Parameter("stiffness", "N/m", 1.5e4, summary="K", source="ours, as of brick"),
+            Parameter("damping", "N s/m", 60.0, summary="C, going in only", source="ours, as of brick"),
         ),
         slots=("stiffness", "damping"), extensive=(0, 1),
         make=lambda v: (v["stiffness"], v["damping"]),
-        loading=fn.spring_damper_loading, loading_work=fn.spring_damper_loading_work,
-        rate_force=fn.spring_damper_rate_force, rate_work=fn.spring_damper_rate_work, has_memory=False,
+        **_functions("spring_damper", "spring_damper"), has_memory=False,
     ),
     SurfaceLaw(
         name="hunt-crossley",
         summary="K z^n (1 + 3/2 alpha dz/dt): restitution 1 - alpha v for small v, no jump of force at first touch",
         source="Hunt and Crossley, Journal of Applied Mechanics 42 (1975), 440",
         parameters=(
-            Parameter(name="stiffness", unit="N/m^n", default=2.1e5, lowest=0.0, highest=_BIG, above_lowest=True,
-                      summary="K", source="ours: as stiff as the spring of brick at a depth of 5 mm"),
-            Parameter(name="dissipation", unit="s/m", default=0.2, lowest=0.0, highest=10.0,
+            Parameter("stiffness", "N/m^n", 2.1e5, above_lowest=True, summary="K",
+                      source="ours: as stiff as the spring of brick at a depth of 5 mm"),
+            Parameter("dissipation", "s/m", 0.2, highest=10.0,
                       summary="alpha: how restitution falls with the speed of impact",
                       source="0.08 to 0.32 s/m for steel, bronze, ivory: Hunt and Crossley, quoted in Drake's manual"),
-            Parameter(name="exponent", unit="1", default=1.5, lowest=1.0, highest=3.0, summary="n",
+            Parameter("exponent", "1", 1.5, lowest=1.0, highest=3.0, summary="n",
                       source="Hertz: 3/2 for a ball on a flat"),
         ),
         slots=("stiffness", "dissipation", "exponent"), extensive=(0,),
         make=lambda v: (v["stiffness"], v["dissipation"], v["exponent"]),
-        loading=fn.power_loading, loading_work=fn.power_loading_work,
-        rate_force=fn.hunt_crossley_rate_force, rate_work=fn.hunt_crossley_rate_work, has_memory=False,
+        **_functions("power", "hunt_crossley"), has_memory=False,
     ),
     SurfaceLaw(
         name="power",
         summary="K z^n + C dz/dt while going in",
         source="the spring-damper with another exponent; n = 3/2 is Hertz, 2 a cone in a material of constant hardness",
         parameters=(
-            Parameter(name="stiffness", unit="N/m^n", default=2.1e5, lowest=0.0, highest=_BIG, above_lowest=True,
-                      summary="K", source="ours: as stiff as the spring of brick at a depth of 5 mm"),
-            Parameter(name="damping", unit="N s/m", default=60.0, lowest=0.0, highest=_BIG, summary="C, going in only",
-                      source="ours, as of brick"),
-            Parameter(name="exponent", unit="1", default=1.5, lowest=0.5, highest=4.0, summary="n", source="Hertz"),
+            Parameter("stiffness", "N/m^n", 2.1e5, above_lowest=True, summary="K",
+                      source="ours: as stiff as the spring of brick at a depth of 5 mm"),
+            Parameter("damping", "N s/m", 60.0, summary="C, going in only", source="ours, as of brick"),
+            Parameter("exponent", "1", 1.5, lowest=0.5, highest=4.0, summary="n", source="Hertz"),
         ),
         slots=("stiffness", "damping", "exponent"), extensive=(0, 1),
         make=lambda v: (v["stiffness"], v["damping"], v["exponent"]),
-        loading=fn.power_loading, loading_work=fn.power_loading_work,
-        rate_force=fn.spring_damper_rate_force, rate_work=fn.spring_damper_rate_work, has_memory=False,
+        **_functions("power", "spring_damper"), has_memory=False,
     ),
     SurfaceLaw(
         name="katsuragi-durian",
         summary="k z + b (dz/dt)^2 while going in: a ball that falls into grains",
         source="Katsuragi and Durian, Nature Physics 3 (2007), 420 and Physical Review E 87, 052208 (2013)",
         parameters=(
-            Parameter(name="stiffness", unit="N/m", default=_SAND["stiffness"], lowest=0.0, highest=_BIG,
-                      above_lowest=True, summary="k: friction that grows with depth",
+            Parameter("stiffness", "N/m", _SAND["stiffness"], above_lowest=True,
+                      summary="k: friction that grows with depth",
                       source="`katsuragi_durian`: a 12 mm steel ball in sand of 1500 kg/m3 and friction 0.6 at 1 g"),
-            Parameter(name="drag", unit="kg/m", default=_SAND["drag"], lowest=0.0, highest=_BIG,
-                      summary="b = m / d_1: inertia of the grains", source="as stiffness"),
+            Parameter("drag", "kg/m", _SAND["drag"], summary="b = m / d_1: inertia of the grains",
+                      source="as stiffness"),
             _REBOUND,
         ),
         slots=("stiffness", "drag"), extensive=(0, 1),
         make=lambda v: (v["stiffness"], v["drag"]),
-        loading=fn.spring_damper_loading, loading_work=fn.spring_damper_loading_work,
-        rate_force=fn.inertial_rate_force, rate_work=fn.inertial_rate_work, has_memory=True,
+        **_functions("spring_damper", "inertial"), has_memory=True,
     ),
     SurfaceLaw(
         name="bekker",
@@ -241,22 +236,19 @@ _LAWS = (
         source="Bekker, Introduction to Terrain-Vehicle Systems (1969); it is for far larger plates",
         parameters=(
             _RADIUS,
-            Parameter(name="tip_height", unit="m", default=0.006, lowest=0.0, highest=1.0,
+            Parameter("tip_height", "m", 0.006, highest=1.0,
                       summary="depth at which the section is full: the radius for a ball, 0 for a flat end",
                       source="geometry"),
-            Parameter(name="cohesive_modulus", unit="N/m^(n+1)", default=990.0, lowest=0.0, highest=_BIG,
-                      summary="k_c",
+            Parameter("cohesive_modulus", "N/m^(n+1)", 990.0, summary="k_c",
                       source="dry sand: Wong, Theory of Ground Vehicles (2008), Table 2.3, at second hand"),
-            Parameter(name="frictional_modulus", unit="N/m^(n+2)", default=1.52843e6, lowest=0.0, highest=_BIG,
-                      above_lowest=True, summary="k_phi", source="as cohesive_modulus"),
-            Parameter(name="exponent", unit="1", default=1.1, lowest=0.1, highest=2.0, summary="n",
+            Parameter("frictional_modulus", "N/m^(n+2)", 1.52843e6, above_lowest=True, summary="k_phi",
                       source="as cohesive_modulus"),
+            Parameter("exponent", "1", 1.1, lowest=0.1, highest=2.0, summary="n", source="as cohesive_modulus"),
             _REBOUND,
         ),
         slots=("pressure times section", "exponent", "tip_height"), extensive=(0,), bends=(2,),
         make=_make_bekker,
-        loading=fn.bekker_loading, loading_work=fn.bekker_loading_work,
-        rate_force=fn.no_rate_force, rate_work=fn.no_rate_work, has_memory=True,
+        **_functions("bekker", "no"), has_memory=True,
     ),
     SurfaceLaw(
         name="rft",
@@ -264,25 +256,23 @@ _LAWS = (
         source="Agarwal, Goldman and Kamrin, PNAS 120 (2023), e2214017120; see rigid/ground/rft.py",
         parameters=(
             _RADIUS,
-            Parameter(name="bulk_density", unit="kg/m3", default=1500.0, lowest=0.0, highest=2e4, above_lowest=True,
-                      summary="rho_c of the bed", source="dry sand"),
-            Parameter(name="friction", unit="1", default=0.6, lowest=0.1, highest=0.9,
+            Parameter("bulk_density", "kg/m3", 1500.0, highest=2e4, above_lowest=True, summary="rho_c of the bed",
+                      source="dry sand"),
+            Parameter("friction", "1", 0.6, lowest=0.1, highest=0.9,
                       summary="internal friction coefficient of the grains",
                       source="dry sand; the fit of xi_n is for 0.3 to 0.9"),
-            Parameter(name="surface_friction", unit="1", default=0.4, lowest=0.0, highest=2.0,
-                      summary="friction coefficient of grains and spike", source="ours"),
-            Parameter(name="gravity", unit="m/s2", default=9.80665, lowest=0.0, highest=100.0, above_lowest=True,
+            Parameter("surface_friction", "1", 0.4, highest=2.0, summary="friction coefficient of grains and spike",
+                      source="ours"),
+            Parameter("gravity", "m/s2", 9.80665, highest=100.0, above_lowest=True,
                       summary="gravity of the grains: 1 g even in the rig", source="docs/planar.md"),
-            Parameter(name="inertia", unit="1", default=1.1, lowest=0.0, highest=10.0,
-                      summary="lambda of the term lambda rho v_n^2",
+            Parameter("inertia", "1", 1.1, highest=10.0, summary="lambda of the term lambda rho v_n^2",
                       source="1.1 for plates dragged level, 1 for a wheel: Agarwal et al. (2021), see rft.py"),
             _REBOUND,
         ),
         slots=("2 pi R^3 xi_n", "pi R^2 lambda rho / 2", "radius", *(f"shape {k}" for k in range(8)), "slope", "wall"),
         extensive=(0, 1), bends=(2,),
         make=_make_rft,
-        loading=fn.rft_loading, loading_work=fn.rft_loading_work,
-        rate_force=fn.rft_rate_force, rate_work=fn.rft_rate_work, has_memory=True,
+        **_functions("rft", "rft"), has_memory=True,
     ),
 )  # fmt: skip
 

@@ -21,13 +21,13 @@ the numbers of the ground's law:
 
 import linecache
 import types
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rigid.ground.laws import SurfaceLaw, find_law
+from rigid.ground.laws import SurfaceLaw, find_law, springback, springback_energy
 from rigid.terms import BASE, STATE_FIELDS, Term
 
 from .mechanics import contact_arms, divide_mass
@@ -46,29 +46,10 @@ class State:
 
     __slots__ = STATE_FIELDS
 
-    time: float
-    x: float
-    y: float
-    theta: float
-    vx: float
-    vy: float
-    omega: float
-    wheel_speed: float
-    cosine: float
-    sine: float
-    up_x: float
-    up_y: float
-    mass: float
-    inertia: float
-    length: float
-    stance: float
-    counterweight: float
-    gravity: float
-    weight: float
-    torque: float
-    inner: float
-    inner_speed: float
-    inner_mode: float
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> float: ...
+        def __setattr__(self, name: str, value: float) -> None: ...
 
 
 class Model:
@@ -76,25 +57,13 @@ class Model:
 
     terms: tuple[Term, ...]
     law: SurfaceLaw
-    vertical: Callable[..., Any]
-    tip_radius: Callable[..., Any]
-    torque_factor: Callable[..., Any]
-    inertia: Callable[..., Any]
-    applied: Callable[..., Any]
-    potential: Callable[..., Any]
-    losses: Callable[..., Any]
-    dry_friction: Callable[..., Any]
-    inner_start: Callable[..., Any]
-    inner: Callable[..., Any]
-    crater: Callable[..., Any]
-    contact: Callable[..., Any]
-    contact_arms: Callable[..., Any]
-    divide_mass: Callable[..., Any]
+    if TYPE_CHECKING:
 
-    def __init__(self, terms: tuple[Term, ...], law: SurfaceLaw, functions: dict[str, Any]) -> None:
+        def __getattr__(self, name: str) -> Callable[..., Any]: ...
+
+    def __init__(self, terms: tuple[Term, ...], law: SurfaceLaw, functions: Mapping[str, Any]) -> None:
         self.terms, self.law = terms, law
-        for name, function in functions.items():
-            setattr(self, name, function)
+        vars(self).update(functions)
 
     def has(self, *hooks: str) -> bool:
         """Whether any effect has one of these hooks."""
@@ -221,17 +190,16 @@ def model_source(terms: Sequence[Term], law: SurfaceLaw) -> str:
 
 
 def _hooks(terms: Sequence[Term], law: SurfaceLaw) -> dict[str, Callable[..., Any]]:
-    from rigid.ground.laws import springback, springback_energy
-
-    hooks: dict[str, Callable[..., Any]] = {
-        f"{_name(term)}__{hook}": function for term in (*BASE, *terms) for hook, function in term.hooks.items()
+    own = {f"{_name(term)}__{hook}": function for term in (*BASE, *terms) for hook, function in term.hooks.items()}
+    return own | {
+        "law_loading": law.loading,
+        "law_loading_work": law.loading_work,
+        "law_rate_force": law.rate_force,
+        "law_springback": springback,
+        "law_springback_energy": springback_energy,
+        "contact_arms": contact_arms,
+        "divide_mass": divide_mass,
     }
-    hooks |= {
-        "law_loading": law.loading, "law_loading_work": law.loading_work, "law_rate_force": law.rate_force,
-        "law_springback": springback, "law_springback_energy": springback_energy,
-        "contact_arms": contact_arms, "divide_mass": divide_mass,
-    }  # fmt: skip
-    return hooks
 
 
 _GLUE = (

@@ -143,8 +143,6 @@ class System:
         again = self.model.contact(self.p, self.s, self.q, depth, -1.0, 0.0, 2 * depth, 2 * depth)
         return bool(self.crater != 0.0 or fresh != again)
 
-    # -- geometry ----------------------------------------------------------------------------------------------------
-
     def arms(self, spike: int, z: Sequence[float]) -> tuple[float, float]:
         """h and d of `spike` (see `rigid.model.mechanics`)."""
         c, s = math.cos(z[THETA]), math.sin(z[THETA])
@@ -172,8 +170,6 @@ class System:
         """Where a term's own coordinate is in equilibrium in the pose of `z`."""
         self.s.x, self.s.y, self.s.theta = z[X], z[Y], z[THETA]
         return float(self.model.inner_start(self.p, self.s))
-
-    # -- motion ------------------------------------------------------------------------------------------------------
 
     def derivative(self, time: float, z: Sequence[float], modes: Modes) -> list[float]:
         """dz/dt at `time` [s] in these modes; what it finds on the way is kept (`contacts`, `stick_force` ...)."""
@@ -322,8 +318,6 @@ class System:
         a = tuple(a[k] + sum(push * m[k] for push, m in zip(pushes, answers, strict=True)) for k in range(3))
         return a, pushes
 
-    # -- energy ------------------------------------------------------------------------------------------------------
-
     def energy(self, time: float, z: Sequence[float], modes: Modes) -> tuple[float, float, float]:
         """Kinetic energy, potential energy (weight, wires, springs) and energy stored in the ground [J]."""
         s, p, model = self.s, self.p, self.model
@@ -347,7 +341,7 @@ class System:
     def hold_still(self, z: list[float], modes: Modes) -> None:
         """Take from the speeds in `z` what the constraints of the spikes that stick do not allow.
 
-        The change is the constraint's own impulse, so the books lose its energy, which is added to what is dissipated.
+        The change is the constraint's own impulse, so its energy, missing from the balance, is added to what is lost.
         """
         contacts = [contact for contact in self.contacts if modes.slip[contact.spike] == 0]
         rows: list[tuple[float, float, float]] = []

@@ -56,7 +56,7 @@ def integrate_fixed(
         if system.inner:
             z[INNER_SPEED] += time_step * rate[INNER_SPEED]
             z[INNER] += time_step * z[INNER_SPEED]
-        # The books with the speeds' mean over the step.
+        # The energy balance takes the speeds' mean over the step.
         mean = 0.5 * (old[2] + z[OMEGA])
         z[WORK] += time_step * (rate[WORK] / old[2] * mean if old[2] else system.s.torque * mean)
         z[LOST] += time_step * rate[LOST]

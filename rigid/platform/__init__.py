@@ -1,4 +1,4 @@
 """The platform and the spike: geometry, mass, wheels, the rig, and files that describe a platform.
 
-Imports nothing of the other packages of `rigid`.
+Of the other packages of `rigid` it imports only `checks`.
 """

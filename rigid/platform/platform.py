@@ -14,6 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rigid.checks import check_above_zero
+
 from .actuation import Flywheel
 from .inertia import check_inertia
 from .solids import Mesh, capped_rod, convex_mesh, merge
@@ -51,8 +53,7 @@ class Platform:
     sources: Mapping[str, str] = field(default_factory=dict)  # Where each number comes from
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.mass) and self.mass > 0):
-            raise ValueError(f"mass is {self.mass}: it must be above 0 (kg)")
+        check_above_zero("kg", mass=self.mass)
         for key in ("tips", "hull_vertices", "centre_of_mass"):
             object.__setattr__(self, key, np.array(getattr(self, key), dtype=float))
         if self.tips.ndim != 2 or self.tips.shape[1] != 3 or len(self.tips) < 3:

@@ -113,11 +113,6 @@ class Rig:
         return (self.mass + self.counterweight) * self.gravity_sim
 
     @property
-    def inertia_ratio(self) -> float:
-        """(m + m_b) / m [1]: how much heavier the platform is to move up and down than sideways."""
-        return (self.mass + self.counterweight) / self.mass
-
-    @property
     def balance(self) -> float:
         """The counterweight [kg] at which (m - m_b) g is the weight that gravity_sim says."""
         return self.mass * (self.gravity - self.gravity_sim) / (self.gravity + self.gravity_sim)

@@ -8,6 +8,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from rigid.checks import check_above_zero, check_not_negative
+
 __all__ = ["Section", "Spike"]
 
 Tip = Literal["sphere", "cone", "flat"]
@@ -53,10 +55,7 @@ class Spike:
     def __post_init__(self) -> None:
         if self.tip not in ("sphere", "cone", "flat"):
             raise ValueError(f"tip is {self.tip!r}: it must be 'sphere', 'cone' or 'flat'")
-        for key in ("diameter", "length", "mass"):
-            value = getattr(self, key)
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"{key} is {value}: it must be a number above 0")
+        check_above_zero(diameter=self.diameter, length=self.length, mass=self.mass)
         if not 0 < self.shaft <= self.diameter:
             raise ValueError(
                 f"shaft_diameter is {self.shaft_diameter}: it must be above 0 and at most the tip's diameter "
@@ -71,8 +70,7 @@ class Spike:
             raise ValueError(f"cone_angle is {self.cone_angle}: the full angle must be from 1 to below 180 degrees")
         if self.length <= self.tip_height:
             raise ValueError(f"length is {self.length}: it must exceed the tip's own height, {self.tip_height:.6g} m")
-        if not (math.isfinite(self.friction) and self.friction >= 0):
-            raise ValueError(f"friction is {self.friction}: it must be 0 or more")
+        check_not_negative(friction=self.friction)
         if not 0.01 <= self.restitution <= 1:
             raise ValueError(f"restitution is {self.restitution}: it must be from 0.01 to 1")
 

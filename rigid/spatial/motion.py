@@ -90,8 +90,6 @@ class Motion:
         self.found: list[Tip] = []
         self.spin = np.zeros(3)  # Angular velocity [rad/s], world axes, as last evaluated
 
-    # -- what a state means -------------------------------------------------------------------------------------------
-
     def turning(self, z: Array) -> tuple[Array, Array]:
         """Rotation matrix and angular velocity in world axes [rad/s]."""
         turn = to_matrix(z[Q])
@@ -119,8 +117,6 @@ class Motion:
         force = self.law.loading(top, self.numbers) * springback(depth, top, self.rebound)
         # A tip on the way out may be above the surface by what a step has left over: nothing acts there.
         return max(0.0, float(force + self.law.rate_force(depth, rate, self.numbers)))
-
-    # -- motion -------------------------------------------------------------------------------------------------------
 
     def rates(self, z: Array, modes: Modes) -> Array:
         """dz/dt, shape [19]; `found` holds the touching tips."""

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import root
 
+from rigid.checks import check_above_zero, check_friction
 from rigid.ground.laws import find_law
 from rigid.platform.actuation import TorqueHistory
 from rigid.platform.platform import Platform
@@ -51,10 +52,7 @@ class SpatialTrial:
         if gravity.shape == (1,) and gravity[0] < 0:
             raise ValueError(f"gravity is {self.gravity}: it must be 0 or more (m/s2)")
         find_law(self.ground).numbers(self.ground_parameters)
-        if not (math.isfinite(self.mu_s) and self.mu_s >= 0):
-            raise ValueError(f"mu_s is {self.mu_s}: it must be 0 or more")
-        if self.mu_d is not None and not 0 <= self.mu_d <= self.mu_s:
-            raise ValueError(f"mu_d is {self.mu_d}: it must be from 0 to mu_s, {self.mu_s}")
+        check_friction(self.mu_s, self.mu_d)
         if not 0 <= self.counterweight < self.platform.mass:
             raise ValueError(
                 f"counterweight is {self.counterweight}: it must be 0 or more and below the platform's mass, "
@@ -226,11 +224,9 @@ def simulate(
         ValueError: what cannot be, named.
         RuntimeError: the motion is no longer finite.
     """
-    for key, value in {"duration": duration, "sample_interval": sample_interval, "tolerance": tolerance}.items():
-        if not (math.isfinite(value) and value > 0):
-            raise ValueError(f"{key} is {value}: it must be above 0")
-    if time_step is not None and not (math.isfinite(time_step) and time_step > 0):
-        raise ValueError(f"time_step is {time_step}: it must be above 0 (s)")
+    check_above_zero(duration=duration, sample_interval=sample_interval, tolerance=tolerance)
+    if time_step is not None:
+        check_above_zero("s", time_step=time_step)
     samples = _samples(duration, sample_interval, times)
     z, motion = _start(trial, position, quaternion, velocity, angular_velocity), trial.motion()
     run = Integration(motion, trial.histories, trial.torque_in_flight, z, tolerance=tolerance, time_step=time_step)

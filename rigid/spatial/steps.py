@@ -65,8 +65,6 @@ class Integration:
         self._tell()
         self.scale = self._scale()
 
-    # -- one step -----------------------------------------------------------------------------------------------------
-
     def advance(self, until: float) -> None:
         """One step, which ends at `until` [s] at the latest."""
         ends = min([until, *(t for t in self.changes if t > self.time)])
@@ -169,8 +167,6 @@ class Integration:
         still[FRICTION_WORK] -= motion.energy(self.z, modes)[0]
         self.z = still
         return True
-
-    # -- events -------------------------------------------------------------------------------------------------------
 
     def _monitors(self, z: Array) -> dict[tuple[str, int], float]:
         """Numbers that are positive within the modes, at `z`, where the equations were last evaluated."""
@@ -336,8 +332,6 @@ class Integration:
 
     def _slip_size(self, k: int) -> float:
         return float(np.linalg.norm(self._slip(k)))
-
-    # -- modes that fit a state ---------------------------------------------------------------------------------------
 
     def _resolve(self, may_stick: Sequence[int]) -> None:
         """Let those stick that may and can; set the torques; take out of the speeds what sticking forbids."""

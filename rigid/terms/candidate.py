@@ -147,9 +147,6 @@ class Candidate:
     push: Push | None = None
 
 
-# Numbers of tumbles ---------------------------------------------------------------------------------------------------
-
-
 def free(name: str, unit: str, scale: float, lowest: float = -math.inf, highest: float = math.inf, *,
          how: str = "same", typical: float = 0.0, fitted: str = "") -> Number:  # fmt: skip
     """A number without a prior, from 0."""
@@ -189,9 +186,6 @@ def bent(word: str, of: str | tuple[str, ...], *numbers: Number) -> Bend:
     """A bend of tumbles, which begins at every combination of its numbers' sides."""
     starts = tuple(product(*(tuple(side * number.std for side in number.sides) for number in numbers)))
     return Bend(f"{{}}, {word}", (of,) if isinstance(of, str) else of, numbers, starts)
-
-
-# Numbers of pushes ----------------------------------------------------------------------------------------------------
 
 
 def amplitude(slot: str, how: str, std: float, lowest: float, highest: float) -> Number:

@@ -44,7 +44,7 @@ Without hooks a term is a sensor's (`sensor=True`): it is declared here and appl
 import inspect
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from typing import Any
 
 __all__ = ["FIXED_ARGUMENTS", "STATE_FIELDS", "Parameter", "Term"]
@@ -89,13 +89,14 @@ coordinate of a term that has one of its own."""
 INNER_HOOKS = ("inner_mass", "inner_start", "inner_force", "inner_holds")
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Parameter:
     """One parameter of a term; with all defaults a term changes nothing, to the bit."""
 
     name: str
     unit: str
     default: float
+    _: KW_ONLY
     summary: str
     lowest: float = -math.inf
     highest: float = math.inf

@@ -1,6 +1,5 @@
 """The motion of a batch from its start to the end; the package's docstring describes the method."""
 
-# Taichi reads the annotations and the source of kernels: no `from __future__ import annotations` here.
 from types import SimpleNamespace
 from typing import Any
 

@@ -1,6 +1,5 @@
 """Forces on the lowest spike and its two neighbours, and when within the step one of them touches or leaves."""
 
-# Taichi reads the annotations and the source of kernels: no `from __future__ import annotations` here.
 from types import SimpleNamespace
 from typing import Any
 

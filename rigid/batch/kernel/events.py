@@ -4,7 +4,6 @@ Kinds: 1 touch, 2 lift, 3 slip through zero, 4 static bound, 5 the wheel stops, 
 stop, 8 and 9 they give way, 10 a term's own coordinate changes its mode.
 """
 
-# Taichi reads the annotations and the source of kernels: no `from __future__ import annotations` here.
 from types import SimpleNamespace
 from typing import Any
 

@@ -1,6 +1,5 @@
 """Accelerations with the forces that hold: spikes that stick, and dry friction of the pulleys and the bearing."""
 
-# Taichi reads the annotations and the source of kernels: no `from __future__ import annotations` here.
 from types import SimpleNamespace
 from typing import Any
 

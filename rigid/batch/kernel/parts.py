@@ -1,6 +1,5 @@
 """What the kernels share: the terms' functions, the numbers that are known when they are compiled, small functions."""
 
-# Taichi reads the annotations and the source of kernels: no `from __future__ import annotations` here.
 import linecache
 import math
 from types import SimpleNamespace

@@ -1,6 +1,5 @@
 """What a batched trial leaves: rows of its series, within a step, and its row of the summary."""
 
-# Taichi reads the annotations and the source of kernels: no `from __future__ import annotations` here.
 from types import SimpleNamespace
 from typing import Any
 

@@ -1,6 +1,5 @@
 """How the platforms of a batch stand before the torque starts, as `rigid.planar.statics` has it for one."""
 
-# Taichi reads the annotations and the source of kernels: no `from __future__ import annotations` here.
 from types import SimpleNamespace
 from typing import Any
 

@@ -23,17 +23,16 @@ def bearing_drag(s, torque, excess, speed):
 TERM = Term(
     rank=60, id="bearing-drag", summary="constant torque against the rotation", acts="virtual work, dry friction",
     parameters=(
-        Parameter(name="torque", unit="N m", default=0.0, lowest=0.0, summary="the same in both directions"),
-        Parameter(name="excess", unit="1", default=0.0, lowest=0.0,
+        Parameter("torque", "N m", 0.0, lowest=0.0, summary="the same in both directions"),
+        Parameter("excess", "1", 0.0, lowest=0.0,
                   summary="a: what friction at rest has more, over that of fast rotation"),
-        Parameter(name="speed", unit="rad/s", default=0.2, lowest=0.0, above_lowest=True,
+        Parameter("speed", "rad/s", 0.2, lowest=0.0, above_lowest=True,
                   summary="omega_0 of exp(-(omega / omega_0)^2), by which the excess falls"),
     ),
     source=f"Coulomb friction of the bearings on which the rig's wires hold the shaft; {_STRIBECK}",
     limits="the static bound is that of sliding as it starts; none that grows with speed",
     hooks={"rotation_friction": bearing_drag},
 )  # fmt: skip
-
 
 CANDIDATE = Candidate(
     meaning="a constant torque acts against the rotation",

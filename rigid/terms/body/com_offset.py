@@ -29,16 +29,13 @@ def com_offset_force(s, x, y):
 TERM = Term(
     rank=20, id="com-offset", summary="the centre of mass is off the shaft", acts="T and V",
     parameters=(
-        Parameter(name="x", unit="m", default=0.0, lowest=-0.05, highest=0.05,
-                  summary="along body x (forward at theta = 0)"),
-        Parameter(name="y", unit="m", default=0.0, lowest=-0.05, highest=0.05,
-                  summary="along body y (up at theta = 0)"),
+        Parameter("x", "m", 0.0, lowest=-0.05, highest=0.05, summary="along body x (forward at theta = 0)"),
+        Parameter("y", "m", 0.0, lowest=-0.05, highest=0.05, summary="along body y (up at theta = 0)"),
     ),
     source="true gravity pulls at the centre of mass, the wires hold the shaft",
     limits="J stays the inertia about the shaft",
     hooks={"mass": com_offset_mass, "potential": com_offset_potential, "force": com_offset_force},
 )  # fmt: skip
-
 
 CANDIDATE = Candidate(
     meaning="the centre of mass is not on the axis of rotation",

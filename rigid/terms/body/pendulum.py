@@ -32,11 +32,10 @@ def pendulum_force(s, length, offset, arc):
 TERM = Term(
     rank=10, id="pendulum", summary="the rig's wires pull back", acts="V", needs_rig=True,
     parameters=(
-        Parameter(name="length", unit="m", default=math.inf, lowest=0.0, above_lowest=True,
-                  summary="from the pulleys down to the shaft"),
-        Parameter(name="offset", unit="m", default=0.0, lowest=-1.0, highest=1.0,
+        Parameter("length", "m", math.inf, lowest=0.0, above_lowest=True, summary="from the pulleys down to the shaft"),
+        Parameter("offset", "m", 0.0, lowest=-1.0, highest=1.0,
                   summary="how far the pulleys stand towards +x of the start"),
-        Parameter(name="arc", unit="1", default=0.0, lowest=0.0, highest=1.0,
+        Parameter("arc", "1", 0.0, lowest=0.0, highest=1.0,
                   summary="0: a long pendulum, which pulls back only; 1: the true arc, whose wires carry less too"),
     ),
     source="the rest tension times x / length of a long pendulum; the paper trusts its rig without it for 40 mm",

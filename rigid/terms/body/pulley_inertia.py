@@ -11,12 +11,10 @@ def pulley_mass(s, mass):
 
 TERM = Term(
     rank=40, id="pulley-inertia", summary="the pulleys turn with the wires", acts="T", needs_rig=True,
-    parameters=(Parameter(name="mass", unit="kg", default=0.0, lowest=0.0,
-                          summary="I / r^2 summed over the pulleys, added in y"),),
+    parameters=(Parameter("mass", "kg", 0.0, lowest=0.0, summary="I / r^2 summed over the pulleys, added in y"),),
     source="Atwood's machine with a heavy pulley (any mechanics textbook)", limits="the wires do not slip",
     hooks={"mass": pulley_mass},
 )  # fmt: skip
-
 
 CANDIDATE = Candidate(
     meaning="the rig's pulleys have to be turned, which acts as mass in y",

@@ -24,17 +24,16 @@ TERM = Term(
     rank=50, id="rig-friction", summary="pulleys resist vertical motion", acts="virtual work, dry friction",
     needs_rig=True,
     parameters=(
-        Parameter(name="force", unit="N", default=0.0, lowest=0.0, summary="the same in both directions"),
-        Parameter(name="excess", unit="1", default=0.0, lowest=0.0,
+        Parameter("force", "N", 0.0, lowest=0.0, summary="the same in both directions"),
+        Parameter("excess", "1", 0.0, lowest=0.0,
                   summary="a: what friction at rest has more, over that of fast motion"),
-        Parameter(name="speed", unit="m/s", default=0.03, lowest=0.0, above_lowest=True,
+        Parameter("speed", "m/s", 0.03, lowest=0.0, above_lowest=True,
                   summary="v_0 of exp(-(v / v_0)^2), by which the excess falls"),
     ),
     source=f"Coulomb friction of the pulleys' bearings; {_STRIBECK}",
     limits="the static bound is that of sliding as it starts; none that grows with speed",
     hooks={"vertical_friction": rig_friction},
 )  # fmt: skip
-
 
 CANDIDATE = Candidate(
     meaning="the rig's pulleys resist vertical motion",

@@ -14,13 +14,12 @@ def slope_up(angle):
 TERM = Term(
     rank=30, id="slope", summary="the surface is not level", acts="gravity, counterweight, wires: their direction",
     parameters=(
-        Parameter(name="angle", unit="rad", default=0.0, lowest=-1.2, highest=1.2,
+        Parameter("angle", "rad", 0.0, lowest=-1.2, highest=1.2,
                   summary="the surface rises towards +x; x and y stay along and normal to it"),
     ),
     source="gravity and wires vertical, the camera's axes along the surface",
     limits="plane; the wires stay vertical", hooks={"up": slope_up},
 )  # fmt: skip
-
 
 CANDIDATE = Candidate(
     meaning="the surface is not level",

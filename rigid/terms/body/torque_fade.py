@@ -19,21 +19,18 @@ TERM = Term(
     rank=80, id="torque-fade", summary="the torque falls with speed or time",
     acts="virtual work: the flywheel's torque",
     parameters=(
-        Parameter(name="speed_loss", unit="s/rad", default=0.0, lowest=0.0,
+        Parameter("speed_loss", "s/rad", 0.0, lowest=0.0,
                   summary="share lost per rad/s of the wheel: 1 / no-load speed of a DC motor"),
-        Parameter(name="time_loss", unit="1/s", default=0.0, lowest=0.0, summary="share lost a second: heating"),
-        Parameter(name="speed_power", unit="1", default=1.0, lowest=0.2, highest=5.0,
+        Parameter("time_loss", "1/s", 0.0, lowest=0.0, summary="share lost a second: heating"),
+        Parameter("speed_power", "1", 1.0, lowest=0.2, highest=5.0,
                   summary="p of (speed_loss w)^p: 1 a straight line, above it falls late"),
-        Parameter(name="time_power", unit="1", default=1.0, lowest=0.2, highest=5.0,
-                  summary="q of (time_loss t)^q"),
+        Parameter("time_power", "1", 1.0, lowest=0.2, highest=5.0, summary="q of (time_loss t)^q"),
     ),
     source="torque-speed line of a DC motor at a fixed voltage; fade of a brake that warms",
     limits="cut at zero", hooks={"torque_factor": torque_fade_factor},
 )  # fmt: skip
 
-
 _POWER = (1.0, 0.4, -0.65, 2.0)
-
 
 CANDIDATE = Candidate(
     meaning="the torque falls with the wheel's speed or with time",

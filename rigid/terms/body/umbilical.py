@@ -36,13 +36,13 @@ def umbilical_loss(s, drag, drag_power):
 TERM = Term(
     rank=70, id="umbilical", summary="the cable pulls or drags on the rotation", acts="V and D",
     parameters=(
-        Parameter(name="stiffness", unit="N m/rad", default=0.0, lowest=0.0, summary="bending of the cable"),
-        Parameter(name="drag", unit="N m s/rad", default=0.0, lowest=0.0, summary="its inner friction"),
-        Parameter(name="spring_power", unit="1", default=1.0, lowest=0.3, highest=4.0,
+        Parameter("stiffness", "N m/rad", 0.0, lowest=0.0, summary="bending of the cable"),
+        Parameter("drag", "N m s/rad", 0.0, lowest=0.0, summary="its inner friction"),
+        Parameter("spring_power", "1", 1.0, lowest=0.3, highest=4.0,
                   summary="of the angle that its torque goes with; where it is not 1, stiffness is at 1 rad"),
-        Parameter(name="drag_power", unit="1", default=1.0, lowest=0.3, highest=3.0,
+        Parameter("drag_power", "1", 1.0, lowest=0.3, highest=3.0,
                   summary="of the rate that its drag goes with; where it is not 1, drag is at 1 rad/s"),
-        Parameter(name="rest", unit="rad", default=0.0,
+        Parameter("rest", "rad", 0.0,
                   summary="theta_0: the angle at which it is free of torque; a cable that hangs wound up"),
     ),
     source="a cable as a torsion spring and a damper, straight or not",

@@ -18,19 +18,16 @@ def vibration_factor(s, slip, reduction, speed, power):
 TERM = Term(
     rank=100, id="wheel-vibration", summary="a spinning wheel lowers the friction at the spikes", acts="mu_s and mu_d",
     parameters=(
-        Parameter(name="reduction", unit="1", default=0.0, lowest=0.0, highest=0.99,
+        Parameter("reduction", "1", 0.0, lowest=0.0, highest=0.99,
                   summary="share of the friction that a fast wheel takes away"),
-        Parameter(name="speed", unit="rad/s", default=100.0, lowest=0.0, above_lowest=True,
-                  summary="wheel speed at half of it"),
-        Parameter(name="power", unit="1", default=2.0, lowest=0.3, highest=8.0,
-                  summary="p: how sharply it sets in about that speed"),
+        Parameter("speed", "rad/s", 100.0, lowest=0.0, above_lowest=True, summary="wheel speed at half of it"),
+        Parameter("power", "1", 2.0, lowest=0.3, highest=8.0, summary="p: how sharply it sets in about that speed"),
     ),
     source="the paper suspects it; vibration lowers mean friction by the share of time in light contact "
            "(Dupont et al. 1994, IEEE TAC 39:2, for the phenomenon)",
     limits="a mean effect: no resonances, no normal vibration of the platform",
     hooks={"friction_factor": vibration_factor},
 )  # fmt: skip
-
 
 CANDIDATE = Candidate(
     meaning="the spinning wheel shakes the platform and lowers the friction at the spikes",

@@ -69,15 +69,14 @@ def gripping(s, depth, held, force, reach, sharpness, speed, grip):
 TERM = Term(
     rank=150, id="adhesion", summary="the tip is held on retreat", acts="normal force, with memory",
     parameters=(
-        Parameter(name="force", unit="N", default=0.0, lowest=0.0, summary="A, a row's, fully mobilised"),
-        Parameter(name="reach", unit="m", default=1e-4, lowest=0.0, above_lowest=True,
-                  summary="retreat over which it is mobilised"),
-        Parameter(name="sharpness", unit="1", default=0.0, lowest=-1.0, highest=2.5,
+        Parameter("force", "N", 0.0, lowest=0.0, summary="A, a row's, fully mobilised"),
+        Parameter("reach", "m", 1e-4, lowest=0.0, above_lowest=True, summary="retreat over which it is mobilised"),
+        Parameter("sharpness", "1", 0.0, lowest=-1.0, highest=2.5,
                   summary="m: 0 as 1 - exp, 1 as tanh of the retreat over that reach"),
-        Parameter(name="speed", unit="m/s", default=0.0, lowest=0.0,
+        Parameter("speed", "m/s", 0.0, lowest=0.0,
                   summary="v_0: where it is not 0 the pull acts on the way out only, at the speed v times "
                           "1 - exp(-v / v_0), and friction loses it all"),
-        Parameter(name="grip", unit="1", default=0.0, lowest=0.0, highest=1.0,
+        Parameter("grip", "1", 0.0, lowest=0.0, highest=1.0,
                   summary="share of the pull that friction does not lose: at 0 its bound goes with the net normal "
                           "force, at 1 with what the ground presses alone"),
     ),

@@ -54,11 +54,11 @@ def hardened(depth, force, work, exponent, reference, bend):
 TERM = Term(
     rank=130, id="depth-hardening", summary="force grows other than linearly with depth", acts="the ground's law",
     parameters=(
-        Parameter(name="exponent", unit="1", default=1.0, lowest=0.3, highest=4.0,
+        Parameter("exponent", "1", 1.0, lowest=0.3, highest=4.0,
                   summary="n of (z / z_0)^(n - 1) on the law's force; 1 changes nothing"),
-        Parameter(name="reference", unit="m", default=1e-3, lowest=0.0, above_lowest=True,
+        Parameter("reference", "m", 1e-3, lowest=0.0, above_lowest=True,
                   summary="z_0: the depth at which the power changes nothing"),
-        Parameter(name="bend", unit="1/m", default=0.0,
+        Parameter("bend", "1/m", 0.0,
                   summary="b of 1 + b z, or of 1 / (1 - b z) where negative, a factor beside the power's: a law "
                           "that is straight while shallow"),
     ),

@@ -37,9 +37,9 @@ def inertial_side_force(s, depth, slip, sideways):
 TERM = Term(
     rank=120, id="inertial-drag", summary="force of the square of the tip's speed", acts="normal and tangential force",
     parameters=(
-        Parameter(name="normal", unit="kg/m", default=0.0, lowest=0.0, summary="b, while the tip goes in"),
-        Parameter(name="sideways", unit="kg/m", default=0.0, lowest=0.0, summary="b_x, while the tip slides"),
-        Parameter(name="power", unit="1", default=2.0, lowest=1.0, highest=3.0,
+        Parameter("normal", "kg/m", 0.0, lowest=0.0, summary="b, while the tip goes in"),
+        Parameter("sideways", "kg/m", 0.0, lowest=0.0, summary="b_x, while the tip slides"),
+        Parameter("power", "1", 2.0, lowest=1.0, highest=3.0,
                   summary="of the speed of going in; where it is not 2, b is the force at 1 m/s over (1 m/s)^2"),
     ),
     source="Katsuragi and Durian, Nature Physics 3 (2007), 420: the inertia of displaced grains",

@@ -41,11 +41,11 @@ def bent_unloading(depth, top, force, share, bend):
 TERM = Term(
     rank=140, id="plastic-sinkage", summary="the surface does not spring back", acts="the ground's law, with memory",
     parameters=(
-        Parameter(name="share", unit="1", default=0.0, lowest=0.0, highest=0.95,
-                          summary="of the deepest depth that stays when the load is gone"),
-        Parameter(name="bend", unit="1", default=0.0, lowest=0.0, highest=4.0,
+        Parameter("share", "1", 0.0, lowest=0.0, highest=0.95,
+                  summary="of the deepest depth that stays when the load is gone"),
+        Parameter("bend", "1", 0.0, lowest=0.0, highest=4.0,
                   summary="c: what unloading's exponent has more than loading's, fully from a share of 0.2 on"),
-        Parameter(name="open", unit="1", default=0.0, lowest=0.0, highest=1.0,
+        Parameter("open", "1", 0.0, lowest=0.0, highest=1.0,
                   summary="1: a tip in its crater still touches, without a load, until it is above the undisturbed "
                           "surface (the torque acts, the damper too); 0: it touches the crater's bottom"),
     ),

@@ -17,17 +17,14 @@ def rate_friction_factor(s, slip, change, speed, power):
 TERM = Term(
     rank=160, id="rate-friction", summary="friction depends on the sliding speed", acts="mu_d",
     parameters=(
-        Parameter(name="change", unit="1", default=0.0, lowest=-0.95, highest=10.0,
+        Parameter("change", "1", 0.0, lowest=-0.95, highest=10.0,
                   summary="relative change of mu_d at high sliding speed"),
-        Parameter(name="speed", unit="m/s", default=0.05, lowest=0.0, above_lowest=True,
-                  summary="sliding speed at half of it"),
-        Parameter(name="power", unit="1", default=1.0, lowest=0.2, highest=8.0,
-                  summary="p: how sharply it sets in about that speed"),
+        Parameter("speed", "m/s", 0.05, lowest=0.0, above_lowest=True, summary="sliding speed at half of it"),
+        Parameter("power", "1", 1.0, lowest=0.2, highest=8.0, summary="p: how sharply it sets in about that speed"),
     ),
     source="velocity strengthening or weakening (Stribeck; Armstrong-Helouvry et al. 1994, Automatica 30:1083)",
     limits="no memory of past sliding", hooks={"friction_factor": rate_friction_factor},
 )  # fmt: skip
-
 
 CANDIDATE = Candidate(
     meaning="friction depends on the sliding speed",

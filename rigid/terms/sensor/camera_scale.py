@@ -6,15 +6,13 @@ from rigid.terms.term import Parameter, Term
 TERM = Term(
     rank=180, id="camera-scale", summary="the camera's scale is off", acts="the camera's x and y", sensor=True,
     parameters=(
-        Parameter(name="scale", unit="1", default=1.0, lowest=0.0, above_lowest=True,
-                  summary="measured over true, x and y"),
-        Parameter(name="bend", unit="1/m2", default=0.0,
+        Parameter("scale", "1", 1.0, lowest=0.0, above_lowest=True, summary="measured over true, x and y"),
+        Parameter("bend", "1/m2", 0.0,
                   summary="added to it by the square of the distance from where the platform stood"),
     ),
     source="a ruler in the wrong plane; a lens that bends outwards or inwards",
     limits="the same in x and y; the lens's axis is on the start",
 )  # fmt: skip
-
 
 CANDIDATE = Candidate(
     meaning="the camera measures lengths by another scale",

@@ -6,13 +6,11 @@ from rigid.terms.term import Parameter, Term
 TERM = Term(
     rank=170, id="clock-offset", summary="IMU against camera", acts="the IMU's times", sensor=True,
     parameters=(
-        Parameter(name="offset", unit="s", default=0.0, summary="IMU time minus true time, at t = 0"),
-        Parameter(name="drift", unit="1", default=0.0, lowest=-0.5, highest=0.5,
-                  summary="what the IMU's clock gains in a second"),
+        Parameter("offset", "s", 0.0, summary="IMU time minus true time, at t = 0"),
+        Parameter("drift", "1", 0.0, lowest=-0.5, highest=0.5, summary="what the IMU's clock gains in a second"),
     ),
     source="two clocks, read apart", limits="it gains evenly, in every trial from t = 0 on",
 )  # fmt: skip
-
 
 CANDIDATE = Candidate(
     meaning="the IMU's clock is not the camera's",
