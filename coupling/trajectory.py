@@ -1,6 +1,5 @@
 """What a penetration leaves behind: one row per macro step, and the numbers read off it."""
 
-import csv
 import itertools
 import json
 import warnings
@@ -12,6 +11,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from rigid.series import RESULT_FORMAT, read_series, write_series
 
 __all__ = ["PHASES", "Penetration"]
 
@@ -115,19 +116,13 @@ class Penetration:
 
     def write_csv(self, path: str | Path) -> None:
         """Write the rows with every digit, so that reading them back gives the same bits."""
-        with Path(path).open("w", newline="", encoding="utf-8") as stream:
-            writer = csv.writer(stream)
-            writer.writerow(COLUMNS)
-            for *numbers, phase in zip(*self.columns().values(), strict=True):
-                writer.writerow([*(repr(float(number)) for number in numbers), str(phase)])
+        write_series(path, self.columns(), line_end="\r\n")
 
     @classmethod
     def read_csv(cls, path: str | Path, *, kind: str, macro_step: float, **more: Any) -> "Penetration":
         """Read what `write_csv` wrote; `kind`, `macro_step` and the rest are not in the file."""
-        with Path(path).open(newline="", encoding="utf-8") as stream:
-            rows = list(csv.DictReader(stream))
-        columns: dict[str, NDArray[Any]] = {name: np.array([float(row[name]) for row in rows]) for name in COLUMNS[:4]}
-        columns["phase"] = np.array([row["phase"] for row in rows], dtype="U4")
+        columns = read_series(path)
+        columns["phase"] = columns["phase"].astype("U4")
         return cls.from_columns(columns, {"kind": kind, "macro_step": macro_step, **more})
 
     def quantities(self) -> dict[str, dict[str, Any]]:
@@ -171,7 +166,7 @@ class Penetration:
             "unfinished": "these are the rows of a run under way",
         }
         result = {
-            "format": "hedgebed-result/1",
+            "format": RESULT_FORMAT,
             "experiment": self.kind,
             "version": version,
             "title": f"A {self.kind.replace('_', ' ')} spike",

@@ -10,6 +10,7 @@ import numpy as np
 
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
+from experiments.runs.result import Result
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import whole_run
 
@@ -39,7 +40,7 @@ def place_of(push: int, size: tuple[float, ...]) -> tuple[float, float]:
     return (0.5 + push * 0.7548776662) % 1 * size[0], (0.5 + push * 0.5698402910) % 1 * size[1]
 
 
-def _carry_out(settings: BedConeSettings, folder: RunFolder, progress: Progress) -> Json:
+def _carry_out(settings: BedConeSettings, folder: RunFolder, progress: Progress) -> Result:
     def test(bed: Any, name: str, tell: Callable[[float], None]) -> Json:
         from dem.measure.penetrometer import SHAFT, cone_gradient, push_cone
 

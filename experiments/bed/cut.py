@@ -9,6 +9,7 @@ from typing import Any
 
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
+from experiments.runs.result import Result
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import whole_run
 
@@ -29,7 +30,7 @@ def check(settings: BedCutSettings) -> None:
     check_width(settings.width, width=bed.size[0], height=bed.surface, grain=bed.grain)
 
 
-def _carry_out(settings: BedCutSettings, folder: RunFolder, progress: Progress) -> Json:
+def _carry_out(settings: BedCutSettings, folder: RunFolder, progress: Progress) -> Result:
     def test(bed: Any, name: str, tell: Callable[[float], None]) -> Json:
         from dem.measure.cutting import cut_and_load
 

@@ -6,6 +6,7 @@ from experiments.grains.kept_material import MATERIAL_COPY, keep_material
 from experiments.grains.sizes import bond_number, in_grains_of, scaling_told, sizes_table
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
+from experiments.runs.result import Result
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import whole_run
 
@@ -55,7 +56,7 @@ def material_of(settings: BedSettings, name: str) -> Material:
     return in_grains_of(own, settings.grain, keep=settings.keep, own=own.grain)
 
 
-def _carry_out(settings: BedSettings, folder: RunFolder, progress: Progress) -> Json:
+def _carry_out(settings: BedSettings, folder: RunFolder, progress: Progress) -> Result:
     options = settings.model_dump(exclude={"name", "coarse", "keep", "distribution", *SPREAD_OUT, *GRADED})
     graded = settings.graded
     if graded is not None:

@@ -14,6 +14,7 @@ from experiments.grains.graded import grading_told
 from experiments.grains.sizes import KEPT, in_grains_of
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
+from experiments.runs.result import Result
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import whole_run
 
@@ -108,7 +109,7 @@ def check(settings: BedRefineSettings) -> None:
     )  # fmt: skip
 
 
-def _carry_out(settings: BedRefineSettings, folder: RunFolder, progress: Progress) -> Json:
+def _carry_out(settings: BedRefineSettings, folder: RunFolder, progress: Progress) -> Result:
     options, coarse = refined_options(settings)
     with folder.lock():
         prepared = prepared_in(folder, progress, options, name=settings.name)

@@ -7,6 +7,7 @@ from typing import Any
 
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
+from experiments.runs.result import Result
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import whole_run
 
@@ -29,7 +30,7 @@ def check(settings: BedReposeSettings) -> None:
     check_width(bed.size[0], slot=settings.slot, grain=bed.grain, depth=bed.surface)
 
 
-def _carry_out(settings: BedReposeSettings, folder: RunFolder, progress: Progress) -> Json:
+def _carry_out(settings: BedReposeSettings, folder: RunFolder, progress: Progress) -> Result:
     def test(bed: Any, name: str, tell: Callable[[float], None]) -> Json:
         from dem.measure.repose import angle_of_repose
 

@@ -19,8 +19,8 @@ from dem.measure.shearing import Shearing, shear_bed
 from dem.prepare.bedfile import find_bed
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
+from experiments.runs.result import Result
 from experiments.runs.types import Json
-from experiments.runs.version import __version__
 from experiments.runs.whole_runs import whole_run
 
 from .shear_settings import BedShearSettings
@@ -96,7 +96,7 @@ def check(settings: BedShearSettings) -> None:
         raise ValueError(f"bed = {settings.bed!r} is tilted: a level one would do")
 
 
-def _carry_out(settings: BedShearSettings, folder: RunFolder, progress: Progress) -> Json:
+def _carry_out(settings: BedShearSettings, folder: RunFolder, progress: Progress) -> Result:
     path = find_bed(settings.bed)
     runs: list[Shearing] = []
     with folder.lock():
@@ -163,7 +163,7 @@ def _entry(value: float, std: float | None, unit: str, note: str) -> Json:
     return {"value": value, "std": std, "unit": unit, "note": note}
 
 
-def _result(settings: BedShearSettings, runs: list[Shearing], grain: float, recipe: Json, bed: Any) -> Json:
+def _result(settings: BedShearSettings, runs: list[Shearing], grain: float, recipe: Json, bed: Any) -> Result:
     strengths = [strength_of(run, grain) for run in runs]
     head = ["normal [Pa]", "peak [Pa]", "at [d]", "critical [Pa]", "+- [Pa]", "peak ratio", "critical ratio",
             "dilates [d]"]  # fmt: skip
@@ -182,24 +182,21 @@ def _result(settings: BedShearSettings, runs: list[Shearing], grain: float, reci
     if doubt := caveat(bed.material):
         warnings.append(doubt)
     kept = ("normal", "peak", "critical", "critical_error")
-    return {
-        "format": "hedgebed-result/1",
-        "experiment": "bed test shear",
-        "version": __version__,
-        "title": f"{settings.bed}: sheared under a lid",
-        "status": "done",
-        "quantities": _strengths(strengths, _BAND * grain / bed.surface, runs[0]),
-        "tables": [{"title": "Run by run", "head": head, "rows": rows}],
-        "runs": [
+    return Result.make(
+        "bed test shear",
+        title=f"{settings.bed}: sheared under a lid",
+        quantities=_strengths(strengths, _BAND * grain / bed.surface, runs[0]),
+        tables=[{"title": "Run by run", "head": head, "rows": rows}],
+        runs=[
             {"id": f"shear-{pressure:g}", "series": f"series/shear-{pressure:g}.csv"}
             | {"pressure": run.pressure, "speed": run.speed}
             | {name: getattr(strength, name) for name in kept}
             for pressure, run, strength in zip(settings.pressures, runs, strengths, strict=True)
         ],
-        "grain": grain,
-        "bed": {"file": str(settings.bed), "recipe": recipe},
-        "warnings": warnings,
-    }
+        grain=grain,
+        bed={"file": str(settings.bed), "recipe": recipe},
+        warnings=warnings,
+    )
 
 
 run, resume = whole_run("bed test shear", BedShearSettings, _carry_out, check=check)

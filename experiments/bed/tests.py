@@ -16,9 +16,9 @@ from experiments.grains.kept_material import keep_material
 from experiments.penetrate.fit import spread
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
+from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
 from experiments.runs.types import Json
-from experiments.runs.version import __version__
 
 from .test_settings import BedTestSettings
 
@@ -126,7 +126,7 @@ def carry_out(
     report: str,
     copies: int = 1,
     bearing: float | None = None,
-) -> Json:
+) -> Result:
     """Test every bed, or take what a stopped run has finished; write result and report.
 
     Args:
@@ -162,15 +162,10 @@ def carry_out(
                 bed = None  # its engine serves the next
                 folder.mark_done(which, {"id": which} | found)
                 runs.append(folder.done_data(which))
-        whole: Json = {
-            "format": "hedgebed-result/1",
-            "experiment": folder.command,
-            "version": __version__,
-            "title": "",
-            "status": "done",
-        } | result(runs)
-        whole["runs"] = runs
-        whole["warnings"] = [*whole["warnings"], *dict.fromkeys(w for run in runs for w in run["warnings"])]
+        entries: Json = {"title": "", "status": "done"} | result(runs)
+        entries["runs"] = runs
+        entries["warnings"] = [*entries["warnings"], *dict.fromkeys(w for run in runs for w in run["warnings"])]
+        whole = Result.make(folder.command, **entries)
         folder.write_result(whole)
         progress.stage("report", total=1.0)
         module, _, function = report.partition(":")

@@ -16,9 +16,9 @@ from experiments.grains.box import expected_grain_count
 from experiments.runs.folder import RunFolder
 from experiments.runs.memory import memory_there
 from experiments.runs.progress import Progress
+from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
 from experiments.runs.types import Json
-from experiments.runs.version import __version__
 
 from .words import say
 
@@ -109,7 +109,7 @@ def finish_bed(
     tables: list[Json] | None = None,
     warnings: list[str] | None = None,
     quantities: Json | None = None,
-) -> Json:
+) -> Result:
     """Write series, frame, result and report of a prepared bed; return the result. ``quantities``: more of them."""
     bed, last = prepared.bed, prepared.reports[-1]
     assert bed is not None
@@ -138,19 +138,16 @@ def finish_bed(
         "time_step": quantity(bed.time_step, "s", "of the grains"),
         "max_overlap": quantity(max(r.max_overlap for r in prepared.reports), "1", "while it was made, over diameter"),
     }
-    result = {
-        "format": "hedgebed-result/1",
-        "experiment": experiment,
-        "version": __version__,
-        "code": prepared.recipe["code"],
-        "title": title,
-        "status": "done",
-        "quantities": own | (quantities or {}),
-        "stages": entries,
-        "tables": [_stage_table(prepared.reports), *(tables or [])],
-        "bed": {"file": "bed.npz", "name": name, "surface": {"value": bed.surface, "unit": "m"}, **prepared.recipe},
-        "warnings": [*(warnings or []), *_warnings(prepared)],
-    }
+    result = Result.make(
+        experiment,
+        code=prepared.recipe["code"],
+        title=title,
+        quantities=own | (quantities or {}),
+        stages=entries,
+        tables=[_stage_table(prepared.reports), *(tables or [])],
+        bed={"file": "bed.npz", "name": name, "surface": {"value": bed.surface, "unit": "m"}, **prepared.recipe},
+        warnings=[*(warnings or []), *_warnings(prepared)],
+    )
     folder.write_result(result)
     progress.stage("report", total=1.0)
     write_report(folder.path, progress)

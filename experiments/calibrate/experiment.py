@@ -22,6 +22,7 @@ from dem.grains.materials import Material
 from experiments.grains.kept_material import BASE_COPY, keep_material
 from experiments.runs.folder import RunFolder, write_text
 from experiments.runs.progress import Progress
+from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import whole_run
@@ -152,7 +153,7 @@ def _said(values: Mapping[str, float]) -> str:
     return ", ".join(f"{key} = {value:.4g}" for key, value in values.items())
 
 
-def _carry_out(settings: CalibrateSettings, folder: RunFolder, progress: Progress) -> Json:
+def _carry_out(settings: CalibrateSettings, folder: RunFolder, progress: Progress) -> Result:
     targets = list(settings.wanted.values())
     wanted = {target.name: Wanted(target.value, target.tolerance) for target in targets if target.fit}
     simulated = [target for target in targets if target.state]

@@ -7,6 +7,7 @@ import numpy as np
 
 from dem.grains.materials import MATERIAL_FORMAT, MATERIALS, Material
 from experiments.runs.folder import RunFolder, toml_value
+from experiments.runs.result import Result
 from experiments.runs.types import Json
 from experiments.runs.version import __version__
 
@@ -45,7 +46,7 @@ def calibration_result(
     best: Mapping[str, float],
     stuff: Material,
     folder: RunFolder,
-) -> Json:
+) -> Result:
     """result.json; writes the series of the responses' curves."""
     targets, measured = list(settings.wanted.values()), done.measured
     quantities: Json = {}
@@ -72,26 +73,23 @@ def calibration_result(
     if settings.name in MATERIALS and MATERIALS[settings.name] != stuff:
         warnings.append(say("name_ships_otherwise", s=settings))
     over = max((test["max_overlap"] for test in done.tests), default=0.0)
-    return {
-        "format": "hedgebed-result/1",
-        "experiment": "bed calibrate",
-        "version": __version__,
-        "code": folder.code,
-        "title": f"{settings.name}: grain parameters from bulk figures",
-        "status": "done",
-        "quantities": quantities,
-        "figures": entries,
-        "tables": [_figure_table(entries), _point_table(settings, done)],
-        "points": _points(settings, done, responses, best),
-        "curves": _curves(settings, responses, best, folder),
-        "scatter": {name: response.scatter for name, response in responses.items()},
-        "correlation": fit.correlation,
-        "chi2": fit.chi2,
-        "tests": [{k: v for k, v in test.items() if "tensor" not in k} for test in done.tests],
-        "max_overlap": over,
-        "material": {f.name: getattr(stuff, f.name) for f in fields(stuff) if f.name != "sources"},
-        "warnings": warnings,
-    }
+    return Result.make(
+        "bed calibrate",
+        code=folder.code,
+        title=f"{settings.name}: grain parameters from bulk figures",
+        quantities=quantities,
+        figures=entries,
+        tables=[_figure_table(entries), _point_table(settings, done)],
+        points=_points(settings, done, responses, best),
+        curves=_curves(settings, responses, best, folder),
+        scatter={name: response.scatter for name, response in responses.items()},
+        correlation=fit.correlation,
+        chi2=fit.chi2,
+        tests=[{k: v for k, v in test.items() if "tensor" not in k} for test in done.tests],
+        max_overlap=over,
+        material={f.name: getattr(stuff, f.name) for f in fields(stuff) if f.name != "sources"},
+        warnings=warnings,
+    )
 
 
 def _entry(

@@ -22,8 +22,8 @@ from experiments.grains.spells import spells
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.reporting import write_report
+from experiments.runs.result import Result
 from experiments.runs.types import Json
-from experiments.runs.version import __version__
 from experiments.runs.whole_runs import whole_run
 
 from . import find_implausible, loud_sensors, missing_sensors, said_once, without_companions
@@ -86,7 +86,7 @@ def _faults_of_data(campaign: Campaign) -> list[Finding]:
 # The result -----------------------------------------------------------------------------------------------------------
 
 
-def _carry_out(settings: CheckSettings, folder: RunFolder, progress: Progress) -> Json:
+def _carry_out(settings: CheckSettings, folder: RunFolder, progress: Progress) -> Result:
     with folder.lock():
         campaign = read_campaign(settings.campaign)
         progress.stage("check", total=1.0)
@@ -128,7 +128,7 @@ def _facts(recording: Recording) -> Json:
     }
 
 
-def _result(campaign: Campaign, recordings: list[Json], findings: list[Finding]) -> Json:
+def _result(campaign: Campaign, recordings: list[Json], findings: list[Finding]) -> Result:
     tables = campaign.tables
     listed: Sequence[Any] = tables.trial
     conditions: dict[str, Condition] = {trial.id: condition_of(tables, trial) for trial in listed}
@@ -156,29 +156,26 @@ def _result(campaign: Campaign, recordings: list[Json], findings: list[Finding])
         for t in trials
     ]  # fmt: skip
     count = len(trials)
-    return {
-        "format": "hedgebed-result/1",
-        "experiment": "campaign check",
-        "version": __version__,
-        "title": f"{tables.name}: {count} trial{'s' if count > 1 else ''}, "
+    return Result.make(
+        "campaign check",
+        title=f"{tables.name}: {count} trial{'s' if count > 1 else ''}, "
         + (f"{len(findings)} found" if findings else "nothing found"),
-        "status": "done",
-        "kind": tables.kind,
-        "quantities": {
+        kind=tables.kind,
+        quantities={
             "trial_count": _exact(count, ""),
             "condition_count": _exact(len(set(conditions.values())), "trials of one condition are replicates"),
             "row_count": _exact(sum(entry["rows"] for entry in recordings), "of all recordings together"),
             "finding_count": _exact(len(findings), "diagnose sets aside or models what it can"),
         },
-        "tables": [{"title": "", "head": head, "rows": rows}],
-        "trials": trials,
-        "recordings": recordings,
-        "findings": [
+        tables=[{"title": "", "head": head, "rows": rows}],
+        trials=trials,
+        recordings=recordings,
+        findings=[
             {"trial": f.trial, "what": f.what, "channel": f.channel, "from_s": f.from_s, "to_s": f.to_s}
             for f in findings
         ],
-        "warnings": [finding.what for finding in said_once(findings)],
-    }
+        warnings=[finding.what for finding in said_once(findings)],
+    )
 
 
 def _exact(value: int, note: str) -> Json:

@@ -19,8 +19,8 @@ from experiments.runs.folder import RunFolder, read_json
 from experiments.runs.kept_results import PATH_AND_MOTION, require_files
 from experiments.runs.progress import Progress
 from experiments.runs.reporting import write_report
+from experiments.runs.result import Result
 from experiments.runs.types import Json
-from experiments.runs.version import __version__
 from experiments.runs.whole_runs import whole_run
 from experiments.spatial.settings import ON_ANY_GROUND
 
@@ -68,14 +68,13 @@ def _finished(path: str) -> RunFolder:
     return folder
 
 
-def _carry_out(settings: CompareSettings, folder: RunFolder, progress: Progress) -> Json:
+def _carry_out(settings: CompareSettings, folder: RunFolder, progress: Progress) -> Result:
     with folder.lock():
         first, second = (_finished(path) for path in settings.runs)
         results = [read_json(one.path / "result.json") for one in (first, second)]
         labels = _labels((first, second), results)
         result: Json = {
-            "format": "hedgebed-result/1", "experiment": "compare", "version": __version__, "kind": first.command,
-            "title": f"{labels[0]} and {labels[1]}", "status": "done",
+            "kind": first.command, "title": f"{labels[0]} and {labels[1]}", "status": "done",
             "runs": [
                 {"folder": os.path.relpath(one.path, folder.path), "label": label, "title": str(found.get("title", ""))}
                 for one, label, found in zip((first, second), labels, results, strict=True)
@@ -95,10 +94,11 @@ def _carry_out(settings: CompareSettings, folder: RunFolder, progress: Progress)
             *([_row_sinkage(result["rows"], labels)] if result.get("rows") else []),
             *([_differing(labels, result["differs"])] if result["differs"] else []),
         ]
-        folder.write_result(result)
+        made = Result.make("compare", **result)
+        folder.write_result(made)
         progress.stage("report", total=1.0)
         write_report(folder.path, progress)
-    return result
+    return made
 
 
 def _relative(first: float, second: float) -> float | None:

@@ -18,7 +18,7 @@ from experiments.diagnose.settings import DiagnoseSettings
 from experiments.runs.folder import RunFolder
 from experiments.runs.kernel_cache import free_kernel_cache
 from experiments.runs.progress import Progress
-from experiments.runs.version import __version__
+from experiments.runs.result import Result
 
 from .core.diagnosis import diagnose
 from .core.outcome import Diagnosis
@@ -38,13 +38,13 @@ def check(settings: DiagnoseSettings) -> None:
     _make_problem(Path(settings.campaign), settings.effect_file)
 
 
-def run(settings: DiagnoseSettings, folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
+def run(settings: DiagnoseSettings, folder: str | Path, *, progress: Progress | None = None) -> Result:
     """Diagnose into `folder` and return the result. Raises ValueError as `check` does."""
     kept = RunFolder.ensure(Path(folder), "diagnose", settings)
     return _carry_out(settings, kept, progress or Progress())
 
 
-def resume(folder: str | Path, *, progress: Progress | None = None) -> dict[str, Any]:
+def resume(folder: str | Path, *, progress: Progress | None = None) -> Result:
     """Diagnose again from the start."""
     kept = RunFolder.open(Path(folder))
     return _carry_out(DiagnoseSettings(**kept.settings), kept, progress or Progress())
@@ -96,7 +96,7 @@ def _make_problem(folder: Path, effect_file: Sequence[str | Path]) -> tuple[Camp
         return campaign, import_module(name).make_problem(campaign, own=own)
 
 
-def _carry_out(settings: DiagnoseSettings, folder: RunFolder, progress: Progress) -> dict[str, Any]:
+def _carry_out(settings: DiagnoseSettings, folder: RunFolder, progress: Progress) -> Result:
     with folder.lock():
         found = diagnose_campaign(
             settings.campaign, thorough=settings.thorough, seed=settings.seed, effect_file=settings.effect_file,
@@ -137,7 +137,7 @@ def _whose(found: Diagnosis) -> str:
     return "the bed's" if getattr(surface, "granular", True) else "the surface's, the rig's or the start's"
 
 
-def _result(found: Diagnosis, said: dict[str, Any]) -> dict[str, Any]:
+def _result(found: Diagnosis, said: dict[str, Any]) -> Result:
     quantities: dict[str, Any] = {
         f"gap_{stage}_{part}": {"value": value, "std": None, "unit": "1",
                                 "note": "chi-square per sample"}
@@ -191,16 +191,13 @@ def _result(found: Diagnosis, said: dict[str, Any]) -> dict[str, Any]:
         ends = [bound.words for bound in bounds if not bound.strains]
         if ends:
             warnings.append(f"fitted by {model} to the end of its range: {', '.join(ends)}")
-    return {
-        "format": "hedgebed-result/1",
-        "experiment": "diagnose",
-        "version": __version__,
-        "title": title_words(said),
-        "status": "done",
-        "verdict": found.verdict,
-        "summary": summary_sentences(said),
-        "quantities": quantities,
-        "tables": told_tables(said),
-        "departures": {"sentences": sentences},
-        "warnings": warnings,
-    }
+    return Result.make(
+        "diagnose",
+        title=title_words(said),
+        verdict=found.verdict,
+        summary=summary_sentences(said),
+        quantities=quantities,
+        tables=told_tables(said),
+        departures={"sentences": sentences},
+        warnings=warnings,
+    )

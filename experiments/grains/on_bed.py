@@ -21,6 +21,7 @@ from experiments.platform.surfaces import find_surface, surface_names
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.reporting import write_report
+from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
 from experiments.runs.types import Json
 from rigid.platform.rig import STANDARD_GRAVITY
@@ -132,7 +133,7 @@ class PlatformOnBed(ABC, Generic[Settings, Run, Expected]):
         """What writes the frames; None where none are wanted."""
 
     @abstractmethod
-    def conclude(self, run: Run, softening: Softening, folder: RunFolder) -> Json:
+    def conclude(self, run: Run, softening: Softening, folder: RunFolder) -> Result:
         """The result, its series written."""
 
     @property
@@ -259,7 +260,7 @@ class PlatformOnBed(ABC, Generic[Settings, Run, Expected]):
         *,
         sinkage: Callable[[Run], float],
         write_series: Callable[[Path, Run], Any],
-    ) -> Json:
+    ) -> Result:
         """Prepare the bed, follow the run in `folder`, from its checkpoint where there is one; the result."""
         self.announce(progress)
         progress.plan({"bed": 1.0, "tumble": self.duration + 0.3}, seconds={"report": 10.0})  # with the setting down
@@ -281,8 +282,8 @@ def finish_run(
     frames: Callable[[bool], Frames | None],
     sinkage: Callable[[Run], float],
     write_series: Callable[[Path, Run], Any],
-    conclude: Callable[[], Json],
-) -> Json:
+    conclude: Callable[[], Result],
+) -> Result:
     """Follow `run` to its end, write result and report, and drop the checkpoint; the result."""
     follow(
         run, folder, progress, frames=frames, checkpoint_interval=checkpoint_interval, sinkage=lambda: sinkage(run),

@@ -11,8 +11,8 @@ from experiments.platform.kept_platform import keep_platform
 from experiments.runs.folder import RunFolder, write_series
 from experiments.runs.progress import Progress
 from experiments.runs.reporting import write_report
+from experiments.runs.result import Result, quantity
 from experiments.runs.types import Json
-from experiments.runs.version import __version__
 from experiments.runs.whole_runs import whole_run
 from experiments.tumble.result import trajectory_columns
 from rigid.hop import Flight, Launch, escape_speed, impulsive_launch, launch_speed_for, least_viable_angle
@@ -37,7 +37,7 @@ def check(settings: HopSettings) -> None:
         simulate(trial, duration=1e-3)  # that it can stand on this ground
 
 
-def _carry_out(settings: HopSettings, folder: RunFolder, progress: Progress) -> Json:
+def _carry_out(settings: HopSettings, folder: RunFolder, progress: Progress) -> Result:
     with folder.lock():
         plan, hop = find_hop(settings, keep_platform(settings.platform, folder.path, progress.message))
         for sentence in plan.sentences():
@@ -96,7 +96,7 @@ def _write_series(settings: HopSettings, folder: RunFolder, hop: Hop, given: Sur
 # The result -----------------------------------------------------------------------------------------------------------
 
 
-def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | None, sought: float | None) -> Json:
+def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | None, sought: float | None) -> Result:
     left, flown, wheel, tumbler, torque = hop.launch, hop.flight, plan.wheel, plan.tumbler, hop.torque
     by_brake = settings.actuator == "brake"
     speed = hop.effort if by_brake else min(torque * left.time / wheel.inertia, wheel.max_speed)
@@ -110,46 +110,43 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
     lands = "" if flown is not None else "it escapes"
     when = "before the brake" if by_brake else "reached when it leaves"
     quantities = {
-        "wheel_speed": _quantity(speed, "rad/s", say("of_wheel", when=when)),
-        "model_wheel_speed": _quantity(sought, "rad/s", _model_speed_note(plan, given, sought, by_brake=by_brake)),
-        "wheel_speed_impulsive": _quantity(wanted / sudden.speed if wanted else None, "rad/s", lands or say("closed")),
-        "torque": _quantity(torque, "N m", "on the platform, constant"),
-        "torque_time": _quantity(driven, "s", say("of_torque_time")),
-        "rotation": _quantity(left.rotation, "rad", say("of_rotation")),
-        "launch_speed": _quantity(left.speed, "m/s", say("of_launch_speed")),
-        "launch_angle": _quantity(left.angle, "rad", say("of_launch_angle")),
-        "least_viable_angle": _quantity(least_viable_angle(tumbler.mu_s), "rad", say("of_viable")),
-        "spin": _quantity(left.spin, "rad/s", "turning rate in flight"),
-        "flight_time": _quantity(flown.time if flown else None, "s", lands or say("of_flight_time")),
-        "peak_height": _quantity(flown.height if flown else None, "m", lands or say("of_height")),
-        "distance": _quantity(flown.distance if flown else None, "m", lands or say("of_distance")),
-        "escape_speed": _quantity(escape, "m/s", "sqrt(2 g R)" if escape else "unknown without body_radius"),
-        "escape_ratio": _quantity(left.speed / escape if escape else None, "1", say("of_escape")),
+        "wheel_speed": quantity(speed, "rad/s", say("of_wheel", when=when)),
+        "model_wheel_speed": quantity(sought, "rad/s", _model_speed_note(plan, given, sought, by_brake=by_brake)),
+        "wheel_speed_impulsive": quantity(wanted / sudden.speed if wanted else None, "rad/s", lands or say("closed")),
+        "torque": quantity(torque, "N m", "on the platform, constant"),
+        "torque_time": quantity(driven, "s", say("of_torque_time")),
+        "rotation": quantity(left.rotation, "rad", say("of_rotation")),
+        "launch_speed": quantity(left.speed, "m/s", say("of_launch_speed")),
+        "launch_angle": quantity(left.angle, "rad", say("of_launch_angle")),
+        "least_viable_angle": quantity(least_viable_angle(tumbler.mu_s), "rad", say("of_viable")),
+        "spin": quantity(left.spin, "rad/s", "turning rate in flight"),
+        "flight_time": quantity(flown.time if flown else None, "s", lands or say("of_flight_time")),
+        "peak_height": quantity(flown.height if flown else None, "m", lands or say("of_height")),
+        "distance": quantity(flown.distance if flown else None, "m", lands or say("of_distance")),
+        "escape_speed": quantity(escape, "m/s", "sqrt(2 g R)" if escape else "unknown without body_radius"),
+        "escape_ratio": quantity(left.speed / escape if escape else None, "1", say("of_escape")),
     } | _model_quantities(plan, left, flown, given, escape)
     said = sentences(plan, left, flown, given, torque=torque, speed=speed, by_brake=by_brake, sought=sought)
-    return {
-        "format": "hedgebed-result/1",
-        "experiment": "hop",
-        "version": __version__,
-        "title": f"{plan.platform.name}: a hop {_asked(settings, plan)} at {settings.gravity:g} m/s2"
+    return Result.make(
+        "hop",
+        title=f"{plan.platform.name}: a hop {_asked(settings, plan)} at {settings.gravity:g} m/s2"
         + (_wheel_words(plan, given, speed, sought) if by_brake and plan.distance is not None else ""),
-        "status": "done",
-        "quantities": quantities,
-        "numbers": {
+        quantities=quantities,
+        numbers={
             name: {"value": number.value, "unit": number.unit, "origin": number.origin}
             for name, number in plan.numbers.items()
         },
-        "actuator": settings.actuator,
-        "asks_for": settings.asks_for,
-        "surface": plan.surface,
-        "departures": {"sentences": said},
-        "platform": {
+        actuator=settings.actuator,
+        asks_for=settings.asks_for,
+        surface=plan.surface,
+        departures={"sentences": said},
+        platform={
             "name": plan.platform.name, "mass": plan.platform.mass, "inertia": tumbler.inertia,
             "spike_length": tumbler.spike_length, "lean": tumbler.lean, "wheel_inertia": wheel.inertia,
             "max_wheel_speed": wheel.max_speed, "sources": dict(plan.platform.sources),
         },
-        "warnings": [*plan.warnings, *warnings(plan, left, flown, given, escape)],
-    }  # fmt: skip
+        warnings=[*plan.warnings, *warnings(plan, left, flown, given, escape)],
+    )  # fmt: skip
 
 
 def _asked(settings: HopSettings, plan: HopPlan) -> str:
@@ -190,19 +187,15 @@ def _model_quantities(
     further = flight_of.distance / flown.distance if flight_of and flown else None
     near = other.speed / escape if other and escape else None
     return {
-        "model_launch_speed": _quantity(other.speed if other else None, "m/s", where),
-        "model_launch_angle": _quantity(other.angle if other else None, "rad", where),
-        "model_flight_time": _quantity(flight_of.time if flight_of else None, "s", where),
-        "model_peak_height": _quantity(flight_of.height if flight_of else None, "m", where),
-        "model_distance": _quantity(flight_of.distance if flight_of else None, "m", where),
-        "speed_factor": _quantity(other.speed / left.speed if other else None, "1", say("of_speed_factor")),
-        "distance_factor": _quantity(further, "1", say("of_distance_factor")),
-        "model_escape_ratio": _quantity(near, "1", say("of_model_escape")),
+        "model_launch_speed": quantity(other.speed if other else None, "m/s", where),
+        "model_launch_angle": quantity(other.angle if other else None, "rad", where),
+        "model_flight_time": quantity(flight_of.time if flight_of else None, "s", where),
+        "model_peak_height": quantity(flight_of.height if flight_of else None, "m", where),
+        "model_distance": quantity(flight_of.distance if flight_of else None, "m", where),
+        "speed_factor": quantity(other.speed / left.speed if other else None, "1", say("of_speed_factor")),
+        "distance_factor": quantity(further, "1", say("of_distance_factor")),
+        "model_escape_ratio": quantity(near, "1", say("of_model_escape")),
     }
-
-
-def _quantity(value: float | None, unit: str, note: str) -> Json:
-    return {"value": value, "std": None if value is None else 0.0, "unit": unit, "note": note}
 
 
 run, resume = whole_run("hop", HopSettings, _carry_out, check=check)

@@ -24,8 +24,8 @@ from experiments.runs.folder import RunFolder
 from experiments.runs.memory import cores_there
 from experiments.runs.progress import Progress
 from experiments.runs.reporting import write_report
+from experiments.runs.result import Result, quantity
 from experiments.runs.types import Json
-from experiments.runs.version import __version__
 from experiments.runs.whole_runs import whole_run
 from experiments.tumble.result import trajectory_columns
 from experiments.tumble.settings import TumbleSettings
@@ -180,7 +180,7 @@ def _all(jobs: Sequence[Job], workers: int, progress: Progress) -> list[Json]:
     return found
 
 
-def _carry_out(settings: PaperSettings, folder: RunFolder, progress: Progress) -> Json:
+def _carry_out(settings: PaperSettings, folder: RunFolder, progress: Progress) -> Result:
     workers = settings.workers or cores_there()
     with folder.lock():
         jobs = plan_jobs(settings, keep_platform(settings.platform, folder.path, progress.message))
@@ -199,7 +199,7 @@ def _carry_out(settings: PaperSettings, folder: RunFolder, progress: Progress) -
     return result
 
 
-def _result(settings: PaperSettings, jobs: Sequence[Job], found: list[Json]) -> Json:
+def _result(settings: PaperSettings, jobs: Sequence[Job], found: list[Json]) -> Result:
     cases = [entry for entry in found if entry["variant"] in ("nominal", "low", "high", "paper")]
 
     def of_kind(kind: str) -> list[Json]:
@@ -214,25 +214,20 @@ def _result(settings: PaperSettings, jobs: Sequence[Job], found: list[Json]) -> 
     guesses = sorted({job.surface for job in jobs if find_surface(job.surface).guess})
     warnings = [f"the numbers of {name} are a guess until they are calibrated" for name in guesses]
     platform = jobs[0].trial
-    return {
-        "format": "hedgebed-result/1",
-        "experiment": "paper",
-        "version": __version__,
-        "title": "The paper's Figures 5 to 8 with our model",
-        "status": "done",
-        "quantities": _quantities(cases, stated, met),
-        "platform": {key: getattr(platform, key) for key in ("mass", "inertia", "spike_length", "wheel_inertia")},
-        "brake_wheel_speed": settings.brake_wheel_speed,
-        "surfaces": {name: asdict(find_surface(name)) for name in settings.surfaces},
-        "claims": stated,
-        "tables": [_table(stated)],
-        "integrations": len(jobs),
-        "cases": cases,
-        "sweep": of_kind("sweep"),
-        "sliding": of_kind("sliding"),
-        "grains": of_kind("grains"),
-        "warnings": warnings,
-    }
+    return Result.make(
+        "paper",
+        title="The paper's Figures 5 to 8 with our model",
+        quantities=_quantities(cases, stated, met),
+        platform={key: getattr(platform, key) for key in ("mass", "inertia", "spike_length", "wheel_inertia")},
+        brake_wheel_speed=settings.brake_wheel_speed,
+        surfaces={name: asdict(find_surface(name)) for name in settings.surfaces},
+        claims=stated,
+        tables=[_table(stated)],
+        integrations=len(jobs),
+        cases=cases,
+        **{kind: of_kind(kind) for kind in ("sweep", "sliding", "grains")},
+        warnings=warnings,
+    )
 
 
 def _table(stated: list[Json]) -> Json:
@@ -245,9 +240,6 @@ def _table(stated: list[Json]) -> Json:
 def _quantities(cases: list[Json], stated: list[Json], met: list[Json]) -> Json:
     """The numbers that a person would quote."""
 
-    def number(value: float | None, unit: str, note: str) -> Json:
-        return {"value": value, "std": 0.0, "unit": unit, "note": note}
-
     nominal = {entry["id"].removesuffix("-nominal"): entry for entry in cases if entry["variant"] == "nominal"}
     fixed = {entry["id"].removesuffix("-paper"): entry for entry in cases if entry["variant"] == "paper"}
 
@@ -256,18 +248,18 @@ def _quantities(cases: list[Json], stated: list[Json], met: list[Json]) -> Json:
         return max((abs(a - b) for a, b in pairs if a is not None and b is not None), default=0.0)
 
     return {
-        "claims_met": number(
+        "claims_met": quantity(
             sum(1 for claim in met if claim["met"]), "1", f"of {len(met)} statements of the text that can be compared"
         ),
-        "claims_compared": number(len(met), "1", f"{len(stated) - len(met)} more cannot be"),
-        "case_count": number(len(nominal), "1", "gravities x torques x surfaces"),
-        "step_angle_gap": number(
+        "claims_compared": quantity(len(met), "1", f"{len(stated) - len(met)} more cannot be"),
+        "case_count": quantity(len(nominal), "1", "gravities x torques x surfaces"),
+        "step_angle_gap": quantity(
             apart("trajectory_angle"), "rad", "largest change of a trajectory angle by the paper's fixed step"
         ),
-        "step_speed_gap": number(
+        "step_speed_gap": quantity(
             apart("max_speed"), "m/s", "largest change of a largest speed by the paper's fixed step"
         ),
-        "energy_residual": number(
+        "energy_residual": quantity(
             max(entry["energy_residual"] for entry in nominal.values()), "1", "largest of the located integrations"
         ),
     }

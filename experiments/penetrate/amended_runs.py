@@ -18,6 +18,7 @@ from experiments.campaign import read_model
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.reporting import write_report
+from experiments.runs.result import Result, quantities_of
 from experiments.runs.types import Json
 from experiments.runs.version import __version__
 
@@ -85,19 +86,19 @@ def run_beside(law: AmendedLaw, units: Sequence[Unit], beds: Runs, models: Runs,
     driven = [unit.id for unit in units if unit.kind == "driven"]
     plain, amended = (_gap(driven, beds, others) for others in (models, runs))
     note = "rms difference over the bed's rms force, driven runs, in, at rest and out"
-    quantities = {
-        "force_gap_spring_damper": _quantity(plain, "1", note),
-        "force_gap_amended": _quantity(amended, "1", f"the same with {law.words}"),
-        **_standing(law, units, runs),
-        "work_returned_amended": _quantity(_returned(driven, runs), "1", "work of the way out over work in, driven"),
+    quantities: dict[str, tuple[float | None, str, str]] = {
+        "force_gap_spring_damper": (plain, "1", note),
+        "force_gap_amended": (amended, "1", f"the same with {law.words}"),
+        "sinkage_amended": (_rest(units, runs), "m", f"depth at rest with {law.words}"),
+        "work_returned_amended": (_returned(driven, runs), "1", "work of the way out over work in, driven"),
     }
     sentences = []
     if plain is not None and amended is not None:
         sentences.append(say("off_by", law=law, amended=100 * amended, plain=100 * plain))
-    return Beside(runs, quantities, sentences)
+    return Beside(runs, quantities_of(quantities, std=None), sentences)
 
 
-def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Json:
+def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Result:
     """The runs of the first seed on the model's K and C, and on the law; write and return the result."""
     with folder.lock():
         keep_model(settings, folder.path)
@@ -116,30 +117,27 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
             progress.update(done)
         driven = [unit.id for unit in units if unit.kind == "driven"]
         stiffness, damping = law.pair
-        result = {
-            "format": "hedgebed-result/1",
-            "experiment": "penetrate",
-            "ground": settings.ground,
-            "version": __version__,
-            "title": f"A {1e3 * settings.tip_diameter:g} mm spike on the spring-damper, and with {law.words}",
-            "status": "done",
-            "quantities": {
-                "stiffness": _quantity(stiffness, "N/m", "of the model"),
-                "damping": _quantity(damping, "N s/m", "of the model"),
-                "load": _quantity(settings.weight, "N", "on the spike, set down and dropped"),
-                "sinkage_spring_damper": _quantity(_rest(units, plain), "m", "depth at rest under the load"),
-                **_standing(law, units, runs),
-                "work_returned_spring_damper": _quantity(
-                    _returned(driven, plain), "1", "work out over work in, driven"
-                ),
-                "work_returned_amended": _quantity(_returned(driven, runs), "1", f"the same with {law.words}"),
-            },
-            "runs": [_entry(unit, plain[unit.id], runs[unit.id]) for unit in units],
-            "spike": asdict(make_spike(settings)) | {"load": settings.weight},
-            "model": {"file": settings.model, "effects": list(law.effects)},
-            "departures": {"sentences": _spike_words(settings, law)},
-            "warnings": law.warnings(),
+        found: dict[str, tuple[float | None, str, str]] = {
+            "stiffness": (stiffness, "N/m", "of the model"),
+            "damping": (damping, "N s/m", "of the model"),
+            "load": (settings.weight, "N", "on the spike, set down and dropped"),
+            "sinkage_spring_damper": (_rest(units, plain), "m", "depth at rest under the load"),
+            "sinkage_amended": (_rest(units, runs), "m", f"depth at rest with {law.words}"),
+            "work_returned_spring_damper": (_returned(driven, plain), "1", "work out over work in, driven"),
+            "work_returned_amended": (_returned(driven, runs), "1", f"the same with {law.words}"),
         }
+        result = Result.make(
+            "penetrate",
+            ground=settings.ground,
+            version=__version__,
+            title=f"A {1e3 * settings.tip_diameter:g} mm spike on the spring-damper, and with {law.words}",
+            quantities=quantities_of(found, std=None),
+            runs=[_entry(unit, plain[unit.id], runs[unit.id]) for unit in units],
+            spike=asdict(make_spike(settings)) | {"load": settings.weight},
+            model={"file": settings.model, "effects": list(law.effects)},
+            departures={"sentences": _spike_words(settings, law)},
+            warnings=law.warnings(),
+        )
         folder.write_result(result)
         progress.stage("report", total=1.0)
         write_report(folder.path, progress)
@@ -167,10 +165,6 @@ def _entry(unit: Unit, plain: Penetration, amended: Penetration) -> Json:
     }
 
 
-def _standing(law: AmendedLaw, units: Sequence[Unit], runs: Runs) -> dict[str, Json]:
-    return {"sinkage_amended": _quantity(_rest(units, runs), "m", f"depth at rest with {law.words}")}
-
-
 def _rest(units: Sequence[Unit], runs: Runs) -> float | None:
     known = [runs[unit.id].resting_depth for unit in units if unit.kind == "set_down"]
     depths = [depth for depth in known if depth is not None]
@@ -193,7 +187,3 @@ def _gap(driven: Sequence[str], beds: Runs, others: Runs) -> float | None:
             square += float(np.mean((force[rows] - bed.force[rows]) ** 2))
             drag += float(np.mean(bed.force[rows] ** 2))
     return float(np.sqrt(square / drag)) if drag > 0 else None
-
-
-def _quantity(value: float | None, unit: str, note: str) -> Json:
-    return {"value": value, "std": None, "unit": unit, "note": note}

@@ -21,8 +21,8 @@ from experiments.grains.softening import Softening
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.reporting import PictureCosts, write_report
+from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
-from experiments.runs.types import Json
 
 from . import beds
 from .amended_runs import keep_model, run_without_bed
@@ -41,7 +41,7 @@ from .words import say
 __all__ = ["check", "fingerprint", "resume", "run"]
 
 
-def run(settings: PenetrateSettings, folder: str | Path, *, progress: Progress | None = None) -> Json:
+def run(settings: PenetrateSettings, folder: str | Path, *, progress: Progress | None = None) -> Result:
     """Carry the experiment out into `folder` and return the result, as result.json has it.
 
     Takes up what the folder already holds of the same settings. Raises ValueError for settings that will not do,
@@ -52,7 +52,7 @@ def run(settings: PenetrateSettings, folder: str | Path, *, progress: Progress |
     return _carry_out(settings, kept, progress or Progress())
 
 
-def resume(folder: str | Path, *, progress: Progress | None = None) -> Json:
+def resume(folder: str | Path, *, progress: Progress | None = None) -> Result:
     """Finish the run in `folder`. Raises ValueError where there is none; otherwise as `run`."""
     kept = RunFolder.open(Path(folder))
     copy = kept.path / MATERIAL_COPY
@@ -60,7 +60,7 @@ def resume(folder: str | Path, *, progress: Progress | None = None) -> Json:
     return _carry_out(PenetrateSettings(**given), kept, progress or Progress())
 
 
-def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Json:
+def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Result:
     if settings.ground == "spring-damper":
         return run_without_bed(settings, folder, progress)
     settings = settings.model_copy(update={"material": keep_material(settings.material, folder.path)})
@@ -87,7 +87,7 @@ def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progres
     return result
 
 
-def _picture_costs(folder: Path, result: Json) -> PictureCosts:
+def _picture_costs(folder: Path, result: Result) -> PictureCosts:
     """What the report has to draw, by the frames that are there."""
     from vis.pictures.frames import frame_names, read_frames
 

@@ -12,9 +12,9 @@ between samples, as a sensor's filter gives them; the depth is that of the momen
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,7 +98,9 @@ def campaign_of_run(run: str | Path, *, sensors: SpikeSensors | None = None) -> 
     return campaign_of(settings, result, folder, sensors or SpikeSensors())
 
 
-def campaign_of(settings: PenetrateSettings, result: Json, folder: RunFolder, sensors: SpikeSensors) -> Campaign:
+def campaign_of(
+    settings: PenetrateSettings, result: Mapping[str, Any], folder: RunFolder, sensors: SpikeSensors
+) -> Campaign:
     """The runs of a bed in `folder`, whose result is `result`, as a campaign. Raises ValueError for too low a rate."""
     runs: Sequence[Json] = result["runs"]
     trials, recordings = [], {}

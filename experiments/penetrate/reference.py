@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.runs.types import Json
+from rigid.series import RESULT_FORMAT
 from vis.page.numbers import foldable, quote
 
 from .fit import Moments, fit_moments, gap_of_moments
@@ -35,7 +36,7 @@ def read_reference(reference: str | Path) -> Json:
     except (OSError, ValueError) as error:
         raise ValueError(f"reference = {str(reference)!r} is no result.json that can be read: {error}") from None
     kind = (other.get("format"), other.get("experiment")) if isinstance(other, dict) else (None, None)
-    if kind != ("hedgebed-result/1", "penetrate"):
+    if kind != (RESULT_FORMAT, "penetrate"):
         raise ValueError(say("other_format", reference=str(reference), format=kind[0], experiment=kind[1]))
     if not isinstance(other.get("quantities"), dict) or not isinstance(other.get("runs"), list):
         raise ValueError(

@@ -10,8 +10,8 @@ from dem.grains.materials import caveat
 from experiments.grains.softening import Softening
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
+from experiments.runs.result import Result
 from experiments.runs.types import Json
-from experiments.runs.version import __version__
 
 from . import beds
 from .amended_runs import kept_law, run_beside
@@ -29,7 +29,7 @@ SHIPPED_RESULT = Path(__file__).parents[2] / "docs" / "results" / "penetrate" / 
 
 def conclude(
     settings: PenetrateSettings, units: list[Unit], softening: Softening, folder: RunFolder, progress: Progress
-) -> Json:
+) -> Result:
     """Fit, make the same runs on the law, compare; write the law's series; return the result."""
     progress.stage("spring-damper", total=1.0)
     notes = {unit.id: folder.done_data(unit.id) for unit in units}
@@ -63,9 +63,6 @@ def conclude(
         departures["sentences"] = [*departures["sentences"], *beside.sentences]
         entries = beside.entries(entries)
     result: Json = {
-        "format": "hedgebed-result/1",
-        "experiment": "penetrate",
-        "version": __version__,
         "code": codes.pop() if len(codes) == 1 else beds.fingerprint(),
         "title": f"A {1e3 * settings.tip_diameter:g} mm spike in {material.name}",
         "status": "done",
@@ -80,7 +77,7 @@ def conclude(
     if law is not None:
         result["model"] = {"file": settings.model, "effects": list(law.effects)}
     _compare(settings, result)
-    return result
+    return Result.make("penetrate", **result)
 
 
 def _compare(settings: PenetrateSettings, result: Json) -> None:

@@ -29,11 +29,13 @@ import numpy as np
 from pydantic import BaseModel
 
 from experiments.runs.version import __version__
+from rigid.series import read_series, replacing, write_series
 
 __all__ = [
     "RunFolder",
     "Status",
     "fresh_path",
+    "plain",
     "read_json",
     "read_series",
     "settings_in",
@@ -54,40 +56,26 @@ _locks: dict[Path, tuple[int, int]] = {}  # resolved folder -> (file descriptor,
 # Files ---------------------------------------------------------------------------------------------------------------
 
 
-@contextmanager
-def _replacing(path: Path) -> Iterator[Path]:
-    """Yield a temporary path beside `path`; move it into place if all went well, remove it if not."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        yield temporary
-        with temporary.open("rb") as file:
-            os.fsync(file.fileno())
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
 def write_text(path: Path, text: str) -> None:
     """Write `text` to `path` (UTF-8), all of it or nothing."""
-    with _replacing(Path(path)) as temporary:
+    with replacing(Path(path)) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """`value` in terms of what JSON knows; a number that is not finite becomes null."""
-    if isinstance(value, BaseModel):
-        return _plain(value.model_dump())
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, BaseModel):
+        return plain(value.model_dump())
     if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, np.generic):
-        return _plain(value.item())
+        return plain(value.item())
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, list | tuple | set | frozenset):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, Path):
         return str(value)
     return value
@@ -99,43 +87,12 @@ def write_json(path: Path, data: Any) -> None:
     Takes numpy scalars and arrays, paths and pydantic models as well; NaN and infinities become null. Raises TypeError
     for what JSON cannot hold.
     """
-    write_text(path, json.dumps(_plain(data), indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+    write_text(path, json.dumps(plain(data), indent=2, allow_nan=False, ensure_ascii=False) + "\n")
 
 
 def read_json(path: Path) -> Any:
     """The contents of the JSON file `path`."""
     return json.loads(Path(path).read_text(encoding="utf-8"))
-
-
-def write_series(path: Path, columns: Mapping[str, Any]) -> None:
-    """Write `columns` (name -> array of shape [n]) to the CSV file `path`, all of it or nothing.
-
-    A name carries its unit: ``depth_m``, ``force_N``. Numbers are written so that they read back to the same bits;
-    arrays of text (``phase``) are written as they are. Raises ValueError where lengths differ.
-    """
-    arrays = {name: np.asarray(values) for name, values in columns.items()}
-    lengths = {name: array.shape for name, array in arrays.items()}
-    if len(set(lengths.values())) > 1 or any(len(shape) != 1 for shape in lengths.values()):
-        raise ValueError(f"the columns of {Path(path).name} must be one-dimensional and of one length, not {lengths}")
-    lines = [",".join(arrays)]
-    as_text = [[str(v) if array.dtype.kind in "USOb" else repr(v) for v in array.tolist()] for array in arrays.values()]
-    lines += [",".join(row) for row in zip(*as_text, strict=True)]
-    write_text(path, "\n".join(lines) + "\n")
-
-
-def read_series(path: Path) -> dict[str, np.ndarray]:
-    """The columns of the CSV file `path`: name -> array of shape [n], float where all of it is numbers, else text."""
-    header, *rows = Path(path).read_text(encoding="utf-8").splitlines()
-    names = header.split(",")
-    cells = [row.split(",") for row in rows if row]
-    columns: dict[str, np.ndarray] = {}
-    for index, name in enumerate(names):
-        values = [row[index] for row in cells]
-        try:
-            columns[name] = np.array([float(value) for value in values])
-        except ValueError:
-            columns[name] = np.array(values)
-    return columns
 
 
 # run.toml ------------------------------------------------------------------------------------------------------------
@@ -410,7 +367,7 @@ class RunFolder:
         for key, array in stored.items():
             if array.dtype.hasobject:
                 raise TypeError(f"{key!r} in checkpoint {name!r} is neither numbers nor text: {arrays[key]!r}")
-        with _replacing(self.path / "checkpoint" / f"{_checked(name)}.npz") as temporary, temporary.open("wb") as file:
+        with replacing(self.path / "checkpoint" / f"{_checked(name)}.npz") as temporary, temporary.open("wb") as file:
             np.savez(file, **stored)  # type: ignore[arg-type]
         if self.status == "running":  # a run that is killed has its processor time until here
             self.set_status("running")

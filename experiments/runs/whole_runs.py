@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from pydantic import BaseModel
 
 from .folder import RunFolder
 from .progress import Progress
+from .result import Result
 
 __all__ = ["whole_run"]
 
 Settings = TypeVar("Settings", bound=BaseModel)
-Result = dict[str, Any]
 
 
 def whole_run(

@@ -10,7 +10,7 @@ from experiments.grains.on_bed import finish_run
 from experiments.platform.kept_platform import keep_platform
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
-from experiments.runs.types import Json
+from experiments.runs.result import Result
 from experiments.runs.whole_runs import whole_run
 
 from .frames import SpatialFrames
@@ -32,7 +32,7 @@ def check(settings: SpatialSettings) -> None:
         run_on_law(settings, plan)
 
 
-def _carry_out(settings: SpatialSettings, folder: RunFolder, progress: Progress) -> Json:
+def _carry_out(settings: SpatialSettings, folder: RunFolder, progress: Progress) -> Result:
     """In `folder`, from its checkpoint where there is one; the result."""
     with folder.lock():
         plan = plan_spatial(settings, platform_file=keep_platform(settings.platform, folder.path, progress.message))
@@ -42,7 +42,7 @@ def _carry_out(settings: SpatialSettings, folder: RunFolder, progress: Progress)
         return _on_law(settings, plan, folder, progress)
 
 
-def _on_law(settings: SpatialSettings, plan: SpatialPlan, folder: RunFolder, progress: Progress) -> Json:
+def _on_law(settings: SpatialSettings, plan: SpatialPlan, folder: RunFolder, progress: Progress) -> Result:
     for sentence in plan.announcement():
         progress.message(sentence)
     run = run_on_law(settings, plan)

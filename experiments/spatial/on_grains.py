@@ -17,7 +17,7 @@ from experiments.grains.softening import PUSHED, Softening
 from experiments.platform.lengths import check_lengths
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
-from experiments.runs.types import Json
+from experiments.runs.result import Result
 from rigid.spatial.quaternions import to_matrix
 
 from .frames import SpatialFrames
@@ -136,6 +136,6 @@ class SpatialOnBed(PlatformOnBed[SpatialSettings, SpatialRun, SpatialForecast]):
         """Of all of the platform."""
         return SpatialFrames(self.settings, run, folder, resumed=resumed) if self.settings.frame_count else None
 
-    def conclude(self, run: SpatialRun, softening: Softening, folder: RunFolder) -> Json:
+    def conclude(self, run: SpatialRun, softening: Softening, folder: RunFolder) -> Result:
         """The result, its series written."""
         return conclude(self.settings, self.plan, run, self.forecast.run, softening, folder.path)

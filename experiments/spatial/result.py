@@ -20,8 +20,8 @@ from experiments.grains.bed_result import (
 )
 from experiments.grains.softening import Softening
 from experiments.runs.folder import write_series
+from experiments.runs.result import Result
 from experiments.runs.types import Json
-from experiments.runs.version import __version__
 from experiments.tumble.words import way_through
 from rigid.spatial.quaternions import to_matrix
 
@@ -99,7 +99,7 @@ def conclude(
     beside: SpatialRun | None,
     softening: Softening | None,
     folder: Path,
-) -> Json:
+) -> Result:
     """The result, its series written. `beside`: the trial on the spring-damper, where the run is on grains."""
     write_series_of(folder, run)
     numbers, trial = quantities_of(run), plan.trial
@@ -108,7 +108,6 @@ def conclude(
     said = [residual_warning(run.energy_residual), unsettled_warning(run.master)]
     warnings = [*plan.warnings, *(warning for warning in said if warning)]
     result: Json = {
-        "format": "hedgebed-result/1", "experiment": "tumble spatial", "version": __version__,
         "title": title, "status": "done",
         "quantities": numbers, "departures": {"sentences": _sentences(run)},
         "trial": {
@@ -124,7 +123,7 @@ def conclude(
     if softening is not None and beside is not None:
         write_series(folder / "series" / "spring-damper.csv", path_columns(beside))
         _add_grains(result, settings, plan, run, beside, softening)
-    return result
+    return Result.make("tumble spatial", **result)
 
 
 def passages(run: SpatialRun) -> list[Json]:

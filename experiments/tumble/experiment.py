@@ -18,6 +18,7 @@ from experiments.platform.numbers import PlatformNumbers, platform_numbers, torq
 from experiments.runs.folder import RunFolder, write_series
 from experiments.runs.progress import Progress
 from experiments.runs.reporting import write_report
+from experiments.runs.result import Result
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import whole_run
 from rigid.planar.simulate import PAPER_STEP, check_step, simulate
@@ -67,7 +68,7 @@ def check(settings: TumbleSettings) -> None:
         _check_planar(settings, plan)
 
 
-def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> Json:
+def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> Result:
     if settings.ground == "bed":
         from .on_grains import tumble_on_grains  # loads Taichi
 
@@ -106,7 +107,7 @@ def _integrate(settings: TumbleSettings, plan: TumblePlan, *, duration: float) -
     return simulate(trial, duration=duration, method=method, sample_interval=interval), full
 
 
-def _on_law(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> Json:
+def _on_law(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> Result:
     """A tumble on the spring-damper or another law, with its sweep and its campaign where they are asked for."""
     copied = _keep_model(settings, folder)
     platform = platform_numbers(settings.platform, file=keep_platform(settings.platform, folder.path, progress.message))
@@ -129,10 +130,11 @@ def _on_law(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> 
         _add_sweep(result, settings, folder, copied, platform)
     made = write_tumble_campaign(settings, plan, folder.path, progress)
     result |= {"campaign": made} if made is not None else {}
-    folder.write_result(result)
+    whole = Result.make("tumble", **result)
+    folder.write_result(whole)
     progress.stage("report", total=1.0)
     write_report(folder.path, progress)
-    return result
+    return whole
 
 
 def _add_sweep(

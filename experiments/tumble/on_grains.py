@@ -28,7 +28,7 @@ from experiments.platform.surfaces import find_surface
 from experiments.platform.tips import tip_angles, tip_depth
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
-from experiments.runs.types import Json
+from experiments.runs.result import Result
 from rigid.planar.simulate import simulate
 from rigid.planar.trajectory import Trajectory
 
@@ -78,7 +78,7 @@ def check_on_grains(settings: TumbleSettings) -> None:
     PlanarOnBed(settings).check()
 
 
-def tumble_on_grains(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> Json:
+def tumble_on_grains(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> Result:
     """Carry it out in `folder`, from its checkpoint where there is one; the result."""
     with folder.lock():
         on_bed = PlanarOnBed(settings, keep_platform(settings.platform, folder.path, progress.message))
@@ -340,12 +340,12 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
         """Of the slice."""
         return TumbleFrames(self.settings, run, folder, resumed=resumed) if self.settings.frame_count else None
 
-    def conclude(self, run: CoupledTumble, softening: Softening, folder: RunFolder) -> Json:
+    def conclude(self, run: CoupledTumble, softening: Softening, folder: RunFolder) -> Result:
         """The result, its series written."""
         law = self.forecast.trajectory
         result = conclude(self.settings, self.plan, run, law, softening, folder, self.graded)
         result["warnings"] += [warning for warning in (self.whose_spikes(),) if warning]
-        return result
+        return Result.make("tumble", **result)
 
 
 def _beside(settings: TumbleSettings) -> TumbleSettings:

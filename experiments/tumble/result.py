@@ -6,7 +6,6 @@ import numpy as np
 
 from experiments.platform.tips import ball_radius, tip_depth
 from experiments.runs.types import Json
-from experiments.runs.version import __version__
 from rigid.planar.trajectory import Trajectory
 
 from .sentences import say
@@ -86,16 +85,13 @@ def title_of(plan: TumblePlan) -> str:
 
 
 def result_of(settings: TumbleSettings, plan: TumblePlan, trajectory: Trajectory, full: float | None) -> Json:
-    """What result.json holds of one trial."""
+    """The entries of the result of one trial; what ran it adds its own."""
     trial, warnings = plan.trial, list(plan.warnings)
     if full is not None:
         warnings.append(say("wheel_at_limit", limit=plan.max_wheel_speed, when=full))
     if trajectory.trajectory_angle is None:
         warnings.append(stayed_words(trajectory))
     return {
-        "format": "hedgebed-result/1",
-        "experiment": "tumble",
-        "version": __version__,
         "title": title_of(plan),
         "status": "done",
         "quantities": quantities_of(trajectory),

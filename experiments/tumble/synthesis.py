@@ -33,6 +33,7 @@ from experiments.platform.surfaces import find_surface
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.reporting import write_report
+from experiments.runs.result import Result, quantity
 from experiments.runs.types import Json
 from experiments.runs.version import __version__
 from experiments.runs.whole_runs import whole_run
@@ -141,7 +142,7 @@ def _true_trial(settings: CampaignSettings, condition: _Condition, number: int, 
     return replace(condition.plan.trial, gravity_sim=gravity, **truth)
 
 
-def _carry_out(settings: CampaignSettings, folder: RunFolder, progress: Progress) -> Json:
+def _carry_out(settings: CampaignSettings, folder: RunFolder, progress: Progress) -> Result:
     conditions = _conditions(settings)
     first = conditions[0].plan
     with folder.lock():
@@ -305,33 +306,30 @@ def _table(rows: Sequence[Json]) -> Json:
     return {"title": "What truly happens in the trials", "head": head, "rows": shown}
 
 
-def _result(settings: CampaignSettings, plan: TumblePlan, made: _Made, folder: Path) -> Json:
+def _result(settings: CampaignSettings, plan: TumblePlan, made: _Made, folder: Path) -> Result:
     count = sum(len(recording) for recording in made.campaign.recordings.values())
     rows = made.rows
-    return {
-        "format": "hedgebed-result/1",
-        "experiment": "campaign",
-        "version": __version__,
-        "title": f"A made-up campaign on {plan.surface}: {len(rows)} trials",
-        "status": "done",
-        "quantities": {
-            "trial_count": {"value": len(rows), "std": 0.0, "unit": "1"},
-            "row_count": {"value": count, "std": 0.0, "unit": "1", "note": "of all recordings together"},
-            "duration": {"value": settings.duration, "std": 0.0, "unit": "s", "note": "of each trial"},
+    return Result.make(
+        "campaign",
+        title=f"A made-up campaign on {plan.surface}: {len(rows)} trials",
+        quantities={
+            "trial_count": quantity(len(rows), "1"),
+            "row_count": quantity(count, "1", "of all recordings together"),
+            "duration": quantity(settings.duration, "s", "of each trial"),
         },
-        "campaign": "campaign",
-        "truth": TRUTH,
-        "tables": [_table(rows)],
-        "departures": {
+        campaign="campaign",
+        truth=TRUTH,
+        tables=[_table(rows)],
+        departures={
             "sentences": [
                 f"{folder / 'campaign'} is what a laboratory would hand over, for `hedgebed diagnose`; {TRUTH} beside "
                 f"it is what made it."
             ]
         },
-        "effects": [{"id": effect.id, "parameters": dict(effect.values)} for effect in plan.trial.effects],
-        "trials": rows,
-        "warnings": list(plan.warnings),
-    }
+        effects=[{"id": effect.id, "parameters": dict(effect.values)} for effect in plan.trial.effects],
+        trials=rows,
+        warnings=list(plan.warnings),
+    )
 
 
 run, resume = whole_run("campaign", CampaignSettings, _carry_out, check=check)

@@ -8,10 +8,10 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from experiments.runs.folder import RunFolder, write_text
+from experiments.runs.folder import RunFolder, plain, write_text
 from experiments.runs.progress import Progress
+from experiments.runs.result import Result
 from experiments.runs.types import Json
-from experiments.runs.version import __version__
 from experiments.validate.settings import ValidateSettings
 
 from . import kept as kept_result
@@ -24,14 +24,14 @@ __all__ = ["check", "fingerprint", "keep", "resume", "run", "run_case"]
 _ROOT = Path(__file__).resolve().parents[2]
 
 
-def run(settings: ValidateSettings, folder: str | Path, *, progress: Progress | None = None) -> Json:
+def run(settings: ValidateSettings, folder: str | Path, *, progress: Progress | None = None) -> Result:
     """Run the suite into `folder` and return the result, as result.json has it. Raises ValueError as `check` does."""
     check(settings)
     kept = RunFolder.ensure(Path(folder), "validate", settings, code=fingerprint())
     return _carry_out(settings, kept, progress or Progress())
 
 
-def resume(folder: str | Path, *, progress: Progress | None = None) -> Json:
+def resume(folder: str | Path, *, progress: Progress | None = None) -> Result:
     """Go on: cases that this code has finished are kept, others are run."""
     kept = RunFolder.open(Path(folder))
     return _carry_out(ValidateSettings(**kept.settings), kept, progress or Progress())
@@ -61,7 +61,7 @@ def run_case(case: Case, tell: Any = None) -> tuple[Outcome, float]:
     return found, time.monotonic() - began
 
 
-def _carry_out(settings: ValidateSettings, folder: RunFolder, progress: Progress) -> Json:
+def _carry_out(settings: ValidateSettings, folder: RunFolder, progress: Progress) -> Result:
     wanted = chosen(settings.only, quick=settings.quick)
     records: dict[str, Json] = {}
     with folder.lock():
@@ -164,29 +164,26 @@ def _row(case: Case, records: dict[str, Json], wanted: Sequence[Case]) -> Json:
 STATUSES = ("pass", "fail", "skipped", "not run", "not yet")
 
 
-def _result(rows: list[Json], entire: bool) -> Json:
+def _result(rows: list[Json], entire: bool) -> Result:
     counts = {status: sum(row["status"] == status for row in rows) for status in STATUSES}
     words = [f"{counts['pass']} pass", f"{counts['fail']} fail"]
     words += [f"{counts[key]} {key}" for key in STATUSES[2:] if counts[key]]
     sentences = [f"{row['id']} fails: {_why(row)}" for row in rows if row["status"] == "fail"]
     sentences += [f"{row['id']} is skipped: {row['skipped']}" for row in rows if row["status"] == "skipped"]
-    return {
-        "format": "hedgebed-result/1",
-        "experiment": "validate",
-        "version": __version__,
-        "code": fingerprint(),
-        "title": f"Verification of the bed: {', '.join(words)}",
-        "status": "done",
-        "entire": entire,
-        "date": date.today().isoformat(),
-        "quantities": {
+    return Result.make(
+        "validate",
+        code=fingerprint(),
+        title=f"Verification of the bed: {', '.join(words)}",
+        entire=entire,
+        date=date.today().isoformat(),
+        quantities={
             f"cases_{status.replace(' ', '_')}": {"value": count, "std": 0.0, "unit": "1"}
             for status, count in counts.items()
         },
-        "cases": rows,
-        "departures": {"sentences": sentences},
-        "warnings": [] if entire else ["not the whole suite: see which cases were not run"],
-    }
+        cases=rows,
+        departures={"sentences": sentences},
+        warnings=[] if entire else ["not the whole suite: see which cases were not run"],
+    )
 
 
 def _why(row: Json) -> str:
@@ -208,7 +205,7 @@ def keep(cases: Sequence[Json], *, command: str) -> None:
     """Put the cases that were run into the checkout's table, docs/validation.md, and the result that it is made of."""
     before = kept_result.read(_ROOT)
     rows = kept_result.merged_rows(before["cases"] if before else (), cases, SUITE, command=command)
-    result = _result(rows, before is not None)
+    result: Json = plain(_result(rows, before is not None))
     if before is not None:
         result |= {key: before[key] for key in ("version", "code", "date")}
     kept_result.write(_ROOT, result)

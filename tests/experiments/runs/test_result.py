@@ -1,0 +1,104 @@
+"""The result of a run: one writer, one reader, and the schema that ships."""
+
+import json
+import sys
+from importlib.resources import files
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+
+from experiments.runs.folder import plain
+from experiments.runs.result import Result, Series, quantity, schema
+
+ROOT = Path(__file__).parents[3]
+KEPT = sorted((ROOT / "docs" / "results").rglob("result.json"))
+SCHEMA = json.loads(files("experiments.runs").joinpath("result.schema.json").read_text(encoding="utf-8"))
+
+
+def made(**more):
+    return Result.make("tumble", title="A tumble", quantities={"speed": quantity(np.float64(0.5), "m/s")}, **more)
+
+
+def test_the_schema_that_ships_is_that_of_the_model():
+    shipped = files("experiments.runs").joinpath("result.schema.json").read_text(encoding="utf-8")
+    assert shipped == schema(), "python -m experiments.runs.result > experiments/runs/result.schema.json"
+
+
+@pytest.mark.parametrize("path", KEPT, ids=lambda path: path.parent.name)
+def test_a_kept_result_is_of_the_schema_and_reads_back_as_it_is(path):
+    raw = json.loads(path.read_text(encoding="utf-8"))
+    jsonschema.validate(raw, SCHEMA)
+    result = Result.load(path.parent)
+    assert result == raw and json.dumps(plain(result)) == json.dumps(raw)  # the order of the keys as well
+
+
+def test_a_result_is_written_in_the_order_in_which_it_was_made(tmp_path):
+    result = made(speed=np.array([1, 2]), nothing=np.nan, where=Path("a"), warnings=("w",))
+    assert result.write(tmp_path) == tmp_path / "result.json"
+    raw = json.loads((tmp_path / "result.json").read_text())
+    assert list(raw) == [
+        "format", "experiment", "version", "title", "status", "quantities", "speed", "nothing", "where", "warnings",
+    ]  # fmt: skip
+    assert (raw["speed"], raw["nothing"], raw["where"], raw["warnings"]) == ([1, 2], None, "a", ["w"])
+    jsonschema.validate(raw, SCHEMA)
+    assert Result.load(tmp_path) == result == raw
+
+
+def test_a_result_is_looked_up_by_key_and_by_attribute():
+    result = made(chi2=2)
+    speed = result["quantities"]["speed"]
+    assert speed["value"] == speed.value == 0.5 and speed == {"value": 0.5, "std": 0.0, "unit": "m/s"}
+    assert "note" not in speed and speed.get("note", "none") == "none" and "tables" not in result
+    assert result["chi2"] == 2 and result.get("tables", []) == [] and list(result)[:2] == ["format", "experiment"]
+    with pytest.raises(KeyError, match="tables"):
+        result["tables"]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"quantities": {"speed": {"value": "fast", "std": None, "unit": "m/s"}}}, r"quantities\.speed\.value"),
+        ({"quantities": {"speed": {"value": 1.0, "std": None}}}, r"quantities\.speed\.unit"),
+        ({"format": "hedgebed-result/2"}, "format"),
+        ({"title": None}, "title"),
+    ],
+)
+def test_what_is_no_result_is_refused_with_file_and_key(tmp_path, change, said):
+    (tmp_path / "result.json").write_text(json.dumps(plain(made()) | change))
+    with pytest.raises(ValueError, match=rf"result\.json: {said}"):
+        Result.load(tmp_path)
+
+
+def test_a_folder_without_a_result_is_named(tmp_path):
+    with pytest.raises(ValueError, match=r"result\.json: cannot be read"):
+        Result.load(tmp_path / "result.json")
+    (tmp_path / "result.json").write_text("{")
+    with pytest.raises(ValueError, match=r"result\.json: is no JSON"):
+        Result.load(tmp_path)
+
+
+def test_a_series_knows_its_units_and_reads_back(tmp_path):
+    columns = {
+        "t_s": np.arange(3.0),
+        "vx_m_s": np.array([0.1, np.nan, 1e-17]),
+        "state": np.array(["stand", "a,b", "hop"]),
+    }
+    Series(columns).write(tmp_path / "x.csv")
+    back = Series.read(tmp_path / "x.csv")
+    assert back.units == {"t_s": "s", "vx_m_s": "m/s", "state": ""}
+    assert all(np.array_equal(back.columns[name], columns[name], equal_nan=name != "state") for name in columns)
+
+
+def test_frames_of_pandas(monkeypatch):
+    pandas = pytest.importorskip("pandas")
+    frame = made().to_dataframe()
+    assert frame.loc["speed", "value"] == 0.5 and list(frame) == ["value", "std", "unit", "note"]
+    assert isinstance(Series({"t_s": np.arange(3.0)}).to_dataframe(), pandas.DataFrame)
+
+
+def test_without_pandas_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ImportError, match=r"hedgebed\[pandas\]"):
+        made().to_dataframe()
