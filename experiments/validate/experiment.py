@@ -85,7 +85,7 @@ def _carry_out(settings: ValidateSettings, folder: RunFolder, progress: Progress
             write_text(Path(settings.document), text)
         elif entire and _is_checkout():
             write_text(_ROOT / "docs" / "validation.md", text)
-            kept_result.write(_ROOT, result)
+            kept_result.write(_ROOT, plain(result))
         elif settings.keep:
             keep(result["cases"], command=_command(settings))
         progress.stage("report", total=1.0)
