@@ -18,10 +18,8 @@ __all__ = ["RESULT_FORMAT", "ResultFormat", "Series", "pandas", "read_series", "
 ResultFormat = Literal["hedgebed-result/1"]
 RESULT_FORMAT: ResultFormat = get_args(ResultFormat)[0]
 """`format` of every result.json."""
-UNITS = {
-    "m_s2": "m/s2", "rad_s": "rad/s", "deg_s": "deg/s", "m_s": "m/s", "s": "s", "m": "m", "N": "N", "J": "J",
-    "Pa": "Pa", "rad": "rad", "deg": "deg", "kg": "kg", "K": "K", "mm": "mm", "N_m": "N m",
-}  # fmt: skip
+SAME = ("s", "m", "N", "J", "Pa", "rad", "deg", "kg", "mm")
+UNITS = {name: name for name in SAME} | {"m_s": "m/s", "m_s2": "m/s2", "rad_s": "rad/s", "deg_s": "deg/s", "N_m": "N m"}
 """Unit at the end of a column's name -> unit."""
 
 

@@ -141,12 +141,17 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
         surface=plan.surface,
         departures={"sentences": said},
         platform={
-            "name": plan.platform.name, "mass": plan.platform.mass, "inertia": tumbler.inertia,
-            "spike_length": tumbler.spike_length, "lean": tumbler.lean, "wheel_inertia": wheel.inertia,
-            "max_wheel_speed": wheel.max_speed, "sources": dict(plan.platform.sources),
+            "name": plan.platform.name,
+            "mass": plan.platform.mass,
+            "inertia": tumbler.inertia,
+            "spike_length": tumbler.spike_length,
+            "lean": tumbler.lean,
+            "wheel_inertia": wheel.inertia,
+            "max_wheel_speed": wheel.max_speed,
+            "sources": dict(plan.platform.sources),
         },
         warnings=[*plan.warnings, *warnings(plan, left, flown, given, escape)],
-    )  # fmt: skip
+    )
 
 
 def _asked(settings: HopSettings, plan: HopPlan) -> str:
