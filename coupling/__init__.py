@@ -8,6 +8,8 @@ any body. The package imports `dem` (where it needs grains) and `rigid`, and not
 from typing import Any
 from warnings import warn
 
+import hedgebed_renamed  # noqa: F401  (old names of modules)
+
 from .bed_ground import BedGround, LeftTheBedError
 from .ground import Ground
 from .law_ground import LawGround

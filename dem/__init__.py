@@ -13,6 +13,8 @@ import importlib
 import os
 from typing import TYPE_CHECKING, Any
 
+import hedgebed_renamed  # noqa: F401  (old names of modules)
+
 __all__ = [
     "Ball",
     "Bed",

@@ -7,6 +7,8 @@ for, since scipy takes longer to load than a tumble to integrate.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+import hedgebed_renamed  # noqa: F401  (old names of modules)
+
 from .batch.simulate import BatchTrajectory, simulate_batch
 from .ground.grounds import SpringDamper, SurfaceGround
 from .ground.laws import GROUNDS

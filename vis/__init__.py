@@ -14,6 +14,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+import hedgebed_renamed  # noqa: F401  (old names of modules)
+
 if TYPE_CHECKING:
     from vis.pictures.frames import FrameWriter, read_frames
     from vis.report import write_report

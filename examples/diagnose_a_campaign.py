@@ -1,0 +1,21 @@
+"""Diagnose measured pushes of a plate into sand: where the spring-damper fails, and what it lacks."""
+
+import json
+import sys
+from pathlib import Path
+
+from experiments import diagnose
+
+shipped = Path(diagnose.__file__).parents[1] / "examples"
+campaign = shipped / ("template-penetration" if "--small" in sys.argv else "cmu-plate-sinkage")
+out = Path(sys.argv[sys.argv.index("--out") + 1] if "--out" in sys.argv else "runs/examples") / "diagnosis"
+
+diagnose.run(diagnose.Settings(campaign=str(campaign)), out)
+diagnosis = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
+print(f"verdict: {diagnosis['verdict']}")
+for effect in diagnosis["effects"]:
+    print(f"  lacks {effect['id']}, probability {effect['probability']:.2f}")
+print(f"the whole story: {out / 'report.html'}")
+
+assert diagnosis["verdict"] in ("none", "named", "unknown"), "one of the three verdicts"
+assert (out / "report.html").is_file(), "a report was written"
