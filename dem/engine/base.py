@@ -101,8 +101,6 @@ class BedBase:
         """Another bed of the same class, precision, architecture and threads, without grains in it yet."""
         return type(self)(settings, radii, **asdict(self.runtime))
 
-    # ------------------------------------------------------------------ sleep
-
     def let_sleep(self, rules: Sleep | None = None) -> None:
         """From here on grains at rest far from the bodies are not computed; ``dem.engine.sleep`` has the rules.
 
@@ -164,8 +162,6 @@ class BedBase:
         radius, mass = position[:, 3], velocity[:, 3]
         now = velocity[:, :3] + half * force / mass[:, None]
         return now, spin[:, :3] + half * torque * (2.5 / (mass * radius**2))[:, None]
-
-    # ------------------------------------------------------------------ time
 
     @property
     def height(self) -> float:
@@ -248,12 +244,12 @@ class BedBase:
 
     def make_lists(self, *, all_awake: bool = False) -> None:
         e = self.engine
-        e.keep_lists(e.rest, e.ledger)
+        e.keep_lists(e.rest, e.balance)
         awake = self.awake_count
         if self.sleeper is not None:
             self.sleeper.rearrange(all_awake=all_awake)
-        e.sort(*self.gravity, awake, e.rest, e.ledger)
-        e.make_lists(self.skin, e.shapes, e.rest, e.ledger)
+        e.sort(*self.gravity, awake, e.rest, e.balance)
+        e.make_lists(self.skin, e.shapes, e.rest, e.balance)
         self.list_count += 1
         self.steps_since_lists = 0
         code, value = (int(v) for v in e.problem[None])
@@ -285,7 +281,7 @@ class BedBase:
         """Forces where the grains are; ``elapsed`` is the time by which contacts have slid since they were computed."""
         self.tallied = None
         e = self.engine
-        e.push_all(elapsed, e.shapes, e.rest, e.ledger)
+        e.push_all(elapsed, e.shapes, e.rest, e.balance)
 
     def shift_velocities(self, part: float) -> None:
         self.engine.shift_velocities(part * self.time_step)

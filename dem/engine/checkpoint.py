@@ -24,9 +24,9 @@ _SLEEPERS_NUMBERS = ("awake", "mass", "slept", "leaving")
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """What ``Bed.hold`` gave; a bed has room for one, so the next one ends it."""
+    """What ``Bed.checkpoint`` gave; a bed has room for one, so the next one ends it."""
 
-    tables: tuple[Any, ...]  # The engine, those that sleep, the book: whose fields were copied
+    tables: tuple[Any, ...]  # The engine, those that sleep, the balance: whose fields were copied
     numbers: Json
     sleeper: Json | None
     under: tuple[Any, ...]
@@ -37,7 +37,7 @@ def take(bed: BedBase) -> Checkpoint:
     """Copy it. Room of the bed's own size is taken the first time, and kept."""
     e = bed.engine
     held = Checkpoint(
-        tables=(e, *(table for table in (e.rest, e.ledger) if table.on)),
+        tables=(e, *(table for table in (e.rest, e.balance) if table.on)),
         numbers={name: getattr(bed, name) for name in _NUMBERS},
         sleeper=None if bed.sleeper is None else {name: getattr(bed.sleeper, name) for name in _SLEEPERS_NUMBERS},
         under=_under(bed),
@@ -52,10 +52,10 @@ def take(bed: BedBase) -> Checkpoint:
 def roll_back(bed: BedBase, held: Checkpoint) -> None:
     """Bring the bed back.
 
-    Raises ValueError for what is not the last that was held, or where sleep, its rules, gravity or book changed.
+    Raises ValueError for what is not the last that was held, or where sleep, its rules, gravity or balance changed.
     """
     e = bed.engine
-    if e.held is not held or held.tables != (e, *(table for table in (e.rest, e.ledger) if table.on)):
+    if e.held is not held or held.tables != (e, *(table for table in (e.rest, e.balance) if table.on)):
         raise ValueError("this bed holds another state by now: only the last one that was held can be taken back")
     if held.under != _under(bed):
         raise ValueError("gravity or the rules of sleep are others by now than when this bed was held")

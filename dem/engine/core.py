@@ -120,8 +120,6 @@ class BedCore(BedBodies):
         bed.measure_surface()
         return bed
 
-    # ------------------------------------------------------------------ what a user reads
-
     def grains(self, *, contacts: bool = True) -> Grains:
         """The grains now: positions, velocities, forces and more, in the order of ids.
 
@@ -188,13 +186,11 @@ class BedCore(BedBodies):
         self.wake()
         self.shift_velocities(0.5)
         self.gravity = _vector(gravity)
-        if self.engine.ledger.on:
-            self.engine.ledger.pull[None] = self.gravity
+        if self.engine.balance.on:
+            self.engine.balance.pull[None] = self.gravity
         self.make_lists()
         self.compute_forces()
         self.shift_velocities(-0.5)
-
-    # ------------------------------------------------------------------ state
 
     def state(self) -> State:
         """Everything that the next step depends on, to the bit: a flat dict of numpy arrays."""
@@ -272,7 +268,7 @@ class BedCore(BedBodies):
         """A bed `times` as long: this one laid end to end along x, where it is periodic, with its contacts' history.
 
         So it is as much at rest as this one, and has the same surface and packing fraction. Copy k of grain i has id
-        i + k grain_count. Its clock begins at 0; sleepers wake, and books of losses are not gone on with.
+        i + k grain_count. Its clock begins at 0; sleepers wake, and sums of losses are not gone on with.
 
         Args:
             times: how often [1]; with 1 it is a copy.
@@ -327,15 +323,13 @@ class BedCore(BedBodies):
             f"{100 * self.overlap_limit:g} %; move it away, or take a larger max_overlap (0.2 at most)"
         )
 
-    # ------------------------------------------------------------------ the book of what is lost
-
     def track_contact_work(self) -> None:
         """From here on what contacts take is summed (``contact_work``), from 0; about a fifth more time a step.
 
         A drag (``advance``) is not in it.
         """
         self.check_valid()
-        self.engine.open_ledger(self.gravity)
+        self.engine.open_balance(self.gravity)
 
     @property
     def contact_work(self) -> dict[str, float]:
@@ -348,9 +342,9 @@ class BedCore(BedBodies):
         Raises:
             ValueError: it is not tracked.
         """
-        if not self.engine.ledger.on:
+        if not self.engine.balance.on:
             raise ValueError("this bed tracks no contact work: track_contact_work() starts it")
-        return dict(zip(PARTS, self.engine.ledger.sums().tolist(), strict=True))
+        return dict(zip(PARTS, self.engine.balance.sums().tolist(), strict=True))
 
     def momentum(self) -> np.ndarray:
         """Of the grains [N s], shape [3], with the velocities half a step ahead, where the forces so far bring them."""
@@ -370,14 +364,14 @@ class BedCore(BedBodies):
         Raises:
             ValueError: it is not tracked.
         """
-        if not self.engine.ledger.on:
+        if not self.engine.balance.on:
             raise ValueError("this bed tracks no contact work: track_contact_work() starts it")
         x, v, w, f, t = self.awake_rows("position", "velocity", "spin", "force", "torque")
         radius, mass = x[:, 3], v[:, 3]
         momentum = mass[:, None] * v[:, :3] + self.time_step * f
         own = (0.4 * mass * radius**2)[:, None] * w[:, :3] + self.time_step * t
         total = np.cross(x[:, :3], momentum).sum(axis=0) + own.sum(axis=0)
-        return {"grains": total, **dict(zip(TURNED, self.engine.ledger.turns(), strict=True))}
+        return {"grains": total, **dict(zip(TURNED, self.engine.balance.turns(), strict=True))}
 
 
 def _check_grains(radii: np.ndarray, positions: np.ndarray, velocities: np.ndarray, spins: np.ndarray) -> None:

@@ -1,29 +1,27 @@
-"""The book of what contacts take: work against dashpots, friction and turning, summed while the bed runs.
+"""The energy balance of contacts: work against dashpots, friction and turning, summed while the bed runs.
 
 A step carries a pair from one set of forces to the next at one velocity (leapfrog), so what a part of the force takes
 over it is minus the mean of the part before and after, times that velocity, times dt: the same sum as that of
-``experiments.validate.base.energy`` in another order, of second order in the step and without a memory but the parts
-of the
-step before. Three parts: the normal dashpot, the tangential force (its spring included), the rolling and twisting
-torque (likewise). What the springs hold, ``dem.engine.energy`` reads off; less that, the last two are friction.
+``experiments.validate.base.energy`` in another order, of second order in the step, its memory the parts of the step
+before. Three parts: the normal dashpot, the tangential force (its spring included), the rolling and twisting torque
+(likewise). What the springs hold, ``dem.engine.energy`` reads off; less that, the last two are friction.
 
-Beside it stands the book of angular momentum about the bed's origin: what the bodies took, and what reaches the grains
+Beside it stands the balance of angular momentum about the bed's origin: what the bodies took, and what reaches grains
 from outside, which is weight, contacts across the periodic sides (the torques on a pair whose neighbour is an image do
 not cancel but leave the period x F), grains put back into the box at its other side, and sleepers (what those awake do
 to them, and what falling asleep takes). Leapfrog's x_n x m v_(n+1/2) changes by exactly the sum of these each step.
 
-A bed without a book has ``NO_LEDGER`` for a table, and its kernels are compiled without all this.
+A bed without a balance has ``NO_BALANCE`` for a table, and its kernels are compiled without all this.
 """
-
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import taichi as ti
 
 from .lists import AWAKE, INDEX_BITS, INDEX_MASK, PERIOD_X, PERIOD_Y, SAME_IMAGE
 from .rows import put_rows, take_rows
+from .values import EnginePart
 
-__all__ = ["NO_LEDGER", "OUTSIDE", "PARTS", "TURNED", "Bookkeeping", "Ledger"]
+__all__ = ["NO_BALANCE", "OUTSIDE", "PARTS", "TURNED", "BalanceKernels", "Balance"]
 
 PARTS = ("damping", "tangential", "turning")
 TURNED = ("outside", "first_body", "bodies")
@@ -33,17 +31,17 @@ _WIDTH = 7
 
 
 @ti.data_oriented
-class _NoLedger:
-    """Stands where no book is kept."""
+class _NoBalance:
+    """Stands where no balance is kept."""
 
     on = False
 
 
-NO_LEDGER = _NoLedger()
+NO_BALANCE = _NoBalance()
 
 
 @ti.data_oriented
-class Ledger:
+class Balance:
     """Parts of the forces of the last step, by row of the pair lists and the near lists, and the sums of chunks."""
 
     on = True
@@ -63,7 +61,7 @@ class Ledger:
         self.pull = F(3, ti.f64, ())
 
     def clear(self) -> None:
-        """A new book: no sums, nothing remembered."""
+        """A new balance: no sums, nothing remembered."""
         for field in (self.last, self.near_last, self.taken, self.turned):
             field.fill(0)
 
@@ -76,7 +74,7 @@ class Ledger:
         return np.asarray(np.cumsum(self.turned.to_numpy(), axis=0)[-1])
 
     def state(self, rows: np.ndarray, near: np.ndarray) -> dict[str, np.ndarray]:
-        """All that the book's next step depends on; ``rows``, ``near``: of the lists, those in use."""
+        """All that its next step depends on; ``rows``, ``near``: of the lists, those in use."""
         return {
             "ledger_last": take_rows(self.last, rows),
             "ledger_near_last": take_rows(self.near_last, near),
@@ -122,15 +120,11 @@ class Ledger:
 
 
 @ti.data_oriented
-class Bookkeeping:
-    """The part of the engine that keeps the book of pairs."""
-
-    if TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any: ...
+class BalanceKernels(EnginePart):
+    """The part of the engine that sums the balance of pairs."""
 
     @ti.func
-    def book_pair(self, c, s, i, j, d, now, dt, rest: ti.template(), ledger: ti.template()):
+    def balance_pair(self, c, s, i, j, d, now, dt, rest: ti.template(), balance: ti.template()):
         """What a pair's row took over the step; ``now`` the parts of its force."""
         start, end = self.chunk_range(c)
         length = d.norm()
@@ -142,10 +136,10 @@ class Bookkeeping:
         half = 0.5 * (self.position[i].w + self.position[j].w - length) + 0.25 * dt * v_n
         w_i, w_j = self.spin[i].xyz, self.spin[j].xyz
         turning = (self.position[i].w - half) * w_i + (self.position[j].w - half) * w_j
-        took = ledger.took(
-            ledger.last[s], now, v_n - h * v_t.norm_sqr(), (1.0 + h * v_n) * v_t - turning.cross(n), w_i - w_j, dt
+        took = balance.took(
+            balance.last[s], now, v_n - h * v_t.norm_sqr(), (1.0 + h * v_n) * v_t - turning.cross(n), w_i - w_j, dt
         )
-        ledger.last[s] = now
+        balance.last[s] = now
         # Across chunks both sides have a row; a sleeper has none.
         share = ti.cast(0.5, self.real)
         if j >= start and j < end:
@@ -153,19 +147,19 @@ class Bookkeeping:
         if ti.static(rest.on):
             if j >= self.count[AWAKE]:
                 share = ti.cast(1.0, self.real)
-        ledger.add(c, share * took)
+        balance.add(c, share * took)
 
     @ti.func
-    def book_weight(self, c, dt, ledger: ti.template()):
+    def balance_weight(self, c, dt, balance: ti.template()):
         """Gravity's angular impulse on the grains of a chunk."""
         start, end = self.chunk_range(c)
         moment = ti.Vector.zero(ti.f64, 3)
         for i in range(start, end):
             moment += ti.cast(self.velocity[i].w * self.position[i].xyz, ti.f64)
-        ledger.turn(c, OUTSIDE, ti.cast(dt, ti.f64) * moment.cross(ledger.pull[None]))
+        balance.turn(c, OUTSIDE, ti.cast(dt, ti.f64) * moment.cross(balance.pull[None]))
 
     @ti.func
-    def book_turning(self, c, bits, f, f_t, turn, n, arm_j, dt, rest: ti.template(), ledger: ti.template()):
+    def balance_turning(self, c, bits, f, f_t, turn, n, arm_j, dt, rest: ti.template(), balance: ti.template()):
         """Of a touching pair's force: what crosses the periodic sides, and what a sleeper takes."""
         start, end = self.chunk_range(c)
         j = bits & INDEX_MASK
@@ -184,10 +178,10 @@ class Bookkeeping:
             out = -share * shift.cross(f)
             if sleeps:
                 out -= arm_j * f_t.cross(n) - turn - self.position[j].xyz.cross(f)
-            ledger.turn(c, OUTSIDE, dt * out)
+            balance.turn(c, OUTSIDE, dt * out)
 
     @ti.func
-    def book_body(self, c, i, b, f, t_body, n, arm, arm_i, dt, ledger: ti.template()):
+    def balance_body(self, c, i, b, f, t_body, n, arm, arm_i, dt, balance: ti.template()):
         """Of a grain's force on a body's row: what the body took, and what crosses the periodic sides."""
         at = self.body_position[b]
         # From the grain to where the body has the contact: a period where an image of the body is met.
@@ -195,16 +189,16 @@ class Bookkeeping:
         shift = ti.Vector.zero(self.real, 3)
         shift.x = ti.round(off.x / self.box[PERIOD_X]) * self.box[PERIOD_X]
         shift.y = ti.round(off.y / self.box[PERIOD_Y]) * self.box[PERIOD_Y]
-        ledger.turn(c, OUTSIDE, -dt * shift.cross(f))
+        balance.turn(c, OUTSIDE, -dt * shift.cross(f))
         taken = dt * (t_body - at.cross(f))
         if b == 0:
-            ledger.turn(c, FIRST, taken)
+            balance.turn(c, FIRST, taken)
         else:
-            ledger.turn(c, OTHERS, taken)
+            balance.turn(c, OTHERS, taken)
 
     @ti.func
-    def book_leaving(self, c, i, ledger: ti.template()):
+    def balance_leaving(self, c, i, balance: ti.template()):
         """A grain that falls asleep: what its motion had is gone."""
         x, v, w = self.position[i], self.velocity[i], self.spin[i]
         own = (ti.cast(0.4, self.real) * v.w * x.w * x.w) * w.xyz
-        ledger.turn(c, OUTSIDE, -(v.w * x.xyz.cross(v.xyz) + own))
+        balance.turn(c, OUTSIDE, -(v.w * x.xyz.cross(v.xyz) + own))

@@ -1,9 +1,8 @@
 """What a bed holds: kinetic energy, height, and the springs of its contacts, read from its state.
 
 The springs are those of ``dem.contact.law``: Hertz's 4/15 (2 E*) a d^2 (which is 2/5 F d), and half the stiffness of
-now
-times the square of the stretch for the tangential, rolling and twisting ones. Cohesion is counted with the normal ones,
-from where the pair has parted: DMT's -2 pi w R* d, and JKR's force integrated over the overlap,
+now times the square of the stretch for the tangential, rolling and twisting ones. Cohesion is counted with the normal
+ones, from where the pair has parted: DMT's -2 pi w R* d, and JKR's force integrated over the overlap,
     U = 8 E* a^5 / (15 R*^2) - 4/3 sqrt(2 pi w E*) a^(7/2) / R* + pi w a^2 - (the same where the pair parts).
 What dashpots and sliding take is ``dem.engine.dissipation``'s.
 """

@@ -29,7 +29,7 @@ from dem.grains.sizes import Json
 from dem.shapes.basic import ROW_WIDTH
 
 from . import runtime
-from .dissipation import NO_LEDGER, Bookkeeping, Ledger
+from .dissipation import NO_BALANCE, Balance, BalanceKernels
 from .lists import (
     AWAKE,
     BOTTOM,
@@ -91,7 +91,7 @@ def _roomy(count: int, *, least: int) -> int:
 
 
 @ti.data_oriented
-class Engine(Lists, Steps, Readings, Shapes, Sleepers, Bookkeeping):
+class Engine(Lists, Steps, Readings, Shapes, Sleepers, BalanceKernels):
     """Grains, lists and bodies in Taichi fields, and the kernels that advance them.
 
     Args:
@@ -204,8 +204,8 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, Bookkeeping):
         self.rest: Any = EVERYONE  # the table of those that sleep, likewise
         self._kept_rest: Rest | None = None
         self.held: Any = None  # what `dem.engine.checkpoint` copied last
-        self.ledger: Any = NO_LEDGER  # the table of the book of dissipation, likewise
-        self._kept_ledger: Ledger | None = None
+        self.balance: Any = NO_BALANCE  # the table of the energy balance, likewise
+        self._kept_balance: Balance | None = None
         # Step control: moved is written by move and read by push; halted is written by push and read by move.
         self.moved = ti.field(ti.i32, ())
         self.halted = ti.field(ti.i32, ())
@@ -298,7 +298,7 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, Bookkeeping):
         self.clear_shapes()
         self.held = None
         self.rest = EVERYONE
-        self.ledger = NO_LEDGER
+        self.balance = NO_BALANCE
 
     def let_sleep(self) -> None:
         """From here on kernels know of sleep; all are awake still."""
@@ -321,19 +321,19 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, Bookkeeping):
         self.count[AWAKE], self.count[CHUNKS] = self.grain_count, self.chunk_count
         self.count[SORTED], self.count[SORTED_CELLS] = self.grain_count, self.count[CELLS]
 
-    def open_ledger(self, gravity: tuple[float, float, float]) -> None:
-        """From here on kernels keep the book of what contacts take."""
-        if self._kept_ledger is None:
-            self._kept_ledger = Ledger(
+    def open_balance(self, gravity: tuple[float, float, float]) -> None:
+        """From here on kernels sum what contacts take."""
+        if self._kept_balance is None:
+            self._kept_balance = Balance(
                 rows=self.pair.shape[0], near=self.near_grain.shape[0], chunks=self.overlap.shape[0], real=self.real
             )
-        self.ledger = self._kept_ledger
-        self.ledger.clear()
-        self.ledger.pull[None] = gravity
+        self.balance = self._kept_balance
+        self.balance.clear()
+        self.balance.pull[None] = gravity
 
-    def close_ledger(self) -> None:
-        """The kernels are those that keep no book."""
-        self.ledger = NO_LEDGER
+    def close_balance(self) -> None:
+        """The kernels are those that sum nothing."""
+        self.balance = NO_BALANCE
 
     def read(self, name: str) -> np.ndarray:
         """A field as a numpy array: the rows of the grains or chunks there are, or all of them."""
@@ -356,8 +356,6 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, Bookkeeping):
             array[rows] = values
         field.from_numpy(array)
 
-    # ------------------------------------------------------------------ the step
-
     def launch(
         self, most: int, dt: float, limit: float, gravity: tuple[float, float, float], keep: float
     ) -> tuple[int, bool]:
@@ -365,7 +363,7 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, Bookkeeping):
         if self.gpu:
             self.done[None] = 0
             for _ in range(min(most, STEPS_PER_LAUNCH)):
-                self.run_on_gpu(dt, limit, *gravity, keep, self.shapes, self.rest, self.ledger)
+                self.run_on_gpu(dt, limit, *gravity, keep, self.shapes, self.rest, self.balance)
         else:
-            self.run(dt, limit, *gravity, keep, min(most, STEPS_PER_LAUNCH), self.shapes, self.rest, self.ledger)
+            self.run(dt, limit, *gravity, keep, min(most, STEPS_PER_LAUNCH), self.shapes, self.rest, self.balance)
         return int(self.done[None]), bool(self.halted[None])

@@ -3,13 +3,13 @@
 Runs every hundred steps or so. The kernels belong to ``dem.engine.engine.Engine``, whose fields they use.
 """
 
-from typing import TYPE_CHECKING, Any
-
 import taichi as ti
 
 from dem.contact.cohesion import JKR
 from dem.contact.law import adhesive_range
 from dem.shapes.basic import distance_to, rotate
+
+from .values import EnginePart
 
 __all__ = ["INDEX_BITS", "INDEX_MASK", "ITEMS_PER_THREAD", "Lists", "MOST_BODIES", "SAME_IMAGE"]
 
@@ -34,12 +34,8 @@ PERIOD_X, PERIOD_Y, BOTTOM, TOP, CELL_X, CELL_Y, CELL_Z = range(7)
 
 
 @ti.data_oriented
-class Lists:
+class Lists(EnginePart):
     """The part of the engine that finds neighbours."""
-
-    if TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any: ...
 
     @ti.func
     def next_chunk(self, w, first: ti.template()):
@@ -138,7 +134,7 @@ class Lists:
         return (k * self.count[NY] + j) * self.count[NX] + i
 
     @ti.kernel
-    def sort(self, gx: float, gy: float, gz: float, awake: int, rest: ti.template(), ledger: ti.template()):
+    def sort(self, gx: float, gy: float, gz: float, awake: int, rest: ti.template(), balance: ti.template()):
         """Wrap the grains into the box and bring them into the order of the curve; ids break ties.
 
         Those that sleep come behind those awake: each set has the cells for itself. ``awake``: how many were, until
@@ -148,14 +144,14 @@ class Lists:
         """
         for k in range(self.count[SORTED_CELLS]):
             self.cell_fill[k] = 0
-        if ti.static(ledger.on):
+        if ti.static(balance.on):
             for _ in range(1):  # one thread: the sum has one order
                 for i in range(awake):
                     x, v = self.position[i], self.velocity[i]
                     a = -ti.floor(x.x / self.box[PERIOD_X]) * self.box[PERIOD_X]
                     b = -ti.floor(x.y / self.box[PERIOD_Y]) * self.box[PERIOD_Y]
                     if a != 0.0 or b != 0.0:
-                        ledger.turn(0, ledger.outside, v.w * ti.Vector([a, b, 0.0]).cross(v.xyz))
+                        balance.turn(0, balance.outside, v.w * ti.Vector([a, b, 0.0]).cross(v.xyz))
         for i in range(self.count[SORTED]):
             cell = 0
             if i < awake:
@@ -278,14 +274,14 @@ class Lists:
         return total
 
     @ti.kernel
-    def keep_lists(self, rest: ti.template(), ledger: ti.template()):
+    def keep_lists(self, rest: ti.template(), balance: ti.template()):
         """Put the lists aside, so that the new ones can take the history over."""
         for _ in range(1):
             self.ticket[QUEUE] = 0
         for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
             c = self.next_chunk(w, True)
             while c < self.count[CHUNKS]:
-                self.keep_chunk(c, rest, ledger)
+                self.keep_chunk(c, rest, balance)
                 c = self.next_chunk(w, False)
         if ti.static(rest.on):
             for i in range(self.count[AWAKE], rest.before(rest.kept, self.count[GRAINS])):
@@ -296,7 +292,7 @@ class Lists:
                 rest.kept[None] = self.count[AWAKE]
 
     @ti.func
-    def keep_chunk(self, c, rest: ti.template(), ledger: ti.template()):
+    def keep_chunk(self, c, rest: ti.template(), balance: ti.template()):
         start, end = self.chunk_range(c)
         for i in range(start, end):
             self.old_start[i] = self.pair_start[i]
@@ -311,8 +307,8 @@ class Lists:
                         self.old_roll[s] = self.roll[s]
                     if ti.static(rest.on):
                         rest.old_force[s] = rest.force[s]
-                    if ti.static(ledger.on):
-                        ledger.old_last[s] = ledger.last[s]
+                    if ti.static(balance.on):
+                        balance.old_last[s] = balance.last[s]
         self.old_near_end[c] = self.near_end[c]
         base = c * self.count[NEAR_ROOM]
         for k in range(self.near_end[c] - base):
@@ -323,8 +319,8 @@ class Lists:
             self.old_near_body[s] = self.near_body[s]
             self.old_near_slide[s] = self.near_slide[s]
             self.old_near_roll[s] = self.near_roll[s]
-            if ti.static(ledger.on):
-                ledger.old_near_last[s] = ledger.near_last[s]
+            if ti.static(balance.on):
+                balance.old_near_last[s] = balance.near_last[s]
 
     @ti.func
     def find_old(self, i, j):
@@ -337,7 +333,7 @@ class Lists:
         return found
 
     @ti.kernel
-    def make_lists(self, skin: float, shapes: ti.template(), rest: ti.template(), ledger: ti.template()):
+    def make_lists(self, skin: float, shapes: ti.template(), rest: ti.template(), balance: ti.template()):
         """New pair and near lists for the sorted grains; history comes over from the lists put aside."""
         for b in range(MOST_BODIES):
             self.body_listed[b] = self.body_position[b]
@@ -347,7 +343,7 @@ class Lists:
         for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
             c = self.next_chunk(w, True)
             while c < self.count[CHUNKS]:
-                self.list_chunk(c, ti.cast(skin, self.real), shapes, rest, ledger)
+                self.list_chunk(c, ti.cast(skin, self.real), shapes, rest, balance)
                 c = self.next_chunk(w, False)
         if ti.static(rest.on):
             for i in range(self.count[AWAKE], rest.before(rest.made, self.count[GRAINS])):
@@ -367,7 +363,7 @@ class Lists:
             self.halted[None] = 0
 
     @ti.func
-    def list_chunk(self, c, skin, shapes: ti.template(), rest: ti.template(), ledger: ti.template()):
+    def list_chunk(self, c, skin, shapes: ti.template(), rest: ti.template(), balance: ti.template()):
         start, end = self.chunk_range(c)
         base = c * self.count[CHUNK_ROOM]
         s = base
@@ -412,15 +408,15 @@ class Lists:
                                     if d.norm_sqr() < reach * reach:
                                         if s < base + self.count[CHUNK_ROOM]:
                                             image = (mi + 1 + 3 * (mj + 1)) << INDEX_BITS
-                                            self.list_pair(s, i, j, j | image, rest, ledger)
+                                            self.list_pair(s, i, j, j | image, rest, balance)
                                         s += 1
             self.pair_end[i] = ti.min(s, base + self.count[CHUNK_ROOM])
         if s > base + self.count[CHUNK_ROOM]:
             self.problem[None] = ti.Vector([2, s - base])
-        self.list_near(c, start, end, skin, shapes, rest, ledger)
+        self.list_near(c, start, end, skin, shapes, rest, balance)
 
     @ti.func
-    def list_pair(self, s, i, j, code, rest: ti.template(), ledger: ti.template()):
+    def list_pair(self, s, i, j, code, rest: ti.template(), balance: ti.template()):
         oi, oj = self.came_from[i], self.came_from[j]
         self.first[s] = i
         sign = ti.cast(1.0, self.real)
@@ -442,15 +438,15 @@ class Lists:
                 self.roll[s] = ti.Vector.zero(self.real, 3)
         if ti.static(rest.on):
             self.list_sleeper(s, i, j, code, old, rest)
-        if ti.static(ledger.on):
-            ledger.last[s] = ledger.nothing()
+        if ti.static(balance.on):
+            balance.last[s] = balance.nothing()
             if old >= 0:
-                last = sign * ledger.old_last[old]
+                last = sign * balance.old_last[old]
                 last[0] = sign * last[0]  # the normal part is the same from either side
-                ledger.last[s] = last
+                balance.last[s] = last
 
     @ti.func
-    def list_near(self, c, start, end, skin, shapes: ti.template(), rest: ti.template(), ledger: ti.template()):
+    def list_near(self, c, start, end, skin, shapes: ti.template(), rest: ti.template(), balance: ti.template()):
         base = c * self.count[NEAR_ROOM]
         s = base
         for i in range(start, end):
@@ -470,15 +466,15 @@ class Lists:
                         self.near_body[s] = b
                         self.near_slide[s] = ti.Vector.zero(self.real, 4)
                         self.near_roll[s] = ti.Vector.zero(self.real, 3)
-                        if ti.static(ledger.on):
-                            ledger.near_last[s] = ledger.nothing()
+                        if ti.static(balance.on):
+                            balance.near_last[s] = balance.nothing()
                         o = self.near_first[self.came_from[i]]
                         while o >= 0:
                             if self.old_near_body[o] == b:
                                 self.near_slide[s] = self.old_near_slide[o]
                                 self.near_roll[s] = self.old_near_roll[o]
-                                if ti.static(ledger.on):
-                                    ledger.near_last[s] = ledger.old_near_last[o]
+                                if ti.static(balance.on):
+                                    balance.near_last[s] = balance.old_near_last[o]
                             o = self.next_near(o, self.came_from[i])
                         if ti.static(rest.on):
                             self.wake_near(s, i, b, rest)

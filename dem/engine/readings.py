@@ -3,11 +3,10 @@
 The kernels belong to ``dem.engine.engine.Engine``, whose fields they use.
 """
 
-from typing import TYPE_CHECKING, Any
-
 import taichi as ti
 
 from .lists import ALL_CHUNKS, CHUNKS, GRAINS, INDEX_MASK, MOST_BODIES, NEAR_ROOM
+from .values import EnginePart
 
 __all__ = ["TALLY_BLOCKS", "Readings"]
 
@@ -15,12 +14,8 @@ TALLY_BLOCKS = 256
 
 
 @ti.data_oriented
-class Readings:
+class Readings(EnginePart):
     """The part of the engine that the host reads sums and counts from."""
-
-    if TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any: ...
 
     @ti.kernel
     def clear_pushes(self):

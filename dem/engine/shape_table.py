@@ -4,8 +4,6 @@ A bed whose bodies are of planes, balls, cylinders and cones alone has ``PLAIN``
 compiled without all this. The table is a template argument of the kernels, so they are compiled anew for a larger one.
 """
 
-from typing import Any
-
 import numpy as np
 import taichi as ti
 
@@ -24,6 +22,8 @@ from dem.shapes.solids import (
     place_row,
     tube_distance,
 )
+
+from .values import EnginePart
 
 __all__ = ["PLAIN", "ShapeTable", "Shapes"]
 
@@ -214,15 +214,9 @@ class ShapeTable:
         return square, feature, nearest
 
 
-class Shapes:
+class Shapes(EnginePart):
     """The part of the engine that puts shapes into its fields and takes them out again."""
 
-    primitive_kind: Any
-    primitive_row: Any
-    body_primitives: Any
-    body_count: Any
-    real: Any
-    shapes: Any
     _kept: ShapeTable | None
     _meshes: list[Mesh]
 

@@ -125,7 +125,7 @@ class Sleeper:
             rest.woken.fill(1)
         elif self.awake < self.bed.grain_count:
             e.look(self.limit, self.rules.share, self.fast, rest)
-        e.stir(self.bed.time_step, self.reach, int(self.leaving), rest, e.shapes, e.ledger)
+        e.stir(self.bed.time_step, self.reach, int(self.leaving), rest, e.shapes, e.balance)
         rest.news.fill(0)
         if self.leaving:
             e.store_contacts(rest)
@@ -163,8 +163,6 @@ class Sleeper:
         pair = take_rows(e.pair, rows)
         others = ~pair[pair < 0] & INDEX_MASK
         return np.asarray(counts + np.bincount(ids[others[others >= self.awake]], minlength=n), dtype=np.int32)
-
-    # ------------------------------------------------------------------ state
 
     def frozen(self) -> State:
         """Contacts of sleepers with one another and the floor: owner and who (ids; a body's number as -1 less it),

@@ -4,8 +4,6 @@ fields they use.
 A bed whose grains do not sleep has ``EVERYONE`` for a table, and its kernels are compiled without all this.
 """
 
-from typing import TYPE_CHECKING, Any
-
 import taichi as ti
 
 from .lists import (
@@ -25,6 +23,7 @@ from .lists import (
     SORTED,
     SORTED_CELLS,
 )
+from .values import EnginePart
 
 __all__ = ["EVERYONE", "FULL", "LEAVING", "Rest", "Sleepers", "WOKEN"]
 
@@ -110,12 +109,8 @@ class Rest:
 
 
 @ti.data_oriented
-class Sleepers:
+class Sleepers(EnginePart):
     """The part of the engine that lets grains sleep."""
-
-    if TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any: ...
 
     @ti.func
     def spring_force(self, x_i, x_j, bits, u):
@@ -211,7 +206,7 @@ class Sleepers:
 
     @ti.kernel
     def stir(
-        self, dt: float, reach: float, leaving: int, rest: ti.template(), shapes: ti.template(), ledger: ti.template()
+        self, dt: float, reach: float, leaving: int, rest: ti.template(), shapes: ti.template(), balance: ti.template()
     ):
         """Wake those flagged, with all around them, and those that a body comes near; let those fall asleep that may.
 
@@ -244,8 +239,8 @@ class Sleepers:
                     k = self.id[i]
                     if rest.leaves[k] == 1:
                         v = self.velocity[i]
-                        if ti.static(ledger.on):
-                            self.book_leaving(c, i, ledger)
+                        if ti.static(balance.on):
+                            self.balance_leaving(c, i, balance)
                         rest.asleep[k] = 1
                         rest.held[c] = rest.held[c] + v.xyz * (v.w / ti.cast(dt, self.real))
                         v.xyz = ti.Vector.zero(self.real, 3)

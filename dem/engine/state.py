@@ -66,8 +66,8 @@ def take(bed: BedBase) -> State:
     state |= e.shape_state()
     if bed.sleeper is not None:
         state |= bed.sleeper.state(rows)
-    if e.ledger.on:
-        state |= e.ledger.state(rows, near)
+    if e.balance.on:
+        state |= e.balance.state(rows, near)
     state["numbers"] = np.array(
         [
             bed.steps,
@@ -115,11 +115,11 @@ def put_back(bed: BedBase, state: State) -> None:
     e.write("near_end", (state["near_count"] + np.arange(e.chunk_count) * e.near_room).astype(np.int32))
     for name in ("near_grain", "near_body", "near_slide", "near_roll"):
         e.write(name, state[name], near)
-    e.close_ledger()
+    e.close_balance()
     if "ledger_taken" in state:
         x, y, z = (float(v) for v in state["reals"][2:5])
-        e.open_ledger((x, y, z))
-        e.ledger.restore(state, rows, near)
+        e.open_balance((x, y, z))
+        e.balance.restore(state, rows, near)
     numbers = [int(v) for v in state["numbers"]]
     bed.steps, bodies, bed.list_count, bed.steps_since_lists, bed.reaction_steps, floor = numbers
     bed.has_floor, bed.tallied = bool(floor), None

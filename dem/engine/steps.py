@@ -3,8 +3,6 @@
 The kernels belong to ``dem.engine.engine.Engine``, whose fields they use.
 """
 
-from typing import TYPE_CHECKING, Any
-
 import taichi as ti
 
 from dem.contact.cohesion import JKR
@@ -26,6 +24,7 @@ from .lists import (
     QUEUE,
     SAME_IMAGE,
 )
+from .values import EnginePart
 
 __all__ = ["Steps"]
 
@@ -34,12 +33,8 @@ PATIENCE = 100
 
 
 @ti.data_oriented
-class Steps:
+class Steps(EnginePart):
     """The part of the engine that moves grains and bodies and computes forces."""
-
-    if TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any: ...
 
     @ti.func
     def move(self, c, dt, limit, gravity, keep):
@@ -96,7 +91,7 @@ class Steps:
             self.body_turn[b] = s / s.norm()
 
     @ti.func
-    def push(self, c, dt, shapes: ti.template(), rest: ti.template(), ledger: ti.template()):
+    def push(self, c, dt, shapes: ti.template(), rest: ti.template(), balance: ti.template()):
         """Forces between the grains of a chunk and all that they touch."""
         start, end = self.chunk_range(c)
         # First find out which pairs touch, without a branch that a processor would have to guess; then their forces.
@@ -124,13 +119,13 @@ class Steps:
             if touching != (code < 0):
                 self.pair[s] = ~code
                 if code < 0:
-                    if ti.static(ledger.on):
-                        self.book_pair(c, s, i, bits & INDEX_MASK, d, ledger.nothing(), dt, rest, ledger)
+                    if ti.static(balance.on):
+                        self.balance_pair(c, s, i, bits & INDEX_MASK, d, balance.nothing(), dt, rest, balance)
                     self.slide[s] = ti.Vector.zero(self.real, 4)
                     if ti.static(self.rolling):
                         self.roll[s] = ti.Vector.zero(self.real, 3)
-        if ti.static(ledger.on):
-            self.book_weight(c, dt, ledger)
+        if ti.static(balance.on):
+            self.balance_weight(c, dt, balance)
         p = self.grain_pair[None]
         largest = ti.cast(0.0, self.real)
         held = ti.Vector.zero(self.real, 3)
@@ -189,12 +184,12 @@ class Steps:
             if ti.static(rest.on):
                 if j >= self.count[AWAKE]:
                     held -= f
-            if ti.static(ledger.on):
-                self.book_pair(c, s, i, j, d, ledger.parts(damped, f_t, turn), dt, rest, ledger)
-                self.book_turning(c, bits, f, f_t, turn, n, arm_j, dt, rest, ledger)
+            if ti.static(balance.on):
+                self.balance_pair(c, s, i, j, d, balance.parts(damped, f_t, turn), dt, rest, balance)
+                self.balance_turning(c, bits, f, f_t, turn, n, arm_j, dt, rest, balance)
             largest = ti.max(largest, overlap * by_sum)
         for s in range(c * self.count[NEAR_ROOM], self.near_end[c]):
-            largest = ti.max(largest, self.push_near(c, s, dt, shapes, ledger))
+            largest = ti.max(largest, self.push_near(c, s, dt, shapes, balance))
         self.overlap[c] = ti.max(self.overlap[c], largest)
         if ti.static(rest.on):
             rest.held[c] = rest.held[c] + held
@@ -210,7 +205,7 @@ class Steps:
         return d
 
     @ti.func
-    def push_near(self, c, s, dt, shapes: ti.template(), ledger: ti.template()):
+    def push_near(self, c, s, dt, shapes: ti.template(), balance: ti.template()):
         """Force between a grain and a body; returns overlap over diameter."""
         i = self.near_grain[s]
         b = self.near_body[s]
@@ -247,18 +242,18 @@ class Steps:
                 self.pushes[c, b][k] = self.pushes[c, b][k] - f[k]
                 self.pushes[c, b][k + 3] = self.pushes[c, b][k + 3] + t_body[k]
             result = overlap / (2.0 * x.w)
-            if ti.static(ledger.on):
-                now = ledger.parts(damped, f_t, turn)
-                ledger.add(c, ledger.took(ledger.near_last[s], now, parting, v_t, spin, dt))
-                ledger.near_last[s] = now
-                self.book_body(c, i, b, f, t_body, n, arm, arm_i, dt, ledger)
+            if ti.static(balance.on):
+                now = balance.parts(damped, f_t, turn)
+                balance.add(c, balance.took(balance.near_last[s], now, parting, v_t, spin, dt))
+                balance.near_last[s] = now
+                self.balance_body(c, i, b, f, t_body, n, arm, arm_i, dt, balance)
         else:
-            if ti.static(ledger.on):
-                before = ledger.near_last[s]
+            if ti.static(balance.on):
+                before = balance.near_last[s]
                 if before.norm_sqr() > 0.0:
                     v_n, v_t, spin, parting = self.near_rates(i, b, n, curvature, arm, x.w - overlap, dt)
-                    ledger.add(c, ledger.took(before, ledger.nothing(), parting, v_t, spin, dt))
-                    ledger.near_last[s] = ledger.nothing()
+                    balance.add(c, balance.took(before, balance.nothing(), parting, v_t, spin, dt))
+                    balance.near_last[s] = balance.nothing()
             self.near_slide[s] = ti.Vector.zero(self.real, 4)
             self.near_roll[s] = ti.Vector.zero(self.real, 3)
         return result
@@ -293,7 +288,7 @@ class Steps:
         steps: int,
         shapes: ti.template(),
         rest: ti.template(),
-        ledger: ti.template(),
+        balance: ti.template(),
     ):
         """Up to ``steps`` steps on a CPU; stops by itself where new lists are needed.
 
@@ -333,7 +328,7 @@ class Steps:
                                     if phase % 2 == 0:
                                         self.move(c, dt, limit, ti.Vector([gx, gy, gz]), keep)
                                     else:
-                                        self.push(c, dt, shapes, rest, ledger)
+                                        self.push(c, dt, shapes, rest, balance)
                                     ti.atomic_add(self.ticket[FINISHED], 1)
                         phase += 1
                         # Leave when it takes long (another program has the core of whom we wait for): the rest is done
@@ -355,7 +350,7 @@ class Steps:
         keep: float,
         shapes: ti.template(),
         rest: ti.template(),
-        ledger: ti.template(),
+        balance: ti.template(),
     ):
         """One step on a GPU, where every grain is a chunk; nothing where new lists are needed, as in ``run``."""
         for c in range(self.count[CHUNKS]):
@@ -363,19 +358,19 @@ class Steps:
                 self.move(c, dt, limit, ti.Vector([gx, gy, gz]), keep)
         for c in range(self.count[CHUNKS]):
             if self.moved[None] == 0:
-                self.push(c, dt, shapes, rest, ledger)
+                self.push(c, dt, shapes, rest, balance)
                 if c == 0:
                     self.done[None] = self.done[None] + 1
             elif c == 0:
                 self.halted[None] = 1
 
     @ti.kernel
-    def push_all(self, dt: float, shapes: ti.template(), rest: ti.template(), ledger: ti.template()):
+    def push_all(self, dt: float, shapes: ti.template(), rest: ti.template(), balance: ti.template()):
         """The forces of the step that was interrupted by new lists."""
         for _ in range(1):
             self.ticket[QUEUE] = 0
         for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
             c = self.next_chunk(w, True)
             while c < self.count[CHUNKS]:
-                self.push(c, dt, shapes, rest, ledger)
+                self.push(c, dt, shapes, rest, balance)
                 c = self.next_chunk(w, False)

@@ -2,14 +2,23 @@
 
 import warnings
 from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dem.grains.materials import Material
 
-__all__ = ["BedFailure", "BedSettings", "Grains", "State"]
+__all__ = ["BedFailure", "BedSettings", "EnginePart", "Grains", "State"]
 
 State = dict[str, np.ndarray]  # Arrays by name: everything that the next step of a bed depends on, to the bit
+
+
+class EnginePart:
+    """A part of ``dem.engine.engine.Engine``, whose fields and functions it uses."""
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any: ...
 
 
 class BedFailure(RuntimeError):  # noqa: N818 - the name in the architecture

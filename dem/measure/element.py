@@ -2,9 +2,8 @@
 
 Gravity is off, so that every layer bears the same stresses and no weight feigns a cohesion (docs/bed.md, Strength); the
 sample is periodic sideways, floor and lid are planes on which grains neither slide nor roll, as in
-``dem.measure.shearing``.
-Nothing in it has a length but the grains: stresses scale with the pressure, and with cohesion the strength depends on
-surface energy over pressure times diameter.
+``dem.measure.shearing``. Nothing in it has a length but the grains: stresses scale with the pressure, and with cohesion
+the strength depends on surface energy over pressure times diameter.
 
 1. Grains of a loose jittered column are pressed together by the lid under servo control, in a drag and without
    adhesion, which comes back once the sample rests (sticking grains would stay apart in a gauze of chains, at a packing

@@ -101,8 +101,6 @@ class Laboratory(Preparation[B]):
         margin = min(self.bed.size[2], 0.3 * block)
         return 0.5 * max(widths) + margin, self.bed.size[0] - 0.5 * max(widths) - margin
 
-    # ------------------------------------------------------------------ kept and found again
-
     def _to_keep(self) -> Json:
         return {"recipe": self._recipe, "done": self.done, "reports": [asdict(report) for report in self.reports]}
 
@@ -111,8 +109,6 @@ class Laboratory(Preparation[B]):
             return False
         self.reports, self.done = [StageReport(**report) for report in kept["reports"]], int(kept["done"])
         return True
-
-    # ------------------------------------------------------------------ the stages
 
     def _rain_down(self, stage: Stage) -> Json:
         if "settle" not in self.notes:

@@ -57,8 +57,6 @@ class Preparation(Generic[B]):
         self._kept = time.monotonic()
         self._densest: State = {}  # state of the bed where taps had it densest
 
-    # ------------------------------------------------------------------ kept and found again
-
     def keep(self) -> None:
         """Write it down as it is."""
         if self._path is not None:
@@ -113,8 +111,6 @@ class Preparation(Generic[B]):
             raise
         if self._now() - self._kept >= _KEEP_INTERVAL:
             self.keep()
-
-    # ------------------------------------------------------------------ the stages
 
     @property
     def _energy(self) -> float:
