@@ -49,8 +49,7 @@ def work_of_adhesion(surface_energy: float) -> float:
 def pull_off(law: str, *, surface_energy: float, radius: float) -> float:
     """The largest force with which a pair of effective radius R* [m] can be pulled before it parts [N]; 0 for "none".
 
-    Raises:
-        KeyError: an unknown law.
+    Raises KeyError: an unknown law.
     """
     factor = {"none": 0.0, "dmt": 2.0, "jkr": 1.5}[law]
     return factor * math.pi * work_of_adhesion(surface_energy) * radius
@@ -64,8 +63,7 @@ def jkr_range(*, surface_energy: float, radius: float, effective_young: float) -
 def jkr_contact(overlap: float, *, surface_energy: float, radius: float, effective_young: float) -> tuple[float, float]:
     """Contact radius [m] and force [N] of a JKR pair at an overlap [m], at rest.
 
-    Raises:
-        ValueError: the pair has parted at this overlap.
+    Raises ValueError: the pair has parted at this overlap.
     """
     w = work_of_adhesion(surface_energy)
     unit = (2 * math.pi * w * radius**2 / effective_young) ** (1 / 3)

@@ -78,8 +78,7 @@ def damping_factor(restitution: float, *, tensile: bool = False) -> float:
         tensile: True where the contact may pull at its end (Tsuji et al. 1992: 2 sqrt(5/6) |beta|); False where the
             force is cut at zero (Thornton et al. 2013's fit up to 0.9).
 
-    Raises:
-        ValueError: a restitution outside 0.01 to 1.
+    Raises ValueError: a restitution outside 0.01 to 1.
     """
     if not _LEAST_RESTITUTION <= restitution <= 1:
         raise ValueError(f"restitution = {restitution} must lie between {_LEAST_RESTITUTION} and 1")
@@ -122,8 +121,7 @@ def pair_parameters(
         restitution, friction, rolling_friction: [1].
         surface_energy: of the pair [J/m2].
 
-    Raises:
-        ValueError: from ``damping_factor``; a negative friction or surface energy.
+    Raises ValueError: from ``damping_factor``; a negative friction or surface energy.
     """
     if not (friction >= 0 and rolling_friction >= 0):
         raise ValueError(f"friction = {friction} and rolling friction = {rolling_friction} must not be negative")

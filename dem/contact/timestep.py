@@ -65,8 +65,7 @@ def stable_step(restitution: float, *, neighbours: float = NEIGHBOURS, sticking:
         neighbours: z, of each grain, in all directions alike; 3 is a pair alone.
         sticking: with friction's springs, for spins of one sense; without, for the normal forces.
 
-    Raises:
-        ValueError: from ``damping_factor``.
+    Raises ValueError: from ``damping_factor``.
     """
     c, n = damping_factor(restitution), neighbours / 3
     # a q^2 + 2 b q = 4
@@ -96,8 +95,7 @@ def time_step_for(material: Material, *, diameter: float, max_overlap: float, wa
     For grains so strongly damped that an eighth may be unstable (e below 0.48 with friction, below 0.3 without), the
     longest that is stable.
 
-    Raises:
-        ValueError: the step wanted is not positive, or longer than ``longest_step``.
+    Raises ValueError: the step wanted is not positive, or longer than ``longest_step``.
     """
     shortest = contact_time(material, diameter=diameter, max_overlap=max_overlap)
     longest = longest_step(material, diameter=diameter, max_overlap=max_overlap)
@@ -128,8 +126,7 @@ def choose_young(
         max_overlap: the bound, over diameter [1].
         diameter: of the grains [m]; only cohesion needs it, whose pull on a plane, 2 pi gamma d, presses as well.
 
-    Raises:
-        ValueError: cohesion, and no diameter.
+    Raises ValueError: cohesion, and no diameter.
     """
     pressed = 1.5 * CHAIN * pressure / max_overlap**1.5
     if material.cohesion != "none":

@@ -107,8 +107,7 @@ class BedBase:
         What is read of the bed counts sleepers in, with no speed and no force. The floor's reaction has what they
         would have passed on to it.
 
-        Raises:
-            ValueError: a bed on a GPU, without floor or gravity, or whose grains cohere by JKR.
+        Raises ValueError: a bed on a GPU, without floor or gravity, or whose grains cohere by JKR.
         """
         self.check_valid()
         if self.engine.gpu:
@@ -180,9 +179,8 @@ class BedBase:
             drag_time: the grains settle as in a fluid that takes their speed away with this time constant [s]; a tool
                 of preparation, off by default.
 
-        Raises:
-            ValueError: steps that are no whole number, a drag time shorter than two steps.
-            BedFailure: a grain left the box, a number is not a number, or an overlap went past its bound.
+        Raises ValueError: steps that are no whole number, a drag time shorter than two steps. BedFailure: a grain left
+        the box, a number is not a number, or an overlap went past its bound.
         """
         self.check_valid()
         e = self.engine

@@ -44,9 +44,8 @@ class BedBodies(BedBase):
             young, poisson: of the body; rigid when None. [Pa], [1].
             surface_energy: of a grain and the body [J/m2], see ``dem.Facing``; the grains' own when None.
 
-        Raises:
-            ValueError: no shape, a number that no pair can have, too many bodies, a grain already in contact by more
-                than the overlap bound.
+        Raises ValueError: no shape, a number that no pair can have, too many bodies, a grain already in contact by more
+        than the overlap bound.
         """
         self.check_valid()
         facing = Facing(
@@ -126,8 +125,7 @@ class BedBodies(BedBase):
             position: of its origin [m]. velocity: [m/s].
             turn: unit quaternion, scalar first. spin: angular velocity [rad/s].
 
-        Raises:
-            ValueError: a body that is not there, numbers that are not finite, a turn that is not of length 1.
+        Raises ValueError: a body that is not there, numbers that are not finite, a turn that is not of length 1.
         """
         self.check_body(body)
         e = self.engine
@@ -160,8 +158,7 @@ class BedBodies(BedBase):
             bodies: their numbers. positions, velocities, spins: [m], [m/s], [rad/s], each of shape [body, 3].
             turns: unit quaternions, scalar first, shape [body, 4].
 
-        Raises:
-            ValueError: a body that is not there, numbers that are not finite, a wrong shape, a turn not of length 1.
+        Raises ValueError: a body that is not there, numbers that are not finite, a wrong shape, a turn not of length 1.
         """
         self.check_valid()
         count = int(self.engine.body_count[None])

@@ -79,10 +79,9 @@ class BedCore(BedBodies):
             tensile: whether the damping may pull at the end of a contact (as LIGGGHTS does by default).
             precision, arch, threads: see ``dem.engine.runtime.start``.
 
-        Raises:
-            ValueError: arrays of wrong shape, numbers that are not finite, a negative size, a step too long, a bed
-                narrower than three grains, grains that overlap one another or the floor by more than ``max_overlap``,
-                grains outside the box.
+        Raises ValueError: arrays of wrong shape, numbers that are not finite, a negative size, a step too long, a bed
+        narrower than three grains, grains that overlap one another or the floor by more than ``max_overlap``, grains
+        outside the box.
         """
         stuff = find_material(material)
         if young is not None:
@@ -200,8 +199,7 @@ class BedCore(BedBodies):
     def restore(self, values: State) -> None:
         """Go back to a state of this bed, or of one that was made with the same settings.
 
-        Raises:
-            ValueError: a state of another number of grains, of another layout or precision.
+        Raises ValueError: a state of another number of grains, of another layout or precision.
         """
         self.check_valid()
         state.put_back(self, values)
@@ -217,8 +215,7 @@ class BedCore(BedBodies):
     def rollback(self, kept: Checkpoint) -> None:
         """Go back to the last checkpoint, to the bit; as often as you like.
 
-        Raises:
-            ValueError: another checkpoint has been taken since, or sleep or the contact work has begun or ended.
+        Raises ValueError: another checkpoint has been taken since, or sleep or the contact work has begun or ended.
         """
         self.check_valid()
         checkpoint.roll_back(self, kept)
@@ -234,8 +231,7 @@ class BedCore(BedBodies):
     def load(cls, path: str | Path, *, arch: str = "cpu", threads: int | None = None) -> Self:
         """Read a bed that ``save`` wrote; it goes on to the same bits on the same kind of processor.
 
-        Raises:
-            ValueError: the file is missing or is not a bed.
+        Raises ValueError: the file is missing or is not a bed.
         """
         settings, values, precision = state.read_file(Path(path))
         bed = cls(settings, values["position"][:, 3].astype(float), precision=precision, arch=arch, threads=threads)
@@ -274,9 +270,8 @@ class BedCore(BedBodies):
             times: how often [1]; with 1 it is a copy.
             height: top of the box [m], above which a grain is lost; this bed's where that is higher, or when None.
 
-        Raises:
-            ValueError: `times` that is no whole number of 1 or more; a height that is no length; a bed with bodies
-                beside its floor.
+        Raises ValueError: `times` that is no whole number of 1 or more; a height that is no length; a bed with bodies
+        beside its floor.
         """
         self.check_valid()
         if isinstance(times, bool) or int(times) != times or times < 1:
@@ -339,8 +334,7 @@ class BedCore(BedBodies):
         against tangential forces, and against rolling and twisting torques; it is lost but for what their springs hold
         more than at the start (``dem.engine.energy.bed_energies``).
 
-        Raises:
-            ValueError: it is not tracked.
+        Raises ValueError: it is not tracked.
         """
         if not self.engine.balance.on:
             raise ValueError("this bed tracks no contact work: track_contact_work() starts it")
@@ -361,8 +355,7 @@ class BedCore(BedBodies):
             the others took. grains = grains then + outside - first_body - bodies, to round-off; not with a drag, and
             not through ``set_gravity``, which shifts the velocities.
 
-        Raises:
-            ValueError: it is not tracked.
+        Raises ValueError: it is not tracked.
         """
         if not self.engine.balance.on:
             raise ValueError("this bed tracks no contact work: track_contact_work() starts it")

@@ -64,8 +64,7 @@ def take_engine(owner: Any, **settings: Any) -> "Engine":
     """An engine for ``owner``, set up by ``settings`` (those of ``Engine.set_up``, and ``rolling``, ``tensile``,
     ``cohesion``, ``real``, ``gpu``, ``threads``); one that an earlier owner has left, where there is one of the shape.
 
-    Raises:
-        ValueError: a bed less than three grains wide.
+    Raises ValueError: a bed less than three grains wide.
     """
     fixed = {key: settings.pop(key) for key in ("rolling", "tensile", "cohesion", "real", "gpu", "threads")}
     plan = Engine.plan(gpu=fixed["gpu"], **settings)

@@ -51,9 +51,8 @@ def start(*, arch: str = "cpu", threads: int | None = None, precision: str = "fl
         threads: CPU threads; all that the machine has when None.
         precision: "float64" or "float32".
 
-    Raises:
-        ValueError: an unknown architecture or precision, or a number of threads below one.
-        RuntimeError: the architecture is not available on this machine.
+    Raises ValueError: an unknown architecture or precision, or a number of threads below one. RuntimeError: the
+    architecture is not available on this machine.
     """
     global _current, _generation
     if arch not in ARCHITECTURES:

@@ -43,8 +43,7 @@ def steepest(spread: float) -> float:
     Args:
         spread: of the diameters about their mean, over it [1].
 
-    Raises:
-        ValueError: a spread so wide that grains of one place would drain through one another.
+    Raises ValueError: a spread so wide that grains of one place would drain through one another.
     """
     if not 0 <= spread < (1 - THROAT) / (1 + THROAT):
         raise ValueError(
@@ -182,8 +181,7 @@ class Graded:
         Returns:
             Centres [m], shape [grain_count, 3]; radii [m], shape [grain_count]. In the order of a curve through space.
 
-        Raises:
-            RuntimeError: no room found, which a bed that passes ``check`` does not come to.
+        Raises RuntimeError: no room found, which a bed that passes ``check`` does not come to.
         """
         top = volume / (_START * size[0] * size[1])
         count = round(volume / (math.pi / 6 * self.fine**3 * (1 + self.spread**2)))

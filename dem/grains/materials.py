@@ -61,8 +61,7 @@ class Material:
         surface_energy: gamma [J/m2], half the work of adhesion of two grains; 0 without cohesion.
         grain: mean diameter of the grains for which ``surface_energy`` holds [m], see ``for_grain``; None: of all.
 
-    Raises:
-        ValueError: a number that no material can have, with the key and what would do.
+    Raises ValueError: a number that no material can have, with the key and what would do.
     """
 
     name: str
@@ -135,8 +134,7 @@ class Facing:
         young: of what it is made of [Pa]; rigid when None. poisson: [1].
         surface_energy: of the pair [J/m2], half its work of adhesion; 0 for what grains do not stick to.
 
-    Raises:
-        ValueError: a number that no pair can have, with the key and what would do.
+    Raises ValueError: a number that no pair can have, with the key and what would do.
     """
 
     friction: float | None = None
@@ -200,9 +198,8 @@ PRESETS = Path(__file__).parents[1] / "presets"
 def read_material(path: str | Path) -> Material:
     """The material in a file of the form that this module's docstring gives.
 
-    Raises:
-        ValueError: a file that cannot be read or is not of this form, a key that there is not or that lacks, a value of
-            the wrong kind or that no material can have, the name of a material that ships with other numbers.
+    Raises ValueError: a file that cannot be read or is not of this form, a key that there is not or that lacks, a value
+    of the wrong kind or that no material can have, the name of a material that ships with other numbers.
     """
     stuff = _read(Path(path))
     known = MATERIALS.get(stuff.name)
@@ -285,8 +282,7 @@ def material(name: str | Path | Material, *, grain: float | None = None) -> Mate
         name: of a material that ships, or the path of a file: what ends in .toml or has a slash in it.
         grain: mean diameter of the grains that it is wanted for [m], see ``Material.for_grain``.
 
-    Raises:
-        ValueError: no material of that name, with those there are; a file that will not do (``read_material``).
+    Raises ValueError: no material of that name, with those there are; a file that will not do (``read_material``).
     """
     stuff = name if isinstance(name, Material) else _find(name)
     return stuff if grain is None else stuff.for_grain(grain)

@@ -25,8 +25,7 @@ def draw_radii(
     Returns:
         Radii [m], shape [grain_count]; at least one.
 
-    Raises:
-        ValueError: a volume that is not positive, or what ``dem.grains.sizes.sizes_of`` refuses.
+    Raises ValueError: a volume that is not positive, or what ``dem.grains.sizes.sizes_of`` refuses.
     """
     if not (math.isfinite(volume) and volume > 0):
         raise ValueError(f"volume = {volume} must be positive [m3]")

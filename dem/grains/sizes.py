@@ -236,8 +236,7 @@ def _ascending(values: Sequence[float], *, strictly: bool) -> bool:
 def sizes_of(grain: float | Sizes, spread: float | None = None) -> Sizes:
     """The distribution that ``grain`` is, or the uniform one about that mean diameter [m] (spread 0.15 when None).
 
-    Raises:
-        ValueError: a grain that is neither, or a spread beside a distribution, which has one of its own.
+    Raises ValueError: a grain that is neither, or a spread beside a distribution, which has one of its own.
     """
     if isinstance(grain, Sizes):
         if spread is not None:

@@ -89,9 +89,8 @@ def cut_and_load(
         most: gravity to which a face is tried, over the bed's own [1]: the step of 1.41 next to it.
         tell: called with the share done, 0 to 1; a guess.
 
-    Raises:
-        ValueError: a tilted bed; a strip that leaves too little for two faces; a ``most`` that is not above ``LEAST``.
-        BedFailure: the bed did not come to rest, or its own reasons.
+    Raises ValueError: a tilted bed; a strip that leaves too little for two faces; a ``most`` that is not above
+    ``LEAST``. BedFailure: the bed did not come to rest, or its own reasons.
     """
     grain = 2 * float(bed.grains().radius.mean())
     if bed.gravity[0] or bed.gravity[1] or not bed.gravity[2] < 0:

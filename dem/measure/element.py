@@ -148,9 +148,7 @@ def press_element(
             own, rolling friction as well, when None.
         spread: diameters are uniform within 1 +- this [1]. max_overlap: the grains are softened to it.
 
-    Raises:
-        ValueError: a pressure, a length or a friction that cannot be.
-        BedFailure: it did not come to rest.
+    Raises ValueError: a pressure, a length or a friction that cannot be. BedFailure: it did not come to rest.
     """
     if pressed_friction is not None and not 0 <= pressed_friction < math.inf:
         raise ValueError(f"pressed_friction = {pressed_friction} must be 0 or more")
@@ -247,9 +245,8 @@ def shear_element(
         strain: how far, over the height [1]. inertial_number: [1].
         tell: called with the share done, 0 to 1.
 
-    Raises:
-        ValueError: as ``press_element``; a strain or a number that is not positive.
-        BedFailure: it did not come to rest, or the bed's own reasons.
+    Raises ValueError: as ``press_element``; a strain or a number that is not positive. BedFailure: it did not come to
+    rest, or the bed's own reasons.
     """
     for name, value in (("strain", strain), ("inertial_number", inertial_number)):
         if not (math.isfinite(value) and value > 0):

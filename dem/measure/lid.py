@@ -52,8 +52,7 @@ class Lid:
             pressure: wanted [Pa].
             energy: a function that gives the grains' mean kinetic energy over m g d [1].
 
-        Raises:
-            BedFailure: the pressure is not met in time.
+        Raises BedFailure: the pressure is not met in time.
         """
         bed, notes, target = self.bed, self.notes, pressure * self._area
         if stay and notes["lifting"]:

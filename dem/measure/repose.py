@@ -105,9 +105,8 @@ def angle_of_repose(
         rough: whether grains neither slide nor roll on the plate; else they do as on one another.
         tell: called with the share done, 0 to 1; a guess.
 
-    Raises:
-        ValueError: a tilted bed, a slot narrower than three diameters, a bed too narrow for two slopes.
-        BedFailure: it did not come to rest, or what stays is too short to have a slope.
+    Raises ValueError: a tilted bed, a slot narrower than three diameters, a bed too narrow for two slopes. BedFailure:
+    it did not come to rest, or what stays is too short to have a slope.
     """
     grain = 2 * float(bed.grains().radius.mean())
     slot = SLOT * grain if slot is None else slot

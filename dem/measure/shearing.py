@@ -74,9 +74,8 @@ def shear_bed(
         inertial_number: sets the speed [1]; below 1e-2 the strength hardly depends on it (GDR MiDi 2004).
         tell: called with the share done, 0 to 1.
 
-    Raises:
-        ValueError: a pressure, a way or a number that is not positive.
-        BedFailure: the pressure is not met, or the bed's own reasons.
+    Raises ValueError: a pressure, a way or a number that is not positive. BedFailure: the pressure is not met, or the
+    bed's own reasons.
     """
     for name, value in (("pressure", pressure), ("way", way), ("inertial_number", inertial_number)):
         if not (math.isfinite(value) and value > 0):

@@ -36,8 +36,7 @@ def bed_shelf() -> Path:
 def find_bed(bed: str | Path) -> Path:
     """The file that ``bed`` means: a path, a run folder that holds bed.npz, or a name on the shelf.
 
-    Raises:
-        ValueError: there is none, with the names there are.
+    Raises ValueError: there is none, with the names there are.
     """
     path = Path(bed)
     for candidate in (path, path / "bed.npz", bed_shelf() / f"{path}.npz"):
@@ -76,8 +75,7 @@ def save_prepared(prepared: Prepared, path: str | Path) -> Path:
 def read_preparation(path: str | Path) -> Prepared:
     """What a bed's file says of its preparation, without the bed; a bed that ``Bed.save`` wrote has none.
 
-    Raises:
-        ValueError: no such file, no bed in it, or a preparation that cannot be read.
+    Raises ValueError: no such file, no bed in it, or a preparation that cannot be read.
     """
     path = Path(path)
     try:
@@ -100,8 +98,7 @@ def load_prepared(
 ) -> Prepared[B]:
     """A bed of the class ``make`` with its preparation, as ``save_prepared`` wrote it.
 
-    Raises:
-        ValueError: as ``read_preparation`` and ``Bed.load``.
+    Raises ValueError: as ``read_preparation`` and ``Bed.load``.
     """
     about = read_preparation(path)
     bed = make.load(path, arch=arch, threads=threads)
@@ -112,8 +109,7 @@ def load_prepared(
 def share_bed(path: str | Path, to: str | Path) -> Path:
     """Copy a bed's file, compressed, to where it can be sent from. Returns the new file.
 
-    Raises:
-        ValueError: ``path`` is no bed; ``to`` is there already.
+    Raises ValueError: ``path`` is no bed; ``to`` is there already.
     """
     path, to = Path(path), Path(to)
     read_preparation(path)

@@ -39,8 +39,7 @@ def touching_as(bed: B, material: Material, *, floor: Facing | None = None) -> B
         material: of the same density, with or without rolling friction as the bed's own.
         floor: how they touch the floor, where there is one; as one another when None.
 
-    Raises:
-        ValueError: a material of which these grains cannot be.
+    Raises ValueError: a material of which these grains cannot be.
     """
     own = bed.material
     if material.density != own.density or (material.rolling_friction > 0) != (own.rolling_friction > 0):

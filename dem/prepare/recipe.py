@@ -114,8 +114,7 @@ def check_stages(stages: Sequence[Stage], *, size: Sequence[float], grain: float
     Args:
         size: of the bed, both widths and the depth [m]. grain: mean diameter [m].
 
-    Raises:
-        ValueError: with the key, the stage and what would do.
+    Raises ValueError: with the key, the stage and what would do.
     """
     if not stages:
         raise ValueError("stages is empty: 'rain' at least would do")

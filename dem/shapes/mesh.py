@@ -29,9 +29,8 @@ class Mesh:
         vertices: Corners [m], shape [vertex_count, 3]; those that coincide exactly are made one (STL repeats them).
         triangles: Rows of three vertices, shape [triangle_count, 3], counter-clockwise seen from outside.
 
-    Raises:
-        ValueError: no triangles; numbers that are not finite; a triangle without area or that names a vertex there is
-            not; an edge with other than two triangles; neighbours that disagree on the outside; a surface inside out.
+    Raises ValueError: no triangles; numbers that are not finite; a triangle without area or that names a vertex there
+    is not; an edge with other than two triangles; neighbours that disagree on the outside; a surface inside out.
     """
 
     vertices: np.ndarray
@@ -76,8 +75,7 @@ class Polyhedron:
         vertices: Corners in the body's frame [m], shape [vertex_count, 3].
         mesh: The hull as triangles.
 
-    Raises:
-        ValueError: fewer than four corners, all in one plane, or a corner inside the hull of the others.
+    Raises ValueError: fewer than four corners, all in one plane, or a corner inside the hull of the others.
     """
 
     vertices: np.ndarray | Sequence[Sequence[float]]
@@ -127,9 +125,8 @@ def mesh_from_file(path: str | Path, *, scale: float = 1.0, flip: bool = False) 
         scale: Metres per unit of the file. STL and OBJ do not say theirs; drawings are often in millimetres (0.001).
         flip: Turn every triangle round: for files whose normals point inwards.
 
-    Raises:
-        ValueError: no such file, one that meshio cannot read or that holds no surface; a scale that is not positive;
-            and what ``Mesh`` refuses.
+    Raises ValueError: no such file, one that meshio cannot read or that holds no surface; a scale that is not positive;
+    and what ``Mesh`` refuses.
     """
     import contextlib
     import io

@@ -18,8 +18,7 @@ def ensure(*, threads: int | None = None) -> None:
     Args:
         threads: CPU threads, all that this process may use when None; of no effect where Taichi runs already.
 
-    Raises:
-        RuntimeError: Taichi runs in single precision or not on the CPU: the batch needs double precision there.
+    Raises RuntimeError: Taichi runs in single precision or not on the CPU: the batch needs double precision there.
     """
     os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")  # its greeting would spoil what a script prints
     import taichi as ti

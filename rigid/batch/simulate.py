@@ -81,9 +81,8 @@ def simulate_batch(
         sample_every: record every so many steps instead. Without `times` and `sample_every` only the summary is kept.
         threads: CPU threads where Taichi is not running yet.
 
-    Raises:
-        ValueError: trials that do not go together, a number that cannot be, a time step too long for a ground.
-        RuntimeError: a trial's motion is no longer finite; Taichi runs in single precision in this process.
+    Raises ValueError: trials that do not go together, a number that cannot be, a time step too long for a ground.
+    RuntimeError: a trial's motion is no longer finite; Taichi runs in single precision in this process.
     """
     if not (math.isfinite(duration) and duration > 0):
         raise ValueError(f"duration = {duration!r} must be a number above 0")

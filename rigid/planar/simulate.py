@@ -43,9 +43,8 @@ def simulate(
         tolerance: relative error of a step, method "located".
         time_step: of method "paper" [s].
 
-    Raises:
-        ValueError: a number that cannot be, named; a platform that cannot stand; a time step too long for the ground.
-        RuntimeError: the motion is no longer finite.
+    Raises ValueError: a number that cannot be, named; a platform that cannot stand; a time step too long for the
+    ground. RuntimeError: the motion is no longer finite.
     """
     if method not in get_args(Method):
         raise ValueError(f"method = {method!r} must be one of {', '.join(get_args(Method))}")

@@ -220,9 +220,7 @@ def simulate(
         tolerance: relative error of a step.
         time_step: a fixed step [s] (events are located all the same) instead of one that follows `tolerance`.
 
-    Raises:
-        ValueError: what cannot be, named.
-        RuntimeError: the motion is no longer finite.
+    Raises ValueError: what cannot be, named. RuntimeError: the motion is no longer finite.
     """
     check_above_zero(duration=duration, sample_interval=sample_interval, tolerance=tolerance)
     if time_step is not None:
