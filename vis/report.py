@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import base64
-import io
-from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
-from PIL import Image
-
-from vis.page.columns import template
 from vis.page.folder import RunFolder, from_python, read_folder
+from vis.page.page import Block, figure, write_template
+from vis.page.report import Progress
 from vis.penetrate.amended import is_amended
-from vis.penetrate.plot_parts import Plot
 from vis.penetrate.plots import make_plots
 from vis.penetrate.summary import summarise
 from vis.pictures.pictures import Picture, Pictures, make_pictures
@@ -34,17 +29,17 @@ _OTHERS = {
     "diagnose": ("vis.diagnose.report", "write_diagnosis_report"),
     "bed make": ("vis.bed.report", "write_bed_report"),
     "bed refine": ("vis.bed.report", "write_bed_report"),
-    "bed test shear": ("vis.bed.shear", "write_shear_report"),
-    "bed test repose": ("vis.bed.repose", "write_repose_report"),
-    "bed test cone": ("vis.bed.cone", "write_cone_report"),
-    "bed test cut": ("vis.bed.cut", "write_cut_report"),
+    "bed test shear": ("vis.bed.tests", "write_shear_report"),
+    "bed test repose": ("vis.bed.tests", "write_test_report"),
+    "bed test cone": ("vis.bed.tests", "write_test_report"),
+    "bed test cut": ("vis.bed.tests", "write_test_report"),
     "bed calibrate": ("vis.bed.calibrate", "write_calibration_report"),
     "compare": ("vis.compare.report", "write_compare_report"),
     "validate": ("vis.bed.validation", "write_validation_report"),
 }
 
 
-def write_report(folder: str | Path, *, pictures: bool = True, progress: Callable[[float], None] | None = None) -> Path:
+def write_report(folder: str | Path, *, pictures: bool = True, progress: Progress | None = None) -> Path:
     """Make every plot and picture of a run folder, and its `report.html`.
 
     Parts that are missing (a run that was stopped, no frames, no OpenGL) are said in the report.
@@ -78,15 +73,11 @@ def write_report(folder: str | Path, *, pictures: bool = True, progress: Callabl
             drawn = Pictures(notes=[f"Pictures could not be drawn ({type(error).__name__}: {error})."])
     context = summarise(run)
     context["missing"] = [*context["missing"], *(text for text in undrawn if _asked_for(run, text))]
-    context["plots"] = {plot.name: _figure(plot, path) for plot, path in plots}
+    context["plots"] = {plot.name: figure(path, title=plot.title, caption=plot.caption) for plot, path in plots}
     context["pictures"] = [_picture(picture) for picture in drawn.stills if picture.file.exists()]
     context["animation"] = _picture(drawn.animation) if drawn.animation and drawn.animation.file.exists() else None
-    context["method"] = drawn.method
-    context["picture_notes"] = drawn.notes
-    report = run.path / "report.html"
-    temporary = report.with_name("report.html.part")
-    temporary.write_text(template("report.html").render(**context), encoding="utf-8")
-    temporary.replace(report)
+    context |= {"method": drawn.method, "picture_notes": drawn.notes}
+    report = write_template(run.path / "report.html", "report.html", **context)
     tell(1.0)
     return report
 
@@ -99,26 +90,6 @@ def _asked_for(run: RunFolder, undrawn: str) -> bool:
     return not from_python(run) and (what not in _NEEDS or bool(run.of_kind(_NEEDS[what])))
 
 
-def _figure(plot: Plot, path: Path) -> dict[str, str]:
-    return {
-        "title": plot.title,
-        "caption": plot.caption,
-        "file": path.name,
-        "data": _data_url(path.read_bytes(), "png"),
-    }
-
-
-def _picture(picture: Picture) -> dict[str, str]:
-    """The picture for the page; stills as JPEG, a quarter of the PNG's size, while the PNG stays in the folder."""
-    if picture.file.suffix == ".gif":
-        data = _data_url(picture.file.read_bytes(), "gif")
-    else:
-        buffer = io.BytesIO()
-        with Image.open(picture.file) as image:
-            image.convert("RGB").save(buffer, "JPEG", quality=90, subsampling=0)
-        data = _data_url(buffer.getvalue(), "jpeg")
-    return {"title": picture.title, "caption": picture.caption, "file": picture.file.name, "data": data}
-
-
-def _data_url(data: bytes, kind: str) -> str:
-    return f"data:image/{kind};base64,{base64.b64encode(data).decode('ascii')}"
+def _picture(picture: Picture) -> Block:
+    """The picture for the page, small; stills stay in the folder as PNG."""
+    return figure(picture.file, title=picture.title, caption=picture.caption, show_file=True, small=True)

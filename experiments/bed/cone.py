@@ -82,7 +82,7 @@ def _carry_out(settings: BedConeSettings, folder: RunFolder, progress: Progress)
         }
 
     return carry_out(
-        settings, folder, progress, test=test, result=_result, report="vis.bed.cone:write_cone_report",
+        settings, folder, progress, test=test, result=_result, report="vis.bed.tests:write_test_report",
         copies=settings.pushes,
     )  # fmt: skip
 

@@ -64,7 +64,7 @@ def _carry_out(settings: BedCutSettings, folder: RunFolder, progress: Progress) 
         return _result(runs, settings.friction_angle, settings.most)
 
     return carry_out(
-        settings, folder, progress, test=test, result=result, report="vis.bed.cut:write_cut_report",
+        settings, folder, progress, test=test, result=result, report="vis.bed.tests:write_test_report",
         bearing=1.0 + settings.most,
     )  # fmt: skip
 

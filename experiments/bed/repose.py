@@ -58,7 +58,7 @@ def _carry_out(settings: BedReposeSettings, folder: RunFolder, progress: Progres
         }
 
     return carry_out(
-        settings, folder, progress, test=test, result=_result, report="vis.bed.repose:write_repose_report",
+        settings, folder, progress, test=test, result=_result, report="vis.bed.tests:write_test_report",
         bearing=BEARING,
     )  # fmt: skip
 

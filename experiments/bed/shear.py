@@ -120,7 +120,7 @@ def _carry_out(settings: BedShearSettings, folder: RunFolder, progress: Progress
         result = _result(settings, runs, grain, prepared.recipe, bed)
         folder.write_result(result)
         progress.stage("report", total=1.0)
-        from vis.bed.shear import write_shear_report
+        from vis.bed.tests import write_shear_report
 
         write_shear_report(folder.path, progress=progress.update)
     return result

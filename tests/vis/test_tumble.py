@@ -8,7 +8,8 @@ from PIL import Image
 
 from vis import write_report
 from vis.page.page import Page, Section, figure, table, text, write_page
-from vis.tumble.report import read_columns, state_runs, write_tumble_report
+from vis.page.tumble_series import read_columns, state_runs
+from vis.tumble.report import write_tumble_report
 
 
 @pytest.fixture

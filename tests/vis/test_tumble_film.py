@@ -8,15 +8,15 @@ import pytest
 from PIL import Image
 
 from vis.compare.report import _alike
+from vis.film.film import Sheet, run_film_job
+from vis.film.reel import Reel
 from vis.pictures import arrows
 from vis.pictures.canvas import moved_since
 from vis.pictures.frames import FrameWriter
 from vis.pictures.meshes import spike_mesh
 from vis.pictures.stage import Eye
 from vis.pictures.tracks import height_map
-from vis.tumble.film import Sheet, run_film_job
 from vis.tumble.pictures import _film_times, draw_tracks, moments
-from vis.tumble.reel import Reel
 
 LENGTH, SIZE = 0.04, (0.12, 0.03)
 

@@ -1,8 +1,8 @@
-"""What the reports of `hedgebed bed test repose`, `cone` and `cut` share: the page, and grains seen from the side."""
+"""Reports of `hedgebed bed test`: shear, repose, cone and cut; grains seen from the side."""
 
 from __future__ import annotations
 
-import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,79 +10,45 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
+from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
 from vis.page.numbers import quote
-from vis.page.page import Page, Section, Tile, code, figure, table, text, write_page
-from vis.page.style import styled
-from vis.penetrate.plot_parts import Plot, new_panels
+from vis.page.page import Section, Tile, text
+from vis.page.plots import Plot, handle, legend_above, new_panels, shades, smooth_ratio
+from vis.page.report import Progress, Report, Result, again, tables
+from vis.page.style import BED, MODEL, styled
 from vis.pictures.frames import read_frames
 
-__all__ = ["said", "side_plot", "write_test_report"]
+__all__ = ["CUT_METHOD", "FALLEN_SHARE", "flank_lines", "said", "write_shear_report", "write_test_report"]
 
 Grains = Mapping[str, NDArray[Any]]
 
 
-def write_test_report(
-    folder: str | Path,
-    *,
-    plots: Callable[[Path, Mapping[str, Any]], list[Plot]],
-    tiles: Callable[[Mapping[str, Any]], list[Tile]],
-    method: Sequence[str],
-    progress: Callable[[float], None] | None = None,
-) -> Path:
-    """Make figures/ and report.html of the folder of a test, and return the report.
-
-    Args:
-        plots: draws what result and series of the folder say. tiles: the numbers on top.
-        method: how the test is made, a paragraph each.
-
-    Raises FileNotFoundError where the folder has no result.json or a series is missing.
-    """
-    tell = progress if progress is not None else lambda done: None
-    folder = Path(folder)
-    result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
-    figures = folder / "figures"
-    figures.mkdir(exist_ok=True)
-    drawn = [figure(plot.save(figures), title=plot.title, caption=plot.caption) for plot in plots(folder, result)]
-    tell(0.9)
-    one, command = result["runs"][0], result["experiment"]
-    every = [
-        (
-            name,
-            "–" if entry["value"] is None else f"{entry['value']:.5g}",
-            "–" if entry["std"] is None else f"{entry['std']:.2g}",
-            "" if entry["unit"] == "1" else entry["unit"],
-            entry["note"],
-        )
-        for name, entry in result["quantities"].items()
-    ]
+def write_test_report(folder: str | Path, *, progress: Progress | None = None) -> Path:
+    """Make figures/ and report.html of the folder of such a test, shear aside, and return the report."""
+    report = Report(folder, progress)
+    result, command = report.result, report.result["experiment"]
+    plots, tiles, method = _TESTS[command.rpartition(" ")[2]]
+    drawn = report.draw_all(plots(report))
+    report.tell(0.9)
+    one = result["runs"][0]
     bed = (
         f"{one['material']}, {one['grain_count']} grains of {1e3 * one['grain']:.3g} mm in "
         f"{' x '.join(f'{1e3 * side:.3g}' for side in one['size'][:2])} mm, {1e3 * one['surface']:.3g} mm deep, "
         f"packing {one['packing_fraction']:.3f}, {one['gravity']:.3g} m/s2; grains of {1e-6 * one['young']:.3g} MPa, "
         f"steps of {1e6 * one['time_step']:.3g} us."
     )
-    page = Page(
-        title=str(result["title"]),
-        lead=[f"hedgebed {result['version']}", command, f"{len(result['runs'])} runs"],
-        tiles=tiles(result),
-        warnings=[str(warning)[:1].upper() + str(warning)[1:] for warning in result["warnings"]],
-        sections=[
-            Section("", [table(t["head"], t["rows"], title=t["title"]) for t in result["tables"]] + drawn),
-            Section("How it is measured", [*(text(words) for words in method), text(f"First bed: {bed}")]),
-            Section(
-                "Every number of the result", [table(("quantity", "value", "std", "unit", "note"), every, words=True)]
-            ),
-            Section("To do this again", [text("In this folder:"), code(f"hedgebed {command} run.toml")]),
-        ],
-    )
-    report = write_page(folder / "report.html", page)
-    tell(1.0)
-    return report
+    sections = [
+        Section("", tables(result) + drawn),
+        Section("How it is measured", [*(text(words) for words in method), text(f"First bed: {bed}")]),
+        report.numbers(std=True),
+        again(f"hedgebed {command} run.toml"),
+    ]
+    return report.write(sections, lead=[command, f"{len(result['runs'])} runs"], tiles=tiles(result))
 
 
-def said(entry: Mapping[str, Any], scale: float = 1.0, unit: str = "") -> str:
+def said(entry: Result, scale: float = 1.0, unit: str = "") -> str:
     """A quantity with its spread, as a tile says it."""
     if entry["value"] is None:
         return "–"
@@ -90,9 +56,9 @@ def said(entry: Mapping[str, Any], scale: float = 1.0, unit: str = "") -> str:
     return f"{quote(value, None if std is None else scale * std)}{unit}"
 
 
-def side_plot(
-    folder: Path,
-    run: Mapping[str, Any],
+def _side_plot(
+    report: Report,
+    run: Result,
     draw: Callable[[Axes], None],
     *,
     title: str,
@@ -106,7 +72,7 @@ def side_plot(
         draw: draws over them, in mm. top: end of the colours' scale [mean diameters].
         shown: which grains, and where.
     """
-    frames = read_frames(folder, run["frames"])
+    frames = read_frames(report.folder, run["frames"])
     if not len(frames):
         return []
     grains, period = shown(frames[len(frames) - 1].grains), float(run["size"][0])
@@ -132,10 +98,345 @@ def _draw_grains(axis: Axes, grains: Grains, *, period: float, unit: float, top:
     )  # fmt: skip
     drawn.set_clim(0.0, top)
     axis.add_collection(drawn)
-    axis.set_aspect("equal")
-    axis.set_xlim(-5e2 * period, 5e2 * period)
-    axis.set_ylim(0.0, 1e3 * float((position[:, 2] + radius).max()) * 1.08)
-    axis.set_xlabel("x [mm]")
-    axis.set_ylabel("height [mm]")
+    highest = 1e3 * float((position[:, 2] + radius).max()) * 1.08
+    axis.set(
+        aspect="equal", xlim=(-5e2 * period, 5e2 * period), ylim=(0.0, highest), xlabel="x [mm]", ylabel="height [mm]"
+    )
     axis.grid(False)
     return drawn
+
+
+# A cone goes in -------------------------------------------------------------------------------------------------------
+
+
+_CONE_METHOD = (
+    "A cone on a thinner shaft goes straight down at constant speed into a bed that is periodic sideways, each push "
+    "into a fresh copy of its bed. Cone index: vertical force over the area of the cone's base. Depth is that of the "
+    "base, 0 where the cone is just all in, counted from the height where the bed's packing falls to half.",
+    "Gradient: slope of a straight line by least squares over all depths of the base from 0 on.",
+)
+
+
+def _cone_tiles(result: Result) -> list[Tile]:
+    quantities, one = result["quantities"], result["runs"][0]
+    return [
+        Tile("Gradient of the cone index", said(quantities["gradient"], 1e-6, " MPa/m"), "spread between the pushes"),
+        Tile("Over the unit weight", said(quantities["gradient_over_weight"]), "gradient / (bulk density g)"),
+        Tile("Cone index at the end", said(quantities["index_at_end"], 1e-3, " kPa"), "last tenth of the way"),
+        Tile("Speed", f"{1e3 * one['speed']:.3g} mm/s", f"v / sqrt(g D) = {one['froude']:.2g}"),
+    ]
+
+
+def _cone_plots(report: Report) -> list[Plot]:
+    return [_indices(report), *_cone_side(report)]
+
+
+def _indices(report: Report) -> Plot:
+    runs = report.result["runs"]
+    with styled():
+        drawing, (axis, lines) = new_panels(2, height=3.8, sharey=True)
+        handles = []
+        for run, colour in zip(runs, shades(len(runs)), strict=True):
+            columns = report.columns(run["series"])
+            depth = 1e3 * columns["base_depth_m"]
+            axis.plot(1e-3 * columns["index_Pa"], depth, color=colour, lw=1.2)
+            inside = depth >= 0
+            lines.plot(1e-3 * columns["index_Pa"][inside], depth[inside], color=colour, lw=0.6, alpha=0.5)
+            ends = np.array([0.0, depth[-1]])
+            lines.plot(1e-3 * (run["start"] + run["gradient"] * 1e-3 * ends), ends, color=colour, lw=2.0)
+            handles.append(handle(run["id"], colour))
+        axis.axhline(0.0, color=MODEL, lw=1.0, ls="--")
+        axis.invert_yaxis()
+        axis.set(ylabel="depth of the cone's base [mm]", title="all the way")
+        lines.set_title("fitted lines")
+        for panel in (axis, lines):
+            panel.set(xlim=(0.0, None), xlabel="cone index [kPa]")
+        legend_above(drawing, handles)
+    words = (
+        "Means over a 200th of the way. Dashed: the cone is just all in; before, its index counts the whole base while "
+        "only the tip is in the bed."
+    )
+    return Plot("index", "Cone index against depth", words, drawing)
+
+
+def _cone_side(report: Report) -> list[Plot]:
+    run = report.result["runs"][0]
+
+    def behind(grains: Mapping[str, Any]) -> Mapping[str, Any]:
+        period = np.array(run["size"][:2])
+        away = grains["position"][:, :2] - np.array(run["place"])
+        away -= period * np.round(away / period)
+        kept = {name: np.asarray(values) for name, values in grains.items()}
+        kept["position"] = np.column_stack([away, grains["position"][:, 2]])
+        return {name: values[away[:, 1] > 0] for name, values in kept.items()}
+
+    def draw(axis: Axes) -> None:
+        tip, length, half = 1e3 * (run["surface"] - run["depth"]), 1e3 * run["length"], 5e2 * run["diameter"]
+        top = axis.get_ylim()[1]
+        shaft, base = 0.5e3 * run["shaft"], tip + length
+        for x, z in (([0.0, half, -half], [tip, base, base]), ([-shaft, shaft, shaft, -shaft], [base, base, top, top])):
+            axis.fill(x, z, facecolor="#d9d9d9", edgecolor="black", lw=0.8)
+
+    words = "The half of the bed behind the cone's axis, grains coloured by how far each has moved."
+    return _side_plot(report, run, draw, title="The cone at its deepest", caption=words, top=2.0, shown=behind)
+
+
+# A face is cut --------------------------------------------------------------------------------------------------------
+
+
+FALLEN_SHARE = 0.2
+"""Of a wedge's grains: `dem.measure.cutting`'s, which a test holds it to; reports read run folders only."""
+
+CUT_METHOD = (
+    "A strip is dug out of a level bed at a tenth of its gravity, which leaves two vertical faces as high as the bed. "
+    "Then gravity rises by factors of 1.41, up to four times the bed's own, as in a centrifuge: a face of height h at "
+    "n g is loaded as one of n h at g. A face has fallen once a fifth of the grains in front of Rankine's plane behind "
+    "it (60 degrees from the horizontal) have moved by more than a diameter; between the last gravity that both faces "
+    "bore and the one at which one of them fell the middle is tried as well.",
+    "Critical height: geometric middle of the heights, at the bed's own gravity, that stood and that fell. Cohesion by "
+    "Terzaghi's plane wedge without tension cracks, c = gamma H / 4 tan(45 + phi / 2); an upper bound solution, so "
+    "that the soil may have a little more cohesion than this says. Angle and cohesion are those of Mohr's circle; on "
+    "the plane of shear a shear box reads less of both.",
+)
+
+
+def _cut_tiles(result: Result) -> list[Tile]:
+    quantities, runs = result["quantities"], result["runs"]
+    bounds = [run["low"] for run in runs], [run["high"] for run in runs if run["high"] is not None]
+    between = f"more than {1e3 * min(bounds[0]):.3g} mm" if any(bounds[0]) else "no face stood"
+    if len(bounds[1]) == len(runs):
+        between += f", less than {1e3 * max(bounds[1]):.3g} mm"
+    note = str(quantities["cohesion"]["note"]).partition(";")[0]
+    angle = f"Terzaghi, with {note.partition(' with ')[2]}" if " with phi" in note else note
+    return [
+        Tile("Critical height", said(quantities["critical_height"], 1e3, " mm"), between),
+        Tile("Cohesion", said(quantities["cohesion"], 1.0, " Pa"), angle),
+        Tile("Slumped to", said(quantities["slumped_to"], 1.0, "°"), "slope of a fallen face"),
+        Tile("Height of the faces", f"{1e3 * runs[0]['height']:.3g} mm", f"{len(runs)} beds"),
+    ]
+
+
+def _cut_plots(report: Report) -> list[Plot]:
+    return [*_cut_side(report), _cut_profiles(report), _trials(report.result["runs"])]
+
+
+def _cut_side(report: Report) -> list[Plot]:
+    run = report.result["runs"][0]
+
+    def draw(axis: Axes) -> None:
+        high = 1e3 * run["height"]
+        axis.set_ylim(top=max(axis.get_ylim()[1], 1.1 * high))
+        for side in (-1, 1):
+            axis.plot(2 * [5e2 * side * run["width"]], [0.0, high], color=MODEL, lw=1.2, ls="--")
+        if run["flanks"]:
+            flank_lines(axis, run, start=0.0, period=run["size"][0], colour=MODEL)
+
+    words = (
+        "All grains from the side at the end, at the bed's own gravity, coloured by how far each has moved. Dashed: "
+        "the faces as they were cut; lines: the slopes that were fitted, if one fell."
+    )
+    return _side_plot(report, run, draw, title="What became of the faces", caption=words)
+
+
+def _cut_profiles(report: Report) -> Plot:
+    runs = report.result["runs"]
+    with styled():
+        drawing, axes = new_panels(len(runs), height=2.4, sharey=True)
+        for axis, run in zip(axes, runs, strict=True):
+            columns = report.columns(run["series"])
+            if "thickness_standing_m" in columns:
+                axis.step(1e3 * columns["x_m"], 1e3 * columns["thickness_standing_m"], where="mid", color=BED, lw=1.2)
+            axis.step(1e3 * columns["x_m"], 1e3 * columns["thickness_m"], where="mid", color=MODEL, lw=1.2, ls="--")
+            axis.set(title=run["id"], xlabel="x [mm]", ylim=(0.0, None))
+        axes[0].set_ylabel("thickness [mm]")
+        legend_above(drawing, [handle("stood last", BED, lw=1.2), handle("at the end", MODEL, ls="--", lw=1.2)])
+    words = (
+        "Solid volume over area and packing fraction, in columns of half a diameter. Heights are not to the scale of x."
+    )
+    return Plot("profiles", "Profiles, run by run", words, drawing)
+
+
+def _trials(runs: Sequence[Result]) -> Plot:
+    with styled():
+        drawing, (axis,) = new_panels(1, height=2.6)
+        handles = []
+        for run, colour in zip(runs, shades(len(runs)), strict=True):
+            trials = np.array(sorted(run["trials"]))
+            axis.plot(1e3 * run["height"] * trials[:, 0], trials[:, 1], color=colour, marker="o", ms=4)
+            handles.append(handle(run["id"], colour, marker="o", ms=4))
+        axis.axhline(FALLEN_SHARE, color=MODEL, lw=1.0, ls="--")
+        axis.set_xscale("log")
+        heights = [1e3 * run["height"] for run in runs]
+        axis.set_xlim(0.09 * min(heights), 4.4 * max(heights))
+        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.xaxis.set_major_formatter("{x:g}")
+        axis.xaxis.set_minor_formatter("")
+        axis.set(
+            ylim=(-0.03, 1.03),
+            xlabel="height of the face at the bed's own gravity [mm]",
+            ylabel="grains of the wedge\nthat have moved [1]",
+        )
+        legend_above(drawing, handles)
+    words = (
+        "Share of the wedge's grains that have moved by more than a diameter; a face has fallen above the dashed line."
+    )
+    return Plot("trials", "Gravity by gravity", words, drawing)
+
+
+# A slot drains the bed ------------------------------------------------------------------------------------------------
+
+
+_REPOSE_METHOD = (
+    "The bed is set on a rough plate with a slot along all of its width in y, and drains into a pit below. Once "
+    "nothing has drained for two of the times in which a grain falls the bed's height, and the grains are at rest "
+    "without drag (1e-5 m g d of kinetic energy each), the slopes on both sides are measured: the drained angle of "
+    "repose. The bed is periodic along y, so that the slopes have no side walls.",
+    "Profile: solid volume in columns half a mean diameter wide, over their area and the packing fraction of the bed "
+    "before. Each slope is fitted by least squares from three diameters, or a fifth of the crest's height, to four "
+    "fifths of it: the foot at the slot and the crest are left out. The angle of a run is the mean of both slopes; its "
+    "error is that of the fits and half the difference of the slopes, in quadrature.",
+)
+
+
+def _repose_tiles(result: Result) -> list[Tile]:
+    quantities, runs = result["quantities"], result["runs"]
+    return [
+        Tile("Angle of repose", said(quantities["angle_of_repose"], 1.0, "°"), "drained; spread between the runs"),
+        Tile("Slopes", f"{2 * len(runs)}", f"{len(runs)} beds, two each"),
+        Tile("Crest", said(quantities["crest"], 1e3, " mm"), f"grains of {1e3 * runs[0]['grain']:.3g} mm"),
+        Tile("Packing fraction", said(quantities["packing_fraction"]), "before the slot was opened"),
+    ]
+
+
+def flank_lines(axis: Axes, run: Result, *, start: float, period: float, colour: Any, base: float = 0.0) -> None:
+    """The straight lines of both flanks in mm: full where they were fitted, dotted down to ``base`` [m]."""
+    for sign, flank in zip((1.0, -1.0), run["flanks"], strict=True):
+        slope = math.tan(math.radians(flank["angle"]))
+        for ends, style in (
+            (np.array([flank["foot"], flank["start"]]), ":"),
+            (np.array([flank["start"], flank["end"]]), "-"),
+        ):
+            x = sign * (start + ends)
+            x = np.where(np.abs(x) > 0.5 * period, np.nan, x)
+            height = base + slope * (ends - flank["foot"])
+            axis.plot(1e3 * x, 1e3 * height, color=colour, ls=style, lw=2.0, zorder=3)
+
+
+def _repose_plots(report: Report) -> list[Plot]:
+    return [*_repose_side(report), _repose_profiles(report)]
+
+
+def _repose_side(report: Report) -> list[Plot]:
+    run = report.result["runs"][0]
+
+    def draw(axis: Axes) -> None:
+        half, plate = 0.5 * run["slot"], run["plate"]
+        flank_lines(axis, run, start=half, period=run["size"][0], colour=MODEL, base=plate)
+        for side in (-1.0, 1.0):
+            ends = side * np.array([half, half, 0.5 * run["size"][0], 0.5 * run["size"][0]])
+            heights = plate - 2.0 * run["grain"] * np.array([0.0, 1.0, 1.0, 0.0])
+            axis.fill(1e3 * ends, 1e3 * heights, color="#444444", zorder=2)
+        axis.set_title(f"{run['id']}: {run['flanks'][1]['angle']:.1f}° and {run['flanks'][0]['angle']:.1f}°")
+
+    words = (
+        "All grains from the side, those in front over those behind, coloured by how far each has moved. Lines: the "
+        "fitted slopes, dotted down to the plate; below it the pit with what drained. The lines follow the mean "
+        "thickness over y, and single grains lie above them."
+    )
+    return _side_plot(report, run, draw, title="What the slot left", caption=words)
+
+
+def _repose_profiles(report: Report) -> Plot:
+    runs = report.result["runs"]
+    with styled():
+        drawing, axes = new_panels(len(runs), height=2.4, sharey=True)
+        for axis, run, colour in zip(axes, runs, shades(len(runs)), strict=True):
+            columns = report.columns(run["series"])
+            axis.plot(1e3 * columns["x_m"], 1e3 * columns["thickness_m"], color=colour, marker=".", ls="none")
+            flank_lines(axis, run, start=0.5 * run["slot"], period=run["size"][0], colour=MODEL)
+            axis.axhline(1e3 * run["surface"], color="#888888", lw=0.8, ls="--")
+            axis.set(title=f"{run['id']}: {run['angle']:.1f} ± {run['error']:.1f}°", xlabel="x [mm]", ylim=(0.0, None))
+        axes[0].set_ylabel("thickness [mm]")
+        legend_above(
+            drawing,
+            [
+                handle("bed", "black", marker=".", ls="none"),
+                handle("fit", MODEL),
+                handle("surface before", "#888888", ls="--", lw=0.8),
+            ],
+        )
+    return Plot("profiles", "Profile and fitted slopes, run by run", "Heights are not to the scale of x.", drawing)
+
+
+_TESTS: dict[str, tuple[Callable[[Report], list[Plot]], Callable[[Result], list[Tile]], Sequence[str]]] = {
+    "cone": (_cone_plots, _cone_tiles, _CONE_METHOD),
+    "cut": (_cut_plots, _cut_tiles, CUT_METHOD),
+    "repose": (_repose_plots, _repose_tiles, _REPOSE_METHOD),
+}
+"""What draws, the numbers on top, and how the test is made, a paragraph each."""
+
+
+# A lid shears it ------------------------------------------------------------------------------------------------------
+
+
+def write_shear_report(folder: str | Path, *, progress: Progress | None = None) -> Path:
+    """Make figures/ and report.html of the folder of a shear test, and return the report."""
+    report = Report(folder, progress)
+    result, quantities = report.result, report.result["quantities"]
+    drawn = report.draw_all([_curves(report), _lines(result)])
+    report.tell(0.9)
+    slope = "slope through the runs"
+    numbers = (
+        ("Critical friction angle", "critical_friction_angle", "°", slope),
+        ("Peak friction angle", "peak_friction_angle", "°", slope),
+        ("Cohesion, critical", "critical_cohesion", " Pa", "where the line begins"),
+        ("Critical stress ratio", "critical_ratio", "", "shear over normal"),
+    )
+    tiles = [Tile(label, _shear_said(quantities[name], unit), note) for label, name, unit, note in numbers]
+    sections = [
+        Section("", tables(result) + drawn),
+        report.numbers(std=True),
+        again("hedgebed bed test shear run.toml"),
+    ]
+    return report.write(sections, lead=["bed test shear"], tiles=tiles)
+
+
+def _shear_said(entry: Result, unit: str) -> str:
+    value, std = entry["value"], entry["std"]
+    return f"{quote(value)}{unit}" if std is None else f"{value:.3g} ± {std:.1g}{unit}"
+
+
+def _curves(report: Report) -> Plot:
+    grain, runs = report.result["grain"], report.result["runs"]
+    with styled():
+        drawing, (ratio, height) = new_panels(2, height=3.2, sharex=True)
+        handles = []
+        for run, colour in zip(runs, shades(len(runs)), strict=True):
+            columns = report.columns(run["series"])
+            way = columns["way_m"] / grain
+            ratio.plot(*smooth_ratio(way, columns), color=colour)
+            height.plot(way, columns["height_m"] / grain, color=colour)
+            handles.append(handle(f"{run['normal']:.0f} Pa", colour))
+        ratio.set(ylabel="shear over normal stress, at the lid [1]", ylim=(0.0, None))
+        height.set_ylabel("the lid has risen by [diameters]")
+        for axis in (ratio, height):
+            axis.set_xlabel("way of the lid [diameters]")
+        legend_above(drawing, handles)
+    return Plot("shear", "The lid's way", "Both stresses smoothed over a sixtieth of the way.", drawing)
+
+
+def _lines(result: Result) -> Plot:
+    quantities, normal = result["quantities"], np.array([run["normal"] for run in result["runs"]])
+    with styled():
+        drawing, (axis,) = new_panels(1, height=3.2)
+        reach = np.array([0.0, 1.05 * normal.max()])
+        handles = []
+        for kind, colour, mark in (("peak", MODEL, "D"), ("critical", BED, "o")):
+            slope = math.tan(math.radians(quantities[f"{kind}_friction_angle"]["value"]))
+            axis.plot(reach, quantities[f"{kind}_cohesion"]["value"] + slope * reach, color=colour, lw=1.2)
+            error = [run["critical_error"] if kind == "critical" else 0.0 for run in result["runs"]]
+            axis.errorbar(normal, [run[kind] for run in result["runs"]], yerr=error, color=colour, marker=mark, ls="")
+            handles.append(handle(kind, colour, marker=mark))
+        axis.set(xlim=(0.0, None), ylim=(0.0, None), xlabel="normal stress [Pa]", ylabel="shear stress [Pa]")
+        legend_above(drawing, handles)
+    return Plot("mohr-coulomb", "Mohr-Coulomb", "Least squares; bars: standard error of the critical stress.", drawing)

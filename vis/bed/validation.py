@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import csv
-import json
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from itertools import cycle
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from vis.page.page import Block, Page, Section, Tile, figure, listing, table, text, write_page
+from vis.page.plots import new_figure
+from vis.page.report import Progress, Report, Result, number_text, unit_text
 from vis.page.style import GREY, styled
 
 __all__ = ["write_validation_report"]
@@ -26,23 +25,21 @@ _INSIDE, _THREE_COLUMNS = 4, 24
 _LEGEND_ROW = 0.16
 
 
-def write_validation_report(folder: str | Path, *, progress: Callable[[float], None] | None = None) -> Path:
-    """Make figures/ and report.html of the folder, and return the report.
-
-    Raises FileNotFoundError where the folder has no result.json or a series is missing.
-    """
-    tell = progress if progress is not None else lambda done: None
-    folder = Path(folder)
-    result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
-    (folder / "figures").mkdir(exist_ok=True)
-    cases, blocks = result["cases"], {}
+def write_validation_report(folder: str | Path, *, progress: Progress | None = None) -> Path:
+    """Make figures/ and report.html of the folder, and return the report."""
+    report = Report(folder, progress)
+    result, cases, blocks = report.result, report.result["cases"], {}
     for done, case in enumerate(cases, 1):
-        blocks[case["id"]] = [_draw(folder, case, plot, k) for k, plot in enumerate(case.get("plots", ()), 1)]
-        tell(done / len(cases))
-    return write_page(folder / "report.html", _page(result, blocks))
+        blocks[case["id"]] = [_draw(report.folder, case, plot, k) for k, plot in enumerate(case.get("plots", ()), 1)]
+        report.tell(done / len(cases))
+    lead = [result["title"].partition(": ")[2], result["date"], f"version {result['version']}, code {result['code']}"]
+    page = Page(
+        "Verification of the bed", lead, _sections(cases, blocks), _tiles(cases), result["warnings"], _absent(cases)
+    )
+    return write_page(report.folder / "report.html", page)
 
 
-def _draw(folder: Path, case: Mapping[str, Any], plot: Mapping[str, Any], number: int) -> Block:
+def _draw(folder: Path, case: Result, plot: Result, number: int) -> Block:
     """One plot: references as lines, what the bed did as dots."""
     curves: dict[str, list[tuple[float, float]]] = {}
     with (folder / plot["series"]).open(encoding="utf-8", newline="") as file:
@@ -53,8 +50,7 @@ def _draw(folder: Path, case: Mapping[str, Any], plot: Mapping[str, Any], number
     across = 3 if max(map(len, curves)) <= _THREE_COLUMNS else 2
     below = _LEGEND_ROW * -(-len(curves) // across) if beneath else 0.0
     with styled():
-        drawing = Figure(figsize=(_WIDTH, _HEIGHT + below))
-        FigureCanvasAgg(drawing)
+        drawing = new_figure(_HEIGHT + below, width=_WIDTH)
         axis = drawing.subplots()
         colours = cycle(_COLOURS)
         lines = plot["lines"]
@@ -62,8 +58,7 @@ def _draw(folder: Path, case: Mapping[str, Any], plot: Mapping[str, Any], number
             x, y = np.array(points).T
             colour = GREY if label in lines and len(lines) == 1 else next(colours)
             axis.plot(x, y, "-" if label in lines else "o", color=colour, ms=3.5, lw=1.6, label=label)
-        axis.set_xlabel(plot["x"])
-        axis.set_ylabel(plot["y"])
+        axis.set(xlabel=plot["x"], ylabel=plot["y"])
         if "x" in plot["log"]:
             axis.set_xscale("log")
         if "y" in plot["log"]:
@@ -77,13 +72,9 @@ def _draw(folder: Path, case: Mapping[str, Any], plot: Mapping[str, Any], number
     return figure(path, title=plot["title"], caption=caption, half=True)
 
 
-def _number(value: float | None) -> str:
-    return "–" if value is None else f"{value:.5g}"
-
-
-def _cells(row: Mapping[str, Any]) -> tuple[str, ...]:
+def _cells(row: Result) -> tuple[str, ...]:
     """Wanted, ours, difference, band, verdict of one comparison."""
-    unit = "" if row["unit"] == "1" else f" {row['unit']}"
+    unit = f" {unit_text(row['unit'])}".rstrip()
     if row["difference"] is None:
         gap = "not a number"
     elif row["relative"]:
@@ -91,47 +82,38 @@ def _cells(row: Mapping[str, Any]) -> tuple[str, ...]:
     else:
         gap = f"{row['difference']:+.2g}"
     band = f"±{100 * row['band']:.2g} %" if row["relative"] else f"±{row['band']:.2g}"
-    return _number(row["reference"]) + unit, _number(row["ours"]) + unit, gap, band, "pass" if row["passes"] else "FAIL"
+    numbers = (number_text(row[key], 5) + unit for key in ("reference", "ours"))
+    return *numbers, gap, band, "pass" if row["passes"] else "FAIL"
 
 
-def _page(result: Mapping[str, Any], blocks: Mapping[str, Sequence[Block]]) -> Page:
-    cases = result["cases"]
-    run = [case for case in cases if case["status"] in ("pass", "fail")]
+def _run(cases: Sequence[Result]) -> list[Result]:
+    return [case for case in cases if case["status"] in ("pass", "fail")]
+
+
+def _tiles(cases: Sequence[Result]) -> list[Tile]:
+    run, many = _run(cases), Counter(case["status"] for case in cases)
     numbers = [one for case in run for one in case["comparisons"]]
-    tiles = [
-        Tile("cases that pass", str(sum(case["status"] == "pass" for case in run)), f"of {len(run)} that were run"),
-        Tile(
-            "cases that fail",
-            str(sum(case["status"] == "fail" for case in run)),
-            "each with what is known why",
-            second=True,
-        ),
+    return [
+        Tile("cases that pass", str(many["pass"]), f"of {len(run)} that were run"),
+        Tile("cases that fail", str(many["fail"]), "each with what is known why", second=True),
         Tile("numbers compared", str(len(numbers)), f"{sum(one['passes'] for one in numbers)} within their bands"),
-        Tile("not yet", str(sum(case["status"] == "not yet" for case in cases)), "cases that the bed cannot run"),
+        Tile("not yet", str(many["not yet"]), "cases that the bed cannot run"),
     ]
+
+
+def _sections(cases: Sequence[Result], blocks: Mapping[str, Sequence[Block]]) -> list[Section]:
+    run = _run(cases)
     sections = [_overview(run)]
     if failing := [case for case in run if case["status"] == "fail"]:
         said = [f"{case['id']}: {case['reason'] or 'not looked into yet'}." for case in failing]
         sections.append(Section("What fails, and why", [listing(said)]))
     for family in dict.fromkeys(case["family"] for case in run):
-        sections.append(
-            Section(family, [block for case in run if case["family"] == family for block in _case(case, blocks)])
-        )
-    return Page(
-        title="Verification of the bed",
-        lead=[
-            result["title"].partition(": ")[2],
-            result["date"],
-            f"version {result['version']}, code {result['code']}",
-        ],
-        sections=sections,
-        tiles=tiles,
-        warnings=result["warnings"],
-        missing=_absent(cases),
-    )
+        own = [block for case in run if case["family"] == family for block in _case(case, blocks)]
+        sections.append(Section(family, own))
+    return sections
 
 
-def _overview(run: Sequence[Mapping[str, Any]]) -> Section:
+def _overview(run: Sequence[Result]) -> Section:
     rows = []
     for case in run:
         worst = case["worst"]
@@ -144,7 +126,7 @@ def _overview(run: Sequence[Mapping[str, Any]]) -> Section:
     return Section("Every case", [text(lead), table(head, rows)])
 
 
-def _case(case: Mapping[str, Any], blocks: Mapping[str, Sequence[Block]]) -> list[Block]:
+def _case(case: Result, blocks: Mapping[str, Sequence[Block]]) -> list[Block]:
     found = [text(f"{case['id']}: {case['title']}. {case['reference']} ({case['source']})."), *blocks[case["id"]]]
     if case["comparisons"]:
         rows = [(one["quantity"], *_cells(one)) for one in case["comparisons"]]
@@ -153,7 +135,7 @@ def _case(case: Mapping[str, Any], blocks: Mapping[str, Sequence[Block]]) -> lis
     return found
 
 
-def _absent(cases: Sequence[Mapping[str, Any]]) -> list[str]:
+def _absent(cases: Sequence[Result]) -> list[str]:
     """What is not in the report: each case that could not be run, and in one sentence those that were left out."""
     said, left = [], []
     for case in cases:

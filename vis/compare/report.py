@@ -1,85 +1,72 @@
-"""The report of two runs side by side: reads the comparison's folder, and for pictures those of the runs."""
-
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from vis.compare import figures as compare_figures
-from vis.compare import spatial as compare_spatial
-from vis.compare.figures import legend
+from vis.compare.figures import plots_in_space, plots_in_the_plane
+from vis.film.film import shown
+from vis.film.reel import NAME, Reel
 from vis.page.folder import read_folder
 from vis.page.numbers import short
-from vis.page.page import Block, Page, Section, Tile, code, figure, listing, table, text, write_page
+from vis.page.page import Block, Section, Tile, listing, table, text
+from vis.page.plots import Array, Plot, sheet
+from vis.page.report import Progress, Report, Result, again, unit_text
+from vis.page.states import LINES, States, legend_of_runs
 from vis.page.style import styled
-from vis.tumble.pictures import draw_reels, moments
-from vis.tumble.reel import Reel
-from vis.tumble.state_figures import LINES, sheet
+from vis.pictures.frames import frame_names
+from vis.spatial.pictures import ARROWS, draw_in_space
+from vis.tumble.pictures import draw_tumbles, moments
 
 __all__ = ["write_compare_report"]
 
-Array = NDArray[np.float64]
-_DPI = 130
+Labels = tuple[str, str]
 
 
-def write_compare_report(folder: str | Path, *, progress: Callable[[float], None] | None = None) -> Path:
+def write_compare_report(folder: str | Path, *, progress: Progress | None = None) -> Path:
     """Make figures/ and report.html (of tumbles also stills and film.gif) of a comparison, and return the report.
 
     Raises FileNotFoundError where the folder has no result.json, or a run is gone whose pictures are asked for.
     """
-    tell = progress if progress is not None else lambda done: None
-    home = Path(folder)
-    result = json.loads((home / "result.json").read_text(encoding="utf-8"))
+    report = Report(folder, progress, dpi=130)
+    result = report.result
     labels = (result["runs"][0]["label"], result["runs"][1]["label"])
-    (home / "figures").mkdir(exist_ok=True)
-    sections: list[Section] = []
-    if result["kind"] != "penetrate":
-        columns, states = _columns(home / result["series"])
-        in_space = result["kind"] == "tumble spatial"
-        plans = (compare_spatial if in_space else compare_figures).plans(result, columns, states, labels)
-        drawn = [_drawn(home, *plan) for plan in plans]
-        tell(0.3)
-        see = compare_spatial.side_by_side if in_space else _side_by_side
-        seen = see(home, result, labels, lambda done: tell(0.3 + 0.65 * done)) if result["pictures"] else []
-        sections = [
-            Section("", [listing(result["departures"]["sentences"]), *drawn[:-4]]),
-            *([Section("Seen side by side", seen)] if seen else []),
-            Section("States and angle", drawn[-4:-3]),
-            Section("Into the ground", [*drawn[-3:-1], *_row_sinkage(result, labels)]),
-            Section("Energy", drawn[-1:]),
-        ]
-    else:
-        sections = [Section("", _drives(home, result, labels))]
-    page = Page(
-        title=f"Compared: {result['title']}",
-        lead=[
-            f"hedgebed {result['version']}",
-            "compare",
-            *(f"{run['label']}: {run['title']}" for run in result["runs"]),
-        ],
-        tiles=_tiles(result),
-        warnings=[str(warning)[:1].upper() + str(warning)[1:] for warning in result["warnings"]],
-        sections=[
-            *sections,
-            Section("Every number, side by side", _numbers(result, labels)),
-            *([Section("What the two were given", [_given(result, labels)])] if result["differs"] else []),
-            Section("To do this again", [text("In this folder:"), code("hedgebed compare run.toml")]),
-        ],
-    )
-    report = write_page(home / "report.html", page)
-    tell(1.0)
-    return report
+    penetrations = result["kind"] == "penetrate"
+    differs = [Section("What the two were given", [_given(result, labels)])] if result["differs"] else []
+    sections = [
+        *([Section("", _drives(report, labels))] if penetrations else _tumbles(report, labels)),
+        Section("Every number, side by side", _numbers(result, labels)),
+        *differs,
+        again("hedgebed compare run.toml"),
+    ]
+    lead = ["compare", *(f"{run['label']}: {run['title']}" for run in result["runs"])]
+    return report.write(sections, lead=lead, tiles=_tiles(result), title=f"Compared: {result['title']}")
 
 
-def _columns(path: Path) -> tuple[dict[str, Array], tuple[NDArray[np.str_], NDArray[np.str_]]]:
+def _tumbles(report: Report, labels: Labels) -> list[Section]:
+    """Figures and pictures of two tumbles."""
+    result, in_space = report.result, report.result["kind"] == "tumble spatial"
+    plots = plots_in_space if in_space else plots_in_the_plane
+    path, states, *ground, energy = report.draw_all(plots(result, *_columns(report.folder / result["series"]), labels))
+    report.tell(0.3)
+
+    def tell(done: float) -> None:
+        report.tell(0.3 + 0.65 * done)
+
+    seen = (_seen_in_space if in_space else _seen)(report, labels, tell) if result["pictures"] else []
+    return [
+        Section("", [listing(result["departures"]["sentences"]), path]),
+        *([Section("Seen side by side", seen)] if seen else []),
+        Section("States and angle", [states]),
+        Section("Into the ground", [*ground, *_row_sinkage(result, labels)]),
+        Section("Energy", [energy]),
+    ]
+
+
+def _columns(path: Path) -> tuple[dict[str, Array], tuple[States, States]]:
     """The columns of compared.csv, and the states of both."""
     head, *rows = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
     by_name = dict(zip(head, zip(*rows, strict=True), strict=True))
@@ -87,33 +74,38 @@ def _columns(path: Path) -> tuple[dict[str, Array], tuple[NDArray[np.str_], NDAr
     return numbers, (np.array(by_name["state_1"]), np.array(by_name["state_2"]))
 
 
-def _drawn(home: Path, name: str, title: str, caption: str, drawing: Figure) -> Block:
-    path = home / "figures" / f"{name}.png"
-    with styled():
-        drawing.savefig(path, dpi=_DPI)
-    return figure(path, title=title, caption=caption)
+# Pictures -------------------------------------------------------------------------------------------------------------
 
 
-def _side_by_side(
-    home: Path, result: Mapping[str, Any], labels: tuple[str, str], tell: Callable[[float], None]
-) -> list[Block]:
+def _folders(report: Report) -> list[Path]:
+    return [(report.folder / run["folder"]).resolve() for run in report.result["runs"]]
+
+
+def _seen(report: Report, labels: Labels, tell: Progress) -> list[Block]:
     """Stills of both at the same moments, and the film."""
-    folders = [(home / run["folder"]).resolve() for run in result["runs"]]
-    reels = _alike([Reel.open(folder) for folder in folders])
+    reels = _alike([Reel.open(folder) for folder in _folders(report)])
     stills = [
-        (home / "figures" / f"seen-{name}.png", f"Both {words}", time,
-         "; ".join(f"{label}: {reel.line(reel.nearest(time))}" for label, reel in zip(labels, reels, strict=True)))
+        (report.figures / f"seen-{name}.png", f"Both {words}", time,
+         "; ".join(f"{one}: {reel.line(reel.nearest(time))}" for one, reel in zip(labels, reels, strict=True)) + ".")
         for name, words, time in moments(reels)
     ]  # fmt: skip
-    drawn = draw_reels(reels, stills, home / "film.gif", by=result["colour"], labels=labels, progress=tell)
-    blocks = [figure(each.file, title=each.title, caption=each.caption) for each in drawn.stills[1:]]
-    if drawn.animation is not None:
-        shown = drawn.animation
-        blocks.insert(0, figure(shown.file, title=shown.title, caption=shown.caption, show_file=True))
-    return [*blocks, *(text(note, small=True) for note in drawn.notes)]
+    film, by = report.folder / "film.gif", report.result["colour"]
+    drawn = draw_tumbles(reels, stills, film, by=by, labels=labels, progress=tell)
+    return [*shown(drawn, first=1), *(text(note, small=True) for note in drawn.notes)]
 
 
-def _alike(reels: list[Reel]) -> list[Reel]:
+def _seen_in_space(report: Report, labels: Labels, tell: Progress) -> list[Block]:
+    """The same in space; where both have frames."""
+    folders = _folders(report)
+    without = [label for label, folder in zip(labels, folders, strict=True) if NAME not in frame_names(folder)]
+    if without:
+        return [text(f"There are no pictures: {' and '.join(without)} kept no frames (frame_count = 0).", small=True)]
+    by = report.result["colour"]
+    drawn = draw_in_space(folders, report.folder, stem="seen", by=by, film=True, labels=labels, progress=tell)
+    return [*shown(drawn), *(text(note, small=True) for note in (ARROWS, *drawn.notes))]
+
+
+def _alike(reels: Sequence[Reel]) -> list[Reel]:
     """A law knows points only: beside a run on grains of spikes as long its platform is drawn with that one's."""
     known = [reel for reel in reels if reel.frames is not None]
     return [
@@ -127,9 +119,9 @@ def _alike(reels: list[Reel]) -> list[Reel]:
 # Penetrations ---------------------------------------------------------------------------------------------------------
 
 
-def _drives(home: Path, result: Mapping[str, Any], labels: tuple[str, str]) -> list[Block]:
+def _drives(report: Report, labels: Labels) -> list[Block]:
     """Force against depth of the drives that both have."""
-    runs = [{run.id: run for run in read_folder(home / one["folder"]).of_kind("driven")} for one in result["runs"]]
+    runs = [{run.id: run for run in read_folder(home).of_kind("driven")} for home in _folders(report)]
     shared = [name for name in runs[0] if name in runs[1]]
     if not shared:
         return [text("The two have no drive of the same name: their numbers are compared below.")]
@@ -141,18 +133,17 @@ def _drives(home: Path, result: Mapping[str, Any], labels: tuple[str, str]) -> l
                 series = run.bed if run.bed is not None else run.model
                 if series is not None:
                     axis.plot(1e3 * series.depth, series.force, **style)
-            axis.set_title(name)
-            axis.set_xlabel("depth [mm]")
+            axis.set(title=name, xlabel="depth [mm]")
         axes[0].set_ylabel("force on the spike [N]")
-        legend(drawing, labels)
+        legend_of_runs(drawing, labels)
     caption = "The same drives in both: force against depth, in and out."
-    return [_drawn(home, "drives", "Drag against depth", caption, drawing)]
+    return [report.draw(Plot("drives", "Drag against depth", caption, drawing))]
 
 
 # Tables ---------------------------------------------------------------------------------------------------------------
 
 
-def _tiles(result: Mapping[str, Any]) -> list[Tile]:
+def _tiles(result: Result) -> list[Tile]:
     wanted = (
         ("trajectory_angle", "Trajectory angle"), ("max_speed", "Largest speed"), ("largest_turn", "Largest turn"),
         ("sinkage_largest", "Deepest"), ("sinkage", "Sinkage"), ("stiffness", "Stiffness"),
@@ -179,7 +170,7 @@ def _said(value: float, unit: str) -> str:
     return f"{short(value, 3)}{'' if unit == '1' else ' ' + unit}"
 
 
-def _numbers(result: Mapping[str, Any], labels: tuple[str, str]) -> list[Block]:
+def _numbers(result: Result, labels: Labels) -> list[Block]:
     """One table; where one run lasts longer, of the time that both last, and of each as a whole."""
     head = ("quantity", *labels, "difference", "of the first", "unit")
     rows, end = result["compared"], result.get("compared_over")
@@ -191,22 +182,22 @@ def _numbers(result: Mapping[str, Any], labels: tuple[str, str]) -> list[Block]:
     return [
         table(head, [_row(row) for row in shared], title=f"Over the first {end:.4g} s, which both last"),
         table(
-            ("quantity", *labels, "unit"), [(*row[:3], row[-1]) for row in whole],
+            ("quantity", *labels, "unit"),
+            [(*row[:3], row[-1]) for row in whole],
             title=f"Of each run as a whole, over its own {lasts} s",
         ),
-    ]  # fmt: skip
+    ]
 
 
-def _row(row: Mapping[str, Any]) -> tuple[str, ...]:
-    in_degrees = row["unit"] == "rad"
-    scale, unit = (180 / math.pi, "°") if in_degrees else (1.0, "" if row["unit"] == "1" else row["unit"])
+def _row(row: Result) -> tuple[str, ...]:
+    scale, unit = (180 / math.pi, "°") if row["unit"] == "rad" else (1.0, unit_text(row["unit"]))
     cells = ["–" if row[key] is None else f"{scale * row[key]:.5g}" for key in ("first", "second")]
     difference = "–" if row["difference"] is None else f"{scale * row['difference']:+.4g}"
     share = "–" if row["relative"] is None else f"{100 * row['relative']:+.3g} %"
     return (row["name"], *cells, difference, share, unit)
 
 
-def _row_sinkage(result: Mapping[str, Any], labels: tuple[str, str]) -> list[Block]:
+def _row_sinkage(result: Result, labels: Labels) -> list[Block]:
     """The deepest point of each row, of tumbles in the plane."""
     rows = [
         (str(row["row"]), *(f"{1e3 * row[key]:.3g}" for key in ("first", "second"))) for row in result.get("rows", [])
@@ -215,6 +206,6 @@ def _row_sinkage(result: Mapping[str, Any], labels: tuple[str, str]) -> list[Blo
     return [table(("row", *labels), rows, title=title)] if rows else []
 
 
-def _given(result: Mapping[str, Any], labels: tuple[str, str]) -> Block:
+def _given(result: Result, labels: Labels) -> Block:
     rows = [(row["key"], row["first"], row["second"], row["unit"]) for row in result["differs"]]
     return table(("key", *labels, "unit"), rows, words=True)

@@ -11,21 +11,18 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import NDArray
 
+from vis.page.plots import DASHED, Array, handle, legend_above, sheet
+from vis.page.report import Result
 from vis.page.style import BED, GREY, INK, MODEL
 from vis.page.tumble_series import STATES, state_runs
 
 __all__ = ["Channel", "draw_evidence", "draw_latent", "draw_phases", "draw_trajectories", "read_channel", "worst"]
 
-Array = NDArray[np.float64]
-
-_WIDTH = 8.6
 _MOST_ROWS = 6
 _MOST_BARS = 14
 #: channel -> (what it is, unit, factor on SI)
@@ -90,9 +87,13 @@ class Channel:
     scatter: Array | None = None
     """What replicates differ by beyond the sensors, beside the best model; None where they differ by no more."""
 
+    def model(self, stage: str) -> Array:
+        """What the model "before" or "after" says."""
+        return self.before if stage == "before" else self.after
+
     def residual(self, stage: str) -> Array:
         """(measured - model) / std."""
-        return (self.measured - getattr(self, stage)) / (self.std if stage == "before" else self.std_after)
+        return (self.measured - self.model(stage)) / (self.std if stage == "before" else self.std_after)
 
 
 def read_channel(path: Path) -> Channel:
@@ -141,10 +142,8 @@ def draw_trajectories(channels: Sequence[Channel], held: set[str], labels: tuple
     """
     if not channels:
         return None
-    drawing = Figure(figsize=(_WIDTH, 0.8 + 1.72 * len(channels)))
-    FigureCanvasAgg(drawing)
-    axes = drawing.subplots(len(channels), 2, squeeze=False)
-    models = [("before", MODEL, (0, (4, 2)), labels[0]), ("after", BED, "-", labels[1])]
+    drawing, axes = sheet(len(channels), 2, 0.8 + 1.72 * len(channels))
+    models = [("before", MODEL, DASHED, labels[0]), ("after", BED, "-", labels[1])]
     models = [entry for entry in models if entry[3]]
     for (left, right), c in zip(axes, channels, strict=True):
         what, unit, factor = _QUANTITIES.get(c.name, (c.name, "SI", 1.0))
@@ -156,7 +155,7 @@ def draw_trajectories(channels: Sequence[Channel], held: set[str], labels: tuple
             right.fill_between(time, -wide, wide, color="#f1ead8", lw=0, zorder=0)
         right.axhspan(-2, 2, color="#e3e8ec", lw=0)
         for stage, colour, dash, _ in models:
-            left.plot(time, factor * getattr(c, stage), color=colour, ls=dash, lw=1.4, zorder=3)
+            left.plot(time, factor * c.model(stage), color=colour, ls=dash, lw=1.4, zorder=3)
             right.plot(time, c.residual(stage), color=colour, lw=0.8, ls="-")
         left.plot(time[::step], factor * c.measured[::step], ".", color=INK, ms=2.4, zorder=2)
         for axis in (left, right):
@@ -167,13 +166,13 @@ def draw_trajectories(channels: Sequence[Channel], held: set[str], labels: tuple
         left.set_title(f"trial {c.trial}, {what}" + (" (held out)" if c.trial in held else ""))
         left.set_ylabel(f"{what.split(',')[0]} [{unit}]", fontsize=8.5)
         right.set_ylabel("left over [std]", fontsize=8.5)
-    handles: list[Any] = [Line2D([], [], color=INK, ls="", marker=".", label="measured")]
-    handles += [Line2D([], [], color=colour, ls=dash, label=label) for _, colour, dash, label in models]
+    handles: list[Any] = [handle("measured", INK, ls="", marker=".")]
+    handles += [handle(label, colour, ls=dash) for _, colour, dash, label in models]
     handles.append(Patch(color="#e3e8ec", label="± 2 std of the sensor"))
     if any(c.scatter is not None for c in channels):
         handles.append(Patch(color="#f1ead8", label="and of replicates"))
     handles += _phase_handles(phase for c in channels for phase in c.phase)
-    drawing.legend(handles=handles, loc="outside upper left", ncols=4, fontsize=8)
+    legend_above(drawing, handles, 4, fontsize=8)
     return drawing
 
 
@@ -196,18 +195,19 @@ def _phase_handles(phases: Iterable[Any]) -> list[Patch]:
 # What is left, by phase and channel -----------------------------------------------------------------------------------
 
 
-def draw_phases(rows: Sequence[Mapping[str, Any]], labels: tuple[str, str]) -> Figure | None:
+def draw_phases(rows: Sequence[Result], labels: tuple[str, str]) -> Figure | None:
     """Chi-square per sample before and after, by channel and phase, fitted trials and held-out ones side by side."""
     if not rows:
         return None
     keys = list(dict.fromkeys((row["channel"], row["phase"]) for row in rows))
     keys.sort(key=lambda key: (list(_QUANTITIES).index(key[0]) if key[0] in _QUANTITIES else 99,
                                list(_PHASES).index(key[1]) if key[1] in _PHASES else 99))  # fmt: skip
-    parts = [(held, name) for held, name in ((False, "fitted trials"), (True, "held-out trials"))
-             if any(row["held_out"] is held for row in rows)]  # fmt: skip
-    drawing = Figure(figsize=(_WIDTH, 1.15 + 0.24 * len(keys)))
-    FigureCanvasAgg(drawing)
-    axes = drawing.subplots(1, len(parts), sharey=True, sharex=True, squeeze=False).ravel()
+    parts = [
+        (held, name)
+        for held, name in ((False, "fitted trials"), (True, "held-out trials"))
+        if any(row["held_out"] is held for row in rows)
+    ]
+    drawing, (axes,) = sheet(1, len(parts), 1.15 + 0.24 * len(keys), sharey=True, sharex=True)
     for axis, (held, title) in zip(axes, parts, strict=True):
         axis.axvline(1.0, color=INK, lw=1.0, ls=(0, (1, 1.5)))
         for row in rows:
@@ -225,24 +225,23 @@ def draw_phases(rows: Sequence[Mapping[str, Any]], labels: tuple[str, str]) -> F
         else:
             axis.set_xscale("log")
             axis.xaxis.set_major_formatter(_plain_numbers)
-        axis.set_title(title)
-        axis.set_xlabel("chi-square per sample (1: the sensors' noise)")
+        axis.set(title=title, xlabel="chi-square per sample (1: the sensors' noise)")
     axes[0].set_yticks(range(len(keys)), [f"{channel}, {phase}" for channel, phase in keys])
     axes[0].set_ylim(len(keys) - 0.4, -0.6)
-    handles = [Line2D([], [], color=MODEL, ls="", marker="D", ms=4.8, label=labels[0])]
+    handles = [handle(labels[0], MODEL, ls="", marker="D", ms=4.8)]
     if labels[1]:
-        handles.append(Line2D([], [], color=BED, ls="", marker="o", ms=5.5, label=labels[1]))
-    drawing.legend(handles=handles, loc="outside upper left", ncols=2, fontsize=8)
+        handles.append(handle(labels[1], BED, ls="", marker="o", ms=5.5))
+    legend_above(drawing, handles, 2, fontsize=8)
     return drawing
 
 
 # Candidates -----------------------------------------------------------------------------------------------------------
 
 
-def draw_evidence(said: Mapping[str, Any]) -> Figure | None:
+def draw_evidence(said: Result) -> Figure | None:
     """Bars of evidence, and what each candidate leaves: the best form of each single name, and the best sets of names
     that beat all of their parts."""
-    best: dict[tuple[str, ...], Mapping[str, Any]] = {}
+    best: dict[tuple[str, ...], Result] = {}
     orders: dict[frozenset[str], tuple[str, ...]] = {}  # one set of names, in whatever order they were added
     for row in (*said.get("candidates", []), *said.get("evidence", [])):
         best.setdefault(orders.setdefault(frozenset(row["effects"]), tuple(row["effects"])), row)
@@ -252,13 +251,14 @@ def draw_evidence(said: Mapping[str, Any]) -> Figure | None:
     leading = _leading_names(said, score)
     leading = orders.get(frozenset(leading), leading)
     singles = [names for names in best if len(names) == 1]
-    sets = [names for names in best if len(names) > 1
-            and all(score[names] > score.get((name,), -math.inf) + 0.05 for name in names)]  # fmt: skip
+    sets = [
+        names
+        for names in best
+        if len(names) > 1 and all(score[names] > score.get((name,), -math.inf) + 0.05 for name in names)
+    ]
     names = sorted({*singles, *sets[:5], *([leading] if leading in best else [])}, key=lambda n: (score[n], -len(n)))
     names = names[-_MOST_BARS:] if len(names) > _MOST_BARS else names
-    drawing = Figure(figsize=(_WIDTH, 1.3 + 0.27 * len(names)))
-    FigureCanvasAgg(drawing)
-    axis, beside = drawing.subplots(1, 2, sharey=True, width_ratios=(3, 2))
+    drawing, ((axis, beside),) = sheet(1, 2, 1.3 + 0.27 * len(names), sharey=True, width_ratios=(3, 2))
     kinds = {name: _kind(name, leading, said) for name in names}
     colours = {name: _KINDS[kinds[name]] for name in names}
     places = range(len(names))
@@ -279,9 +279,9 @@ def draw_evidence(said: Mapping[str, Any]) -> Figure | None:
     _draw_left(beside, [best[name] for name in names], [colours[name] for name in names], said)
     shown = [kind for kind in _KINDS if kind in kinds.values()]
     handles: list[Any] = [Patch(color=_KINDS[kind], label=kind) for kind in shown]
-    handles.append(Line2D([], [], color=INK, ls=(0, (1, 1.5)), label="the noise alone"))
-    handles.append(Line2D([], [], color=MODEL, ls=(0, (4, 2)), label="the base model"))
-    drawing.legend(handles=handles, loc="outside upper left", ncols=5, fontsize=8)
+    handles.append(handle("the noise alone", INK, ls=(0, (1, 1.5))))
+    handles.append(handle("the base model", MODEL, ls=DASHED))
+    legend_above(drawing, handles, 5, fontsize=8)
     return drawing
 
 
@@ -290,15 +290,13 @@ _KINDS = {"named": BED, "certain": BED, "likeliest, not certain": "#7fb8d9", "ca
 """What a candidate is -> its colour."""
 
 
-def _draw_left(
-    axis: Axes, rows: Sequence[Mapping[str, Any]], colours: Sequence[str], said: Mapping[str, Any]
-) -> None:  # fmt: skip
+def _draw_left(axis: Axes, rows: Sequence[Result], colours: Sequence[str], said: Result) -> None:
     """Chi-square a sample that each candidate leaves, between that of the base model and that of the noise."""
     base = said.get("evidence_base", {})
     left = [max(1 + float(row["left"]), 1e-2) for row in rows]
     axis.axvline(1.0, color=INK, lw=1.0, ls=(0, (1, 1.5)))
     whole = 1 + float(base["left"]) if base else max(left)
-    axis.axvline(whole, color=MODEL, lw=1.0, ls=(0, (4, 2)))
+    axis.axvline(whole, color=MODEL, lw=1.0, ls=DASHED)
     most = max(whole, *left)
     for place, (row, value, colour) in enumerate(zip(rows, left, colours, strict=True)):
         axis.plot([whole, value], [place, place], color=GREY, lw=1.0, zorder=2)
@@ -312,8 +310,7 @@ def _draw_left(
         low = min(1.0, *left)
         axis.set_xlim(low - 0.1 * max(most - low, 0.1), most + 0.1 * max(most - low, 0.1))
     else:
-        axis.set_xscale("log")
-        axis.set_xlim(min(0.9, 0.9 * min(left)), 1.15 * most)
+        axis.set(xscale="log", xlim=(min(0.9, 0.9 * min(left)), 1.15 * most))
         axis.xaxis.set_major_formatter(_plain_numbers)
         if most < 20:
             axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
@@ -327,7 +324,7 @@ def _plain_numbers(value: float, place: float) -> str:
     return f"{value:g}" if 1e-3 <= value < 1e5 else f"{value:.0e}"
 
 
-def _leading_names(said: Mapping[str, Any], score: Mapping[tuple[str, ...], float]) -> tuple[str, ...]:
+def _leading_names(said: Result, score: Mapping[tuple[str, ...], float]) -> tuple[str, ...]:
     """The set of names that is told: named, or of an unknown the best model's, or the likeliest single one."""
     if said["verdict"] != "unknown":
         return tuple(effect["id"] for effect in said["effects"])
@@ -337,7 +334,7 @@ def _leading_names(said: Mapping[str, Any], score: Mapping[tuple[str, ...], floa
     return same or max(singles, key=lambda known: score[known], default=())
 
 
-def _kind(name: tuple[str, ...], leading: tuple[str, ...], said: Mapping[str, Any]) -> str:
+def _kind(name: tuple[str, ...], leading: tuple[str, ...], said: Result) -> str:
     if said["verdict"] == "unknown":
         certain = {effect["id"] for effect in said["effects"]}
         if certain and set(name) == certain:
@@ -352,7 +349,7 @@ def _kind(name: tuple[str, ...], leading: tuple[str, ...], said: Mapping[str, An
 # What no effect explains ----------------------------------------------------------------------------------------------
 
 
-def draw_latent(folder: Path, said: Mapping[str, Any], channels: Sequence[Channel]) -> Figure | None:
+def draw_latent(folder: Path, said: Result, channels: Sequence[Channel]) -> Figure | None:
     """Every latent column over time, and over what it goes with most; coloured by phase, with means of equal counts."""
     if "latent" not in said or not (folder / said["latent"]["file"]).exists():
         return None
@@ -368,9 +365,7 @@ def draw_latent(folder: Path, said: Mapping[str, Any], channels: Sequence[Channe
     others = [name for name in sorted(shares, key=lambda n: -shares[n]) if name != "t_s" and shares[name] > 0]
     other = others[0] if others else next(name for name in head if name not in (*latents, "trial", "t_s"))
     phase = _phase_at(trials, values["t_s"], channels)
-    drawing = Figure(figsize=(_WIDTH, 0.6 + 2.3 * len(latents)))
-    FigureCanvasAgg(drawing)
-    axes = drawing.subplots(len(latents), 2, squeeze=False, sharey="row")
+    drawing, axes = sheet(len(latents), 2, 0.6 + 2.3 * len(latents), sharey="row")
     for pair, latent in zip(axes, latents, strict=True):
         for axis, column in zip(pair, ("t_s", other), strict=True):
             label, factor = _COLUMNS.get(column, (column, 1.0))
@@ -385,8 +380,8 @@ def draw_latent(folder: Path, said: Mapping[str, Any], channels: Sequence[Channe
             axis.set_xlabel(label + (f"; explains {several}{100 * share:.0f} %" if share is not None else ""))
         pair[0].set_ylabel(_COLUMNS.get(latent, (latent, 1.0))[0])
         _frame(pair[1], values[latent])
-    handles = [*_phase_handles(phase), Line2D([], [], color=INK, marker="o", ms=3, label="means of equal counts")]
-    drawing.legend(handles=handles, loc="outside upper left", ncols=5, fontsize=8)
+    handles = [*_phase_handles(phase), handle("means of equal counts", INK, marker="o", ms=3)]
+    legend_above(drawing, handles, 5, fontsize=8)
     return drawing
 
 

@@ -3,74 +3,108 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
-
-from matplotlib.figure import Figure
 
 from vis.diagnose.figures import draw_evidence, draw_latent, draw_phases, draw_trajectories, read_channel, worst
 from vis.page.numbers import plain, short
-from vis.page.page import Block, Page, Section, Tile, code, figure, listing, table, text, write_page
+from vis.page.page import Block, Section, Tile, listing, table, text
+from vis.page.plots import Plot
+from vis.page.report import Progress, Report, Result, again, unit_text
 from vis.page.style import styled
 
 __all__ = ["write_diagnosis_report"]
 
-_DPI = 130
 _MOST_PLACES = 8
 """Stretches that are listed."""
 _DASH = "\N{EN DASH}"
+_SEARCHED = (
+    "Every candidate in every form is in evidence.csv. Chi-square here is that of the search, beyond the noise as it "
+    "was found (its jitter, its correlation, replicates' scatter) and without those held out; the gap above is counted "
+    "with the noise that campaign.toml states, so the two are not the same number."
+)
+_FIGURES = {
+    "trajectories": (
+        "Measured and modelled",
+        "The channels in which the base model fails most, held-out trials last: left measured (dots) and modelled, "
+        "right what is left over the sensor's noise, and, where replicates differ by more, how far that is. The band "
+        "along the top is the phase of the base model's motion.",
+    ),
+    "residuals": (
+        "What is left, by phase and channel",
+        "Chi-square per sample with the noise that campaign.toml states. Trials held out took no part in fitting or "
+        "choosing.",
+    ),
+    "evidence": (
+        "What every candidate explains",
+        "The best form of each name, and of sets of names those that beat all of their parts. Left: log evidence over "
+        "the base model, tempered for misfit of form. Right: what each leaves of the trials that were fitted, and how "
+        "much of what the base model leaves beyond the noise it takes away.",
+    ),
+    "latent": (
+        "What no effect explains",
+        "What the best model lacks, over time and over what it goes with most. Shares are those of the variance that "
+        "a binned mean explains, judged on rows that took no part in making it.",
+    ),
+}
+"""Title and caption by the name of the file."""
 
 
-def write_diagnosis_report(folder: str | Path, *, progress: Callable[[float], None] | None = None) -> Path:
+def write_diagnosis_report(folder: str | Path, *, progress: Progress | None = None) -> Path:
     """Make figures/ and report.html of the folder of a diagnosis, and return the report.
 
     Raises FileNotFoundError where the folder has no diagnosis.json or result.json.
     """
-    tell = progress if progress is not None else lambda done: None
-    folder = Path(folder)
-    said = json.loads((folder / "diagnosis.json").read_text(encoding="utf-8"))
-    result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
-    channels = [read_channel(path) for path in sorted((folder / "series").glob("*.csv"))]
-    held = set(said["gap"]["held_out_trials"])
-    labels = _labels(said)
-    shown = worst([channel for channel in channels if len(channel.time)], held)
-    figures = folder / "figures"
-    figures.mkdir(exist_ok=True)
-    drawn: dict[str, Block] = {}
-    plans: list[tuple[str, str, str, Callable[[], Figure | None]]] = [
-        ("trajectories", "Measured and modelled",
-         "The channels in which the base model fails most, held-out trials last: left measured (dots) and modelled, "
-         "right what is left over the sensor's noise, and, where replicates differ by more, how far that is. The band "
-         "along the top is the phase of the base model's motion.",
-         lambda: draw_trajectories(shown, held, labels)),
-        ("residuals", "What is left, by phase and channel",
-         "Chi-square per sample with the noise that campaign.toml states. Trials held out took no part in fitting or "
-         "choosing.",
-         lambda: draw_phases(said.get("by_phase", []), labels)),
-        ("evidence", "What every candidate explains",
-         "The best form of each name, and of sets of names those that beat all of their parts. Left: log evidence over "
-         "the base model, tempered for misfit of form. Right: what each leaves of the trials that were fitted, and how "
-         "much of what the base model leaves beyond the noise it takes away.",
-         lambda: draw_evidence(said)),
-        ("latent", "What no effect explains",
-         "What the best model lacks, over time and over what it goes with most. Shares are those of the variance that "
-         "a binned mean explains, judged on rows that took no part in making it.",
-         lambda: draw_latent(folder, said, channels)),
+    report = Report(folder, progress, dpi=130)
+    said: Result = json.loads((report.folder / "diagnosis.json").read_text(encoding="utf-8"))
+    drawn = _drawn(report, said)
+    result, gap = report.result, said["gap"]
+    named = ", ".join(effect["id"] for effect in said["effects"]) or "nothing"
+    which = "chi-square a sample, " + ("fitted" if gap["before"]["held_out"] is None else "held-out") + " trials"
+    tiles = [
+        Tile("Verdict", said["verdict"], " or ".join([named, *said["alternatives"]])),
+        Tile("Gap before", _gap(gap["before"]), which + _weighed(said, "before")),
+        Tile("Gap after", _gap(gap["after"]), which + _weighed(said, "after"), second=True),
+    ]
+    departures = result["departures"]["sentences"]
+    sections = [
+        Section("", [listing(result.get("summary", [])), *drawn["trajectories"]]),
+        Section("What is left", [_gap_table(said), *_in_units(said), *drawn["residuals"], *_phase_table(said),
+                                 *drawn["latent"]]),
+        Section("Where the base model fails", [*([listing(departures)] if departures else []), *_where(said)]),
+        Section("Candidates", [*drawn["evidence"], *_evidence(said)]),
+        Section("What these trials can tell apart", _told_apart(said)),
+        Section("The next experiment", [text(said["next_experiment"])] if said.get("next_experiment") else []),
+        Section("Numbers", _numbers(said)),
+        Section("What was found in the recordings", _findings(said)),
+        again("hedgebed diagnose THIS_FOLDER/run.toml", f"With hedgebed {result['version']}, where it was started from "
+              "(the campaign's path is as given):"),
     ]  # fmt: skip
-    for place, (name, title, caption, draw) in enumerate(plans):
+    lead = ["diagnose", f"held out: {', '.join(gap['held_out_trials']) or 'none'}"]
+    return report.write([section for section in sections if section.blocks], lead=lead, tiles=tiles)
+
+
+def _drawn(report: Report, said: Result) -> dict[str, list[Block]]:
+    """Each of the figures that has something to show."""
+    channels = [read_channel(path) for path in sorted((report.folder / "series").glob("*.csv"))]
+    held, labels = set(said["gap"]["held_out_trials"]), _labels(said)
+    shown = worst([channel for channel in channels if len(channel.time)], held)
+    draws = (
+        lambda: draw_trajectories(shown, held, labels),
+        lambda: draw_phases(said.get("by_phase", []), labels),
+        lambda: draw_evidence(said),
+        lambda: draw_latent(report.folder, said, channels),
+    )
+    drawn: dict[str, list[Block]] = {}
+    for (name, words), draw in zip(_FIGURES.items(), draws, strict=True):
         with styled():
             drawing = draw()
-            if drawing is not None:
-                drawing.savefig(figures / f"{name}.png", dpi=_DPI)
-                drawn[name] = figure(figures / f"{name}.png", title=title, caption=caption)
-        tell(0.2 * (place + 1))
-    report = write_page(folder / "report.html", _page(said, result, drawn))
-    tell(1.0)
-    return report
+        drawn[name] = [] if drawing is None else [report.draw(Plot(name, *words, drawing))]
+        report.tell(0.2 * len(drawn))
+    return drawn
 
 
-def _labels(said: Mapping[str, Any]) -> tuple[str, str]:
+def _labels(said: Result) -> tuple[str, str]:
     """What the models before and after are called; the second is empty where nothing was added."""
     before, names = "base model, fitted", " + ".join(effect["id"] for effect in said["effects"])
     if said["verdict"] == "none" or said["gap"]["after"] == said["gap"]["before"]:
@@ -79,50 +113,16 @@ def _labels(said: Mapping[str, Any]) -> tuple[str, str]:
     return before, f"with {names}" if names else f"with {likeliest}, not certain" if likeliest else "best model found"
 
 
-# The page -------------------------------------------------------------------------------------------------------------
+# Its parts ------------------------------------------------------------------------------------------------------------
 
 
-def _page(said: Mapping[str, Any], result: Mapping[str, Any], drawn: Mapping[str, Block]) -> Page:
-    gap = said["gap"]
-    named = ", ".join(effect["id"] for effect in said["effects"]) or "nothing"
-    which = "chi-square a sample, " + ("fitted" if gap["before"]["held_out"] is None else "held-out") + " trials"
-    tiles = [
-        Tile("Verdict", said["verdict"], " or ".join([named, *said["alternatives"]])),
-        Tile("Gap before", _gap(gap["before"]), which + _weighed(said, "before")),
-        Tile("Gap after", _gap(gap["after"]), which + _weighed(said, "after"), second=True),
-    ]
-    sections = [
-        Section("", [listing(result.get("summary", [])), *_there(drawn, "trajectories")]),
-        Section("What is left", [_gap_table(said), *_in_units(said), *_there(drawn, "residuals"), *_phase_table(said),
-                                 *_there(drawn, "latent")]),
-        Section("Where the base model fails", [*_sentences(result["departures"]["sentences"]), *_where(said)]),
-        Section("Candidates", [*_there(drawn, "evidence"), *_evidence(said)]),
-        Section("What these trials can tell apart", _told_apart(said)),
-        Section("The next experiment", [text(said["next_experiment"])] if said.get("next_experiment") else []),
-        Section("Numbers", _numbers(said)),
-        Section("What was found in the recordings", _findings(said)),
-        Section("To do this again", [
-            text(f"With hedgebed {result['version']}, where it was started from (the campaign's path is as given):"),
-            code("hedgebed diagnose THIS_FOLDER/run.toml"),
-        ]),
-    ]  # fmt: skip
-    held = ", ".join(gap["held_out_trials"]) or "none"
-    return Page(
-        title=str(result["title"]),
-        lead=[f"hedgebed {result['version']}", "diagnose", f"held out: {held}"],
-        tiles=tiles,
-        warnings=[str(warning)[:1].upper() + str(warning)[1:] for warning in result["warnings"]],
-        sections=[section for section in sections if section.blocks],
-    )
-
-
-def _weighed(said: Mapping[str, Any], stage: str) -> str:
+def _weighed(said: Result, stage: str) -> str:
     """The same weighed against what replicates differ by, where that is more than the sensors."""
     weighed = said.get("gap_with_scatter")
     return "" if weighed is None else f"; {_gap(weighed[stage])} beside what replicates differ by"
 
 
-def _gap(gap: Mapping[str, Any]) -> str:
+def _gap(gap: Result) -> str:
     return _number(gap["fit"] if gap["held_out"] is None else gap["held_out"])
 
 
@@ -131,18 +131,14 @@ def _number(value: float) -> str:
     return plain(value) if value >= 1e3 else short(value, 3)
 
 
-def _sentences(sentences: Sequence[str]) -> list[Block]:
-    return [listing(sentences)] if sentences else []
-
-
-def _gap_table(said: Mapping[str, Any]) -> Block:
+def _gap_table(said: Result) -> Block:
     gap, weighed = said["gap"], said.get("gap_with_scatter")
 
     def cell(value: float | None, error: float | None = None) -> str:
         told = _DASH if value is None else _number(value)
         return told if error is None else f"{told} ± {short(error, 1)}"
 
-    def error(one: Mapping[str, Any], stage: str, part: str) -> float | None:
+    def error(one: Result, stage: str, part: str) -> float | None:
         return one.get("after_std", {}).get(part) if stage == "after" else None
 
     rows = [
@@ -160,7 +156,7 @@ def _gap_table(said: Mapping[str, Any]) -> Block:
     return table(head, rows, title=title)
 
 
-def _in_units(said: Mapping[str, Any]) -> list[Block]:
+def _in_units(said: Result) -> list[Block]:
     """The gap in the channels' units, and by condition."""
     blocks = []
     cells = {(row["channel"], row["held_out"]): row for row in said.get("by_channel", [])}
@@ -171,8 +167,10 @@ def _in_units(said: Mapping[str, Any]) -> list[Block]:
 
     names = dict.fromkeys((row["channel"], row["unit"]) for row in said.get("by_channel", []))
     if names:
-        rows = [(name, unit, *(rms(name, held, stage) for held in (False, True) for stage in ("before", "after")))
-                for name, unit in names]  # fmt: skip
+        rows = [
+            (name, unit, *(rms(name, held, stage) for held in (False, True) for stage in ("before", "after")))
+            for name, unit in names
+        ]
         head = ("channel", "unit", "fitted: before", "after", "held out: before", "after")
         blocks.append(table(head, rows, title="Measured less modelled, root mean square, the sensors' noise included"))
     conditions = said.get("by_condition", [])
@@ -185,15 +183,15 @@ def _in_units(said: Mapping[str, Any]) -> list[Block]:
     return blocks
 
 
-def _phase_table(said: Mapping[str, Any]) -> list[Block]:
+def _phase_table(said: Result) -> list[Block]:
     """By phase and channel, fitted trials beside held-out ones."""
-    rows: dict[tuple[str, str], dict[bool, Mapping[str, Any]]] = {}
+    rows: dict[tuple[str, str], dict[bool, Result]] = {}
     for row in said.get("by_phase", []):
         rows.setdefault((row["phase"], row["channel"]), {})[row["held_out"]] = row
     if not rows:
         return []
 
-    def cells(part: Mapping[str, Any] | None) -> tuple[str, str, str]:
+    def cells(part: Result | None) -> tuple[str, str, str]:
         if part is None:
             return _DASH, _DASH, _DASH
         return str(part["samples"]), _number(part["before"]), _number(part["after"])
@@ -203,7 +201,7 @@ def _phase_table(said: Mapping[str, Any]) -> list[Block]:
     return [table(head, body, title="Chi-square per sample by phase and channel")]
 
 
-def _where(said: Mapping[str, Any]) -> list[Block]:
+def _where(said: Result) -> list[Block]:
     if not said["where"]:
         return []
     places = said["where"][:_MOST_PLACES]
@@ -225,7 +223,7 @@ def _common(settings: Sequence[Mapping[str, float]]) -> dict[str, float]:
     return {name: value for name, value in first.items() if all(other.get(name) == value for other in settings)}
 
 
-def _parted(said: Mapping[str, Any]) -> list[Block]:
+def _parted(said: Result) -> list[Block]:
     """When each trial parts from the base model, channel by channel, in the order in which they do."""
     trials: dict[str, list[str]] = {}
     for row in said.get("parted", []):
@@ -250,7 +248,7 @@ def _settings(settings: Mapping[str, float], *, but: Mapping[str, float] | None 
     return ", ".join(shown)
 
 
-def _evidence(said: Mapping[str, Any]) -> list[Block]:
+def _evidence(said: Result) -> list[Block]:
     """A line a set of names; those no better than the base model in one sentence."""
     plain = {"closes": None, "tried": 1, "better": True, "note": ""}  # of a folder from before there were candidates
     rows = said.get("candidates") or [plain | dict(row) for row in said.get("evidence", [])]
@@ -271,15 +269,11 @@ def _evidence(said: Mapping[str, Any]) -> list[Block]:
         blocks.append(table(head, better, title=title, words=True))
     if worse:
         blocks.append(text(f"No better than the base model with its parameters fitted: {', '.join(worse)}."))
-    blocks.append(text(
-        "Every candidate in every form is in evidence.csv. Chi-square here is that of the search, beyond the noise as "
-        "it was found (its jitter, its correlation, replicates' scatter) and without those held out; the gap above "
-        "is counted with the noise that campaign.toml states, so the two are not the same number.", small=True,
-    ))  # fmt: skip
+    blocks.append(text(_SEARCHED, small=True))
     return blocks
 
 
-def _sizes(said: Mapping[str, Any]) -> list[Block]:
+def _sizes(said: Result) -> list[Block]:
     rows = [
         (size["effect"], short(size["signature"], 2), size["channel"], f"{short(size['rms'], 2)} {size['unit']}",
          f"{short(size['most'], 2)} {size['unit']}",
@@ -293,22 +287,24 @@ def _sizes(said: Mapping[str, Any]) -> list[Block]:
                                     "refitted, over the sensors' noise")]  # fmt: skip
 
 
-def _numbers(said: Mapping[str, Any]) -> list[Block]:
-    ends = {stage: {bound["parameter"] for bound in bounds if bound["at_bound"]}
-            for stage, bounds in said.get("at_bounds", {}).items()}  # fmt: skip
+def _numbers(said: Result) -> list[Block]:
+    ends = {
+        stage: {bound["parameter"] for bound in bounds if bound["at_bound"]}
+        for stage, bounds in said.get("at_bounds", {}).items()
+    }
 
-    def error(entry: Mapping[str, Any], name: str, stage: str) -> str:
+    def error(entry: Result, name: str, stage: str) -> str:
         return "at its end" if name in ends.get(stage, ()) else short(entry["std"], 2)
 
     effects = [
         (effect["id"], name, short(entry["value"], 4), error(entry, f"{effect['id']}.{name}", "after"),
-         _unit(entry["unit"]))
+         unit_text(entry["unit"]))
         for effect in said["effects"] for name, entry in effect["parameters"].items()
     ]  # fmt: skip
     after = said["base"]["after"]
     base = [
         (name, short(entry["value"], 4), error(entry, name, "before"), short(after[name]["value"], 4),
-         error(after[name], name, "after"), _unit(entry["unit"]))
+         error(after[name], name, "after"), unit_text(entry["unit"]))
         for name, entry in said["base"]["before"].items() if name in after
     ]  # fmt: skip
     blocks = []
@@ -326,7 +322,7 @@ def _numbers(said: Mapping[str, Any]) -> list[Block]:
     return blocks
 
 
-def _equations(said: Mapping[str, Any]) -> list[Block]:
+def _equations(said: Result) -> list[Block]:
     """The law that each number is of."""
     rows = [row for row in said.get("equations", []) if row["equation"]]
     if not rows:
@@ -336,11 +332,7 @@ def _equations(said: Mapping[str, Any]) -> list[Block]:
     return [listing(laws), *([text(f"{symbols}.", small=True)] if symbols else [])]
 
 
-def _unit(unit: str) -> str:
-    return "" if unit == "1" else unit
-
-
-def _findings(said: Mapping[str, Any]) -> list[Block]:
+def _findings(said: Result) -> list[Block]:
     rows = [
         (f["what"], f["trial"] or _DASH, f["channel"] or _DASH,
          _DASH if f["from_s"] is None else f"{f['from_s']:.4g} to {f['to_s']:.4g}", "yes" if f["set_aside"] else "no")
@@ -349,7 +341,7 @@ def _findings(said: Mapping[str, Any]) -> list[Block]:
     return [table(("what", "trial", "channel", "seconds", "set aside"), rows, words=True)] if rows else []
 
 
-def _told_apart(said: Mapping[str, Any]) -> list[Block]:
+def _told_apart(said: Result) -> list[Block]:
     """The first effect against the nearest other names, and what would tell them apart."""
     rows = said.get("equivalence", [])
     if len(rows) < 2:
@@ -374,7 +366,3 @@ def _told_apart(said: Mapping[str, Any]) -> list[Block]:
     )
     close = [row["what_would_tell"] for row in others if not row["told_apart"]]
     return [table(head, cells, title=caption), *([listing(close)] if close else [])]
-
-
-def _there(drawn: Mapping[str, Block], *names: str) -> list[Block]:
-    return [drawn[name] for name in names if name in drawn]

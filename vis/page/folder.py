@@ -51,7 +51,10 @@ class Series:
 
     def part(self, *phases: str) -> Series:
         """The rows in these phases."""
-        keep = np.isin(self.phase, phases)
+        return self.where(np.isin(self.phase, phases))
+
+    def where(self, keep: NDArray[np.bool_]) -> Series:
+        """The rows that are kept, shape (n,)."""
         return Series(self.time[keep], self.depth[keep], self.velocity[keep], self.force[keep], self.phase[keep])
 
     def __len__(self) -> int:

@@ -1,19 +1,35 @@
 """A report as a page: title, tiles, warnings, and sections of text, figures and tables, in one file without a network.
 
-What the page says is its author's business (`vis.tumble.report`, `vis.paper.report`); how it looks is that of every
+What the page says is its author's business (`vis.page.report` and those who use it); how it looks is that of every
 report.
 """
 
 from __future__ import annotations
 
 import base64
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
+
+from PIL import Image
 
 from vis.page.columns import template
 
-__all__ = ["Block", "Page", "Section", "Tile", "code", "figure", "listing", "table", "text", "write_page"]
+__all__ = [
+    "Block",
+    "Page",
+    "Section",
+    "Tile",
+    "code",
+    "figure",
+    "listing",
+    "table",
+    "text",
+    "write_page",
+    "write_template",
+]
 
 _KINDS = {".png": "png", ".gif": "gif", ".jpg": "jpeg"}
 
@@ -81,11 +97,22 @@ def listing(items: Sequence[str]) -> Block:
     return Block(kind="list", entries=tuple(items))
 
 
-def figure(path: Path, *, title: str, caption: str, half: bool = False, show_file: bool = False) -> Block:
-    """A picture, put into the page. Raises ValueError for a file that is neither PNG, GIF nor JPEG."""
+def figure(
+    path: Path, *, title: str, caption: str, half: bool = False, show_file: bool = False, small: bool = False
+) -> Block:
+    """A picture, put into the page; if `small` as JPEG, a quarter of a PNG's size.
+
+    Raises ValueError for a file that is neither PNG, GIF nor JPEG.
+    """
     if path.suffix not in _KINDS:
         raise ValueError(f"{path} is no picture that a page takes: {', '.join(_KINDS)}")
-    data = f"data:image/{_KINDS[path.suffix]};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
+    kind, content = _KINDS[path.suffix], path.read_bytes()
+    if small and kind == "png":
+        buffer = io.BytesIO()
+        with Image.open(path) as image:
+            image.convert("RGB").save(buffer, "JPEG", quality=90, subsampling=0)
+        kind, content = "jpeg", buffer.getvalue()
+    data = f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"
     return Block(kind="figure", title=title, caption=caption, data=data, half=half, file=path.name if show_file else "")
 
 
@@ -96,7 +123,12 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], *, title: str = ""
 
 def write_page(path: Path, page: Page) -> Path:
     """Write the page to `path`, all of it or nothing, and return it."""
+    return write_template(path, "page.html", page=page)
+
+
+def write_template(path: Path, name: str, **context: Any) -> Path:
+    """The same of a template with what it asks for."""
     temporary = path.with_name(f"{path.name}.part")
-    temporary.write_text(template("page.html").render(page=page), encoding="utf-8")
+    temporary.write_text(template(name).render(**context), encoding="utf-8")
     temporary.replace(path)
     return path

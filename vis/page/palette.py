@@ -31,9 +31,7 @@ def line_handles(labels: Sequence[str], keys: Sequence[Hashable]) -> list[Line2D
     """For the legend: a line for each different key, followed by the labels that share it."""
     styles = line_styles(keys)
     named = {key: [label for label, own in zip(labels, keys, strict=True) if own == key] for key in styles}
-    return [
-        Line2D([], [], lw=1.6, label=f"{key}: {_listed(named[key])}", **style) for key, style in styles.items()
-    ]  # fmt: skip
+    return [Line2D([], [], lw=1.6, label=f"{key}: {_listed(named[key])}", **style) for key, style in styles.items()]
 
 
 def _listed(labels: Sequence[str]) -> str:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
 
 from vis.page.page import Block, table, text
+from vis.page.report import Result
 from vis.paper.run import PaperRun, in_order
 
 __all__ = ["grains_blocks", "ours", "sliding_blocks"]
 
 
-def ours(result: Mapping[str, Any]) -> str:
+def ours(result: Result) -> str:
     """What of the numbers is ours, in a sentence."""
     surfaces = result["surfaces"]
     loose = [name for name, numbers in surfaces.items() if numbers.get("granular")]
@@ -73,15 +72,15 @@ def grains_blocks(paper: PaperRun) -> list[Block]:
     return [table(head, rows, title="Brake trials on grains"), text(note, small=True)]
 
 
-def _place(entry: Mapping[str, Any]) -> tuple[str, float, float]:
+def _place(entry: Result) -> tuple[str, float, float]:
     return entry["surface"], entry["rig"], entry["torque"]
 
 
-def _ground(entry: Mapping[str, Any]) -> tuple[str, float | None, float]:
+def _ground(entry: Result) -> tuple[str, float | None, float]:
     varied = entry["varied"]
     return varied["law"], varied["stiffness"], varied["rebound"]
 
 
-def _angle(entry: Mapping[str, Any]) -> str:
+def _angle(entry: Result) -> str:
     value = entry["trajectory_angle"]
     return "none" if value is None else f"{math.degrees(value):.1f}"

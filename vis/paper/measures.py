@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 
 from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
 
+from vis.page.plots import Plot, handle, legend_above, sheet
 from vis.page.style import GREY, INK, styled
-from vis.paper.run import WIDTH, Drawn, PaperRun, in_order, legend_above, new_figure
+from vis.paper.run import PaperRun, in_order
 
 __all__ = ["figure_8", "figure_sweep"]
 
@@ -20,11 +20,10 @@ _MEASURES = (
 )
 
 
-def figure_8(paper: PaperRun) -> Drawn | None:
+def figure_8(paper: PaperRun) -> Plot:
     """Angle, speed and angular velocity over gravities, torques and surfaces."""
     with styled():
-        drawing = new_figure(WIDTH, 7.2)
-        axes = drawing.subplots(len(_MEASURES), len(paper.rigs), sharex=True, sharey="row", squeeze=False)
+        drawing, axes = sheet(len(_MEASURES), len(paper.rigs), 7.2, sharex=True, sharey="row")
         for j, rig in enumerate(paper.rigs):
             axes[0, j].set_title(f"{rig:g} g")
             for i, (key, scale, label) in enumerate(_MEASURES):
@@ -42,18 +41,16 @@ def figure_8(paper: PaperRun) -> Drawn | None:
                 axes[0, j].axhline(stated, color=GREY, lw=0.9, ls=(0, (5, 3)), zorder=1)
         for row in axes[1:]:
             row[0].set_ylim(bottom=0.0)
-        dashed = Line2D([], [], color=GREY, lw=0.9, ls=(0, (5, 3)), label="0°, 22.5°, 60° of the text")
-        hollow = Line2D([], [], color=INK, marker="o", mfc="none", ls="", ms=7, label="the paper's 1 ms step")
-        dots = [
-            Line2D([], [], color=paper.colour(t), marker="o", ls="", ms=5, label=paper.label(t)) for t in paper.torques
-        ]
+        dashed = handle("0°, 22.5°, 60° of the text", GREY, lw=0.9, ls=(0, (5, 3)))
+        hollow = handle("the paper's 1 ms step", INK, marker="o", mfc="none", ls="", ms=7)
+        dots = [handle(paper.label(t), paper.colour(t), marker="o", ls="", ms=5) for t in paper.torques]
         legend_above(drawing, [*dots, hollow, dashed], columns=3)
     caption = (
         "The centre's angle over its first 10 mm, and its largest speed and angular velocity before it is 40 mm away. "
         "Bars: friction at both ends of its band; rings: the paper's fixed step. The text: about 22.5° at low torque "
         "on brick, growing to about 60°; negative angles for the brake on grains. Sand and JSC-1A are spring-dampers."
     )
-    return "Figure 8: angle, speed, angular velocity", caption, drawing
+    return Plot("figure8", "Figure 8: angle, speed, angular velocity", caption, drawing)
 
 
 def _draw_measures(axis: Axes, paper: PaperRun, surface: str, rig: float, key: str, scale: float, place: int) -> None:
@@ -61,22 +58,22 @@ def _draw_measures(axis: Axes, paper: PaperRun, surface: str, rig: float, key: s
     count = len(paper.torques)
     for index, torque in enumerate(paper.torques):
         at = place + 0.22 * (index - 0.5 * (count - 1))
-        values = {v: paper.case(surface, rig, torque, v)[key] for v in ("low", "nominal", "high", "paper")}
-        if values["nominal"] is None:
+        *band, fixed = paper.variants(surface, rig, torque, key)
+        if band[1] is None:
             axis.text(at, 0.02, "none", rotation=90, fontsize=7, transform=axis.get_xaxis_transform(), ha="center")
             continue
-        band = [scale * values[v] for v in ("low", "nominal", "high") if values[v] is not None]
+        known = [scale * value for value in band if value is not None]
         colour = paper.colour(torque)
-        axis.plot([at, at], [min(band), max(band)], color=colour, lw=3.0, alpha=0.45, solid_capstyle="butt")
-        axis.plot(at, scale * values["nominal"], "o", color=colour, ms=5)
-        if values["paper"] is not None:
-            axis.plot(at, scale * values["paper"], "o", color=INK, mfc="none", ms=7.5, mew=0.8)
+        axis.plot([at, at], [min(known), max(known)], color=colour, lw=3.0, alpha=0.45, solid_capstyle="butt")
+        axis.plot(at, scale * band[1], "o", color=colour, ms=5)
+        if fixed is not None:
+            axis.plot(at, scale * fixed, "o", color=INK, mfc="none", ms=7.5, mew=0.8)
 
 
 # The sweep ------------------------------------------------------------------------------------------------------------
 
 
-def figure_sweep(paper: PaperRun) -> Drawn | None:
+def figure_sweep(paper: PaperRun) -> Plot | None:
     """What halving and doubling does to the trajectory angle and to the first hop."""
     if not paper.sweep:
         return None
@@ -87,18 +84,16 @@ def figure_sweep(paper: PaperRun) -> Drawn | None:
     places = [*keys, "sliding"] if sliding else keys
     words = {
         "inertia": "inertia J", "wheel_inertia": "wheel inertia", "stiffness": "stiffness K", "damping": "damping C",
-        "wheel_speed_0": "brake's wheel speed",
-        "sliding": "friction mu_d / mu_s",
+        "wheel_speed_0": "brake's wheel speed", "sliding": "friction mu_d / mu_s",
     }  # fmt: skip
-    measures = (
-        ("trajectory_angle", "trajectory angle [degrees]"),
-        ("transition_angle_hop", "θ at the first hop [degrees]"),
-    )
+    measures = {
+        "trajectory_angle": "trajectory angle [degrees]",
+        "transition_angle_hop": "θ at the first hop [degrees]",
+    }
     with styled():
-        drawing = new_figure(WIDTH, 5.2)
-        axes = drawing.subplots(len(paper.hard), 2, sharey=True, sharex="col", squeeze=False)
+        drawing, axes = sheet(len(paper.hard), 2, 5.2, sharey=True, sharex="col")
         for i, surface in enumerate(paper.hard):
-            for j, (measure, label) in enumerate(measures):
+            for j, (measure, label) in enumerate(measures.items()):
                 axis: Axes = axes[i, j]
                 axis.set_title(surface)
                 for torque in paper.torques:
@@ -123,20 +118,16 @@ def figure_sweep(paper: PaperRun) -> Drawn | None:
                     axis.set_xlabel(label)
             axes[i, 0].set_yticks(range(len(places)), [words.get(key, key) for key in places])
             axes[i, 0].set_ylim(len(places) - 0.5, -0.5)
-        marks = [
-            Line2D([], [], color=INK, marker=mark, ls="", ms=6, label=label)
-            for mark, label in (("<", "halved"), (">", "doubled"))
-        ]
+        marks = [handle(label, INK, marker=mark, ls="", ms=6) for mark, label in (("<", "halved"), (">", "doubled"))]
         marks += [
-            Line2D([], [], color=INK, marker="D", ls="", ms=_diamond(ratio, ratios), label=f"mu_d = {ratio:g} mu_s")
-            for ratio in ratios
+            handle(f"mu_d = {ratio:g} mu_s", INK, marker="D", ls="", ms=_diamond(ratio, ratios)) for ratio in ratios
         ]
         legend_above(drawing, [*paper.handles(), *marks], columns=5)
     caption = (
         f"At {rig:g} g: the numbers that the paper does not give, one at a time; the line is the value as it is, with "
         "mu_d half of mu_s on steel and brick."
     )
-    return "What the paper does not give", caption, drawing
+    return Plot("sweep", "What the paper does not give", caption, drawing)
 
 
 def _diamond(ratio: float, ratios: Sequence[float]) -> float:

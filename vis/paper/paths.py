@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from vis.page.plots import Array, Plot, handle, legend_above, sheet
+from vis.page.report import Result
 from vis.page.style import GREY, INK, styled
-from vis.paper.run import WIDTH, Array, Case, Drawn, PaperRun, legend_above, new_figure
-from vis.tumble.report import STATES, state_runs
+from vis.page.tumble_series import STATES, state_runs
+from vis.paper.run import PaperRun
 
 __all__ = ["figure_5", "figure_6", "figure_7"]
 
@@ -21,7 +22,7 @@ _SHOWN = 0.045
 """How far Figure 5 goes [m]: a little more than what the paper trusts."""
 
 
-def _start(paper: PaperRun, case: Case) -> tuple[Array, Array]:
+def _start(paper: PaperRun, case: Result) -> tuple[Array, Array]:
     """The path from the start to the end of the first hop [mm], as far as Figure 5 goes."""
     numbers, states = paper.rows(case)
     x, y = 1e3 * (numbers["x_m"] - numbers["x_m"][0]), 1e3 * (numbers["y_m"] - numbers["y_m"][0])
@@ -31,14 +32,13 @@ def _start(paper: PaperRun, case: Case) -> tuple[Array, Array]:
     return x[:end], y[:end]
 
 
-def figure_5(paper: PaperRun) -> Drawn | None:
+def figure_5(paper: PaperRun) -> Plot | None:
     """Path of the centre from its start, steel, the first gravity."""
     if "steel" not in paper.surfaces:
         return None
     rig, gap = paper.rigs[0], 0.0
     with styled():
-        drawing = new_figure(WIDTH, 4.6)
-        axis = drawing.subplots()
+        drawing, ((axis,),) = sheet(1, 1, 4.6)
         for stated in (22.5, 60.0):
             reach = 1e3 * _SHOWN
             along = np.array([0.0, reach * math.cos(math.radians(stated))])
@@ -59,13 +59,15 @@ def figure_5(paper: PaperRun) -> Drawn | None:
             shared = min(len(x), len(fixed[0]))
             gap = max(gap, float(np.hypot(x[:shared] - fixed[0][:shared], y[:shared] - fixed[1][:shared]).max()))
         axis.plot(0, 0, "o", color=INK, ms=4)
-        axis.set_aspect("equal")
-        axis.set_xlim(-2.0, 1.25e3 * _SHOWN)
-        axis.set_ylim(-1.0, 1.02e3 * _SHOWN)
-        axis.set_xlabel("x of the centre from the start [mm]")
-        axis.set_ylabel("y of the centre from the start [mm]")
+        axis.set(
+            aspect="equal",
+            xlim=(-2.0, 1.25e3 * _SHOWN),
+            ylim=(-1.0, 1.02e3 * _SHOWN),
+            xlabel="x of the centre from the start [mm]",
+            ylabel="y of the centre from the start [mm]",
+        )
         band = Patch(color=GREY, alpha=0.35, lw=0, label="friction band")
-        dotted = Line2D([], [], color=INK, lw=1.1, ls=(0, (1, 1.6)), label="the paper's 1 ms step")
+        dotted = handle("the paper's 1 ms step", INK, lw=1.1, ls=(0, (1, 1.6)))
         legend_above(drawing, [*paper.handles(), band, dotted], columns=5)
     caption = (
         f"Steel, {rig:g} g, to the end of the first hop or {1e3 * _SHOWN:g} mm from the start (the paper trusts its "
@@ -73,7 +75,7 @@ def figure_5(paper: PaperRun) -> Drawn | None:
         f"{gap:.2g} mm from the located integrator at the same time. Dashed: the angles that the text states for low "
         "and high torque."
     )
-    return "Figure 5: the start on steel", caption, drawing
+    return Plot("figure5", "Figure 5: the start on steel", caption, drawing)
 
 
 # Figure 6 -------------------------------------------------------------------------------------------------------------
@@ -82,14 +84,14 @@ def figure_5(paper: PaperRun) -> Drawn | None:
 _ROWS = (("low", "μ low"), ("nominal", "μ"), ("high", "μ high"), ("paper", "1 ms step"))
 
 
-def figure_6(paper: PaperRun) -> Drawn | None:
+def figure_6(paper: PaperRun) -> Plot | None:
     """State against angle, steel and brick, the first gravity, a row a torque."""
     if not paper.hard:
         return None
     rig, widest = paper.rigs[0], 60.0
     with styled():
-        drawing = new_figure(WIDTH, 0.55 + 1.35 * len(paper.torques))
-        axes = drawing.subplots(len(paper.torques), len(paper.hard), sharex=True, sharey=True, squeeze=False)
+        count = len(paper.torques)
+        drawing, axes = sheet(count, len(paper.hard), 0.55 + 1.35 * count, sharex=True, sharey=True)
         for i, torque in enumerate(paper.torques):
             for j, surface in enumerate(paper.hard):
                 axis: Axes = axes[i, j]
@@ -101,20 +103,19 @@ def figure_6(paper: PaperRun) -> Drawn | None:
         for axis in axes[-1]:
             axis.set_xlabel("θ [degrees]")
         axes[0, 0].set_yticks(range(len(_ROWS)), [label for _, label in _ROWS])
-        axes[0, 0].set_ylim(len(_ROWS) - 0.4, -0.6)
-        axes[0, 0].set_xlim(-2.0, widest)
-        handles = [Line2D([], [], color=colour, lw=6, label=name) for name, colour in STATES.items()]
-        handles.append(Line2D([], [], color=INK, marker="v", ls="", ms=5, label="first hop"))
+        axes[0, 0].set(ylim=(len(_ROWS) - 0.4, -0.6), xlim=(-2.0, widest))
+        handles = [handle(name, colour, lw=6) for name, colour in STATES.items()]
+        handles.append(handle("first hop", INK, marker="v", ls="", ms=5))
         legend_above(drawing, handles, columns=5)
     caption = (
         f"State by angle at {rig:g} g, up to {widest:g} degrees or the end of the trial; in each panel friction low, "
         "as it is and high by the located integrator, and the paper's fixed step. The text: at the brake's torque the "
         "platform slips almost at once, and short tumbles end in a brief hop (triangle: the first one begins)."
     )
-    return "Figure 6: pivot, slip, hop", caption, drawing
+    return Plot("figure6", "Figure 6: pivot, slip, hop", caption, drawing)
 
 
-def _state_bar(axis: Axes, paper: PaperRun, case: Case, row: int) -> None:
+def _state_bar(axis: Axes, paper: PaperRun, case: Result, row: int) -> None:
     """One bar of states over the angle; a state too short to be seen is a tick."""
     numbers, states = paper.rows(case)
     theta = np.degrees(numbers["theta_rad"])
@@ -138,22 +139,21 @@ def _nearest(edges: Sequence[float], one: float, other: float) -> float:
 # Figure 7 -------------------------------------------------------------------------------------------------------------
 
 
-def _parabola(launch: Mapping[str, float]) -> tuple[Array, Array]:
+def _parabola(launch: Result) -> tuple[Array, Array]:
     """The flight from the launch [m] until it is back at the launch's height, from where it starts."""
     g, vx, vy = launch["gravity"], launch["vx"], launch["vy"]
     time = np.linspace(0.0, 2 * max(vy, 0.0) / g, 120)
     return vx * time, vy * time - 0.5 * g * time**2
 
 
-def figure_7(paper: PaperRun) -> Drawn | None:
+def figure_7(paper: PaperRun) -> Plot | None:
     """The first hops extrapolated: motor trials above, all below."""
     if not paper.hard:
         return None
     styles = dict(zip(paper.rigs, ("-", (0, (4, 2)), (0, (1, 1.4))), strict=False))
     flat = []
     with styled():
-        drawing = new_figure(WIDTH, 5.4)
-        axes = drawing.subplots(2, len(paper.hard), squeeze=False, sharey="row", sharex="row")
+        drawing, axes = sheet(2, len(paper.hard), 5.4, sharey="row", sharex="row")
         for j, surface in enumerate(paper.hard):
             for i, chosen in enumerate((_motors(paper), paper.torques)):
                 axis: Axes = axes[i, j]
@@ -168,7 +168,7 @@ def figure_7(paper: PaperRun) -> Drawn | None:
             axis.set_xlabel("x from the launch [mm]")
         for axis in axes[:, 0]:
             axis.set_ylabel("y from the launch [mm]")
-        gravities = [Line2D([], [], color=INK, ls=style, lw=1.6, label=f"{rig:g} g") for rig, style in styles.items()]
+        gravities = [handle(f"{rig:g} g", INK, ls=style, lw=1.6) for rig, style in styles.items()]
         band = Patch(color=GREY, alpha=0.35, lw=0, label="friction band")
         legend_above(drawing, [*paper.handles(), *gravities, band], columns=6)
     caption = (
@@ -176,7 +176,7 @@ def figure_7(paper: PaperRun) -> Drawn | None:
         "height; above those of the motors, below all. Shaded: friction at both ends of its band."
         + (f" No hop that rises: {'; '.join(flat)}." if flat else "")
     )
-    return "Figure 7: hops as parabolas", caption, drawing
+    return Plot("figure7", "Figure 7: hops as parabolas", caption, drawing)
 
 
 def _motors(paper: PaperRun) -> list[float]:
@@ -185,7 +185,7 @@ def _motors(paper: PaperRun) -> list[float]:
 
 def _draw_hop(axis: Axes, paper: PaperRun, surface: str, rig: float, torque: float, style: Any) -> bool:
     """One hop with its band; False where there is none that rises."""
-    nominal, low, high = (paper.case(surface, rig, torque, v)["launch"] for v in ("nominal", "low", "high"))
+    low, nominal, high, _ = paper.variants(surface, rig, torque, "launch")
     if nominal is None or nominal["vy"] <= 0:
         return False
     colour = paper.colour(torque)

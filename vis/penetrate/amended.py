@@ -5,22 +5,19 @@ The bed is blue and thin, the spring-damper orange and dashed, the amended law g
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from vis.page.folder import Run, RunFolder, Series, read_folder
 from vis.page.numbers import quote
-from vis.page.page import Page, Section, Tile, code, figure, table, text, write_page
+from vis.page.page import Section, Tile, table, text
+from vis.page.plots import DASHED, Plot, handle, legend_above, sheet
+from vis.page.report import Progress, Report, Result, again
 from vis.page.style import BED, GREY, MODEL, styled
-from vis.penetrate.plot_parts import Plot
 
 __all__ = ["AMENDED", "TITLE", "amended_plot", "is_amended", "words_of_effects", "write_amended_report"]
 
@@ -31,7 +28,6 @@ _CAPTION = (
     "Top: the ground's force while the spike is driven in and pulled out. Below: the depth of drops, and of the spike "
     "that is set down, downwards."
 )
-_WIDTH = 8.6
 _MOST = 4
 """Panels in a row at most."""
 
@@ -41,7 +37,7 @@ def is_amended(run: RunFolder) -> bool:
     return any(r.amended is not None for r in run.runs)
 
 
-def words_of_effects(result: Mapping[str, Any]) -> str:
+def words_of_effects(result: Result) -> str:
     """What was added, in words."""
     model = result.get("model")
     effects = model.get("effects") if isinstance(model, Mapping) else None
@@ -63,98 +59,74 @@ def _draw(run: RunFolder) -> Figure | None:
     if not groups:
         return None
     with styled():
-        wide = max(map(len, groups))
-        drawing = Figure(figsize=(_WIDTH, 2.7 * len(groups)))
-        FigureCanvasAgg(drawing)
-        axes = drawing.subplots(len(groups), wide, squeeze=False)
+        drawing, axes = sheet(len(groups), max(map(len, groups)), 2.7 * len(groups))
         for row, group in zip(axes, groups, strict=True):
             for axis, (title, runs) in zip(row, group, strict=False):
                 axis.set_title(title)
                 (_draw_driven if runs[0].kind == "driven" else _draw_motion)(axis, runs)
             for axis in row[len(group) :]:
                 axis.set_visible(False)
-        handles = [Line2D([], [], color=BED, lw=1.0, label="bed")] if any(r.bed is not None for r in run.runs) else []
-        handles += [
-            Line2D([], [], color=MODEL, ls=(0, (4, 2)), label="spring-damper"),
-            Line2D([], [], color=AMENDED, label=f"with {words_of_effects(run.result)}"),
-        ]
-        drawing.legend(handles=handles, loc="outside upper left", ncols=3)
+        handles = [handle("bed", BED, lw=1.0)] if any(r.bed is not None for r in run.runs) else []
+        law = handle(f"with {words_of_effects(run.result)}", AMENDED)
+        legend_above(drawing, [*handles, handle("spring-damper", MODEL, ls=DASHED), law], 3)
     return drawing
 
 
-def write_amended_report(folder: str | Path, *, progress: Callable[[float], None] | None = None) -> Path:
-    """Make figures/ and report.html of a run without a bed, and return the report.
-
-    Raises FileNotFoundError where the folder has no result.json.
-    """
-    folder = Path(folder)
-    result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
-    run = read_folder(folder)
-    figures = folder / "figures"
-    figures.mkdir(exist_ok=True)
-    plot = amended_plot(run)
-    blocks = [] if plot is None else [figure(plot.save(figures), title=plot.title, caption=plot.caption)]
-    if progress is not None:
-        progress(0.8)
-    return write_page(folder / "report.html", _page(result, blocks))
-
-
-def _page(result: Mapping[str, Any], blocks: Sequence[Any]) -> Page:
-    numbers = result["quantities"]
-    words = words_of_effects(result)
+def write_amended_report(folder: str | Path, *, progress: Progress | None = None) -> Path:
+    """Make figures/ and report.html of a run without a bed, and return the report."""
+    report = Report(folder, progress)
+    numbers = report.result["quantities"]
+    plot = amended_plot(read_folder(report.folder))
+    blocks = [text("There is nothing to draw.")] if plot is None else [report.draw(plot)]
+    report.tell(0.8)
     rows = [
         (name.replace("_", " "), quote(entry["value"], entry["std"], entry["unit"]), str(entry.get("note", "")))
         for name, entry in numbers.items()
     ]
-    return Page(
-        title=str(result["title"]),
-        lead=[f"hedgebed {result['version']}", "penetrate", "no bed: the model's law only"],
-        tiles=[
-            Tile("Sinks", quote(numbers["sinkage_spring_damper"]["value"], None, "m"), "spring-damper"),
-            Tile("Sinks", quote(numbers["sinkage_amended"]["value"], None, "m"), f"with {words}", second=True),
-        ],
-        warnings=[str(warning)[:1].upper() + str(warning)[1:] for warning in result["warnings"]],
-        sections=[
-            Section("", list(blocks) or [text("There is nothing to draw.")]),
-            Section("Numbers", [table(("quantity", "value", "note"), rows, words=True)]),
-            Section(
-                "To do this again",
-                [text("From where it was started:"), code("hedgebed penetrate THIS_FOLDER/run.toml")],
-            ),
-        ],
-    )
+    sunk = [quote(numbers[f"sinkage_{law}"]["value"], None, "m") for law in ("spring_damper", "amended")]
+    tiles = [
+        Tile("Sinks", sunk[0], "spring-damper"),
+        Tile("Sinks", sunk[1], f"with {words_of_effects(report.result)}", second=True),
+    ]
+    sections = [
+        Section("", blocks),
+        Section("Numbers", [table(("quantity", "value", "note"), rows, words=True)]),
+        again("hedgebed penetrate THIS_FOLDER/run.toml", "From where it was started:"),
+    ]
+    return report.write(sections, lead=["penetrate", "no bed: the model's law only"], tiles=tiles)
 
 
 def _by_speed(runs: Sequence[Run]) -> list[tuple[str, list[Run]]]:
     speeds = sorted({r.speed for r in runs if r.speed is not None})
     word = {"driven": "driven", "drop": "dropped"}
-    return [(f"{word[own[0].kind]} at {speed:g} m/s", own) for speed in speeds
-            if (own := [r for r in runs if r.speed == speed])]  # fmt: skip
+    return [
+        (f"{word[own[0].kind]} at {speed:g} m/s", own)
+        for speed in speeds
+        if (own := [r for r in runs if r.speed == speed])
+    ]
 
 
 def _draw_driven(axis: Axes, runs: Sequence[Run]) -> None:
     for r in runs:
         if r.bed is not None:
             axis.plot(1e3 * r.bed.depth, r.bed.force, color=BED, lw=0.7, alpha=0.6)
-    for series, colour, style in ((runs[0].model, MODEL, (0, (4, 2))), (runs[0].amended, AMENDED, "-")):
+    for series, colour, style in ((runs[0].model, MODEL, DASHED), (runs[0].amended, AMENDED, "-")):
         if series is not None:
             axis.plot(1e3 * series.depth, series.force, color=colour, ls=style, lw=1.8)
     axis.axhline(0.0, color=GREY, lw=0.8)
-    axis.set_xlabel("depth of the tip [mm]")
-    axis.set_ylabel("force on the spike [N]")
+    axis.set(xlabel="depth of the tip [mm]", ylabel="force on the spike [N]")
 
 
 def _draw_motion(axis: Axes, runs: Sequence[Run]) -> None:
     beds = [r.bed for r in runs if r.bed is not None]
-    others = [(runs[0].model, MODEL, (0, (4, 2)), 1.8), (runs[0].amended, AMENDED, "-", 1.8)]
+    others = [(runs[0].model, MODEL, DASHED, 1.8), (runs[0].amended, AMENDED, "-", 1.8)]
     for series, colour, style, width in [*((bed, BED, "-", 0.9) for bed in beds), *others]:
         if series is not None:
             start = _touch(series)
             axis.plot(1e3 * (series.time - start), 1e3 * series.depth, color=colour, ls=style, lw=width)
     axis.axhline(0.0, color=GREY, lw=0.8)
     axis.invert_yaxis()
-    axis.set_xlabel("time [ms]")
-    axis.set_ylabel("depth of the tip [mm]")
+    axis.set(xlabel="time [ms]", ylabel="depth of the tip [mm]")
 
 
 def _touch(series: Series) -> float:

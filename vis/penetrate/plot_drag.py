@@ -6,30 +6,16 @@ from collections.abc import Iterable
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import TwoSlopeNorm
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from vis.page.folder import Run, RunFolder, Series
 from vis.page.numbers import plain, quote, short
+from vis.page.plots import DASHED, Array, Plot, handle, legend_above, new_panels, sheet
 from vis.page.style import BED, GREY, INK, MODEL, styled
-from vis.penetrate.plot_parts import (
-    WIDTH,
-    Plot,
-    above_surface,
-    by_speed,
-    has_model,
-    legend_above,
-    new_panels,
-    number_of,
-    pair_of_handles,
-    speed_words,
-    spread_words,
-)
-from vis.penetrate.summary_words import Departure, departure_rows
+from vis.penetrate.plot_parts import above_surface, by_speed, has_model, pair_of_handles, speed_words, spread_words
+from vis.penetrate.summary_parts import Departure, departure_rows, value_of
 
 __all__ = ["drag_plot", "gap_plot", "work_plot"]
 
@@ -53,26 +39,25 @@ def drag_plot(run: RunFolder) -> Plot | None:
                 models = [_way(r.model, way) for r in here if r.model is not None]
                 if models:
                     grid, mean, _ = _mean_by_depth(models)
-                    style = (0, (4, 2)) if way == "in" else (0, (1, 1.5))
+                    style = DASHED if way == "in" else (0, (1, 1.5))
                     axis.plot(1e3 * grid, mean, color=MODEL, ls=style, lw=1.8)
-            for part in (above_surface(r.bed) for r in here):
-                if part is not None:
-                    axis.plot(1e3 * part.depth, part.force, color=BED, lw=0.6, alpha=0.25)
-                    grid, mean, _ = _mean_by_depth([part], bins=8)
-                    axis.plot(1e3 * grid, mean, color=BED, lw=1.6, alpha=0.4)
+            for part in filter(None, (above_surface(r.bed) for r in here)):
+                axis.plot(1e3 * part.depth, part.force, color=BED, lw=0.6, alpha=0.25)
+                grid, mean, _ = _mean_by_depth([part], bins=8)
+                axis.plot(1e3 * grid, mean, color=BED, lw=1.6, alpha=0.4)
             axis.axhline(0.0, color=GREY, lw=0.8)
             if above:
                 axis.axvline(0.0, color=GREY, lw=0.8, ls=(0, (2, 2)))
             axis.set_xlim(left=1e3 * min((float(part.depth.min()) for part in above), default=0.0))
             axis.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
         _label(axes, "depth of the tip [mm]", "force on the spike [N]")
-        handles = [Line2D([], [], color=BED, lw=2.2, label="bed, way in")]
+        handles = [handle("bed, way in", BED, lw=2.2)]
         out = any(len(_way(r.bed, "out") or ()) for r in driven)
-        handles += [Line2D([], [], color=BED, lw=2.2, alpha=0.45, label="bed, way out")] if out else []
-        handles += [Line2D([], [], color=BED, lw=0.7, alpha=0.55, label="bed, as recorded")]
+        handles += [handle("bed, way out", BED, lw=2.2, alpha=0.45)] if out else []
+        handles += [handle("bed, as recorded", BED, lw=0.7, alpha=0.55)]
         law = has_model(driven)
-        handles += [Line2D([], [], color=MODEL, ls=(0, (4, 2)), label="spring-damper, in")] if law else []
-        handles += [Line2D([], [], color=MODEL, ls=(0, (1, 1.5)), label="spring-damper, out")] if law and out else []
+        handles += [handle("spring-damper, in", MODEL, ls=DASHED)] if law else []
+        handles += [handle("spring-damper, out", MODEL, ls=(0, (1, 1.5)))] if law and out else []
         legend_above(figure, handles)
     many = any(sum(r.speed == s for r in driven) > 1 for s in speeds)
     width = _bin_width([_way(r.bed, "in") for r in driven])
@@ -87,13 +72,9 @@ def drag_plot(run: RunFolder) -> Plot | None:
     if law:
         spread += "Dashed: the fitted spring-damper in the same motion"
         spread += "; dotted: its way out, predicted, not fitted." if out else "."
-    return Plot(
-        "drag",
-        "Drag against depth",
-        "The ground's force on the spike, upwards, while it is driven in"
-        f"{' and pulled out' if out else ''} at constant speed. {spread}".strip(),
-        figure,
-    )
+    moved = f"driven in{' and pulled out' if out else ''}"
+    caption = f"The ground's force on the spike, upwards, while it is {moved} at constant speed. {spread}".strip()
+    return Plot("drag", "Drag against depth", caption, figure)
 
 
 def gap_plot(run: RunFolder) -> Plot | None:
@@ -112,15 +93,12 @@ def gap_plot(run: RunFolder) -> Plot | None:
     told = any(row.known for row in table)
     bound = float(np.nanmax(np.abs(difference))) or 1.0
     with styled():
-        figure = Figure(figsize=(WIDTH, max(2.6, 0.9 + (0.62 if told else 0.42) * len(depths))))
-        FigureCanvasAgg(figure)
-        axis = figure.add_subplot()
+        figure, ((axis,),) = sheet(1, 1, max(2.6, 0.9 + (0.62 if told else 0.42) * len(depths)))
         norm = TwoSlopeNorm(0.0, -bound, bound)
         image = axis.imshow(difference, cmap="PuOr_r", norm=norm, aspect="auto")
         axis.set_xticks(range(len(speeds)), [f"{s:.4g}" for s in speeds])
         axis.set_yticks(range(len(depths)), [f"{short(1e3 * a)} to {short(1e3 * b)}" for a, b in depths])
-        axis.set_xlabel("speed [m/s]")
-        axis.set_ylabel("depth [mm]")
+        axis.set(xlabel="speed [m/s]", ylabel="depth [mm]")
         axis.grid(False)
         axis.set_xticks(np.arange(len(speeds) + 1) - 0.5, minor=True)
         axis.set_yticks(np.arange(len(depths) + 1) - 0.5, minor=True)
@@ -139,31 +117,27 @@ def gap_plot(run: RunFolder) -> Plot | None:
         bar = figure.colorbar(image, ax=axis, pad=0.015, fraction=0.05)
         bar.set_label("spring-damper − bed [N]")
         bar.outline.set_visible(False)
-    return Plot(
-        "gap",
-        "Where the spring-damper departs",
+    caption = (
         "Mean drag of the spring-damper minus the bed's on the way in, by depth and speed; in brackets as a share of "
         "the bed's. Orange: the spring-damper pushes back too hard; purple: too softly."
-        + (" Below: of how many beds; ±: the standard deviation of the bed's drag between them." if told else ""),
-        figure,
+        + (" Below: of how many beds; ±: the standard deviation of the bed's drag between them." if told else "")
     )
+    return Plot("gap", "Where the spring-damper departs", caption, figure)
 
 
 def work_plot(run: RunFolder) -> Plot | None:
     """Work put in and got back, bed beside spring-damper, by speed."""
-    driven = [
-        r for r in run.of_kind("driven") if r.speed is not None and number_of(r.quantities, "work_in") is not None
-    ]
+    known = (r for r in run.of_kind("driven") if r.speed is not None)
+    driven = [r for r in known if value_of(r.quantities, "work_in") is not None]
     speeds = sorted({r.speed for r in driven if r.speed is not None})
     if not speeds:
         return None
     with styled():
         figure, axes = new_panels(2, height=2.7, sharey=True)
-        law = any(number_of(r.quantities, "model_work_in") is not None for r in driven)
+        law = any(value_of(r.quantities, "model_work_in") is not None for r in driven)
         sides = ((-0.2, "", BED), (0.2, "model_", MODEL)) if law else ((0.0, "", BED),)
-        for axis, key, title in zip(
-            axes, ("work_in", "work_out"), ("put in, way in", "got back, way out"), strict=True
-        ):
+        titles = {"work_in": "put in, way in", "work_out": "got back, way out"}
+        for axis, (key, title) in zip(axes, titles.items(), strict=True):
             for shift, prefix, colour in sides:
                 mean, spread = by_speed(driven, speeds, prefix + key, 1e3)
                 where = np.arange(len(speeds)) + shift
@@ -183,13 +157,11 @@ def work_plot(run: RunFolder) -> Plot | None:
             axis.axhline(0.0, color=GREY, lw=0.8)
         _label(axes, "speed [m/s]", "work [mJ]")
         legend_above(figure, pair_of_handles(bars=True)[: 2 if law else 1])
-    return Plot(
-        "work",
-        "Work in and out",
+    caption = (
         "Work done on the ground on the way in, and got back from it on the way out; below zero, pulling out took "
-        f"work as well.{_returned_words(driven)}{spread_words(driven)}",
-        figure,
+        f"work as well.{_returned_words(driven)}{spread_words(driven)}"
     )
+    return Plot("work", "Work in and out", caption, figure)
 
 
 def _label(axes: list[Axes], x: str, y: str) -> None:
@@ -219,13 +191,10 @@ def _way(series: Series | None, way: str) -> Series | None:
     if series is None:
         return None
     part = series.part(way)
-    keep = part.depth >= 0.0
-    return Series(part.time[keep], part.depth[keep], part.velocity[keep], part.force[keep], part.phase[keep])
+    return part.where(part.depth >= 0.0)
 
 
-def _mean_by_depth(
-    parts: Iterable[Series | None], bins: int = 40
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _mean_by_depth(parts: Iterable[Series | None], bins: int = 40) -> tuple[Array, Array, Array]:
     """Depth [m], mean force [N] and its standard deviation between the parts [N], shape (bins,).
 
     Each part is averaged within a bin first, so that noise within one bed is not taken for spread between beds.
@@ -252,7 +221,7 @@ def _bins(parts: list[Series], most: int = 40) -> int:
     return int(np.clip(min(len(part) for part in parts) // 3, 4, most))
 
 
-def _bessel(count: NDArray[np.int64]) -> NDArray[np.float64]:
+def _bessel(count: NDArray[np.int64]) -> Array:
     return np.where(count > 1, count / np.maximum(count - 1, 1), 0.0)
 
 
@@ -297,8 +266,8 @@ def _returned_words(runs: list[Run]) -> str:
         works = [
             out / put
             for r in runs
-            if (put := number_of(r.quantities, f"{prefix}work_in") or 0.0) > 0.0
-            and (out := number_of(r.quantities, f"{prefix}work_out")) is not None
+            if (put := value_of(r.quantities, f"{prefix}work_in") or 0.0) > 0.0
+            and (out := value_of(r.quantities, f"{prefix}work_out")) is not None
         ]
         if works:
             shares.append(f"{what} {quote(float(np.mean(works)), None, '%', significant=2)}")

@@ -2,30 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
 from vis.page.folder import Run, RunFolder, Series
 from vis.page.numbers import quote
+from vis.page.plots import DASHED, Array, Plot, handle, legend_above, new_panels, sheet
+from vis.page.report import capital
 from vis.page.style import BED, GREY, INK, MODEL, styled
-from vis.penetrate.plot_parts import (
-    WIDTH,
-    Plot,
-    above_surface,
-    by_speed,
-    has_model,
-    legend_above,
-    new_panels,
-    number_of,
-    pair_of_handles,
-    speed_words,
-    spread_words,
-)
+from vis.penetrate.plot_parts import above_surface, by_speed, has_model, pair_of_handles, speed_words, spread_words
+from vis.penetrate.summary_parts import fit_error, joined, std_of, value_of
 
 __all__ = ["drop_peaks_plot", "drops_plot", "set_down_plot", "spread_plot"]
 
@@ -37,9 +23,7 @@ def drops_plot(run: RunFolder) -> Plot | None:
     if not speeds:
         return None
     with styled():
-        figure = Figure(figsize=(WIDTH, 4.6))
-        FigureCanvasAgg(figure)
-        axes = figure.subplots(2, len(speeds), sharex="col", sharey="row", squeeze=False)
+        figure, axes = sheet(2, len(speeds), 4.6, sharex="col", sharey="row")
         window = _nice(0.04 * max(_settled(r) for r in drops))
         free = False
         for column, speed in enumerate(speeds):
@@ -49,7 +33,7 @@ def drops_plot(run: RunFolder) -> Plot | None:
             early = [r.bed.time[0] - _touch(r.bed) for r in here if r.bed is not None and above_surface(r.bed)]
             begin = min(-0.03 * end, *(max(_first_touch(r.bed), -0.5 * end) for r in here)) if early else -0.03 * end
             for r in here:
-                for series, colour, style in ((r.bed, BED, "-"), (r.model, MODEL, (0, (4, 2)))):
+                for series, colour, style in ((r.bed, BED, "-"), (r.model, MODEL, DASHED)):
                     if series is None:
                         continue
                     start = _touch(series)
@@ -79,21 +63,19 @@ def drops_plot(run: RunFolder) -> Plot | None:
         axes[0, 0].set_ylabel("depth of the tip [mm]")
         axes[1, 0].set_ylabel("force on the spike [N]")
         axes[0, 0].invert_yaxis()
-        recorded = Line2D([], [], color=BED, lw=0.7, alpha=0.55, label="bed, as recorded")
-        peaks = Line2D([], [], color=GREY, marker="o", ls="", ms=5, label="peak force, as recorded")
+        recorded = handle("bed, as recorded", BED, lw=0.7, alpha=0.55)
+        peaks = handle("peak force, as recorded", GREY, marker="o", ls="", ms=5)
         bed, *model = pair_of_handles()[: 2 if has_model(drops) else 1]
         legend_above(figure, [bed, recorded, *model, peaks])
     each = ", a line for each bed" if len({(r.speed, r.seed) for r in drops}) > len(speeds) else ""
-    return Plot(
-        "drops",
-        "Drops",
+    caption = (
         f"Depth (downwards) and the ground's force against time since touch-down{each}. Of the bed's force the running "
         f"mean over {quote(window, 0.0, 's')} is drawn full, what was recorded faint; the peaks are those of what was "
         "recorded."
         + (" Left of 0, pale: grains that stick out of the surface, which the fit leaves out." if free else "")
-        + (" The fit uses each drop up to its first stop; what follows is predicted." if has_model(drops) else ""),
-        figure,
+        + (" The fit uses each drop up to its first stop; what follows is predicted." if has_model(drops) else "")
     )
+    return Plot("drops", "Drops", caption, figure)
 
 
 def drop_peaks_plot(run: RunFolder) -> Plot | None:
@@ -107,7 +89,7 @@ def drop_peaks_plot(run: RunFolder) -> Plot | None:
             ("max_depth", "Greatest depth", "mm", 1e3),
             ("stop_time", "Time to first stop", "ms", 1e3),
         )
-        if any(number_of(r.quantities, key) is not None for r in drops)
+        if any(value_of(r.quantities, key) is not None for r in drops)
     ]
     if not columns:
         return None
@@ -117,22 +99,16 @@ def drop_peaks_plot(run: RunFolder) -> Plot | None:
             for prefix, colour, style in (("", BED, "o-"), ("model_", MODEL, "D--")):
                 mean, spread = by_speed(drops, speeds, prefix + key, scale)
                 axis.errorbar(speeds, mean, spread, fmt=style, color=colour, ms=5, mec="white", mew=0.8, capsize=3)
-            axis.set_ylabel(_unit_label(title, unit))
-            axis.set_xlabel("speed at touch-down [m/s]")
-            axis.set_ylim(0.0, 1.1 * axis.get_ylim()[1])
+            label, top = f"{title[0].lower()}{title[1:]} [{unit}]", 1.1 * axis.get_ylim()[1]
+            axis.set(ylabel=label, xlabel="speed at touch-down [m/s]", ylim=(0.0, top))
             axis.margins(x=0.12)
             if len(speeds) <= 5:
                 axis.set_xticks(speeds, [f"{s:.4g}" for s in speeds])
-        law = any(number_of(r.quantities, "model_peak_force") is not None for r in drops)
+        law = any(value_of(r.quantities, "model_peak_force") is not None for r in drops)
         legend_above(figure, pair_of_handles(markers=True)[: 2 if law else 1])
-    names = [title[0].lower() + title[1:] for _, title, *_ in columns]
-    listed = ", ".join(names[:-1]) + (" and " if len(names) > 1 else "") + names[-1]
-    return Plot(
-        "drop_peaks",
-        "Peaks of the drops",
-        f"{listed[0].upper()}{listed[1:]} of the drops by their speed at touch-down.{spread_words(drops)}",
-        figure,
-    )
+    listed = joined([title[0].lower() + title[1:] for _, title, *_ in columns])
+    caption = f"{capital(listed)} of the drops by their speed at touch-down.{spread_words(drops)}"
+    return Plot("drop_peaks", "Peaks of the drops", caption, figure)
 
 
 def set_down_plot(run: RunFolder) -> Plot | None:
@@ -141,32 +117,30 @@ def set_down_plot(run: RunFolder) -> Plot | None:
     if not sets:
         return None
     with styled():
-        figure = Figure(figsize=(WIDTH, 3.1))
-        FigureCanvasAgg(figure)
-        axis = figure.add_subplot()
+        figure, ((axis,),) = sheet(1, 1, 3.1)
         end, begin = 1.15 * max(_settled(r) + _touch(r.bed) for r in sets if r.bed is not None), 0.0
-        dots = 0
+        dots: list[Line2D] = []
         for i, r in enumerate(sets):
             # One law: its runs differ in where they start only, and dashes that overlap look like a full line.
             model = None if any(s.model is not None for s in sets[:i]) else r.model
-            for series, colour, style in ((r.bed, BED, "-"), (model, MODEL, (0, (4, 2)))):
+            for series, colour, style in ((r.bed, BED, "-"), (model, MODEL, DASHED)):
                 if series is not None:
                     shown = (series.time <= end) & (series.time >= -0.1 * end)
                     axis.plot(1e3 * series.time[shown], 1e3 * series.depth[shown], color=colour, ls=style, lw=1.4)
                     begin = min(begin, float(series.time[shown].min(initial=0.0)))
             assert r.bed is not None
-            if number_of(r.quantities, "sinkage") is not None and r.bed.time[-1] <= end:
-                dots += 1
-                axis.plot(
-                    1e3 * r.bed.time[-1], 1e3 * r.bed.depth[-1], "o", color=BED, ms=5, mec="white", mew=0.8, zorder=5
-                )
+            if value_of(r.quantities, "sinkage") is not None and r.bed.time[-1] <= end:
+                dots = [handle("at rest", BED, marker="o", ls="", ms=5)]
+                end_of = 1e3 * r.bed.time[-1], 1e3 * r.bed.depth[-1]
+                axis.plot(*end_of, "o", color=BED, ms=5, mec="white", mew=0.8, zorder=5)
         rests = []
         for key, what, colour in (("sinkage", "bed", BED), ("model_sinkage", "spring-damper", MODEL)):
-            depths = [1e3 * n for r in sets if (n := number_of(r.quantities, key)) is not None]
+            depths = [1e3 * n for r in sets if (n := value_of(r.quantities, key)) is not None]
             if depths:
                 spread = float(np.std(depths, ddof=1)) if len(depths) > 1 else None
                 if what != "bed":  # one law here; between beds it is the fits that differ
-                    spread = _std_of(run, "sinkage_spring_damper", 1e3)
+                    std = std_of(run.result.get("quantities"), "sinkage_spring_damper")
+                    spread = 1e3 * std if std else None
                 rests.append((float(np.mean(depths)), spread, what, colour))
         axis.invert_yaxis()
         low, high = sorted(axis.get_ylim())
@@ -181,22 +155,17 @@ def set_down_plot(run: RunFolder) -> Plot | None:
             axis.text(1.01, last, f"{what}: {number}", color=colour, va="center", transform=axis.get_yaxis_transform())
         axis.set_xlim(1e3 * begin, 1e3 * end)
         axis.axhline(0.0, color=GREY, lw=0.8)
-        axis.set_xlabel("time since the spike was let go [ms]")
-        axis.set_ylabel("depth of the tip [mm]")
-        legend_above(
-            figure,
-            [
-                *pair_of_handles()[: 2 if has_model(sets) else 1],
-                *([_dot("at rest")] if dots else []),
-            ],
-        )
-    still = sum(number_of(r.quantities, "sinkage") is not None for r in sets)
+        axis.set(xlabel="time since the spike was let go [ms]", ylabel="depth of the tip [mm]")
+        legend_above(figure, [*pair_of_handles()[: 2 if has_model(sets) else 1], *dots])
+    still = sum(value_of(r.quantities, "sinkage") is not None for r in sets)
     many = len(sets) > 1
     said = f"Sinking under the load, {len(sets)} bed{'s' if many else ''}."
     if still < len(sets):
-        said += f" {still or 'None'} of them came to rest in the time that was followed." if many else (
-            " It did not come to rest in the time that was followed."
-        )  # fmt: skip
+        said += (
+            f" {still or 'None'} of them came to rest in the time that was followed."
+            if many
+            else (" It did not come to rest in the time that was followed.")
+        )
     if rests:
         said += f" Right: the depth at rest{', ± the standard deviation between beds' if still > 1 else ''}."
     if has_model(sets):
@@ -205,12 +174,7 @@ def set_down_plot(run: RunFolder) -> Plot | None:
     departures = run.result.get("departures")
     if isinstance(departures, dict) and isinstance(departures.get("set_down"), str):
         said += f" {departures['set_down']}"
-    return Plot(
-        "set_down",
-        "Set down under its load",
-        said,
-        figure,
-    )
+    return Plot("set_down", "Set down under its load", said, figure)
 
 
 def spread_plot(run: RunFolder) -> Plot | None:
@@ -219,7 +183,7 @@ def spread_plot(run: RunFolder) -> Plot | None:
     panels = [
         (key, title, unit)
         for key, title, unit in (("stiffness", "Stiffness K", "N/m"), ("damping", "Damping C", "N s/m"))
-        if any(number_of(f, key) is not None for f in fits)
+        if any(value_of(f, key) is not None for f in fits)
     ]
     if not panels or len(fits) < 2:
         return None
@@ -227,13 +191,13 @@ def spread_plot(run: RunFolder) -> Plot | None:
         figure, axes = new_panels(len(panels), height=2.5)
         for axis, (key, title, unit) in zip(axes, panels, strict=True):
             rows = [
-                (f.get("seed", i + 1), n, _error(f, key))
+                (f.get("seed", i + 1), n, fit_error(f, key))
                 for i, f in enumerate(fits)
-                if (n := number_of(f, key)) is not None
+                if (n := value_of(f, key)) is not None
             ]
             values = np.array([value for _, value, _ in rows])
             spread = float(values.std(ddof=1)) if len(values) > 1 else None
-            pooled = number_of(run.result.get("quantities"), key)
+            pooled = value_of(run.result.get("quantities"), key)
             mean = float(values.mean()) if pooled is None else pooled
             axis.axhline(mean, color=INK, lw=1.0)
             if spread:
@@ -249,52 +213,32 @@ def spread_plot(run: RunFolder) -> Plot | None:
                 capsize=3,
             )
             axis.set_xticks(range(len(rows)), [str(seed) for seed, *_ in rows])
-            axis.set_xlim(-0.6, len(rows) - 0.4)
-            axis.set_title(title)
-            axis.set_xlabel("seed of the bed")
-            axis.set_ylabel(f"{title.split()[1]} [{unit}]")
+            axis.set(
+                xlim=(-0.6, len(rows) - 0.4),
+                title=title,
+                xlabel="seed of the bed",
+                ylabel=f"{title.split()[1]} [{unit}]",
+            )
             reach = max(2.2 * (spread or 0.0), 0.1 * abs(mean), 1e-12)
             axis.set_ylim(min(mean - reach, *axis.get_ylim()), max(mean + reach, *axis.get_ylim()))
             axis.grid(False, axis="x")
-    known = any(_error(f, key) is not None for f in fits for key in ("stiffness", "damping"))
+    known = any(fit_error(f, key) is not None for f in fits for key in ("stiffness", "damping"))
     bars = "; bars: standard error of the fit" if known else "; how well each fit is determined is not known"
-    return Plot(
-        "spread",
-        "Spread between beds",
+    caption = (
         f"The spring-damper fitted to each bed by itself, on the runs that every bed has{bars}. Line: fitted to all "
         "runs of all beds; band: one standard deviation between beds about it. K and C of one bed are not independent: "
-        "where one comes out high the other comes out low. The axes do not start at zero.",
-        figure,
+        "where one comes out high the other comes out low. The axes do not start at zero."
     )
+    return Plot("spread", "Spread between beds", caption, figure)
 
 
 # ---- parts ---------------------------------------------------------------------------------------------------------
-
-
-def _std_of(run: RunFolder, name: str, scale: float) -> float | None:
-    """The standard deviation of a quantity of the run; None where unknown."""
-    quantities = run.result.get("quantities")
-    entry = quantities.get(name) if isinstance(quantities, dict) else None
-    std = entry.get("std") if isinstance(entry, dict) else None
-    return scale * std if isinstance(std, int | float) and std > 0 else None
-
-
-def _unit_label(title: str, unit: str) -> str:
-    """The label of an axis: quantity and unit."""
-    return f"{title[0].lower()}{title[1:]} [{unit}]"
 
 
 def _first_touch(series: Series | None) -> float:
     """Time from the first grain felt to depth 0 [s], below 0; 0 where no grain sticks out."""
     part = above_surface(series)
     return 0.0 if part is None or series is None else float(part.time[0]) - _touch(series)
-
-
-def _error(fit: dict[str, Any], key: str) -> float | None:
-    """Standard error of a bed's own fit; None where unknown."""
-    entry = fit.get(key)
-    number = entry.get("std") if isinstance(entry, dict) else fit.get(f"{key}_error", fit.get(f"{key}_std"))
-    return float(number) if isinstance(number, int | float) and np.isfinite(number) else None
 
 
 def _touch(series: Series) -> float:
@@ -314,7 +258,7 @@ def _settled(run: Run) -> float:
     return 1.25 * last if last > 0.0 else 1.0
 
 
-def _running_mean(time: NDArray[np.float64], force: NDArray[np.float64], window: float) -> NDArray[np.float64]:
+def _running_mean(time: Array, force: Array, window: float) -> Array:
     """Mean of the force over `window` [s] around each time, over what there is of it at the ends."""
     if len(time) < 2:
         return force
@@ -329,7 +273,3 @@ def _nice(number: float) -> float:
     """The next 1, 2 or 5 times a power of ten not above `number`."""
     power = 10.0 ** np.floor(np.log10(number))
     return float(next(n * power for n in (5.0, 2.0, 1.0) if n * power <= 1.0001 * number))
-
-
-def _dot(label: str) -> Line2D:
-    return Line2D([], [], color=BED, marker="o", ls="", ms=5, label=label)

@@ -10,10 +10,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from vis.page.folder import RunFolder
+from vis.page.plots import Plot
 from vis.penetrate.amended import TITLE, amended_plot, is_amended
 from vis.penetrate.plot_drag import drag_plot, gap_plot, work_plot
 from vis.penetrate.plot_drops import drop_peaks_plot, drops_plot, set_down_plot, spread_plot
-from vis.penetrate.plot_parts import Plot
 
 __all__ = ["PLOTS", "make_plots"]
 

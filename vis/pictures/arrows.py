@@ -49,8 +49,7 @@ def draw_measure(sheet: Figure, *, right: float, height: float, length: float, w
     wide = length / float(sheet.get_size_inches()[0])
     axis = sheet.add_axes((right - wide, height - 0.01, wide, 0.02))
     axis.set_axis_off()
-    axis.set_xlim(0.0, 1.0)
-    axis.set_ylim(0.0, 1.0)
+    axis.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
     axis.annotate("", (1.0, 0.5), (0.0, 0.5), arrowprops=FORCE)
     words = f"weight, {quote(weight, unit='N')}"
     sheet.text(right - wide - 0.008, height, words, fontsize=10, ha="right", va="center", color=INK)

@@ -151,8 +151,7 @@ class Page:
             axis.set_axis_off()
             if image is not None:
                 axis.imshow(image, extent=(0.0, 1.0, 0.0, 1.0), aspect="auto", interpolation="nearest")
-            axis.set_xlim(0.0, 1.0)
-            axis.set_ylim(0.0, 1.0)
+            axis.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
             axis.set_autoscale_on(False)
             if draw is not None:
                 draw(axis)

@@ -23,7 +23,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["GRAIN_FIELDS", "Frame", "FrameWriter", "Frames", "HeightMap", "frame_names", "read_frames"]
+__all__ = ["GRAIN_FIELDS", "Frame", "FrameWriter", "Frames", "HeightMap", "frame_names", "grains_box", "read_frames"]
 
 #: The fields of a grain that a frame keeps: name -> (components, meaning and unit).
 GRAIN_FIELDS: dict[str, tuple[int, str]] = {
@@ -258,6 +258,12 @@ def frame_names(folder: str | Path) -> list[str]:
     return sorted(path.stem for path in (Path(folder) / "frames").glob("*.pvd"))
 
 
+def grains_box(frame: Frame) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Corners of what the grains of a frame fill [m]."""
+    position, radius = frame.grains["position"], frame.grains["radius"][:, None]
+    return (position - radius).min(axis=0), (position + radius).max(axis=0)
+
+
 @dataclass(frozen=True)
 class _Entry:
     time: float
@@ -418,9 +424,7 @@ def _read_vti(path: Path) -> HeightMap:
     return HeightMap(image.GetOrigin()[:2], image.GetSpacing()[:2], fields)
 
 
-def _read_vtu(
-    path: Path,
-) -> tuple[NDArray[np.float64], NDArray[np.int64], dict[str, NDArray[Any]], dict[str, float]]:
+def _read_vtu(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64], dict[str, NDArray[Any]], dict[str, float]]:
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 

@@ -15,7 +15,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -25,11 +25,12 @@ from numpy.typing import NDArray
 
 from vis.page.folder import Run, RunFolder, read_folder
 from vis.page.numbers import quote
+from vis.page.report import Progress
 from vis.pictures.canvas import colour_values, nice_above
-from vis.pictures.frames import Frame, Frames, frame_names, read_frames
-from vis.pictures.render import run_job
+from vis.pictures.frames import Frame, Frames, frame_names, grains_box, read_frames
+from vis.pictures.render import PictureJob, View, run_job
 
-__all__ = ["Picture", "Pictures", "make_pictures", "opengl_available", "render_apart"]
+__all__ = ["Counter", "Picture", "Pictures", "carry_out", "make_pictures", "opengl_available", "render_apart"]
 
 _STILLS = 6
 _STILL_COSTS = 4.0  # in frames of the animation, as measured in software
@@ -95,7 +96,7 @@ def make_pictures(
     animation_size: tuple[int, int] = (720, 540),
     animate: bool = True,
     stall: float = 120.0,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Pictures:
     """Draw the stills (`figures/bed-*.png`) and `animation.gif` of a run folder.
 
@@ -120,38 +121,62 @@ def make_pictures(
     if not job["stills"]:
         return Pictures(method="none", notes=[*notes, "There are no frames to draw pictures of."])
     moving = len(job["animation"]["frames"]) if job["animation"] else 0
-    counter = _Counter([_STILL_COSTS] * len(job["stills"]) + [1.0] * moving, progress)
-    if opengl_available():
-        failure = render_apart(job, stall, counter.step)
-        if failure is None:
-            return Pictures(stills, animation, "opengl", notes)
-        notes.append(f"Rendering with OpenGL failed ({failure}); cross-sections stand in for the pictures.")
-        counter.done = 0
-    else:
-        notes.append(
-            "This machine has no OpenGL for off-screen pictures; cross-sections stand in for them (Debian: apt install "
-            "libegl1 libgl1-mesa-dri)."
-        )
-    for view in filter(None, [*job["stills"], job["animation"]]):
-        view["note"] = view["note"].replace(_CUT, _SLAB)
-    run_job(job, opengl=False, step=counter.step)
-    return Pictures(stills, animation, "sections", notes)
+    counter = Counter([_STILL_COSTS] * len(job["stills"]) + [1.0] * moving, progress)
+
+    def flat() -> None:
+        for view in filter(None, [*job["stills"], job["animation"]]):
+            view["note"] = view["note"].replace(_CUT, _SLAB)
+        run_job(job, opengl=False, step=counter.step)
+
+    method, note = carry_out(
+        job, counter, flat, stall=stall, failed="cross-sections stand in for the pictures",
+        without="cross-sections stand in for them (Debian: apt install libegl1 libgl1-mesa-dri)",
+    )  # fmt: skip
+    return Pictures(stills, animation, method, notes + note)
 
 
-class _Counter:
-    """Tells how much is done; a still costs more than a frame of the animation."""
+class Counter:
+    """Reports how much is done; a still may cost more than a frame of an animation."""
 
-    def __init__(self, costs: list[float], progress: Callable[[float], None] | None) -> None:
+    def __init__(self, costs: list[float], progress: Progress | None = None) -> None:
         self.costs, self.progress, self.done = costs, progress, 0
 
     def step(self) -> None:
+        """One more is done."""
         self.done += 1
         if self.progress is not None:
             self.progress(min(1.0, sum(self.costs[: self.done]) / sum(self.costs)))
 
 
+def carry_out(
+    job: Mapping[str, Any],
+    counter: Counter,
+    flat: Callable[[], None],
+    *,
+    failed: str,
+    without: str,
+    module: str = "vis.pictures.render",
+    stall: float = 120.0,
+) -> tuple[str, list[str]]:
+    """Draw a job with OpenGL in a child process, `python -m module`, or where that does not do it by `flat`.
+
+    Returns:
+        "opengl" or "sections", and a note on what stands in: `failed` where OpenGL did not do it, `without` where there
+        is none.
+    """
+    if not opengl_available():
+        note = f"This machine has no OpenGL for off-screen pictures; {without}."
+    elif (failure := render_apart(job, stall, counter.step, module=module)) is None:
+        return "opengl", []
+    else:
+        note = f"Rendering with OpenGL failed ({failure}); {failed}."
+        counter.done = 0
+    flat()
+    return "sections", [note]
+
+
 def render_apart(
-    job: dict[str, Any], stall: float, step: Callable[[], None], *, module: str = "vis.pictures.render"
+    job: Mapping[str, Any], stall: float, step: Callable[[], None], *, module: str = "vis.pictures.render"
 ) -> str | None:
     """Carry out a job in a child process, `python -m module`; None when it succeeded, else why it did not."""
     environment = dict(os.environ)
@@ -291,7 +316,7 @@ def _tell(run: RunFolder, name: str) -> _Story | None:
 
 def _plan(
     run: RunFolder, size: tuple[int, int], animation_size: tuple[int, int] | None, notes: list[str]
-) -> tuple[dict[str, Any], list[Picture], Picture | None]:
+) -> tuple[PictureJob, list[Picture], Picture | None]:
     stories = []
     for name in frame_names(run.path):
         try:
@@ -301,7 +326,7 @@ def _plan(
             continue
         if story is not None:
             stories.append(story)
-    job: dict[str, Any] = {"folder": str(run.path), "stills": [], "animation": None}
+    job: PictureJob = {"folder": str(run.path), "stills": [], "animation": None}
     chosen = _choose(stories)
     if not chosen:
         return job, [], None
@@ -315,13 +340,9 @@ def _plan(
         if len(stills) >= _STILLS:
             return
         file = figures / f"bed-{story.name}-{moment}.png"
-        view = _view(run, story, [index], by, upper)
-        job["stills"].append({**view, "file": str(file), "size": list(size)})
-        stills.append(
-            Picture(
-                file, f"{story.title}: {words}", f"{story.line(index)}.".replace("\n", ", ").replace("bed ", "Bed ", 1)
-            )
-        )
+        job["stills"].append(_view(run, story, [index], by, upper, file, size))
+        said = f"{story.line(index)}.".replace("\n", ", ").replace("bed ", "Bed ", 1)
+        stills.append(Picture(file, f"{story.title}: {words}", said))
 
     def deep(story: _Story) -> None:
         if story.rested:  # it moves grains far less than a drive does: its scale is its own
@@ -347,8 +368,7 @@ def _plan(
     if animation_size is not None and len(main.frames) > 1:
         frames = np.unique(np.linspace(0, last, min(len(main.frames), _ANIMATED)).round().astype(int)).tolist()
         file = run.path / "animation.gif"
-        view = _view(run, main, frames, "displacement", top)
-        job["animation"] = {**view, "file": str(file), "size": list(animation_size)}
+        job["animation"] = _view(run, main, frames, "displacement", top, file, animation_size)
         animation = Picture(file, f"{main.title}: from the first frame to the last", f"{len(frames)} frames.")
     return job, stills, animation
 
@@ -384,10 +404,12 @@ def _high(frame: Frame, by: str) -> float:
     return float(np.percentile(values, 99.5)) if len(values) else 0.0
 
 
-def _view(run: RunFolder, story: _Story, frames: list[int], by: str, top: float) -> dict[str, Any]:
+def _view(
+    run: RunFolder, story: _Story, frames: list[int], by: str, top: float, file: Path, size: tuple[int, int]
+) -> View:
     first = story.frames[0]
-    position, radius = first.grains["position"], first.grains["radius"][:, None]
-    low, high = (position - radius).min(axis=0), (position + radius).max(axis=0)
+    position = first.grains["position"]
+    low, high = grains_box(first)
     cut = 0.5 * float(low[1] + high[1])
     surface = float(high[2])
     body = next(iter(first.bodies.values()), None)
@@ -403,16 +425,8 @@ def _view(run: RunFolder, story: _Story, frames: list[int], by: str, top: float)
     high[2] = max(min(high[2], surface + 0.25 * (surface - low[2])), surface)  # a grain that flies does not count
     count = f"{len(position):,}".replace(",", "\N{NO-BREAK SPACE}")
     return {
-        "name": story.name,
-        "frames": frames,
-        "by": by,
-        "top": top,
-        "title": story.title,
-        "lines": [story.line(index) for index in frames],
-        "note": f"{count} grains; {_CUT}",
-        "low": low.tolist(),
-        "high": high.tolist(),
-        "cut": cut,
-        "radius": float(radius.mean()),
-        "surface": surface,
-    }
+        "name": story.name, "frames": frames, "by": by, "top": top, "title": story.title,
+        "lines": [story.line(index) for index in frames], "note": f"{count} grains; {_CUT}", "low": low.tolist(),
+        "high": high.tolist(), "cut": cut, "radius": float(first.grains["radius"].mean()), "surface": surface,
+        "file": str(file), "size": list(size),
+    }  # fmt: skip

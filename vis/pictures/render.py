@@ -1,22 +1,17 @@
 """Draws a list of pictures. `python -m vis.pictures.render <job.json>` does it with OpenGL in a process of its own.
 
-A job is plain JSON, so that a crash or a hang of the driver costs a child process and nothing else:
-
-    {"folder", "stills": [View...], "animation": View or null}
-    View = {"name", "file", "size": [w, h], "frames": [index...], "by", "top", "title", "lines": [text per frame],
-            "note", "low", "high", "cut", "radius", "surface"}
-
-One line is printed per finished frame.
+A job is plain JSON, so that a crash or a hang of the driver costs a child process and nothing else. One line is printed
+per finished frame.
 """
 
 from __future__ import annotations
 
-import functools
 import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +21,39 @@ from vis.page.tumble_series import STATES
 from vis.pictures.arrows import FORCE
 from vis.pictures.canvas import Caption, ColourScale, Page, colour_values, colourmap
 from vis.pictures.frames import read_frames
+from vis.pictures.scene import Scene
+from vis.pictures.sections import Section
 
-__all__ = ["main", "replace_file", "run_job", "write_gif", "write_png"]
+__all__ = ["PictureJob", "View", "main", "replace_file", "run_job", "write_gif", "write_png"]
+
+
+class View(TypedDict):
+    """Frames of a run from one place, as one picture each or as an animation."""
+
+    name: str
+    file: str
+    size: Sequence[int]
+    frames: list[int]
+    by: str
+    top: float
+    title: str
+    lines: list[str]
+    """A text for each frame."""
+    note: str
+    low: list[float]
+    high: list[float]
+    cut: float
+    radius: float
+    surface: float
+
+
+class PictureJob(TypedDict):
+    """Pictures of the frames in a run folder."""
+
+    folder: str
+    stills: list[View]
+    animation: View | None
+
 
 _GIF_LIMIT = 5_500_000  # bytes
 _KEPT = tuple(ImageColor.getrgb(colour)[:3] for colour in ("#ffffff", *STATES.values(), str(FORCE["color"])))
@@ -36,54 +62,44 @@ _ROOM = 256 - len(_KEPT)
 """Left of a film's palette for all others."""
 
 
-def run_job(job: dict[str, Any], *, opengl: bool, step: Callable[[], None] = lambda: None) -> None:
+def run_job(job: PictureJob, *, opengl: bool, step: Callable[[], None] = lambda: None) -> None:
     """Draw every picture of a job.
 
     Args:
-        job: See the module.
+        job: Its views, with lengths in m and sizes in pixels.
         opengl: With `vis.pictures.scene`, else with `vis.pictures.sections`.
         step: Called after each frame.
     """
     folder = Path(job["folder"])
     for view in job["stills"]:
         for image in _images(folder, view, opengl):
-            replace_file(Path(view["file"]), functools.partial(write_png, image))
+            replace_file(Path(view["file"]), partial(write_png, image))
             step()
-    if view := job.get("animation"):
+    if moving := job.get("animation"):
         images = []
-        for image in _images(folder, view, opengl):
+        for image in _images(folder, moving, opengl):
             images.append(image)
             step()
-        replace_file(Path(view["file"]), functools.partial(write_gif, images=images))
+        replace_file(Path(moving["file"]), partial(write_gif, images=images))
 
 
-def _images(folder: Path, view: dict[str, Any], opengl: bool) -> Iterator[NDArray[np.uint8]]:
+def _images(folder: Path, view: View, opengl: bool) -> Iterator[NDArray[np.uint8]]:
     size = (int(view["size"][0]), int(view["size"][1]))
     low, high = np.array(view["low"]), np.array(view["high"])
     page = Page(size, ColourScale(view["by"], view["top"]))
     frames = read_frames(folder, view["name"])
     section = (low[0], high[0], view["cut"], low[2], view["surface"])
-    if opengl:
-        from vis.pictures.scene import Scene
-
-        scene = Scene(size, low, high, cut=view["cut"], radius=view["radius"])
-        try:
-            for index, line in zip(view["frames"], view["lines"], strict=True):
-                frame = frames[index]
-                image = scene.render(frame, page.colours(colour_values(frame.grains, view["by"])))
-                words = Caption(view["title"], line)
-                yield page.compose(words, image=image, place=scene.place, section=section, note=view["note"])
-        finally:
-            scene.close()
-    else:
-        from vis.pictures.sections import Section
-
-        cross = Section(size, low, high, cut=view["cut"], radius=view["radius"])
+    drawer = (Scene if opengl else Section)(size, low, high, cut=view["cut"], radius=view["radius"])
+    try:
         for index, line in zip(view["frames"], view["lines"], strict=True):
-            frame = frames[index]
-            draw = cross.draw(frame, page.colours(colour_values(frame.grains, view["by"])))
-            words = Caption(view["title"], line)
-            yield page.compose(words, draw=draw, place=cross.place, section=section, note=view["note"])
+            frame, words = frames[index], Caption(view["title"], line)
+            colours = page.colours(colour_values(frame.grains, view["by"]))
+            image = drawer.render(frame, colours) if isinstance(drawer, Scene) else None
+            draw = drawer.draw(frame, colours) if isinstance(drawer, Section) else None
+            yield page.compose(words, image=image, draw=draw, place=drawer.place, section=section, note=view["note"])
+    finally:
+        if isinstance(drawer, Scene):
+            drawer.close()
 
 
 def write_gif(path: Path, images: list[NDArray[np.uint8]], *, frame_ms: int = 80, limit: int = _GIF_LIMIT) -> None:

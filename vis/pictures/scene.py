@@ -1,28 +1,112 @@
-"""The bed cut open, rendered off screen with VTK. Needs OpenGL: call it only in a process that may die.
+"""Scenes rendered off screen with VTK. Needs OpenGL: use them only in a process that may die.
 
 Grains are exact spheres by ray casting in the shader (a quad per grain, not a mesh): software OpenGL draws 20,000 of
-them in about a second.
+them in about a second. `Scene` is the bed cut open in front of a camera that stands still; `vis.pictures.stage` has the
+one that follows a platform.
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from vis.page.plots import Array
 from vis.pictures.frames import Frame
 
-__all__ = ["Scene", "add_spheres"]
+__all__ = ["FLOOR", "METAL", "Rendered", "Scene"]
 
 _OVERSAMPLE = 1.5  # rendered larger and shrunk: smooth edges at a third of the cost of multi-sampling
-_METAL = (0.74, 0.76, 0.79)
+_LIGHTS = (((-1.0, -1.6, 1.9), 0.72), ((1.6, -1.4, 0.5), 0.26), ((0.1, 1.0, 1.4), 0.22))
 _RIM = (0.30, 0.32, 0.35)
+FLOOR = (0.55, 0.55, 0.57)
+METAL = (0.74, 0.76, 0.79)
 
 
-class Scene:
+class Rendered:
+    """A white picture of a size [pixels] with lights about `centre`, far away for what reaches so far [m]."""
+
+    def __init__(self, size: tuple[int, int], *, centre: Array, reach: float) -> None:
+        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+        import pyvista
+
+        self._pyvista, self.size = pyvista, size
+        window = [round(_OVERSAMPLE * n) for n in size]
+        self._plotter = pyvista.Plotter(off_screen=True, window_size=window, lighting="none")
+        self._plotter.set_background("white")
+        for direction, intensity in _LIGHTS:
+            light = pyvista.Light(position=tuple(centre + 10 * reach * np.array(direction)), focal_point=tuple(centre))
+            light.positional = False
+            light.intensity = intensity
+            self._plotter.add_light(light)
+        self._actors: list[Any] = []
+
+    def add_block(
+        self, corners: Sequence[float], colour: tuple[float, float, float], ambient: float, diffuse: float
+    ) -> None:
+        """A box, its corners in VTK's order [m], that stays: ground or floor."""
+        self._plotter.add_mesh(self._pyvista.Box(corners), color=colour, ambient=ambient, diffuse=diffuse)
+
+    def close(self) -> None:
+        """Free the window."""
+        self._plotter.close()
+
+    def _clear(self) -> None:
+        for actor in self._actors:
+            self._plotter.remove_actor(actor, render=False)
+        self._actors = []
+
+    def _image(self) -> NDArray[np.uint8]:
+        """The picture, shape (height, width, 3)."""
+        self._plotter.render()  # a screenshot alone would show the frame before
+        image = np.asarray(self._plotter.screenshot(None, return_img=True))[..., :3]
+        return np.asarray(Image.fromarray(image).resize(self.size, Image.Resampling.LANCZOS))
+
+    def _mesh(self, points: Array, triangles: NDArray[np.int64]) -> Any:
+        return self._pyvista.PolyData(points, np.column_stack([np.full(len(triangles), 3), triangles]).ravel())
+
+    def _add_body(
+        self, mesh: Any, *, rim: float, smooth: float, line: float, specular: float, colour: Any = METAL
+    ) -> None:
+        """A body with lines along edges of more than `rim` degrees, smooth over those of less than `smooth`."""
+        edges = mesh.extract_feature_edges(feature_angle=rim, boundary_edges=False, non_manifold_edges=False)
+        mesh = mesh.compute_normals(feature_angle=smooth, split_vertices=True)
+        body = self._plotter.add_mesh(
+            mesh, color=colour, smooth_shading=True, ambient=0.35, diffuse=0.75, specular=specular, specular_power=30,
+            render=False, reset_camera=False,
+        )  # fmt: skip
+        self._actors.append(body)
+        if edges.n_cells:
+            style = {"color": _RIM, "line_width": line, "lighting": False}
+            self._actors.append(self._plotter.add_mesh(edges, **style, render=False, reset_camera=False))
+
+    def _add_spheres(self, centres: Array, radius: Array, colours: Array) -> None:
+        """Spheres, each of its colour, shape (n, 3) or more, 0 to 1."""
+        from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLSphereMapper
+
+        cloud = self._pyvista.PolyData(centres.astype(np.float32))
+        cloud["radius"] = np.ascontiguousarray(radius, dtype=np.float32)
+        cloud["colour"] = np.round(255 * colours[:, :3]).astype(np.uint8)
+        mapper = vtkOpenGLSphereMapper()
+        mapper.SetInputData(cloud)
+        mapper.SetScaleArray("radius")
+        mapper.SetScalarModeToUsePointFieldData()
+        mapper.SelectColorArray("colour")
+        mapper.SetColorModeToDirectScalars()
+        mapper.SetScalarVisibility(True)
+        actor = self._pyvista.Actor()
+        actor.SetMapper(mapper)
+        light = actor.prop
+        light.ambient, light.diffuse, light.specular = 0.40, 0.74, 0.0
+        self._plotter.add_actor(actor, render=False, reset_camera=False)
+        self._actors.append(actor)
+
+
+class Scene(Rendered):
     """A camera on a bed; the same for every frame it renders.
 
     Args:
@@ -32,37 +116,15 @@ class Scene:
         radius: Typical radius of a grain [m], for the shading of the gaps between them.
     """
 
-    def __init__(
-        self,
-        size: tuple[int, int],
-        low: NDArray[np.float64],
-        high: NDArray[np.float64],
-        *,
-        cut: float,
-        radius: float,
-    ) -> None:
-        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-        import pyvista
-
-        self._pyvista = pyvista
-        self.size = size
-        self.cut = cut
-        plotter = pyvista.Plotter(off_screen=True, window_size=[round(_OVERSAMPLE * n) for n in size], lighting="none")
-        self._plotter = plotter
-        plotter.set_background("white")
+    def __init__(self, size: tuple[int, int], low: Array, high: Array, *, cut: float, radius: float) -> None:
         width, height = high[0] - low[0], high[2] - low[2]
         reach = float(max(width, 1.25 * height))
         centre = np.array([0.5 * (low[0] + high[0]), cut, 0.5 * (low[2] + high[2])])
-        for direction, intensity in (((-1.0, -1.6, 1.9), 0.72), ((1.6, -1.4, 0.5), 0.26), ((0.1, 1.0, 1.4), 0.22)):
-            light = pyvista.Light(position=tuple(centre + 10 * reach * np.array(direction)), focal_point=tuple(centre))
-            light.positional = False
-            light.intensity = intensity
-            plotter.add_light(light)
-        # The floor: a thin slab
-        slab = pyvista.Box((low[0], high[0], cut, high[1], low[2] - 0.03 * height, low[2] - 1e-6))
-        plotter.add_mesh(slab, color=(0.55, 0.55, 0.57), ambient=0.25, diffuse=0.8)
-        plotter.enable_ssao(radius=3.0 * radius, bias=0.12 * radius, kernel_size=48, blur=True)
-        camera = plotter.camera
+        super().__init__(size, centre=centre, reach=reach)
+        self.cut = cut
+        self.add_block((low[0], high[0], cut, high[1], low[2] - 0.03 * height, low[2] - 1e-6), FLOOR, 0.25, 0.8)
+        self._plotter.enable_ssao(radius=3.0 * radius, bias=0.12 * radius, kernel_size=48, blur=True)
+        camera = self._plotter.camera
         view = np.array([0.0, -1.0, 0.40])  # from straight ahead: a depth on the ruler is the same all across the cut
         camera.focal_point = tuple(centre)
         camera.position = tuple(centre + view / np.linalg.norm(view) * 5.0 * reach)
@@ -71,27 +133,28 @@ class Scene:
         camera.clipping_range = (0.5 * reach, 12.0 * reach)
         corners = [(x, y, z) for x in (low[0], high[0]) for y in (cut, high[1]) for z in (low[2], high[2])]
         self._fit(np.array([*corners, (centre[0], cut, high[2] + 0.55 * height)]))
-        self._actors: list[Any] = []
 
-    def render(self, frame: Frame, colours: NDArray[np.float64]) -> NDArray[np.uint8]:
+    def render(self, frame: Frame, colours: Array) -> NDArray[np.uint8]:
         """Image of a frame, shape (height, width, 3).
 
         Args:
             frame: The frame.
             colours: A colour per grain, shape (n, 3 or 4), 0 to 1.
         """
-        for actor in self._actors:
-            self._plotter.remove_actor(actor, render=False)
+        self._clear()
         position = frame.grains["position"]
         shown = position[:, 1] >= self.cut
-        self._actors = [add_spheres(self._plotter, position[shown], frame.grains["radius"][shown], colours[shown])]
+        self._add_spheres(position[shown], frame.grains["radius"][shown], colours[shown])
         for points, triangles in frame.bodies.values():
-            self._actors += self._body(points, triangles)
-        self._plotter.render()  # a screenshot alone would show the frame before
-        image = np.asarray(self._plotter.screenshot(None, return_img=True))[..., :3]
-        return np.asarray(Image.fromarray(image).resize(self.size, Image.Resampling.LANCZOS))
+            mesh = self._mesh(points, triangles)
+            # What lies behind the cut, closed by its section: in front its rim would be nearer the camera, and the tip
+            # would not meet the scale of depth.
+            if points[:, 1].min() < self.cut < points[:, 1].max():
+                mesh = mesh.clip_closed_surface(normal=(0.0, 1.0, 0.0), origin=(0.0, self.cut, 0.0))
+            self._add_body(mesh, rim=60.0, smooth=40.0, line=2.5, specular=0.5)
+        return self._image()
 
-    def place(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def place(self, points: Array) -> Array:
         """Where points [m], shape (n, 3), lie on the image: fractions from the lower left corner, shape (n, 2)."""
         camera = self._plotter.camera
         aspect = self.size[0] / self.size[1]
@@ -100,11 +163,7 @@ class Scene:
         clip = np.column_stack([points, np.ones(len(points))]) @ full.T
         return 0.5 + 0.5 * clip[:, :2] / clip[:, 3:]
 
-    def close(self) -> None:
-        """Free the window."""
-        self._plotter.close()
-
-    def _fit(self, points: NDArray[np.float64]) -> None:
+    def _fit(self, points: Array) -> None:
         """Zoom and shift so that these points fill the page between the depth scale and the colour bar."""
         left, right, foot, head = 0.125, 0.865, 0.12, 0.90
         camera = self._plotter.camera
@@ -114,46 +173,3 @@ class Scene:
         low, high = (edge(self.place(points), axis=0) for edge in (np.min, np.max))
         shift = 0.5 * (low + high) - 0.5 * np.array([left + right, foot + head])
         camera.SetWindowCenter(*(2.0 * shift))
-
-    def _body(self, points: NDArray[np.float64], triangles: NDArray[np.int64]) -> list[Any]:
-        """What of a body lies behind the cut, closed by its section: in front its rim would be nearer the camera, and
-        the tip would not meet the scale of depth."""
-        faces = np.column_stack([np.full(len(triangles), 3), triangles]).ravel()
-        mesh = self._pyvista.PolyData(points, faces)
-        if points[:, 1].min() < self.cut < points[:, 1].max():
-            mesh = mesh.clip_closed_surface(normal=(0.0, 1.0, 0.0), origin=(0.0, self.cut, 0.0))
-        rim = mesh.extract_feature_edges(feature_angle=60.0, boundary_edges=False, non_manifold_edges=False)
-        mesh = mesh.compute_normals(feature_angle=40.0, split_vertices=True)
-        body = self._plotter.add_mesh(
-            mesh, color=_METAL, smooth_shading=True, ambient=0.35, diffuse=0.75, specular=0.5, specular_power=30,
-            render=False, reset_camera=False,
-        )  # fmt: skip
-        if not rim.n_cells:
-            return [body]
-        line = self._plotter.add_mesh(rim, color=_RIM, line_width=2.5, lighting=False, render=False, reset_camera=False)
-        return [body, line]
-
-
-def add_spheres(
-    plotter: Any, centres: NDArray[np.float64], radius: NDArray[np.float64], colours: NDArray[np.float64]
-) -> Any:
-    """Add spheres to a plotter, each of its colour, shape (n, 3) or more, 0 to 1; return the actor."""
-    import pyvista
-    from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLSphereMapper
-
-    cloud = pyvista.PolyData(centres.astype(np.float32))
-    cloud["radius"] = np.ascontiguousarray(radius, dtype=np.float32)
-    cloud["colour"] = np.round(255 * colours[:, :3]).astype(np.uint8)
-    mapper = vtkOpenGLSphereMapper()
-    mapper.SetInputData(cloud)
-    mapper.SetScaleArray("radius")
-    mapper.SetScalarModeToUsePointFieldData()
-    mapper.SelectColorArray("colour")
-    mapper.SetColorModeToDirectScalars()
-    mapper.SetScalarVisibility(True)
-    actor = pyvista.Actor()
-    actor.SetMapper(mapper)
-    light = actor.prop
-    light.ambient, light.diffuse, light.specular = 0.40, 0.74, 0.0
-    plotter.add_actor(actor, render=False, reset_camera=False)
-    return actor

@@ -12,11 +12,15 @@ import numpy as np
 from matplotlib.collections import EllipseCollection, PolyCollection
 from numpy.typing import NDArray
 
+from vis.page.plots import Array
 from vis.pictures.frames import Frame
+from vis.pictures.scene import METAL
 
-__all__ = ["Section"]
+__all__ = ["SLAB", "Section", "discs", "facing"]
 
-_METAL = np.array([0.74, 0.76, 0.79])
+SLAB = 8.0
+"""Thickness of what is shown of the bed, over a grain's radius."""
+_LIGHT = np.array([-0.45, -0.75, 0.48])
 
 
 class Section:
@@ -29,18 +33,10 @@ class Section:
         radius: Typical radius of a grain [m]; the slab is eight of them thick.
     """
 
-    def __init__(
-        self,
-        size: tuple[int, int],
-        low: NDArray[np.float64],
-        high: NDArray[np.float64],
-        *,
-        cut: float,
-        radius: float,
-    ) -> None:
+    def __init__(self, size: tuple[int, int], low: Array, high: Array, *, cut: float, radius: float) -> None:
         left, right, foot, head = 0.125, 0.865, 0.13, 0.90
         self._low, self._high = low, high
-        self._cut, self._depth = cut, 8.0 * radius
+        self._cut, self._depth = cut, SLAB * radius
         height = 1.55 * (high[2] - low[2])
         aspect = size[0] / size[1]
         across = min((right - left) / (high[0] - low[0]), (head - foot) / (height * aspect))
@@ -48,55 +44,71 @@ class Section:
         middle = 0.5 * np.array([low[0] + high[0], 2.0 * low[2] + height])
         self._shift = 0.5 * np.array([left + right, foot + head]) - self._scale * middle
 
-    def place(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def place(self, points: Array) -> Array:
         """Where points [m], shape (n, 3), lie on the page: fractions from the lower left corner, shape (n, 2)."""
         return np.asarray(points)[:, [0, 2]] * self._scale + self._shift
 
-    def draw(self, frame: Frame, colours: NDArray[np.float64]) -> Callable[[Any], None]:
+    def draw(self, frame: Frame, colours: Array) -> Callable[[Any], None]:
         """A function that draws the frame on an axes in page fractions; arguments as
         `vis.pictures.scene.Scene.render`."""
+        (left, _, top), right = (float(edge) for edge in self._low), float(self._high[0])
+        foot = top - 0.03 * (self._high[2] - self._low[2])
+        floor = np.array([[x, 0.0, z] for x, z in ((left, foot), (right, foot), (right, top), (left, top))])
         position, radius = frame.grains["position"], frame.grains["radius"]
-        behind = position[:, 1] - self._cut
-        slab = np.flatnonzero((behind >= 0.0) & (behind <= self._depth))
-        slab = slab[np.argsort(-behind[slab])]
-        tone = 1.0 - 0.6 * behind[slab] / self._depth  # farther is darker
-        faces = np.column_stack([colours[slab, :3] * tone[:, None], np.ones(len(slab))])
 
         def on(axis: Any) -> None:
-            floor = self.place(
-                np.array([[x, 0.0, z] for x, z in self._corners(self._low[2], 0.03 * (self._high[2] - self._low[2]))])
-            )
-            axis.add_collection(PolyCollection([floor], facecolors="#8c8c91", edgecolors="none"))
-            axis.add_collection(
-                EllipseCollection(
-                    2.0 * radius[slab] * self._scale[0],
-                    2.0 * radius[slab] * self._scale[1],
-                    np.zeros(len(slab)),
-                    units="xy",
-                    offsets=self.place(position[slab]),
-                    offset_transform=axis.transData,
-                    facecolors=faces,
-                    edgecolors=(0.0, 0.0, 0.0, 0.45),
-                    linewidths=0.35,
-                )
-            )
+            axis.add_collection(PolyCollection([self.place(floor)], facecolors="#8c8c91", edgecolors="none"))
+            discs(
+                axis, self.place(position), (2.0 * radius * self._scale[0], 2.0 * radius * self._scale[1]), colours,
+                behind=position[:, 1] - self._cut, thick=self._depth, edge=0.45, line=0.35,
+            )  # fmt: skip
             for points, triangles in frame.bodies.values():
                 axis.add_collection(self._body(points, triangles))
 
         return on
 
-    def _corners(self, top: float, thickness: float) -> list[tuple[float, float]]:
-        left, right = float(self._low[0]), float(self._high[0])
-        return [(left, top - thickness), (right, top - thickness), (right, top), (left, top)]
-
-    def _body(self, points: NDArray[np.float64], triangles: NDArray[np.int64]) -> PolyCollection:
-        corners = points[triangles]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    def _body(self, points: Array, triangles: NDArray[np.int64]) -> PolyCollection:
+        corners, normal = facing(points, triangles)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-        facing = normal[:, 1] < 0.0
-        light = np.array([-0.45, -0.75, 0.48])
-        shade = 0.45 + 0.6 * np.clip(normal[facing] @ light, 0.0, 1.0)
-        faces = np.clip(shade[:, None] * _METAL, 0.0, 1.0)
-        flat = self.place(corners[facing].reshape(-1, 3)).reshape(-1, 3, 2)
-        order = np.argsort(-corners[facing][:, :, 1].mean(axis=1))
+        shade = 0.45 + 0.6 * np.clip(normal @ _LIGHT, 0.0, 1.0)
+        faces = np.clip(shade[:, None] * np.array(METAL), 0.0, 1.0)
+        flat = self.place(corners.reshape(-1, 3)).reshape(-1, 3, 2)
+        order = np.argsort(-corners[:, :, 1].mean(axis=1))
         return PolyCollection(list(flat[order]), facecolors=faces[order], edgecolors=faces[order], linewidths=0.4)
+
+
+def discs(
+    axis: Any,
+    places: Array,
+    sizes: tuple[Array, Array],
+    colours: Array,
+    *,
+    behind: Array,
+    thick: float,
+    edge: float,
+    line: float,
+    shown: Any = True,
+) -> None:
+    """Grains as discs, those up to `thick` behind the cut, the far ones first and darker.
+
+    Args:
+        places, sizes: In fractions of the page, shape (n, 2), and across and up, shape (n,).
+        behind: How far each is behind the cut [m]. shown: Which may be seen.
+        edge, line: Opacity and width of the rims.
+    """
+    slab = np.flatnonzero(shown & (behind >= 0.0) & (behind <= thick))
+    slab = slab[np.argsort(-behind[slab])]
+    tone = 1.0 - 0.6 * behind[slab] / thick
+    axis.add_collection(EllipseCollection(
+        sizes[0][slab], sizes[1][slab], np.zeros(len(slab)), units="xy", offsets=places[slab],
+        offset_transform=axis.transData, edgecolors=(0.0, 0.0, 0.0, edge), linewidths=line,
+        facecolors=np.column_stack([colours[slab, :3] * tone[:, None], np.ones(len(slab))]),
+    ))  # fmt: skip
+
+
+def facing(points: Array, triangles: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Corners [m], shape (m, 3, 3), and normals, shape (m, 3), of the triangles that are seen along +y."""
+    corners = points[triangles]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    seen = normal[:, 1] < 0.0
+    return corners[seen], normal[seen]

@@ -6,26 +6,22 @@ onto the plane of the cut. `place` says where points lie on the picture, for wha
 
 from __future__ import annotations
 
-import os
 from typing import Any
 
 import numpy as np
-from matplotlib.collections import EllipseCollection, PolyCollection
+from matplotlib.collections import PolyCollection
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
-from PIL import Image
 
+from vis.page.plots import Array
 from vis.pictures.frames import Frame
-from vis.pictures.scene import add_spheres
+from vis.pictures.scene import FLOOR, METAL, Rendered
+from vis.pictures.sections import SLAB, discs, facing
 
 __all__ = ["Eye", "FlatStage", "Stage"]
 
-Array = NDArray[np.float64]
-_OVERSAMPLE = 1.5
 _GROUND = (0.86, 0.80, 0.70)
-_FLOOR = (0.55, 0.55, 0.57)
 _COLOURS = {"hull": (0.80, 0.82, 0.85), "spikes": (0.52, 0.55, 0.60)}
-_BODY = (0.74, 0.76, 0.79)
 
 
 class Eye:
@@ -49,8 +45,12 @@ class Eye:
         up = (at[:, 2] - focus[1]) * np.cos(self.pitch) + (at[:, 1] - self.cut) * np.sin(self.pitch)
         return np.column_stack([0.5 + (at[:, 0] - focus[0]) / self.width, 0.5 + up / self.height])
 
+    def _near(self, position: Array, focus: tuple[float, float]) -> NDArray[np.bool_]:
+        """Which grains the picture may show."""
+        return np.abs(position[:, 0] - focus[0]) < 0.6 * self.width
 
-class Stage(Eye):
+
+class Stage(Eye, Rendered):
     """Renders frames with VTK. Needs OpenGL: use it only in a process that may die.
 
     Args:
@@ -70,47 +70,28 @@ class Stage(Eye):
         radius: float | None,
         pitch: float = 0.24,
     ) -> None:
-        super().__init__(size, width=width, cut=cut, pitch=pitch)
-        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-        import pyvista
-
-        self._pyvista = pyvista
-        plotter = pyvista.Plotter(off_screen=True, window_size=[round(_OVERSAMPLE * n) for n in size], lighting="none")
-        self._plotter = plotter
-        plotter.set_background("white")
-        for direction, intensity in (((-1.0, -1.6, 1.9), 0.72), ((1.6, -1.4, 0.5), 0.26), ((0.1, 1.0, 1.4), 0.22)):
-            light = pyvista.Light(position=tuple(10 * np.array(direction)), focal_point=(0.0, 0.0, 0.0))
-            light.positional = False
-            light.intensity = intensity
-            plotter.add_light(light)
+        Eye.__init__(self, size, width=width, cut=cut, pitch=pitch)
+        Rendered.__init__(self, size, centre=np.zeros(3), reach=1.0)
         thick = 0.03 * float(high[2] - low[2])
         if radius is None:
-            block = (low[0], high[0], cut, high[1], low[2], high[2])
-            plotter.add_mesh(pyvista.Box(block), color=_GROUND, ambient=0.4, diffuse=0.7)
+            self.add_block((low[0], high[0], cut, high[1], low[2], high[2]), _GROUND, 0.4, 0.7)
         else:
-            slab = pyvista.Box((low[0], high[0], cut, high[1], low[2] - thick, low[2] - 1e-6))
-            plotter.add_mesh(slab, color=_FLOOR, ambient=0.25, diffuse=0.8)
+            self.add_block((low[0], high[0], cut, high[1], low[2] - thick, low[2] - 1e-6), FLOOR, 0.25, 0.8)
             if radius / width * size[0] > 4.0:  # on smaller grains the shading of gaps does not show
-                plotter.enable_ssao(radius=3.0 * radius, bias=0.3 * radius, kernel_size=32, blur=True)
-        plotter.enable_parallel_projection()
+                self._plotter.enable_ssao(radius=3.0 * radius, bias=0.3 * radius, kernel_size=32, blur=True)
+        self._plotter.enable_parallel_projection()
         self.reach = 0.5 * width + 2.0 * float(high[1] - low[1])
-        self._actors: list[Any] = []
 
     def render(self, frame: Frame, colours: Array, focus: tuple[float, float]) -> NDArray[np.uint8]:
         """Image of a frame with `focus` (x, z) [m] in its middle, shape (height, width, 3)."""
-        for actor in self._actors:
-            self._plotter.remove_actor(actor, render=False)
-        self._actors = []
+        self._clear()
         position = frame.grains["position"]
-        if len(position):
-            near = np.abs(position[:, 0] - focus[0]) < 0.6 * self.width
-            shown = near & (position[:, 1] >= self.cut)
-            if shown.any():
-                self._actors.append(
-                    add_spheres(self._plotter, position[shown], frame.grains["radius"][shown], colours[shown])
-                )
-        for name, (points, triangles) in frame.bodies.items():
-            self._actors += self._body(name, points, triangles)
+        shown = self._near(position, focus) & (position[:, 1] >= self.cut)
+        if shown.any():
+            self._add_spheres(position[shown], frame.grains["radius"][shown], colours[shown])
+        for name, body in frame.bodies.items():
+            colour = _COLOURS.get(name, METAL)
+            self._add_body(self._mesh(*body), rim=40.0, smooth=35.0, line=2.0, specular=0.4, colour=colour)
         camera = self._plotter.camera
         far = 1.05 * self.reach
         middle = np.array([focus[0], self.cut, focus[1]])
@@ -121,29 +102,7 @@ class Stage(Eye):
         # As near as it can be: the shading of gaps reads distances from the camera off half-precision numbers (a part
         # in 2048), and coarse ones stripe what is flat.
         camera.clipping_range = (far - self.reach, far + self.reach)
-        self._plotter.render()
-        image = np.asarray(self._plotter.screenshot(None, return_img=True))[..., :3]
-        return np.asarray(Image.fromarray(image).resize(self.size, Image.Resampling.LANCZOS))
-
-    def close(self) -> None:
-        """Free the window."""
-        self._plotter.close()
-
-    def _body(self, name: str, points: Array, triangles: NDArray[np.int64]) -> list[Any]:
-        faces = np.column_stack([np.full(len(triangles), 3), triangles]).ravel()
-        mesh = self._pyvista.PolyData(points, faces)
-        rim = mesh.extract_feature_edges(feature_angle=40.0, boundary_edges=False, non_manifold_edges=False)
-        mesh = mesh.compute_normals(feature_angle=35.0, split_vertices=True)
-        body = self._plotter.add_mesh(
-            mesh, color=_COLOURS.get(name, _BODY), smooth_shading=True, ambient=0.35, diffuse=0.75, specular=0.4,
-            specular_power=30, render=False, reset_camera=False,
-        )  # fmt: skip
-        if not rim.n_cells:
-            return [body]
-        line = self._plotter.add_mesh(
-            rim, color=(0.30, 0.32, 0.35), line_width=2.0, lighting=False, render=False, reset_camera=False
-        )
-        return [body, line]
+        return self._image()
 
 
 class FlatStage(Eye):
@@ -165,30 +124,15 @@ class FlatStage(Eye):
             axis.add_patch(Rectangle((left, foot), right - left, top - foot, color=_GROUND))
         else:
             thick = 0.02 * (top - foot)
-            axis.add_patch(Rectangle((left, foot - thick), right - left, thick, color=_FLOOR))
-            self._grains(axis, frame, colours, focus)
+            axis.add_patch(Rectangle((left, foot - thick), right - left, thick, color=FLOOR))
+            position, radius = frame.grains["position"], frame.grains["radius"]
+            discs(
+                axis, self.place(position, focus), (2.0 * radius / self.width, 2.0 * radius / self.height), colours,
+                behind=position[:, 1] - self.cut, thick=SLAB * self.radius, shown=self._near(position, focus),
+                edge=0.4, line=0.3,
+            )  # fmt: skip
         for name in sorted(frame.bodies, reverse=True):  # spikes first: the hull hides their upper ends
-            points, triangles = frame.bodies[name]
-            normal = np.cross(
-                points[triangles[:, 1]] - points[triangles[:, 0]], points[triangles[:, 2]] - points[triangles[:, 0]]
-            )
-            facing = triangles[normal[:, 1] < 0]
-            corners = self.place(points[facing].reshape(-1, 3), focus).reshape(-1, 3, 2)
-            colour = _COLOURS.get(name, _BODY)
-            axis.add_collection(PolyCollection(list(corners), facecolors=[colour], edgecolors=[colour], linewidths=0.4))
-
-    def _grains(self, axis: Any, frame: Frame, colours: Array, focus: tuple[float, float]) -> None:
-        position, radius = frame.grains["position"], frame.grains["radius"]
-        assert self.radius is not None
-        behind, thick = position[:, 1] - self.cut, 8.0 * self.radius
-        near = np.abs(position[:, 0] - focus[0]) < 0.6 * self.width
-        slab = np.flatnonzero(near & (behind >= 0.0) & (behind <= thick))
-        slab = slab[np.argsort(-behind[slab])]
-        tone = 1.0 - 0.6 * behind[slab] / thick
-        discs = EllipseCollection(
-            2.0 * radius[slab] / self.width, 2.0 * radius[slab] / self.height, np.zeros(len(slab)), units="xy",
-            offsets=self.place(position[slab], focus), offset_transform=axis.transData,
-            facecolors=np.column_stack([colours[slab, :3] * tone[:, None], np.ones(len(slab))]),
-            edgecolors=(0.0, 0.0, 0.0, 0.4), linewidths=0.3,
-        )  # fmt: skip
-        axis.add_collection(discs)
+            corners, _ = facing(*frame.bodies[name])
+            flat = self.place(corners.reshape(-1, 3), focus).reshape(-1, 3, 2)
+            colour = _COLOURS.get(name, METAL)
+            axis.add_collection(PolyCollection(list(flat), facecolors=[colour], edgecolors=[colour], linewidths=0.4))

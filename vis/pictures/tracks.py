@@ -49,12 +49,7 @@ def lying(position: ArrayLike, radius: ArrayLike) -> NDArray[np.bool_]:
 
 
 def height_map(
-    position: ArrayLike,
-    radius: ArrayLike,
-    size: tuple[float, float],
-    *,
-    spacing: float,
-    lies: ArrayLike | None = None,
+    position: ArrayLike, radius: ArrayLike, size: tuple[float, float], *, spacing: float, lies: ArrayLike | None = None
 ) -> HeightMap:
     """Height of the grains' tops over a grid on a bed that is periodic along x and y.
 

@@ -2,38 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import TwoSlopeNorm
-from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from vis.film.film import MOST_FRAMES, Stills, draw_reels
+from vis.film.reel import Reel
+from vis.page.plots import Array, legend_above, sheet
+from vis.page.report import Progress, capital
 from vis.page.style import INK, styled
 from vis.pictures.canvas import COLOURS, nice_above
-from vis.pictures.pictures import Picture, Pictures, opengl_available, render_apart
-from vis.tumble.film import run_film_job
-from vis.tumble.reel import Reel
+from vis.pictures.pictures import Picture, Pictures
 
-__all__ = ["draw_reels", "draw_tracks", "make_tumble_pictures", "moments"]
+__all__ = ["draw_tracks", "draw_tumbles", "make_tumble_pictures", "moments"]
 
-Array = NDArray[np.float64]
-_MOST_FRAMES = 48
-_STILL = (1920, 1080)
-_FILM = (1280, 720)
 _LONGEST_MAP = 40.0  # length over width of a map that is drawn to scale
 
 
 def make_tumble_pictures(
-    folder: str | Path,
-    *,
-    by: str = "displacement",
-    film: bool = True,
-    progress: Callable[[float], None] | None = None,
+    folder: str | Path, *, by: str = "displacement", film: bool = True, progress: Progress | None = None
 ) -> Pictures:
     """Draw figures/tumble-*.png, figures/tracks.png and film.gif of a tumble's run folder.
 
@@ -52,10 +42,10 @@ def make_tumble_pictures(
     home = Path(folder)
     reel = Reel.open(home)
     stills = [
-        (home / "figures" / f"tumble-{name}.png", f"{words}", time, reel.line(reel.nearest(time)))
+        (home / "figures" / f"tumble-{name}.png", capital(words), time, reel.line(reel.nearest(time)) + ".")
         for name, words, time in moments([reel])
     ]
-    drawn = draw_reels([reel], stills, home / "film.gif" if film else None, by=by, progress=progress)
+    drawn = draw_tumbles([reel], stills, home / "film.gif" if film else None, by=by, progress=progress)
     if reel.frames is not None and "surface" in reel.frame(len(reel) - 1).maps:
         drawn.stills.append(draw_tracks(reel, home / "figures" / "tracks.png"))
     return drawn
@@ -66,7 +56,7 @@ def moments(reels: Sequence[Reel]) -> list[tuple[str, str, float]]:
 
     Times at which the run with the fewest pictures has one, so that two runs are shown at the same.
     """
-    first, coarse = reels[0], _coarsest(reels)
+    first, coarse = reels[0], min(reels, key=len)
     end = min(float(reel.series["t_s"][-1]) for reel in reels)
     theta, at = first.series["theta_rad"], first.series["t_s"]
     turned = np.abs(theta - theta[0])
@@ -76,16 +66,11 @@ def moments(reels: Sequence[Reel]) -> list[tuple[str, str, float]]:
     return [(*named, time) for named, time in zip(words, times, strict=True)]
 
 
-def _coarsest(reels: Sequence[Reel]) -> Reel:
-    """The run with the fewest pictures."""
-    return min(reels, key=len)
-
-
 def _film_times(reels: Sequence[Reel]) -> Array:
     """Evenly over the longest run, no two of them with the same picture of every run on grains [s]."""
     end = max(float(reel.times[-1]) for reel in reels)
     on_grains = [reel for reel in reels if reel.frames is not None]
-    count = min(_MOST_FRAMES, max(len(reel) for reel in on_grains or reels))
+    count = min(MOST_FRAMES, max(len(reel) for reel in on_grains or reels))
     times = np.linspace(0.0, end, count)
     finest = max(on_grains, key=len) if on_grains else None
     if finest is None:
@@ -95,48 +80,19 @@ def _film_times(reels: Sequence[Reel]) -> Array:
     return np.unique(own)
 
 
-def draw_reels(
+def draw_tumbles(
     reels: Sequence[Reel],
-    stills: Sequence[tuple[Path, str, float, str]],
+    stills: Stills,
     film: Path | None,
     *,
     by: str,
     labels: Sequence[str] | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Pictures:
-    """Stills (file, words, time [s], caption) and film of one or two runs, by OpenGL in a child process or flat."""
-    times = _film_times(reels)
-    count = len(times)
-    job: dict[str, Any] = {
-        "runs": [str(reel.folder) for reel in reels], "labels": list(labels) if labels else None, "by": by,
-        "stills": [{"file": str(file), "time": time, "size": list(_STILL)} for file, _, time, _ in stills],
-        "film": {"file": str(film), "times": times.tolist(), "size": list(_FILM)} if film else None,
-        "spikes": [list(reel.spikes) for reel in reels],
-    }  # fmt: skip
-    pictures = [Picture(file, words[:1].upper() + words[1:], caption + ".") for file, words, _, caption in stills]
-    moving = None
-    if film:
-        many = f"{count} pictures of {times[-1]:.3g} s; the camera follows, the colours keep their scale."
-        moving = Picture(film, "The film", many)
-    total, done = len(stills) + (count if film else 0), 0
-
-    def step() -> None:
-        nonlocal done
-        done += 1
-        if progress is not None:
-            progress(min(1.0, done / max(total, 1)))
-
-    notes: list[str] = []
-    if opengl_available():
-        failure = render_apart(job, 120.0, step, module="vis.tumble.film")
-        if failure is None:
-            return Pictures(pictures, moving, "opengl", notes)
-        notes.append(f"Rendering with OpenGL failed ({failure}); cross-sections stand in for the pictures.")
-        done = 0
-    else:
-        notes.append("This machine has no OpenGL for off-screen pictures; cross-sections stand in for them.")
-    run_film_job(job, opengl=False, step=step)
-    return Pictures(pictures, moving, "sections", notes)
+    """Stills and film of one or two runs, by OpenGL in a child process or flat."""
+    times = _film_times(reels).tolist()
+    about = f" of {times[-1]:.3g} s"
+    return draw_reels(reels, stills, film, times, by=by, about=about, labels=labels, progress=progress)
 
 
 def draw_tracks(reel: Reel, file: Path) -> Picture:
@@ -149,14 +105,11 @@ def draw_tracks(reel: Reel, file: Path) -> Picture:
     y = 1e3 * (grid.origin[1] + grid.spacing[1] * np.arange(change.shape[0]) - reel.cut)
     # Single grains that roll count less than what a spike's width of them did.
     most = nice_above(float(np.percentile(np.abs(change), 99.5)))
-    with styled(), mpl.rc_context({"figure.constrained_layout.use": True}):
-        drawing = Figure(figsize=(8.6, 4.6))
-        FigureCanvasAgg(drawing)
-        above, along = drawing.subplots(2, 1, sharex=True, height_ratios=(1.0, 1.3))
+    with styled():
+        drawing, ((above,), (along,)) = sheet(2, 1, 4.6, sharex=True, height_ratios=(1.0, 1.3))
         picture = above.pcolormesh(x, y, change, norm=TwoSlopeNorm(0.0, -most, most), cmap="RdBu", rasterized=True)
         if np.ptp(x) <= _LONGEST_MAP * np.ptp(y):
-            above.set_aspect("equal")
-            above.set_ylabel("across [mm]")
+            above.set(aspect="equal", ylabel="across [mm]")
         else:  # in its true shape it would be a thread
             above.set_ylabel("across [mm], stretched")
         above.grid(False)
@@ -164,14 +117,15 @@ def draw_tracks(reel: Reel, file: Path) -> Picture:
         bar.set_label("change of the surface's height [mm]")
         wide = max(reel.spikes[0], 2.0 * float(grid.spacing[1]))  # of the strip [m]: two columns of the map at least
         strip = np.abs(y) <= 0.5e3 * wide
+        ages = mpl.colormaps["viridis_r"]
         for index in np.unique(np.linspace(1, len(reel) - 1, 4).round().astype(int)):
             now = reel.frame(int(index))
             mean = 1e3 * np.asarray(now.maps["surface"].fields["change"], dtype=float)[strip].mean(axis=0)
-            along.plot(x, mean, lw=1.2, label=f"{reel.times[index]:.2f} s", color=_ageing(index / (len(reel) - 1)))
+            colour = ages(0.15 + 0.8 * (index / (len(reel) - 1)))
+            along.plot(x, mean, lw=1.2, label=f"{reel.times[index]:.2f} s", color=colour)
         along.axhline(0.0, color=INK, lw=0.8, ls=(0, (5, 4)))
-        along.set_xlabel("x from the start of the platform's centre [mm]")
-        along.set_ylabel("mean under the spikes [mm]")
-        drawing.legend(handles=along.lines[:-1], loc="outside upper left", ncols=4)
+        along.set(xlabel="x from the start of the platform's centre [mm]", ylabel="mean under the spikes [mm]")
+        legend_above(drawing, along.lines[:-1], 4)
         file.parent.mkdir(parents=True, exist_ok=True)
         drawing.savefig(file, dpi=130)
     caption = (
@@ -179,7 +133,3 @@ def draw_tracks(reel: Reel, file: Path) -> Picture:
         f"Below: the same, mean over {1e3 * wide:.3g} mm across the spikes' way, at four times."
     )
     return Picture(file, "The tracks", caption)
-
-
-def _ageing(share: float) -> Any:
-    return mpl.colormaps["viridis_r"](0.15 + 0.8 * share)

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from vis.page.page import Section, figure, listing, table
+from vis.page.page import Section, listing
+from vis.page.plots import Array, Plot, legend_above, sheet
+from vis.page.report import Report, Result, tables
 from vis.page.style import BED, styled
 
 __all__ = ["sweep_section"]
@@ -28,27 +26,23 @@ _MOST_LINES = 7
 """Values of the other key that are drawn as lines; with more, colours stand for the numbers."""
 
 
-def sweep_section(result: Mapping[str, Any], figures: Path, columns: Mapping[str, NDArray[np.float64]]) -> Section:
-    """The section of the sweep, its figure drawn into `figures`. `columns` are those of the sweep's CSV file."""
-    keys = result["sweep"]["keys"]
+def sweep_section(report: Report) -> Section:
+    """The section of the sweep, its figure drawn from the sweep's CSV file."""
+    sweep = report.result["sweep"]
     with styled():
-        drawing = _draw(keys, columns)
-        drawing.savefig(figures / "sweep.png", dpi=130)
-    names = " and ".join(key["key"] for key in keys)
+        drawing = _draw(sweep["keys"], report.columns(sweep["file"]))
+    names = " and ".join(key["key"] for key in sweep["keys"])
     caption = (
-        f"{result['sweep']['trials']} trials by the batched model, nothing but {names} changed. Gaps: the centre never "
-        f"got 10 mm away, or the platform cannot stand."
+        f"{sweep['trials']} trials by the batched model, nothing but {names} changed. Gaps: the centre never got 10 mm "
+        "away, or the platform cannot stand."
     )
-    blocks = [figure(figures / "sweep.png", title=f"Over {names}", caption=caption)]
-    blocks += [table(shown["head"], shown["rows"], title=shown["title"]) for shown in result.get("tables", [])]
-    return Section("The sweep", [*blocks, listing(result["sweep"]["sentences"])])
+    drawn = report.draw(Plot("sweep", f"Over {names}", caption, drawing))
+    told = tables(report.result) if "tables" in report.result else []
+    return Section("The sweep", [drawn, *told, listing(sweep["sentences"])])
 
 
-def _draw(keys: list[dict[str, Any]], columns: Mapping[str, NDArray[np.float64]]) -> Figure:
-    with mpl.rc_context({"figure.constrained_layout.use": True}):
-        drawing = Figure(figsize=(8.6, 3.0))
-    FigureCanvasAgg(drawing)
-    axes = drawing.subplots(1, len(_PANELS))
+def _draw(keys: Sequence[Result], columns: Mapping[str, Array]) -> Figure:
+    drawing, (axes,) = sheet(1, len(_PANELS), 3.0)
     shape = [len(key["values"]) for key in keys]
     if len(keys) == 1:
         for axis, (name, scale, label) in zip(axes, _PANELS, strict=True):
@@ -73,21 +67,19 @@ def _draw(keys: list[dict[str, Any]], columns: Mapping[str, NDArray[np.float64]]
             axis.plot(keys[along]["values"], values, "o-", color=colour, ms=3, lw=1.3, label=f"{value:g}")
         _say_if_empty(axis, keys[along], grid)
         _label(axis, keys[along], label)
-    handles, labels = axes[0].get_legend_handles_labels()
-    drawing.legend(handles, labels, title=_words(keys[other]), loc="outside upper left", ncols=_MOST_LINES)
+    legend_above(drawing, axes[0].lines, _MOST_LINES, title=_words(keys[other]))
     return drawing
 
 
-def _words(key: Mapping[str, Any]) -> str:
+def _words(key: Result) -> str:
     return key["key"] if key["unit"] == "1" else f"{key['key']} [{key['unit']}]"
 
 
-def _label(axis: Axes, key: Mapping[str, Any], label: str) -> None:
-    axis.set_xlabel(_words(key))
-    axis.set_ylabel(label)
+def _label(axis: Axes, key: Result, label: str) -> None:
+    axis.set(xlabel=_words(key), ylabel=label)
 
 
-def _say_if_empty(axis: Axes, key: Mapping[str, Any], values: NDArray[np.float64]) -> None:
+def _say_if_empty(axis: Axes, key: Result, values: Array) -> None:
     if np.isnan(values).all():
         axis.set_xlim(min(key["values"]), max(key["values"]))
         axis.set_yticks([])

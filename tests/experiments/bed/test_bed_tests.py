@@ -16,7 +16,7 @@ from experiments.bed.test_settings import BedConeSettings, BedCutSettings, BedRe
 from experiments.bed.tests import quantity
 from experiments.cli.main import BAD_INPUT, DONE, main
 from experiments.runs.folder import read_series
-from vis.bed import cut as bed_cut
+from vis.bed import tests as bed_cut
 from vis.bed.tests import said
 
 GRAIN = 0.004
@@ -168,7 +168,7 @@ def test_defaults_can_be_run():
 
 def test_the_line_above_which_a_face_has_fallen_is_drawn_where_it_falls():
     assert bed_cut.FALLEN_SHARE == cutting.FALLEN_SHARE
-    assert "A face has fallen once a fifth of the grains" in " ".join(bed_cut.METHOD)
+    assert "A face has fallen once a fifth of the grains" in " ".join(bed_cut.CUT_METHOD)
 
 
 @pytest.mark.parametrize(

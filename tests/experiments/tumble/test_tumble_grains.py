@@ -561,8 +561,8 @@ def test_tips_that_come_down_over_more_than_one_copy_are_said_to_meet_the_same_s
 
 def _check_report(folder, result):
     """The section of the report has its figures and both columns, and where the energy went."""
+    from vis.page.tumble_series import read_columns
     from vis.tumble.grains import grains_section
-    from vis.tumble.report import read_columns
 
     (folder / "figures").mkdir(exist_ok=True)
     tables = {name: read_columns(folder / file) for name, file in result["grains"]["series"].items()}

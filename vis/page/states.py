@@ -10,30 +10,28 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from vis.page.page import Block, table, text
+from vis.page.plots import Array, handle, legend_above, new_figure, sheet
 from vis.page.style import BED, GREY, INK, MODEL, styled
 from vis.page.tumble_series import STATES, state_runs
 
 __all__ = [
-    "LINES", "by_state", "draw_bands", "draw_states", "legend_of_states", "panels", "passages", "sheet", "state_strip",
+    "LINES", "States", "by_state", "draw_bands", "draw_states", "legend_of_runs", "legend_of_states", "panels",
+    "passages", "state_strip",
 ]  # fmt: skip
 
-Array = NDArray[np.float64]
 States = NDArray[np.str_]
-LINES: tuple[dict[str, Any], dict[str, Any]] = (
+LINES: tuple[Mapping[str, Any], Mapping[str, Any]] = (
     {"color": BED, "lw": 1.7},
     {"color": MODEL, "lw": 1.4, "ls": (0, (4, 2))},
 )
 """Of the first of two runs and of the second, which is dashed as well."""
-_WIDTH = 8.6
 _LABEL = 26
 """Letters of a run's label in a line."""
 _LETTER = 0.0063
@@ -47,27 +45,22 @@ def panels(
     count: int, height: float, *, widths: tuple[float, ...] | None = None, right: float = 0.985
 ) -> tuple[Figure, list[Axes]]:
     """Panels side by side, placed by hand: a layout engine would take as long as all the rest."""
-    with mpl.rc_context({"figure.constrained_layout.use": False}):
-        drawing = Figure(figsize=(_WIDTH, height))
-    FigureCanvasAgg(drawing)
+    drawing = new_figure(height, layout="none")
     axes = drawing.subplots(1, count, width_ratios=widths)
     drawing.subplots_adjust(left=0.09, right=right, bottom=0.5 / height, top=1 - 0.38 / height, wspace=0.23)
     return drawing, list(np.atleast_1d(axes))
 
 
-def sheet(rows: int, columns: int, height: float, **options: Any) -> tuple[Figure, Any]:
-    """Panels in rows and columns, laid out by matplotlib; the axes have the shape (rows, columns)."""
-    with mpl.rc_context({"figure.constrained_layout.use": True}):
-        drawing = Figure(figsize=(_WIDTH, height))
-    FigureCanvasAgg(drawing)
-    return drawing, drawing.subplots(rows, columns, squeeze=False, **options)
-
-
-def legend_of_states(drawing: Figure, states: States, more: tuple[Line2D, ...] = ()) -> None:
+def legend_of_states(drawing: Figure, states: States, more: tuple[Line2D, ...] = (), *, columns: int = 8) -> None:
     """Those that occur, and what else there is."""
     there = [name for name in STATES if name in states]
-    handles = [Line2D([], [], color=STATES[name], lw=3, label=name) for name in there]
-    drawing.legend(handles=[*handles, *more], loc="upper left", bbox_to_anchor=(0.075, 1.0), ncols=8)
+    handles = [handle(name, STATES[name], lw=3) for name in there]
+    drawing.legend(handles=[*handles, *more], loc="upper left", bbox_to_anchor=(0.075, 1.0), ncols=columns)
+
+
+def legend_of_runs(drawing: Figure, labels: Sequence[str], more: Sequence[Line2D] = (), *, columns: int = 2) -> None:
+    """The lines of two runs, and what else there is."""
+    legend_above(drawing, [*(handle(name, **style) for name, style in zip(labels, LINES, strict=True)), *more], columns)
 
 
 def by_state(axis: Axes, x: Array, y: Array, states: States, **style: Any) -> None:
@@ -82,8 +75,7 @@ def draw_states(time: Array, angle: Array, states: States, *, label: str = "θ [
     with styled():
         drawing, (over_time, over_angle) = panels(2, 3.0)
         by_state(over_time, time, angle, states, lw=2.4)
-        over_time.set_xlabel("time [s]")
-        over_time.set_ylabel(label)
+        over_time.set(xlabel="time [s]", ylabel=label)
         stretches = state_runs(states)
         for low, high, name in stretches:
             last = min(high, len(angle) - 1)
@@ -96,8 +88,7 @@ def draw_states(time: Array, angle: Array, states: States, *, label: str = "θ [
                 there = [row, order.index(str(states[last]))]
                 over_angle.plot([angle[last]] * 2, there, color=GREY, lw=0.7)
         over_angle.set_yticks(range(len(order)), order)
-        over_angle.set_ylim(-0.5, len(order) - 0.5)
-        over_angle.set_xlabel(label)
+        over_angle.set(ylim=(-0.5, len(order) - 0.5), xlabel=label)
         over_angle.locator_params(axis="x", nbins=6)
         legend_of_states(drawing, states)
     return drawing
@@ -114,14 +105,10 @@ def draw_bands(
         _band(bands, 1 - number, time, states)
     above.set_ylabel(label)
     bands.set_yticks([1, 0], labels)
-    bands.set_ylim(-0.55, 1.55)
-    bands.set_xlim(runs[0][0][0], max(time[-1] for time, _, _ in runs))
-    bands.set_xlabel("time [s]")
+    bands.set(ylim=(-0.55, 1.55), xlim=(runs[0][0][0], max(time[-1] for time, _, _ in runs)), xlabel="time [s]")
     bands.grid(False)
     there = [name for name in STATES if any(name in states for _, _, states in runs)]
-    handles = [Line2D([], [], label=name, **style) for name, style in zip(labels, LINES, strict=True)]
-    handles += [Line2D([], [], color=STATES[name], lw=6, label=name) for name in there]
-    drawing.legend(handles=handles, loc="outside upper left", ncols=6)
+    legend_of_runs(drawing, labels, [handle(name, STATES[name], lw=6) for name in there], columns=6)
     return drawing
 
 
@@ -135,8 +122,7 @@ def state_strip(drawing: Figure, runs: Sequence[Mapping[str, Any]], labels: Sequ
     for number, run in enumerate(runs):
         _band(axis, count - 1 - number, run["t_s"], run["state"])
     axis.axvline(time, color=INK, lw=2.0)
-    axis.set_xlim(0.0, max(float(run["t_s"][-1]) for run in runs))
-    axis.set_ylim(-0.5, count - 0.5)
+    axis.set(xlim=(0.0, max(float(run["t_s"][-1]) for run in runs)), ylim=(-0.5, count - 0.5))
     axis.set_yticks(range(count), names)
     axis.grid(False)
     axis.set_xlabel("time [s]", labelpad=1)

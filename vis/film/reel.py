@@ -1,4 +1,7 @@
-"""A tumble as a sequence of frames to be pictured: of a bed of grains from its frames, of a law from its trajectory."""
+"""A run as a sequence of frames to be pictured: of a bed of grains from its frames, of a law from its trajectory.
+
+`Reel` is one in the plane, `SpaceReel` one in space.
+"""
 
 from __future__ import annotations
 
@@ -8,44 +11,164 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vis.page.plots import Array
+from vis.page.report import Result
 from vis.page.tumble_series import read_columns
 from vis.pictures.canvas import colour_values, moved_since, nice_above
-from vis.pictures.frames import Frame, Frames, frame_names, read_frames
+from vis.pictures.frames import Frame, Frames, frame_names, grains_box, read_frames
 from vis.pictures.meshes import in_place, spike_mesh
 
-__all__ = ["NAME", "Reel"]
+__all__ = ["NAME", "AnyReel", "Reel", "SpaceReel"]
 
-Array = NDArray[np.float64]
 NAME = "tumble"
-"""Of the frames in a run folder of a tumble on grains."""
+"""Of the frames in a run folder."""
 _SPIKE, _CLEAR, _WIDE = 0.012, 0.04, 0.06
 """Of the platform on a law, which sees points only: diameter and length of a spike, width of the hull as they are
 drawn, all of spikes that end 0.2 m from the centre [m]."""
-_BLOCK = 0.08
-"""Depth of the ground that is drawn where there are no grains [m]."""
+_BLOCK, _THIN = 0.08, 0.06
+"""Depth of the ground that is drawn where there are no grains [m], in the plane and in space."""
 
 
-@dataclass(frozen=True)
-class Reel:
-    """A run to be pictured.
+class _Filmed:
+    """What runs in the plane and in space share.
 
     Attributes:
         folder: The run folder.
         result: Its result.json.
         series: The columns of trajectory.csv.
-        states: Its states, a word a row.
+        states: Its states, a word a row; none in a folder of an older hedgebed.
         times: When there is a picture [s], increasing.
-        frames: Its frames; None: the ground is a law.
-        like: What `spikes` is where the folder does not say, as on a law: of the run that it stands beside.
+        frames: Its frames; None: the ground is a law that has none.
     """
 
     folder: Path
-    result: Mapping[str, Any]
+    result: Result
+    series: Mapping[str, Array]
+    states: NDArray[np.str_]
+    times: Array
+    frames: Frames | None
+    still: ClassVar[tuple[int, int]]
+    """Size of its still pictures [pixels]."""
+    film: ClassVar[tuple[int, int]]
+    bar: ClassVar[tuple[float, float, float, float]]
+    """Place of the colour bar on a sheet."""
+    least: ClassVar[float]
+    """End of the colour scale where there are no grains."""
+    failed: ClassVar[str]
+    without: ClassVar[str]
+    """What to say where OpenGL failed, and where there is none."""
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    @cached_property
+    def _first(self) -> Frame | None:
+        return self.frames[0] if self.frames is not None else None
+
+    @property
+    def on_grains(self) -> bool:
+        """Whether there are grains to be seen."""
+        return self._first is not None and len(self._first.grains["position"]) > 0
+
+    @cached_property
+    def radius(self) -> float | None:
+        """Mean radius of the grains [m]."""
+        return float(self._first.grains["radius"].mean()) if self._first is not None and self.on_grains else None
+
+    def nearest(self, time: float) -> int:
+        """The picture nearest to this time [s]."""
+        return int(np.argmin(np.abs(self.times - time)))
+
+    def row(self, index: int) -> int:
+        """The row of the series at a picture."""
+        return int(np.argmin(np.abs(self.series["t_s"] - self.times[index])))
+
+    def number(self, name: str) -> float:
+        """A number of the trial (`weight`, `spike_length` ...) in SI."""
+        return float(self.result["trial"][name]["value"])
+
+    def grains(self, found: Frame) -> dict[str, NDArray[Any]]:
+        """The grains of a frame, displaced since the torque began: that the setting down moved them is left out."""
+        return found.grains if self._first is None else moved_since(found.grains, self._first.grains)
+
+    def colour_top(self, by: str) -> float:
+        """Upper end of a scale for all pictures, in the unit of its label, by those grains that take part."""
+        if self.frames is None or not self.on_grains:
+            return self.least
+        most = 0.0
+        for index in {len(self) // 3, 2 * len(self) // 3, len(self) - 1}:
+            values = colour_values(self.grains(self.frames[index]), by)
+            taking = values[values > 0.05 * values.max()] if len(values) else values
+            most = max(most, float(np.percentile(taking, 97)) if len(taking) else 0.0)
+        return nice_above(most)
+
+
+class SpaceReel(_Filmed):
+    """A run in space to be pictured; its folder has frames, with grains or without."""
+
+    still, film, bar, least = (1600, 1000), (960, 600), (0.93, 0.3, 0.012, 0.45), 0.0
+    failed, without = "flat pictures stand in", "flat ones stand in for them"
+    frames: Frames
+
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = Path(folder)
+        self.result = json.loads((self.folder / "result.json").read_text(encoding="utf-8"))
+        self.series, self.states = read_columns(self.folder / "trajectory.csv")
+        self.frames = read_frames(self.folder, NAME)
+        self.times = np.asarray(self.frames.times)
+
+    @property
+    def called(self) -> str:
+        """Its title."""
+        return str(self.result["title"])
+
+    @cached_property
+    def centres(self) -> Array:
+        """Middle of what the hull's corners span at every picture [m], shape (n, 3)."""
+        return np.array([np.asarray(frame.bodies["hull"][0].mean(axis=0), dtype=float) for frame in self.frames])
+
+    @cached_property
+    def reach(self) -> float:
+        """Largest distance of a tip from the centre [m]."""
+        points = np.concatenate([part for part, _ in self.frames[0].bodies.values()])
+        return float(np.linalg.norm(points - self.centres[0], axis=1).max())
+
+    @cached_property
+    def box(self) -> tuple[Array, Array]:
+        """Corners of the bed, or of a block of ground under the way [m]."""
+        if self.on_grains:
+            return grains_box(self.frames[0])
+        low, high = self.centres.min(axis=0) - 4 * self.reach, self.centres.max(axis=0) + 4 * self.reach
+        low[2], high[2] = -_THIN, 0.0
+        return low, high
+
+    def line(self, index: int) -> str:
+        """Time and state, as a picture says it."""
+        state = f"    {self.states[self.row(index)]}" if len(self.states) else ""
+        return f"t = {self.times[index]:.3f} s{state}"
+
+    def frame(self, index: int) -> Frame:
+        """The frame of a picture."""
+        found = self.frames[index]
+        return replace(found, grains=self.grains(found))
+
+
+@dataclass(frozen=True)
+class Reel(_Filmed):
+    """A run in the plane to be pictured; on a law without frames.
+
+    `like` is what `spikes` is where the folder does not say, as on a law: of the run that it stands beside.
+    """
+
+    still, film, bar, least = (1920, 1080), (1280, 720), (0.925, 0.27, 0.012, 0.5), 1.0
+    failed, without = "cross-sections stand in for the pictures", "cross-sections stand in for them"
+    folder: Path
+    result: Result
     series: Mapping[str, Array]
     states: NDArray[np.str_]
     times: Array
@@ -68,32 +191,14 @@ class Reel:
         end = float(series["t_s"][-1])
         return cls(home, result, series, states, np.linspace(0.0, end, max(2, count)), None, like)
 
-    def __len__(self) -> int:
-        return len(self.times)
-
-    def nearest(self, time: float) -> int:
-        """The picture nearest to this time [s]."""
-        return int(np.argmin(np.abs(self.times - time)))
-
-    def row(self, index: int) -> int:
-        """The row of the series at a picture."""
-        return int(np.argmin(np.abs(self.series["t_s"] - self.times[index])))
-
-    def state(self, index: int) -> str:
-        """The state there."""
-        return str(self.states[self.row(index)])
-
     def line(self, index: int) -> str:
         """Time, angle, state, as a picture says it."""
-        theta = math.degrees(float(self.series["theta_rad"][self.row(index)]))
-        return f"t = {self.times[index]:.3f} s    θ = {theta:.1f}°    {self.state(index)}".replace("-", "−")
-
-    def number(self, name: str) -> float:
-        """A number of the trial (`weight`, `spike_length` ...) in SI."""
-        return float(self.result["trial"][name]["value"])
+        row = self.row(index)
+        theta = math.degrees(float(self.series["theta_rad"][row]))
+        return f"t = {self.times[index]:.3f} s    θ = {theta:.1f}°    {self.states[row]}".replace("-", "−")
 
     @property
-    def ground(self) -> str:
+    def called(self) -> str:
         """What it stands on, in words."""
         return "bed of grains" if self.frames is not None else str(self.result.get("ground", "law"))
 
@@ -103,14 +208,10 @@ class Reel:
         told = self.result.get("grains") or {}
         if "spike_diameter" in told:
             return float(told["spike_diameter"]), float(told.get("spike_clear", _CLEAR))
-        scale = self.number("spike_length") / 0.2
+        scale = self.reach / 0.2
         return self.like if self.like is not None else (_SPIKE * scale, _CLEAR * scale)
 
     # Where things are -------------------------------------------------------------------------------------------------
-
-    @cached_property
-    def _first(self) -> Frame | None:
-        return self.frames[0] if self.frames is not None else None
 
     @cached_property
     def origin(self) -> Array:
@@ -139,13 +240,12 @@ class Reel:
         if self._first is None:
             x = self.series["x_m"]
             return np.array([x.min() - 1.0, 0.0, -_BLOCK]), np.array([x.max() + 1.0, 0.5 * _WIDE, 0.0])
-        position, radius = self._first.grains["position"], self._first.grains["radius"][:, None]
-        return (position - radius).min(axis=0), (position + radius).max(axis=0)
+        return grains_box(self._first)
 
-    @cached_property
-    def radius(self) -> float | None:
-        """Mean radius of the grains [m]."""
-        return float(self._first.grains["radius"].mean()) if self._first is not None else None
+    @property
+    def reach(self) -> float:
+        """Length of its spikes from the centre [m]."""
+        return self.number("spike_length")
 
     def centres(self) -> Array:
         """(x, z) of the platform's centre at every picture [m], shape (n, 2)."""
@@ -154,14 +254,23 @@ class Reel:
 
     def feet(self) -> Array:
         """x of the lowest tip at every picture [m], shape (n,): of two nearly as low the leading one."""
-        rows = [self.row(index) for index in range(len(self))]
-        length, count = self.number("spike_length"), int(self.result.get("spike_count", 8))
-        angles = self.series["theta_rad"][rows][:, None] + math.pi / count + 2 * math.pi / count * np.arange(count)
+        rows, length = [self.row(index) for index in range(len(self))], self.reach
+        angles = self._directions(self.series["theta_rad"][rows][:, None])
         x = self.series["x_m"][rows][:, None] - length * np.sin(angles)
         depth = length * np.cos(angles) - self.series["y_m"][rows][:, None]
         wanted = depth + 0.03 * (x - x.mean(axis=1, keepdims=True))
         share = np.exp((wanted - wanted.max(axis=1, keepdims=True)) / (0.005 * length))
         return (share * x).sum(axis=1) / share.sum(axis=1) + self.origin[0]
+
+    @property
+    def _count(self) -> int:
+        """Rows of spikes."""
+        return int(self.result.get("spike_count", 8))
+
+    def _directions(self, theta: Any, rows: Any = None) -> Array:
+        """Angles of the rows, of all or of some, where the platform has turned by theta [rad]."""
+        rows = np.arange(self._count) if rows is None else rows
+        return np.asarray(theta + math.pi / self._count + 2 * math.pi / self._count * rows)
 
     # What is seen -----------------------------------------------------------------------------------------------------
 
@@ -180,56 +289,46 @@ class Reel:
         grains: dict[str, NDArray[Any]] = {"position": np.zeros((0, 3)), "radius": np.zeros(0)}
         return Frame(float(self.times[index]), grains, bodies, {}, {"row_forces": self._loads(row, x, y, theta)})
 
-    def grains(self, found: Frame) -> dict[str, NDArray[Any]]:
-        """The grains of a frame, displaced since the torque began: that the setting down moved them is left out."""
-        return found.grains if self._first is None else moved_since(found.grains, self._first.grains)
-
     @cached_property
     def _meshes(self) -> dict[str, tuple[Array, NDArray[np.int64]]]:
         """Spikes and hull in body axes."""
-        length, count = self.number("spike_length"), int(self.result.get("spike_count", 8))
-        thick, clear = self.spikes
+        length, (thick, clear) = self.reach, self.spikes
         points, faces = spike_mesh("sphere", diameter=thick, length=clear + 0.5 * thick, segments=24)
         parts, triangles = [], []
-        for row in range(count):
-            gamma = math.pi / count + 2 * math.pi / count * row
+        for row, gamma in enumerate(self._directions(0.0).tolist()):
             tip = np.array([-length * math.sin(gamma), 0.0, -length * math.cos(gamma)])
             parts.append(in_place(points, tip, (math.cos(0.5 * gamma), 0.0, math.sin(0.5 * gamma), 0.0)))
             triangles.append(faces + row * len(points))
-        return {"spikes": (np.concatenate(parts), np.concatenate(triangles)), "hull": self._hull(length - clear, count)}
+        return {"spikes": (np.concatenate(parts), np.concatenate(triangles)), "hull": self._hull(length - clear)}
 
-    def _hull(self, corner: float, count: int) -> tuple[Array, NDArray[np.int64]]:
+    def _hull(self, corner: float) -> tuple[Array, NDArray[np.int64]]:
         """A prism whose corners are where the spikes begin, as wide as the bed."""
-        low, high = self.box
-        half = 0.5 * (_WIDE * self.number("spike_length") / 0.2 if self.frames is None else float(high[1] - low[1]))
-        angles = math.pi / count + 2 * math.pi / count * np.arange(count)
+        (low, high), count, angles = self.box, self._count, self._directions(0.0)
+        half = 0.5 * (_WIDE * self.reach / 0.2 if self.frames is None else float(high[1] - low[1]))
         ring = np.column_stack([-corner * np.sin(angles), np.zeros(count), -corner * np.cos(angles)])
         points = np.concatenate([ring - [0.0, half, 0.0], ring + [0.0, half, 0.0]])
         here = np.arange(count)
         after = (here + 1) % count
-        sides = np.concatenate(
-            [np.column_stack([here, after + count, after]), np.column_stack([here, here + count, after + count])]
-        )
+        sides = [(here, after + count, after), (here, here + count, after + count)]
         fan = np.column_stack([np.zeros(count - 2, dtype=int), here[1:-1], here[2:]])
-        return points, np.concatenate([sides, fan, fan[:, ::-1] + count]).astype(np.int64)
+        return points, np.concatenate([*map(np.column_stack, sides), fan, fan[:, ::-1] + count]).astype(np.int64)
 
     def _loads(self, row: int, x: float, y: float, theta: float) -> tuple[Array, dict[str, NDArray[Any]]]:
         """Points and forces of the rows that touch, of series/feet.csv or the law's; their friction shared by load."""
-        feet, motion = self._feet
-        length, count = self.number("spike_length"), int(self.result.get("spike_count", 8))
+        (feet, motion), length = self._feet, self.reach
         if not motion:
             return np.zeros((0, 3)), {"force": np.zeros((0, 3))}
         if feet:
             at = int(np.argmin(np.abs(feet["t_s"] - self.series["t_s"][row])))
-            load = np.array([feet[f"normal_{n}_N"][at] for n in range(count)])
+            load = np.array([feet[f"normal_{n}_N"][at] for n in range(self._count)])
         else:  # K delta + C max(0, rate of delta), docs/planar.md
-            every = theta + math.pi / count + 2 * math.pi / count * np.arange(count)
+            every = self._directions(theta)
             depth = length * np.cos(every) - y
             rate = -self.series["vy_m_s"][row] - length * np.sin(every) * self.series["omega_rad_s"][row]
             spring = self.number("stiffness") * depth + self.number("damping") * np.maximum(rate, 0.0)
             load = np.where(depth > 0, spring, 0.0)
         rows = np.flatnonzero(load > 0)
-        gamma = theta + math.pi / count + 2 * math.pi / count * rows
+        gamma = self._directions(theta, rows)
         points = np.column_stack([x - length * np.sin(gamma), np.zeros(len(rows)), y - length * np.cos(gamma)])
         push = self.number("mass") * float(motion["ax_m_s2"][row])
         share = load[rows] / max(load[rows].sum(), 1e-300)
@@ -237,20 +336,12 @@ class Reel:
 
     @cached_property
     def _feet(self) -> tuple[dict[str, Array], dict[str, Array]]:
-        path = self.folder / "series" / "feet.csv"
-        motion = self.folder / "series" / "motion.csv"
+        path, motion = (self.folder / "series" / f"{name}.csv" for name in ("feet", "motion"))
         feet = read_columns(path)[0] if path.exists() else {}
         known = bool(feet) or self.result.get("ground") == "spring-damper"
         if not known or not motion.exists() or self.result.get("effects"):
             return {}, {}
         return feet, read_columns(motion)[0]
 
-    def colour_top(self, by: str) -> float:
-        """Upper end of a scale for all pictures, in the unit of its label, by those grains that take part."""
-        most = 0.0
-        if self.frames is not None:
-            for index in {len(self) // 3, 2 * len(self) // 3, len(self) - 1}:
-                values = colour_values(self.grains(self.frames[index]), by)
-                taking = values[values > 0.05 * values.max()] if len(values) else values
-                most = max(most, float(np.percentile(taking, 97)) if len(taking) else 0.0)
-        return nice_above(most)
+
+AnyReel = Reel | SpaceReel

@@ -1,0 +1,162 @@
+"""The cameras that follow a platform: in the plane the whole of it and its feet from near, in space the whole of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from vis.film.reel import AnyReel, Reel, SpaceReel
+from vis.page.plots import Array
+from vis.page.style import INK
+from vis.pictures.arrows import HALO
+from vis.pictures.frames import Frame
+from vis.pictures.stage import Eye, FlatStage, Stage
+
+__all__ = ["Camera", "Panel", "layout"]
+
+Focus = tuple[float, float]
+"""x and z of the middle of a picture [m]."""
+_STEADY = 0.03
+"""Over which a camera's way is smoothed (standard deviation), over the run's duration."""
+
+
+class Camera(Protocol):
+    """Sees one run.
+
+    Attributes:
+        arrow: Length of the arrow of the whole weight, over the picture's height; 0: forces are not shown.
+    """
+
+    arrow: float
+
+    def set_up(
+        self, reel: Any, pixels: tuple[int, int], reach: float, *, opengl: bool
+    ) -> tuple[Stage | FlatStage, Array]:
+        """The stage for pictures of this size that show a platform of this reach [m], and the focus at every picture
+        [m], shape (n, 2)."""
+
+    def dress(self, axis: Any, reel: Any, stage: Stage | FlatStage, frame: Frame, focus: Focus) -> None:
+        """Draw what lies over the ground and the platform."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One picture on a sheet."""
+
+    run: int
+    camera: Camera
+    place: tuple[float, float, float, float]
+    """Left, foot, width, height in fractions of the sheet."""
+
+
+class _Plane:
+    """In front of the plane of the spikes: a level line, a ruler.
+
+    Least `width` and height `tall` of its picture are over the spikes' length.
+    """
+
+    width, tall, arrow = 3.1, 2.75, 0.0
+
+    def set_up(
+        self, reel: Reel, pixels: tuple[int, int], reach: float, *, opengl: bool
+    ) -> tuple[Stage | FlatStage, Array]:
+        width = max(self.width, self.tall * pixels[0] / pixels[1])
+        (low, high), kind = reel.box, Stage if opengl else FlatStage
+        stage = kind(pixels, width=width * reach, cut=reel.cut, low=low, high=high, radius=reel.radius)
+        return stage, _steady(self.way(reel, stage, reach))
+
+    def way(self, reel: Reel, stage: Eye, reach: float) -> Array:
+        centres = reel.centres()
+        risen = np.maximum(0.0, centres[:, 1] - centres[0, 1] - 0.2 * reach)
+        return np.column_stack([centres[:, 0], centres[0, 1] - 0.06 * stage.height + risen])
+
+    def dress(self, axis: Any, reel: Reel, stage: Stage | FlatStage, frame: Frame, focus: Focus) -> None:
+        for spine in axis.spines.values():
+            spine.set(visible=True, color="#bbbbbb")
+        level = stage.place(np.array([[focus[0], reel.cut, reel.surface]]), focus)[0, 1]
+        axis.plot([0.0, 1.0], [level, level], color=INK, lw=0.8, ls=(0, (5, 4)))
+        step, right = _round_length(0.2 * stage.width), 0.97
+        axis.plot([right - step / stage.width, right], [0.035, 0.035], color=INK, lw=2.5, solid_capstyle="butt")
+        middle = right - 0.5 * step / stage.width
+        axis.text(middle, 0.05, f"{1e3 * step:g} mm", ha="center", va="bottom", fontsize=10, bbox=HALO)
+        self.mark(axis, stage, frame, focus, level)
+
+    def mark(self, axis: Any, stage: Eye, frame: Frame, focus: Focus, level: float) -> None:
+        """A line from the centre to where row 0 begins: it shows how far the platform has turned, and says so."""
+        hull = frame.bodies["hull"][0]
+        ring = hull[: len(hull) // 2]  # its face in front
+        ends = stage.place(np.array([ring.mean(axis=0), ring[0]]), focus)
+        axis.plot(ends[:, 0], ends[:, 1], color=INK, lw=1.6, solid_capstyle="round")
+        axis.plot(ends[:1, 0], ends[:1, 1], "o", color=INK, ms=4)
+        axis.plot([0.02, 0.06], [0.96, 0.96], color=INK, lw=1.6)
+        axis.plot([0.02], [0.96], "o", color=INK, ms=4)
+        axis.text(0.075, 0.96, "from the centre to row 0", fontsize=9, va="center", color=INK, bbox=HALO)
+
+
+class _Near(_Plane):
+    """The same from near, on the feet, with the forces on them."""
+
+    width, tall, arrow = 0.75, 0.0, 0.28
+
+    def way(self, reel: Reel, stage: Eye, reach: float) -> Array:
+        x = reel.feet()
+        return np.column_stack([x, np.full(len(x), reel.surface + 0.06 * stage.height)])
+
+    def mark(self, axis: Any, stage: Eye, frame: Frame, focus: Focus, level: float) -> None:
+        axis.text(0.012, level + 0.012, "undisturbed surface", fontsize=9, va="bottom", bbox=HALO)
+
+
+class _Space:
+    """From above and aside; least width and height of the picture over the largest distance of a tip from the centre.
+
+    The plane that a rendered picture looks at is the front of the bed: no grain is left out.
+    """
+
+    width, tall, arrow, pitch = 4.4, 2.6, 0.22, 0.5
+
+    def set_up(
+        self, reel: SpaceReel, pixels: tuple[int, int], reach: float, *, opengl: bool
+    ) -> tuple[Stage | FlatStage, Array]:
+        width = max(self.width, self.tall * pixels[0] / pixels[1]) * reach
+        (low, high), centres = reel.box, reel.centres
+        stage: Stage | FlatStage
+        if opengl:
+            cut = float(low[1])
+            stage = Stage(pixels, width=width, cut=cut, low=low, high=high, radius=reel.radius, pitch=self.pitch)
+            stage.reach = 0.5 * width + 2.0 * float(np.linalg.norm(high - low))
+        else:
+            cut = float(centres[:, 1].mean())
+            stage = FlatStage(pixels, width=width, cut=cut, low=low, high=high, radius=reel.radius)
+        level = centres[:, 2] + (centres[:, 1] - cut) * np.tan(stage.pitch)
+        return stage, _steady(np.column_stack([centres[:, 0], level - 0.12 * stage.height]))
+
+    def dress(self, axis: Any, reel: SpaceReel, stage: Stage | FlatStage, frame: Frame, focus: Focus) -> None:
+        """Nothing."""
+
+
+def layout(reels: Sequence[AnyReel]) -> list[Panel]:
+    """The pictures of one run or two: in space one each; in the plane the whole beside the feet, or above them."""
+    if isinstance(reels[0], SpaceReel):
+        if len(reels) == 1:
+            return [Panel(0, _Space(), (0.015, 0.17, 0.895, 0.715))]
+        return [Panel(run, _Space(), (left, 0.18, 0.445, 0.70)) for run, left in enumerate((0.015, 0.47))]
+    if len(reels) == 1:
+        return [Panel(0, _Plane(), (0.02, 0.17, 0.40, 0.70)), Panel(0, _Near(), (0.435, 0.17, 0.465, 0.70))]
+    panels = []
+    for run in range(2):
+        x, wide = 0.02 + run * (0.44 + 0.01), 0.44
+        panels += [Panel(run, _Plane(), (x, 0.53, wide, 0.36)), Panel(run, _Near(), (x, 0.17, wide, 0.35))]
+    return panels
+
+
+def _steady(way: Array) -> Array:
+    return gaussian_filter1d(way, _STEADY * len(way), axis=0, mode="nearest") if len(way) > 3 else way
+
+
+def _round_length(length: float) -> float:
+    power = 10.0 ** np.floor(np.log10(length))
+    return float(max(n * power for n in (1.0, 2.0, 5.0) if n * power <= 1.0001 * length))

@@ -1,0 +1,419 @@
+"""Words, numbers and tables of the report: names of quantities, units, how a value is quoted, and its parts."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import MISSING, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vis.page.folder import PYTHON_RUNS, Run, RunFolder, Setting
+from vis.page.numbers import column, plain, quantity, quote, short
+
+__all__ = [
+    "Departure", "NBSP", "SHARES", "Table", "bed_part", "cell_text", "departure_rows", "departures_part",
+    "facts_table", "fit_error", "fit_part", "fitted", "joined", "label_of", "list_of", "mapping_of", "more_or_less",
+    "numbers_table", "percent", "plain_value", "reference_part", "reproduce_part", "run_words", "runs_table",
+    "sentence", "setting_of", "settings_table", "signed_percent", "std_of", "value_of",
+]  # fmt: skip
+
+NBSP = "\N{NO-BREAK SPACE}"
+_NAMES = {
+    "stiffness": "stiffness K",
+    "damping": "damping C",
+    "stiffness_error": "stiffness K, standard error of the fit",
+    "damping_error": "damping C, standard error of the fit",
+    "sinkage_dem": "sinkage at rest, bed",
+    "sinkage_spring_damper": "sinkage at rest, spring-damper",
+    "drag_gap": "drag gap, spring-damper against bed",
+    "work_returned_dem": "work given back, bed",
+    "work_returned_amended": "work given back, model's law",
+    "sinkage_amended": "sinkage, model's law",
+    "force_gap_spring_damper": "off over whole driven runs, spring-damper",
+    "force_gap_amended": "off over whole driven runs, model's law",
+    "work_returned_spring_damper": "work given back, spring-damper",
+    "load": "load set down",
+    "drop_mass": "mass dropped",
+    "stiffness_standing": "stiffness for a foot that stands (load over sinkage)",
+    "surface_force": "force at depth 0, driven",
+    "surface_roughness": "how far grains stick out under the tip",
+    "grain_count": "grains",
+    "packing_fraction": "packing fraction",
+    "coordination_number": "contacts per grain",
+    "surface": "height of the surface above the floor",
+    "young": "Young's modulus of the softened grains",
+    "time_step": "time step",
+    "max_overlap": "largest overlap of two grains",
+    "size": "size (x, y, depth)",
+    "grain": "mean diameter of a grain",
+    "grain_diameter": "mean diameter of a grain",
+    "spread": "spread of the diameters",
+    "gravity": "gravity of the grains",
+    "seeds": "seeds",
+    "material": "material",
+    "pressure": "pressure expected under the tip",
+    "speed": "speed expected",
+    "real": "Young's modulus of the real grain",
+    "factor": "softer than the real grain by a factor of",
+    "overlap": "overlap expected",
+}
+_UNITS = {
+    "size": "m", "grain": "m", "grain_diameter": "m", "surface": "m", "gravity": "m/s2", "young": "Pa", "real": "Pa",
+    "pressure": "Pa", "time_step": "s",
+    "diameter": "m", "shaft_diameter": "m", "length": "m", "mass": "kg", "load": "N", "speed": "m/s",
+    "cone_angle": "degrees",
+}  # fmt: skip
+SHARES = {
+    "drag_gap", "model_drag_gap", "work_returned_dem", "work_returned_spring_damper", "work_returned_amended",
+    "force_gap_spring_damper", "force_gap_amended", "max_overlap", "overlap",
+    "overlap_quasi_static", "overlap_impact", "spread",
+}  # fmt: skip
+
+
+def fitted(quantities: Mapping[str, Any], key: str) -> str:
+    """K or C with its spread between beds, or for one bed with the standard error of the fit."""
+    entry = mapping_of(quantities.get(key))
+    error = value_of(quantities, f"{key}_error")
+    if entry.get("std") is None and error is not None:
+        entry = {**entry, "std": error}
+    return quantity(entry) if entry else "unknown"
+
+
+@dataclass(frozen=True)
+class Departure:
+    """One row of the table of departures: mean forces of bed and law in a band of depth at one speed."""
+
+    speed: float
+    """[m/s]."""
+    depth_from: float
+    """[m]."""
+    depth_to: float
+    """[m]."""
+    bed_force: float
+    """[N], mean over the beds."""
+    model_force: float
+    """[N]."""
+    beds: float | None = None
+    """How many; None where it was not told."""
+    bed_std: float | None = None
+    """Standard deviation of the bed's force between beds [N]; None where unknown."""
+
+    @property
+    def difference(self) -> float:
+        """Law minus bed [N]."""
+        return self.model_force - self.bed_force
+
+    @property
+    def share(self) -> float | None:
+        """The difference as a share of the bed's [1]; None where the bed does not push."""
+        return self.difference / self.bed_force if self.bed_force > 0 else None
+
+    @property
+    def known(self) -> str:
+        """How well: ``one bed``, ``3 beds``; empty where it was not told."""
+        return "" if self.beds is None else "one bed" if self.beds == 1 else f"{self.beds:.0f} beds"
+
+
+def departure_rows(result: Mapping[str, Any]) -> list[Departure]:
+    """The rows of the table of departures; one that lacks a number is left out."""
+    rows = []
+    for entry in list_of(mapping_of(result.get("departures")).get("table")):
+        told = {field.name: plain_value(mapping_of(entry).get(field.name)) for field in fields(Departure)}
+        if all(told[field.name] is not None for field in fields(Departure) if field.default is MISSING):
+            rows.append(Departure(**told))  # type: ignore[arg-type]
+    return rows
+
+
+def run_words(run: Run, *, which_bed: bool = True) -> str:
+    """What a run did, in words."""
+    words = {"driven": "driven", "drop": "dropped", "set_down": "set down"}.get(run.kind, run.id)
+    speed = f" at {run.speed:g}{NBSP}m/s" if run.speed and run.kind != "set_down" else ""
+    return f"{words}{speed}" + (f", bed {run.seed}" if run.seed is not None and which_bed else "")
+
+
+def cell_text(key: str, value: Any) -> str:
+    """A value of result.json as a person reads it; units of bare numbers are known by their name."""
+    if isinstance(value, Mapping) and "value" in value:
+        return quantity(value, unit="%" if key in SHARES else None)
+    if isinstance(value, Mapping):
+        return ", ".join(f"{label_of(str(k))} {cell_text(str(k), v)}" for k, v in value.items())
+    if isinstance(value, list | tuple):
+        if key == "size" and all(isinstance(item, int | float) for item in value):
+            return " × ".join(short(1e3 * item) for item in value) + f"{NBSP}mm"
+        return ", ".join(cell_text(key, item) for item in value)
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int | float):
+        return quote(value, 0.0, "%" if key in SHARES else _UNITS.get(key, "1"))
+    return "unknown" if value is None else str(value)
+
+
+def label_of(key: str) -> str:
+    """The name of a key, as a person reads it."""
+    return _NAMES.get(key, key.replace("_", " "))
+
+
+def mapping_of(value: Any) -> Mapping[str, Any]:
+    """`value` where it is a mapping, else an empty one."""
+    return value if isinstance(value, Mapping) else {}
+
+
+def list_of(value: Any) -> list[Any]:
+    """`value` where it is a list, else an empty one."""
+    return value if isinstance(value, list) else []
+
+
+def plain_value(value: Any) -> float | None:
+    """`value` where it is a finite number, else None."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+        return None
+    return float(value)
+
+
+def value_of(quantities: Any, key: str) -> float | None:
+    """The value of a quantity; None where there is none that is a number."""
+    entry = mapping_of(quantities).get(key)
+    return plain_value(entry.get("value") if isinstance(entry, Mapping) else entry)
+
+
+def std_of(quantities: Any, key: str) -> float | None:
+    """The standard deviation of a quantity; None where it is unknown."""
+    return plain_value(mapping_of(mapping_of(quantities).get(key)).get("std"))
+
+
+def fit_error(fit: Mapping[str, Any], key: str) -> float | None:
+    """Standard error of a bed's own fit; None where unknown."""
+    entry = fit.get(key)
+    return plain_value(
+        entry.get("std") if isinstance(entry, Mapping) else fit.get(f"{key}_error", fit.get(f"{key}_std"))
+    )
+
+
+def setting_of(run: RunFolder, key: str) -> str:
+    """A setting of the run at the top of run.toml, as text; empty where there is none."""
+    return next((s.value.strip('"') for s in run.settings if s.key == key and not s.table), "")
+
+
+def percent(share: float) -> str:
+    """A share in per cent."""
+    return f"{plain(100.0 * share, 2)}{NBSP}%"
+
+
+def signed_percent(share: float) -> str:
+    """A share in per cent, with its sign."""
+    return ("+" if share > 0 else "") + percent(share)
+
+
+def more_or_less(share: float, above: str, below: str) -> str:
+    """A share in per cent without its sign, and the word that its sign stands for."""
+    return f"{percent(abs(share))} {above if share > 0 else below}"
+
+
+def joined(words: list[str]) -> str:
+    """ "a, b and c"."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}" if words else ""
+
+
+def sentence(text: str) -> str:
+    """`text` with a capital at its start and a full stop at its end."""
+    text = text.strip()
+    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".") if text else ""
+
+
+#: {"head": [...], "rows": [[...], ...]}; the first column is text, the others are numbers unless "text" is set.
+Table = dict[str, Any]
+_BARE_UNITS = {"1", "m", "m/s", "m/s2", "s", "kg", "N", "N/m", "N s/m", "Pa", "degrees"}
+
+
+# ---- tables --------------------------------------------------------------------------------------------------------
+
+
+def fit_part(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> dict[str, Any] | None:
+    """What was fitted: a table of the pooled and the beds' own fits, and a note."""
+    if value_of(quantities, "stiffness") is None and not result.get("fits"):
+        return None
+    own = [mapping_of(fit) for fit in list_of(result.get("fits"))]
+    one = len(own) < 2
+    rows = [
+        [
+            "this bed" if one else "all beds together",
+            fitted(quantities, "stiffness"),
+            fitted(quantities, "damping"),
+            quantity(quantities.get("drag_gap"), unit="%"),
+        ]
+    ]
+    if one:
+        said = "± is the standard error of the fit, leaving out one run at a time; how much K and C differ from bed to "
+        said += "bed is not known."
+        known = value_of(quantities, "stiffness_error") is not None
+        return {"table": {"head": ["fitted to", "K", "C", "drag gap"], "rows": rows}, "note": said if known else ""}
+    for i, fit in enumerate(own):
+        rows.append(
+            [
+                f"bed {fit.get('seed', i + 1)} by itself",
+                quote(value_of(fit, "stiffness"), fit_error(fit, "stiffness"), "N/m"),
+                quote(value_of(fit, "damping"), fit_error(fit, "damping"), "N s/m"),
+                quote(value_of(fit, "drag_gap"), None, "%") if "drag_gap" in fit else "\N{EN DASH}",
+            ]
+        )
+    errors = [
+        f"{name} {quantity(quantities[key])}"
+        for name, key in (("K", "stiffness_error"), ("C", "damping_error"))
+        if value_of(quantities, key) is not None
+    ]
+    said_of: list[str] = []
+    if errors:
+        said_of.append(f"Standard error of the fit to all beds, leaving out one run at a time: {joined(errors)}.")
+    if any(fit_error(fit, key) is not None for fit in own for key in ("stiffness", "damping")):
+        said_of.append(
+            "± is the spread between beds in the first row, the standard error of that bed's fit in the others."
+        )
+    note = " ".join(said_of)
+    return {"table": {"head": ["fitted to", "K", "C", "drag gap"], "rows": rows}, "note": note}
+
+
+def departures_part(result: Mapping[str, Any]) -> dict[str, Any]:
+    """Where bed and spring-damper depart: sentences and a table."""
+    departures = mapping_of(result.get("departures"))
+    entries, dash = departure_rows(result), "\N{EN DASH}"
+    told = any(row.beds is not None for row in entries)
+    unit, forces = column([force for row in entries for force in (row.bed_force, row.bed_std, row.model_force)], "N")
+    rows = [
+        [
+            f"{row.speed:g}",
+            f"{short(1e3 * row.depth_from)} to {short(1e3 * row.depth_to)}",
+            *([f"{row.beds:.0f}" if row.beds is not None else dash] if told else []),
+            bed,
+            *([apart] if told else []),
+            model,
+            dash if row.share is None else signed_percent(row.share),
+        ]
+        for row, bed, apart, model in zip(entries, forces[::3], forces[1::3], forces[2::3], strict=True)
+    ]
+    answered = {sentence(str(departures.get(name, ""))) for name in ("which_stiffness", "surface", "set_down")}
+    said = [sentence(str(text)) for text in list_of(departures.get("sentences"))]
+    head = ["speed [m/s]", "depth [mm]", f"bed [{unit}]", f"spring-damper [{unit}]", "gap"]
+    if told:
+        head[2:3] = ["beds", f"bed, mean [{unit}]", f"std between beds [{unit}]"]
+    return {
+        "sentences": [text for text in said if text not in answered],
+        "table": {"head": head, "rows": rows} if rows else None,
+    }
+
+
+def reference_part(result: Mapping[str, Any]) -> dict[str, Any] | None:
+    """By how much the numbers moved from those of another result, where it was compared with one."""
+    reference = mapping_of(result.get("reference"))
+    rows = []
+    for key, entry in mapping_of(reference.get("moved")).items():
+        moved = mapping_of(entry)
+        unit = "%" if key in SHARES else str(moved.get("unit") or "1")
+        change = plain_value(moved.get("change"))
+        rows.append(
+            [
+                label_of(key),
+                quote(plain_value(moved.get("before")), plain_value(moved.get("before_std")), unit),
+                quote(plain_value(moved.get("now")), plain_value(moved.get("now_std")), unit),
+                signed_percent(change) if change is not None else "\N{EN DASH}",
+            ]
+        )
+    if not rows:
+        return None
+    return {"file": str(reference.get("file") or ""), "table": {"head": ["", "there", "here", "change"], "rows": rows}}
+
+
+def bed_part(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> dict[str, Any]:
+    """What is known of the bed, and a table of the beds of several seeds."""
+    bed = mapping_of(result.get("bed"))
+    listed = [mapping_of(entry) for entry in list_of(bed.get("seeds")) if isinstance(entry, Mapping)]
+    own = {key: value for key, value in bed.items() if not (key == "seeds" and listed) and key != "softening"}
+    for key in (
+        "grain_count",
+        "packing_fraction",
+        "coordination_number",
+        "surface",
+        "young",
+        "time_step",
+        "max_overlap",
+    ):
+        if key in quantities:
+            own[key] = quantities[key]
+    seeds = None
+    if len(listed) > 1:
+        keys = [key for key in listed[0] if key != "seed"]
+        rows = [[str(e.get("seed", "?")), *(cell_text(key, e.get(key)) for key in keys)] for e in listed]
+        seeds = {"head": ["seed", *(label_of(key) for key in keys)], "rows": rows}
+    softening = facts_table(mapping_of(bed.get("softening")))
+    return {"facts": facts_table(own), "seeds": seeds, "softening": softening}
+
+
+def runs_table(run: RunFolder) -> Table | None:
+    """The runs, one a row."""
+    columns = [
+        ("depth", "max_depth", "m"),
+        ("at rest", "sinkage", "m"),
+        ("peak force", "peak_force", "N"),
+        ("work in", "work_in", "J"),
+        ("work out", "work_out", "J"),
+        ("drag gap", "drag_gap", "%"),
+    ]
+    runs = [r for kind in ("driven", "drop", "set_down") for r in run.of_kind(kind)]
+    runs += [r for r in run.runs if r not in runs]
+    many = len({r.seed for r in runs}) > 1
+    head, cells = ["run"], [[run_words(r, which_bed=many) for r in runs]]
+    for title, key, unit in columns:
+        bed = [value_of(r.quantities, key) for r in runs]
+        model = [value_of(r.quantities, f"model_{key}") for r in runs]
+        shown, texts = column([*bed, *model], unit)  # one unit for both
+        for name, values, part in ((title, bed, texts[: len(runs)]), ("spring-damper", model, texts[len(runs) :])):
+            if any(value is not None for value in values):
+                head.append(f"{name} [{shown}]")
+                cells.append(part)
+    return {"head": head, "rows": [list(row) for row in zip(*cells, strict=True)]} if runs else None
+
+
+def numbers_table(quantities: Mapping[str, Any]) -> Table | None:
+    """Every quantity with its note."""
+    rows = [
+        [label_of(key), cell_text(key, entry), str(mapping_of(entry).get("note") or "")]
+        for key, entry in quantities.items()
+    ]
+    return {"head": ["quantity", "value", "note"], "rows": rows, "text": True} if rows else None
+
+
+def facts_table(entries: Mapping[str, Any]) -> Table | None:
+    """Names and values, without those that are not known."""
+    rows = [[label_of(key), cell_text(key, value)] for key, value in entries.items() if value is not None]
+    return {"head": [], "rows": rows, "text": True} if rows else None
+
+
+def settings_table(settings: Iterable[Setting]) -> Table | None:
+    """Every setting with what it is."""
+    rows = []
+    for setting in settings:
+        if not setting.table and setting.key in ("format", "version", "command", "created", "not_set"):
+            continue
+        units = re.findall(r"\[([^\[\]]+)\]", setting.comment)
+        meaning = re.sub(r"\s*\[[^\[\]]+\]", "", setting.comment).strip().rstrip(".")
+        if meaning in _BARE_UNITS:  # a run saved from Python: the comment is the unit
+            units, meaning = [meaning], ""
+        unit = units[-1] if units and units[-1] != "1" else ""
+        name = setting.key if setting.table in ("", "settings") else f"{setting.table}.{setting.key}"
+        rows.append([name, setting.value, unit, meaning])
+    return {"head": ["setting", "value", "unit", "meaning"], "rows": rows, "text": True} if rows else None
+
+
+def reproduce_part(run: RunFolder, experiment: str) -> dict[str, str]:
+    """How to do the run again."""
+    called = PYTHON_RUNS.get(experiment, "")
+    folder = Path(os.path.relpath(run.path)) if run.path.resolve().is_relative_to(Path.cwd()) else run.path.resolve()
+    command = f".venv/bin/hedgebed {experiment or 'penetrate'} {folder / 'run.toml'} --out runs/again"
+    return {
+        "command": "" if called else command,
+        "script": f"coupling.{called}" if called else "",
+        "version": str(run.result.get("version") or setting_of(run, "version") or "unknown"),
+    }
