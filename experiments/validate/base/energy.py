@@ -102,23 +102,91 @@ class _Dashpot:
         return self.force
 
 
+@dataclass(frozen=True)
 class _Forces:
     """The contact forces of one moment, and the power that each kind has at given velocities."""
 
-    def __init__(self, i: Array, j: Array, normals: Array, arm: Array, dashpot: Array, f_t: Array, torque: Array):
-        self.i, self.j, self.normals, self.arm = i, j, normals, arm
-        self.dashpot, self.f_t, self.torque = dashpot, f_t, torque
+    i: Array
+    j: Array
+    normals: Array
+    arm: Array
+    overlap: Array
+    dashpot: Array
+    normal: Array
+    f_t: Array
+    torque: Array
 
     def losses(self, v: Array, w: Array) -> Array:
         """What the normal dashpots, the tangential forces and the torques take [W], shape [3]."""
         speed = v[self.i] - v[self.j] - np.cross(self.arm[:, None] * (w[self.i] + w[self.j]), self.normals)
-        return -np.array(
-            [
-                self.dashpot @ (speed * self.normals).sum(axis=1),
-                (self.f_t * speed).sum(),
-                (self.torque * (w[self.i] - w[self.j])).sum(),
-            ]
-        )
+        taken = (self.dashpot @ (speed * self.normals).sum(axis=1), (self.f_t * speed).sum())
+        return -np.array([*taken, (self.torque * (w[self.i] - w[self.j])).sum()])
+
+    def total(self, weight: Array, count: int) -> Array:
+        """On each grain [N], shape [count, 3]."""
+        total = np.tile(weight, (count, 1))
+        np.add.at(total, self.i, self.normal[:, None] * self.normals + self.f_t)
+        np.add.at(total, self.j, -self.normal[:, None] * self.normals - self.f_t)
+        return total
+
+
+class _Contacts:
+    """The law of docs/bed.md between like grains, and what its springs hold."""
+
+    def __init__(self, bed: Bed, r: float, m: float, *, tensile: bool):
+        stuff = bed.material
+        self.r, self.radius, self.mass = r, r / 2, m / 2
+        self.star, self.shear = effective_moduli(stuff.young, stuff.poisson, stuff.young, stuff.poisson)
+        self.factor = damping_factor(stuff.restitution, tensile=tensile)
+        self.mu, self.mu_r = stuff.friction, stuff.rolling_friction
+        self.period = np.array(bed.size[:2])
+        self.i, self.j = np.triu_indices(bed.grain_count, 1)
+        self.slide, self.roll, self.twist = (_Springs(len(self.i)) for _ in range(3))
+        self.dashpot = _Dashpot(len(self.i), self.mass, tensile=tensile)
+
+    def load(self, x: Array, v: Array, w: Array, took: float) -> _Forces:
+        """A step of ``took`` [s] on: the forces at places ``x``, the velocities those of half a step before."""
+        i, j, mu, factor = self.i, self.j, self.mu, self.factor
+        d = x[i] - x[j]
+        d[:, :2] -= self.period * np.round(d[:, :2] / self.period)
+        length = np.linalg.norm(d, axis=1)
+        overlap, normals = np.maximum(0.0, 2 * self.r - length), d / length[:, None]
+        touching = overlap > 0
+        arm, a = self.r - overlap / 2, np.sqrt(self.radius * overlap)
+        s_n, k_t = 2 * self.star * a, 8 * self.shear * a
+        root = np.sqrt(self.mass * s_n)
+        path = v[i] - v[j]
+        v_n = (path * normals).sum(axis=1)
+        elastic = 2 / 3 * s_n * overlap
+        f_n = self.dashpot.load(elastic, factor * root, v_n, overlap, took)
+        f_t, torque = np.zeros_like(normals), np.zeros_like(normals)
+        # Half a step ago, where the velocities are, the normal was this and the arm longer by what it has lost since.
+        middle = normals - 0.5 * took * (path - v_n[:, None] * normals) / length[:, None]
+        if mu > 0:
+            back = arm - 0.25 * took * v_n
+            v_t = path - v_n[:, None] * middle - np.cross(back[:, None] * (w[i] + w[j]), normals)
+            v_t = np.where(touching[:, None], v_t, 0.0)
+            damping = factor * math.sqrt(4 * self.shear / self.star) * root
+            f_t = self.slide.load(k_t, damping, v_t, mu * np.abs(f_n), took, _in_plane(normals))
+        if self.mu_r > 0:
+            spin = np.where(touching[:, None], w[i] - w[j], 0.0)
+            along = (spin * normals).sum(axis=1)[:, None] * normals
+            share = 2 * TURNING_DAMPING_RATIO * math.sqrt(0.4 * self.mass) * self.radius
+            k_r, k_w = k_t * self.radius**2, 0.5 * k_t * a * a
+            # One angle is kept for both, so that what the normal turns into changes hands.
+            angle = self.roll.stretch + self.twist.stretch
+            self.twist.stretch = (angle * normals).sum(axis=1)[:, None] * normals
+            self.roll.stretch = angle - self.twist.stretch
+            bound = self.mu_r * self.radius * np.abs(f_n)
+            torque = self.roll.load(k_r, share * np.sqrt(k_r), spin - along, bound, took, _as_it_is)
+            bound = 3 * math.pi / 16 * mu * a * np.abs(f_n)
+            torque += self.twist.load(k_w, share * np.sqrt(k_w), along, bound, took, _as_it_is)
+        return _Forces(i, j, normals, arm, overlap, f_n - elastic, f_n, f_t, torque)
+
+    def stored(self, overlap: Array) -> tuple[float, float, float]:
+        """In normal, tangential and turning springs [J]."""
+        normal = 0.4 * float((4 / 3 * self.star * math.sqrt(self.radius) * overlap**2.5).sum())
+        return normal, self.slide.stored, self.roll.stored + self.twist.stored
 
 
 def keep_book(bed: Bed, steps: int, *, every: int = 20, tensile: bool = False) -> Book:
@@ -127,17 +195,10 @@ def keep_book(bed: Bed, steps: int, *, every: int = 20, tensile: bool = False) -
     The law is that of docs/bed.md without cohesion, cut at zero unless ``tensile``. Grains must start apart, and under
     gravity reach no boundary.
     """
-    stuff, dt, count = bed.material, bed.time_step, bed.grain_count
-    start = bed.grains()
+    dt, start = bed.time_step, bed.grains()
     r, m = float(start.radius[0]), float(start.mass[0])
-    inertia, radius, mass = 0.4 * m * r * r, r / 2, m / 2
-    star, shear = effective_moduli(stuff.young, stuff.poisson, stuff.young, stuff.poisson)
-    factor = damping_factor(stuff.restitution, tensile=tensile)
-    mu, mu_r = stuff.friction, stuff.rolling_friction
-    weight = m * np.array(bed.gravity)
-    i, j = np.triu_indices(count, 1)
-    slide, roll, twist = (_Springs(len(i)) for _ in range(3))
-    dashpot = _Dashpot(len(i), mass, tensile=tensile)
+    contacts = _Contacts(bed, r, m, tensile=tensile)
+    inertia, weight = 0.4 * m * r * r, m * np.array(bed.gravity)
     lost, half_w = np.zeros(3), start.spin
     before: tuple[_Forces, Array, Array] | None = None
     worst = largest = 0.0
@@ -152,54 +213,15 @@ def keep_book(bed: Bed, steps: int, *, every: int = 20, tensile: bool = False) -
         if before is not None:
             forces, old_v, old_w = before
             lost += dt * forces.losses(0.5 * (old_v + v), 0.5 * (old_w + w))
-        x = g.position
-        d = x[i] - x[j]
-        d[:, :2] -= np.array(bed.size[:2]) * np.round(d[:, :2] / np.array(bed.size[:2]))
-        length = np.linalg.norm(d, axis=1)
-        overlap, normals = np.maximum(0.0, 2 * r - length), d / length[:, None]
-        touching = overlap > 0
-        arm, a = r - overlap / 2, np.sqrt(radius * overlap)
-        s_n, k_t = 2 * star * a, 8 * shear * a
-        root = np.sqrt(mass * s_n)
-        path = v[i] - v[j]
-        v_n = (path * normals).sum(axis=1)
-        elastic = 2 / 3 * s_n * overlap
-        took = dt if step else 0.0
-        f_n = dashpot.load(elastic, factor * root, v_n, overlap, took)
-        f_t, torque = np.zeros_like(normals), np.zeros_like(normals)
-        # Half a step ago, where the velocities are, the normal was this and the arm longer by what it has lost since.
-        middle = normals - 0.5 * took * (path - v_n[:, None] * normals) / length[:, None]
-        flat = _in_plane(normals)
-        if mu > 0:
-            back = arm - 0.25 * took * v_n
-            v_t = path - v_n[:, None] * middle - np.cross(back[:, None] * (w[i] + w[j]), normals)
-            v_t = np.where(touching[:, None], v_t, 0.0)
-            f_t = slide.load(k_t, factor * math.sqrt(4 * shear / star) * root, v_t, mu * np.abs(f_n), took, flat)
-        if mu_r > 0:
-            spin = np.where(touching[:, None], w[i] - w[j], 0.0)
-            along = (spin * normals).sum(axis=1)[:, None] * normals
-            share = 2 * TURNING_DAMPING_RATIO * math.sqrt(0.4 * mass) * radius
-            k_r, k_w = k_t * radius**2, 0.5 * k_t * a * a
-            # One angle is kept for both, so that what the normal turns into changes hands.
-            angle = roll.stretch + twist.stretch
-            twist.stretch = (angle * normals).sum(axis=1)[:, None] * normals
-            roll.stretch = angle - twist.stretch
-            torque = roll.load(k_r, share * np.sqrt(k_r), spin - along, mu_r * radius * np.abs(f_n), took, _as_it_is)
-            bound = 3 * math.pi / 16 * mu * a * np.abs(f_n)
-            torque += twist.load(k_w, share * np.sqrt(k_w), along, bound, took, _as_it_is)
-        total = np.tile(weight, (count, 1))
-        np.add.at(total, i, f_n[:, None] * normals + f_t)
-        np.add.at(total, j, -f_n[:, None] * normals - f_t)
+        forces = contacts.load(g.position, v, w, dt if step else 0.0)
         largest = max(largest, float(np.abs(g.force).max()))
-        worst = max(worst, float(np.abs(g.force - total).max()))
-        forces = _Forces(i, j, normals, arm, f_n - elastic, f_t, torque)
+        worst = max(worst, float(np.abs(g.force - forces.total(weight, bed.grain_count)).max()))
         if step % every == 0:
             # The velocities of now hold half a step of the forces of now.
             so_far = lost + 0.5 * dt * forces.losses(0.5 * (v + g.velocity), 0.5 * (w + g.spin))
             kinetic = 0.5 * m * float((g.velocity**2).sum()) + 0.5 * inertia * float((g.spin**2).sum())
-            stored = 0.4 * float((4 / 3 * star * math.sqrt(radius) * overlap**2.5).sum())
-            held, turned = slide.stored, roll.stored + twist.stored
-            fallen = -float(weight @ (x - start.position).sum(axis=0))
+            stored, held, turned = contacts.stored(forces.overlap)
+            fallen = -float(weight @ (g.position - start.position).sum(axis=0))
             losses = [so_far[0], so_far[1] - held, so_far[2] - turned]
             rows.append([step * dt, kinetic, stored, held, turned, *losses, fallen])
         before = (forces, v, w)

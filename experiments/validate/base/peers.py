@@ -18,8 +18,9 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,7 @@ from scipy.optimize import brentq
 from dem import Bed, Material
 
 from . import cloud
-from .case import Comparison, Compute, Curve, Outcome, Plot, Tell, near_zero, told
+from .case import Comparison, Curve, Outcome, Plot, Tell, near_zero, told
 
 __all__ = ["CASES", "Assembly", "PEERS", "Peer", "compare", "dense", "lammps_restitution", "pairs", "run_peer"]
 
@@ -54,6 +55,10 @@ class Peer:
     def find(self) -> str | None:
         """The program on the PATH, or None."""
         return next((name for name in self.programs if shutil.which(name)), None)
+
+    def lacking(self) -> Outcome:
+        """Of a case where it is not installed."""
+        return Outcome(skipped=f"{self.name} is not installed (apt install {self.package})")
 
 
 PEERS = {
@@ -158,22 +163,33 @@ def run_peer(peer: str, data: str, deck: str, wanted: str, *, limit: float) -> s
         return (folder / wanted).read_text(encoding="ascii")
 
 
-def _data(assembly: Assembly) -> str:
-    """The data file that both read: id, type, diameter, density, position; then velocity and spin."""
-    count = len(assembly.radii)
-    lines = ["grains of hedgebed\n", f"{count} atoms", "1 atom types\n"]
-    lines += [
-        f"0 {assembly.period[0]:.17g} xlo xhi",
-        f"0 {assembly.period[1]:.17g} ylo yhi",
-        f"0 {assembly.height:.17g} zlo zhi\n",
-    ]
-    lines.append("Atoms\n")
-    for k, (radius, place) in enumerate(zip(assembly.radii, assembly.positions, strict=True), 1):
-        lines.append(f"{k} 1 {2 * radius:.17g} {DENSITY:.17g} " + " ".join(f"{v:.17g}" for v in place))
-    lines.append("\nVelocities\n")
-    for k, row in enumerate(np.hstack([assembly.velocities, assembly.spins]), 1):
-        lines.append(f"{k} " + " ".join(f"{v:.17g}" for v in row))
+def data_file(box: Sequence[str], atoms: Sequence[str], velocities: Sequence[str] = (), *, types: int = 1) -> str:
+    """The data file that both read: a row of ``spheres`` for each grain; then velocity and spin."""
+    lines = ["grains of hedgebed\n", f"{len(atoms)} atoms", f"{types} atom types\n", *box, "\nAtoms\n"]
+    lines += [f"{k} {row}" for k, row in enumerate(atoms, 1)]
+    lines += ["\nVelocities\n", *(f"{k} {row}" for k, row in enumerate(velocities, 1))] if velocities else []
     return "\n".join(lines) + "\n"
+
+
+def spheres(radii: np.ndarray, places: np.ndarray, density: float) -> list[str]:
+    """Type, diameter, density and position of each."""
+    return [f"1 {2 * r:.17g} {density:.17g} {digits(place)}" for r, place in zip(radii, places, strict=True)]
+
+
+def digits(values: Iterable[float]) -> str:
+    """Numbers, all their digits."""
+    return " ".join(f"{value:.17g}" for value in values)
+
+
+def box_of(*sides: float) -> list[str]:
+    """The lines of a box from 0 on."""
+    return [f"0 {side:.17g} {axis}lo {axis}hi" for axis, side in zip("xyz", sides, strict=True)]
+
+
+def _data(assembly: Assembly) -> str:
+    atoms = spheres(assembly.radii, assembly.positions, DENSITY)
+    moving = [digits(row) for row in np.hstack([assembly.velocities, assembly.spins])]
+    return data_file(box_of(*assembly.period, assembly.height), atoms, moving)
 
 
 def lammps_restitution(restitution: float) -> float:
@@ -245,45 +261,34 @@ def compare(peer: str, assembly: Assembly, restitution: float, friction: float) 
     }
 
 
-def _case(peer: str, make: Callable[[], Assembly], bands: dict[str, float]) -> Compute:
-    def compute(tell: Tell) -> Outcome:
-        if PEERS[peer].find() is None:
-            return Outcome(skipped=f"{PEERS[peer].name} is not installed (apt install {PEERS[peer].package})")
-        assembly = make()
-        rows: list[Comparison] = []
-        curves: list[Curve] = []
-        time = 1e6 * assembly.step * assembly.every * np.arange(assembly.samples)
-        for label, band in told(bands.items(), tell):
-            found = compare(peer, assembly, *LAWS[label])
-            for name, what in (
-                ("force", "force on a grain over the largest"),
-                ("velocity", "velocity over the largest"),
-                ("way", "place over a diameter"),
-            ):
-                rows.append(near_zero(f"{label}: difference of the {what}", found[name].max(), band))
-            if label in ONE_LAW[peer]:
-                finer = compare(peer, refined(assembly, _FINER), *LAWS[label])["velocity"].max()
-                order = math.log(found["velocity"].max() / finer) / math.log(_FINER)
-                rows.append(
-                    Comparison(f"{label}: order at which the velocities' difference falls", "1", 1.0, order, 0.1, False)
-                )
-            curves.append(Curve(label, time, np.maximum(found["force"], 1e-17)))
-        return Outcome(
-            rows,
-            [
-                Plot(
-                    "Largest difference of a force, over the largest force",
-                    "time [us]",
-                    "difference [1]",
-                    curves,
-                    log="y",
-                )
-            ],
-        )
-
-    return compute
+_WHAT = {
+    "force": "force on a grain over the largest",
+    "velocity": "velocity over the largest",
+    "way": "place over a diameter",
+}
 
 
+def _compute(peer: str, make: Callable[[], Assembly], bands: dict[str, float], tell: Tell) -> Outcome:
+    if PEERS[peer].find() is None:
+        return PEERS[peer].lacking()
+    assembly = make()
+    rows: list[Comparison] = []
+    curves: list[Curve] = []
+    time = 1e6 * assembly.step * assembly.every * np.arange(assembly.samples)
+    for label, band in told(bands.items(), tell):
+        found = compare(peer, assembly, *LAWS[label])
+        rows += [near_zero(f"{label}: difference of the {what}", found[key].max(), band) for key, what in _WHAT.items()]
+        if label in ONE_LAW[peer]:
+            finer = compare(peer, refined(assembly, _FINER), *LAWS[label])["velocity"].max()
+            order = math.log(found["velocity"].max() / finer) / math.log(_FINER)
+            quantity = f"{label}: order at which the velocities' difference falls"
+            rows.append(Comparison(quantity, "1", 1.0, order, 0.1, False))
+        curves.append(Curve(label, time, np.maximum(found["force"], 1e-17)))
+    return Outcome(rows, [Plot(*LARGEST_FORCE, curves, "y")])
+
+
+LARGEST_FORCE = ("Largest difference of a force, over the largest force", "time [us]", "difference [1]")
+"""Title and axes of the plots."""
 _UNDAMPED, _SMOOTH, _STICKING = "e = 1, friction 0.5", "e = 0.5, no friction", "e = 0.5, friction 50"
 ONE_LAW = {"liggghts": (_SMOOTH, _UNDAMPED), "lammps": (_SMOOTH,)}
 """The laws in which a peer differs from the bed in nothing but its order in time."""
@@ -298,4 +303,4 @@ _CASES = (
     ("lammps-contacts", pairs, {_SMOOTH: _SIGN} | dict.fromkeys((_UNDAMPED, _STICKING), _SMALL_TERMS)),
     ("lammps-cloud", dense, {_SMOOTH: _SIGN, _UNDAMPED: _SMALL_TERMS}),
 )
-CASES = {name: _case(name.partition("-")[0], make, bands) for name, make, bands in _CASES}
+CASES = {name: partial(_compute, name.partition("-")[0], make, bands) for name, make, bands in _CASES}

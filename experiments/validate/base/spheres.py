@@ -5,27 +5,19 @@ and 11).
 """
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from dem import Bed, Material
+from dem import Bed, Material, Plane
 from dem.contact.law import effective_moduli
 from experiments.runs.types import Json
 
 __all__ = [
-    "ALUMINA",
-    "CAST_IRON",
-    "HERTZ_TIME",
-    "Meeting",
-    "RADIUS",
-    "SIXTEEN",
-    "hertz",
-    "mass_of",
-    "meet_floor",
-    "plane_modulus",
-    "row_of_grains",
-]
+    "ALUMINA", "CAST_IRON", "HERTZ_TIME", "Meeting", "RADIUS", "SIXTEEN", "hertz", "mass_of", "meet_floor",
+    "plane_modulus", "row_of_grains", "upright_walls",
+]  # fmt: skip
 
 HERTZ_TIME = 2.943275
 RADIUS = 0.0025
@@ -54,6 +46,15 @@ def mass_of(density: float, radius: float) -> float:
 def plane_modulus(young: float, poisson: float) -> float:
     """E* on a rigid plane [Pa]."""
     return effective_moduli(young, poisson, math.inf, poisson)[0]
+
+
+def upright_walls(width: float, depth: float, margin: float) -> Iterator[tuple[int, int, Plane, tuple[float, ...]]]:
+    """Axis, side, shape and place of four plane walls that face one another, a margin inside the box [m]."""
+    for axis, side in enumerate((width, depth)):
+        for sign in (1, -1):
+            at = [margin, margin, 0.0]
+            at[axis] += 0.0 if sign > 0 else side
+            yield axis, sign, Plane(normal=tuple(sign * (k == axis) for k in range(3))), tuple(at)
 
 
 def row_of_grains(height: float = RADIUS, **options: Any) -> tuple[np.ndarray, np.ndarray, Json]:

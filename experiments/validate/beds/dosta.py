@@ -7,18 +7,15 @@ have them, without history. The walls are of what the grains are of.
 
 import gzip
 import math
-import os
-import subprocess
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from dem import Ball, Bed, Facing, Material, Plane
+from dem import Ball, Bed, Facing, Material
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero
-from experiments.validate.base.peers import PEERS
-from experiments.validate.base.spheres import mass_of
+from experiments.validate.base.peers import PEERS, data_file, digits, run_peer
+from experiments.validate.base.spheres import mass_of, upright_walls
 
 from .words import say
 
@@ -81,13 +78,8 @@ def ours(case: Setup, tell: Tell) -> np.ndarray:
         STUFF, positions=case.positions + shift, radii=case.radii, size=size, height=0.4, gravity=GRAVITY,
         time_step=STEP, max_overlap=0.1, floor=Facing(**like), tensile=True,
     )  # fmt: skip
-    for normal, x, y in (
-        ((1, 0, 0), 0.0, 0.0),
-        ((-1, 0, 0), width, 0.0),
-        ((0, 1, 0), 0.0, 0.0),
-        ((0, -1, 0), 0.0, depth),
-    ):
-        bed.add_body([Plane(normal=normal)], position=(MARGIN + x, MARGIN + y, 0.0), **like)
+    for _, _, wall, at in upright_walls(width, depth, MARGIN):
+        bed.add_body([wall], position=at, **like)
     ball = bed.add_body(
         [Ball(radius=BALL_RADIUS)], position=case.ball + shift, friction=BALL_FRICTION, restitution=BALL_RESTITUTION,
         young=BALL_YOUNG, poisson=BALL_POISSON,
@@ -111,33 +103,17 @@ def ours(case: Setup, tell: Tell) -> np.ndarray:
 
 def theirs(case: Setup) -> np.ndarray:
     """The same by LIGGGHTS, in one process. Raises RuntimeError with its last lines where it fails."""
-    with tempfile.TemporaryDirectory(prefix="hedgebed-dosta-") as name:
-        folder = Path(name)
-        (folder / "grains.data").write_text(_data(case), encoding="ascii")
-        (folder / "deck").write_text(_deck(), encoding="ascii")
-        done = subprocess.run(
-            [str(PEERS["liggghts"].find()), "-in", "deck", "-log", "log.txt", "-screen", "none"],
-            cwd=folder, check=False, capture_output=True, text=True, errors="replace", timeout=LIMIT,
-            env={**os.environ, "OMP_NUM_THREADS": "1"},
-        )  # fmt: skip
-        log = folder / "log.txt"
-        if done.returncode != 0 or not (folder / "ball.txt").is_file():
-            said = (log.read_text(errors="replace") if log.exists() else "") + done.stdout + done.stderr
-            raise RuntimeError(f"LIGGGHTS failed: {' | '.join(said.splitlines()[-4:])}")
-        blocks = (folder / "ball.txt").read_text(encoding="ascii").split("ITEM: ATOMS z vz")[1:]
+    blocks = run_peer("liggghts", _data(case), _deck(), "ball.txt", limit=LIMIT).split("ITEM: ATOMS z vz")[1:]
     return np.array([[float(v) for v in block.splitlines()[1].split()] for block in blocks])
 
 
 def _data(case: Setup) -> str:
-    count = len(case.radii)
     box = [f"{WALLS[0]:g} {WALLS[1]:g} xlo xhi", f"{WALLS[2]:g} {WALLS[3]:g} ylo yhi", f"{FLOOR:.7f} 0.3 zlo zhi"]
-    lines = ["grains of hedgebed\n", f"{count + 1} atoms", "2 atom types\n", *box, "\nAtoms\n"]
-    for k, (radius, place) in enumerate(zip(case.radii, case.positions, strict=True), 1):
-        lines.append(f"{k} 1 {2 * radius:.10g} {STUFF.density:g} " + " ".join(f"{v:.17g}" for v in place))
-    where = " ".join(f"{v:.17g}" for v in case.ball)
-    lines.append(f"{count + 1} 2 {2 * BALL_RADIUS:g} {BALL_DENSITY:g} {where}")
-    lines += ["\nVelocities\n", *(f"{k} 0 0 0 0 0 0" for k in range(1, count + 1))]
-    return "\n".join([*lines, f"{count + 1} 0 0 {-case.speed:.17g} 0 0 0"]) + "\n"
+    grains = zip(case.radii, case.positions, strict=True)
+    atoms = [f"1 {2 * radius:.10g} {STUFF.density:g} {digits(place)}" for radius, place in grains]
+    atoms.append(f"2 {2 * BALL_RADIUS:g} {BALL_DENSITY:g} {digits(case.ball)}")
+    speeds = len(case.radii) * ["0 0 0 0 0 0"] + [f"0 0 {-case.speed:.17g} 0 0 0"]
+    return data_file(box, atoms, speeds, types=2)
 
 
 def _deck() -> str:
@@ -174,7 +150,7 @@ def _deck() -> str:
 
 def _compute(tell: Tell) -> Outcome:
     if PEERS["liggghts"].find() is None:
-        return Outcome(skipped=f"LIGGGHTS is not installed (apt install {PEERS['liggghts'].package})")
+        return PEERS["liggghts"].lacking()
     case = setup()
     there = theirs(case)
     tell(0.5)

@@ -23,6 +23,7 @@ where the spheres are ten times as soft), and sizes within 15 % and an inertial 
 
 import io
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,7 +35,7 @@ from dem.grains.sizes import Uniform
 from dem.measure.element import ElementShear, shear_element
 from experiments.calibrate.tests import mohr_circle, summary_of, triaxial_angle
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell
-from experiments.validate.base.peers import PEERS, lammps_restitution, run_peer
+from experiments.validate.base.peers import PEERS, box_of, data_file, lammps_restitution, run_peer, spheres
 
 from .words import say
 
@@ -128,11 +129,6 @@ def _here(stuff: Material, seed: int, tell: Tell, **otherwise: float) -> tuple[S
     return found, run
 
 
-def _packing(run: ElementShear) -> float:
-    """At large strain [1]."""
-    return float(run.packing[run.inside_strain > 0.5 * STRAIN].mean())
-
-
 def in_lammps(stuff: Material, *, young: float, packing: float, seed: int) -> Sheared:
     """Shear grains of this material, softened to ``young`` [Pa], at a packing fraction [1].
 
@@ -154,7 +150,7 @@ def in_lammps(stuff: Material, *, young: float, packing: float, seed: int) -> Sh
 def _input(stuff: Material, young: float, packing: float, seed: int) -> tuple[str, str]:
     """Data file and deck: grains of a jittered lattice are pressed together in y in a drag, then sheared in xy."""
     rng = np.random.default_rng(seed)
-    width, depth, height = (side * GRAIN for side in (SIZE[0], SIZE[1], SIZE[2]))
+    width, depth, height = (side * GRAIN for side in SIZE)
     radii = draw_radii(rng, packing * width * depth * height, Uniform(GRAIN, SPREAD))
     site = 1.25 * 2 * float(radii.max())
     across, along = int(width / site), int(depth / site)
@@ -162,19 +158,7 @@ def _input(stuff: Material, young: float, packing: float, seed: int) -> tuple[st
     cell = np.array([width / across, site, depth / along])
     places = (np.column_stack([rest % across, k, rest // across]) + 0.5) * cell
     places += rng.uniform(-0.49, 0.49, (len(radii), 3)) * (cell - 2 * radii[:, None])
-    top = (k.max() + 1) * site
-    lines = ["grains of hedgebed\n", f"{len(radii)} atoms", "1 atom types\n"]
-    lines += [
-        f"0 {width:.17g} xlo xhi",
-        f"0 {top:.17g} ylo yhi",
-        f"0 {depth:.17g} zlo zhi",
-        "0 0 0 xy xz yz\n",
-        "Atoms\n",
-    ]
-    lines += [
-        f"{i} 1 {2 * r:.17g} {stuff.density:g} " + " ".join(f"{v:.17g}" for v in place)
-        for i, (r, place) in enumerate(zip(radii, places, strict=True), 1)
-    ]
+    box = [*box_of(width, (k.max() + 1) * site, depth), "0 0 0 xy xz yz"]
     solid = 4 / 3 * math.pi * float((radii**3).sum())
     soft = stuff.softened(young)
     step = time_step_for(soft, diameter=GRAIN * (1 - SPREAD), max_overlap=0.05, wanted=None)
@@ -193,7 +177,7 @@ def _input(stuff: Material, young: float, packing: float, seed: int) -> tuple[st
         f"fix mean all ave/time 1 {_EVERY} {_EVERY} {' '.join(f'c_stress[{i}]' for i in range(1, 7))} file stress.txt",
         f"run {round(STRAIN / rate / step / _EVERY) * _EVERY}",
     ]  # fmt: skip
-    return "\n".join(lines) + "\n", "\n".join(deck) + "\n"
+    return data_file(box, spheres(radii, places, stuff.density)), "\n".join(deck) + "\n"
 
 
 def _smooth(strain: np.ndarray, ratio: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -202,29 +186,40 @@ def _smooth(strain: np.ndarray, ratio: np.ndarray, at: np.ndarray) -> np.ndarray
     return np.interp(at, strain, np.convolve(ratio, kernel / len(kernel), "same"))
 
 
-def _each(found: list[Sheared]) -> str:
-    return ", ".join(f"{one.angle:.1f}" for one in found)
+def _each(found: Sequence[Sheared], key: str = "angle", form: str = ".1f") -> str:
+    return ", ".join(format(getattr(one, key), form) for one in found)
+
+
+def _mean(found: Sequence[Sheared], key: str) -> float:
+    return float(np.mean([getattr(one, key) for one in found]))
+
+
+def _samples(
+    stuff: Material, seeds: Sequence[int], tell: Tell, **otherwise: float
+) -> tuple[list[Sheared], list[ElementShear], float]:
+    """One of each seed here, sheared, and their packing fraction at large strain [1]."""
+    count = len(seeds)
+    pairs = [
+        _here(stuff, seed, lambda share, k=k: tell((k + share) / count), **otherwise)  # type: ignore[misc]
+        for k, seed in enumerate(seeds)
+    ]
+    late = [run.packing[run.inside_strain > 0.5 * STRAIN].mean() for _, run in pairs]
+    return [one for one, _ in pairs], [run for _, run in pairs], float(np.mean([float(value) for value in late]))
 
 
 def _compute(tell: Tell) -> Outcome:
     if PEERS["lammps"].find() is None:
-        return Outcome(skipped=f"LAMMPS is not installed (apt install {PEERS['lammps'].package})")
+        return PEERS["lammps"].lacking()
     rows, curves, words = [], [], []
-    parts = len(ROLLING) * len(SEEDS)
     for k, rolling in enumerate(ROLLING):
-        stuff, here, there = _stuff(rolling), [], []
-        runs: list[ElementShear] = []
-        for m, seed in enumerate(SEEDS):
-            begin = (k * len(SEEDS) + m) / parts
-            one, run = _here(stuff, seed, lambda share, begin=begin: tell(begin + 0.7 * share / parts))  # type: ignore[misc]
-            here.append(one)
-            runs.append(run)
-        packing = float(np.mean([_packing(run) for run in runs]))
+        stuff = _stuff(rolling)
+        here, runs, packing = _samples(stuff, SEEDS, lambda share, k=k: tell((k + 0.97 * share) / len(ROLLING)))  # type: ignore[misc]
         there = [in_lammps(stuff, young=runs[0].young, packing=packing, seed=seed) for seed in SEEDS]
         about = f"rolling friction {rolling:g}"
         for name, words_of in (("angle", "plane of shear"), ("triaxial", "triaxial"), ("mohr", "Mohr's circle")):
-            theirs, ours = (float(np.mean([getattr(one, name) for one in found])) for found in (there, here))
-            rows.append(Comparison(f"{about}, {words_of}", "degrees", theirs, ours, BAND, False))
+            rows.append(
+                Comparison(f"{about}, {words_of}", "degrees", _mean(there, name), _mean(here, name), BAND, False)
+            )
         for label, found in (("LAMMPS", there), ("bed", here)):
             strain = np.linspace(0.05, 0.98 * STRAIN, 60)
             ratio = np.mean([_smooth(one.strain, one.ratio, strain) for one in found], axis=0)
@@ -243,18 +238,11 @@ def _compute(tell: Tell) -> Outcome:
 def _published(tell: Tell) -> Outcome:
     rows, words = [], []
     everything: list[ElementShear] = []
-    parts = len(PUBLISHED) * len(SEEDS_AS_PUBLISHED)
     for k, (friction, (wanted, dense)) in enumerate(PUBLISHED.items()):
-        found, runs = [], []
-        for m, seed in enumerate(SEEDS_AS_PUBLISHED):
-            begin = (k * len(SEEDS_AS_PUBLISHED) + m) / parts
-            stuff = _stuff(0.0, friction)
-            one, run = _here(stuff, seed, lambda share, b=begin: tell(b + share / parts), **AS_PUBLISHED)  # type: ignore[misc]
-            found.append(one)
-            runs.append(run)
+        part = lambda share, k=k: tell((k + share) / len(PUBLISHED))  # noqa: E731
+        found, runs, packing = _samples(_stuff(0.0, friction), SEEDS_AS_PUBLISHED, part, **AS_PUBLISHED)
         everything += runs
-        ratio, circle = (float(np.mean([getattr(one, key) for one in found])) for key in ("over_mean", "mohr"))
-        packing = float(np.mean([_packing(run) for run in runs]))
+        ratio, circle = _mean(found, "over_mean"), _mean(found, "mohr")
         about = f"friction {friction:g}"
         rows += [
             Comparison(f"{about}, Mohr's circle", "degrees", math.degrees(math.asin(wanted)), circle, BAND, False),
@@ -264,8 +252,8 @@ def _published(tell: Tell) -> Outcome:
         late = [run.inside_strain > 0.5 * STRAIN for run in runs]
         tensor = np.mean([run.stress[at].mean(axis=0) for run, at in zip(runs, late, strict=True)], axis=0)
         words.append(say(
-            "circles", about=about, found=", ".join(f"{one.mohr:.1f}" for one in found),
-            found_2=", ".join(f"{one.over_mean:.3f}" for one in found), found_3=_each(found),
+            "circles", about=about, found=_each(found, "mohr"), found_2=_each(found, "over_mean", ".3f"),
+            found_3=_each(found),
             along=tensor[0, 0] / tensor[2, 2], across=tensor[1, 1] / tensor[2, 2],
         ))  # fmt: skip
     remark = say(

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, told
 from experiments.validate.base.drops import BEADS, drop, prepared
 from experiments.validate.base.parts import part
 
@@ -65,8 +65,7 @@ class Fall:
             )  # fmt: skip
             return found | {"packing": np.array(bed.packing_fraction), "count": np.array(bed.grain_count)}
 
-        told = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        return part("impact", told | {"size": size, "mass": MASS, "longest": LONGEST}, compute)
+        return part("impact", vars(self) | {"size": size, "mass": MASS, "longest": LONGEST}, compute)
 
 
 def energy(depth: np.ndarray, *, start: float, d1: float, k_over_m: float, gravity: float = GRAVITY) -> np.ndarray:
@@ -79,17 +78,16 @@ def fit_law(falls: Sequence[dict[str, np.ndarray]]) -> tuple[float, float]:
     """d1 [m] and k/m [1/s2] that fit v^2 over depth of all drops, each weighted by its largest v^2."""
     sampled = []
     for fall in falls:
-        depth, squared = fall["depth"], fall["velocity"] ** 2
-        grid = np.linspace(0.0, 0.98 * depth[-1], POINTS)
-        sampled.append((grid, np.interp(grid, depth, squared)))
+        grid = np.linspace(0.0, 0.98 * fall["depth"][-1], POINTS)
+        sampled.append((grid, np.interp(grid, fall["depth"], fall["velocity"] ** 2)))
 
     def off(logs: np.ndarray) -> np.ndarray:
         d1, k_over_m = np.exp(logs)
         parts = [(energy(z, start=u[0], d1=d1, k_over_m=k_over_m) - u) / u.max() for z, u in sampled]
         return np.concatenate(parts)
 
-    found = least_squares(off, np.log([D1, K_OVER_M]))
-    return float(np.exp(found.x[0])), float(np.exp(found.x[1]))
+    d1, k_over_m = np.exp(least_squares(off, np.log([D1, K_OVER_M])).x)
+    return float(d1), float(k_over_m)
 
 
 def published(speed: float) -> tuple[float, float]:
@@ -114,37 +112,35 @@ def _scatter(falls: Sequence[dict[str, np.ndarray]]) -> tuple[float, float]:
 def _drops(fineness: tuple[str, int, Any], tell: Tell) -> Outcome:
     name, across, beds = fineness
     falls = [Fall(across, seed, at, speed) for seed, places in beds for at in places for speed in SPEEDS]
-    found = []
-    for fall in falls:
-        found.append(fall.run())
-        tell(len(found) / len(falls))
+    found = [fall.run() for fall in told(falls, tell)]
     d1, k_over_m = fit_law(found)
     errors = _scatter(found)
 
     def mean(key: str) -> dict[float, float]:
         """Of the last values, by speed."""
-        pairs = list(zip(falls, found, strict=True))
-        return {v: float(np.mean([run[key][-1] for fall, run in pairs if fall.speed == v])) for v in SPEEDS}
+        ends = [(fall.speed, run[key][-1]) for fall, run in zip(falls, found, strict=True)]
+        return {v: float(np.mean([end for speed, end in ends if speed == v])) for v in SPEEDS}
 
     stops, deep = mean("time"), mean("depth")
     first, last = SPEEDS[0], SPEEDS[-1]
+    longer = published(last)[1] / published(first)[1], stops[last] / stops[first]
     rows = [
         Comparison(f"d1, {name} grains across", "cm", 100 * D1, 100 * d1, D1_BAND),
         Comparison(f"k/m, {name} grains across", "1/s2", K_OVER_M, k_over_m, K_BAND),
-        Comparison(f"time to stop, {last:g} over {first:g} m/s", "1", published(last)[1] / published(first)[1],
-                   stops[last] / stops[first], TIME_BAND),
-    ]  # fmt: skip
-    curves = [Curve(f"bed, {name} across", SPEEDS, [1e3 * deep[v] for v in SPEEDS])]
+        Comparison(f"time to stop, {last:g} over {first:g} m/s", "1", *longer, TIME_BAND),
+    ]
+    speeds = np.linspace(first, last, 40)
+    curves = [
+        Curve("published law", speeds, [1e3 * published(v)[0] for v in speeds], False),
+        Curve(f"bed, {name} across", SPEEDS, [1e3 * deep[v] for v in SPEEDS]),
+    ]
     stood = ", ".join(f"{1e3 * deep[v]:.1f} ({1e3 * published(v)[0]:.1f}) at {v:g} m/s" for v in SPEEDS)
     many = f"{len(found)} drops in {len(beds)} bed{'s' if len(beds) > 1 else ''}"
     words = say(
         "drops", count=int(found[0]["count"]), packing=float(found[0]["packing"]), many=many, d1=100 * d1,
         d1_error=100 * errors[0], k_over_m=k_over_m, k_error=errors[1], stood=stood,
     )  # fmt: skip
-    speeds = np.linspace(SPEEDS[0], SPEEDS[-1], 40)
-    curves.insert(0, Curve("published law", speeds, [1e3 * published(v)[0] for v in speeds], False))
-    at = ", ".join(f"{speed:g}" for speed in SPEEDS)
-    box = " x ".join(f"{share:g}" for share in BOX)
+    at, box = ", ".join(f"{speed:g}" for speed in SPEEDS), " x ".join(f"{share:g}" for share in BOX)
     remark = say("of_drops", words=words, at=at, beads=BEADS, box=box)
     return Outcome(rows, [Plot("Depth at which the ball stops", "speed [m/s]", "depth [mm]", curves)], [remark])
 

@@ -17,6 +17,7 @@ less of the same grains.
 
 import math
 from collections.abc import Sequence
+from itertools import count
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -108,13 +109,10 @@ def _between(run: dict[str, np.ndarray], depths: tuple[float, float]) -> tuple[n
 
 
 def _compute(tell: Tell) -> Outcome:
-    whole = len(SAMPLES) + len(PLACES) * (len(PLATES) + 1)
-    done = 0
+    whole, done = len(SAMPLES) + len(PLACES) * (len(PLATES) + 1), count(1)
 
     def ticked(found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        nonlocal done
-        done += 1
-        tell(done / whole)
+        tell(next(done) / whole)
         return found
 
     samples = [ticked(_sheared(seed)) for seed in SAMPLES]
@@ -122,15 +120,13 @@ def _compute(tell: Tell) -> Outcome:
     mu, density = float(told["over_mean"].mean()), float(told["packing"].mean()) * BEADS.density
     gradient = stress_gradient(bulk_density=density, friction=mu, gravity=GRAVITY)
     height = (CONE_DEPTHS[1] + 2) * GRAIN
-    shape = Cone(0.0, height, 0.0, height * math.tan(HALF_ANGLE))
-    cones = [ticked(_driven("cone", shape, place, CONE_DEPTHS[1] + 0.5)) for place in PLACES]
+    cone_shape = Cone(0.0, height, 0.0, height * math.tan(HALF_ANGLE))
+    cones = [ticked(_driven("cone", cone_shape, place, CONE_DEPTHS[1] + 0.5)) for place in PLACES]
     pushes, means, curves = [], [], []
     for across in PLATES:
         diameter = across * GRAIN
-        runs = [
-            ticked(_driven(f"plate {across:g}", Cylinder(0.0, GRAIN, 0.5 * diameter), place, PLATE_DEPTHS[1] + 0.5))
-            for place in PLACES
-        ]
+        shape, name = Cylinder(0.0, GRAIN, 0.5 * diameter), f"plate {across:g}"
+        runs = [ticked(_driven(name, shape, place, PLATE_DEPTHS[1] + 0.5)) for place in PLACES]
         pieces = [_between(run, PLATE_DEPTHS) for run in runs]
         pushes += [(diameter, *piece) for piece in pieces]
         law = flat_plate() * gradient * 0.25 * math.pi * diameter**2
@@ -151,10 +147,8 @@ def _compute(tell: Tell) -> Outcome:
         Comparison("F / z^3 of the cone", "MPa/m", 1e-6 * wanted_cone, 1e-6 * cone, BAND),
     ]
     steep = (3 * 894 * mu**2 - 2 * 386 * mu + 89) / (894 * mu**3 - 386 * mu**2 + 89 * mu)
-    shares = "; ".join(
-        f"{' and '.join(f'{one:.2f}' for one in each)} at {across:g} d"
-        for across, each in zip(PLATES, means, strict=True)
-    )
+    pairs = [" and ".join(f"{one:.2f}" for one in each) for each in means]
+    shares = "; ".join(f"{pair} at {across:g} d" for across, pair in zip(PLATES, pairs, strict=True))
     stagnant = math.tan(math.radians(45) + 0.5 * math.asin(min(1.0, mu))) / 6
     remark = say(
         "plates", mu=mu, over_mean=_each(told["over_mean"]), over_normal=told["over_normal"].mean(), density=density,

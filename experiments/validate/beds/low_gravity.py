@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, told
 from experiments.validate.base.drops import BEADS, drop, prepared
 from experiments.validate.base.parts import part
 
@@ -61,8 +61,7 @@ class Setting:
                 tell=tell,
             )  # fmt: skip
 
-        told = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        return part("drop", told | {"grain": GRAIN, "box": BOX, "longest": LONGEST}, compute)
+        return part("drop", vars(self) | {"grain": GRAIN, "box": BOX, "longest": LONGEST}, compute)
 
 
 def power_of(x: Sequence[float], y: Sequence[float]) -> float:
@@ -84,14 +83,6 @@ def collapsed(
         for run, length, unit in zip(runs, lengths, times, strict=True)
     ]
     return grid, np.array(depths)
-
-
-def _all(settings: Sequence[Setting], tell: Tell) -> list[dict[str, np.ndarray]]:
-    found = []
-    for k, one in enumerate(settings):
-        found.append(one.run())
-        tell((k + 1) / len(settings))
-    return found
 
 
 def _time_down(run: dict[str, np.ndarray]) -> float:
@@ -119,7 +110,7 @@ def _means(values: Sequence[float]) -> list[float]:
 
 def _sink(tell: Tell) -> Outcome:
     settings = _sweep(0.0)
-    runs = _all(settings, tell)
+    runs = [one.run() for one in told(settings, tell)]
     depths, times = [float(run["depth"][-1]) for run in runs], [_time_down(run) for run in runs]
     creeping = sum(not run["stopped"] for run in runs)
     gravities = [one.gravity for one in settings]
@@ -128,12 +119,11 @@ def _sink(tell: Tell) -> Outcome:
         Comparison(f"final depth over D, {_name(*bed)}", "1", mean / BALL, depth / BALL, BAND)
         for bed, depth in zip(SWEEP, _means(depths), strict=True)
     ]
-    rows.append(near_zero("exponent of g in the final depth", power_of(gravities, depths), 0.01))
-    rows.append(
-        Comparison(
-            f"exponent of g in the time to {MOSTLY:g} of the depth", "1", -0.5, power_of(gravities, times), 0.01, False
-        )
-    )
+    about = f"exponent of g in the time to {MOSTLY:g} of the depth"
+    rows += [
+        near_zero("exponent of g in the final depth", power_of(gravities, depths), 0.01),
+        Comparison(about, "1", -0.5, power_of(gravities, times), 0.01, False),
+    ]
     spread = np.std(depths, ddof=1) / mean
     curves = [Curve("mean", [min(gravities), max(gravities)], [mean / BALL] * 2, False)]
     curves.append(Curve("bed", gravities, np.array(depths) / BALL))
@@ -145,11 +135,11 @@ def _sink(tell: Tell) -> Outcome:
     return Outcome(rows, [plot], [remark])
 
 
-def _one_froude(tell: Tell, others: Sequence[Setting], names: Sequence[str]) -> Outcome:
+def _one_froude(tell: Tell, others: Sequence[Setting] = (), names: Sequence[str] = ()) -> Outcome:
     """The sweep at one Froude number and beside it other beds; held to the mean curve of the sweep are the others, or
     its own beds where there are none."""
     settings = [*_sweep(FROUDE), *others]
-    runs = _all(settings, tell)
+    runs = [one.run() for one in told(settings, tell)]
     lengths = [one.ball + GRAIN for one in settings]
     units = [math.sqrt(length / one.gravity) for length, one in zip(lengths, settings, strict=True)]
     grid, depths = collapsed(runs, lengths, units)
@@ -159,10 +149,9 @@ def _one_froude(tell: Tell, others: Sequence[Setting], names: Sequence[str]) -> 
     labels = [*(_name(*bed) for bed in SWEEP), *names]
     rows = []
     for name, curve in list(zip(labels, beds, strict=True))[len(SWEEP) if others else 0 :]:
+        off = np.abs(curve - mean).max() / final
         rows.append(Comparison(f"final depth over D + d, {name}", "1", final, float(curve[-1]), BAND))
-        rows.append(
-            near_zero(f"largest difference over the final depth, {name}", np.abs(curve - mean).max() / final, BAND)
-        )  # fmt: skip
+        rows.append(near_zero(f"largest difference over the final depth, {name}", off, BAND))
     curves = [Curve("mean of the sweep", grid, mean, False)]
     curves += [Curve(name, grid, curve) for name, curve in zip(labels, beds, strict=True)]
     plot = Plot("One Froude number", "t sqrt(g / (D + d)) [1]", "depth over D + d [1]", curves)
@@ -172,10 +161,6 @@ def _one_froude(tell: Tell, others: Sequence[Setting], names: Sequence[str]) -> 
         scatter=100 * float(np.std(ends, ddof=1)) / final,
     )  # fmt: skip
     return Outcome(rows, [plot], [remark])
-
-
-def _froude(tell: Tell) -> Outcome:
-    return _one_froude(tell, (), ())
 
 
 def _size(tell: Tell) -> Outcome:
@@ -194,7 +179,7 @@ def _murdoch(tell: Tell) -> Outcome:
         Setting(g, seed, at, ALUMINIUM, speed) for g, seed in MURDOCH_GRAVITIES for speed in MURDOCH_SPEEDS
         for at in PLACES
     ]  # fmt: skip
-    runs = _all(settings, tell)
+    runs = [one.run() for one in told(settings, tell)]
     shape = (len(MURDOCH_GRAVITIES), len(MURDOCH_SPEEDS))
     depths = np.array(_means([run["depth"][-1] for run in runs])).reshape(shape)
     times = np.array(_means([_time_down(run) for run in runs])).reshape(shape)
@@ -210,12 +195,14 @@ def _murdoch(tell: Tell) -> Outcome:
     terms = np.column_stack([np.ones(depths.size), *logs])
     of_depth = np.linalg.lstsq(terms, np.log(depths).ravel(), rcond=None)[0]
     of_time = np.linalg.lstsq(terms, np.log(times).ravel(), rcond=None)[0]
-    rows.append(near_zero("exponent of g in the depth", of_depth[1], 0.1))
-    rows.append(near_zero("exponent of g in the duration", of_time[1], 0.1))
-    rows.append(near_zero("exponent of the speed in the duration", of_time[2], 0.1))
+    rows += [
+        near_zero("exponent of g in the depth", of_depth[1], 0.1),
+        near_zero("exponent of g in the duration", of_time[1], 0.1),
+        near_zero("exponent of the speed in the duration", of_time[2], 0.1),
+    ]
     remark = say("murdoch", about=_about(), aluminium=ALUMINIUM)
     plot = Plot("A ball of 10 cm in low gravity", "speed [m/s]", "depth [mm]", curves)
     return Outcome(rows, [plot], [remark])
 
 
-CASES = {"sink-from-rest": _sink, "gravity-sweep": _froude, "size-collapse": _size, "murdoch": _murdoch}
+CASES = {"sink-from-rest": _sink, "gravity-sweep": _one_froude, "size-collapse": _size, "murdoch": _murdoch}

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from dem import Bed, Facing, Material, Plane
+from dem import Bed, Facing, Material
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero
+from experiments.validate.base.spheres import upright_walls
 
 from .words import say
 
@@ -64,20 +65,11 @@ def fill(depth: float, *, seed: int = 3) -> Filling:
         size=(WIDTH + 2 * margin, WIDTH + 2 * margin, depth * WIDTH), gravity=GRAVITY,
         floor=Facing(rolling_friction=0.0),
     )  # fmt: skip
-    walls = []
-    for axis, sign, normal, x, y in (
-        (0, 1, (1, 0, 0), 0.0, 0.0),
-        (0, -1, (-1, 0, 0), WIDTH, 0.0),
-        (1, 1, (0, 1, 0), 0.0, 0.0),
-        (1, -1, (0, -1, 0), 0.0, WIDTH),
-    ):
-        wall = bed.add_body(
-            [Plane(normal=normal)],
-            position=(margin + x, margin + y, 0.0),
-            friction=WALL_FRICTION,
-            rolling_friction=0.0,
-        )
-        walls.append((wall, axis, sign))
+    rough = {"friction": WALL_FRICTION, "rolling_friction": 0.0}
+    walls = [
+        (bed.add_body([wall], position=at, **rough), axis, sign)
+        for axis, sign, wall, at in upright_walls(WIDTH, WIDTH, margin)
+    ]
     fall = math.sqrt(2 * float(places[:, 2].max()) / GRAVITY)
     bed.advance(round((fall + SETTLED) / bed.time_step), drag_time=DRAG)
     for wall, _, _ in walls:
@@ -111,20 +103,13 @@ def _compute(tell: Tell) -> Outcome:
     held = [one.friction / one.pressing for one in found]
     rows = []
     for depth, one, share in zip(DEPTHS, found, held, strict=True):
-        rows.append(
-            Comparison(
-                f"floor and walls over the weight, {depth:g} D", "1", 1.0, (one.floor + one.friction) / one.weight, 0.01
-            )
-        )
-        rows.append(
-            near_zero(
-                f"friction over pressing at the walls, beyond mu_w, {depth:g} D", max(0.0, share - WALL_FRICTION), 1e-3
-            )
-        )
-        rows.append(Comparison(
-            f"floor force, {depth:g} D, with one K for the three", "N", float(carried(one.weight, scale)), one.floor,
-            0.1,
-        ))  # fmt: skip
+        borne, beyond = (one.floor + one.friction) / one.weight, max(0.0, share - WALL_FRICTION)
+        fitted = float(carried(one.weight, scale))
+        rows += [
+            Comparison(f"floor and walls over the weight, {depth:g} D", "1", 1.0, borne, 0.01),
+            near_zero(f"friction over pressing at the walls, beyond mu_w, {depth:g} D", beyond, 1e-3),
+            Comparison(f"floor force, {depth:g} D, with one K for the three", "N", fitted, one.floor, 0.1),
+        ]
     deepest = found[-1]
     bulk = deepest.weight / (GRAVITY * WIDTH**2 * deepest.height)
     ratio = bulk * GRAVITY * WIDTH**3 / (4 * held[-1] * scale)

@@ -19,7 +19,7 @@ from dem.grains.materials import SAND, Material
 from dem.measure.repose import measure_flanks, thickness_profile
 from experiments.bed.tests import stiff_enough
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell
-from experiments.validate.base.peers import PEERS, run_peer
+from experiments.validate.base.peers import PEERS, box_of, data_file, run_peer, spheres
 
 from .friction_angle import lammps_law
 from .words import say
@@ -109,12 +109,7 @@ def in_lammps(stuff: Material, block: tuple[Any, ...]) -> Heap:
     places, radii, young, packing = block
     bed = _bed(stuff, places, radii, young)
     steps, high = _steps(bed), 3 * BLOCK[2] * GRAIN
-    lines = ["grains of hedgebed\n", f"{len(radii)} atoms", "1 atom types\n"]
-    lines += [f"0 {bed.size[0]:.17g} xlo xhi", f"0 {bed.size[1]:.17g} ylo yhi", f"0 {high:.17g} zlo zhi\n", "Atoms\n"]
-    lines += [
-        f"{i} 1 {2 * r:.17g} {stuff.density:g} " + " ".join(f"{v:.17g}" for v in place)
-        for i, (r, place) in enumerate(zip(radii, places, strict=True), 1)
-    ]
+    data = data_file(box_of(*bed.size[:2], high), spheres(radii, places, stuff.density))
     law, floor = lammps_law(stuff, young, GRAIN), lammps_law(stuff, young, GRAIN, friction=ROUGH)
     deck = [
         "units si", "atom_style sphere", "comm_modify vel yes", "boundary p p f", "newton off", "read_data grains.data",
@@ -124,7 +119,7 @@ def in_lammps(stuff: Material, block: tuple[Any, ...]) -> Heap:
         f"dump last all custom {steps} dump.txt id x y z vx vy vz",
         "dump_modify last sort id first no format float %.17g", f"run {steps}",
     ]  # fmt: skip
-    text = run_peer("lammps", "\n".join(lines) + "\n", "\n".join(deck) + "\n", "dump.txt", limit=LIMIT)
+    text = run_peer("lammps", data, "\n".join(deck) + "\n", "dump.txt", limit=LIMIT)
     rows = np.array([line.split()[1:] for line in text.split("ITEM: ATOMS")[-1].splitlines()[1:]], dtype=float)
     mass = stuff.density * 4 / 3 * math.pi * radii**3
     energy = 0.5 * float(mass @ (rows[:, 3:] ** 2).sum(axis=1)) / float(mass.sum()) / (GRAVITY * GRAIN)
@@ -135,7 +130,7 @@ def in_lammps(stuff: Material, block: tuple[Any, ...]) -> Heap:
 
 def _compute(tell: Tell) -> Outcome:
     if PEERS["lammps"].find() is None:
-        return Outcome(skipped=f"LAMMPS is not installed (apt install {PEERS['lammps'].package})")
+        return PEERS["lammps"].lacking()
     block = _block(replace(SAND, name="slump"))
     tell(0.3)
     rows, curves, words = [], [], []

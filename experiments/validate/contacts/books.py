@@ -1,6 +1,7 @@
 """Many grains: the books of momentum, angular momentum and energy; the floor carries the weight."""
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,7 @@ import numpy as np
 from dem import Bed, Material
 from dem.contact.law import effective_moduli
 from experiments.validate.base import cloud
-from experiments.validate.base.case import Comparison, Compute, Curve, Outcome, Plot, Tell, near_zero, told
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, told
 from experiments.validate.base.energy import Book, keep_book
 from experiments.validate.base.spheres import RADIUS
 
@@ -19,8 +20,11 @@ ROUGH = Material("grain", 2600, 1e7, 0.25, 0.5, 0.6, 0.15)
 GAS = Material("gas", 2600, 1e6, 0.25, 0.0, 1.0)
 
 
-def cluster(material: Material, *, flat: bool = False, gravity: Any = 0.0, **options: Any) -> Bed:
-    """Sixteen grains of 2.5 mm near the middle of the box that fly at one another; ``flat``: a gas in one plane."""
+def cluster(material: Material, *, flat: bool = False, gravity: Any = 0.0, spin: float = 100.0, **options: Any) -> Bed:
+    """Sixteen grains of 2.5 mm near the middle of the box that fly at one another; ``flat``: a gas in one plane.
+
+    ``spin``: standard deviation of each component [rad/s].
+    """
     rng = np.random.default_rng(5)
     i = np.arange(CLUSTER_SIZE)
     spins = None
@@ -32,7 +36,7 @@ def cluster(material: Material, *, flat: bool = False, gravity: Any = 0.0, **opt
         lattice = np.column_stack([i % 2, i // 2 % 2, i // 4]) * 0.0052
         positions = lattice + [0.0224, 0.0224, 0.02] + rng.uniform(0, 1e-4, (16, 3))
         velocities = (positions.mean(axis=0) - positions) * 40 + rng.normal(0, 0.1, (16, 3))
-        spins = rng.normal(0, 100, (16, 3))
+        spins = rng.normal(0, spin, (16, 3)) if spin else None
     return Bed.from_grains(
         material, positions=positions, radii=np.full(CLUSTER_SIZE, RADIUS), velocities=velocities, spins=spins,
         size=(0.05, 0.05, 0.05), height=0.08, gravity=gravity, floor=False, max_overlap=0.2, **options,
@@ -65,22 +69,23 @@ def _momentum(tell: Tell) -> Outcome:
     )
 
 
+def moments(bed: Bed) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Momentum, angular momentum about the origin and own angular momentum of each grain, SI, [grain_count, 3]."""
+    g = bed.grains()
+    momentum = g.mass[:, None] * g.velocity
+    return momentum, np.cross(g.position, momentum), 0.4 * (g.mass * g.radius**2)[:, None] * g.spin
+
+
 def _angular_momentum(tell: Tell) -> Outcome:
     """The sum of x x m v + I w of a cluster that reaches no boundary; pairs' torques balance at the contact point."""
     bed = cluster(ROUGH, time_step=4e-6)
-
-    def moments() -> tuple[np.ndarray, np.ndarray]:
-        g = bed.grains()
-        orbital = np.cross(g.position, g.mass[:, None] * g.velocity)
-        return orbital, 0.4 * (g.mass * g.radius**2)[:, None] * g.spin
-
-    orbital, own = moments()
+    _, orbital, own = moments(bed)
     for part in range(5):
         bed.advance(200)
         tell((part + 1) / 5)
-    later = moments()
-    change = (later[0] + later[1] - orbital - own).sum(axis=0)
-    moved = np.abs(later[1] - own).max() / np.abs(own).max()
+    _, later, own_later = moments(bed)
+    change = (later + own_later - orbital - own).sum(axis=0)
+    moved = np.abs(own_later - own).max() / np.abs(own).max()
     return Outcome(
         [near_zero("change over the sum of |x x m v|", np.abs(change).max() / np.abs(orbital).sum(), 1e-13)],
         remarks=[f"The grains' own angular momenta change by up to {100 * moved:.0f} % of the largest."],
@@ -123,33 +128,30 @@ _DURATION = 0.004  # from the first collision to dispersal [s]
 _STRONG = (30.0, 0.0, -100.0)  # gravity that does as much work in that time as the collisions [m/s2]
 
 
-def _energy(material: Material, *, gravity: Any = 0.0, tensile: bool = False) -> Compute:
-    def compute(tell: Tell) -> Outcome:
-        books: list[Book] = []
-        for k, step in enumerate((4e-6, 2e-6)):
-            bed = cluster(material, gravity=gravity, time_step=step, tensile=tensile)
-            books.append(keep_book(bed, round(_DURATION / step), tensile=tensile))
-            tell((1 + 2 * k) / 3)
-        fine = books[1]
-        first = fine.parts["kinetic"][0]
-        gaps = [float(np.abs(book.gap).max() / first) for book in books]
-        off = max(book.force_error for book in books)
-        back = max(fine.given_back(part) for part in ("damped", "rubbed", "turned")) / first
-        rows = [
-            near_zero("gap of the book over the first energy, steps of 4 us", gaps[0], 1e-3),
-            Comparison("order of the gap in the step", "1", 2.0, math.log2(gaps[0] / gaps[1]), 0.5, False),
-            near_zero("force on a grain: the bed's less the law's, over the largest", off, 1e-9),
-            near_zero("what a dashpot or friction gives back, over the first energy", back, 1e-3),
-        ]
-        named = {key: name for key, name in PARTS.items() if key in fine.parts}
-        shares = {name: fine.parts[key][-1] / first for key, name in named.items()}
-        said = ", ".join(f"{100 * share:.2f} % {name}" for name, share in shares.items())
-        curves = [Curve(name, 1e3 * fine.time, fine.parts[key] / first, False) for key, name in named.items()]
-        curves.append(Curve("sum", 1e3 * fine.time, fine.total / first))
-        plot = Plot("Where the energy goes", "time [ms]", "share of the first energy [1]", curves)
-        return Outcome(rows, [plot], [f"Of the first energy at the end: {said}."])
-
-    return compute
+def _energy(material: Material, tell: Tell, *, gravity: Any = 0.0, tensile: bool = False) -> Outcome:
+    books: list[Book] = []
+    for k, step in enumerate((4e-6, 2e-6)):
+        bed = cluster(material, gravity=gravity, time_step=step, tensile=tensile)
+        books.append(keep_book(bed, round(_DURATION / step), tensile=tensile))
+        tell((1 + 2 * k) / 3)
+    fine = books[1]
+    first = fine.parts["kinetic"][0]
+    gaps = [float(np.abs(book.gap).max() / first) for book in books]
+    off = max(book.force_error for book in books)
+    back = max(fine.given_back(part) for part in ("damped", "rubbed", "turned")) / first
+    rows = [
+        near_zero("gap of the book over the first energy, steps of 4 us", gaps[0], 1e-3),
+        Comparison("order of the gap in the step", "1", 2.0, math.log2(gaps[0] / gaps[1]), 0.5, False),
+        near_zero("force on a grain: the bed's less the law's, over the largest", off, 1e-9),
+        near_zero("what a dashpot or friction gives back, over the first energy", back, 1e-3),
+    ]
+    named = {key: name for key, name in PARTS.items() if key in fine.parts}
+    shares = {name: fine.parts[key][-1] / first for key, name in named.items()}
+    said = ", ".join(f"{100 * share:.2f} % {name}" for name, share in shares.items())
+    curves = [Curve(name, 1e3 * fine.time, fine.parts[key] / first, False) for key, name in named.items()]
+    curves.append(Curve("sum", 1e3 * fine.time, fine.total / first))
+    plot = Plot("Where the energy goes", "time [ms]", "share of the first energy [1]", curves)
+    return Outcome(rows, [plot], [f"Of the first energy at the end: {said}."])
 
 
 def settled_cloud() -> Bed:
@@ -182,12 +184,9 @@ def _floor_weight(tell: Tell) -> Outcome:
 _ROUGH_WITHOUT_ROLLING = {"energy-hertz": (0.0, 0.6), "energy-undamped": (0.5, 1.0), "energy-friction": (0.5, 0.6)}
 """Friction and restitution [1]."""
 CASES = {
-    "momentum": _momentum,
-    "angular-momentum": _angular_momentum,
-    "energy-elastic": _elastic_gas,
-    **{id: _energy(Material(id, 2600, 1e7, 0.25, *given)) for id, given in _ROUGH_WITHOUT_ROLLING.items()},
-    "energy-rolling": _energy(ROUGH),
-    "energy-tensile": _energy(Material("tensile", 2600, 1e7, 0.25, 0.5, 0.6), tensile=True),
-    "energy-gravity": _energy(ROUGH, gravity=_STRONG),
-    "floor-weight": _floor_weight,
-}
+    "momentum": _momentum, "angular-momentum": _angular_momentum, "energy-elastic": _elastic_gas,
+    **{id: partial(_energy, Material(id, 2600, 1e7, 0.25, *given)) for id, given in _ROUGH_WITHOUT_ROLLING.items()},
+    "energy-rolling": partial(_energy, ROUGH),
+    "energy-tensile": partial(_energy, Material("tensile", 2600, 1e7, 0.25, 0.5, 0.6), tensile=True),
+    "energy-gravity": partial(_energy, ROUGH, gravity=_STRONG), "floor-weight": _floor_weight,
+}  # fmt: skip

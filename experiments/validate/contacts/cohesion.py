@@ -6,6 +6,7 @@ w = 2 gamma is the work of adhesion. The closed forms are written anew here, JKR
 """
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,10 @@ from dem import Bed, Material
 from dem.contact.law import effective_moduli
 from dem.engine.energy import bed_energies
 from experiments.runs.types import Json
-from experiments.validate.base.case import Comparison, Compute, Curve, Outcome, Plot, Tell, near_zero
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero
 from experiments.validate.base.spheres import RADIUS, SIXTEEN, mass_of, plane_modulus, row_of_grains
+
+from .books import PARTS, cluster, moments
 
 __all__ = ["CASES", "Law"]
 
@@ -90,34 +93,26 @@ def _bed(material: Material, heights: np.ndarray, **options: Any) -> Bed:
     return Bed.from_grains(material, positions=positions, **chosen)
 
 
-def _pull_off(name: str) -> Compute:
-    def compute(tell: Tell) -> Outcome:
-        law = Law(name, RADIUS, STAR["plane"])
-        reach = law.free if name == "dmt" else -law.end
-        overlap = reach * np.concatenate([[-0.98, -0.9, -0.7, -0.4, -0.1, 0.01, 0.1], np.geomspace(0.2, 10, 9)])
-        found = _bed(_stuff(name), RADIUS - overlap).grains().force[:, 2]
-        closed = np.array([law.force(d) for d in overlap])
-        rows = [
-            near_zero(
-                "force over the floor, 16 overlaps: largest difference over the pull-off force",
-                np.abs(found - closed).max() / law.pull,
-                1e-9,
-            )
-        ]
-        tell(0.2)
-        rows += [_parting(name, law), _hanging(name)]
-        tell(0.6)
-        rows += _no_load(name)
-        tell(0.8)
-        rows += _sliding(name, law)
-        line = np.linspace(law.end - 0.1 * reach, 10 * reach, 300)
-        curves = [
-            Curve("closed form", 1e6 * line, [1e3 * law.force(d) for d in line], False),
-            Curve("bed", 1e6 * overlap, 1e3 * found),
-        ]
-        return Outcome(rows, [Plot("Force of a grain on the floor", "overlap [um]", "force [mN]", curves)])
-
-    return compute
+def _pull_off(name: str, tell: Tell) -> Outcome:
+    law = Law(name, RADIUS, STAR["plane"])
+    reach = law.free if name == "dmt" else -law.end
+    overlap = reach * np.concatenate([[-0.98, -0.9, -0.7, -0.4, -0.1, 0.01, 0.1], np.geomspace(0.2, 10, 9)])
+    found = _bed(_stuff(name), RADIUS - overlap).grains().force[:, 2]
+    closed = np.array([law.force(d) for d in overlap])
+    off = np.abs(found - closed).max() / law.pull
+    rows = [near_zero("force over the floor, 16 overlaps: largest difference over the pull-off force", off, 1e-9)]
+    tell(0.2)
+    rows += [_parting(name, law), _hanging(name)]
+    tell(0.6)
+    rows += _no_load(name)
+    tell(0.8)
+    rows += _sliding(name, law)
+    line = np.linspace(law.end - 0.1 * reach, 10 * reach, 300)
+    curves = [
+        Curve("closed form", 1e6 * line, [1e3 * law.force(d) for d in line], False),
+        Curve("bed", 1e6 * overlap, 1e3 * found),
+    ]
+    return Outcome(rows, [Plot("Force of a grain on the floor", "overlap [um]", "force [mN]", curves)])
 
 
 def _parting(name: str, law: Law) -> Comparison:
@@ -126,10 +121,9 @@ def _parting(name: str, law: Law) -> Comparison:
     overlap = law.end + scale * np.linspace(-4e-4, 4.1e-4, SIXTEEN)
     held = np.abs(_bed(_stuff(name), RADIUS - overlap).grains().force[:, 2]) > 0
     least = 0.5 * (overlap[held].min() + overlap[~held].max())
-    quantity = "overlap at which it parts, over that at no load" if name == "dmt" else "distance at which it parts"
     if name == "dmt":
-        return near_zero(quantity, least / law.free, 1e-4)
-    return Comparison(quantity, "um", -1e6 * law.end, -1e6 * least, 1e-4)
+        return near_zero("overlap at which it parts, over that at no load", least / law.free, 1e-4)
+    return Comparison("distance at which it parts", "um", -1e6 * law.end, -1e6 * least, 1e-4)
 
 
 def _hanging(name: str) -> Comparison:
@@ -145,10 +139,8 @@ def _hanging(name: str) -> Comparison:
     load = share**2  # of the weight over the pull-off force, as r^3 / r
     found = 0.5 * float(load[~fell].max() + load[fell].min()) if fell.any() and not fell.all() else math.nan
     closed = pull * math.pi * GAMMA * RADIUS
-    return Comparison(
-        "pull-off, by the heaviest that hangs and the lightest that falls", "mN", 1e3 * closed, 1e3 * closed * found,
-        3e-3,
-    )  # fmt: skip
+    about = "pull-off, by the heaviest that hangs and the lightest that falls"
+    return Comparison(about, "mN", 1e3 * closed, 1e3 * closed * found, 3e-3)
 
 
 def _hung(law: Law, force: float) -> float:
@@ -186,34 +178,16 @@ def _sliding(name: str, law: Law) -> list[Comparison]:
     mu, rows = 0.2, []
     for share, band in ((0.98, 0.02), (1.5, 2e-3)):
         pull = share * mu * law.load / MASS
-        bed = _bed(
-            _stuff(name, friction=mu, rolling_friction=5.0),
-            np.full(SIXTEEN, RADIUS - law.free),
-            gravity=(pull, 0.0, 0.0),
-        )
+        stuff = _stuff(name, friction=mu, rolling_friction=5.0)
+        bed = _bed(stuff, np.full(SIXTEEN, RADIUS - law.free), gravity=(pull, 0.0, 0.0))
         bed.advance(round(0.02 / bed.time_step))
         first, start = bed.grains().velocity, bed.time
         bed.advance(round(0.02 / bed.time_step))
         found = (bed.grains().velocity - first)[:, 0] / (bed.time - start) / pull
         closed = max(0.0, 1 - 1 / share)
-        rows.append(Comparison(
-            f"acceleration at {share:g} of mu load, over the pull's", "1", closed, _furthest(found, closed), band,
-            False,
-        ))  # fmt: skip
+        about = f"acceleration at {share:g} of mu load, over the pull's"
+        rows.append(Comparison(about, "1", closed, _furthest(found, closed), band, False))
     return rows
-
-
-def _cluster(material: Material, step: float, spin: float) -> Bed:
-    """Sixteen grains that fly at one another near the middle of the box; no gravity, no floor."""
-    rng, i = np.random.default_rng(5), np.arange(SIXTEEN)
-    positions = np.column_stack([i % 2, i // 2 % 2, i // 4]) * 0.0052
-    positions = positions + [0.0224, 0.0224, 0.02] + rng.uniform(0, 1e-4, (SIXTEEN, 3))
-    velocities = (positions.mean(axis=0) - positions) * 40 + rng.normal(0, 0.1, (SIXTEEN, 3))
-    return Bed.from_grains(
-        material, positions=positions, radii=np.full(SIXTEEN, RADIUS), velocities=velocities,
-        spins=rng.normal(0, spin, (SIXTEEN, 3)) if spin else None, size=(0.05, 0.05, 0.05), height=0.08, gravity=0.0,
-        floor=False, max_overlap=0.2, time_step=step,
-    )  # fmt: skip
 
 
 def _energy(bed: Bed, law: Law) -> float:
@@ -222,75 +196,55 @@ def _energy(bed: Bed, law: Law) -> float:
     return bed.kinetic_energy + law.stored(2 * RADIUS - np.linalg.norm(x[i] - x[j], axis=1))
 
 
-def _books(name: str) -> Compute:
-    def compute(tell: Tell) -> Outcome:
-        law, curves = Law(name, REDUCED["pair"], STAR["pair"]), []
-        drifts = []
-        steps = (2e-6, 1e-6)
-        for k, step in enumerate(steps):
-            bed = _cluster(_stuff(name, friction=0.0, restitution=1.0, rolling_friction=0.0), step, 0.0)
-            first, energies, times = _energy(bed, law), [], []
-            for _ in range(30):
-                bed.advance(round(1e-4 / step))
-                energies.append(_energy(bed, law) / first - 1)
-                times.append(1e3 * bed.time)
-            drifts.append(float(np.abs(energies).max()))
-            curves.append(Curve(f"elastic, dt = {1e6 * step:g} us", times, energies))
-            tell(0.4 * (k + 1))
-        bed = _cluster(_stuff(name), 4e-6, 100.0)
-
-        def moments() -> tuple[np.ndarray, np.ndarray, float]:
-            g = bed.grains()
-            orbital = np.cross(g.position, g.mass[:, None] * g.velocity)
-            own = 0.4 * (g.mass * g.radius**2)[:, None] * g.spin
-            return (g.mass[:, None] * g.velocity).sum(axis=0), (orbital + own).sum(axis=0), np.abs(orbital).sum()
-
-        before, energies, times = moments(), [_energy(bed, law)], [0.0]
-        speed = float((bed.grains().mass * np.linalg.norm(bed.grains().velocity, axis=1)).sum())
-        for _ in range(40):
-            bed.advance(25)
-            energies.append(_energy(bed, law))
+def _books(name: str, tell: Tell) -> Outcome:
+    law, curves = Law(name, REDUCED["pair"], STAR["pair"]), []
+    drifts = []
+    steps = (2e-6, 1e-6)
+    for k, step in enumerate(steps):
+        bed = cluster(_stuff(name, friction=0.0, restitution=1.0, rolling_friction=0.0), time_step=step, spin=0.0)
+        first, energies, times = _energy(bed, law), [], []
+        for _ in range(30):
+            bed.advance(round(1e-4 / step))
+            energies.append(_energy(bed, law) / first - 1)
             times.append(1e3 * bed.time)
-        after = moments()
-        curves.append(Curve("rough and damped", times, np.array(energies) / energies[0] - 1))
-        rows = [
-            near_zero(
-                f"elastic: largest drift at dt = {1e6 * step:g} us, over the energy", drift, 2e-4 * step / steps[1]
-            )
-            for step, drift in zip(steps, drifts, strict=True)
-        ]
-        rows += [
-            near_zero(
-                "rough: change of momentum over the sum of m v",
-                float(np.abs(after[0] - before[0]).max()) / speed,
-                1e-13,
-            ),
-            near_zero(
-                "rough: change of angular momentum over the sum of |x x m v|",
-                np.abs(after[1] - before[1]).max() / before[2],
-                1e-13,
-            ),
-            near_zero(
-                "rough: largest rise of the energy in 0.1 ms, over the first",
-                max(0.0, float(np.diff(energies).max() / energies[0])),
-                1e-3,
-            ),
-        ]
-        closed, more, remark = _closed(name, tell)
-        return Outcome(
-            rows + closed,
-            [Plot("Kinetic, elastic and surface energy", "time [ms]", "change over the first", curves), more],
-            [remark],
-        )
-
-    return compute
+        drifts.append(float(np.abs(energies).max()))
+        curves.append(Curve(f"elastic, dt = {1e6 * step:g} us", times, energies))
+        tell(0.4 * (k + 1))
+    bed = cluster(_stuff(name), time_step=4e-6)
+    before, energies, times = moments(bed), [_energy(bed, law)], [0.0]
+    speed = float((bed.grains().mass * np.linalg.norm(bed.grains().velocity, axis=1)).sum())
+    for _ in range(40):
+        bed.advance(25)
+        energies.append(_energy(bed, law))
+        times.append(1e3 * bed.time)
+    after = moments(bed)
+    curves.append(Curve("rough and damped", times, np.array(energies) / energies[0] - 1))
+    orbital = np.abs(before[1]).sum()
+    pushed = float(np.abs(after[0].sum(axis=0) - before[0].sum(axis=0)).max()) / speed
+    turned = np.abs((after[1] + after[2]).sum(axis=0) - (before[1] + before[2]).sum(axis=0)).max() / orbital
+    rise = max(0.0, float(np.diff(energies).max() / energies[0]))
+    rows = [
+        near_zero(f"elastic: largest drift at dt = {1e6 * step:g} us, over the energy", drift, 2e-4 * step / steps[1])
+        for step, drift in zip(steps, drifts, strict=True)
+    ]
+    rows += [
+        near_zero("rough: change of momentum over the sum of m v", pushed, 1e-13),
+        near_zero("rough: change of angular momentum over the sum of |x x m v|", turned, 1e-13),
+        near_zero("rough: largest rise of the energy in 0.1 ms, over the first", rise, 1e-3),
+    ]
+    closed, more, remark = _closed(name, tell)
+    return Outcome(
+        rows + closed,
+        [Plot("Kinetic, elastic and surface energy", "time [ms]", "change over the first", curves), more],
+        [remark],
+    )
 
 
 def _closed(name: str, tell: Tell) -> tuple[list[Comparison], Plot, str]:
     """The bed's own book of the rough cluster: what is held and what contacts took is the first energy."""
     gaps, steps = [], (4e-6, 2e-6)
     for k, step in enumerate(steps):
-        bed = _cluster(_stuff(name), step, 100.0)
+        bed = cluster(_stuff(name), time_step=step)
         bed.track_contact_work()
         rows = []
         for _ in range(41):
@@ -303,12 +257,9 @@ def _closed(name: str, tell: Tell) -> tuple[list[Comparison], Plot, str]:
         total = np.sum(parts, axis=0)
         gaps.append(float(np.abs(total - total[0]).max() / total[0]))
         tell(0.9 + 0.05 * (k + 1))
+    about = "rough: gap of the book over the first energy, steps of"
     found = [
-        near_zero(
-            f"rough: gap of the book over the first energy, steps of {1e6 * step:g} us",
-            gap,
-            2e-4 * (step / steps[0]) ** 2,
-        )
+        near_zero(f"{about} {1e6 * step:g} us", gap, 2e-4 * (step / steps[0]) ** 2)
         for step, gap in zip(steps, gaps, strict=True)
     ]
     curves = [Curve(words, time, part / total[0], False) for words, part in zip(_PARTS, parts, strict=True)]
@@ -318,19 +269,9 @@ def _closed(name: str, tell: Tell) -> tuple[list[Comparison], Plot, str]:
     return found, Plot("Book of the rough cluster, steps of 2 us", "time [ms]", "over the first energy", curves), remark
 
 
-_PARTS = (
-    "kinetic",
-    "in normal springs and surfaces",
-    "in tangential springs",
-    "in rolling and twisting springs",
-    "lost to normal dashpots",
-    "lost to tangential forces",
-    "lost to rolling and twisting",
-)
+_PARTS = ["kinetic", "in normal springs and surfaces", *list(PARTS.values())[2:7]]
 
 CASES = {
-    "dmt": _pull_off("dmt"),
-    "jkr": _pull_off("jkr"),
-    "energy-dmt": _books("dmt"),
-    "energy-jkr": _books("jkr"),
+    **{law: partial(_pull_off, law) for law in ("dmt", "jkr")},
+    **{f"energy-{law}": partial(_books, law) for law in ("dmt", "jkr")},
 }

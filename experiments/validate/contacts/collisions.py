@@ -1,11 +1,13 @@
 """Elastic collisions along the normal: Chung & Ooi's T1 to T3, and the force over the whole of a contact."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from functools import partial
 
 import numpy as np
 
 from dem import Bed, Material
 from dem.contact.law import effective_moduli
+from experiments.runs.types import Json
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, told
 from experiments.validate.base.spheres import ALUMINA, CAST_IRON, RADIUS, hertz, mass_of, plane_modulus, row_of_grains
 
@@ -94,6 +96,15 @@ def on_a_plane(name: str) -> list[Comparison]:
     return _rows(name, (bed.max_overlap * 2 * LARGE, force, time), closed, published)
 
 
+def _thrown_down(name: str, numbers: Json, speed: float, step: float) -> Bed:
+    """Spheres of T3 about to meet the floor."""
+    positions, radii, options = row_of_grains()
+    return Bed.from_grains(
+        Material(name, friction=0.3, restitution=1.0, **numbers), positions=positions, radii=radii,
+        velocities=np.tile([0.0, 0.0, -speed], (16, 1)), time_step=step, **options,
+    )  # fmt: skip
+
+
 def small_on_a_plane(name: str) -> list[Comparison]:
     """T3's elastic part: a sphere of 2.5 mm on a rigid plane at 3.9 m/s."""
     numbers, published = T3[name]
@@ -101,11 +112,7 @@ def small_on_a_plane(name: str) -> list[Comparison]:
     closed = hertz(
         mass_of(numbers["density"], RADIUS), RADIUS, plane_modulus(numbers["young"], numbers["poisson"]), speed
     )
-    positions, radii, options = row_of_grains()
-    bed = Bed.from_grains(
-        Material(name, friction=0.3, restitution=1.0, **numbers), positions=positions, radii=radii,
-        velocities=np.tile([0.0, 0.0, -speed], (16, 1)), time_step=closed[2] / STEPS, **options,
-    )  # fmt: skip
+    bed = _thrown_down(name, numbers, speed, closed[2] / STEPS)
 
     def gap(grains):
         return grains.position[0, 2] - RADIUS, grains.velocity[0, 2]
@@ -120,11 +127,7 @@ def force_curve(tell: Tell) -> Outcome:
     speed = 3.9
     star = plane_modulus(ALUMINA["young"], ALUMINA["poisson"])
     overlap, force, time, k = hertz(mass_of(ALUMINA["density"], RADIUS), RADIUS, star, speed)
-    positions, radii, options = row_of_grains()
-    bed = Bed.from_grains(
-        Material("alumina", friction=0.3, restitution=1.0, **ALUMINA), positions=positions, radii=radii,
-        velocities=np.tile([0.0, 0.0, -speed], (16, 1)), time_step=time / 200, **options,
-    )  # fmt: skip
+    bed = _thrown_down("alumina", ALUMINA, speed, time / 200)
     found = []
     for _ in range(200):
         bed.advance(1)
@@ -134,35 +137,21 @@ def force_curve(tell: Tell) -> Outcome:
     delta, pushed = delta[delta > 0], pushed[delta > 0]
     worst = float(np.abs(pushed - k * delta**1.5).max())
     line = np.linspace(0, overlap, 100)
+    curves = [
+        Curve("4/3 E* sqrt(R*) delta^1.5", 1e6 * line, k * line**1.5, False),
+        Curve("bed", 1e6 * delta, pushed),
+    ]
     return Outcome(
         [near_zero("largest departure from k delta^1.5, over the largest force", worst / force, 1e-9)],
-        [
-            Plot(
-                "Force over overlap, in and out",
-                "overlap [um]",
-                "force [N]",
-                [
-                    Curve("4/3 E* sqrt(R*) delta^1.5", 1e6 * line, k * line**1.5, False),
-                    Curve("bed", 1e6 * delta, pushed),
-                ],
-            )
-        ],
+        [Plot("Force over overlap, in and out", "overlap [um]", "force [N]", curves)],
     )
 
 
-def _all(measure: Callable[[str], list[Comparison]], names) -> Callable:
-    def compute(tell: Tell) -> Outcome:
-        rows: list[Comparison] = []
-        for name in told(names, tell):
-            rows += measure(name)
-        return Outcome(rows)
-
-    return compute
+def _all(measure: Callable[[str], list[Comparison]], names: Iterable[str], tell: Tell) -> Outcome:
+    return Outcome([row for name in told(names, tell) for row in measure(name)])
 
 
 CASES = {
-    "hertz-force": force_curve,
-    "t1": _all(head_on, T1),
-    "t2": _all(on_a_plane, T2),
-    "t3-elastic": _all(small_on_a_plane, T3),
-}
+    "hertz-force": force_curve, "t1": partial(_all, head_on, T1), "t2": partial(_all, on_a_plane, T2),
+    "t3-elastic": partial(_all, small_on_a_plane, T3),
+}  # fmt: skip

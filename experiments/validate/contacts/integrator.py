@@ -1,13 +1,14 @@
 """The order of the integrator: collisions against the equations of motion integrated by another method."""
 
 import math
+from functools import partial
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from dem import Bed, Grains, Material
 from dem.contact.law import effective_moduli
-from experiments.validate.base.case import Comparison, Compute, Curve, Outcome, Plot, Tell, near_zero, told
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, told
 from experiments.validate.base.spheres import RADIUS, SIXTEEN, hertz, mass_of, row_of_grains
 
 from .words import say
@@ -82,19 +83,14 @@ def _orders_of_the_scheme() -> tuple[float, float]:
     star, shear = effective_moduli(YOUNG, POISSON, YOUNG, POISSON)
     time = 0.7 * hertz(m / 2, RADIUS / 2, star, 1.0)[2]
     start, _, _ = oblique_pair(time / COUNTS[0], steps=0)
-    y0 = np.concatenate(
-        [getattr(start, k)[i] for i in (0, 5) for k in ("position", "velocity", "spin")] + [np.zeros(3)]
-    )
+    y0 = _unknowns(start)
     exact = _reference(y0, time, m, RADIUS, star, shear)
-    errors = np.array(
-        [
-            [
-                np.abs(staggered_pair(y0, time, n, m, RADIUS, middle=at)[[0, 3]] - exact[[0, 3]]).max()
-                for at in (False, True)
-            ]
-            for n in COUNTS[-2:]
-        ]
-    )
+
+    def off(steps: int, middle: bool) -> float:
+        found = staggered_pair(y0, time, steps, m, RADIUS, middle=middle)
+        return np.abs(found[[0, 3]] - exact[[0, 3]]).max()
+
+    errors = np.array([[off(steps, at) for at in (False, True)] for steps in COUNTS[-2:]])
     end, middle = np.log2(errors[0] / errors[1])
     return float(end), float(middle)
 
@@ -139,10 +135,7 @@ def errors_of_pair(along: bool) -> tuple[np.ndarray, np.ndarray]:
     for count in COUNTS:
         start, after, _ = oblique_pair(0.7 * contact / count, steps=count, along=along)
         if count == COUNTS[0]:
-            y0 = np.concatenate(
-                [getattr(start, k)[i] for i in (0, 5) for k in ("position", "velocity", "spin")] + [np.zeros(3)]
-            )
-            y = _reference(y0, 0.7 * contact, m, RADIUS, star, shear)
+            y = _reference(_unknowns(start), 0.7 * contact, m, RADIUS, star, shear)
         errors.append(
             [
                 np.abs(after.velocity[[0, 5]] - y[[1, 4]]).max(),
@@ -154,28 +147,25 @@ def errors_of_pair(along: bool) -> tuple[np.ndarray, np.ndarray]:
     return found, -np.polyfit(np.log(COUNTS), np.log(found), 1)[0]
 
 
-def _order(along: bool) -> Compute:
-    def compute(tell: Tell) -> Outcome:
-        errors, slopes = errors_of_pair(along)
-        band = 0.1 if along else 0.25
-        rows = [
-            Comparison(f"order of the {name}'s error", "1", 2.0, slope, band, False)
-            for name, slope in zip(QUANTITIES, slopes, strict=False)
-        ]
-        coarsest = 2e-4 if along else 3e-4
-        rows.append(near_zero("largest error at 50 steps", errors[0].max(), coarsest, "m/s"))
-        rows.append(near_zero("largest error at 400 steps", errors[-1].max(), 6e-6, "m/s"))
-        counts = np.array(COUNTS)
-        curves = [Curve("order 2", counts, errors[0].max() * (counts[0] / counts) ** 2.0, False)]
-        curves += [Curve(name, counts, column) for name, column in zip(QUANTITIES, errors.T, strict=False)]
-        remarks = []
-        if not along:
-            end, middle = _orders_of_the_scheme()
-            remarks.append(say("scheme_order", middle=middle, end=end))
-        plot = Plot("Error at seven tenths of a contact", "steps", "error [m/s]", curves, log="xy")
-        return Outcome(rows, [plot], remarks)
-
-    return compute
+def _order(along: bool, tell: Tell) -> Outcome:
+    errors, slopes = errors_of_pair(along)
+    band = 0.1 if along else 0.25
+    rows = [
+        Comparison(f"order of the {name}'s error", "1", 2.0, slope, band, False)
+        for name, slope in zip(QUANTITIES, slopes, strict=False)
+    ]
+    coarsest = 2e-4 if along else 3e-4
+    rows.append(near_zero("largest error at 50 steps", errors[0].max(), coarsest, "m/s"))
+    rows.append(near_zero("largest error at 400 steps", errors[-1].max(), 6e-6, "m/s"))
+    counts = np.array(COUNTS)
+    curves = [Curve("order 2", counts, errors[0].max() * (counts[0] / counts) ** 2.0, False)]
+    curves += [Curve(name, counts, column) for name, column in zip(QUANTITIES, errors.T, strict=False)]
+    remarks = []
+    if not along:
+        end, middle = _orders_of_the_scheme()
+        remarks.append(say("scheme_order", middle=middle, end=end))
+    plot = Plot("Error at seven tenths of a contact", "steps", "error [m/s]", curves, log="xy")
+    return Outcome(rows, [plot], remarks)
 
 
 def _bouncing(tell: Tell) -> Outcome:
@@ -210,4 +200,4 @@ def _bouncing(tell: Tell) -> Outcome:
     )
 
 
-CASES = {"order-head-on": _order(along=True), "order-oblique": _order(along=False), "order-rebound": _bouncing}
+CASES = {"order-head-on": partial(_order, True), "order-oblique": partial(_order, False), "order-rebound": _bouncing}

@@ -96,26 +96,14 @@ def _neck(tell: Tell) -> Outcome:
         tell((done + 1) / len(RATIOS))
         closed = rolling_angle(ratio, times)
         scale = math.degrees(1.0)
-        rows.append(
-            Comparison(
-                f"way rolled, ratio {ratio}", "deg", scale * (closed[-1] - START), scale * (angles[-1] - START), 0.02
-            )
-        )
+        way = scale * (closed[-1] - START), scale * (angles[-1] - START)
+        rows.append(Comparison(f"way rolled, ratio {ratio}", "deg", *way, 0.02))
         rows.append(Comparison(f"spin r sin b over speed, ratio {ratio}", "1", 1.0, turn, 0.01))
         part = times / times[-1]
         curves.append(Curve(f"closed form, {ratio}", part, scale * closed, False))
         curves.append(Curve(f"bed, {ratio}", part, scale * angles))
-    return Outcome(
-        rows,
-        [
-            Plot(
-                "A small grain rolls off the neck of two balls",
-                "time over the whole [1]",
-                "angle from the top [deg]",
-                curves,
-            )
-        ],
-    )
+    title = "A small grain rolls off the neck of two balls"
+    return Outcome(rows, [Plot(title, "time over the whole [1]", "angle from the top [deg]", curves)])
 
 
 CASES = {"large-neck": _neck}

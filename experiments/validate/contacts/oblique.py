@@ -26,16 +26,7 @@ from experiments.validate.base.spheres import (
 from .microslip import tangential_restitution
 from .words import say
 
-__all__ = [
-    "ANGLES",
-    "CASES",
-    "E_N",
-    "MU",
-    "STEP",
-    "oblique",
-    "plane_contact_time",
-]
-
+__all__ = ["ANGLES", "CASES", "E_N", "MU", "STEP", "oblique", "plane_contact_time"]
 
 MU, E_N, SPEED = 0.092, 0.98, 3.9
 ANGLES = np.array([5, 10, 15, 20, 25, 30, 35, 40, 50, 60, 70, 80, 85])
@@ -142,26 +133,14 @@ def _t4_spin(tell: Tell) -> Outcome:
     slipping = spin_of(angles, np.array([_by_rings(angle) for angle in angles]))
     ten = int(np.abs(angles - 10).argmin())
     worth = _slope(angles, found, ten) / 10
+    few = slice(3)
     remarks = [
         say("figure_read", reading=reading, worth=worth, band=100 * PUBLISHED_BAND),
-        say(
-            "law_alone",
-            angle=angles[ten],
-            off=held[ten],
-            bare_off=bare[ten],
-            rms=_rms(held),
-            bare_rms=_rms(bare),
-            finer=np.abs(fine - found).max(),
-            book=100 * _book(),
-        ),
-        say(
-            "rings",
-            slipping=_listed(slipping[:3]),
-            angles=_listed(angles[:3]),
-            figure=_listed(quoted[:3]),
-            spring=_listed((bare + quoted)[:3]),
-        ),
-    ]
+        say("law_alone", angle=angles[ten], off=held[ten], bare_off=bare[ten], rms=_rms(held), bare_rms=_rms(bare),
+            finer=np.abs(fine - found).max(), book=100 * _book()),
+        say("rings", slipping=_listed(slipping[few]), angles=_listed(angles[few]), figure=_listed(quoted[few]),
+            spring=_listed((bare + quoted)[few])),
+    ]  # fmt: skip
     curves.append(Curve("rings that slip one by one", angles, slipping, False))
     return Outcome(rows, [Plot("Spin after the impact", "angle of impact [deg]", "spin [rad/s]", curves)], remarks)
 
@@ -227,21 +206,16 @@ def _t5(tell: Tell) -> Outcome:
             Material(name, density, young, poisson, T5_MU, 1.0), velocities, radius=T5_RADIUS, step=time / 300,
             time=1.5 * time, max_overlap=0.2,
         )  # fmt: skip
-        slides = T5_RATIOS > 7
-        scaled = after.spin[:, 1] * T5_RADIUS / (T5_MU * T5_SPEED)
+        slides, unit = T5_RATIOS > 7, T5_MU * T5_SPEED
+        scaled = after.spin[:, 1] * T5_RADIUS / unit
         labels = [f"tan / mu = {ratio:g}" for ratio in T5_RATIOS[slides]]
-        lost = (along - after.velocity[:, 0]) / (T5_MU * T5_SPEED)
-        rows += compared(
-            f"{name}: loss of v_t over mu v_n", labels, np.full(slides.sum(), 2.0), lost[slides], band=CLOSED_BAND
-        )
+        lost, alike = (along - after.velocity[:, 0]) / unit, np.ones(slides.sum())
+        rows += compared(f"{name}: loss of v_t over mu v_n", labels, 2 * alike, lost[slides], band=CLOSED_BAND)
         overlap = hertz(mass_of(density, T5_RADIUS), T5_RADIUS, plane_modulus(young, poisson), T5_SPEED)[0]
-        arm = overlap / T5_RADIUS  # the arm is shorter by the overlap at most
-        rows += compared(
-            f"{name}: spin r over mu v_n", labels, np.full(slides.sum(), 5.0), scaled[slides], band=CLOSED_BAND + arm
-        )
-        rows.append(
-            Comparison(f"{name}: e_n, worst", "1", 1.0, float(_worst(after.velocity[:, 2] / T5_SPEED, 1.0)), 1e-3)
-        )
+        band = CLOSED_BAND + overlap / T5_RADIUS  # the arm is shorter by the overlap at most
+        rows += compared(f"{name}: spin r over mu v_n", labels, 5 * alike, scaled[slides], band=band)
+        worst = float(_worst(after.velocity[:, 2] / T5_SPEED, 1.0))
+        rows.append(Comparison(f"{name}: e_n, worst", "1", 1.0, worst, 1e-3))
         curves.append(Curve(name, T5_RATIOS, scaled))
     return Outcome(rows, [Plot("Spin after the impact", "tan / mu [1]", "spin r / (mu v_n) [1]", curves)])
 

@@ -102,15 +102,10 @@ def _sliding(tell: Tell) -> Outcome:
     gap = np.abs(speed / (u0 - mu * GRAVITY * t) - 1)[slides].max()
     # Each grain slides until its own time, and no longer: where its speed meets 5/7 of the first.
     stop = u0 * (2 / 7) / (-np.polyfit(t[:20, 0], speed[:20, -1], 1)[0])
+    spun = (spin / np.maximum(2.5 * mu * GRAVITY * t / RADIUS, 1e-30))[1:][slides[1:]]
     rows = [
         Comparison("speed while sliding over u0 - mu g t, worst", "1", 1.0, 1 + gap, 1e-4),
-        Comparison(
-            "spin while sliding over 5/2 mu g t / r, worst",
-            "1",
-            1.0,
-            _worst((spin / np.maximum(2.5 * mu * GRAVITY * t / RADIUS, 1e-30))[1:][slides[1:]]),
-            1e-3,
-        ),
+        Comparison("spin while sliding over 5/2 mu g t / r, worst", "1", 1.0, _worst(spun), 1e-3),
         Comparison("time to rolling over 2 u0 / 7 mu g", "1", 1.0, float(stop[-1] / turning[-1]), 1e-3),
         Comparison("speed once rolling over 5/7 u0, worst", "1", 1.0, _worst((speed / (5 * u0 / 7))[rolls]), 1e-3),
         Comparison("spin r over speed once rolling, worst", "1", 1.0, _worst((spin * RADIUS / speed)[rolls]), 1e-3),

@@ -1,7 +1,7 @@
 """The restitution asked for, at any speed: with fine steps and with the bed's own, cut at zero and tensile."""
 
 import math
-from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -89,18 +89,15 @@ def staggered_rebound(
     raise RuntimeError("a collision did not end")
 
 
-def _fine(tensile: bool) -> Callable:
-    def compute(tell: Tell) -> Outcome:
-        rows, curves = [], []
-        for asked in told(RESTITUTIONS, tell):
-            found = rebound(asked, tensile, FINE_STEP)
-            worst = found[np.argmax(np.abs(found - asked))]
-            rows.append(Comparison(f"worst of 16 speeds, {asked} asked for", "1", asked, worst, _FINE_BAND, False))
-            curves.append(Curve(f"{asked:g}", SPEEDS, found - asked))
-        plot = Plot("Rebound less what was asked for", "speed [m/s]", "difference [1]", curves, log="x")
-        return Outcome(rows, [plot])
-
-    return compute
+def _fine(tensile: bool, tell: Tell) -> Outcome:
+    rows, curves = [], []
+    for asked in told(RESTITUTIONS, tell):
+        found = rebound(asked, tensile, FINE_STEP)
+        worst = found[np.argmax(np.abs(found - asked))]
+        rows.append(Comparison(f"worst of 16 speeds, {asked} asked for", "1", asked, worst, _FINE_BAND, False))
+        curves.append(Curve(f"{asked:g}", SPEEDS, found - asked))
+    plot = Plot("Rebound less what was asked for", "speed [m/s]", "difference [1]", curves, log="x")
+    return Outcome(rows, [plot])
 
 
 def _own_step(tell: Tell) -> Outcome:
@@ -109,9 +106,8 @@ def _own_step(tell: Tell) -> Outcome:
     for done, asked in enumerate(RESTITUTIONS, 1):
         found = np.array([rebound(asked, False, phase=phase) for phase in np.arange(_PHASES) / _PHASES]) - asked
         worst = found.flat[np.argmax(np.abs(found))]
-        rows.append(
-            Comparison(f"worst of 16 speeds, 8 phases, {asked} asked for", "1", asked, asked + worst, _OWN_BAND, False)
-        )
+        about = f"worst of 16 speeds, 8 phases, {asked} asked for"
+        rows.append(Comparison(about, "1", asked, asked + worst, _OWN_BAND, False))
         curves.append(Curve(f"{asked:g}", np.tile(SPEEDS, _PHASES), found.ravel()))
         means.append(f"{found.mean():+.4f} at {asked:g}")
         highest, lowest = max(highest, found.max()), min(lowest, found.min())
@@ -129,26 +125,18 @@ def _own_step(tell: Tell) -> Outcome:
         say("own_step", lowest=lowest, highest=highest, means=", ".join(means)),
         say("scheme_alone", asked=_LOW, mean=new[0, 1], most=new[1, 1], old_mean=old[0, 1], old_most=old[1, 1]),
     ]
-    return Outcome(
-        rows,
-        [
-            Plot(
-                "Rebound less what was asked for, the bed's own step", "speed [m/s]", "difference [1]", curves, log="x"
-            ),
-            Plot(
-                f"The scheme alone, e = {_LOW:g}: largest error over the phases",
-                "steps in a contact",
-                "error of the restitution [1]",
-                [Curve(label, counts, found[1]) for label, found in errors.items()],
-                log="xy",
-            ),
-        ],
-        remarks,
-    )
+    own = "Rebound less what was asked for, the bed's own step"
+    alone = f"The scheme alone, e = {_LOW:g}: largest error over the phases"
+    lines = [Curve(label, counts, found[1]) for label, found in errors.items()]
+    plots = [
+        Plot(own, "speed [m/s]", "difference [1]", curves, "x"),
+        Plot(alone, "steps in a contact", "error of the restitution [1]", lines, "xy"),
+    ]
+    return Outcome(rows, plots, remarks)
 
 
 CASES = {
-    "t3-restitution": _fine(False),
-    "restitution-tensile": _fine(True),
+    "t3-restitution": partial(_fine, False),
+    "restitution-tensile": partial(_fine, True),
     "restitution-own-step": _own_step,
 }

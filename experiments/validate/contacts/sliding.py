@@ -7,11 +7,12 @@ else; how much it does stands in the remarks, and is no error of either.
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from experiments.validate.base import peers
-from experiments.validate.base.case import Comparison, Compute, Curve, Outcome, Plot, Tell, near_zero, told
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, told
 
 from .laws import written_again
 
@@ -43,41 +44,33 @@ def _law(law: str, assembly: peers.Assembly, restitution: float, friction: float
     )  # fmt: skip
 
 
-def _case(peer: str, make: Callable[[], peers.Assembly], labels: tuple[str, ...]) -> Compute:
+def _compute(peer: str, make: Callable[[], peers.Assembly], labels: tuple[str, ...], tell: Tell) -> Outcome:
     about = peers.PEERS[peer]
-
-    def compute(tell: Tell) -> Outcome:
-        if about.find() is None:
-            return Outcome(skipped=f"{about.name} is not installed (apt install {about.package})")
-        assembly = make()
-        rows: list[Comparison] = []
-        curves: list[Curve] = []
-        remarks: list[str] = []
-        time = 1e6 * assembly.step * assembly.every * np.arange(assembly.samples)
-        for label in told(labels, tell):
-            bed, other = peers.ours(assembly, *peers.LAWS[label]), peers.theirs(peer, assembly, *peers.LAWS[label])
-            found = {
-                "bed": _differences(bed, _law("bed", assembly, *peers.LAWS[label]), assembly),
-                about.name: _differences(other, _law(peer, assembly, *peers.LAWS[label]), assembly),
-            }
-            for who, band in (("bed", _AS_UNSLID), (about.name, _ROUNDING)):
-                most = {name: float(values.max()) for name, values in found[who].items()}
-                rows += [
-                    near_zero(f"{label}, {who} beside its law: {what}", most[name], band) for name, _, what in WHAT
-                ]
-                curves.append(Curve(f"{label}: {who}, its law", time, np.maximum(found[who]["force"], 1e-17)))
-            if label == _SLIDING:
-                rows.append(_order(label, assembly, float(found["bed"]["velocity"].max())))
-            apart = _differences(bed, other, assembly)
-            curves.append(Curve(f"{label}: bed, {about.name}", time, np.maximum(apart["force"], 1e-17), False))
-            most_apart = ", ".join(f"{apart[name].max():.2g} ({what})" for name, _, what in WHAT)
-            remarks.append(f"{label}: with a law each, bed and {about.name} differ by up to {most_apart}.")
-        plot = Plot(
-            "Largest difference of a force, over the largest force", "time [us]", "difference [1]", curves, log="y"
-        )
-        return Outcome(rows, [plot], remarks)
-
-    return compute
+    if about.find() is None:
+        return about.lacking()
+    assembly = make()
+    rows: list[Comparison] = []
+    curves: list[Curve] = []
+    remarks: list[str] = []
+    time = 1e6 * assembly.step * assembly.every * np.arange(assembly.samples)
+    for label in told(labels, tell):
+        law = peers.LAWS[label]
+        bed, other = peers.ours(assembly, *law), peers.theirs(peer, assembly, *law)
+        found = {
+            "bed": _differences(bed, _law("bed", assembly, *law), assembly),
+            about.name: _differences(other, _law(peer, assembly, *law), assembly),
+        }
+        for who, band in (("bed", _AS_UNSLID), (about.name, _ROUNDING)):
+            most = {name: float(values.max()) for name, values in found[who].items()}
+            rows += [near_zero(f"{label}, {who} beside its law: {what}", most[name], band) for name, _, what in WHAT]
+            curves.append(Curve(f"{label}: {who}, its law", time, np.maximum(found[who]["force"], 1e-17)))
+        if label == _SLIDING:
+            rows.append(_order(label, assembly, float(found["bed"]["velocity"].max())))
+        apart = _differences(bed, other, assembly)
+        curves.append(Curve(f"{label}: bed, {about.name}", time, np.maximum(apart["force"], 1e-17), False))
+        most_apart = ", ".join(f"{apart[name].max():.2g} ({what})" for name, _, what in WHAT)
+        remarks.append(f"{label}: with a law each, bed and {about.name} differ by up to {most_apart}.")
+    return Outcome(rows, [Plot(*peers.LARGEST_FORCE, curves, "y")], remarks)
 
 
 def _order(label: str, assembly: peers.Assembly, coarse: float) -> Comparison:
@@ -86,14 +79,13 @@ def _order(label: str, assembly: peers.Assembly, coarse: float) -> Comparison:
     there = _law("bed", fine, *peers.LAWS[label])
     finer = float(_differences(peers.ours(fine, *peers.LAWS[label]), there, fine)["velocity"].max())
     order = math.log(coarse / finer) / math.log(_FINER)
-    return Comparison(
-        f"{label}, bed beside its law: order at which velocities come together", "1", 1.0, order, 0.1, False
-    )
+    about = f"{label}, bed beside its law: order at which velocities come together"
+    return Comparison(about, "1", 1.0, order, 0.1, False)
 
 
 _STICKING, _SLIDING = "e = 0.5, friction 50", "e = 0.5, friction 0.5"
 CASES = {
-    f"{peer}-{name}-sliding": _case(peer, make, labels)
+    f"{peer}-{name}-sliding": partial(_compute, peer, make, labels)
     for peer, labels in (("liggghts", (_SLIDING,)), ("lammps", (_STICKING, _SLIDING)))
     for name, make in (("contacts", peers.pairs), ("cloud", peers.dense))
 }

@@ -44,16 +44,10 @@ def _spin_rows(name: str, along: np.ndarray, spin: np.ndarray, share: float, rad
     """Speed mu (1 + e) v_n and spin less 5/2 of it over r, where the contact slides; ``share`` is m* over the mass."""
     labels = [f"{s:g} rad/s" for s in SPINS[SLIDES]]
     closed = np.full(SLIDES.sum(), share * _KICK)
+    lost = (SPINS - spin)[SLIDES]
     return [
         *compared(f"{name}: speed", labels, closed, along[SLIDES], unit="m/s", band=E_BAND),
-        *compared(
-            f"{name}: loss of spin",
-            labels,
-            2.5 * closed / radius,
-            (SPINS - spin)[SLIDES],
-            unit="rad/s",
-            band=2 * E_BAND,
-        ),
+        *compared(f"{name}: loss of spin", labels, 2.5 * closed / radius, lost, unit="rad/s", band=2 * E_BAND),
     ]
 
 
@@ -88,15 +82,12 @@ def _t7(tell: Tell) -> Outcome:
         time = _pair_time(density, young, poisson, radii, 2 * SPIN_SPEED)
         for spin in (0.5, 4.0, 22.0):
             after = _pair(stuff, radii, (SPIN_SPEED, -SPIN_SPEED), (spin, -spin), time / 300, 4 * time)
-            rows.append(
-                near_zero(
-                    f"{name}: tangential speed at {spin:g} rad/s", np.abs(after.velocity[:, 1:]).max(), 1e-12, "m/s"
-                )
-            )
-            rows.append(Comparison(f"{name}: spin at {spin:g} rad/s", "rad/s", spin, after.spin[0, 2], 1e-12))
-            rows.append(
-                Comparison(f"{name}: e_n at {spin:g} rad/s", "1", SPIN_E, after.velocity[1, 0] / SPIN_SPEED, 2 * E_BAND)
-            )
+            sideways, back = np.abs(after.velocity[:, 1:]).max(), after.velocity[1, 0] / SPIN_SPEED
+            rows += [
+                near_zero(f"{name}: tangential speed at {spin:g} rad/s", sideways, 1e-12, "m/s"),
+                Comparison(f"{name}: spin at {spin:g} rad/s", "rad/s", spin, after.spin[0, 2], 1e-12),
+                Comparison(f"{name}: e_n at {spin:g} rad/s", "1", SPIN_E, back, 2 * E_BAND),
+            ]
     return Outcome(rows)
 
 
@@ -169,24 +160,15 @@ def _t8(tell: Tell) -> Outcome:
     share = second / (first + second)
     speed, spin = np.array([a.velocity[0, 1] for a in after]), np.array([a.spin[0, 2] for a in after])
     other = np.array([a.spin[1, 2] for a in after])
-    closed = 2.5 * first / (first + second) * _KICK / radii[1]
+    closed = np.full(SLIDES.sum(), 2.5 * first / (first + second) * _KICK / radii[1])
     labels = [f"{s:g} rad/s" for s in SPINS[SLIDES]]
     curves = [
         Curve("mu (1 + e) v_n m_2 / (m_1 + m_2)", SPINS[SLIDES], np.full(SLIDES.sum(), share * _KICK), False),
         Curve("small sphere", SPINS, np.abs(speed)),
     ]
+    large = compared("large sphere: spin", labels, closed, np.abs(other)[SLIDES], unit="rad/s", band=2 * E_BAND)
     return Outcome(
-        [
-            *_spin_rows("small sphere", np.abs(speed), spin, share, radii[0]),
-            *compared(
-                "large sphere: spin",
-                labels,
-                np.full(SLIDES.sum(), closed),
-                np.abs(other)[SLIDES],
-                unit="rad/s",
-                band=2 * E_BAND,
-            ),
-        ],
+        [*_spin_rows("small sphere", np.abs(speed), spin, share, radii[0]), *large],
         [Plot("Tangential speed of the small sphere after the impact", "spin before [rad/s]", "speed [m/s]", curves)],
     )
 

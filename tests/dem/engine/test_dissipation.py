@@ -40,7 +40,7 @@ def test_what_is_held_and_what_was_taken_is_the_first_energy_to_second_order(law
     """Kinetic, Hertz's or cohesion's energy, and the works against dashpots, friction and turning."""
     gaps = []
     for step in (4e-6, 2e-6):
-        bed = cluster(ROUGH, time_step=step) if law == "none" else cohesion._cluster(cohesion._stuff(law), step, 100.0)
+        bed = cluster(ROUGH, time_step=step) if law == "none" else cluster(cohesion._stuff(law), time_step=step)
         conserved, *taken, _, _ = accounts(bed, parts=40, every=round(1e-4 / step))
         total = conserved + np.sum(taken, axis=0)
         assert sum(part[-1] for part in taken) > 0.2 * conserved[0]
