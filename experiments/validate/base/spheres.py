@@ -15,9 +15,19 @@ from dem.contact.law import effective_moduli
 from experiments.runs.types import Json
 
 __all__ = [
-    "ALUMINA", "CAST_IRON", "HERTZ_TIME", "Meeting", "RADIUS", "SIXTEEN", "hertz", "mass_of", "meet_floor",
-    "plane_modulus", "row_of_grains", "upright_walls",
-]  # fmt: skip
+    "ALUMINA",
+    "CAST_IRON",
+    "HERTZ_TIME",
+    "Meeting",
+    "RADIUS",
+    "SIXTEEN",
+    "hertz",
+    "mass_of",
+    "meet_floor",
+    "plane_modulus",
+    "row_of_grains",
+    "upright_walls",
+]
 
 HERTZ_TIME = 2.943275
 RADIUS = 0.0025

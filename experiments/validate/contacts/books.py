@@ -184,9 +184,12 @@ def _floor_weight(tell: Tell) -> Outcome:
 _ROUGH_WITHOUT_ROLLING = {"energy-hertz": (0.0, 0.6), "energy-undamped": (0.5, 1.0), "energy-friction": (0.5, 0.6)}
 """Friction and restitution [1]."""
 CASES = {
-    "momentum": _momentum, "angular-momentum": _angular_momentum, "energy-elastic": _elastic_gas,
+    "momentum": _momentum,
+    "angular-momentum": _angular_momentum,
+    "energy-elastic": _elastic_gas,
     **{id: partial(_energy, Material(id, 2600, 1e7, 0.25, *given)) for id, given in _ROUGH_WITHOUT_ROLLING.items()},
     "energy-rolling": partial(_energy, ROUGH),
     "energy-tensile": partial(_energy, Material("tensile", 2600, 1e7, 0.25, 0.5, 0.6), tensile=True),
-    "energy-gravity": partial(_energy, ROUGH, gravity=_STRONG), "floor-weight": _floor_weight,
-}  # fmt: skip
+    "energy-gravity": partial(_energy, ROUGH, gravity=_STRONG),
+    "floor-weight": _floor_weight,
+}

@@ -133,14 +133,13 @@ def _t4_spin(tell: Tell) -> Outcome:
     slipping = spin_of(angles, np.array([_by_rings(angle) for angle in angles]))
     ten = int(np.abs(angles - 10).argmin())
     worth = _slope(angles, found, ten) / 10
-    few = slice(3)
+    alone = {"off": held[ten], "bare_off": bare[ten], "rms": _rms(held), "bare_rms": _rms(bare)}
+    lists = {"slipping": slipping, "angles": angles, "figure": quoted, "spring": bare + quoted}
     remarks = [
         say("figure_read", reading=reading, worth=worth, band=100 * PUBLISHED_BAND),
-        say("law_alone", angle=angles[ten], off=held[ten], bare_off=bare[ten], rms=_rms(held), bare_rms=_rms(bare),
-            finer=np.abs(fine - found).max(), book=100 * _book()),
-        say("rings", slipping=_listed(slipping[few]), angles=_listed(angles[few]), figure=_listed(quoted[few]),
-            spring=_listed((bare + quoted)[few])),
-    ]  # fmt: skip
+        say("law_alone", angle=angles[ten], finer=np.abs(fine - found).max(), book=100 * _book(), **alone),
+        say("rings", **{name: _listed(values[:3]) for name, values in lists.items()}),
+    ]
     curves.append(Curve("rings that slip one by one", angles, slipping, False))
     return Outcome(rows, [Plot("Spin after the impact", "angle of impact [deg]", "spin [rad/s]", curves)], remarks)
 
