@@ -5,15 +5,15 @@ effect has another functional form than the library's. What is hidden comes back
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from experiments.campaign import Campaign, PenetrationCampaign, Recording
+from experiments.runs.types import Json
 
-__all__ = ["EFFECTS", "OUTSIDE", "Hidden", "make_hidden"]
+__all__ = ["EFFECTS", "OUTSIDE", "Hidden", "correlated", "draw_hidden", "draw_kind", "make_hidden"]
 
 EFFECTS = ("inertial-drag", "depth-hardening", "plastic-sinkage", "adhesion", "shaft-friction", "layering")
 OUTSIDE = ("floor-vibration", "loose-mass", "shock", "load-cell-drift", "sloshing")
@@ -38,7 +38,7 @@ class Hidden:
     trials: int = 0
     depth_persistence: float = 0.0
     """Correlation of the depth's noise from row to row: 0 for white noise."""
-    extra: dict[str, Any] = field(default_factory=dict)
+    extra: Json = field(default_factory=dict)
 
 
 class _Law:
@@ -100,12 +100,7 @@ def make_hidden(
     `trials`: how many; None draws 6 to 24.
     """
     random = np.random.default_rng(seed)
-    kind = kind or _draw_kind(random)
-    strength = strength if strength is not None else float(np.exp(random.uniform(math.log(0.4), math.log(40.0))))
-    effects = (kind,) if kind in EFFECTS else ()
-    if kind == "pair":
-        effects = tuple(str(e) for e in random.choice(EFFECTS, 2, replace=False))
-    outside = kind if kind in OUTSIDE else None
+    kind, strength, effects, outside = draw_hidden(random, kind, strength, EFFECTS, OUTSIDE, between=(0.4, 40.0))
     plan = _plan(
         random, retreat=bool({"plastic-sinkage", "adhesion", "shaft-friction"} & set(effects)),
         drops=outside in ("loose-mass",), faster=bool({"inertial-drag"} & set(effects)), wanted=trials,
@@ -133,18 +128,38 @@ def make_hidden(
     return campaign, Hidden(effects, outside, settings, measure, coloured, len(clean), persistence)
 
 
-def _draw_kind(random: np.random.Generator) -> str:
+def draw_kind(
+    random: np.random.Generator, effects: Sequence[str], outside: Sequence[str], *, nulls: float = 0.25
+) -> str:
+    """Nothing in a share `nulls`, something outside the library in 17 %, a pair in 8 %, else an effect."""
     draw = random.random()
-    if draw < 0.25:
+    if draw < nulls:
         return "null"
-    if draw < 0.42:
-        return str(random.choice(OUTSIDE))
-    return "pair" if draw < 0.5 else str(random.choice(EFFECTS))
+    if draw < nulls + 0.17:
+        return str(random.choice(outside))
+    return "pair" if draw < nulls + 0.25 else str(random.choice(effects))
 
 
-def _plan(
-    random: np.random.Generator, *, retreat: bool, drops: bool, faster: bool, wanted: int | None
-) -> dict[str, Any]:
+def draw_hidden(
+    random: np.random.Generator,
+    kind: str | None,
+    strength: float | None,
+    effects: Sequence[str],
+    outside: Sequence[str],
+    *,
+    between: tuple[float, float],
+) -> tuple[str, float, tuple[str, ...], str | None]:
+    """Kind, strength, the effects and what is outside: as given, or drawn; strengths evenly in their logarithm."""
+    kind = kind or draw_kind(random, effects, outside)
+    low, high = (math.log(end) for end in between)
+    strength = strength if strength is not None else float(np.exp(random.uniform(low, high)))
+    own = (kind,) if kind in effects else ()
+    if kind == "pair":
+        own = tuple(str(e) for e in random.choice(effects, 2, replace=False))
+    return kind, strength, own, kind if kind in outside else None
+
+
+def _plan(random: np.random.Generator, *, retreat: bool, drops: bool, faster: bool, wanted: int | None) -> Json:
     """What is done: trials, the true K, C, what is believed of them, noise."""
     k, mass = float(np.exp(random.uniform(math.log(300), math.log(4000)))), float(random.uniform(0.2, 1.0))
     c = float(random.uniform(0.05, 0.3)) * 2 * math.sqrt(k * mass)
@@ -183,7 +198,7 @@ def _plan(
 
 
 def _shape(
-    random: np.random.Generator, plan: dict[str, Any], effects: tuple[str, ...], outside: str | None
+    random: np.random.Generator, plan: Json, effects: tuple[str, ...], outside: str | None
 ) -> Callable[[float], dict[str, float]]:
     """What an amplitude means, relative to the force at full depth."""
     k, depth = plan["k"], plan["depth"]
@@ -195,40 +210,31 @@ def _shape(
     rate, phase = float(random.uniform(30, 200)), float(random.uniform(0, 6))
 
     def settings(amplitude: float) -> dict[str, float]:
-        s: dict[str, float] = {"depth": depth}
-        for effect in effects:
-            if effect == "inertial-drag":
-                s |= {"drag": amplitude * full / fastest**2, "drag_onset": onset}
-            elif effect == "depth-hardening":
-                s |= {"hardening": amplitude, "hardening_kind": hard_kind}
-            elif effect == "plastic-sinkage":
-                s |= {"plastic": amplitude / (1 + amplitude),
-                      "plastic_bend": 1 + (bend - 1) * amplitude / (0.3 + amplitude)}  # fmt: skip
-            elif effect == "adhesion":
-                s |= {"pull": amplitude * full, "pull_reach": reach}
-            elif effect == "shaft-friction":
-                s |= {"shaft": amplitude * full, "shaft_speed": 0.02}
-            else:
-                # no less than a tenth of the force is left: no bed pulls a spike in
-                least = -0.9 if layer_kind < 0.5 else -0.9 * layer_at / depth
-                s |= {"layer": max(sign * amplitude, least), "layer_depth": layer_at, "layer_width": 0.03 * depth,
-                      "layer_kind": layer_kind}  # fmt: skip
-        if outside == "floor-vibration":
-            s |= {"vibration": amplitude * depth * 0.1, "vibration_rate": rate, "vibration_phase": phase}
-        elif outside == "loose-mass":
-            s |= {"loose": amplitude, "loose_rate": rate}
-        elif outside == "shock":
-            s |= {"shock": amplitude * full, "shock_width": 0.02}
-        elif outside == "load-cell-drift":
-            s |= {"drift": amplitude * full}
-        elif outside == "sloshing":
-            s |= {"slosh": amplitude * full, "slosh_rate": rate, "slosh_time": 1.0}
-        return s
+        force = amplitude * full
+        # no less than a tenth of the force is left: no bed pulls a spike in
+        least = -0.9 if layer_kind < 0.5 else -0.9 * layer_at / depth
+        layer = {"layer_depth": layer_at, "layer_width": 0.03 * depth, "layer_kind": layer_kind}
+        bent = 1 + (bend - 1) * amplitude / (0.3 + amplitude)
+        table = {
+            "inertial-drag": {"drag": force / fastest**2, "drag_onset": onset},
+            "depth-hardening": {"hardening": amplitude, "hardening_kind": hard_kind},
+            "plastic-sinkage": {"plastic": amplitude / (1 + amplitude), "plastic_bend": bent},
+            "adhesion": {"pull": force, "pull_reach": reach},
+            "shaft-friction": {"shaft": force, "shaft_speed": 0.02},
+            "layering": {"layer": max(sign * amplitude, least), **layer},
+            "floor-vibration": {"vibration": amplitude * depth * 0.1, "vibration_rate": rate, "vibration_phase": phase},
+            "loose-mass": {"loose": amplitude, "loose_rate": rate},
+            "shock": {"shock": force, "shock_width": 0.02},
+            "load-cell-drift": {"drift": force},
+            "sloshing": {"slosh": force, "slosh_rate": rate, "slosh_time": 1.0},
+        }
+        chosen = [table[name] for name in (*effects, *([outside] if outside else []))]
+        return {"depth": depth} | {key: value for own in chosen for key, value in own.items()}
 
     return settings
 
 
-def _trial(plan: dict[str, Any], index: int, s: dict[str, float]) -> _Columns:
+def _trial(plan: Json, index: int, s: dict[str, float]) -> _Columns:
     """A trial without noise: time, depth, and force or acceleration."""
     this = plan["trials"][index]
     size = this["diameter"] / 0.012
@@ -236,7 +242,7 @@ def _trial(plan: dict[str, Any], index: int, s: dict[str, float]) -> _Columns:
     return _driven(plan, this, law, s) if this["driven"] else _drop(plan, this, law, s)
 
 
-def _driven(plan: dict[str, Any], this: dict[str, Any], law: _Law, s: dict[str, float]) -> _Columns:
+def _driven(plan: Json, this: Json, law: _Law, s: dict[str, float]) -> _Columns:
     depth, speed = plan["depth"], this["speed"]
     going = depth / speed
     total = going * (1.9 if plan["returns"] else 1.0)
@@ -252,18 +258,15 @@ def _driven(plan: dict[str, Any], this: dict[str, Any], law: _Law, s: dict[str, 
     moving = moving if plan["returns"] else np.full(len(fine), speed)
     path = np.concatenate([[0], np.cumsum(0.5 * (moving[1:] + moving[:-1]) * np.diff(fine))])
     z = np.interp(time, fine, path)
-    force = []
-    slow = 0.02 * speed
-    for t, depth_now, v in zip(time, z, velocity, strict=True):
-        force.append(law(float(depth_now), float(v), float(t), math.tanh(v / slow)))
-    values = np.array(force)
+    rows = zip(z.tolist(), velocity.tolist(), time.tolist(), strict=True)
+    values = np.array([law(depth_now, v, t, math.tanh(v / (0.02 * speed))) for depth_now, v, t in rows])
     if "shock" in s:
         values = values + s["shock"] * np.exp(-0.5 * ((time / total - this["shock_time"]) / s["shock_width"]) ** 2)
     values = values + s.get("drift", 0.0) * (time / total) ** 1.5
     return {"time": time, "depth": z, "other": values}
 
 
-def _drop(plan: dict[str, Any], this: dict[str, Any], law: _Law, s: dict[str, float]) -> _Columns:
+def _drop(plan: Json, this: Json, law: _Law, s: dict[str, float]) -> _Columns:
     m, g, dt = plan["mass"], this["gravity"], _STEP
     rate = plan["rate"] * 2
     time = np.arange(0, plan["drop_time"], 1 / rate)
@@ -301,7 +304,7 @@ def _drop(plan: dict[str, Any], this: dict[str, Any], law: _Law, s: dict[str, fl
     return {"time": time, "depth": depth, "other": acceleration}
 
 
-def _signature(plan: dict[str, Any], clean: list[_Columns], made: list[_Columns], which: list[int]) -> float:
+def _signature(plan: Json, clean: list[_Columns], made: list[_Columns], which: list[int]) -> float:
     """Root mean square of the change over the noise, what a change of K would explain taken out."""
     change, slope = [], []
     for one, other, index in zip(clean, made, which, strict=True):
@@ -320,8 +323,8 @@ def _signature(plan: dict[str, Any], clean: list[_Columns], made: list[_Columns]
     return float(np.sqrt(np.mean(d**2)))
 
 
-def _correlated(white: np.ndarray, persistence: float) -> np.ndarray:
-    """An autoregressive law of order one with unit variance."""
+def correlated(white: np.ndarray, persistence: float) -> np.ndarray:
+    """White noise made into that of an autoregressive law of order one with unit variance."""
     if persistence:
         for k in range(1, len(white)):
             white[k] = persistence * white[k - 1] + math.sqrt(1 - persistence**2) * white[k]
@@ -329,7 +332,7 @@ def _correlated(white: np.ndarray, persistence: float) -> np.ndarray:
 
 
 def _record(
-    random: np.random.Generator, plan: dict[str, Any], made: list[_Columns], coloured: bool, depth_persistence: float
+    random: np.random.Generator, plan: Json, made: list[_Columns], coloured: bool, depth_persistence: float
 ) -> Campaign:
     persistence = float(random.uniform(0.3, 0.8)) if coloured else 0.0
     trials, recordings = [], {}
@@ -342,8 +345,8 @@ def _record(
         column, std = ("force_N", plan["noise_force"]) if this["driven"] else ("accel_m_s2", plan["noise_accel"])
         recordings[(name, "data")] = Recording({
             "t_s": data["time"],
-            "depth_m": data["depth"] + plan["noise_depth"] * _correlated(random.standard_normal(n), depth_persistence),
-            column: data["other"] + std * _correlated(random.standard_normal(n), persistence),
+            "depth_m": data["depth"] + plan["noise_depth"] * correlated(random.standard_normal(n), depth_persistence),
+            column: data["other"] + std * correlated(random.standard_normal(n), persistence),
         })  # fmt: skip
     tables = PenetrationCampaign.model_validate({
         "format": "hedgehog-campaign/1", "kind": "penetration", "name": "made up",

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from experiments.campaign import Campaign, PenetrationCampaign, Recording
 
-from .penetration import EFFECTS, Hidden
+from .penetration import EFFECTS, Hidden, correlated, draw_kind
 from .rig_bed import LAWS, Bed, Law, draw_law, drop, push
 from .rig_plan import NUISANCES, SIZES, Rig, Trial, draw_rig
 
@@ -47,7 +47,7 @@ def make_rig(
     readings: zeros, jitter and noise louder than stated are in it, and no law can leave less.
     """
     random = np.random.default_rng((seed, 20))
-    kind = kind or _draw_kind(random)
+    kind = kind or draw_kind(random, EFFECTS, OUTSIDE, nulls=0.22)
     if kind not in ("null", "pair", *EFFECTS, *OUTSIDE):
         raise ValueError(f"kind = {kind!r}: null, pair, {', '.join((*EFFECTS, *OUTSIDE))} was expected")
     strength = strength if strength is not None else float(np.exp(random.uniform(math.log(0.7), math.log(50.0))))
@@ -77,15 +77,6 @@ def make_rig(
     }  # fmt: skip
     return campaign, Hidden(effects, outside, parameters | {"amplitude": amplitude}, measure, coloured,
                             len(clean), rig.persistence["depth"], extra)  # fmt: skip
-
-
-def _draw_kind(random: np.random.Generator) -> str:
-    draw = random.random()
-    if draw < 0.22:
-        return "null"
-    if draw < 0.39:
-        return str(random.choice(OUTSIDE))
-    return "pair" if draw < 0.47 else str(random.choice(EFFECTS))
 
 
 # What comes of it -----------------------------------------------------------------------------------------------------
@@ -256,7 +247,9 @@ def _read_off(random: np.random.Generator, rig: Rig, trial: Trial, data: _Column
     read = {}
     for name, true in (("depth", depth), (what, other)):
         value = true + zeros[name]
-        value = value + rig.noise[name] * rig.louder[name] * _coloured(random, len(true), rig.persistence[name])
+        value = value + rig.noise[name] * rig.louder[name] * correlated(
+            random.standard_normal(len(true)), rig.persistence[name]
+        )
         step = rig.steps[name]
         read[name] = np.round(value / step) * step if step else value
     if gaps:
@@ -269,11 +262,3 @@ def _read_off(random: np.random.Generator, rig: Rig, trial: Trial, data: _Column
         name, factor = ("force_mN", 1e3) if trial.driven else ("accel_g", 1 / 9.80665)
         return Recording({"t_ms": 1e3 * time, "depth_mm": 1e3 * read["depth"], name: factor * read[what]})
     return Recording({"t_s": time, "depth_m": read["depth"], "force_N" if trial.driven else "accel_m_s2": read[what]})
-
-
-def _coloured(random: np.random.Generator, count: int, persistence: float) -> Array:
-    """Unit variance, correlated from row to row."""
-    white = random.standard_normal(count)
-    for row in range(1, count if persistence else 0):
-        white[row] = persistence * white[row - 1] + math.sqrt(1 - persistence**2) * white[row]
-    return np.asarray(white)

@@ -55,41 +55,46 @@ def draw_law(random: np.random.Generator, name: str, depth: float, kind: str | N
     def between(low: float, high: float) -> float:
         return float(random.uniform(low, high))
 
+    def evenly(low: float, high: float) -> float:
+        return math.exp(between(math.log(low), math.log(high)))
+
+    def reach() -> dict[str, float]:
+        ends = {"short": (5e-5, 5e-4), "fading": (3e-4, 1.5e-3), "deepest": (3e-4, 2e-3)}
+        return {name: between(*pair) for name, pair in ends.items()} | {"long": between(0.3, 0.6) * depth}
+
     kind = kind or str(random.choice(LAWS[name]))
-    n: dict[str, float] = {}
-    if name == "inertial-drag":
-        n = {"onset": between(0.1, 0.5) * depth}
-    elif name == "depth-hardening":
-        n = {"reference": between(0.4, 0.8) * depth, "softer": float(random.random() < 0.35),
-             "corner": between(0.0, 0.1) * depth, "width": between(0.3, 0.5) * depth}  # fmt: skip
-    elif name == "plastic-sinkage":
-        n = {"bend": between(1.3, 2.2)}
-    elif name == "adhesion":
-        reach = {"short": between(5e-5, 5e-4), "fading": between(3e-4, 1.5e-3), "deepest": between(3e-4, 2e-3),
-                 "long": between(0.3, 0.6) * depth}  # fmt: skip
-        n = {"reach": reach[kind], "fade": between(1e-3, 4e-3)}
-    elif name == "shaft-friction":
-        onset = math.exp(between(math.log(3e-4), math.log(5e-3)))
-        n = {"onset": min(onset, 0.5 * depth), "reach": between(1e-4, 5e-4), "more": between(0.3, 1.0),
-             "speed": math.exp(between(math.log(0.005), math.log(0.02))),
-             "grows": float(random.random() < 0.4)}  # fmt: skip
-    elif name == "layering":
-        n = {"at": between(0.3, 0.7) * depth, "sign": float(random.choice([-0.5, 1.0])),
-             "width": between(2e-4, 8e-4), "crust": between(0.1, 0.3) * depth,
-             "fall": between(0.05, 0.15) * depth}  # fmt: skip
-    elif name == "relaxation":
-        n = {"time": math.exp(between(math.log(0.05), math.log(1.0)))}
-    elif name == "collapse":
-        n = {"period": between(0.12, 0.35) * depth}
-    elif name == "magnet":
-        n = {"at": depth + between(0.005, 0.03), "scale": between(0.008, 0.02)}
-    elif name == "cell-drift":
-        n = {"time": between(0.5, 3.0)}
-    elif name == "ringing":
-        n = {"time": between(0.05, 0.15), "rate": 2 * math.pi * between(12.0, 40.0)}
-    elif name == "rate":
-        n = {"speed": 0.05, "power": between(0.25, 0.35)}
-    return Law(name, kind, {"depth": depth} | n)
+    draws: dict[str, Callable[[], dict[str, float]]] = {
+        "inertial-drag": lambda: {"onset": between(0.1, 0.5) * depth},
+        "depth-hardening": lambda: {
+            "reference": between(0.4, 0.8) * depth,
+            "softer": float(random.random() < 0.35),
+            "corner": between(0.0, 0.1) * depth,
+            "width": between(0.3, 0.5) * depth,
+        },
+        "plastic-sinkage": lambda: {"bend": between(1.3, 2.2)},
+        "adhesion": lambda: {"reach": reach()[kind], "fade": between(1e-3, 4e-3)},
+        "shaft-friction": lambda: {
+            "onset": min(evenly(3e-4, 5e-3), 0.5 * depth),
+            "reach": between(1e-4, 5e-4),
+            "more": between(0.3, 1.0),
+            "speed": evenly(0.005, 0.02),
+            "grows": float(random.random() < 0.4),
+        },
+        "layering": lambda: {
+            "at": between(0.3, 0.7) * depth,
+            "sign": float(random.choice([-0.5, 1.0])),
+            "width": between(2e-4, 8e-4),
+            "crust": between(0.1, 0.3) * depth,
+            "fall": between(0.05, 0.15) * depth,
+        },
+        "relaxation": lambda: {"time": evenly(0.05, 1.0)},
+        "collapse": lambda: {"period": between(0.12, 0.35) * depth},
+        "magnet": lambda: {"at": depth + between(0.005, 0.03), "scale": between(0.008, 0.02)},
+        "cell-drift": lambda: {"time": between(0.5, 3.0)},
+        "ringing": lambda: {"time": between(0.05, 0.15), "rate": 2 * math.pi * between(12.0, 40.0)},
+        "rate": lambda: {"speed": 0.05, "power": between(0.25, 0.35)},
+    }
+    return Law(name, kind, {"depth": depth} | draws[name]())
 
 
 class Bed:

@@ -2,9 +2,10 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
+
+from experiments.runs.types import Json
 
 from .rig_bed import Path, drive
 
@@ -72,7 +73,7 @@ class Rig:
 
 def draw_rig(
     random: np.random.Generator, effects: tuple[str, ...], outside: str | None, wanted: int | None
-) -> tuple[Rig, dict[str, Any]]:
+) -> tuple[Rig, Json]:
     """A rig, its bed and its trials, and the design in words and numbers."""
 
     def between(low: float, high: float) -> float:
@@ -157,7 +158,7 @@ def _persistence(random: np.random.Generator) -> dict[str, float]:
     return {"force": force, "accel": force, "depth": depth}
 
 
-def _own(random: np.random.Generator, rig: Rig, trial: Trial, style: dict[str, Any], *, both: bool) -> Trial:
+def _own(random: np.random.Generator, rig: Rig, trial: Trial, style: Json, *, both: bool) -> Trial:
     """The trial with what is its own, and its path."""
     bed, (f, g, h) = rig.wandering["bed"], random.standard_normal(3)
     luck, shallow = random.random(), random.random() < 0.4

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from experiments.campaign import Campaign, write_campaign
+from experiments.runs.types import Json
 
 from . import penetration as hidden_penetration
 from . import rig as hidden_rig
@@ -37,9 +38,7 @@ _MAKERS: dict[str, Callable[..., tuple[Campaign, Any]]] = {
 }
 
 
-def suite(
-    kind: str, count: int, *, seed: int = 1, only: str | None = None, trials: int | None = None
-) -> list[dict[str, Any]]:
+def suite(kind: str, count: int, *, seed: int = 1, only: str | None = None, trials: int | None = None) -> list[Json]:
     """Arguments of `make_case` for `count` campaigns of `kind`: seed, kind of what is hidden, and strength.
 
     `only`: null, pair, an effect or one thing outside the library: the same for every case. `trials`: of every
@@ -62,7 +61,7 @@ def suite(
         hidden = order[group][taken[group] % len(order[group])]
         place = (first[group] + taken[group] * _GOLDEN) % 1.0
         taken[group] += 1
-        case: dict[str, Any] = {"seed": 1000 * seed + k, "kind": only or hidden}
+        case: Json = {"seed": 1000 * seed + k, "kind": only or hidden}
         if case["kind"] != "null":
             case["strength"] = round(math.exp(low + place * (high - low)), 3)
         if trials:

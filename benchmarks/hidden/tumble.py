@@ -14,7 +14,9 @@ from typing import Any
 import numpy as np
 
 from experiments.campaign import Campaign, Recording, TumbleCampaign
+from experiments.runs.types import Json
 
+from .penetration import correlated, draw_hidden
 from .tumble_motion import COLUMNS, STEP, move
 
 __all__ = ["EFFECTS", "OUTSIDE", "HiddenTumble", "make_hidden_tumble"]
@@ -68,7 +70,7 @@ class _Plan:
     sigma_gravity: float
     surface: str
     rig: bool
-    trials: tuple[dict[str, Any], ...]
+    trials: tuple[Json, ...]
     duration: float
     std: dict[str, float]
     window: float
@@ -91,14 +93,9 @@ def make_hidden_tumble(
     Raises ValueError for a kind there is not.
     """
     random = np.random.default_rng(seed)
-    kind = kind or _draw_kind(random)
+    kind, strength, effects, outside = draw_hidden(random, kind, strength, EFFECTS, OUTSIDE, between=(0.5, 50.0))
     if kind not in ("null", "pair", *EFFECTS, *OUTSIDE):
         raise ValueError(f"kind = {kind!r}: null, pair, an effect or one of {', '.join(OUTSIDE)} was expected")
-    strength = strength if strength is not None else float(np.exp(random.uniform(math.log(0.5), math.log(50.0))))
-    effects: tuple[str, ...] = (kind,) if kind in EFFECTS else ()
-    if kind == "pair":
-        effects = tuple(str(e) for e in random.choice(EFFECTS, 2, replace=False))
-    outside = kind if kind in OUTSIDE else None
     plan = _plan(random, rig=bool(set(_RIG) & set(effects)), count=trials)
     true = {
         n: v * (1 + plan.sigma[n] * float(np.clip(random.standard_normal(), -2.5, 2.5))) for n, v in plan.stated.items()
@@ -120,15 +117,6 @@ def make_hidden_tumble(
         true | {f"gravity[{k + 1:03d}]": float(g) for k, g in enumerate(gravity)},
     )  # fmt: skip
     return campaign, told
-
-
-def _draw_kind(random: np.random.Generator) -> str:
-    draw = random.random()
-    if draw < 0.25:
-        return "null"
-    if draw < 0.42:
-        return str(random.choice(OUTSIDE))
-    return "pair" if draw < 0.5 else str(random.choice(EFFECTS))
 
 
 def _plan(random: np.random.Generator, *, rig: bool, count: int | None) -> _Plan:
@@ -387,11 +375,7 @@ def _record(
     persistence = float(random.uniform(0.2, 0.6)) if coloured else 0.0
 
     def noisy(value: np.ndarray, std: float) -> np.ndarray:
-        white = random.standard_normal(len(value))
-        if persistence:
-            for k in range(1, len(white)):
-                white[k] = persistence * white[k - 1] + math.sqrt(1 - persistence**2) * white[k]
-        return value + std * white
+        return value + std * correlated(random.standard_normal(len(value)), persistence)
 
     recordings = {}
     for number, one in enumerate(readings, 1):
@@ -415,7 +399,7 @@ def _tables(plan: _Plan, wires: float | None) -> TumbleCampaign:
         id = f"{number:03d}"
         told = {key: value for key, value in trial.items() if key != "counterweight" or plan.rig}
         trials.append({"id": id, **told, "pose": f"{id}-pose.csv", "imu": f"{id}-imu.csv", "wheel": f"{id}-wheel.csv"})
-    tables: dict[str, Any] = {
+    tables: Json = {
         "format": "hedgehog-campaign/1", "kind": "tumble", "name": "made up",
         "platform": {"mass": stated["mass"], "inertia": stated["inertia"], "spike_length": 0.2},
         "wheel": {"inertia": 1.2e-3},
