@@ -71,11 +71,8 @@ def try_all(
 ) -> dict[str, dict[str, Any]]:
     """What each baseline says of a campaign: alarm, terms, before, after, seconds.
 
-    Args:
-        campaign: as diagnose read it.
-        values: of the fitted base model, the held-out trials' own nuisances with it.
-        fitted: trials to learn from.
-        held_out: trials to be predicted.
+    ``campaign``: as diagnose read it. ``values``: of the fitted base model, the held-out trials' own nuisances with it.
+    ``fitted``: trials to learn from. ``held_out``: trials to be predicted.
     """
     package = "push" if campaign.tables.kind == "penetration" else "tumble"
     problem = import_module(f"experiments.diagnose.{package}.problem").make_problem(campaign)

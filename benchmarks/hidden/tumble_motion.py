@@ -24,12 +24,9 @@ def move(numbers: np.ndarray, duration: float, *, step: float = STEP) -> tuple[n
 
     Columns of a motion: x, y, theta, vx, vy, omega, wheel speed, state (0 stand, 1 pivot, 2 slip, 3 hop).
 
-    Args:
-        numbers: of every trial, shape [trial_count, len(COLUMNS)].
-        duration: [s].
-        step: of the integration [s]; a longer one where the answer need not be good.
-
-    Raises ValueError for a table of another width, RuntimeError where a motion is no longer finite.
+    ``numbers``: of every trial, shape [trial_count, len(COLUMNS)]. ``duration``: [s]. ``step``: of the integration [s];
+    a longer one where the answer need not be good. Raises ValueError for a table of another width, RuntimeError where a
+    motion is no longer finite.
     """
     from rigid.batch.runtime import ensure
 

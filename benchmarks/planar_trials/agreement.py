@@ -45,10 +45,7 @@ _JUMP = 3.0
 def random_trial(rng: np.random.Generator, effects: Sequence[str], ranges: Ranges) -> Trial:
     """A random trial: motor or brake, rig or free, both of the paper's gravities, soft to hard ground.
 
-    Args:
-        rng: draws the numbers.
-        effects: the ids of those that are on.
-        ranges: of the effects' parameters.
+    ``rng``: draws the numbers. ``effects``: the ids of those that are on. ``ranges``: of the effects' parameters.
     """
     mass, level = rng.uniform(4, 7), rng.choice([0.0085, 0.015]) * 9.80665
     rigged = any(EFFECTS[id].needs_rig for id in effects) or rng.random() < 0.6

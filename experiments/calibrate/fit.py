@@ -40,8 +40,7 @@ class Response:
     def __init__(self, x: np.ndarray, y: np.ndarray, error: np.ndarray):
         """``x``: scaled to 0..1, shape [n, parameter_count]; ``y``, ``error``: its standard error, shape [n].
 
-        Raises:
-            ValueError: fewer points than a straight trend has numbers, plus one.
+        Raises ValueError for fewer points than a straight trend has numbers, plus one.
         """
         x, y, error = (np.asarray(a, dtype=float) for a in (x, y, error))
         count, width = x.shape
@@ -219,8 +218,7 @@ def next_point(
     It is where the weight times the largest standard deviation, over the tolerance, is greatest. Enough is known once
     that ratio is below ``enough`` at the best point for every figure that is fitted.
 
-    Args:
-        done: what was simulated, in units, shape [n, parameter_count].
+    ``done``: what was simulated, in units, shape [n, parameter_count].
     """
     low, high = np.array([tuple(pair) for pair in ranges.values()]).T
     fit = find_best(responses, wanted, ranges)

@@ -174,11 +174,8 @@ def summary_of(run: ElementShear, density: float) -> Json:
 def triaxial_angle(tensor: np.ndarray, *, added: float = 0.0) -> float:
     """The angle of triaxial compression [degrees] of a stress tensor [Pa], pressure positive; see the module.
 
-    Args:
-        added: cohesion over the tangent of the angle [Pa], taken as a pressure on all sides.
-
-    Raises:
-        ValueError: a tensor that pulls.
+    ``added``: cohesion over the tangent of the angle [Pa], taken as a pressure on all sides. Raises ValueError for a
+    tensor that pulls.
     """
     tensor = np.asarray(tensor, dtype=float)
     principal = np.linalg.eigvalsh(0.5 * (tensor + tensor.T)) + added
@@ -262,11 +259,8 @@ def laboratory_figure(
 ) -> tuple[float, float | None]:
     """A figure of a bed prepared as in a laboratory: its value and, where it tells one, its standard error.
 
-    Args:
-        progress: anything with ``stage`` and ``update``, as ``dem.prepare.prepare.prepare_as`` takes it.
-
-    Raises:
-        BedFailure: the bed did not come to rest. ValueError: a bed that cannot be.
+    ``progress``: anything with ``stage`` and ``update``, as ``dem.prepare.prepare.prepare_as`` takes it. Raises
+    BedFailure where the bed did not come to rest, ValueError for a bed that cannot be.
     """
     from dem import Bed
 

@@ -88,11 +88,8 @@ def _mm(value: float | None) -> str:
 def places_touched(trajectory: Trajectory, *, reach: float) -> list[tuple[float, float]]:
     """Where the tips of a planar platform are in the ground, along the motion from its start.
 
-    Args:
-        reach: a tip counts from this height above the surface on [m].
-
-    Returns:
-        (from, to) of each stretch [m], ascending, none meeting another.
+    ``reach``: a tip counts from this height above the surface on [m]. Returns (from, to) of each stretch [m],
+    ascending, none meeting another.
     """
     trial = trajectory.trial
     count, length = trial.spike_count, trial.spike_length
@@ -128,14 +125,10 @@ def graded_under(
 ) -> Graded:
     """Fine grains where the tips of a forecast come down, coarse ones elsewhere.
 
-    Args:
-        length: of the bed [m]. origin: x in the bed of the platform's start [m].
-        grain, spread, coarse: as ``fine``, ``spread`` and ``coarse`` of ``dem.Graded``.
-        margin: fine sand on either side of a tip's way, from its axis, over the spike's diameter [1].
-        options: ``depth`` and ``growth`` of ``dem.Graded``.
-
-    Raises:
-        ValueError: grains of more than a fifth of the spike; what ``dem.Graded`` refuses.
+    ``length``: of the bed [m]. ``origin``: x in the bed of the platform's start [m]. ``grain``, ``spread``, ``coarse``:
+    as ``fine``, ``spread`` and ``coarse`` of ``dem.Graded``. ``margin``: fine sand on either side of a tip's way, from
+    its axis, over the spike's diameter [1]. ``options``: ``depth`` and ``growth`` of ``dem.Graded``. Raises ValueError
+    for grains of more than a fifth of the spike; what ``dem.Graded`` refuses.
     """
     if grain > spike_diameter / 5 * (1 + 1e-9):
         raise ValueError(say("fine_for_footprints", grain=grain, spike=spike_diameter, fifth=spike_diameter / 5))
@@ -148,8 +141,7 @@ def graded_under(
 def coarsest_touched(run: CoupledTumble, graded: Graded, *, size: Sequence[float]) -> float:
     """The largest mean diameter that belongs where tips of a tumble on such a bed were [m].
 
-    Args:
-        size: of the bed, both widths and the depth [m].
+    ``size``: of the bed, both widths and the depth [m].
     """
     ground: Any = run.ground
     x, depth = tips_in_ground(run)

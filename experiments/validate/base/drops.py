@@ -62,9 +62,8 @@ def drop(
 ) -> dict[str, np.ndarray]:
     """A ball let go with `speed` downwards at (x, y), until it stops for the first time. The bed is used up by it.
 
-    Returns:
-        time since the first touch [s], depth [m], velocity [m/s], downwards, each of shape [n]; stopped: 0 where
-        `longest` [s] was not enough.
+    Returns time since the first touch [s], depth [m], velocity [m/s], downwards, each of shape [n]; stopped: 0 where
+    `longest` [s] was not enough.
     """
     mass = density * 4 / 3 * math.pi * radius**3
     inertia = 0.4 * mass * radius**2

@@ -40,8 +40,7 @@ CAST_IRON: Json = {"density": 7000, "young": 100e9, "poisson": 0.25}
 def hertz(reduced_mass: float, radius: float, young: float, speed: float) -> tuple[float, float, float, float]:
     """Largest overlap [m], largest force [N], contact time [s], stiffness k [N/m^1.5] of an elastic collision.
 
-    Args:
-        reduced_mass: m* [kg]. radius: R* [m]. young: E* [Pa]. speed: of approach [m/s].
+    ``reduced_mass``: m* [kg]. ``radius``: R* [m]. ``young``: E* [Pa]. ``speed``: of approach [m/s].
     """
     k = 4 / 3 * young * math.sqrt(radius)
     overlap = (5 * reduced_mass * speed**2 / (4 * k)) ** 0.4
@@ -103,9 +102,8 @@ def meet_floor(
 ) -> Meeting:
     """Grains of one radius that touch the floor at time 0 with these velocities, well apart.
 
-    Args:
-        velocities, spins: shape [grain_count, 3] [m/s, rad/s].
-        radius: [m]. step: time step [s]. time: after which they are looked at [s].
+    ``velocities``, ``spins``: shape [grain_count, 3] [m/s, rad/s]. ``radius``: [m]. ``step``: time step [s]. ``time``:
+    after which they are looked at [s].
     """
     count = len(velocities)
     side = max(4, math.ceil(math.sqrt(count)))

@@ -47,10 +47,8 @@ def _reference(y0: np.ndarray, time: float, m: float, r: float, star: float, she
 def staggered_pair(y0: np.ndarray, time: float, steps: int, m: float, r: float, *, middle: bool) -> np.ndarray:
     """A leapfrog for ``_reference``'s two grains, in numpy: (x, v, w of both), shape [6, 3].
 
-    Args:
-        y0: as ``_reference`` has it. time: [s].
-        middle: the slip of a step is that across the normal at its middle, where the velocity is, as the bed has it
-            (to second order in the step); else at its end.
+    ``y0``: as ``_reference`` has it. ``time``: [s]. ``middle``: the slip of a step is that across the normal at its
+    middle, where the velocity is, as the bed has it (to second order in the step); else at its end.
     """
     star, shear = effective_moduli(YOUNG, POISSON, YOUNG, POISSON)
     radius, inertia, dt = r / 2, 0.4 * m * r * r, time / steps
@@ -98,8 +96,7 @@ def _orders_of_the_scheme() -> tuple[float, float]:
 def oblique_pair(step: float, *, steps: int, friction: float = 50.0, along: bool = False) -> tuple[Grains, Grains, int]:
     """Two grains meet obliquely, spinning, among others that are far away; before, after, and how many lists were made.
 
-    Args:
-        step: [s]. along: without spins and slip.
+    ``step``: [s]. ``along``: without spins and slip.
     """
     positions, radii, options = row_of_grains(floor=False)
     positions[:, 2] += 0.02

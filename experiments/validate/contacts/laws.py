@@ -40,11 +40,7 @@ def written_again(
 ) -> Array:
     """Position, velocity, spin and force of each grain at each sample, shape [samples, grain_count, 12].
 
-    Args:
-        law: of sliding, one of ``SLIDING``.
-
-    Raises:
-        ValueError: an unknown law.
+    ``law``: of sliding, one of ``SLIDING``. Raises ValueError for an unknown law.
     """
     if law not in SLIDING:
         raise ValueError(f"law = {law!r} is unknown; use one of {', '.join(SLIDING)}")

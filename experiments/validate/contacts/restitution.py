@@ -27,8 +27,7 @@ _PHASES, _LONGEST, _LOW = 8, 2_000_000, 0.2
 def rebound(restitution: float, tensile: bool, step: float | None = None, *, phase: float = 0.0) -> np.ndarray:
     """Rebound over approach speed of an alumina sphere on the floor, at sixteen speeds, shape [16].
 
-    Args:
-        step: [s]; the bed's own when None. phase: where in a step the contact begins, 0 to 1.
+    ``step``: [s]; the bed's own when None. ``phase``: where in a step the contact begins, 0 to 1.
     """
     positions, radii, options = row_of_grains(tensile=tensile)
     stuff = Material("t3", friction=0.3, restitution=restitution, **ALUMINA)
@@ -54,14 +53,10 @@ def staggered_rebound(
     m* = v = k = 1: x' = v, v' = max(0, x^1.5 + c sqrt(1.5 sqrt(x)) x'), x the overlap, by leapfrog; the bed's scheme
     but for round-off where both options are on.
 
-    Args:
-        steps: in the elastic contact time.
-        phase: where in a step the contact begins, 0 to 1, shape [n].
-        synchronised: the dashpot sees the velocity at the time of the force, else that of half a step before.
-        first_touch: in the step in which the contact begins the dashpot is its mean from there to half a step later.
-
-    Returns:
-        Rebound over approach speed, shape [n].
+    ``steps``: in the elastic contact time. ``phase``: where in a step the contact begins, 0 to 1, shape [n].
+    ``synchronised``: the dashpot sees the velocity at the time of the force, else that of half a step before.
+    ``first_touch``: in the step in which the contact begins the dashpot is its mean from there to half a step later.
+    Returns rebound over approach speed, shape [n].
     """
     overlap = (5 / 4) ** 0.4
     dt = 2.943275 * overlap / steps

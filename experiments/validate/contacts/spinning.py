@@ -104,9 +104,8 @@ def sliding_share(restitution: float, ratio: float, *, spring_alone: bool, steps
 
     A sphere on a rigid plane with m = v_n = k = 1, E* for nu = 0.33, mu = 0.4, the slip's speed held at ``ratio`` v_n.
 
-    Args:
-        spring_alone: the bound holds the spring, and a sliding contact has no dashpot, as the bed (and LIGGGHTS) have
-            it; else both together, and the stretch is set back to what their sum allows, as LAMMPS has it.
+    ``spring_alone``: the bound holds the spring, and a sliding contact has no dashpot, as the bed (and LIGGGHTS) have
+    it; else both together, and the stretch is set back to what their sum allows, as LAMMPS has it.
     """
     nu, mu = 0.33, 0.4
     stiffness_ratio = 2 * (1 - nu) / (2 - nu)  # S_t / S_n
