@@ -15,7 +15,7 @@ from experiments.runs.types import Json
 from experiments.runs.whole_runs import whole_run
 
 from .test_settings import BedConeSettings
-from .tests import about, carry_out, check_bed, quantity, write_frame
+from .tests import about, carry_out, check_bed, picked, quantity, table, write_frame
 from .words import say
 
 __all__ = ["check", "place_of", "resume", "run"]
@@ -67,9 +67,7 @@ def _carry_out(settings: BedConeSettings, folder: RunFolder, progress: Progress)
             "start": start,
             "index_at_end": float(found.index[found.depth >= 0.9 * found.depth[-1]].mean()),
             "index_at_half": float(np.interp(half, found.base_depth, _smooth(found.index))),
-            "diameter": found.diameter,
-            "length": found.length,
-            "angle": found.angle,
+            **picked(found, "diameter", "length", "angle"),
             "shaft": SHAFT * found.diameter if settings.shaft is None else settings.shaft,
             "speed": found.speed,
             "froude": found.speed / math.sqrt(first["gravity"] * found.diameter),
@@ -111,26 +109,17 @@ def _result(runs: list[Json]) -> Json:
         "grain_count": of("grain_count", "1", "grains"),
         "max_overlap": of("max_overlap", "1", "over diameter"),
     }
-    rows = [
-        [
-            run["id"],
-            f"{1e-6 * run['gradient']:.3g}",
-            f"{1e-3 * run['index_at_half']:.3g}",
-            f"{1e-3 * run['index_at_end']:.3g}",
-            f"{1e-3 * run['start']:.2g}",
-            f"{run['packing_fraction']:.4f}",
-            f"{100 * run['max_overlap']:.2g}",
-        ]
-        for run in runs
-    ]
-    head = ["run", "gradient [MPa/m]", "index, half way [kPa]", "at the end [kPa]", "at surface [kPa]", "packing",
-            "overlap [%]"]  # fmt: skip
-    return {
-        "title": f"Cone of {1e3 * one['diameter']:.3g} mm and {one['angle']:g} degrees in {one['material']}",
-        "quantities": quantities,
-        "tables": [{"title": "Push by push", "head": head, "rows": rows}],
-        "warnings": [],
+    columns = {
+        "run": lambda run: run["id"],
+        "gradient [MPa/m]": lambda run: f"{1e-6 * run['gradient']:.3g}",
+        "index, half way [kPa]": lambda run: f"{1e-3 * run['index_at_half']:.3g}",
+        "at the end [kPa]": lambda run: f"{1e-3 * run['index_at_end']:.3g}",
+        "at surface [kPa]": lambda run: f"{1e-3 * run['start']:.2g}",
+        "packing": lambda run: f"{run['packing_fraction']:.4f}",
+        "overlap [%]": lambda run: f"{100 * run['max_overlap']:.2g}",
     }
+    title = f"Cone of {1e3 * one['diameter']:.3g} mm and {one['angle']:g} degrees in {one['material']}"
+    return {"title": title, "quantities": quantities, "tables": [table("Push by push", runs, columns)], "warnings": []}
 
 
 run, resume = whole_run("bed test cone", BedConeSettings, _carry_out, check=check)

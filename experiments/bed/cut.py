@@ -3,7 +3,6 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import asdict
 from functools import partial
 from typing import Any
 
@@ -14,7 +13,7 @@ from experiments.runs.types import Json
 from experiments.runs.whole_runs import whole_run
 
 from .test_settings import BedCutSettings
-from .tests import about, carry_out, check_bed, quantity, write_frame
+from .tests import about, carry_out, check_bed, picked, quantity, table, write_frame
 
 __all__ = ["check", "resume", "run"]
 
@@ -42,23 +41,22 @@ def _carry_out(settings: BedCutSettings, folder: RunFolder, progress: Progress) 
         series = folder.write_series(name, columns)
         write_frame(folder, name, found.bed)
         low, high = found.bounds
-        return first | {
-            "critical_height": found.critical_height,
-            "stood": found.stood,
-            "fell": found.fell,
-            "low": low,
-            "high": high if math.isfinite(high) else None,
-            "height": found.height,
-            "unit_weight": found.unit_weight,
-            "trials": [list(trial) for trial in found.trials],
-            "flanks": None if found.flanks is None else [asdict(flank) for flank in found.flanks],
-            "slumped_to": None if found.flanks is None else sum(flank.angle for flank in found.flanks) / 2,
-            "width": found.width,
-            "max_overlap": found.bed.max_overlap,
-            "series": series,
-            "frames": name,
-            "warnings": [],
-        }
+        flanks = found.flanks
+        bounds = {"low": low, "high": high if math.isfinite(high) else None}
+        told = picked(found, "critical_height", "stood", "fell") | bounds
+        told |= picked(found, "height", "unit_weight", "trials", "flanks")
+        return (
+            first
+            | told
+            | {
+                "slumped_to": None if flanks is None else sum(flank.angle for flank in flanks) / 2,
+                "width": found.width,
+                "max_overlap": found.bed.max_overlap,
+                "series": series,
+                "frames": name,
+                "warnings": [],
+            }
+        )
 
     def result(runs: list[Json]) -> Json:
         return _result(runs, settings.friction_angle, settings.most)
@@ -102,31 +100,24 @@ def _result(runs: list[Json], friction_angle: float | None, most: float) -> Json
         "grain_count": of("grain_count", "1", "grains before the cut"),
         "max_overlap": of("max_overlap", "1", "over diameter"),
     }
-    rows = [
-        [
-            run["id"],
-            f"{1e3 * run['height']:.3g}",
-            f"{run['stood']:.2g} g" if run["stood"] else f"not at {LEAST:g} g",
-            f"{run['fell']:.2g} g" if run["fell"] else f"not at {most:g} g",
-            "-" if run["critical_height"] is None else f"{1e3 * run['critical_height']:.3g}",
-            "-" if run["slumped_to"] is None else f"{run['slumped_to']:.1f}",
-        ]
-        for run in runs
-    ]
-    head = ["run", "face [mm]", "stood at", "fell at", "critical height [mm]", "slumped to [deg]"]
-    tables = [{"title": "Run by run (g: the bed's own gravity)", "head": head, "rows": rows}]
+    columns = {
+        "run": lambda run: run["id"],
+        "face [mm]": lambda run: f"{1e3 * run['height']:.3g}",
+        "stood at": lambda run: f"{run['stood']:.2g} g" if run["stood"] else f"not at {LEAST:g} g",
+        "fell at": lambda run: f"{run['fell']:.2g} g" if run["fell"] else f"not at {most:g} g",
+        "critical height [mm]": lambda run: _or_dash(run["critical_height"], 1e3, ".3g"),
+        "slumped to [deg]": lambda run: _or_dash(run["slumped_to"], 1.0, ".1f"),
+    }
+    tables = [table("Run by run (g: the bed's own gravity)", runs, columns)]
     if any(run["low"] > 0 for run in runs):
-        tables.append(
-            {
-                "title": "What cohesion that means [Pa], by friction angle",
-                "head": ["run", "", *(f"{angle:g} deg" for angle in _ANGLES)],
-                "rows": [
-                    [run["id"], words, *("-" if (c := cohesion(run, a, key)) is None else f"{c:.3g}" for a in _ANGLES)]
-                    for run in runs
-                    for words, key in (("stood: more than", "low"), ("fell: less than", "high"))
-                ],
-            }
-        )
+        bounds = (("stood: more than", "low"), ("fell: less than", "high"))
+        rows = [
+            [run["id"], words, *(_or_dash(cohesion(run, angle, key), 1.0, ".3g") for angle in _ANGLES)]
+            for run in runs
+            for words, key in bounds
+        ]
+        head = ["run", "", *(f"{angle:g} deg" for angle in _ANGLES)]
+        tables.append({"title": "What cohesion that means [Pa], by friction angle", "head": head, "rows": rows})
     warnings = []
     if not any(run["stood"] for run in runs):
         bound = max(cohesion_of(run["high"], run["unit_weight"], friction_angle or 30.0) for run in runs)
@@ -137,12 +128,12 @@ def _result(runs: list[Json], friction_angle: float | None, most: float) -> Json
         warnings.append(
             f"not every face fell at {most:g} times the bed's gravity: more ('most') or a deeper bed would tell"
         )
-    return {
-        "title": f"Vertical cut in {runs[0]['material']}",
-        "quantities": quantities,
-        "tables": tables,
-        "warnings": warnings,
-    }
+    title = f"Vertical cut in {runs[0]['material']}"
+    return {"title": title, "quantities": quantities, "tables": tables, "warnings": warnings}
+
+
+def _or_dash(value: float | None, scale: float, form: str) -> str:
+    return "-" if value is None else format(scale * value, form)
 
 
 run, resume = whole_run("bed test cut", BedCutSettings, _carry_out, check=check)

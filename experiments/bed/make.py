@@ -6,12 +6,12 @@ from experiments.grains.kept_material import MATERIAL_COPY, keep_material
 from experiments.grains.sizes import bond_number, in_grains_of, scaling_told, sizes_table
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
-from experiments.runs.result import Result
+from experiments.runs.result import Result, quantity
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import whole_run
 
 from .settings import GRADED, SPREAD_OUT, BedSettings
-from .work import check_memory, check_name, finish_bed, prepared_in, quantity
+from .work import check_memory, check_name, finish_bed, prepared_in
 
 __all__ = ["check", "fingerprint", "resume", "run"]
 
@@ -33,12 +33,8 @@ def check(settings: BedSettings) -> None:
     )
     if young > stuff.young:
         raise ValueError(f"young = {young:g} Pa is more than {stuff.name} itself has: at most {stuff.young:g} Pa")
-    time_step_for(
-        stuff.softened(young),
-        diameter=sizes.bounds[0],
-        max_overlap=settings.max_overlap,
-        wanted=settings.time_step,
-    )
+    soft, overlap = stuff.softened(young), settings.max_overlap
+    time_step_for(soft, diameter=sizes.bounds[0], max_overlap=overlap, wanted=settings.time_step)
 
 
 def fingerprint() -> str:
@@ -82,7 +78,9 @@ def _carry_out(settings: BedSettings, folder: RunFolder, progress: Progress) -> 
 def _add_adhesion(told: Json, settings: BedSettings, own: Material, now: Material) -> None:
     """Put into `told` the grains' Bond number, and what was kept of `own`, of grains of another size."""
     bond = bond_number(now, diameter=settings.grain, gravity=settings.gravity)
-    told.setdefault("quantities", {})["bond_number"] = quantity(bond, "1", "pull-off of two grains over one's weight")
+    told.setdefault("quantities", {})["bond_number"] = quantity(
+        bond, "1", "pull-off of two grains over one's weight", std=None
+    )
     if own.grain != settings.grain:
         said = scaling_told(own, now, diameter=settings.grain, gravity=settings.gravity, keep=settings.keep)
         told.setdefault("warnings", []).append(said)

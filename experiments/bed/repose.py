@@ -1,7 +1,6 @@
 """`hedgebed bed test repose`: angle of repose, of the slopes that stay beside a slot (`dem.measure.repose`)."""
 
 from collections.abc import Callable
-from dataclasses import asdict
 from functools import partial
 from typing import Any
 
@@ -12,7 +11,7 @@ from experiments.runs.types import Json
 from experiments.runs.whole_runs import whole_run
 
 from .test_settings import BedReposeSettings
-from .tests import about, carry_out, check_bed, quantity, write_frame
+from .tests import about, carry_out, check_bed, picked, quantity, table, write_frame
 
 __all__ = ["BEARING", "check", "resume", "run"]
 
@@ -43,19 +42,9 @@ def _carry_out(settings: BedReposeSettings, folder: RunFolder, progress: Progres
             warnings.append(
                 f"a slope was fitted over less than {_SHORT:g} diameters: a wider or a deeper bed tells it better"
             )
-        return first | {
-            "angle": found.angle,
-            "error": found.error,
-            "flanks": [asdict(flank) for flank in found.flanks],
-            "drained": found.drained,
-            "crest": found.crest,
-            "slot": found.slot,
-            "plate": found.plate,
-            "max_overlap": found.bed.max_overlap,
-            "series": series,
-            "frames": name,
-            "warnings": warnings,
-        }
+        told = picked(found, "angle", "error", "flanks", "drained", "crest", "slot", "plate")
+        kept = {"max_overlap": found.bed.max_overlap, "series": series, "frames": name, "warnings": warnings}
+        return first | told | kept
 
     return carry_out(
         settings, folder, progress, test=test, result=_result, report="vis.bed.tests:write_test_report",
@@ -65,6 +54,10 @@ def _carry_out(settings: BedReposeSettings, folder: RunFolder, progress: Progres
 
 def _result(runs: list[Json]) -> Json:
     of = partial(quantity, runs)
+
+    def slope(flank: Json) -> str:
+        return f"{flank['angle']:.1f} +- {flank['error']:.1f}"
+
     quantities = {
         "angle_of_repose": of(
             "angle",
@@ -78,26 +71,18 @@ def _result(runs: list[Json]) -> Json:
         "grain_count": of("grain_count", "1", "grains before"),
         "max_overlap": of("max_overlap", "1", "over diameter"),
     }
-    rows = [
-        [
-            run["id"],
-            f"{run['angle']:.1f}",
-            f"{run['error']:.1f}",
-            *(f"{flank['angle']:.1f} +- {flank['error']:.1f}" for flank in run["flanks"]),
-            f"{run['crest'] / run['grain']:.1f}",
-            f"{min((f['end'] - f['start']) for f in run['flanks']) / run['grain']:.0f}",
-            f"{run['drained']} of {run['grain_count']}",
-        ]
-        for run in runs
-    ]
-    head = ["run", "angle [deg]", "error", "right slope", "left slope", "crest [d]", "fitted over [d]", "drained"]
-    material = runs[0]["material"]
-    return {
-        "title": f"Angle of repose of {material}",
-        "quantities": quantities,
-        "tables": [{"title": "Run by run", "head": head, "rows": rows}],
-        "warnings": [],
+    columns = {
+        "run": lambda run: run["id"],
+        "angle [deg]": lambda run: f"{run['angle']:.1f}",
+        "error": lambda run: f"{run['error']:.1f}",
+        "right slope": lambda run: slope(run["flanks"][0]),
+        "left slope": lambda run: slope(run["flanks"][1]),
+        "crest [d]": lambda run: f"{run['crest'] / run['grain']:.1f}",
+        "fitted over [d]": lambda run: f"{min((f['end'] - f['start']) for f in run['flanks']) / run['grain']:.0f}",
+        "drained": lambda run: f"{run['drained']} of {run['grain_count']}",
     }
+    title = f"Angle of repose of {runs[0]['material']}"
+    return {"title": title, "quantities": quantities, "tables": [table("Run by run", runs, columns)], "warnings": []}
 
 
 run, resume = whole_run("bed test repose", BedReposeSettings, _carry_out, check=check)

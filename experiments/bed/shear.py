@@ -8,6 +8,7 @@ own weight, so that the bed shears under the lid; what lies between lid and ther
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,11 +20,12 @@ from dem.measure.shearing import Shearing, shear_bed
 from dem.prepare.bedfile import find_bed
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
-from experiments.runs.result import Result
+from experiments.runs.result import Result, quantity
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import whole_run
 
-from .shear_settings import BedShearSettings
+from .test_settings import BedShearSettings
+from .tests import picked, table
 from .words import say
 
 __all__ = ["Strength", "check", "fit_line", "resume", "run", "strength_of"]
@@ -58,14 +60,8 @@ def strength_of(run: Shearing, grain: float) -> Strength:
     kernel = np.ones(count) / count
     smooth = np.convolve(run.shear, kernel, "valid") / np.convolve(run.normal, kernel, "valid")
     top = int(np.argmax(smooth))
-    parts = [
-        part.mean() / other.mean()
-        for part, other in zip(
-            np.array_split(run.shear[len(run.way) // 2 :], _PARTS),
-            np.array_split(run.normal[len(run.way) // 2 :], _PARTS),
-            strict=True,
-        )
-    ]
+    shear, pressed = (np.array_split(values[len(run.way) // 2 :], _PARTS) for values in (run.shear, run.normal))
+    parts = [part.mean() / other.mean() for part, other in zip(shear, pressed, strict=True)]
     return Strength(
         normal=normal,
         peak=normal * float(smooth[top]),
@@ -132,7 +128,7 @@ _NUMBERS = ("pressure", "speed", "inertial_number", "packing_fraction", "overbur
 
 def _write(folder: RunFolder, name: str, run: Shearing) -> None:
     folder.write_series(name, {column: getattr(run, key) for key, column in _COLUMNS.items()})
-    folder.mark_done(name, {key: getattr(run, key) for key in _NUMBERS})
+    folder.mark_done(name, picked(run, *_NUMBERS))
 
 
 def _read(folder: RunFolder, name: str) -> Shearing:
@@ -150,29 +146,29 @@ def _strengths(strengths: list[Strength], band: float, run: Shearing) -> Json:
         start, slope, start_error, slope_error = fit_line(normal, shear)
         angle_error = None if slope_error is None else slope_error * (math.degrees(1) / (1 + slope**2))
         ratios = shear / normal
+        degrees = math.degrees(math.atan(slope))
+        feigned, spread = band * run.overburden * slope, float(ratios.std(ddof=1))
         found |= {
-            f"{kind}_friction_angle": _entry(math.degrees(math.atan(slope)), angle_error, "degrees", say("slope")),
-            f"{kind}_cohesion": _entry(start, start_error, "Pa", "where that line begins"),
-            f"{kind}_cohesion_feigned": _entry(band * run.overburden * slope, None, "Pa", say("feigned")),
-            f"{kind}_ratio": _entry(float(ratios.mean()), float(ratios.std(ddof=1)), "1", say("ratio")),
+            f"{kind}_friction_angle": quantity(degrees, "degrees", say("slope"), std=angle_error),
+            f"{kind}_cohesion": quantity(start, "Pa", "where that line begins", std=start_error),
+            f"{kind}_cohesion_feigned": quantity(feigned, "Pa", say("feigned"), std=None),
+            f"{kind}_ratio": quantity(float(ratios.mean()), "1", say("ratio"), std=spread),
         }
-    return found | {"packing_fraction": _entry(run.packing_fraction, None, "1", "of the bed")}
-
-
-def _entry(value: float, std: float | None, unit: str, note: str) -> Json:
-    return {"value": value, "std": std, "unit": unit, "note": note}
+    return found | {"packing_fraction": quantity(run.packing_fraction, "1", "of the bed", std=None)}
 
 
 def _result(settings: BedShearSettings, runs: list[Shearing], grain: float, recipe: Json, bed: Any) -> Result:
     strengths = [strength_of(run, grain) for run in runs]
-    head = ["normal [Pa]", "peak [Pa]", "at [d]", "critical [Pa]", "+- [Pa]", "peak ratio", "critical ratio",
-            "dilates [d]"]  # fmt: skip
-    rows = [
-        [f"{s.normal:.0f}", f"{s.peak:.0f}", f"{s.peak_way / grain:.1f}", f"{s.critical:.0f}",
-         f"{s.critical_error:.0f}", f"{s.peak / s.normal:.3f}", f"{s.critical / s.normal:.3f}",
-         f"{run.height[-1] / grain:.2f}"]
-        for s, run in zip(strengths, runs, strict=True)
-    ]  # fmt: skip
+    columns: dict[str, Callable[[tuple[Strength, Shearing]], str]] = {
+        "normal [Pa]": lambda row: f"{row[0].normal:.0f}",
+        "peak [Pa]": lambda row: f"{row[0].peak:.0f}",
+        "at [d]": lambda row: f"{row[0].peak_way / grain:.1f}",
+        "critical [Pa]": lambda row: f"{row[0].critical:.0f}",
+        "+- [Pa]": lambda row: f"{row[0].critical_error:.0f}",
+        "peak ratio": lambda row: f"{row[0].peak / row[0].normal:.3f}",
+        "critical ratio": lambda row: f"{row[0].critical / row[0].normal:.3f}",
+        "dilates [d]": lambda row: f"{row[1].height[-1] / grain:.2f}",
+    }
     warnings = []
     if min(bed.size[:2]) < 12 * grain or bed.surface < 8 * grain:
         long, wide, deep = (side / grain for side in (*bed.size[:2], bed.surface))
@@ -186,11 +182,11 @@ def _result(settings: BedShearSettings, runs: list[Shearing], grain: float, reci
         "bed test shear",
         title=f"{settings.bed}: sheared under a lid",
         quantities=_strengths(strengths, _BAND * grain / bed.surface, runs[0]),
-        tables=[{"title": "Run by run", "head": head, "rows": rows}],
+        tables=[table("Run by run", zip(strengths, runs, strict=True), columns)],
         runs=[
             {"id": f"shear-{pressure:g}", "series": f"series/shear-{pressure:g}.csv"}
-            | {"pressure": run.pressure, "speed": run.speed}
-            | {name: getattr(strength, name) for name in kept}
+            | picked(run, "pressure", "speed")
+            | picked(strength, *kept)
             for pressure, run, strength in zip(settings.pressures, runs, strengths, strict=True)
         ],
         grain=grain,

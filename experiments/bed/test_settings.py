@@ -1,4 +1,4 @@
-"""Settings of `hedgebed bed test repose`, `cone` and `cut`."""
+"""Settings of `hedgebed bed test repose`, `cone`, `cut` and `shear`."""
 
 from typing import Annotated, Self
 
@@ -7,7 +7,9 @@ from pydantic import Field, model_validator
 from experiments.penetrate.settings import MATERIAL, STANDARD_GRAVITY
 from experiments.runs.strict import StrictSettings
 
-__all__ = ["BedConeSettings", "BedCutSettings", "BedReposeSettings", "BedTestSettings"]
+from .words import say
+
+__all__ = ["BedConeSettings", "BedCutSettings", "BedReposeSettings", "BedShearSettings", "BedTestSettings"]
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Size = tuple[Positive, Positive, Positive]
@@ -40,13 +42,10 @@ class BedTestSettings(StrictSettings):
     def _one_or_the_other(self) -> Self:
         if len(set(self.seeds)) < len(self.seeds):
             raise ValueError("seeds holds a seed twice: each once would do")
-        if self.bed is not None:
-            for key in _OF_BED:
-                value = getattr(self, key)
-                if value != type(self).model_fields[key].default:
-                    raise ValueError(
-                        f"{key} = {value} beside bed = {self.bed!r}, which has its own: leave one of them out"
-                    )
+        for key in _OF_BED if self.bed is not None else ():
+            value = getattr(self, key)
+            if value != type(self).model_fields[key].default:
+                raise ValueError(f"{key} = {value} beside bed = {self.bed!r}, which has its own: leave one of them out")
         return self
 
 
@@ -100,3 +99,28 @@ class BedCutSettings(BedTestSettings):
         "of the plane of shear, as bed test shear gives it, is smaller and tells too large a cohesion; none is told if "
         "not given.",
     )
+
+
+class BedShearSettings(StrictSettings):
+    """A bed sheared under a rough lid at several pressures: friction angles, peak and critical, and cohesion."""
+
+    bed: str = Field(description="The bed: a file, the folder of a run of bed make, or a name on the shelf.")
+    pressures: tuple[Positive, ...] = Field(
+        (1.0, 2.0, 4.0),
+        min_length=2,
+        description="Pressures on the lid, over what lies on the bed's floor [1]; at most 4.",
+    )
+    way: Positive = Field(8.0, ge=2, le=200, description="How far the lid goes sideways [mean diameters].")
+    inertial_number: Positive = Field(
+        5e-3, le=0.05, description="Speed of the lid, as speed / height d sqrt(density / pressure) [1]."
+    )
+    threads: int | None = Field(None, ge=1, le=1024, description="CPU threads; all there are if not given.")
+
+    @model_validator(mode="after")
+    def _can_be(self) -> Self:
+        if max(self.pressures) > 4:
+            given = " ".join(f"{p:g}" for p in self.pressures)
+            raise ValueError(say("pressures", pressures=given, most=max(self.pressures)))
+        if len(set(self.pressures)) < len(self.pressures):
+            raise ValueError("pressures holds a value twice: each once would do")
+        return self

@@ -1,8 +1,8 @@
 """What `bed test repose`, `cone` and `cut` share: the beds, run by run; quantities with their spread; the result."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, is_dataclass
 from functools import partial
 from importlib import import_module
 from typing import Any
@@ -22,7 +22,7 @@ from experiments.runs.types import Json
 
 from .test_settings import BedTestSettings
 
-__all__ = ["Extent", "about", "check_bed", "carry_out", "quantity", "stiff_enough", "write_frame"]
+__all__ = ["Extent", "about", "check_bed", "carry_out", "picked", "quantity", "stiff_enough", "table", "write_frame"]
 
 Run = Json
 _PACKING = 0.6  # about, to reckon what lies on the floor
@@ -154,7 +154,7 @@ def carry_out(
                 if not copy or progress.stage_name != f"test of {name}":
                     progress.stage(f"test of {name}", total=float(copies))
                 try:
-                    found = test(bed, which, partial(_tell, progress, copy))
+                    found = test(bed, which, lambda share, copy=copy: progress.update(copy + share))  # type: ignore[misc]
                 except ValueError as error:  # a bed whose surface lies otherwise than its depth says
                     raise RuntimeError(f"{which}: {error}") from error
                 if doubt := caveat(bed.material):
@@ -173,18 +173,22 @@ def carry_out(
     return whole
 
 
-def _tell(progress: Progress, copy: int, share: float) -> None:
-    progress.update(copy + share)
+def picked(found: Any, *names: str) -> Run:
+    """These of what a test found, as JSON takes them."""
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, list | tuple):
+            return [plain(one) for one in value]
+        return asdict(value) if is_dataclass(value) else value  # type: ignore[arg-type]
+
+    return {name: plain(getattr(found, name)) for name in names}
 
 
 def about(bed: Any) -> Run:
     """What every run says of its bed before the test."""
     return {
         "grain": 2 * float(bed.grains().radius.mean()),
-        "grain_count": bed.grain_count,
-        "packing_fraction": bed.packing_fraction,
-        "surface": bed.surface,
-        "size": list(bed.size),
+        **picked(bed, "grain_count", "packing_fraction", "surface", "size"),
         "gravity": -bed.gravity[2],
         "material": bed.material.name,
         "density": bed.material.density,
@@ -204,16 +208,21 @@ def quantity(runs: Sequence[Run], of: Of, unit: str, note: str, *, error: Of | N
         value = run[what] if isinstance(what, str) else what(run)
         return float(value) if value is not None and math.isfinite(value) else None
 
-    known = [run for run in runs if number(run, of) is not None]
+    known = {k: value for k, run in enumerate(runs) if (value := number(run, of)) is not None}
     if not known:
         return {"value": None, "std": None, "unit": unit, "note": note}
-    values = [value for run in known if (value := number(run, of)) is not None]
+    values = list(known.values())
     std = spread(values)
     if std is not None:
         note = f"{note}; std: between {len(values)} runs"
-    elif error is not None and (std := number(known[0], error)) is not None:
+    elif error is not None and (std := number(runs[next(iter(known))], error)) is not None:
         note = f"{note}; std: error of the one run"
     return {"value": float(np.mean(values)), "std": std, "unit": unit, "note": note}
+
+
+def table(title: str, rows: Iterable[Any], columns: Mapping[str, Callable[[Any], str]]) -> Json:
+    """A table of a result: by its heading, what each column says of a row."""
+    return {"title": title, "head": list(columns), "rows": [[said(row) for said in columns.values()] for row in rows]}
 
 
 def write_frame(folder: RunFolder, name: str, bed: Any) -> None:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,13 +15,14 @@ from experiments.grains.box import expected_grain_count
 from experiments.runs.folder import RunFolder
 from experiments.runs.memory import memory_there
 from experiments.runs.progress import Progress
-from experiments.runs.result import Result
+from experiments.runs.result import Result, quantities_of
 from experiments.runs.stopping import held_back
 from experiments.runs.types import Json
 
+from .tests import table, write_frame
 from .words import say
 
-__all__ = ["check_memory", "check_name", "finish_bed", "prepared_in", "quantity"]
+__all__ = ["check_memory", "check_name", "finish_bed", "prepared_in"]
 
 BYTES_PER_GRAIN = 4000
 """Memory of one grain with its lists and contact history, float64, measured generously [bytes]."""
@@ -93,11 +93,6 @@ def prepared_in(folder: RunFolder, progress: Progress, options: Mapping[str, Any
     return prepared
 
 
-def quantity(value: Any, unit: str, note: str) -> Json:
-    """An entry of result.json's quantities; of one bed there is no spread."""
-    return {"value": value, "std": None, "unit": unit, "note": note}
-
-
 def finish_bed(
     folder: RunFolder,
     prepared: Prepared,
@@ -123,26 +118,27 @@ def finish_bed(
             trace = np.array(report.notes["trace"])
             what = {"pass": np.arange(len(trace)), "packing": trace}
             entries[-1]["trace_series"] = folder.write_series(f"{safe}.passes", what)
-    _write_frame(folder.path, bed)
+    write_frame(folder, "bed", bed)
+    reports = prepared.reports
     own = {
-        "packing_fraction": quantity(last.packing_fraction, "1", "between two diameters above the floor and two below"),
-        "coordination_number": quantity(last.coordination_number, "1", "contacts of a grain, the floor's included"),
-        "surface": quantity(last.surface, "m", "height where the packing falls to half"),
-        "pressure_ratio": quantity(last.pressure_ratio, "1", "horizontal over vertical stress, away from the ends"),
-        "kinetic_energy": quantity(last.kinetic_energy, "1", "mean of a grain, over m g d"),
-        "floor_share": quantity(last.floor_share, "1", "what the floor carries over the weight"),
-        "loosest": quantity(min(r.packing_fraction for r in prepared.reports), "1", "packing after any stage"),
-        "densest": quantity(max(r.packing_fraction for r in prepared.reports), "1", "packing after any stage"),
-        "grain_count": quantity(last.grain_count, "1", "grains"),
-        "young": quantity(prepared.recipe["young"], "Pa", "of the grains, softened"),
-        "time_step": quantity(bed.time_step, "s", "of the grains"),
-        "max_overlap": quantity(max(r.max_overlap for r in prepared.reports), "1", "while it was made, over diameter"),
+        "packing_fraction": (last.packing_fraction, "1", "between two diameters above the floor and two below"),
+        "coordination_number": (last.coordination_number, "1", "contacts of a grain, the floor's included"),
+        "surface": (last.surface, "m", "height where the packing falls to half"),
+        "pressure_ratio": (last.pressure_ratio, "1", "horizontal over vertical stress, away from the ends"),
+        "kinetic_energy": (last.kinetic_energy, "1", "mean of a grain, over m g d"),
+        "floor_share": (last.floor_share, "1", "what the floor carries over the weight"),
+        "loosest": (min(r.packing_fraction for r in reports), "1", "packing after any stage"),
+        "densest": (max(r.packing_fraction for r in reports), "1", "packing after any stage"),
+        "grain_count": (last.grain_count, "1", "grains"),
+        "young": (prepared.recipe["young"], "Pa", "of the grains, softened"),
+        "time_step": (bed.time_step, "s", "of the grains"),
+        "max_overlap": (max(r.max_overlap for r in reports), "1", "while it was made, over diameter"),
     }
     result = Result.make(
         experiment,
         code=prepared.recipe["code"],
         title=title,
-        quantities=own | (quantities or {}),
+        quantities=quantities_of(own, std=None) | (quantities or {}),
         stages=entries,
         tables=[_stage_table(prepared.reports), *(tables or [])],
         bed={"file": "bed.npz", "name": name, "surface": {"value": bed.surface, "unit": "m"}, **prepared.recipe},
@@ -150,7 +146,9 @@ def finish_bed(
     )
     folder.write_result(result)
     progress.stage("report", total=1.0)
-    write_report(folder.path, progress)
+    from vis.bed.report import write_bed_report
+
+    write_bed_report(folder.path, progress=progress.update)
     return result
 
 
@@ -158,21 +156,17 @@ _UNITS = {"height": "m", "packing": "", "stress_zz": "Pa", "stress_xx": "Pa", "s
 
 
 def _stage_table(reports: list[StageReport]) -> Json:
-    rows = [
-        [
-            report.stage,
-            f"{report.packing_fraction:.4f}",
-            f"{report.coordination_number:.2f}",
-            "-" if report.pressure_ratio is None else f"{report.pressure_ratio:.2f}",
-            f"{1e3 * report.surface:.4g}",
-            str(report.grain_count),
-            f"{report.kinetic_energy:.1e}",
-            f"{report.floor_share:.4f}",
-        ]
-        for report in reports
-    ]
-    head = ["stage", "packing", "contacts", "K", "surface [mm]", "grains", "energy [m g d]", "floor / weight"]
-    return {"title": "Stage by stage", "head": head, "rows": rows}
+    columns: dict[str, Callable[[StageReport], str]] = {
+        "stage": lambda report: report.stage,
+        "packing": lambda report: f"{report.packing_fraction:.4f}",
+        "contacts": lambda report: f"{report.coordination_number:.2f}",
+        "K": lambda report: "-" if report.pressure_ratio is None else f"{report.pressure_ratio:.2f}",
+        "surface [mm]": lambda report: f"{1e3 * report.surface:.4g}",
+        "grains": lambda report: str(report.grain_count),
+        "energy [m g d]": lambda report: f"{report.kinetic_energy:.1e}",
+        "floor / weight": lambda report: f"{report.floor_share:.4f}",
+    }
+    return table("Stage by stage", reports, columns)
 
 
 def _warnings(prepared: Prepared) -> list[str]:
@@ -187,17 +181,3 @@ def _warnings(prepared: Prepared) -> list[str]:
     if doubt := caveat(bed.material):
         said.append(doubt)
     return said
-
-
-def _write_frame(folder: Path, bed: Any) -> None:
-    from vis.pictures.frames import GRAIN_FIELDS, FrameWriter
-
-    grains = bed.grains().as_dict()
-    FrameWriter(folder, name="bed").write(0.0, {name: grains[name] for name in ("position", *GRAIN_FIELDS)})
-
-
-def write_report(folder: Path, progress: Progress) -> None:
-    """Plots, picture and report.html of the folder."""
-    from vis.bed.report import write_bed_report
-
-    write_bed_report(folder, progress=progress.update)

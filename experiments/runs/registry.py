@@ -164,7 +164,7 @@ EXPERIMENTS: dict[str, Experiment] = {
         Experiment(
             "bed test shear",
             "A bed sheared under a lid at several pressures: peak and critical friction angle, cohesion.",
-            settings="experiments.bed.shear_settings:BedShearSettings",
+            settings="experiments.bed.test_settings:BedShearSettings",
             module="experiments.bed.shear",
             subject="bed",
         ),

@@ -7,7 +7,7 @@ import pytest
 
 from dem.measure.shearing import Shearing
 from experiments.bed.shear import fit_line, strength_of
-from experiments.bed.shear_settings import BedShearSettings
+from experiments.bed.test_settings import BedShearSettings
 
 GRAIN = 0.004
 
