@@ -78,9 +78,8 @@ def _carry_out(settings: BedSettings, folder: RunFolder, progress: Progress) -> 
 def _add_adhesion(told: Json, settings: BedSettings, own: Material, now: Material) -> None:
     """Put into `told` the grains' Bond number, and what was kept of `own`, of grains of another size."""
     bond = bond_number(now, diameter=settings.grain, gravity=settings.gravity)
-    told.setdefault("quantities", {})["bond_number"] = quantity(
-        bond, "1", "pull-off of two grains over one's weight", std=None
-    )
+    about = "pull-off of two grains over one's weight"
+    told.setdefault("quantities", {})["bond_number"] = quantity(bond, "1", about, std=None)
     if own.grain != settings.grain:
         said = scaling_told(own, now, diameter=settings.grain, gravity=settings.gravity, keep=settings.keep)
         told.setdefault("warnings", []).append(said)
