@@ -1,6 +1,7 @@
 """`hedgebed bed make`: a bed prepared as in a laboratory, in a run folder with a report of every stage."""
 
 from dem.grains.materials import Material, material
+from dem.prepare.prepare import check_options, fingerprint, soft_enough
 from experiments.grains.graded import grading_told
 from experiments.grains.kept_material import MATERIAL_COPY, keep_material
 from experiments.grains.sizes import bond_number, in_grains_of, scaling_told, sizes_table
@@ -19,7 +20,6 @@ __all__ = ["check", "fingerprint", "resume", "run"]
 def check(settings: BedSettings) -> None:
     """Raise ValueError, naming key, value and what would do, for what this machine or the material cannot serve."""
     from dem.contact.timestep import time_step_for
-    from dem.prepare.prepare import check_options, soft_enough
 
     check_name(settings.name)
     check_options(settings.size, settings.grain, settings.gravity, settings.seed, settings.max_overlap)
@@ -35,13 +35,6 @@ def check(settings: BedSettings) -> None:
         raise ValueError(f"young = {young:g} Pa is more than {stuff.name} itself has: at most {stuff.young:g} Pa")
     soft, overlap = stuff.softened(young), settings.max_overlap
     time_step_for(soft, diameter=sizes.bounds[0], max_overlap=overlap, wanted=settings.time_step)
-
-
-def fingerprint() -> str:
-    """A digest of the code that computes beds: other code may give other bits."""
-    from dem.prepare.prepare import fingerprint as of_dem
-
-    return of_dem()
 
 
 def material_of(settings: BedSettings, name: str) -> Material:

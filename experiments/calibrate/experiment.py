@@ -19,6 +19,7 @@ import numpy as np
 
 from dem import BedFailure
 from dem.grains.materials import Material
+from dem.prepare.prepare import fingerprint
 from experiments.grains.kept_material import BASE_COPY, keep_material
 from experiments.runs.folder import RunFolder, write_text
 from experiments.runs.progress import Progress
@@ -52,13 +53,6 @@ def check(settings: CalibrateSettings) -> None:
         material_at(settings, {key: pair[end] for key, pair in settings.free.items()})
 
 
-def fingerprint() -> str:
-    """A digest of the code that computes beds: other code may give other bits."""
-    from dem.prepare.prepare import fingerprint as of_dem
-
-    return of_dem()
-
-
 @dataclass
 class _Work:
     """What is done so far."""
@@ -90,12 +84,8 @@ class _Work:
             kept = self.folder.done_data(name) if self.folder.is_done(name) else None
             if kept is None or kept["values"] != values:
                 try:
-                    summary, series = run_test(
-                        stuff,
-                        test,
-                        self.settings,
-                        tell=lambda share, k=k: self.tell(begin + (k + share) / len(tests)),  # type: ignore[misc]
-                    )
+                    tell = lambda share, k=k: self.tell(begin + (k + share) / len(tests))  # noqa: E731
+                    summary, series = run_test(stuff, test, self.settings, tell=tell)
                 except BedFailure as failure:
                     raise RuntimeError(f"{_said(values)}, {test.name}: {failure.reason}") from failure
                 self.folder.write_series(name, series)
@@ -138,15 +128,9 @@ class _Work:
         """The surfaces through what is known."""
         low, high = np.array(list(self.settings.free.values())).T
         scaled = (self.x - low) / (high - low)
-        return {
-            target.name: Response(
-                scaled,
-                np.array([found[target.name][0] for found in self.figures]),
-                np.array([found[target.name][1] for found in self.figures]),
-            )
-            for target in self.targets
-            if target.fit
-        }
+        fitted = [target.name for target in self.targets if target.fit]
+        known = {name: np.array([found[name] for found in self.figures]) for name in fitted}
+        return {name: Response(scaled, *pairs.T.copy()) for name, pairs in known.items()}
 
 
 def _said(values: Mapping[str, float]) -> str:
@@ -237,13 +221,11 @@ def _of_bed(work: _Work, target: Target, stuff: Material) -> tuple[float, float 
     work.progress.stage(target.name, total=1.0)
     kept = work.folder.done_data(about) if work.folder.is_done(about) else None
     if kept is None or kept["material"] != numbers:
-        name = about.removeprefix("bed-")
+        name, seed = about.removeprefix("bed-"), work.settings.check_seeds[0]
         kept = {"material": numbers, "value": None, "error": None, "reason": ""}
         try:
-            found = laboratory_figure(
-                name, stuff, work.settings, seed=work.settings.check_seeds[0], progress=_Stages(work)
-            )
-            kept |= {"value": found[0], "error": found[1]}
+            value, error = laboratory_figure(name, stuff, work.settings, seed=seed, progress=_Stages(work))
+            kept |= {"value": value, "error": error}
         except (BedFailure, ValueError) as failure:
             kept["reason"] = str(failure)
         work.folder.mark_done(about, kept)

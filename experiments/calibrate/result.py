@@ -1,11 +1,12 @@
 """What a calibration says: result.json, the material's file, what could not be met."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 
 import numpy as np
 
 from dem.grains.materials import MATERIAL_FORMAT, MATERIALS, Material
+from experiments.bed.tests import table
 from experiments.runs.folder import RunFolder, toml_value
 from experiments.runs.result import Result
 from experiments.runs.types import Json
@@ -161,23 +162,26 @@ def _reach(responses: Mapping[str, Response]) -> dict[str, tuple[float, float]]:
     return found
 
 
+def _box(settings: CalibrateSettings, values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    """The ends of the ranges, shape [parameter_count, 2], and where these values lie between them."""
+    ends = np.array(list(settings.free.values()))
+    return ends, (np.array(list(values.values())) - ends[:, 0]) / (ends[:, 1] - ends[:, 0])
+
+
 def _points(
     settings: CalibrateSettings, done: Simulated, responses: Mapping[str, Response], best: Mapping[str, float]
 ) -> list[Json]:
     """The points explored; ``moved``: each figure along the surface to the parameters found, but for the one named."""
-    ends = np.array(list(settings.free.values()))
-    at = (np.array(list(best.values())) - ends[:, 0]) / (ends[:, 1] - ends[:, 0])
+    _, at = _box(settings, best)
     found = []
     for point, figures in zip(done.points, done.figures, strict=True):
-        x = (np.array(list(point.values())) - ends[:, 0]) / (ends[:, 1] - ends[:, 0])
+        _, x = _box(settings, point)
         moved: dict[str, dict[str, float]] = {}
         for k, key in enumerate(settings.free):
             there = at.copy()
             there[k] = x[k]
-            moved[key] = {}
-            for name, response in responses.items():
-                mean, _ = response.at(np.array([x, there]))
-                moved[key][name] = float(figures[name][0] + mean[1] - mean[0])
+            means = {name: response.at(np.array([x, there]))[0] for name, response in responses.items()}
+            moved[key] = {name: float(figures[name][0] + mean[1] - mean[0]) for name, mean in means.items()}
         found.append({"values": point, "figures": figures, "moved": moved})
     return found
 
@@ -186,8 +190,7 @@ def _curves(
     settings: CalibrateSettings, responses: Mapping[str, Response], best: Mapping[str, float], folder: RunFolder
 ) -> dict[str, str]:
     """Each fitted figure along each parameter through the best point, as series; parameter -> file."""
-    ends = np.array(list(settings.free.values()))
-    at = (np.array(list(best.values())) - ends[:, 0]) / (ends[:, 1] - ends[:, 0])
+    ends, at = _box(settings, best)
     files = {}
     for k, key in enumerate(settings.free):
         x = np.repeat(at[None, :], _CURVE, axis=0)
@@ -200,25 +203,24 @@ def _curves(
 
 
 def _figure_table(entries: list[Json]) -> Json:
-    rows = [
-        [
-            entry["name"] + (f" ({entry['plane']})" if entry["plane"] not in (None, "shear") else ""),
-            f"{entry['wanted']:g} +- {entry['tolerance']:g} {entry['unit']}",
-            "-"
-            if entry["measured"] is None
-            else f"{entry['measured']:.4g}" + ("" if entry["error"] is None else f" +- {entry['error']:.2g}"),
-            "-" if entry["expected"] is None else f"{entry['expected']:.4g} +- {entry['expected_std']:.2g}",
-            entry["verdict"],
-            entry["source"],
-        ]
-        for entry in entries
-    ]
-    return {
-        "title": "Figure by figure",
-        "head": ["figure", "wanted", "measured", "surface", "verdict", "source"],
-        "rows": rows,
-        "words": True,
+    def measured(entry: Json) -> str:
+        error = "" if entry["error"] is None else f" +- {entry['error']:.2g}"
+        return "-" if entry["measured"] is None else f"{entry['measured']:.4g}{error}"
+
+    def expected(entry: Json) -> str:
+        return "-" if entry["expected"] is None else f"{entry['expected']:.4g} +- {entry['expected_std']:.2g}"
+
+    columns: dict[str, Callable[[Json], str]] = {
+        "figure": lambda entry: (
+            entry["name"] + (f" ({entry['plane']})" if entry["plane"] not in (None, "shear") else "")
+        ),
+        "wanted": lambda entry: f"{entry['wanted']:g} +- {entry['tolerance']:g} {entry['unit']}",
+        "measured": measured,
+        "surface": expected,
+        "verdict": lambda entry: entry["verdict"],
+        "source": lambda entry: entry["source"],
     }
+    return table("Figure by figure", entries, columns) | {"words": True}
 
 
 def _point_table(settings: CalibrateSettings, done: Simulated) -> Json:

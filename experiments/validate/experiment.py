@@ -1,20 +1,25 @@
-"""`hedgebed validate`: runs the verification suite into a run folder, case by case; finished cases are kept."""
+"""`hedgebed validate`: runs the verification suite into a run folder, case by case; finished cases are kept.
 
+The result that docs/validation.md is made of is kept in the checkout. Long cases need not all be run in one go:
+`hedgebed validate --only sink-from-rest --keep` puts its row into the table with its own date, command and code, and
+leaves the others as they are.
+"""
+
+import json
 import math
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import date
 from pathlib import Path
 from typing import Any
 
 from experiments.runs.folder import RunFolder, plain, write_text
 from experiments.runs.progress import Progress
-from experiments.runs.result import Result
+from experiments.runs.result import Result, quantities_of
 from experiments.runs.types import Json
 from experiments.validate.settings import ValidateSettings
 
-from . import kept as kept_result
 from .base.case import Case, Outcome
 from .document import markdown
 from .suite import SUITE, chosen, fingerprint, fingerprint_of
@@ -22,6 +27,7 @@ from .suite import SUITE, chosen, fingerprint, fingerprint_of
 __all__ = ["check", "fingerprint", "keep", "resume", "run", "run_case"]
 
 _ROOT = Path(__file__).resolve().parents[2]
+_KEPT = Path("docs/results/validate/result.json")
 
 
 def run(settings: ValidateSettings, folder: str | Path, *, progress: Progress | None = None) -> Result:
@@ -85,7 +91,7 @@ def _carry_out(settings: ValidateSettings, folder: RunFolder, progress: Progress
             write_text(Path(settings.document), text)
         elif entire and _is_checkout():
             write_text(_ROOT / "docs" / "validation.md", text)
-            kept_result.write(_ROOT, plain(result))
+            _keep_result(plain(result))
         elif settings.keep:
             keep(result["cases"], command=_command(settings))
         progress.stage("report", total=1.0)
@@ -100,23 +106,12 @@ def _record(folder: RunFolder, case: Case, progress: Progress) -> Json:
     found, seconds = run_case(case, progress.update)
     plots = []
     for k, plot in enumerate(found.plots, 1):
-        points = [
-            (curve.label, float(x), float(y)) for curve in plot.curves for x, y in zip(curve.x, curve.y, strict=True)
-        ]
-        labels, x, y = zip(*points, strict=True)
-        series = folder.write_series(
-            f"{case.id}-{k}", {"curve": [label.replace(",", ";") for label in labels], "x": x, "y": y}
-        )
-        plots.append(
-            {
-                "title": plot.title,
-                "x": plot.x,
-                "y": plot.y,
-                "log": plot.log,
-                "series": series,
-                "lines": [curve.label.replace(",", ";") for curve in plot.curves if not curve.ours],
-            }
-        )
+        named = [(curve.label.replace(",", ";"), curve) for curve in plot.curves]
+        points = [(n, float(x), float(y)) for n, curve in named for x, y in zip(curve.x, curve.y, strict=True)]
+        columns = dict(zip(("curve", "x", "y"), zip(*points, strict=True), strict=True))
+        about = {"title": plot.title, "x": plot.x, "y": plot.y, "log": plot.log}
+        about["series"] = folder.write_series(f"{case.id}-{k}", columns)
+        plots.append(about | {"lines": [name for name, curve in named if not curve.ours]})
     record = {
         "status": found.status,
         "skipped": found.skipped,
@@ -154,11 +149,8 @@ def _row(case: Case, records: dict[str, Json], wanted: Sequence[Case]) -> Json:
     if case not in wanted:
         return head | {"status": "not run"}
     record = records[case.id]
-    return (
-        head
-        | record
-        | {"reason": case.reason if record["status"] == "fail" else "", "worst": worst_of(record["comparisons"])}
-    )
+    reason = case.reason if record["status"] == "fail" else ""
+    return head | record | {"reason": reason, "worst": worst_of(record["comparisons"])}
 
 
 STATUSES = ("pass", "fail", "skipped", "not run", "not yet")
@@ -176,10 +168,7 @@ def _result(rows: list[Json], entire: bool) -> Result:
         title=f"Verification of the bed: {', '.join(words)}",
         entire=entire,
         date=date.today().isoformat(),
-        quantities={
-            f"cases_{status.replace(' ', '_')}": {"value": count, "std": 0.0, "unit": "1"}
-            for status, count in counts.items()
-        },
+        quantities=quantities_of({f"cases_{key.replace(' ', '_')}": (n, "1", "") for key, n in counts.items()}),
         cases=rows,
         departures={"sentences": sentences},
         warnings=[] if entire else ["not the whole suite: see which cases were not run"],
@@ -187,12 +176,9 @@ def _result(rows: list[Json], entire: bool) -> Result:
 
 
 def _why(row: Json) -> str:
-    worst = row["worst"]
-    said = (
-        f"{worst['quantity']} is {worst['ours']:.4g}, {worst['reference']:.4g} was wanted"
-        if worst
-        else "it ended with an error"
-    )
+    worst, said = row["worst"], "it ended with an error"
+    if worst:
+        said = f"{worst['quantity']} is {worst['ours']:.4g}, {worst['reference']:.4g} was wanted"
     return f"{said} ({row['reason']})" if row["reason"] else said
 
 
@@ -203,13 +189,39 @@ def _is_checkout() -> bool:
 
 def keep(cases: Sequence[Json], *, command: str) -> None:
     """Put the cases that were run into the checkout's table, docs/validation.md, and the result that it is made of."""
-    before = kept_result.read(_ROOT)
-    rows = kept_result.merged_rows(before["cases"] if before else (), cases, SUITE, command=command)
-    result: Json = plain(_result(rows, before is not None))
+    path = _ROOT / _KEPT
+    before = dict(json.loads(path.read_text(encoding="utf-8"))) if path.is_file() else None
+    result: Json = plain(_result(_merged(before["cases"] if before else (), cases, command), before is not None))
     if before is not None:
         result |= {key: before[key] for key in ("version", "code", "date")}
-    kept_result.write(_ROOT, result)
+    _keep_result(result)
     write_text(_ROOT / "docs" / "validation.md", markdown(result, command="hedgebed validate"))
+
+
+def _keep_result(result: Json) -> None:
+    """In the checkout, without what its plots are drawn from (that is in the run folder)."""
+    slim = {key: value for key, value in result.items() if key not in ("departures", "warnings")}
+    slim["cases"] = [{key: value for key, value in row.items() if key != "plots"} for row in result["cases"]]
+    (_ROOT / _KEPT).parent.mkdir(parents=True, exist_ok=True)
+    write_text(_ROOT / _KEPT, json.dumps(slim, indent=0) + "\n")
+
+
+def _merged(before: Iterable[Mapping[str, Any]], now: Iterable[Mapping[str, Any]], command: str) -> list[Json]:
+    """A row for each case of the suite: as run now, or as it was before, or what is known of one that was not run."""
+    ran = {row["id"]: dict(row) | {"command": command} for row in now if row["status"] in _RAN}
+    old = {row["id"]: dict(row) for row in before if row["status"] in _RAN}
+    rows = []
+    for case in SUITE:
+        row = dict(case.head()) | (ran.get(case.id) or old.get(case.id) or {})
+        if row.get("status") == "fail":
+            row["reason"] = case.reason or row.get("reason", "")
+        if "status" not in row:
+            row |= {"status": "not run"} if case.compute else {"status": "not yet", "waits_for": case.waits_for}
+        rows.append(row)
+    return rows
+
+
+_RAN = ("pass", "fail")
 
 
 def _command(settings: ValidateSettings) -> str:
