@@ -1,15 +1,14 @@
 """Settings of `hedgebed bed make` and `hedgebed bed refine`."""
 
-from __future__ import annotations
-
-from typing import Annotated, Literal
+from dataclasses import replace
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from dem.grains.graded import Graded
-from dem.grains.sizes import Sizes
+from dem.grains.sizes import LogNormal, Normal, Sieve, Sizes, Uniform
 from dem.prepare.recipe import check_stages, parse_stage
-from experiments.grains.sizes import Distribution, Kept, distribution
+from experiments.grains.sizes import Distribution, Kept
 from experiments.penetrate.settings import MATERIAL, STANDARD_GRAVITY
 from experiments.runs.strict import StrictSettings
 
@@ -23,6 +22,7 @@ GRADED = ("footprints", "fine_depth", "growth")
 """Settings that a graded bed alone has, beside ``coarse``."""
 SPREAD_OUT = ("deviation", "cut", "openings", "passing")
 """Settings of ``distribution``, each of some of them."""
+_OF = {"normal": ("deviation", "cut"), "log-normal": ("deviation", "cut"), "sieve": ("openings", "passing")}
 _NAME = "Name under which the bed is kept on the shelf (HEDGEBED_BEDS); in the run's folder alone if not given."
 
 
@@ -88,7 +88,7 @@ class BedSettings(StrictSettings):
     threads: int | None = Field(None, ge=1, le=1024, description="CPU threads; all there are if not given.")
 
     @model_validator(mode="after")
-    def _can_be(self) -> BedSettings:
+    def _can_be(self) -> Self:
         from dem.grains.materials import material
 
         local = self.local
@@ -107,10 +107,24 @@ class BedSettings(StrictSettings):
     @property
     def local(self) -> Sizes:
         """Sizes of grains side by side, under the footprints of one that is graded. Raises ValueError for bad ones."""
-        return distribution(
-            self.distribution, grain=self.grain, spread=self.spread, deviation=self.deviation, cut=self.cut,
-            openings=self.openings, passing=self.passing,
-        )  # fmt: skip
+        for key in SPREAD_OUT:
+            value = getattr(self, key) or None
+            if value is not None and key not in _OF.get(self.distribution, ()):
+                owners = " or ".join(f"{name!r}" for name, keys in _OF.items() if key in keys)
+                raise ValueError(say("of_another", s=self, key=key, value=value, owners=owners))
+        if self.distribution == "uniform":
+            return Uniform(self.grain, self.spread)
+        if self.spread != BedSettings.model_fields["spread"].default:
+            raise ValueError(say("spread_of_uniform", s=self))
+        if self.distribution == "sieve":
+            if not self.openings or not self.passing:
+                raise ValueError(say("sieve_needs"))
+            table = Sieve(self.openings, self.passing)
+            return replace(table, scale=self.grain / table.mean)
+        if self.deviation is None:
+            raise ValueError(say("needs_deviation", s=self))
+        made = Normal if self.distribution == "normal" else LogNormal
+        return made(self.grain, self.deviation, *([] if self.cut is None else [self.cut]))
 
     @property
     def graded(self) -> Graded | None:

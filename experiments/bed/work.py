@@ -11,6 +11,7 @@ from dem.grains.materials import caveat
 from dem.prepare.bedfile import load_prepared, save_prepared, shelf_path
 from dem.prepare.prepare import prepare_as
 from dem.prepare.report import Prepared, StageReport
+from experiments.grains.bed_progress import Stages
 from experiments.grains.box import expected_grain_count
 from experiments.runs.folder import RunFolder
 from experiments.runs.memory import memory_there
@@ -47,23 +48,6 @@ def check_name(name: str | None) -> None:
         )
 
 
-class _Stages:
-    """Shows the stages of a preparation; stops it where it can be gone on with."""
-
-    def __init__(self, progress: Progress, asked_to_stop: Callable[[], bool]) -> None:
-        self.progress, self.asked_to_stop = progress, asked_to_stop
-
-    def stage(self, name: str, total: float | None = None) -> None:
-        """The next stage begins."""
-        self.progress.stage(name, total=total)
-
-    def update(self, done: float) -> None:
-        """`done` of it, 0 to 1. Raises KeyboardInterrupt if asked to stop."""
-        self.progress.update(done)
-        if self.asked_to_stop():
-            raise KeyboardInterrupt
-
-
 def prepared_in(folder: RunFolder, progress: Progress, options: Mapping[str, Any], *, name: str | None) -> Prepared:
     """The bed of the run: prepared now, gone on with, or that of bed.npz, where it is finished.
 
@@ -81,7 +65,7 @@ def prepared_in(folder: RunFolder, progress: Progress, options: Mapping[str, Any
     keep.parent.mkdir(exist_ok=True)
     try:
         with held_back() as asked_to_stop:
-            prepared = prepare_as(**options, make=Bed, progress=_Stages(progress, asked_to_stop), keep=keep)
+            prepared = prepare_as(**options, make=Bed, progress=Stages(progress, asked_to_stop), keep=keep)
     except ValueError as error:  # found while it was prepared, as a packing that cannot be reached
         raise RuntimeError(str(error)) from error
     save_prepared(prepared, file)

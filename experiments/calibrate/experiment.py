@@ -20,6 +20,7 @@ import numpy as np
 from dem import BedFailure
 from dem.grains.materials import Material
 from dem.prepare.prepare import fingerprint
+from experiments.grains.bed_progress import Stages
 from experiments.grains.kept_material import BASE_COPY, keep_material
 from experiments.runs.folder import RunFolder, write_text
 from experiments.runs.progress import Progress
@@ -68,9 +69,7 @@ class _Work:
 
     def tell(self, done: float) -> None:
         """`done` of the stage. Raises KeyboardInterrupt if asked to stop."""
-        self.progress.update(done)
-        if self.asked_to_stop():
-            raise KeyboardInterrupt
+        Stages(self.progress, self.asked_to_stop).update(done)
 
     def simulate(
         self, label: str, values: dict[str, float], targets: list[Target], *, seed: int, begin: float
@@ -197,18 +196,14 @@ def _mean(values: list[tuple[float, float]]) -> tuple[float, float]:
     return float(found.mean()), max(own, float(found.std(ddof=1)) / math.sqrt(count))
 
 
-class _Stages:
-    """The stages of a bed as one stage of the calibration."""
-
-    def __init__(self, work: _Work) -> None:
-        self.work = work
+class _Hidden(Stages):
+    """The stages of a bed as one stage of the calibration: not shown, but stopped where asked to."""
 
     def stage(self, name: str, total: float | None = None) -> None:
         """The next stage of the bed."""
 
     def update(self, done: float) -> None:
-        """`done` of it: not shown; asked to stop, it stops."""
-        if self.work.asked_to_stop():
+        if self.asked_to_stop():
             raise KeyboardInterrupt
 
 
@@ -221,10 +216,11 @@ def _of_bed(work: _Work, target: Target, stuff: Material) -> tuple[float, float 
     work.progress.stage(target.name, total=1.0)
     kept = work.folder.done_data(about) if work.folder.is_done(about) else None
     if kept is None or kept["material"] != numbers:
+        hidden = _Hidden(work.progress, work.asked_to_stop)
         name, seed = about.removeprefix("bed-"), work.settings.check_seeds[0]
         kept = {"material": numbers, "value": None, "error": None, "reason": ""}
         try:
-            value, error = laboratory_figure(name, stuff, work.settings, seed=seed, progress=_Stages(work))
+            value, error = laboratory_figure(name, stuff, work.settings, seed=seed, progress=hidden)
             kept |= {"value": value, "error": error}
         except (BedFailure, ValueError) as failure:
             kept["reason"] = str(failure)

@@ -1,11 +1,9 @@
 """Settings of `hedgebed bed calibrate`: target.toml."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass, fields
-from typing import Annotated
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
@@ -189,7 +187,7 @@ class CalibrateSettings(StrictSettings):
     threads: int | None = Field(None, ge=1, le=1024, description="CPU threads; all there are if not given.")
 
     @model_validator(mode="after")
-    def _can_be(self) -> CalibrateSettings:
+    def _can_be(self) -> Self:
         base = self._base()
         if self.name == material(self.material).name:
             raise ValueError(say("own_name", s=self))

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from experiments.runs.progress import Progress, as_expected
 
-__all__ = ["BedProgress"]
+__all__ = ["BedProgress", "Stages"]
 
 _SHARES = {"rain": 0.30, "calm": 0.12, "settle": 0.32, "rest": 0.26}
 """Of the time, as measured on 20,000 grains, compiling left out [1]."""
@@ -16,7 +16,24 @@ _CALM, _REST = 4, 14
 """Updates of a bed until it is cut level, and while it rests without drag: two to thirty of these were seen."""
 
 
-class BedProgress:
+class Stages:
+    """Shows the stages of a preparation; stops it where it can be gone on with."""
+
+    def __init__(self, progress: Progress, asked_to_stop: Callable[[], bool]) -> None:
+        self.progress, self.asked_to_stop = progress, asked_to_stop
+
+    def stage(self, name: str, total: float | None = None) -> None:
+        """The next stage begins."""
+        self.progress.stage(name, total=total)
+
+    def update(self, done: float) -> None:
+        """`done` of it, 0 to 1. Raises KeyboardInterrupt if asked to stop."""
+        self.progress.update(done)
+        if self.asked_to_stop():
+            raise KeyboardInterrupt
+
+
+class BedProgress(Stages):
     """Shows the stages of a preparation as one stage of the experiment; stops it where it can be gone on with.
 
     A preparation tells how far the grains have fallen and how still they have become; here that becomes time. `tapped`:
@@ -26,7 +43,7 @@ class BedProgress:
     def __init__(
         self, progress: Progress, name: str, asked_to_stop: Callable[[], bool], *, tapped: bool = False
     ) -> None:
-        self.progress, self.asked_to_stop = progress, asked_to_stop
+        super().__init__(progress, asked_to_stop)
         self._part, self._count, self._last = "rain", 0, 0.0
         self._scale = _TAPPED if tapped else 1.0
         progress.stage(name, total=1.0)
@@ -45,9 +62,7 @@ class BedProgress:
         elif self._part == "settle" and done >= 1:
             self._enter("rest")
         self._last, self._count = done, self._count + 1
-        self.progress.update(self._share(done))
-        if self.asked_to_stop():
-            raise KeyboardInterrupt
+        super().update(self._share(done))
 
     def _enter(self, part: str) -> None:
         self._part, self._count, self._last = part, 0, 0.0

@@ -1,18 +1,17 @@
 """How large the grains of `bed make` are, what adhesion becomes in grains of another size, and what reports say."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
 from dem.grains.materials import Material
-from dem.grains.sizes import LogNormal, Normal, Sieve, Sizes, Uniform
+from dem.grains.sizes import Sieve, Sizes
 from experiments.runs.types import Json
 
 from .sentences import say
 
-__all__ = ["KEPT", "Distribution", "Kept", "bond_number", "distribution", "in_grains_of", "scaling_told", "sizes_table"]
+__all__ = ["KEPT", "Distribution", "Kept", "bond_number", "in_grains_of", "scaling_told", "sizes_table"]
 
 Distribution = Literal["uniform", "normal", "log-normal", "sieve"]
 Kept = Literal["strength", "bond", "surface-energy"]
@@ -22,43 +21,7 @@ KEPT: dict[str, tuple[str, int]] = {
     "surface-energy": ("surface energy", 0),
 }
 """What can stay the same of grains that stick: in words; the power of d with which surface energy goes."""
-_OF = {"normal": ("deviation", "cut"), "log-normal": ("deviation", "cut"), "sieve": ("openings", "passing")}
-_SPREAD = 0.15  # the default of the setting
 _SHARES = (0.1, 0.3, 0.5, 0.6, 0.9)
-
-
-def distribution(
-    kind: str,
-    *,
-    grain: float,
-    spread: float,
-    deviation: float | None,
-    cut: float | None,
-    openings: Sequence[float],
-    passing: Sequence[float],
-) -> Sizes:
-    """The distribution of that name about the mean diameter `grain` [m]; a sieve table is enlarged, or reduced, to it.
-
-    Raises ValueError for what belongs to another distribution, what is lacking, and what ``dem.grains.sizes`` refuses.
-    """
-    given = {"deviation": deviation, "cut": cut, "openings": openings or None, "passing": passing or None}
-    for key, value in given.items():
-        if value is not None and key not in _OF.get(kind, ()):
-            owners = " or ".join(f"{name!r}" for name, keys in _OF.items() if key in keys)
-            raise ValueError(say("of_another", key=key, value=value, kind=kind, owners=owners))
-    if kind == "uniform":
-        return Uniform(grain, spread)
-    if spread != _SPREAD:
-        raise ValueError(say("spread_of_uniform", spread=spread, kind=kind))
-    if kind == "sieve":
-        if not openings or not passing:
-            raise ValueError(say("sieve_needs"))
-        table = Sieve(tuple(openings), tuple(passing))
-        return replace(table, scale=grain / table.mean)
-    if deviation is None:
-        raise ValueError(say("needs_deviation", kind=kind))
-    made = Normal if kind == "normal" else LogNormal
-    return made(grain, deviation) if cut is None else made(grain, deviation, cut)
 
 
 def in_grains_of(stuff: Material, diameter: float, *, keep: str, own: float) -> Material:

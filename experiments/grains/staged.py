@@ -1,8 +1,9 @@
 """A bed that goes through stages before an experiment, from the cache where it is there."""
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
-from dem import Bed, Graded
+from dem import Bed
 from dem.grains.materials import Material
 from dem.grains.sizes import sizes_of
 from dem.prepare.prepare import prepare_as
@@ -10,6 +11,7 @@ from dem.prepare.recipe import check_stages, parse_stage
 from experiments.platform.surfaces import Surface
 from experiments.runs.progress import Progress
 
+from .bed_progress import Stages
 from .sentences import say
 
 __all__ = ["check_bed_stages", "packing_warning", "staged_bed"]
@@ -44,49 +46,37 @@ def packing_warning(surface: Surface, material: Material, stages: Sequence[str] 
     return say("not_packed", surface=surface, stages=would_do)
 
 
-class _OneStage:
+class _OneStage(Stages):
     """Shows the stages of a preparation as one of the experiment; stops it where it can be gone on with."""
 
     def __init__(self, progress: Progress, name: str, count: int, asked_to_stop: Callable[[], bool]) -> None:
-        self.progress, self.count, self.asked_to_stop, self.index = progress, count, asked_to_stop, -1
+        super().__init__(progress, asked_to_stop)
+        self.count, self.index = count, -1
         progress.stage(name, total=1.0)
 
     def stage(self, name: str, total: float | None = None) -> None:
         self.index += total is not None
 
     def update(self, done: float) -> None:
-        self.progress.update(min(1.0, (max(self.index, 0) + min(max(done, 0.0), 1.0)) / self.count))
-        if self.asked_to_stop():
-            raise KeyboardInterrupt
+        super().update(min(1.0, (max(self.index, 0) + min(max(done, 0.0), 1.0)) / self.count))
 
 
 def staged_bed(
     material: Material,
     stages: Sequence[str],
     *,
-    size: tuple[float, float, float],
-    grain: float | Graded,
-    spread: float | None,
-    gravity: float,
-    seed: int,
-    young: float,
-    max_overlap: float,
-    arch: str,
-    threads: int | None,
-    cache: bool,
     progress: Progress,
     asked_to_stop: Callable[[], bool],
+    **options: Any,
 ) -> Bed:
     """The bed that `hedgebed bed make` with these stages would make; kept under ``HEDGEBED_CACHE``, as rained ones are.
 
-    Raises RuntimeError where it cannot be made as asked for, and what ``dem.prepare.prepare.prepare_as`` does.
+    ``options``: those of ``dem.prepare.prepare.prepare_as``. Raises RuntimeError where it cannot be made as asked for,
+    and what that does.
     """
+    shown = _OneStage(progress, "bed", len(stages), asked_to_stop)
     try:
-        prepared = prepare_as(
-            material, make=Bed, stages=stages, size=size, grain=grain, spread=spread, gravity=gravity, seed=seed,
-            young=young, max_overlap=max_overlap, arch=arch, threads=threads, cache=cache,
-            progress=_OneStage(progress, "bed", len(stages), asked_to_stop),
-        )  # fmt: skip
+        prepared = prepare_as(material, make=Bed, stages=stages, **options, progress=shown)
     except ValueError as error:  # found while it was prepared, as a packing that cannot be reached
         raise RuntimeError(str(error)) from error
     assert prepared.bed is not None
