@@ -1,7 +1,5 @@
 """What is implausible about a campaign, as findings that name their trial; and sensors louder than stated."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator, Sequence
@@ -12,30 +10,24 @@ from numpy.typing import NDArray
 
 from experiments.campaign import Campaign, PenetrationCampaign, TumbleCampaign
 from experiments.campaign.tables import PenetrationTrial, TumbleTrial
-from experiments.diagnose.fit.problem import Finding
 
 from .force_units import force_units
 from .penetration import penetration_oddities
 from .tumble import tumble_oddities
-from .words import say, times, unit_words
+from .words import Finding, say, times, unit_words
 from .zeros import depth_zeros
 
 __all__ = ["find_implausible", "loud_sensors", "missing_sensors", "said_once", "without_companions"]
 
 Array = NDArray[np.float64]
 
-_MANY = 4
-"""Trials of which the same is said once."""
-_LOUD = 2.0
-"""Times the stated noise from which on a sensor is called louder."""
-_QUIET = 0.1
-"""And quieter: coloured noise has less of it from row to row than in all, but not so little."""
-_NAMED = ("looks like", "would say so")
-"""Words of a finding that names a unit."""
+_MANY = 4  # trials of which the same is said once
+_LOUD = 2.0  # times the stated noise from which on a sensor is called louder
+_QUIET = 0.1  # and quieter: coloured noise has less of it from row to row than in all, but not so little
+_NAMED = ("looks like", "would say so")  # words of a finding that names a unit
 _FOLLOWS = ("by a jump that no motion makes", "jumps so often", "what [sensors.", "its zero is to be taken off")
 """Words of findings that a named cause makes of itself."""
-_OFF_SCALE = "in other units (N/mm, g)"
-"""Words of a force that is out of all proportion."""
+_OFF_SCALE = "in other units (N/mm, g)"  # words of a force that is out of all proportion
 _TOGETHER = (frozenset(("x", "y", "theta")), frozenset(("gyro", "ax", "ay")), frozenset(("wheel",)),
              frozenset(("depth",)), frozenset(("force",)), frozenset(("accel",)))  # fmt: skip
 """Channels of one sensor."""

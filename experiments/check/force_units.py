@@ -4,8 +4,6 @@ A factor between two units is the same in every push and at every depth, and far
 It is a suspicion, said by name; nothing is converted.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -23,17 +21,14 @@ __all__ = ["force_units"]
 
 Array = NDArray[np.float64]
 
-_POUND = 4.4482216152605
-"""Newtons of a pound of force."""
+_POUND = 4.4482216152605  # newtons of a pound of force
 
 
 @dataclass(frozen=True)
 class _Unit:
-    ratio: float
-    """Read over true."""
+    ratio: float  # read over true
     what: str
-    alone: bool
-    """Whether no effect and no damper makes such a factor, so that a force of any shape may have it."""
+    alone: bool  # whether no effect and no damper makes such a factor, so that a force of any shape may have it
 
 
 _UNITS = (
@@ -43,29 +38,21 @@ _UNITS = (
     _Unit(STANDARD_GRAVITY, "newtons that were multiplied by 9.81 once more", False),
     _Unit(_POUND, "newtons that were multiplied by 4.448 once more", False),
 )
-_SIGMAS = 4.0
-"""Standard deviations of what is stated, in logarithms, beyond which a ratio is no parameter's error."""
-_LEAST = 3.0
-"""Ratio from which on it is asked for at all."""
+_SIGMAS = 4.0  # standard deviations of what is stated, in logarithms, beyond which a ratio is no parameter's error
+_LEAST = 3.0  # ratio from which on it is asked for at all
 _NEAR, _NEAR_SIGMAS = 0.25, 2.5
 """How near in logarithms a unit must be: what a missing effect may add, and what the stated numbers leave open."""
-_ALIKE = 0.3
-"""Standard deviation of the pushes' ratios, in logarithms, up to which they are one factor."""
-_ONE_SHAPE = 0.3
-"""Logarithm by which the ratio may differ between shallow and deep rows."""
+_ALIKE = 0.3  # standard deviation of the pushes' ratios, in logarithms, up to which they are one factor
+_ONE_SHAPE = 0.3  # logarithm by which the ratio may differ between shallow and deep rows
 _ROWS = 8
-_BY_DROPS = 0.15
-"""Relative uncertainty of a stiffness that drops tell."""
+_BY_DROPS = 0.15  # relative uncertainty of a stiffness that drops tell
 
 
 @dataclass(frozen=True)
 class _Push:
-    ratio: float
-    """Force over that of spring and damper, in the deeper half of the way in."""
-    bend: float
-    """Logarithm of the same, deep over shallow; NaN where it cannot be told."""
-    doubt: float
-    """Relative uncertainty of what spring and damper give, one sigma."""
+    ratio: float  # force over that of spring and damper, in the deeper half of the way in
+    bend: float  # logarithm of the same, deep over shallow; NaN where it cannot be told
+    doubt: float  # relative uncertainty of what spring and damper give, one sigma
 
 
 def force_units(campaign: Campaign) -> Iterator[str]:

@@ -1,7 +1,5 @@
 """Pushes and drops that are not what the format asks for: signs, units, zeros, speeds, what an accelerometer reads."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 
@@ -18,13 +16,11 @@ __all__ = ["penetration_oddities"]
 
 Array = NDArray[np.float64]
 
-_DEEP = 30.0
-"""Diameters beyond which a depth over `_DEEP_METRES` is doubted."""
+_DEEP = 30.0  # diameters beyond which a depth over `_DEEP_METRES` is doubted
 _DEEP_METRES = 0.3
 _WIDE_METRES, _SHALLOW = 1.0, 0.02
 """A diameter above this is doubted where the spike goes in by less than this share of it."""
-_FEW_ROWS = 5
-"""Rows by which a drop may begin late."""
+_FEW_ROWS = 5  # rows by which a drop may begin late
 _OFF_SCALE = 30.0
 """Ratio of a measured force and that of the spring with the stated stiffness which no doubt of it explains."""
 

@@ -1,7 +1,5 @@
 """Replicates in a campaign, looked at without a model: which trials are alike, and is one at odds with the others?"""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -9,10 +7,8 @@ from numpy.typing import NDArray
 
 from experiments.campaign import Campaign, PenetrationCampaign, Recording, TumbleCampaign
 from experiments.campaign.tables import PenetrationTrial, TumbleTrial
-from experiments.diagnose.fit.problem import Finding
-from experiments.diagnose.noise.unit_factors import factor_words
 
-from .words import say
+from .words import Finding, factor_words, say
 
 __all__ = ["Condition", "condition_of", "condition_words", "odd_replicates"]
 
@@ -21,12 +17,10 @@ Condition = tuple[object, ...]
 
 _AT_ODDS = 20.0
 """How many times as far from its replicates as they are from one another, in mean square, a trial is at odds."""
-_NOISE = 4.0
-"""And how many times farther, in mean square, than the sensors' noise would put it."""
+_NOISE = 4.0  # and how many times farther, in mean square, than the sensors' noise would put it
 _SIZEABLE = 0.1
 """And by which share of what the channel does (its standard deviation) it must differ: beds differ by some percent."""
-_POINTS = 80
-"""Places at which replicates are compared."""
+_POINTS = 80  # places at which replicates are compared
 
 
 def condition_of(tables: TumbleCampaign | PenetrationCampaign, trial: Any) -> Condition:

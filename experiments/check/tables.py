@@ -1,7 +1,5 @@
 """Numbers of campaign.toml that contradict one another: a simulated gravity that the counterweight does not leave."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

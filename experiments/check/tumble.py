@@ -1,7 +1,5 @@
 """Tumbles that are not what the format asks for: the camera's zero, gyro, wheel, gravity."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 
@@ -19,8 +17,7 @@ __all__ = ["tumble_oddities"]
 
 Array = NDArray[np.float64]
 
-_LATE = 0.03
-"""Seconds by which the wheel may begin to change late before t = 0 is doubted."""
+_LATE = 0.03  # seconds by which the wheel may begin to change late before t = 0 is doubted
 
 
 def tumble_oddities(campaign: Campaign, tables: TumbleCampaign, trial: TumbleTrial) -> Iterator[Odd]:

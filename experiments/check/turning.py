@@ -1,7 +1,5 @@
 """Which way a tumble turns and when, by camera, gyro and accelerometer: scales, signs and clocks that disagree."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 
@@ -11,16 +9,15 @@ from scipy.ndimage import median_filter
 
 from experiments.campaign import Recording, TumbleCampaign
 from experiments.campaign.tables import TumbleTrial
-from experiments.diagnose.noise.lags import Lag, find_lag, pieces
 
+from .lags import Lag, find_lag, pieces
 from .words import Odd, said
 
 __all__ = ["clock_oddities", "sideways_oddities", "turning_oddities"]
 
 Array = NDArray[np.float64]
 
-_SCALE = 0.1
-"""Relative difference of gyro and camera that neither noise nor a clock makes."""
+_SCALE = 0.1  # relative difference of gyro and camera that neither noise nor a clock makes
 _TURNS = {
     -1.0: "one of the two has its sign reversed: clockwise is positive",
     180 / math.pi: "gyro_rad_s looks like degrees a second: gyro_deg_s would say so",
@@ -28,18 +25,12 @@ _TURNS = {
     30 / math.pi: "gyro_rad_s looks like revolutions a minute: gyro_rpm would say so",
 }
 _NO_TURN = "one of the two has another scale, or is not about the axis of rotation"
-_LATE = 0.03
-"""Seconds of a constant lag from which on it is said; `diagnose` finds smaller ones as clock-offset."""
-_APART = 0.02
-"""Seconds by which the lag of a trial's second half must be another."""
-_ONE_MOTION = 1.5
-"""Misfit over the noise's, up to which each half is one motion: a marker that jumps is no clock."""
-_FIRST = 0.3
-"""Radians of the first turn, in which a platform still pivots about the row that it stands on."""
-_ROWS = 9
-"""Rows whose median is taken."""
-_SURE_OF_AXES = 0.9
-"""Correlation from which on one column follows another."""
+_LATE = 0.03  # seconds of a constant lag from which on it is said; `diagnose` finds smaller ones as clock-offset
+_APART = 0.02  # seconds by which the lag of a trial's second half must be another
+_ONE_MOTION = 1.5  # misfit over the noise's, up to which each half is one motion: a marker that jumps is no clock
+_FIRST = 0.3  # radians of the first turn, in which a platform still pivots about the row that it stands on
+_ROWS = 9  # rows whose median is taken
+_SURE_OF_AXES = 0.9  # correlation from which on one column follows another
 
 
 def clock_oddities(tables: TumbleCampaign, pose: Recording, imu: Recording) -> tuple[list[Odd], bool]:

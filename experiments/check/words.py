@@ -1,23 +1,23 @@
-"""What an odd recording is called: a channel and a sentence, and what a ratio of two units means."""
-
-from __future__ import annotations
+"""What is said of an odd recording: a finding, a channel and a sentence, and what a ratio of two units means."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from experiments.campaign.tables import DepthSensor
 from rigid.platform.rig import STANDARD_GRAVITY
 from vis.page.sentences import Sentences
 
-__all__ = ["OFF", "ZERO", "Odd", "said", "say", "std_of", "times", "unit_words"]
+__all__ = ["OFF", "ZERO", "Finding", "Odd", "factor_words", "said", "say", "std_of", "times", "unit_words"]
 
 say = Sentences(__package__)
-OFF = 6.0
-"""Standard errors by which a zero or a speed must be off."""
-ZERO = 5.0
-"""And standard deviations of the sensor."""
-_NEAR = 0.15
-"""Relative distance within which a ratio counts as that of two units."""
+OFF = 6.0  # standard errors by which a zero or a speed must be off
+ZERO = 5.0  # and standard deviations of the sensor
+_NEAR = 0.15  # relative distance within which a ratio counts as that of two units
 _RATIOS = {
     -1.0: "the sign is reversed",
     180 / math.pi: "it looks like degrees under a heading in radians",
@@ -26,6 +26,37 @@ _RATIOS = {
     1e3: "it looks like thousandths under a heading without them",
     1 / STANDARD_GRAVITY: "it looks like units of g under a heading in m_s2",
 }
+
+_LENGTHS = {1e3: "mm", 100.0: "cm", 1 / 0.0254: "inches"}
+_TURNED = {180 / math.pi: "degrees"}
+_RATES = {180 / math.pi: "deg/s", 30 / math.pi: "rpm"}
+_READ_IN: dict[str, dict[float, str]] = {
+    "force": {1e3: "mN", 1e-3: "kN", 1 / STANDARD_GRAVITY: "kilograms of force",
+              1e3 / STANDARD_GRAVITY: "grams of force",
+              1 / 4.4482216152605: "pounds of force", STANDARD_GRAVITY: "newtons times 9.81 once more"},
+    "accel": {1 / STANDARD_GRAVITY: "g", 1e3: "mm/s2", 100.0: "cm/s2", STANDARD_GRAVITY: "m/s2 times 9.81 once more"},
+    "depth": _LENGTHS, "x": _LENGTHS, "y": _LENGTHS, "theta": _TURNED, "gyro": _RATES,
+    "wheel": _RATES | {1 / math.tau: "revolutions/s"},
+}  # fmt: skip
+_READ_IN |= {"ax": _READ_IN["accel"], "ay": _READ_IN["accel"]}
+"""Channel -> how many times too large a reading is that was taken in another unit."""
+_NEXT_TO = 0.02  # relative distance from such a factor; between 9.807 and 30/pi lie 2.7 %
+_SHAPE = 0.1
+"""Share of its size by which it may differ from its replicates times that factor: what is left is noise and beds."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """Something wrong with the data that was found, and what was done."""
+
+    trial: str
+    what: str  # one plain sentence, which also says what was done: set aside, modelled, or kept
+    channel: str | None = None
+    from_s: float | None = None
+    to_s: float | None = None
+    set_aside: bool = False
+    doubt: bool = False
+    """Whether a person has to put it right before a name can be trusted: a unit, a sign, a zero, a clock."""
 
 
 class Odd(NamedTuple):
@@ -53,3 +84,22 @@ def times(ratio: float) -> str:
 def std_of(sensor: DepthSensor | None) -> float:
     """The first std of a table of [sensors]; 0 without one."""
     return 0.0 if sensor is None else float(sensor.std[0])
+
+
+def factor_words(channel: str, own: NDArray[np.float64], others: Sequence[NDArray[np.float64]]) -> str:
+    """What to add to "at odds" where `own` is its replicates' curve, times a factor between two units; else nothing.
+
+    Curves at the same places, shape [n], NaN where there is nothing.
+    """
+    usual = np.median(np.stack(list(others)), axis=0)
+    good = np.isfinite(own) & np.isfinite(usual)
+    a, b = own[good], usual[good]
+    if len(a) < 8 or not a.any() or not b.any():
+        return ""
+    factor = float(a @ b) / float(b @ b)
+    if factor <= 0 or float(np.linalg.norm(a - factor * b)) > _SHAPE * float(np.linalg.norm(a)):
+        return ""
+    for ratio, unit in _READ_IN.get(channel, {}).items():
+        if abs(factor / ratio - 1) < _NEXT_TO:
+            return f"; its {channel} is {factor:.4g} times theirs all along, as if it were in {unit}: is it?"
+    return ""

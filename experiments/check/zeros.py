@@ -1,7 +1,5 @@
 """Is depth 0 where the bed begins? Where the force sets in, push by push, compared over all pushes of a machine."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 
@@ -17,20 +15,13 @@ __all__ = ["depth_zeros", "force_onset"]
 
 Array = NDArray[np.float64]
 
-_ROWS = 8
-"""Rows that are averaged to tell whether there is a force."""
-_SURE = 4.0
-"""Standard errors from which on there is."""
-_AFTER = 3
-"""Such averages in a row with which it has set in."""
-_LEAST = 5e-4
-"""m by which the zero must be off to be said."""
-_SHARE = 0.05
-"""And the share of the deepest point."""
-_BEGINS = 0.2
-"""Share of what a force comes to that it may be where it begins."""
-_ALIKE = 0.5
-"""Share of it by which pushes may differ and yet be off alike."""
+_ROWS = 8  # rows that are averaged to tell whether there is a force
+_SURE = 4.0  # standard errors from which on there is
+_AFTER = 3  # such averages in a row with which it has set in
+_LEAST = 5e-4  # m by which the zero must be off to be said
+_SHARE = 0.05  # and the share of the deepest point
+_BEGINS = 0.2  # share of what a force comes to that it may be where it begins
+_ALIKE = 0.5  # share of it by which pushes may differ and yet be off alike
 
 
 def depth_zeros(campaign: Campaign) -> Iterator[tuple[str, str]]:
@@ -105,8 +96,7 @@ def force_onset(depth: Array, force: Array, std: float) -> tuple[float, float] |
 
 
 def _from_nothing(depth: Array, force: Array, first: float, std: float) -> bool:
-    """Whether a force that is there from the first row on, at the depth `first` [m], begins at nothing there: next to
-    what it comes to at depth 0 (begun above it), or at twice that depth (below)."""
+    """Whether a force that is there from the first row on, at the depth `first` [m], begins at nothing there."""
     rows = depth <= (2 * first if first > 0 else 0.0)
     if first == 0 or rows.sum() < _ROWS:
         return False
@@ -117,8 +107,7 @@ def _from_nothing(depth: Array, force: Array, first: float, std: float) -> bool:
 
 
 def _nothing_before(depth: Array, force: Array, onset: float, std: float) -> bool:
-    """Whether the rows from depth 0 to the onset [m] show that there is no force, not only that none can be seen: less
-    than half of what a force that grows with the square of the depth up to twice the onset would have there."""
+    """Whether the rows from depth 0 to the onset [m] show that there is no force, not only that none is seen."""
     before, there = (depth > 0) & (depth < onset), (depth > 1.6 * onset) & (depth < 2.4 * onset)
     if before.sum() < _ROWS or not there.any():
         return False

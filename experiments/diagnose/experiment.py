@@ -1,7 +1,5 @@
 """`hedgebed diagnose CAMPAIGN`: a campaign of measured trials in, a diagnosis in a run folder out."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Sequence
 from dataclasses import replace
@@ -25,7 +23,7 @@ from .core.outcome import Diagnosis
 from .fit.bounds import is_strained
 from .fit.own import load_own
 from .fit.problem import Problem
-from .noise.words import together
+from .noise.colour import together
 from .report.document import write_diagnosis
 from .report.summary import summary_sentences, title_words
 from .report.telling import findings_in_words, told_tables, where_sentences
@@ -69,8 +67,7 @@ def diagnose_campaign(
             told.stage(what, total=1.0)
         told.update(done)
 
-    known = getattr(problem, "explains", lambda finding: False)
-    odd = [finding for finding in find_implausible(measured) if not known(finding)]
+    odd = [finding for finding in find_implausible(measured) if not problem.explains(finding)]
     for finding in odd:  # before the long part: a wrong number in campaign.toml is soon put right
         told.message(f"before anything is fitted: {finding.what}")
     gates = None
@@ -80,7 +77,7 @@ def diagnose_campaign(
         gates = cache_folder() / "gates"
     with threadpool_limits(1):  # matrices are small: threads of the linear algebra only get in each other's way
         found = diagnose(problem, thorough=thorough, seed=seed, tell=tell, gates=gates)
-    odd = [finding for finding in odd if not known(finding)]  # by now zeros may be taken into account
+    odd = [finding for finding in odd if not problem.explains(finding)]  # by now zeros may be taken into account
     seen = (*missing_sensors(measured), *odd, *findings_in_words(found.findings))
     return replace(found, findings=seen)
 
@@ -130,13 +127,6 @@ _UNITS = {"force": "N, each in its own way", "depth": "m, each in its own way", 
 _SENSORS = ("depth zero", "force zero")
 
 
-def _whose(found: Diagnosis) -> str:
-    """What replicates differ by: grains lie otherwise in each bed, a hard surface has none."""
-    tables = getattr(found.problem, "tables", None)
-    surface = getattr(tables, "surface", None)
-    return "the bed's" if getattr(surface, "granular", True) else "the surface's, the rig's or the start's"
-
-
 def _result(found: Diagnosis, said: dict[str, Any]) -> Result:
     quantities: dict[str, Any] = {
         f"gap_{stage}_{part}": {"value": value, "std": None, "unit": "1",
@@ -163,14 +153,14 @@ def _result(found: Diagnosis, said: dict[str, Any]) -> Result:
         for name, entry in effect["parameters"].items():
             quantities[f"{effect['id']}.{name}"] = _quantity(entry, at_end=f"{effect['id']}.{name}" in at_end["after"])
     sentences = where_sentences(said)
-    more = getattr(found.problem, "remarks", None)
-    sentences += more(found.best_values, found.forms) if more is not None else []
+    sentences += found.problem.remarks(found.best_values, found.forms)
+    whose = "the bed's" if found.problem.granular else "the surface's, the rig's or the start's"
     noises = [together([colour]) for colour in found.colours.values()]
     sentences += [f"{words[0].upper()}{words[1:]}." for words in noises]
     sentences += [
         f"Replicates differ by more than the sensors: {kind}, standard deviation {std:.3g} "
         + _UNITS.get(kind, "(relative)")
-        + f"; it is {'the zero of a sensor, or of where it was set up' if kind in _SENSORS else _whose(found)}."
+        + f"; it is {'the zero of a sensor, or of where it was set up' if kind in _SENSORS else whose}."
         for kind, std in found.model_std.items()
     ]
     warnings = [finding.what for finding in said_once(found.findings)]

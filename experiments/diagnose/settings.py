@@ -1,7 +1,5 @@
 """Settings of `hedgebed diagnose`."""
 
-from __future__ import annotations
-
 from pydantic import Field
 
 from experiments.runs.strict import StrictSettings

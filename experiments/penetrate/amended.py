@@ -21,7 +21,7 @@ from coupling import Penetration
 from experiments.campaign import PenetrationModel, read_model
 from experiments.campaign.tables import EffectTable
 from experiments.diagnose.fit.own import OwnEffect, load_own
-from experiments.diagnose.push.forms import Scales, make_library
+from experiments.diagnose.push.forms import push_forms
 from experiments.diagnose.push.law import PHASES, SLOTS, fall, push, slot_places, slot_table
 from experiments.runs.types import Json
 from rigid import SpringDamper
@@ -78,8 +78,9 @@ def read_law(path: str | Path, settings: PenetrateSettings) -> AmendedLaw:
 
 def _hows() -> dict[str, str]:
     """Slot of the law -> how it goes with the diameter, of every form in the library."""
-    library = make_library(Scales(depth=1.0, speed=1.0, force=1.0), retreats=True, speeds_differ=True)
-    return {slot.name: slot.how for table in library.slots.values() for slot in table.values()}
+    forms = push_forms(retreats=True, speeds_differ=True)
+    numbers = [form.numbers for form in forms] + [bend.numbers for form in forms for bend in form.bends]
+    return {number.name: number.how for several in numbers for number in several}
 
 
 def _own(path: Path, number: int, effect: EffectTable) -> OwnEffect:

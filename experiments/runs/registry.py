@@ -131,7 +131,7 @@ EXPERIMENTS: dict[str, Experiment] = {
             "Is a campaign fit to be diagnosed? Every fault by file and line, a table of its trials, plots of what is "
             "in it.",
             settings="experiments.check.settings:CheckSettings",
-            module="experiments.check.experiment",
+            module="experiments.diagnose.inspection",
             subject="campaign",
         ),
         Experiment(

@@ -31,7 +31,7 @@ class Number:
     fitted: str  # Its name while it is fitted, without the effect's
     how: str = "same"
     """Tumbles: ``same``, ``change`` (`typical` + value), ``logarithm`` (`typical` e^value), ``inverse`` (1 / value,
-    infinite at 0), ``fixed`` (always `typical`, not fitted). Pushes: see `experiments.diagnose.push.forms.Slot`."""
+    infinite at 0), ``fixed`` (always `typical`, not fitted). Pushes: see `experiments.diagnose.push.forms.physical`."""
     typical: float = 0.0
     unit: str = "1"
     value: float = 0.0  # Where fits begin, and the middle of the prior

@@ -11,7 +11,7 @@ from benchmarks.hidden.rig import EFFECTS, NUISANCES, OUTSIDE, make_rig
 from benchmarks.hidden.rig_bed import LAWS, Bed, Law, draw_law, drive, drop, push
 from benchmarks.hidden.suite import STRENGTHS, make_case, suite
 from experiments.campaign import read_campaign, write_campaign
-from experiments.check.experiment import find_faults
+from experiments.diagnose.inspection import find_faults
 
 
 def test_a_seed_gives_the_same_campaign_and_the_answer_is_not_in_it(tmp_path):

@@ -1,7 +1,5 @@
 """What a diagnosis decides on: the gap, when a name stands, when it is certain beside something else."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -24,8 +22,7 @@ __all__ = [
     "verdict_of", "well_known",
 ]  # fmt: skip
 
-_AS_LIKELY = 1.0
-"""Nats within which a third name is said as well."""
+_AS_LIKELY = 1.0  # nats within which a third name is said as well
 _AS_LOUD, _RIGHT_FORM = 2.0, 0.02
 """Chi-square per sample up to which a misfit of form is no louder than the sensors; and the share of what the base
 model leaves that it may be."""
@@ -37,10 +34,8 @@ Of trials held out twice that: few as they are, one that is sensitive (a slow dr
 _NO_NAME = 0.5
 """Share of what the base model leaves, of trials fitted or held out, from which on a name explains too little to be
 one, where the gate sees that something is left. In five counts of tumbles right names left 0.47 at most of these."""
-_LOUD = 3.0
-"""Standard deviations of chi-square beyond which what a name leaves is no matter of chance."""
-_LATE = 0.5
-"""Share of a held-out trial's time up to which a model that explains all fitted ones must follow it."""
+_LOUD = 3.0  # standard deviations of chi-square beyond which what a name leaves is no matter of chance
+_LATE = 0.5  # share of a held-out trial's time up to which a model that explains all fitted ones must follow it
 _CERTAIN = 0.1
 """Share of what the base model leaves, fitted, predicted and held out, that may be left by a name that is certain
 beside something that has no name."""
@@ -130,8 +125,7 @@ def explains_nothing(choice: Choice, held_out: tuple[str, ...]) -> bool:
 
 
 def _of_form(choice: Choice, held_out: tuple[str, ...]) -> bool:
-    """Whether what is left is little beside what the base model leaves, and less where it is louder than the sensors:
-    nature's form is never quite the library's."""
+    """Whether what is left is so little that it is the form's misfit: nature's form is never quite the library's."""
     found, base = choice.best.fit, choice.base.fit
     left, share = [found.chi_square / found.count], [excess(found) / max(excess(base), 1e-9)]
     if held_out:
@@ -149,8 +143,7 @@ def _too_little(choice: Choice, after: float, held_out: tuple[str, ...]) -> bool
         return True
     problem, trials = base.model.problem, base.model.trials
     before = gap_of(problem, base.model, values_of_all(base, held_out), trials, ()).fit
-    of_form = getattr(problem, "left_by_forms", 1.0)
-    return after - 1 > max(_LOUD * math.sqrt(2 / found.count), of_form * (before - 1))
+    return after - 1 > max(_LOUD * math.sqrt(2 / found.count), problem.left_by_forms * (before - 1))
 
 
 def _share_left(choice: Choice, held_out: tuple[str, ...]) -> float:

@@ -1,7 +1,5 @@
 """From a problem to a diagnosis: split, fit, gate, search, verdict. Knows nothing of what kind of trials these are."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
@@ -11,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.diagnose.fit.bounds import is_strained
-from experiments.diagnose.fit.evidence import Hypothesis, excess, held_out_fit, score, signature_matrix
+from experiments.diagnose.fit.evidence import Hypothesis, excess, held_out_fit, signature_matrix
 from experiments.diagnose.fit.fitting import Fit, Model, Whitener, by_beginnings, fit, settled
 from experiments.diagnose.fit.gate import Verdict, held_out_gate, open_gate
 from experiments.diagnose.fit.problem import Finding, Problem
@@ -23,7 +21,8 @@ from experiments.diagnose.noise.replicates import Scatter, exchanged, groups_of,
 from experiments.diagnose.noise.unrest import Unrest
 
 from .deciding import explains_nothing, unscattered, verdict_of
-from .outcome import Diagnosis, Told
+from .finishing import Told
+from .outcome import Diagnosis
 from .own_ways import all_astray, held_out_ways, missed, own_ways
 from .renoised import (
     calmed,
@@ -37,7 +36,6 @@ from .renoised import (
     plain,
     recoloured,
     rescattered,
-    scatter_apart,
     scatter_of,
     unrest_of,
     whitened_fit,
@@ -50,12 +48,9 @@ Tell = Callable[[str, float], None]
 
 _DRAWS, _REFITS = 600, 400
 """Made-up campaigns of a null, and of a thorough one, each of them refitted."""
-_MARGIN = 1.5
-"""Standard deviations beyond the gate that something without a name must reach: no effect speaks for it."""
-_MOST_LEFT = 2.5
-"""Chi-square a sample up to which a name is near enough to the motion for rows to be weighed by it."""
-_ON = 1.0
-"""Chi-square by which a fit must go on to be taken instead."""
+_MARGIN = 1.5  # standard deviations beyond the gate that something without a name must reach: no effect speaks for it
+_MOST_LEFT = 2.5  # chi-square a sample up to which a name is near enough to the motion for rows to be weighed by it
+_ON = 1.0  # chi-square by which a fit must go on to be taken instead
 _OUT_OF_THE_WAY = 0.5
 """Share of what the base model leaves from which on a name has not taken the motion out of the way."""
 
@@ -88,17 +83,14 @@ class _Asked:
     seed: int
     tell: Tell
     gates: Path | None
-    aside: Sequence[Finding] = ()
-    """Fitted trials that are to take no part (`astray`)."""
+    aside: Sequence[Finding] = ()  # fitted trials that are to take no part (`astray`)
     looked_at: Sequence[str] = ()
     """Trials that must not be held out, others are in their place: the base model explains all but these."""
     restless: bool = False
     """What replicates differ by each in its own way (`unrest`) counts as noise; asked only whether a name that stands
     beside something unknown is there for certain."""
-    begun: _Begun | None = None
-    """What the same campaign's first fits have told."""
-    patient: bool = False
-    """Look for further names before a trial is asked whether it goes its own way."""
+    begun: _Begun | None = None  # what the same campaign's first fits have told
+    patient: bool = False  # look for further names before a trial is asked whether it goes its own way
 
 
 class _Course:
@@ -159,20 +151,17 @@ class _Course:
     def _fit_base(self) -> None:
         """Split and fitted, trials at odds with their replicates, and those that are to take no part, aside."""
         problem, asked = self.problem, self.asked
-        if hasattr(problem, "prepare"):
-            problem.prepare(self.tell)
+        problem.prepare(self.tell)
         self.tell("fitting the base model", 0.0)
         self.findings = list(problem.findings)
         fitted, self.held_out = split_trials(problem.trials)
-        if hasattr(problem, "shake"):
-            problem.shake({})
-        if hasattr(problem, "calm"):
-            problem.calm({})
+        problem.shake({})
+        problem.calm({})
         begun = asked.begun
         if begun is None or begun.jitters or not (asked.aside or asked.looked_at):  # or else all is fitted anew below
             base, jitters = jittered(whitened_fit(Model(problem, Whitener.white(problem), fitted)), self.held_out)
             odd = []
-            if any(len(ids) > 2 for ids in groups_of(problem.trials).values()) or not hasattr(problem, "follows"):
+            if any(len(ids) > 2 for ids in groups_of(problem.trials).values()) or problem.contacts is None:
                 odd = odd_trials(whitened_fit(base.model.on([t.id for t in problem.trials])))
             begun = _Begun(base, jitters, odd)
         self.begun, self.jitters, base = begun, begun.jitters, begun.base
@@ -204,11 +193,10 @@ class _Course:
         self.base = coloured(base, self.colours)
 
     def _ask_gate(self) -> None:
-        """Whether the base model leaves anything; where it is rough and leaves little, once more from the beginnings: a
-        small effect may make up for a branch of the motion that its fit has missed."""
+        """Whether the base model leaves anything; where it is rough and leaves little, also from the beginnings."""
         self.tell("is anything left?", 0.0)
         self.first = self._gate_of_base()
-        if self.first.passed or not hasattr(self.problem, "follows") or leaves_much(self.base):
+        if self.first.passed or self.problem.contacts is None or leaves_much(self.base):
             return
         other = by_beginnings(self.base)
         if other is not self.base:
@@ -237,10 +225,9 @@ class _Course:
         return choice
 
     def _reweighed(self, choice: Choice) -> Choice:
-        """With rows weighed as the best model has it: what the error of a path does to a force goes with the model, and
-        one that lacks something plain bends its numbers."""
+        """With rows weighed as the best model has it: the effect of a path's error on a force goes with the model."""
         best = choice.best
-        if self.asked.restless or not (best.effects and getattr(self.problem, "by_path", False)):
+        if self.asked.restless or not (best.effects and self.problem.by_path):
             return choice
         loud = best.fit.chi_square > _MOST_LEFT * best.fit.count
         if loud or excess(best.fit) >= _OUT_OF_THE_WAY * excess(self.base):
@@ -276,10 +263,11 @@ class _Course:
         if not self._compares(choice):
             return choice
         fits, named = (choice.best.fit, choice.base.fit), choice.left.passed
-        for kinds, beside in itertools.product(("", "zero_scatter", "force_scatter"), fits[1:] if named else fits):
+        later = [kinds for kinds in (self.problem.zero_scatter, self.problem.force_scatter) if kinds]
+        for kinds, beside in itertools.product(((), *later), fits[1:] if named else fits):
             if choice.left.passed and not named:
                 break
-            scatter = scatter_apart(beside, self.held_out, kinds=kinds)
+            scatter = scatter_of(beside, self.held_out, apart=True, kinds=kinds)
             if not scatter.parameters or set(scatter.model_std) == set(self.model_std):
                 continue
             if named:
@@ -287,17 +275,16 @@ class _Course:
                     return other
                 continue
             self.tell("replicates are found to differ beside what is left: choosing again", 0.0)
-            stands = _explains if kinds == "force_scatter" else partial(_leaves_less, than=choice)
+            stands = _explains if kinds == self.problem.force_scatter else partial(_leaves_less, than=choice)
             choice = self._chosen_with(scatter, stands) or choice
         return choice
 
     def _scattered_alone(self, choice: Choice) -> Choice:
-        """Where no trial repeats another, and something is left: whether beds, or zeros, differ without going with
-        anything."""
+        """Where no trial repeats another, and something is left: whether beds, or zeros, differ without a rule."""
         if not self._compares(choice):
             return choice
         found: list[tuple[Scatter, Fit]] = []
-        fits, asked = (choice.best.fit, choice.base.fit), getattr(self.problem, "lone_scatter", ())
+        fits, asked = (choice.best.fit, choice.base.fit), self.problem.lone_scatter
         for beside, kinds in itertools.product(fits[1:] if choice.left.passed else fits, asked):
             scatter, findings = lone_scatter_of(beside, self.held_out, kinds=kinds)
             self.findings += [finding for finding in findings if finding not in self.findings]
@@ -335,14 +322,13 @@ class _Course:
         left, held = self._gate_of_base(), self._held_out_gate(self.base)
         if left.passed and (held is None or held.passed):
             self.model_std = scatter.model_std
-            nothing = Hypothesis(self.base, score(self.base))
+            nothing = Hypothesis.of(self.base)
             return Choice(nothing, nothing, (), choice.table, left)
         self.base, self.colours = before
         return None
 
     def _beside(self, scatter: Scatter, base: Fit | None) -> tuple[Fit, dict[str, Colour]]:
-        """Take `scatter` into the base model; the fit and the colours as they were. With what differs out of the way a
-        colour may show."""
+        """Take `scatter` into the base model, and the colour that shows then; fit and colours as they were."""
         before = self.base, self.colours
         base = base or rescattered(plain(self.base), scatter)
         self.colours = {**self.colours, **colours_of(base)}
@@ -351,8 +337,7 @@ class _Course:
 
     def _compares(self, choice: Choice) -> bool:
         """Whether trials are to be compared with one another once more (pushes and drops only)."""
-        asked = not self.asked.restless and getattr(self.problem, "by_path", False)
-        return asked and not self._settled(choice)
+        return not self.asked.restless and self.problem.by_path and not self._settled(choice)
 
     def _settled(self, choice: Choice) -> bool:
         """Whether the best leaves nothing of trials that were fitted and, where it has a name, of those held out."""
@@ -374,8 +359,8 @@ class _Course:
             self.tell("times are found to jitter: choosing again", 0.0)
             return self._chosen()
         left = open_gate(best, seed=self.asked.seed)[1]
-        base = Hypothesis(self.base, score(self.base))
-        return replace(choice, base=base, best=Hypothesis(best, score(best)), left=left)
+        base = Hypothesis.of(self.base)
+        return replace(choice, base=base, best=Hypothesis.of(best), left=left)
 
     def _recoloured_choice(self, choice: Choice) -> Choice:
         """A colour that is seen only now that the motion is out of the way."""
@@ -416,7 +401,7 @@ class _Course:
         asked, held_out = self.asked, self.held_out
         self.tell("verdict", 0.0)
         choice = self._ended(choice)
-        if choice.best.effects and hasattr(self.problem, "follows") and explains_nothing(choice, held_out):
+        if choice.best.effects and self.problem.contacts is not None and explains_nothing(choice, held_out):
             return self._nothing(choice.left)
         held = self._held_out_gate(choice.best.fit)
         verdict = verdict_of(choice, held, held_out, asked.seed, set_aside=bool(asked.aside))
@@ -454,7 +439,7 @@ class _Course:
                     sure = anew.effects
                     best = settled(fit(self.base.model.with_forms(anew.forms), unscattered(anew.best)))
                     # The table of candidates is of the likelihood in which they were weighed, its base model's with it.
-                    choice = replace(anew.choice, best=Hypothesis(best, score(best)), left=choice.left)
+                    choice = replace(anew.choice, best=Hypothesis.of(best), left=choice.left)
                     held = self._held_out_gate(best)
                 model_std = {**model_std, **wander.model_std}
         if verdict in ("named", "ambiguous") and held is not None and not held.passed:
@@ -463,14 +448,12 @@ class _Course:
         return told.finish(self.base, choice, verdict, held=held, sure=sure)
 
     def _stands(self, anew: Diagnosis, gone: Sequence[Finding]) -> bool:
-        """Whether what was found without the trials that are `gone` stands. A whole condition is set aside for a name
-        only: where nothing is missing without it, what is missing shows in it."""
+        """Whether what was found without `gone` trials stands; a whole condition is set aside for a name only."""
         few = len(gone) <= allowed(len(self.base.model.trials))
         return anew.verdict != "unknown" and (few or anew.verdict != "none")
 
     def _ended(self, choice: Choice) -> Choice:
-        """The best fit once more from where it is: one that a bend of the model had stopped may go on, above all along
-        the valley in which a number that is shared and every trial's own factor on it make up for one another."""
+        """The best fit once more from where it is: one that a bend of the model had stopped may go on."""
         best = choice.best.fit
         again = fit(best.model, best.values)
         if again.objective < best.objective - _ON:
@@ -488,7 +471,7 @@ class _Course:
         return told.finish(self.base, None, "none", last=last)
 
     def _told(self, model_std: Mapping[str, float]) -> Told:
-        model_std = {**getattr(self.problem, "known_std", {}), **model_std}
+        model_std = {**self.problem.known_std, **model_std}
         return Told(self.problem, self.first, self.findings, self.held_out, self.jitters, self.colours, model_std,
                     self.alone)  # fmt: skip
 

@@ -4,8 +4,6 @@ Of penetration an equation that begins with + or - is added to F = K z + C max(v
 Clauses after the first define what it uses, or say when it holds. They stand in the effects' own files (`rigid.terms`).
 """
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any

@@ -3,8 +3,6 @@
 The words stand in the effects' own files (`rigid.terms`).
 """
 
-from __future__ import annotations
-
 from rigid.terms import find_candidate
 
 __all__ = ["advice", "confirmation", "meaning", "push_advice"]

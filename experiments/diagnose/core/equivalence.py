@@ -6,8 +6,6 @@ noise was in these trials; their distance, how many standard deviations of noise
 its square is what the evidence can be expected to tell [nats], less where the misfit of form is louder than the noise.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -21,13 +19,11 @@ from .prediction import Predicted
 
 __all__ = ["CLOSE", "Rival", "compare"]
 
-CLOSE = 4.0
-"""Nats within which two names cannot be told apart."""
+CLOSE = 4.0  # nats within which two names cannot be told apart
 _SMALL_ANGLE = 25.0
 """Degrees below which two signatures count as one: forms of one and the same effect differ by as much."""
 
-_SURE = 2.0
-"""Nats of evidence and prediction together below which names whose signatures differ are both said."""
+_SURE = 2.0  # nats of evidence and prediction together below which names whose signatures differ are both said
 
 
 @dataclass(frozen=True)
@@ -36,18 +32,12 @@ class Rival:
 
     effect: str
     hypothesis: Hypothesis
-    behind: float
-    """Evidence of the best over this one [nats]."""
-    angle: float
-    """Between the two signatures [degrees]."""
-    distance: float
-    """Between the two predictions [standard deviations of the noise]."""
-    expected: float
-    """What these trials can be expected to tell between the two [nats]."""
-    predicted: Predicted | None = None
-    """Of conditions left out in turn; None where that was not looked at."""
-    behind_left_out: float | None = None
-    """The same for the prediction of conditions left out [nats]."""
+    behind: float  # evidence of the best over this one [nats]
+    angle: float  # between the two signatures [degrees]
+    distance: float  # between the two predictions [standard deviations of the noise]
+    expected: float  # what these trials can be expected to tell between the two [nats]
+    predicted: Predicted | None = None  # of conditions left out in turn; None where that was not looked at
+    behind_left_out: float | None = None  # the same for the prediction of conditions left out [nats]
 
     @property
     def close(self) -> bool:

@@ -5,8 +5,6 @@ Replicates answer by themselves what a repeated trial would: what is left of one
 body or in what it stands on; what does not is each trial's own.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 
@@ -18,16 +16,12 @@ from experiments.diagnose.noise.replicates import groups_of
 
 __all__ = ["after_unknown", "common_share"]
 
-_SHARES = np.linspace(0.0, 1.0, 401)
-"""Places along a trial at which replicates are compared."""
+_SHARES = np.linspace(0.0, 1.0, 401)  # places along a trial at which replicates are compared
 _COMMON, _IN_PART = 0.5, 0.25
 """Shares of what is left from which on it comes back, or does in part."""
-_AS_BAD = 0.3
-"""Share of the worst trial's misfit from which on one that has replicates is asked in its place."""
-_MAINLY = 0.5
-"""Share of it from which on a phase holds it."""
-_GOES_WITH = 0.1
-"""Share of the latent force that a column must explain to be followed up."""
+_AS_BAD = 0.3  # share of the worst trial's misfit from which on one that has replicates is asked in its place
+_MAINLY = 0.5  # share of it from which on a phase holds it
+_GOES_WITH = 0.1  # share of the latent force that a column must explain to be followed up
 
 _FOLLOW = {
     "t_s": "run the sensors as long as a trial with nothing moving: a sensor that drifts and a floor that shakes show "

@@ -1,7 +1,5 @@
 """Trials that go ways of their own, as a diagnosis asks for them: beside the base model, a name, or held out."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 
@@ -16,10 +14,8 @@ from .search import Choice
 
 __all__ = ["all_astray", "held_out_ways", "missed", "own_ways"]
 
-_ASKED = 3
-"""Hypotheses that are asked whether a trial of its own way is all that speaks against them."""
-_NAMES = 2
-"""Names beside which a trial may go its own way: more and a trial set aside would explain nearly anything."""
+_ASKED = 3  # hypotheses that are asked whether a trial of its own way is all that speaks against them
+_NAMES = 2  # names beside which a trial may go its own way: more and a trial set aside would explain nearly anything
 _SEEN_ELSEWHERE = 3.0
 """Nats by which a name must be better than none on the other trials, where one trial goes its own way."""
 

@@ -8,8 +8,6 @@ parameters moved as the projection says. Changes add up only as far as the model
 the beginning is looked at (`Model.until`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -20,12 +18,10 @@ from experiments.diagnose.fit.problem import Array, Form, Values
 
 __all__ = ["FormsStart", "next_starts", "pair_starts"]
 
-_SIZES = (0.1, 0.4, 1.0, 3.0)
-"""Amplitudes at which changes are taken, over those of a form's starts."""
+_SIZES = (0.1, 0.4, 1.0, 3.0)  # amplitudes at which changes are taken, over those of a form's starts
 _LEAST, _MOST = 0.3, 3.0
 """How far the change at one amplitude is scaled."""
-_BEGINNING = 0.4
-"""Share of a motion that bounces which is looked at."""
+_BEGINNING = 0.4  # share of a motion that bounces which is looked at
 
 
 @dataclass(frozen=True)
@@ -34,8 +30,7 @@ class FormsStart:
 
     forms: tuple[Form, ...]
     values: Values
-    promised: float
-    """Chi-square that would be left if changes added up."""
+    promised: float  # chi-square that would be left if changes added up
 
 
 def pair_starts(model: Model, values: Values, forms: Sequence[Form], *, most: int) -> list[FormsStart]:

@@ -7,8 +7,6 @@ name whose form happens to bend to the trials at hand predicts others badly. Wha
 evidence weighs a fit (`evidence.tempered`), since the form is never nature's.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -29,10 +27,8 @@ class Predicted:
 
     chi_square: float
     count: int
-    score: float
-    """Tempered log likelihood of the prediction, comparable between models of one campaign [nats]."""
-    learned: tuple[Values, ...] = ()
-    """What was fitted without each fold."""
+    score: float  # tempered log likelihood of the prediction, comparable between models of one campaign [nats]
+    learned: tuple[Values, ...] = ()  # what was fitted without each fold
 
     @property
     def per_sample(self) -> float:

@@ -1,11 +1,8 @@
 """A fit once more where the noise, or what replicates differ by, is found to be another."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 from experiments.diagnose.fit.evidence import held_out_fit
 from experiments.diagnose.fit.fitting import Fit, Model, Whitener, by_beginnings, fit
@@ -20,15 +17,12 @@ from .deciding import unscattered, values_of_all
 
 __all__ = [
     "calmed", "coloured", "colours_of", "differ", "doubted", "jittered", "leaves_much", "lone_scatter_of", "plain",
-    "recoloured", "rescattered", "scatter_apart", "scatter_of", "unrest_of", "whitened_fit",
+    "recoloured", "rescattered", "scatter_of", "unrest_of", "whitened_fit",
 ]  # fmt: skip
 
-_MOST_FOR_COLOUR = 2.5
-"""Chi-square per sample above which motion, not noise, fills the fast modes too."""
-_OTHER = 0.1
-"""Change of a noise's persistence, and relative change of its size, from which on it is another one."""
-_MUCH = 3.0
-"""Standard deviations of chi-square that a fit must leave for another one to be looked for."""
+_MOST_FOR_COLOUR = 2.5  # chi-square per sample above which motion, not noise, fills the fast modes too
+_OTHER = 0.1  # change of a noise's persistence, and relative change of its size, from which on it is another one
+_MUCH = 3.0  # standard deviations of chi-square that a fit must leave for another one to be looked for
 
 
 def whitened_fit(model: Model, *, beginnings: bool = False) -> Fit:
@@ -37,7 +31,7 @@ def whitened_fit(model: Model, *, beginnings: bool = False) -> Fit:
     found = fit(model)
     model.problem.rewhiten(found.values, ())
     found = fit(model, found.values)
-    if beginnings or (leaves_much(found) and hasattr(model.problem, "follows")):
+    if beginnings or (leaves_much(found) and model.problem.contacts is not None):
         return by_beginnings(found)
     return found
 
@@ -52,19 +46,19 @@ def jittered(found: Fit, held_out: tuple[str, ...], known: tuple[Jitter, ...] = 
     jitters = tuple({jitter.channels: jitter for jitter in (*known, *find_jitter(found))}.values())
     if not jitters:
         return found, ()
-    problem: Any = found.model.problem
+    problem = found.model.problem
     problem.shake(steepness(problem, jitters, values_of_all(found, held_out), found.model.forms))
     problem.rewhiten(found.values, found.model.forms)
     return fit(found.model, found.values), jitters
 
 
 def doubted(found: Fit, held_out: tuple[str, ...]) -> Fit:
-    """With readings that this model makes doubtful counted for little (`TumbleProblem.doubt`), where there are any."""
-    problem: Any = found.model.problem
-    if not hasattr(problem, "doubt"):
+    """With readings that this model makes doubtful counted for little (`Contacts.doubt`), where there are any."""
+    contacts = found.model.problem.contacts
+    if contacts is None:
         return found
     values = held_out_fit(found.model, held_out, found.values) if held_out else found.values
-    return fit(found.model, found.values) if problem.doubt(values, found.model.forms) else found
+    return fit(found.model, found.values) if contacts.doubt(values, found.model.forms) else found
 
 
 def plain(found: Fit) -> Fit:
@@ -107,15 +101,6 @@ def scatter_of(found: Fit, held_out: tuple[str, ...], *, apart: bool = False, ki
     return find_scatter(fit(model.on((*model.trials, *held_out)), unscattered(found)), apart=apart, kinds=kinds)
 
 
-def scatter_apart(found: Fit, held_out: tuple[str, ...], *, kinds: str = "") -> Scatter:
-    """What replicates differ by where what is left hides it; none where they cannot be compared row by row. `kinds`:
-    the problem's name of those that are asked for by themselves."""
-    asked = getattr(found.model.problem, kinds, ()) if kinds else ()
-    if not hasattr(found.model.problem, "calm") or (kinds and not asked):
-        return Scatter()
-    return scatter_of(found, held_out, apart=True, kinds=asked)
-
-
 def lone_scatter_of(found: Fit, held_out: tuple[str, ...], *, kinds: tuple[str, ...]) -> tuple[Scatter, list[Finding]]:
     """The same, of these kinds, of trials of which none repeats another, and what speaks against it; nothing where one
     does."""
@@ -128,7 +113,7 @@ def lone_scatter_of(found: Fit, held_out: tuple[str, ...], *, kinds: tuple[str, 
 def unrest_of(found: Fit, held_out: tuple[str, ...]) -> Unrest:
     """How replicates wander apart beyond what trials' own numbers say: asked of all trials."""
     problem = found.model.problem
-    if not hasattr(problem, "calm"):
+    if not problem.by_path:
         return Unrest({})
     values = held_out_fit(found.model, held_out, found.values) if held_out else found.values
     return find_unrest(found, values, (*found.model.trials, *held_out))
@@ -136,8 +121,8 @@ def unrest_of(found: Fit, held_out: tuple[str, ...]) -> Unrest:
 
 def calmed(found: Fit, unrest: Unrest) -> Fit:
     """The same with what replicates differ by taken for noise, which is white otherwise."""
-    problem: Any = found.model.problem
-    if not unrest and not getattr(problem, "calmed", {}):
+    problem = found.model.problem
+    if not unrest and not problem.calmed:
         return found
     problem.calm(unrest.weights(problem) if unrest else {})
     return plain(found)

@@ -11,25 +11,20 @@ row. A factor of a trial's own (`bed`, `friction`: relative) adds what one stand
 reading; what replicates do each in its own way (`unrest`: in the channel's unit) adds its mean square.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from experiments.diagnose.fit.problem import Array, Form, Problem, Values
 from experiments.diagnose.noise.replicates import groups_of
 
-if TYPE_CHECKING:
-    from .outcome import Diagnosis
+from .outcome import Diagnosis
 
-__all__ = ["ScatterGap", "gap_with_scatter", "scatter_std", "sensor_std", "weighed_residuals"]
+__all__ = ["ScatterGap", "gap_with_scatter", "scatter_std", "weighed_residuals"]
 
-_LOST = 1e3
-"""Residual over the noise where the model cannot be integrated."""
+_LOST = 1e3  # residual over the noise where the model cannot be integrated
 
 
 @dataclass(frozen=True)
@@ -38,10 +33,8 @@ class ScatterGap:
 
     before: tuple[float, float | None]
     """Of the fitted trials and of those held out (None where there are none), the base model."""
-    after: tuple[float, float | None]
-    """The same of the best model."""
-    after_std: tuple[float | None, float | None]
-    """Standard errors of `after`; None of a single trial."""
+    after: tuple[float, float | None]  # the same of the best model
+    after_std: tuple[float | None, float | None]  # standard errors of `after`; None of a single trial
     freedom: int
     """Degrees of freedom on which the replicates' scatter rests: trials that have replicates less their conditions."""
 
@@ -80,7 +73,7 @@ def _per_sample(
     found = weighed_residuals(problem, model_std, values, forms, trials)
     totals, counts, of_scatter = [], [], []
     for trial in trials:
-        stds, wide = sensor_std(problem, values, forms, trial), scatter_std(problem, model_std, values, forms, trial)
+        stds, wide = problem.sensor_std(values, forms, trial), scatter_std(problem, model_std, values, forms, trial)
         channel = problem.samples(trial).channel
         counted, share = np.zeros(len(channel), dtype=bool), np.zeros(len(channel))
         for name in stds:
@@ -109,7 +102,7 @@ def weighed_residuals(
     found = {}
     for trial in trials:
         channel = problem.samples(trial).channel
-        stds = sensor_std(problem, values, forms, trial)
+        stds = problem.sensor_std(values, forms, trial)
         wide = scatter_std(problem, model_std, values, forms, trial)
         whole = np.zeros(len(channel))
         for name, columns in problem.compare(values, forms, trial).items():
@@ -119,30 +112,14 @@ def weighed_residuals(
     return found
 
 
-def sensor_std(problem: Problem, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
-    """Noise of each reading as `gap` takes it, by channel: of a driven force with the error of its depth; endless where
-    a tumble was read while a contact switched."""
-    samples = problem.samples(trial)
-    found = {str(name): samples.std[samples.channel == name] for name in dict.fromkeys(samples.channel.tolist())}
-    own: Any = getattr(problem, "gap_std", None)
-    if own is not None and "force" in found:
-        found["force"] = own(values, forms, trial)
-    switches: Any = getattr(problem, "switches", None)
-    if switches is not None:
-        doubtful = switches(values, forms, [trial])[trial] != 0
-        found = {name: np.where(doubtful[samples.channel == name], np.inf, std) for name, std in found.items()}
-    return found
-
-
 def scatter_std(
     problem: Problem, model_std: Mapping[str, float], values: Values, forms: Sequence[Form], trial: str
 ) -> dict[str, Array]:
     """By how much replicates of a trial differ beyond the sensors at each reading: channel -> std, in its unit."""
     here = problem.compare(values, forms, trial)
     variance = {name: np.full(len(columns["t_s"]), model_std.get(name, 0.0) ** 2) for name, columns in here.items()}
-    offered: Any = getattr(problem, "scatter", {})
-    for kind in (kind for kind in offered if kind in model_std):
-        own = next((p for p in offered[kind] if p.trial == trial), None)
+    for kind in (kind for kind in problem.scatter if kind in model_std):
+        own = next((p for p in problem.scatter[kind] if p.trial == trial), None)
         if own is None:
             continue
         ends = [

@@ -4,10 +4,8 @@ The signature is the root mean square of what the readings change by over the se
 (docs/diagnose.md); of what a channel reads it is a share, and it is at most so many N.
 """
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,10 +14,7 @@ from experiments.diagnose.fit.fitting import fit
 from experiments.diagnose.fit.gaps import unit_of
 from experiments.diagnose.fit.problem import Form, Values
 
-from .scatter_gap import sensor_std
-
-if TYPE_CHECKING:
-    from .outcome import Diagnosis
+from .outcome import Diagnosis
 
 __all__ = ["effect_sizes"]
 
@@ -51,7 +46,7 @@ def _size(found: Diagnosis, values: Values, rest: tuple[Form, ...]) -> dict[str,
     whole: dict[str, list[float]] = {}
     for trial in (*found.fitted, *found.held_out):
         before, after = problem.compare(values, rest, trial), problem.compare(found.best_values, found.forms, trial)
-        stds = sensor_std(problem, found.best_values, found.forms, trial)
+        stds = problem.sensor_std(found.best_values, found.forms, trial)
         for name, columns in after.items():
             change = columns["model"] - before[name]["model"]
             good = np.isfinite(change) & np.isfinite(stds[name])

@@ -4,8 +4,6 @@ A number that was stated as 5.3 +- 0.01 and is fitted as 5.36 has not been measu
 bends what it has. Such a model does not explain the data, however little it leaves.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass
@@ -14,8 +12,7 @@ from .fitting import Fit
 
 __all__ = ["Bound", "bends_little_away", "bounds_met", "is_strained"]
 
-_FAR = 5.0
-"""Standard deviations from the stated value that no true number has (chance 6e-7)."""
+_FAR = 5.0  # standard deviations from the stated value that no true number has (chance 6e-7)
 _FAR_FOR_LITTLE, _LITTLE = 3.5, 0.5
 """The same (chance 5e-4) where the base model leaves so little a sample beyond the noise that a form that is not quite
 nature's has nothing to bend numbers with. Of a reviewer's tumbles one such name was false and needed a mass 4.4
@@ -29,8 +26,7 @@ class Bound:
     parameter: str
     value: float
     unit: str
-    sigmas: float | None
-    """Standard deviations from what was stated; None where nothing was (a parameter of an effect)."""
+    sigmas: float | None  # standard deviations from what was stated; None where nothing was (a parameter of an effect)
     at_bound: bool
 
     @property

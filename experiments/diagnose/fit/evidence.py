@@ -7,8 +7,6 @@ noise, E = chi-square - samples, is taken for slow modes of unknown size: with M
 large (a variance of unknown scale integrated out). Laplace's factor for the parameters' volume is added to it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -24,8 +22,7 @@ __all__ = [
     "slow_count", "tempered",
 ]  # fmt: skip
 
-SMALL = 1.2
-"""Chi-square per sample up to which what is left is too small to be called unknown, or to be given a name."""
+SMALL = 1.2  # chi-square per sample up to which what is left is too small to be called unknown, or to be given a name
 _MODES_EACH = 6
 """Slow modes that a misfit of form has in one channel of one trial; it is alike from trial to trial, so that their
 number is taken to grow with the square root of the number of channels."""
@@ -38,8 +35,12 @@ class Hypothesis:
     """A set of effects, each in one form or two, fitted to the trials that choose."""
 
     fit: Fit
-    score: float
-    """Log evidence, tempered [nats]."""
+    score: float  # log evidence, tempered [nats]
+
+    @staticmethod
+    def of(found: Fit) -> "Hypothesis":
+        """With its score."""
+        return Hypothesis(found, score(found))
 
     @property
     def forms(self) -> tuple[Form, ...]:
@@ -94,8 +95,7 @@ def score(found: Fit) -> float:
     return likelihood - cost
 
 
-_PLACES = 8
-"""Signs of the amplitude, lengths and other numbers from which a form is fitted, at most."""
+_PLACES = 8  # signs of the amplitude, lengths and other numbers from which a form is fitted, at most
 _SIZES = (0.1, 0.4, 1.0, 3.0)
 _FIRST = 0.2
 
@@ -107,7 +107,7 @@ def best_start(model: Model, form: Form, values: Values, *, rounds: int = 6) -> 
     and what replicates differ by first of all.
     `rounds`: steps, where the problem looks for the best start itself.
     """
-    if hasattr(model.problem, "guess"):
+    if model.problem.contacts is not None:
         return fit(model, values, rounds=rounds)
     starts = form.starts or ({form.amplitude: 1.0},)
     amplitude = next(p for p in form.parameters if p.name == form.amplitude)
@@ -133,7 +133,7 @@ def best_start(model: Model, form: Form, values: Values, *, rounds: int = 6) -> 
     fits = [fit(model, points[k], rounds=5) for k in chosen]
     best = min(fits, key=lambda found: found.objective)
     best = fit(model, best.values)
-    if getattr(model.problem, "rough", ()) and excess(best) > 6 * math.sqrt(2.0 * best.count):
+    if model.problem.rough and excess(best) > 6 * math.sqrt(2.0 * best.count):
         part = model.until(_FIRST)
         early = [float(modes @ modes) for modes in part.evaluate(points)]
         begun: Values = points[int(np.argmin(early))]
@@ -181,4 +181,4 @@ def held_out_fit(model: Model, trials: Sequence[str], values: Mapping[str, float
     if not own or not trials:
         return dict(values)
     found = fit(model.on(trials).holding(values), values)
-    return {**values, **(scanned(found) if model.scatter and hasattr(model.problem, "guess") else found).values}
+    return {**values, **(scanned(found) if model.scatter and model.problem.contacts is not None else found).values}

@@ -23,27 +23,20 @@ __all__ = ["Fit", "Model", "Whitener", "by_beginnings", "fit", "linearised", "sc
 
 _ROUNDS = 30
 _DAMPINGS = (0.0, 1e-3, 1e-1, 10.0)
-_SETTLING = 3
-"""Rounds in which the steps of a settled Jacobian are found."""
-_SCAN = np.linspace(-3.0, 3.0, 25)
-"""Standard deviations of a trial's own number that are looked at for another valley."""
+_SETTLING = 3  # rounds in which the steps of a settled Jacobian are found
+_SCAN = np.linspace(-3.0, 3.0, 25)  # standard deviations of a trial's own number that are looked at for another valley
 _PASSES = 3
-_BEGINNINGS = (0.3, 0.5, 0.7, 0.85)
-"""Shares of their time that are looked at one after the other (`by_beginnings`)."""
-_MANY = 2**15
-"""Residuals from which threads are worth their while."""
-_ENOUGH = 0.02
-"""Change of chi-square below which a fit has ended: a hundredth of what one sigma is worth."""
+_BEGINNINGS = (0.3, 0.5, 0.7, 0.85)  # shares of their time that are looked at one after the other (`by_beginnings`)
+_MANY = 2**15  # residuals from which threads are worth their while
+_ENOUGH = 0.02  # change of chi-square below which a fit has ended: a hundredth of what one sigma is worth
 
 
 @dataclass(frozen=True)
 class Whitener:
     """Turns residuals into modes of unit variance, trial by trial."""
 
-    blocks: Mapping[str, tuple[NDArray[np.intp], ...]]
-    """Rows of each channel in each trial, in the order of time."""
-    weights: Mapping[str, Array]
-    """One over the noise of each mode, in the order of the blocks, shape [sample_count]."""
+    blocks: Mapping[str, tuple[NDArray[np.intp], ...]]  # rows of each channel in each trial, in the order of time
+    weights: Mapping[str, Array]  # one over the noise of each mode, in the order of the blocks, shape [sample_count]
     kept: Mapping[str, Array] = field(default_factory=dict)
     """Of trials that are looked at in part only: factors 0 or 1 on the residuals, shape [sample_count]."""
 
@@ -51,7 +44,7 @@ class Whitener:
     def white(problem: Problem) -> Whitener:
         """For noise that is white, beside what replicates are known to differ by (`unrest`)."""
         bare = Whitener.bare(problem)
-        return replace(bare, weights={**bare.weights, **getattr(problem, "calmed", {})})
+        return replace(bare, weights={**bare.weights, **problem.calmed})
 
     @staticmethod
     def bare(problem: Problem) -> Whitener:
@@ -90,12 +83,9 @@ class Model:
     whitener: Whitener
     trials: tuple[str, ...]
     forms: tuple[Form, ...] = ()
-    scatter: tuple[Parameter, ...] = ()
-    """Nuisances of trials that describe what differs between replicates."""
-    held: Mapping[str, float] | None = None
-    """Values at which all shared parameters are held; None: they are fitted."""
-    share: float = 1.0
-    """Of their time, up to which trials are looked at (`until`)."""
+    scatter: tuple[Parameter, ...] = ()  # nuisances of trials that describe what differs between replicates
+    held: Mapping[str, float] | None = None  # values at which all shared parameters are held; None: they are fitted
+    share: float = 1.0  # of their time, up to which trials are looked at (`until`)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -125,7 +115,7 @@ class Model:
         beginning find their way.
         """
         kept = {}
-        for trial in getattr(self.problem, "rough", ()) if trials is None else trials:
+        for trial in self.problem.rough if trials is None else trials:
             time = self.problem.samples(trial).time
             kept[trial] = (time <= time.min() + share * np.ptp(time)).astype(float)
         return replace(self, whitener=replace(self.whitener, kept=kept), share=share)
@@ -134,11 +124,9 @@ class Model:
         """Modes of all trials, one after another, at each point."""
         held = self.held
         whole = points if held is None else [{**held, **point} for point in points]
-        part = getattr(self.problem, "evaluate_until", None)
-        if part is not None and self.share < 1 and all(trial in self.whitener.kept for trial in self.trials):
-            found = part(whole, self.forms, self.trials, self.share)  # what is not looked at need not be simulated
-        else:
-            found = self.problem.evaluate(whole, self.forms, self.trials)
+        # What is not looked at need not be simulated.
+        share = self.share if all(trial in self.whitener.kept for trial in self.trials) else 1.0
+        found = self.problem.evaluate(whole, self.forms, self.trials, share)
 
         def modes(trial: str) -> Array:
             return self.whitener.modes(trial, np.stack([one[trial] for one in found]))
@@ -165,16 +153,11 @@ class Fit:
 
     model: Model
     values: dict[str, float]
-    modes: Array
-    """Residual modes, shape [n]."""
-    jacobian: Array
-    """d modes / d parameter / scale, shape [n, p]."""
-    chi_square: float
-    """Of the data alone."""
-    penalty: float
-    """Of the priors."""
-    free: NDArray[np.bool_] = field(repr=False)
-    """Parameters not held by a bound, shape [p]."""
+    modes: Array  # residual modes, shape [n]
+    jacobian: Array  # d modes / d parameter / scale, shape [n, p]
+    chi_square: float  # of the data alone
+    penalty: float  # of the priors
+    free: NDArray[np.bool_] = field(repr=False)  # parameters not held by a bound, shape [p]
 
     @property
     def objective(self) -> float:
@@ -409,13 +392,12 @@ def _groups(parameters: Sequence[Parameter]) -> list[list[int]]:
 
 def _begun(model: Model, start: Values | None) -> Values:
     """Where to begin: as told, and what is not told by the problem's own search, where it has one (`guess`)."""
-    known, guess = dict(start or {}), getattr(model.problem, "guess", None)
+    known, contacts = dict(start or {}), model.problem.contacts
     scatter = {p.name for p in model.scatter}  # a small thing beside the rest: it begins at none
-    if guess is None or all(p.name in known or p.name in scatter for p in model.parameters):
+    if contacts is None or all(p.name in known or p.name in scatter for p in model.parameters):
         return known
     held = model.held is not None
-    found: Values = guess(model.forms, model.trials, {**(model.held or {}), **known}, held=held, apart=model.scatter)
-    return found
+    return contacts.guess(model.forms, model.trials, {**(model.held or {}), **known}, held=held, apart=model.scatter)
 
 
 def _solve(matrix: Array, right: Array) -> Array:
@@ -427,8 +409,7 @@ def _solve(matrix: Array, right: Array) -> Array:
 def _linearise(
     model: Model, parameters: Sequence[Parameter], x: Array, known: Array | None = None
 ) -> tuple[Array, Array]:
-    """Modes at `x` (`known`, if they are), and their changes per scale of each parameter; nuisances of one kind are
-    changed together."""
+    """Modes at `x` (`known`, if they are), and their changes per scale of each parameter, one kind at a time."""
     names = [p.name for p in parameters]
     base = {name: float(value) for name, value in zip(names, x, strict=True)}
     groups = _groups(parameters)

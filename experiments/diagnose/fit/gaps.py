@@ -1,7 +1,5 @@
 """The gap in units: rms by channel, when a trial first parts from the base model, and the gap by condition."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -18,12 +16,9 @@ _UNITS: dict[str, tuple[str, float]] = {
     "ax": ("m/s2", 1.0), "ay": ("m/s2", 1.0), "wheel": ("rad/s", 1.0), "depth": ("mm", 1e3), "force": ("N", 1.0),
     "accel": ("m/s2", 1.0), "depth zero": ("mm", 1e3), "force zero": ("N", 1.0),
 }  # fmt: skip
-_ZEROED = ("x", "y", "theta")
-"""Channels whose zero is fitted in each trial."""
-_WINDOW = 9
-"""Samples of the running mean."""
-_SIGMAS = 5.0
-"""Standard errors of that mean at which a trial has parted."""
+_ZEROED = ("x", "y", "theta")  # channels whose zero is fitted in each trial
+_WINDOW = 9  # samples of the running mean
+_SIGMAS = 5.0  # standard errors of that mean at which a trial has parted
 
 
 def unit_of(channel: str) -> tuple[str, float]:

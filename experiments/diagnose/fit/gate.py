@@ -11,8 +11,6 @@ priors all but exclude does not explain the data. Trials that were held out have
 whose null holds the noise and what the fitted parameters leave uncertain.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -30,15 +28,11 @@ from .problem import Array, Values
 
 __all__ = ["Gate", "Verdict", "held_out_gate", "low_modes", "open_gate"]
 
-LOW_MODES = 16
-"""Modes of a channel that count as slow: half a period up to eight periods over its record."""
+LOW_MODES = 16  # modes of a channel that count as slow: half a period up to eight periods over its record
 _DRAWS = 600
-_FORMAT = 2
-"""Of the files in which nulls are kept; a change of the statistics is a change of this."""
-_OFFSET = 20.0
-"""Added to "one trial": it may be below zero, the gamma law not."""
-_LEVEL = 0.005
-"""Chance that a right model is refused, of each of the two rounds of tests."""
+_FORMAT = 2  # of the files in which nulls are kept; a change of the statistics is a change of this
+_OFFSET = 20.0  # added to "one trial": it may be below zero, the gamma law not
+_LEVEL = 0.005  # chance that a right model is refused, of each of the two rounds of tests
 
 
 @dataclass(frozen=True)
@@ -46,12 +40,9 @@ class Verdict:
     """What the gate says of one fit."""
 
     passed: bool
-    score: float
-    """The most surprising statistic, as standard deviations of a normal law."""
-    threshold: float
-    """What a right model exceeds in `_LEVEL` of all cases."""
-    details: Mapping[str, float]
-    """Statistic -> standard deviations."""
+    score: float  # the most surprising statistic, as standard deviations of a normal law
+    threshold: float  # what a right model exceeds in `_LEVEL` of all cases
+    details: Mapping[str, float]  # statistic -> standard deviations
 
 
 @dataclass(frozen=True)

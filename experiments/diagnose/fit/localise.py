@@ -1,7 +1,5 @@
 """Where a model fails: sensor, trial, phase and seconds; and what a force that no effect explains goes with."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -14,8 +12,7 @@ from .problem import Array, Form, Problem, Values
 
 __all__ = ["Place", "depends_on", "latent_table", "phases_of", "places", "places_in"]
 
-_SURE = 4.0
-"""Standard deviations by which the energy of a stretch must exceed that of noise."""
+_SURE = 4.0  # standard deviations by which the energy of a stretch must exceed that of noise
 _MOST = 24
 _WINDOW = 9
 
@@ -29,8 +26,7 @@ class Place:
     phase: str
     from_s: float
     to_s: float
-    excess: float
-    """Chi-square beyond the number of its samples."""
+    excess: float  # chi-square beyond the number of its samples
 
 
 def places(model: Model, values: Values, trials: Sequence[str]) -> list[Place]:

@@ -10,8 +10,6 @@ left out). With FIT, tumbles take every hook but those of a coordinate of its ow
 down has: mass, gravity, weight, y = -depth and vy.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -25,8 +23,7 @@ from .problem import Parameter, Values
 __all__ = ["PENETRATION_HOOKS", "OwnEffect", "load_own", "own_parameters", "own_starts", "parameters_of"]
 
 PENETRATION_HOOKS = ("stiffen", "rate_force", "hold")
-_FINE = 0.2
-"""Scale of a change that can be seen, over the typical size."""
+_FINE = 0.2  # scale of a change that can be seen, over the typical size
 
 
 def parameters_of(effect: str, numbers: Sequence[Number]) -> tuple[Parameter, ...]:
@@ -44,10 +41,8 @@ class OwnEffect:
 
     term: Term
     file: Path
-    off: float
-    """Of the amplitude: the value that changes nothing."""
-    typical: Mapping[str, float]
-    """Parameter -> a size that can be seen; empty without FIT."""
+    off: float  # of the amplitude: the value that changes nothing
+    typical: Mapping[str, float]  # parameter -> a size that can be seen; empty without FIT
     candidate: Candidate | None = None
 
     @property

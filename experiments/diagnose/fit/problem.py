@@ -9,37 +9,34 @@ r(v) - r(v0) + noise.
 Names of values: a base parameter by its own name (``stiffness``), a nuisance of a trial as ``gravity_sim[001]``, an
 effect's as ``pendulum.curvature``. Units are SI. A parameter that is not among the values given has its `value`.
 
-Where times may jitter (`jitter`), a kind of trial has `clocks` (channels whose times come from one clock), `readings`
-(what the model reads so many seconds later) and `shake` (takes jitter into the whitening) as well. Where replicates may
-wander apart (`unrest`), it has `calm`, and `calmed` once that was called.
-
-A kind of trial is a class with these members (no base class to inherit), made by a function
-``make_problem(campaign: Campaign) -> Problem`` in ``experiments/diagnose/<kind>_problem.py``.
+A kind of trial is a class that inherits `Problem`, in ``experiments/diagnose/<push or tumble>/problem.py``, made there
+by ``make_problem(campaign, own=())``. A member that has a default here is one that not every kind of trial needs.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Array", "Finding", "Form", "Parameter", "Problem", "Samples", "TrialInfo", "Values"]
+from experiments.check.words import Finding
+from rigid.terms.candidate import Bend, Number
+
+__all__ = ["Array", "Contacts", "Finding", "Form", "Parameter", "Problem", "Samples", "TrialInfo", "Values"]
 
 Array = NDArray[np.float64]
-Values = Mapping[str, float]
-"""Name of a parameter -> value."""
+Values = Mapping[str, float]  # name of a parameter -> value
 
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter:
     """One number that a fit may change."""
 
-    name: str
-    """As in `Values`; of a nuisance ``kind[trial]``, of an effect ``effect.name``."""
+    name: str  # as in `Values`; of a nuisance ``kind[trial]``, of an effect ``effect.name``
     unit: str
     value: float
     """Where fits begin, and the middle of the prior. Of an effect's amplitude: 0."""
@@ -50,8 +47,7 @@ class Parameter:
     `step` says otherwise, and fits work in units of it."""
     lowest: float = -math.inf
     highest: float = math.inf
-    trial: str | None = None
-    """Id of the one trial that it touches; None for a shared parameter."""
+    trial: str | None = None  # id of the one trial that it touches; None for a shared parameter
     kind: str = ""
     """Of a nuisance: what it is in every trial (``gravity_sim``). Nuisances of one kind are changed in all trials at
     once when a Jacobian is made, since none touches another's trial."""
@@ -65,14 +61,11 @@ class Parameter:
 class Form:
     """One functional form of one effect. With its `amplitude` at 0 it changes nothing."""
 
-    effect: str
-    """Id of the effect, as in docs/diagnose.md: ``depth-hardening``."""
+    effect: str  # id of the effect, as in docs/diagnose.md: ``depth-hardening``
     name: str
     """Of the form: ``power``. Unique within the effect."""
-    parameters: tuple[Parameter, ...]
-    """Shared ones (``trial`` None) or a trial's own; names begin with ``<effect>.``."""
-    amplitude: str
-    """Name of the parameter that at 0 is the base model."""
+    parameters: tuple[Parameter, ...]  # shared ones (``trial`` None) or a trial's own; names begin with ``<effect>.``
+    amplitude: str  # name of the parameter that at 0 is the base model
     starts: tuple[Values, ...] = ()
     """Values of the form's parameters to begin fits from, amplitudes that can be seen, other signs and lengths among
     them; every one is tried. Empty: 1 and, where the bounds allow, -1 scale of the amplitude."""
@@ -81,11 +74,19 @@ class Form:
     at its beginning): what was stated of them is no measure of it."""
     linear: bool = False
     """Whether the residuals are close to linear in all of the form's parameters (then one start does)."""
+    numbers: tuple[Number, ...] = ()  # of the term (tumbles) or of the law (pushes), as the effect's file declares them
+    bends: tuple[Bend, ...] = ()  # what may bend it
+    form_std: float = 0.0  # of the amplitude, relative: how far nature's law lets it be another number than the form's
 
     @property
     def id(self) -> str:
         """``effect:name``"""
         return f"{self.effect}:{self.name}"
+
+    @cached_property
+    def slots(self) -> dict[str, Number]:
+        """Name of a parameter -> the number that follows from it."""
+        return {f"{self.effect}.{number.fitted}": number for number in self.numbers}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,10 +107,8 @@ class Samples:
     A channel's samples lie together and in the order of their times.
     """
 
-    time: Array
-    """On the trial's clock [s]."""
-    channel: NDArray[np.str_]
-    """``x y theta gyro ax ay wheel depth force accel``"""
+    time: Array  # on the trial's clock [s]
+    channel: NDArray[np.str_]  # ``x y theta gyro ax ay wheel depth force accel``
     std: Array
     """Of the sensor as campaign.toml states it, in the channel's unit (of a driven force at the base model's fit,
     the smoothed depth's error included)."""
@@ -117,72 +116,112 @@ class Samples:
     """Which samples share noise that is not white: equal numbers. None: time and channel say it all."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Finding:
-    """Something wrong with the data that was found, and what was done."""
+class Contacts(Protocol):
+    """What a problem also answers whose trials touch, slip and fall, so that the likelihood jumps in its parameters."""
 
-    trial: str
-    what: str
-    """One plain sentence, which also says what was done: set aside, modelled, or kept."""
-    channel: str | None = None
-    from_s: float | None = None
-    to_s: float | None = None
-    set_aside: bool = False
-    doubt: bool = False
-    """Whether a person has to put it right before a name can be trusted: a unit, a sign, a zero, a clock."""
+    def guess(
+        self, forms: Sequence[Form], trials: Sequence[str], values: Values, *, held: bool = False,
+        apart: Sequence[Parameter] = (),
+    ) -> dict[str, float]:  # fmt: skip
+        """Values near the best, from which a local fit may begin; parameters of forms that are not among `values` are
+        looked for. `held`: all that is shared stays; `apart`: what else is fitted to single trials."""
+
+    def refine(
+        self, asked: Sequence[tuple[Sequence[Form], Values]], trials: Sequence[str], *, apart: Sequence[Parameter] = ()
+    ) -> list[dict[str, float]]:
+        """The same for several sets of forms at once, all of whose values are given."""
+
+    def follows(self, values: Values, forms: Sequence[Form], trial: str) -> float | None:
+        """The moment [s] up to which the model follows a trial; None where that is no good part of it."""
+
+    def doubt(self, values: Values, forms: Sequence[Form]) -> bool:
+        """Count readings next to which the model jumps as doubtful from now on; whether any has changed."""
 
 
 class Problem(Protocol):
     """One campaign as the statistics see it."""
 
-    @property
-    def kind(self) -> str:
-        """``penetration`` or ``tumble``."""
+    kind: str  # ``penetration`` or ``tumble``
+    whole: str  # all that takes part in a trial, as in "what comes back is in ..."
+    trials: tuple[TrialInfo, ...]  # the trials that can be used, in the campaign's order
+    base: tuple[Parameter, ...]
+    """Parameters of the base model: shared ones (from [uncertainty]) and each trial's nuisances."""
+    forms: Sequence[Form]  # the library: every effect that this campaign could show, each in one or several forms
+    shapes: Mapping[str, Sequence[Form]] = MappingProxyType({})
+    """Forms of another shape, tried from where the plain one ends, by the id of that."""
+    findings: tuple[Finding, ...]  # what was found wrong with the data when it was read
+    design: str  # digest of what decides the gate: sampling, conditions, noise, priors; not of the measured numbers
+    granular: bool = True  # whether replicates differ because grains lie otherwise in each bed
+    by_path: bool = False
+    """Whether trials follow a measured path: its error goes with the model (`rewhiten`), and replicates are compared
+    row by row (`calm`)."""
+    contacts: Contacts | None = None  # of a motion with contacts; None where the likelihood is smooth
+    rough: Sequence[str] = ()  # trials whose motion bounces: the likelihood is the rougher the longer they are
+    clocks: Sequence[tuple[str, ...]] = ()  # channels whose times come from one clock, if these may jitter
+    left_by_forms: float = 1.0
+    """Share of what the base model leaves that a right name's form may leave, where the gate sees it."""
+    scatter: Mapping[str, tuple[Parameter, ...]] = MappingProxyType({})
+    """What may differ between replicates beyond the sensors: kind -> one nuisance a trial, mostly not fitted."""
+    least_scatter: float = 0.005
+    """Relative scatter below this is not the bed's: the smoothing of a depth column does as much."""
+    hidden_scatter: tuple[str, ...] = ()  # kinds that are asked for only where something is left
+    special_scatter: tuple[str, ...] = ()  # kinds that are not asked for with all others at once
+    zero_scatter: tuple[str, ...] = ()
+    """Kinds that are asked for by themselves where the others do not explain what is left."""
+    force_scatter: tuple[str, ...] = ()  # and after these; they count where they explain all
+    own_base: str = ""  # the setting each value of which has base parameters of its own
+    lone_scatter: tuple[tuple[str, ...], ...] = ()
+    """What is asked for, one after the other, where no trial repeats another (`lone_beds`)."""
+    known_std: Mapping[str, float] = MappingProxyType({})
+    """What differs from trial to trial as the readings themselves tell: kind -> std, in its unit."""
+    calmed: Mapping[str, Array] = MappingProxyType({})  # weights of modes as `calm` was given them last
 
-    @property
-    def whole(self) -> str:
-        """All that takes part in a trial, as in "what comes back is in ..."."""
-
-    @property
-    def trials(self) -> tuple[TrialInfo, ...]:
-        """The trials that can be used, in the campaign's order."""
-
-    @property
-    def base(self) -> tuple[Parameter, ...]:
-        """Parameters of the base model: shared ones (from [uncertainty]) and each trial's nuisances."""
-
-    @property
-    def forms(self) -> tuple[Form, ...]:
-        """The library: every effect that this campaign could show, each in one or several forms."""
-
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """What was found wrong with the data when it was read."""
-
-    @property
-    def design(self) -> str:
-        """Digest of what decides the gate: sampling, conditions, noise, priors; not of the measured numbers."""
+    def prepare(self, tell: Callable[[str, float], None]) -> None:
+        """What takes long the first time, and says so."""
+        return
 
     def samples(self, trial: str) -> Samples:
         """The valid samples of a trial."""
 
     def evaluate(
-        self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[str]
+        self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[str], share: float = 1.0
     ) -> list[dict[str, Array]]:
         """For each point the whitened residuals of each trial, shape [sample_count], for the base model plus `forms`.
 
         All points at once, so that a batched model can take them together. Always finite: where the model cannot be
         integrated, residuals are 1e3. The whitening must not depend on the values (between calls of `rewhiten`).
+        `share`: of each trial's time, beyond which nothing need be simulated.
         """
 
     def rewhiten(self, values: Values, forms: Sequence[Form]) -> None:
         """Take the whitening at these values from now on. Does nothing where it does not depend on them."""
 
+    def shake(self, along: Mapping[str, Array]) -> None:
+        """Take times that jitter into the whitening from now on.
+
+        `along`: what one standard deviation of jitter changes in each sample, over its stated noise, by trial; {} for
+        times as they stand.
+        """
+
+    def calm(self, weights: Mapping[str, Array]) -> None:
+        """Weigh modes so from now on (`Whitener.white`): what replicates differ by counts as noise; {}: as they are."""
+        self.calmed = dict(weights)
+
     def chi_square(self, values: Values, forms: Sequence[Form], trial: str) -> tuple[float, int]:
         """Sum of squared residuals with the std that docs/diagnose.md says for `gap`; number of samples."""
 
+    def sensor_std(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
+        """Noise of each reading as `gap` takes it, by channel: of a driven force with the error of its depth; endless
+        where a tumble was read while a contact switched."""
+        samples = self.samples(trial)
+        return {name: samples.std[samples.channel == name] for name in dict.fromkeys(samples.channel.tolist())}
+
     def noise(self, random: np.random.Generator, trial: str) -> Array:
         """A draw of the whitened residuals of a right model, shape [sample_count]; mostly standard normal."""
+        return random.standard_normal(len(self.samples(trial).time))
+
+    def readings(self, values: Values, forms: Sequence[Form], trials: Sequence[str], late: float) -> dict[str, Array]:
+        """What the model reads `late` seconds after each sample's time, over the stated noise, shape [sample_count]."""
 
     def phases(self, values: Values, forms: Sequence[Form], trial: str) -> NDArray[np.str_]:
         """The state at each sample: stand, pivot, slip, hop; for penetration free, in, rest, out."""
@@ -192,6 +231,18 @@ class Problem(Protocol):
 
         A smooth function of the form's parameters: the core carries uncertainties through it by differences.
         """
+
+    def form_std(self, form: Form) -> Mapping[str, float]:
+        """Relative uncertainty of what is reported of a form, for nature's law is not the form's: name -> std."""
+        return {}
+
+    def explains(self, finding: Finding) -> bool:
+        """Whether something odd about a recording is taken into account."""
+        return False
+
+    def remarks(self, values: Values, forms: Sequence[Form]) -> Sequence[str]:
+        """What else an engineer says of the forms' numbers, a sentence each."""
+        return ()
 
     def latent(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
         """Columns of latent.csv: ``t_s`` first, then ``latent_...`` (the force, torque or error of a sensor that the

@@ -1,15 +1,12 @@
 """Slopes of noisy readings, by polynomials through neighbouring rows."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .problem import Array
 
 __all__ = ["acceleration", "slope"]
 
-_SHARE = 1 / 12
-"""Of a recording, over which an acceleration is taken."""
+_SHARE = 1 / 12  # of a recording, over which an acceleration is taken
 _FEWEST = 7
 
 

@@ -3,8 +3,6 @@
 Contract: the pieces touch nothing of one another, so what comes out has the same bits however many threads there are.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -18,8 +16,7 @@ __all__ = ["each"]
 T = TypeVar("T")
 R = TypeVar("R")
 
-_MOST = 8
-"""Threads: the pieces are short, and more of them would wait for Python's lock."""
+_MOST = 8  # threads: the pieces are short, and more of them would wait for Python's lock
 
 
 def each(function: Callable[[T], R], pieces: Sequence[T], *, threads: int | None = None) -> list[R]:

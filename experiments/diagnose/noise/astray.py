@@ -8,8 +8,6 @@ for a good part of its time. Few may be: what shows in one trial of six is hardl
 Beside a name that the others call for, one of the trials that were fitted and one of those held out may.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -24,8 +22,7 @@ from .replicates import groups_of
 
 __all__ = ["allowed", "astray", "astray_finding", "astray_held_out"]
 
-_ONE_OF = 6
-"""Of so many trials one may have gone its own way; of fewer one."""
+_ONE_OF = 6  # of so many trials one may have gone its own way; of fewer one
 _MOST_LEFT = 0.5
 """Share of what a model leaves that may be left without those trials, to first order, for a refit to be worth it: on
 another branch it may take more."""
@@ -48,11 +45,10 @@ def astray(
     """The fitted trials without which this model passes the gate and which it follows at first; () if there are none.
 
     `found`: the model on all fitted trials, and where fits begin. `recoloured`: the same fit with the noise that it
-    leaves, which is not seen as long as a trial astray is loud beside it. Problems that cannot say how far they follow
-    (`follows`) have none.
+    leaves, which is not seen as long as a trial astray is loud beside it. Problems without contacts have none.
     """
     problem, trials = found.model.problem, found.model.trials
-    if not hasattr(problem, "follows"):
+    if problem.contacts is None:
         return ()
     most = allowed(len(trials))
     bare = not found.model.forms  # then one of all of them: what shows in two trials may be an effect
@@ -94,7 +90,7 @@ def astray_held_out(
     `enough`: chi-square per sample up to which trials pass in any case. `share`: of its time up to which each must be
     followed. None where there are more, or others.
     """
-    problem = found.model.problem
+    problem, contacts = found.model.problem, found.model.problem.contacts
 
     def explained(trials: Sequence[str]) -> bool:
         left = [problem.chi_square(values, found.model.forms, trial) for trial in trials]
@@ -104,10 +100,10 @@ def astray_held_out(
     if not held_out or explained(held_out):
         return ()
     failing = [t for t in held_out if not explained((t,))]
-    if not failing or len(failing) > most or not hasattr(problem, "follows"):
+    if not failing or len(failing) > most or contacts is None:
         return None
     for trial in failing:
-        until = problem.follows(values, found.model.forms, trial)
+        until = contacts.follows(values, found.model.forms, trial)
         if until is None or until < share * float(np.max(problem.samples(trial).time)):
             return None
     rest = tuple(trial for trial in held_out if trial not in failing)
@@ -131,16 +127,17 @@ def _unexplained(found: Fit, trials: Sequence[str]) -> float:
 def _refitted(found: Fit, trials: tuple[str, ...]) -> Fit:
     """On these trials alone, looked for anew: on all of them the fit was bent."""
     model = found.model.on(trials)
-    if not model.forms or not hasattr(model.problem, "refine"):
+    contacts = model.problem.contacts
+    if not model.forms or contacts is None:
         return by_beginnings(fit(model))
-    (values,) = model.problem.refine([(model.forms, found.values)], trials, apart=model.scatter)
+    (values,) = contacts.refine([(model.forms, found.values)], trials, apart=model.scatter)
     return fit(model, values)
 
 
 def astray_finding(found: Fit, trial: str, values: Mapping[str, float], *, set_aside: bool = True) -> Finding | None:
     """What is said of a trial that follows the model up to a moment only; None where it does not even that."""
     problem = found.model.problem
-    until: float | None = problem.follows(values, found.model.forms, trial)  # type: ignore[attr-defined]
+    until = problem.contacts.follows(values, found.model.forms, trial) if problem.contacts is not None else None
     if until is None:
         return None
     end = float(np.max(problem.samples(trial).time))

@@ -5,8 +5,6 @@ An autoregressive law of order one is fitted to the power of the modes of all tr
 do not call for it, the noise stays as stated.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,22 +17,18 @@ from scipy.optimize import minimize
 from experiments.diagnose.fit.fitting import Fit, Whitener
 from experiments.diagnose.fit.problem import Array
 
-__all__ = ["Colour", "colour_of", "find_colours", "find_loud", "whitener_for"]
+__all__ = ["Colour", "colour_of", "find_colours", "find_loud", "together", "whitener_for"]
 
-_FAST = 0.15
-"""Share of the band that counts as slow and is left out."""
-_FASTER = 0.5
-"""The same where a model leaves much: what a motion leaves falls with the frequency."""
+_FAST = 0.15  # share of the band that counts as slow and is left out
+_FASTER = 0.5  # the same where a model leaves much: what a motion leaves falls with the frequency
 _QUIET, _LOUD = 0.25, 1.5
 """Share of all pieces that count as the quiet ones, and how loud these must be, in mean square."""
-_SURE = 16.0
-"""Twice the log likelihood that two more numbers must gain: chance 3e-4 under white noise."""
+_SURE = 16.0  # twice the log likelihood that two more numbers must gain: chance 3e-4 under white noise
 _PIECES, _PIECE = 8, 24
 """Pieces of a recording, and samples of one at least, over which noise has to be alike."""
-_FEWEST = 100
-"""Fast modes from which on a law is fitted."""
-_ALIKE = 0.5
-"""Share of the excess, and of the correlation, that half of all pieces must show."""
+_FEWEST = 100  # fast modes from which on a law is fitted
+_ONE_NUMBER = 0.05  # spread up to which one number stands for all of them
+_ALIKE = 0.5  # share of the excess, and of the correlation, that half of all pieces must show
 
 
 @dataclass(frozen=True)
@@ -42,10 +36,8 @@ class Colour:
     """The noise of one channel."""
 
     channel: str
-    std: float
-    """Over the stated one."""
-    persistence: float
-    """Correlation of neighbouring samples, a."""
+    std: float  # over the stated one
+    persistence: float  # correlation of neighbouring samples, a
 
     def power(self, frequency: Array) -> Array:
         """S at frequencies 0..1 of half the sampling rate."""
@@ -174,3 +166,19 @@ def whitener_for(found: Fit, colours: dict[str, Colour]) -> Whitener:
 def _power(frequency: Array, std: float, persistence: float) -> Array:
     a = persistence
     return std**2 * (1 - a**2) / (1 - 2 * a * np.cos(np.pi * frequency) + a**2)
+
+
+def together(colours: Sequence[Colour]) -> str:
+    """One sentence on the noise of a channel, of which `colours` are what was found at its rates."""
+    stds, persistences = [colour.std for colour in colours], [colour.persistence for colour in colours]
+    as_stated = max(abs(std - 1.0) for std in stds) < _ONE_NUMBER
+    size = "as large as is stated" if as_stated else f"{_range(stds)} times what is stated"
+    white = max(abs(persistence) for persistence in persistences) < _ONE_NUMBER
+    colour = "" if white else f" and a sample correlates with the next by {_range(persistences)}"
+    rates = f", at {len(colours)} sampling rates" if len(colours) > 1 else ""
+    return f"the noise of {colours[0].channel} is {size}{colour}{rates}: taken into account"
+
+
+def _range(numbers: Sequence[float]) -> str:
+    low, high = min(numbers), max(numbers)
+    return f"{0.5 * (low + high):.2f}" if high - low <= _ONE_NUMBER else f"{low:.2f} to {high:.2f}"

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,28 +20,23 @@ from scipy.optimize import minimize
 from scipy.sparse import csr_matrix
 
 from experiments.diagnose.fit.fitting import Fit
-from experiments.diagnose.fit.problem import Array, Finding, Form, Values
+from experiments.diagnose.fit.problem import Array, Finding, Form, Problem, Values
 
 __all__ = ["Jitter", "Shaken", "find_jitter", "steepness"]
 
 _FOURTH, _SECOND = np.array([1.0, -4.0, 6.0, -4.0, 1.0]), np.array([1.0, -2.0, 1.0])
-_NEAR = 0.5
-"""Of a row's interval: how far from its time the slope is looked for."""
+_NEAR = 0.5  # of a row's interval: how far from its time the slope is looked for
 _MOST = 9.0
 """Squared standard deviations that one difference counts for at most: a touch that a model misses is no noise."""
-_FEWEST = 100
-"""Differences from which on a clock is asked."""
+_FEWEST = 100  # differences from which on a clock is asked
 _SURE = 20.0
 """Twice the log likelihood that one more number must gain: chance 8e-6 under white noise. Of a misfit of 78 a sample,
 where nothing jitters, it was 11."""
-_SLOPES = 3.0
-"""The same of one trial, were the jitter there: less, and its slopes are too small to tell."""
-_SHARE = 0.75
-"""Of the trials with slopes that must show it."""
+_SLOPES = 3.0  # the same of one trial, were the jitter there: less, and its slopes are too small to tell
+_SHARE = 0.75  # of the trials with slopes that must show it
 _ALIKE = 1.4
 """Factor by which the jitter of second and of fourth differences may differ: of a misfit these hold far less."""
-_FAR = 3.0
-"""Standard deviations of a time within which a jump of the model makes a reading doubtful."""
+_FAR = 3.0  # standard deviations of a time within which a jump of the model makes a reading doubtful
 
 
 @dataclass(frozen=True)
@@ -50,8 +44,7 @@ class Jitter:
     """What is found of one clock."""
 
     channels: tuple[str, ...]
-    std: float
-    """[s]"""
+    std: float  # [s]
 
     @property
     def finding(self) -> Finding:
@@ -66,12 +59,9 @@ class _Windows:
     """Differences of one channel of one trial."""
 
     trial: str
-    channel: int
-    """Its place among the clock's."""
-    square: Array
-    """Of the differences, over the stated noise and sum b^2, shape [n]."""
-    slope: Array
-    """Sum of (b dy/dt)^2 over the same [1/s2], shape [n]."""
+    channel: int  # its place among the clock's
+    square: Array  # of the differences, over the stated noise and sum b^2, shape [n]
+    slope: Array  # sum of (b dy/dt)^2 over the same [1/s2], shape [n]
 
 
 @dataclass(frozen=True)
@@ -80,12 +70,9 @@ class Shaken:
 
     rows: csr_matrix = field(repr=False)
     """Which samples share an error, that error's shape in each row, shape [row_count, sample_count]."""
-    shrink: Array = field(repr=False)
-    """Shape [row_count, 1]."""
-    directions: Array = field(repr=False)
-    """Orthonormal, of what else samples share, shape [sample_count, k]."""
-    less: Array = field(repr=False)
-    """Share of each that is taken away, shape [k]."""
+    shrink: Array = field(repr=False)  # shape [row_count, 1]
+    directions: Array = field(repr=False)  # orthonormal, of what else samples share, shape [sample_count, k]
+    less: Array = field(repr=False)  # share of each that is taken away, shape [k]
 
     @staticmethod
     def of(along: Array, row: NDArray[np.intp], common: Array) -> Shaken:
@@ -109,10 +96,8 @@ class Shaken:
 
 def find_jitter(found: Fit) -> tuple[Jitter, ...]:
     """Clocks whose times jitter beyond doubt, on the trials that were fitted."""
-    problem = found.model.problem
-    clocks: Sequence[tuple[str, ...]] = getattr(problem, "clocks", ())
     jitters = []
-    for clock in clocks:
+    for clock in found.model.problem.clocks:
         windows, longest = _windows(found, clock, _SECOND)
         if sum(len(w.square) for w in windows) < _FEWEST:
             continue
@@ -124,7 +109,7 @@ def find_jitter(found: Fit) -> tuple[Jitter, ...]:
     return tuple(jitters)
 
 
-def steepness(problem: Any, jitters: Sequence[Jitter], values: Values, forms: Sequence[Form]) -> dict[str, Array]:
+def steepness(problem: Problem, jitters: Sequence[Jitter], values: Values, forms: Sequence[Form]) -> dict[str, Array]:
     """What one standard deviation of jitter changes in each sample, over its stated noise: trial -> shape
     [sample_count], the larger of what is before and after; {} without jitter. Jumps as far as 3 of them count."""
     trials = [trial.id for trial in problem.trials] if jitters else []
@@ -142,8 +127,7 @@ def steepness(problem: Any, jitters: Sequence[Jitter], values: Values, forms: Se
 
 def _windows(found: Fit, clock: tuple[str, ...], weights: Array) -> tuple[list[_Windows], float]:
     """Differences of a clock's channels on the trials fitted, and the longest of the trials' intervals [s]."""
-    problem: Any = found.model.problem
-    forms = found.model.forms
+    problem, forms = found.model.problem, found.model.forms
     width, windows = len(weights), []
     usual: dict[tuple[str, str], float] = {}
     for trial in found.model.trials:

@@ -8,8 +8,6 @@ trials differ, neither with speed, gravity and kind of trial nor with the campai
 is an effect, or a drift, and is said instead.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -26,8 +24,7 @@ __all__ = ["find_lone_scatter", "lone_finding"]
 
 _FEWEST = 5
 """Trials that can tell whether their factors go with something: of four, one order in twelve is monotone by chance."""
-_GOES = 0.02
-"""Chance below which a factor goes with a setting."""
+_GOES = 0.02  # chance below which a factor goes with a setting
 _DRAWS = 4999
 _EXPLAINED = 0.75
 """Share of the factors' variance that a setting explains, by a straight line, from which on they go with it."""

@@ -10,34 +10,27 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy import stats
 
+from experiments.check.words import factor_words
 from experiments.diagnose.fit.evidence import inflation, slow_count
 from experiments.diagnose.fit.fitting import Fit, Model, fit, scanned
 from experiments.diagnose.fit.gaps import size_words
 from experiments.diagnose.fit.gate import low_modes
-from experiments.diagnose.fit.problem import Finding, Parameter, Problem, TrialInfo, Values
-
-from .unit_factors import factor_words
+from experiments.diagnose.fit.problem import Finding, Parameter, TrialInfo, Values
 
 __all__ = ["Scatter", "exchanged", "find_scatter", "groups_of", "likeliest_scatter", "odd_trials", "parted",
            "split_trials", "trends", "with_scatter"]  # fmt: skip
 
 _SURE = 1e-4
-_LEAST = 0.005
-"""Relative scatter below this is not the bed's: the smoothing of a depth column does as much."""
-_SAYS_SOMETHING = 0.5
-"""Share of what is known of a trial's number that must come from its data."""
-_LOOKS = 12
-"""Steps with all kinds of scatter at once; what is found is fitted in full."""
+_SAYS_SOMETHING = 0.5  # share of what is known of a trial's number that must come from its data
+_LOOKS = 12  # steps with all kinds of scatter at once; what is found is fitted in full
 _AT_ODDS = 20.0
 """How many times as far from its replicates as they are from one another, in mean square, a trial is at odds."""
 
-_FAR_PAIRS = 0.75
-"""Share of all pairs of replicates that lie nearer than what one at odds is measured by."""
+_FAR_PAIRS = 0.75  # share of all pairs of replicates that lie nearer than what one at odds is measured by
 _TREND, _DRAWS = 1e-3, 4999
 """Chance below which what replicates differ by is said to grow or fall from trial to trial, and orders that are drawn
 for it."""
-_ANOTHER = 1.1
-"""Ratio of two depths or durations from which on trials do not go through the same."""
+_ANOTHER = 1.1  # ratio of two depths or durations from which on trials do not go through the same
 _SIZEABLE = 0.2
 """And by which share of what the base model leaves it must differ: small errors of the path count for more there."""
 
@@ -143,13 +136,12 @@ def find_scatter(
     prior under which all is fitted and asked again. `kinds`: those that are asked for; none: all that no other
     question is for. `alone`: sets of trials that are compared although none repeats another (`lone_beds`).
     """
-    problem: Problem = found.model.problem
-    offered: dict[str, tuple[Parameter, ...]] = getattr(problem, "scatter", {})
+    problem = found.model.problem
     asked = tuple(kinds)
     if not asked:
-        late = () if apart else getattr(problem, "hidden_scatter", ())
-        asked = tuple(kind for kind in offered if kind not in (*late, *getattr(problem, "special_scatter", ())))
-    offered = {kind: parameters for kind, parameters in offered.items() if kind in asked}
+        late = () if apart else problem.hidden_scatter
+        asked = tuple(kind for kind in problem.scatter if kind not in (*late, *problem.special_scatter))
+    offered = {kind: parameters for kind, parameters in problem.scatter.items() if kind in asked}
     inside = [t for t in problem.trials if t.id in found.model.trials]
     groups = [list(ids) for ids in alone or groups_of(inside).values() if len(ids) > 1]
     if not groups or not offered:
@@ -174,12 +166,12 @@ def with_scatter(model: Model, values: Values) -> Fit:
     nobody measured."""
     names = {p.name for p in model.parameters}
     found = fit(model, {name: value for name, value in values.items() if name in names})
-    guess = getattr(model.problem, "guess", None)
-    if guess is None or inflation(found) == 1:
+    contacts = model.problem.contacts
+    if contacts is None or inflation(found) == 1:
         return found
     stated = {p.name: p.value for p in model.problem.base}
     begun = {name: values[name] for form in model.forms for name in (p.name for p in form.parameters)}
-    other = fit(model, guess(model.forms, model.trials, {**stated, **begun}, apart=model.scatter))
+    other = fit(model, contacts.guess(model.forms, model.trials, {**stated, **begun}, apart=model.scatter))
     best = min(found, other, key=lambda one: one.objective)
     return scanned(best)
 
@@ -190,8 +182,7 @@ class Scatter:
 
     parameters: tuple[Parameter, ...] = ()
     model_std: Mapping[str, float] = field(default_factory=dict)
-    values: Mapping[str, float] = field(default_factory=dict)
-    """Of the model with it, for fits to begin from."""
+    values: Mapping[str, float] = field(default_factory=dict)  # of the model with it, for fits to begin from
 
 
 def trends(scatter: Scatter, trials: Sequence[TrialInfo]) -> list[Finding]:
@@ -235,7 +226,7 @@ def _scattered(
     found: Fit, offered: Mapping[str, Sequence[Parameter]], groups: Sequence[Sequence[str]], apart: bool
 ) -> dict[str, float]:
     """The scatter of those kinds in which replicates differ for sure."""
-    least = getattr(found.model.problem, "least_scatter", _LEAST)
+    least = found.model.problem.least_scatter
     louder = _louder(found, groups) if apart else inflation(found)
     scatter = {}
     for kind, parameters in offered.items():
@@ -252,11 +243,7 @@ def _scattered(
 
 
 def _louder(found: Fit, groups: Sequence[Sequence[str]]) -> float:
-    """How much louder than the sensors what tells replicates apart is, where they go through the same at the same time.
-
-    What a model lacks is the same in all of them and bends their numbers alike: only what each has of its own counts
-    (pure error, as in `unrest`).
-    """
+    """How much louder than the sensors what each replicate has of its own is (pure error, as in `unrest`)."""
     whole = inflation(found)
     rows = {(trial, channel): block for trial, channel, block in found.model.channel_rows()}
     left, freedom = 0.0, 0

@@ -7,8 +7,6 @@ their logarithms). Such ratios are summed over trials and channels, for a line h
 and judged by their own spread over all frequencies, so that a misfit that is loud everywhere makes no line.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -24,24 +22,18 @@ from experiments.diagnose.fit.problem import Array, Form, Problem, Values
 
 __all__ = ["Line", "Part", "Piece", "line_rows", "line_sentence", "lines_of", "spectral_lines"]
 
-_CYCLES = 1.5
-"""Periods that a recording must hold for a frequency to count as a neighbour: slower is a misfit."""
+_CYCLES = 1.5  # periods that a recording must hold for a frequency to count as a neighbour: slower is a misfit
 _OF_RATE = 0.49
-_HIGHEST = 150.0
-"""Share of a channel's rate, and frequency [Hz], up to which is looked."""
-_PER_WIDTH = 3
-"""Frequencies a resolution of the longest recording."""
+_HIGHEST = 150.0  # share of a channel's rate, and frequency [Hz], up to which is looked
+_PER_WIDTH = 3  # frequencies a resolution of the longest recording
 _NEIGHBOURS, _LOBE, _BESIDE = 9.0, 2.5, 4.0
 """Resolutions on either side from which the background is taken; those next to a line that are not: Hann's lobe; and
 how many there must be on each side: a background from one side is guessed."""
-_MEAN_LOG = 0.5772
-"""Of an exponential law's logarithm, below that of its mean."""
-_CHANCE = 1e-3
-"""Probability, over all frequencies, below which a line is one."""
+_MEAN_LOG = 0.5772  # of an exponential law's logarithm, below that of its mean
+_CHANCE = 1e-3  # probability, over all frequencies, below which a line is one
 _IN_CHANNEL, _IN_TRIALS = 4.0, 0.5
 """Mean ratio to the background from which a channel has the line, and share of the trials that must show it."""
-_ODD = 5.0
-"""Robust standard deviations at which residuals are cut: a touch at another moment is no line."""
+_ODD = 5.0  # robust standard deviations at which residuals are cut: a touch at another moment is no line
 _MOST, _SHOWN, _FEWEST = 3, 3, 60
 """Lines that are looked for, channels that are said of each; rows below which a recording tells nothing."""
 
@@ -64,8 +56,7 @@ class Line:
     frequency: float
     std: float
     chance: float
-    parts: tuple[Part, ...]
-    """The plainest channel first."""
+    parts: tuple[Part, ...]  # the plainest channel first
 
 
 @dataclass(frozen=True)
@@ -76,8 +67,7 @@ class Piece:
     channel: str
     time: Array
     rest: Array
-    unit: float
-    """The noise in the channel's unit."""
+    unit: float  # the noise in the channel's unit
     phase: Array
 
     @property

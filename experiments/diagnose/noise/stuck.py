@@ -1,7 +1,5 @@
 """Readings that are stuck, or clip: a sensor that says the same number over and over where it otherwise never does."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,18 +9,15 @@ from numpy.typing import NDArray
 
 __all__ = ["Clipped", "clipped", "clipped_wheel", "cut_rows", "stuck_rows"]
 
-_LONG = 12
-"""Equal readings in a row that noise does not make."""
+_LONG = 12  # equal readings in a row that noise does not make
 _USUAL = 0.05
 """Share of equal neighbours elsewhere up to which a run of them is odd: coarse or held readings repeat all the time."""
 _AT_THE_END, _IN_A_ROW = 8, 4
 """Readings at the very end of a channel's range, and those of them in a row, from which on it clips there."""
-_NEXT = 2
-"""Readings at the value next to that: more, and it is a coarse channel that turns there."""
+_NEXT = 2  # readings at the value next to that: more, and it is a coarse channel that turns there
 _BESIDE, _SLIGHT = 7, 6.0
 """Rows on either side of a zero that are looked at, and standard deviations up to which a reading may belong to it."""
-_NOISY = 0.2
-"""Share of the stated noise that a wheel's speed must have below where it clips."""
+_NOISY = 0.2  # share of the stated noise that a wheel's speed must have below where it clips
 
 
 @dataclass(frozen=True)
@@ -31,8 +26,7 @@ class Clipped:
 
     rows: NDArray[np.int64]
     value: float
-    highest: bool
-    """Whether it is the highest; else the lowest."""
+    highest: bool  # whether it is the highest; else the lowest
 
     @property
     def words(self) -> str:

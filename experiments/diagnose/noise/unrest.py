@@ -23,12 +23,9 @@ from .replicates import groups_of
 
 __all__ = ["Unrest", "find_unrest"]
 
-_SURE = 30.0
-"""Twice the log likelihood that wandering must gain in a channel."""
-_SHARE = 0.5
-"""Share of the conditions with replicates that must wander."""
-_LEAST = 3.0
-"""Variance of the slowest mode, in units of the noise, from which on a condition wanders."""
+_SURE = 30.0  # twice the log likelihood that wandering must gain in a channel
+_SHARE = 0.5  # share of the conditions with replicates that must wander
+_LEAST = 3.0  # variance of the slowest mode, in units of the noise, from which on a condition wanders
 _SHARES = np.linspace(0.0, 1.0, 201)
 _BENDS, _POWERS = np.geomspace(0.5, 128.0, 9), (1.0, 1.5, 2.0, 3.0, 4.0, 8.0)
 _AMPLITUDES = np.concatenate([[0.0], np.geomspace(0.1, 1e8, 61)])
@@ -38,24 +35,19 @@ _AMPLITUDES = np.concatenate([[0.0], np.geomspace(0.1, 1e8, 61)])
 class Law:
     """How replicates wander in one channel."""
 
-    bend: float
-    """b, in modes."""
-    power: float
-    """p."""
+    bend: float  # b, in modes
+    power: float  # p
     amplitudes: Mapping[tuple[object, ...], float]
     """A of each condition, for one row: modes of a given wander grow with the root of the number of rows."""
-    other: float
-    """A of a condition without replicates."""
-    std: float
-    """By how much replicates differ beyond the sensor, root mean square of all rows [the channel's unit]."""
+    other: float  # A of a condition without replicates
+    std: float  # by how much replicates differ beyond the sensor, root mean square of all rows [the channel's unit]
 
 
 @dataclass(frozen=True)
 class Unrest:
     """How replicates of a campaign wander apart; nothing by default."""
 
-    laws: Mapping[str, Law]
-    """By channel."""
+    laws: Mapping[str, Law]  # by channel
 
     def __bool__(self) -> bool:
         return bool(self.laws)

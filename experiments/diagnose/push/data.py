@@ -1,9 +1,7 @@
 """Trials of penetration made ready for fits: gaps left out, faults found and set aside, depth smoothed."""
 
-from __future__ import annotations
-
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,33 +12,27 @@ from scipy.stats import norm
 from experiments.campaign import Campaign, PenetrationCampaign, Recording
 from experiments.campaign.tables import PenetrationTrial
 from experiments.diagnose.fit.problem import Array, Finding, TrialInfo
-from experiments.diagnose.noise.colour import Colour, colour_of
+from experiments.diagnose.noise.colour import Colour, colour_of, together
 from experiments.diagnose.noise.replicates import parted
 from experiments.diagnose.noise.stuck import clipped, cut_rows, stuck_rows
-from experiments.diagnose.noise.words import together
 
 from .depth import SmoothDepth, smooth_depth
 from .drive import Holds, Weights
 
 __all__ = ["Prepared", "prepare"]
 
-_FEWEST = 12
-"""Rows that a trial must have to say anything."""
-_AROUND = 20
-"""Rows on either side of a gap that tell whether the clock has jumped."""
-_LONG = 0.02
-"""Share of a recording from which on a stretch without rows is said."""
+_FEWEST = 12  # rows that a trial must have to say anything
+_AROUND = 20  # rows on either side of a gap that tell whether the clock has jumped
+_LONG = 0.02  # share of a recording from which on a stretch without rows is said
 _SMOOTH, _ROUGH = 1.7, 3.0
 """Chi-square a row up to which a polynomial goes through both sides of a gap, and beyond which it does not."""
 _LOUDER = 1.2
 """Power of a depth sensor's slow noise, over what is stated, from which on its pushes are smoothed once more."""
-_AS_TAKEN = 3.0
-"""Standard errors within which what is left is what it was taken for."""
+_AS_TAKEN = 3.0  # standard errors within which what is left is what it was taken for
 _OF_MEDIAN = 1.8
 """Relative standard error of a median of n absolute third differences, times the root of n: 1.17 of independent normal
 numbers, and sqrt(1 + 2 (0.75^2 + 0.3^2 + 0.05^2)) for those of neighbours."""
-_OUTLIER = 8.0
-"""Noise standard deviations beyond which a lone reading is a fault (once in 1e15 by chance)."""
+_OUTLIER = 8.0  # noise standard deviations beyond which a lone reading is a fault (once in 1e15 by chance)
 
 
 @dataclass(frozen=True)
@@ -50,18 +42,13 @@ class Prepared:
 
     table: PenetrationTrial
     info: TrialInfo
-    diameter: float
-    """[m]"""
-    time: Array
-    """[s], shape [n]"""
-    depth: Array
-    """As measured [m], shape [n]."""
-    other: Array
-    """Force [N] or acceleration [m/s2], NaN where there is none, shape [n]."""
+    diameter: float  # [m]
+    time: Array  # [s], shape [n]
+    depth: Array  # as measured [m], shape [n]
+    other: Array  # force [N] or acceleration [m/s2], NaN where there is none, shape [n]
     has_depth: NDArray[np.bool_]
     has_other: NDArray[np.bool_]
-    smooth: SmoothDepth | None = None
-    """Of a driven trial."""
+    smooth: SmoothDepth | None = None  # of a driven trial
     findings: tuple[Finding, ...] = field(default=())
 
     @property
@@ -215,8 +202,7 @@ def _alike(campaign: Campaign, trials: list[Prepared], colours: Mapping[str, Col
 
 
 def _path(trial: Prepared) -> tuple[float, ...]:
-    """What makes another path of a drive at the same nominal speed: depth, way back and duration; of a drop how long it
-    is looked at. Nothing of pushes by hand, of which each goes its own."""
+    """Depth, way back and duration, by which drives at one speed differ; of a drop how long it is looked at."""
     lasted = float(np.ptp(trial.time))
     if trial.smooth is None:
         return (lasted,)
@@ -287,39 +273,9 @@ def _one(
             what=f"trial {table.id}: there is no row from {time[k]:.4g} to {time[k + 1]:.4g} s, where one every "
             f"{usual:.3g} s is usual: kept as a gap",
         ))  # fmt: skip
-    for name, values, std in (("depth", depth, loud * std_depth), (channel, other, std_other)):
-        # A depth cannot jump; a force can, where a tip touches for a moment, but not beyond all that it is elsewhere.
-        known = values[np.isfinite(values)]
-        range_ = float(np.ptp(np.percentile(known, [0.5, 99.5]))) if name != "depth" and len(known) else 0.0
-        lone = _lone_readings(values, max(std, 0.15 * range_))
-        if len(lone):
-            several = f"{len(lone)} readings of {name} lie far from their neighbours and are set aside"
-            one = f"one reading of {name} lies far from its neighbours and is set aside"
-            say(several if len(lone) > 1 else one, where=name, rows=lone)
-            values[lone] = np.nan
-        for end in clipped(values) if not driven or name != "depth" else ():  # a machine may stop at its end
-            if name == "accel" and abs(end.value - table.gravity) < 1e-3 * table.gravity:
-                continue  # free flight
-            say(f"{len(end.rows)} readings of {name} {end.words}", where=name, rows=end.rows)
-            values[end.rows] = np.nan
-        stuck = stuck_rows(values) if not driven or name != "depth" else lone[:0]  # a machine may stand still
-        if len(stuck):
-            say(f"{len(stuck)} readings of {name} repeat the one before where it never does otherwise: the sensor is "
-                f"stuck, they are set aside", where=name, rows=stuck)  # fmt: skip
-            values[stuck] = np.nan
-    step = _step(time, depth, loud * std_depth)
-    while step is not None:
-        size = depth[step] - depth[step - 1]
-        back = _step(time, depth, loud * std_depth, after=step)
-        while back is not None and abs(depth[back] - depth[back - 1] + size) > 0.5 * abs(size):
-            back = _step(time, depth, loud * std_depth, after=back)  # until one takes it back
-        rows = np.arange(step, len(depth) if back is None else back)
-        stays = "stays there, as where a marker is lost; it is set aside from there on"
-        comes = f"comes back {len(rows)} rows later, as where a marker is lost for a while; these are set aside"
-        say(f"the depth jumps by {1e3 * size:.3g} mm between two readings and {stays if back is None else comes}",
-            where="depth", rows=rows)  # fmt: skip
-        depth[rows] = np.nan
-        step = None if back is None else _step(time, depth, loud * std_depth, after=back)
+    _drop_odd(table, "depth", depth, loud * std_depth, say)
+    _drop_odd(table, channel, other, std_other, say)
+    _drop_jumps(time, depth, loud * std_depth, say)
     if driven:
         held = _held(other)
         if held is not None:
@@ -334,6 +290,48 @@ def _one(
         return None, findings
     info = _info(tables, table, abs(float(table.speed or 0.0)))
     return Prepared(table, info, tables.diameter_of(table), time, depth, other, has_depth, has_other), findings
+
+
+def _drop_odd(table: PenetrationTrial, name: str, values: Array, std: float, say: Callable[..., None]) -> None:
+    """Put NaN in the place of readings that stand alone, clip or are stuck, and say so."""
+    # A depth cannot jump; a force can, where a tip touches for a moment, but not beyond all that it is elsewhere.
+    known = values[np.isfinite(values)]
+    range_ = float(np.ptp(np.percentile(known, [0.5, 99.5]))) if name != "depth" and len(known) else 0.0
+    lone = _lone_readings(values, max(std, 0.15 * range_))
+    if len(lone):
+        several = f"{len(lone)} readings of {name} lie far from their neighbours and are set aside"
+        one = f"one reading of {name} lies far from its neighbours and is set aside"
+        say(several if len(lone) > 1 else one, where=name, rows=lone)
+        values[lone] = np.nan
+    if table.mode == "driven" and name == "depth":
+        return  # a machine may stop at its end, or stand still
+    for end in clipped(values):
+        if name == "accel" and abs(end.value - table.gravity) < 1e-3 * table.gravity:
+            continue  # free flight
+        say(f"{len(end.rows)} readings of {name} {end.words}", where=name, rows=end.rows)
+        values[end.rows] = np.nan
+    stuck = stuck_rows(values)
+    if len(stuck):
+        say(f"{len(stuck)} readings of {name} repeat the one before where it never does otherwise: the sensor is "
+            f"stuck, they are set aside", where=name, rows=stuck)  # fmt: skip
+        values[stuck] = np.nan
+
+
+def _drop_jumps(time: Array, depth: Array, std: float, say: Callable[..., None]) -> None:
+    """The same of depths from a jump on to where it is taken back."""
+    step = _step(time, depth, std)
+    while step is not None:
+        size = depth[step] - depth[step - 1]
+        back = _step(time, depth, std, after=step)
+        while back is not None and abs(depth[back] - depth[back - 1] + size) > 0.5 * abs(size):
+            back = _step(time, depth, std, after=back)  # until one takes it back
+        rows = np.arange(step, len(depth) if back is None else back)
+        stays = "stays there, as where a marker is lost; it is set aside from there on"
+        comes = f"comes back {len(rows)} rows later, as where a marker is lost for a while; these are set aside"
+        say(f"the depth jumps by {1e3 * size:.3g} mm between two readings and {stays if back is None else comes}",
+            where="depth", rows=rows)  # fmt: skip
+        depth[rows] = np.nan
+        step = None if back is None else _step(time, depth, std, after=back)
 
 
 def _driven(

@@ -6,19 +6,16 @@ each the column calls for, is chosen by the Bayesian information criterion at th
 Statistics 6 (1978), 461). The fit is linear, or all but so, and its error a known linear map of the noise.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
+
+from experiments.diagnose.fit.problem import Array
 
 from .drive import Drive, Holds, Weights, find_drive
 
 __all__ = ["SmoothDepth", "smooth_depth"]
-
-Array = NDArray[np.float64]
 
 _INTERVALS = (1, 2, 4, 8, 16, 32, 64, 128)
 _MOST_KINKS = 10
@@ -28,30 +25,21 @@ _KINKED_INTERVALS = 2  # finer splines need no kinks, and the search is dear
 _KINK_GRID = 160
 _APART = 3.0
 """Rows between two kinks: of a speed that lasts less they tell nothing, and a row that is far off would make one."""
-_DRIVEN = 24
-"""Rows from which on levels and ramps are looked for."""
-_FINER = (1, 3)
-"""Times as many intervals of bends, tried in turn."""
-_SHOWN = 3.0
-"""Nats by which finer bends must be likelier."""
-_BENDS = 8
-"""Intervals of the spline that lets levels and ramps be not quite such."""
+_DRIVEN = 24  # rows from which on levels and ramps are looked for
+_FINER = (1, 3)  # times as many intervals of bends, tried in turn
+_SHOWN = 3.0  # nats by which finer bends must be likelier
+_BENDS = 8  # intervals of the spline that lets levels and ramps be not quite such
 
 
 @dataclass(frozen=True)
 class SmoothDepth:
     """A smoothed depth column at its own times, n rows."""
 
-    depth: Array
-    """[m], shape [n]"""
-    speed: Array
-    """Its slope [m/s], shape [n]."""
-    depth_error: Array
-    """Factor of the depth's error: the error is this times standard normal numbers [m], shape [n, p]."""
-    speed_error: Array
-    """Of the slope's, the same numbers [m/s], shape [n, p]."""
-    holds: Holds = ()
-    """Which of its levels of speed are 0; () where it is no motion of levels."""
+    depth: Array  # [m], shape [n]
+    speed: Array  # its slope [m/s], shape [n]
+    depth_error: Array  # factor of the depth's error: the error is this times standard normal numbers [m], shape [n, p]
+    speed_error: Array  # of the slope's, the same numbers [m/s], shape [n, p]
+    holds: Holds = ()  # which of its levels of speed are 0; () where it is no motion of levels
     inflation: float = 1.0
     """By how much its standard error is larger than with white noise as loud as stated, which the gap is taken with."""
 
@@ -141,11 +129,7 @@ def _curve(
 
 
 def _less(score: float, count: int, drive: Drive, n: int, limit: float) -> bool:
-    """Whether a curve of `count` columns describes the rows better than a drive, by the criterion.
-
-    Where neither comes down to the noise, that may be louder than stated: then both are judged with the noise that they
-    themselves leave (n log of the mean square in place of the sum), or rows that are far off would have own kinks.
-    """
+    """Whether a curve of `count` columns is better than a drive by the criterion, or by the noise they leave."""
     chi_square = score - float(np.log(n)) * count
     if min(chi_square, drive.chi_square) < limit:
         return score < drive.criterion(n)

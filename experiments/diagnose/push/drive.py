@@ -14,25 +14,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.diagnose.fit.problem import Array
+
 __all__ = ["Drive", "Holds", "Weights", "find_drive"]
 
-Array = NDArray[np.float64]
-Holds = tuple[bool, ...]
-"""Which levels are at rest."""
+Holds = tuple[bool, ...]  # which levels are at rest
 
-_ALIKE = 6.0
-"""Twice the logarithm of the odds (20 to 1) that a machine's pushes go alike."""
+_ALIKE = 6.0  # twice the logarithm of the odds (20 to 1) that a machine's pushes go alike
 _MOST_RAMPS = 10
-_FIRST_WIDTH = 0.05
-"""Of a ramp when it is added, of the record."""
-_HIDDEN = 2.0
-"""Change of all depths together, in standard deviations of the noise, that may go unseen."""
-_GRID = 200
-"""Places at which a ramp is looked for."""
-_BLOCKS = 400
-"""Means of neighbouring rows in which the search is made, at most."""
-_WAYS = 2
-"""Ways of adding a ramp that are fitted."""
+_FIRST_WIDTH = 0.05  # of a ramp when it is added, of the record
+_HIDDEN = 2.0  # change of all depths together, in standard deviations of the noise, that may go unseen
+_GRID = 200  # places at which a ramp is looked for
+_BLOCKS = 400  # means of neighbouring rows in which the search is made, at most
+_WAYS = 2  # ways of adding a ramp that are fitted
 _AHEAD = 2
 """Ramps that may be added without a gain before the search ends: a stop and a start are worth something together."""
 
@@ -41,10 +35,8 @@ _AHEAD = 2
 class Weights:
     """Turns rows into independent ones of unit variance."""
 
-    root: Array
-    """One over the standard deviation of each row, shape [n]."""
-    persistence: float = 0.0
-    """Correlation of neighbouring rows, an autoregressive law of order one."""
+    root: Array  # one over the standard deviation of each row, shape [n]
+    persistence: float = 0.0  # correlation of neighbouring rows, an autoregressive law of order one
 
     def __call__(self, rows: Array) -> Array:
         """Of shape [n] or [n, p], the same."""
@@ -66,20 +58,13 @@ class Weights:
 class Drive:
     """A motion of levels and ramps; times from 0 to 1, depths in standard deviations of the noise."""
 
-    start: float
-    """Depth at time 0."""
-    levels: Array
-    """Speeds, shape [ramp_count + 1]."""
-    middles: Array
-    """Of the ramps, shape [ramp_count]."""
-    widths: Array
-    """Shape [ramp_count]; 0 for a corner."""
-    round: bool
-    """Whether the speed of a ramp changes as a raised cosine, not in proportion to time."""
-    resting: Holds
-    """Which levels are 0 for certain."""
-    even: bool = False
-    """Whether the ramps' widths change in proportion, as with one acceleration for all of them."""
+    start: float  # depth at time 0
+    levels: Array  # speeds, shape [ramp_count + 1]
+    middles: Array  # of the ramps, shape [ramp_count]
+    widths: Array  # shape [ramp_count]; 0 for a corner
+    round: bool  # whether the speed of a ramp changes as a raised cosine, not in proportion to time
+    resting: Holds  # which levels are 0 for certain
+    even: bool = False  # whether the ramps' widths change in proportion, as with one acceleration for all of them
     chi_square: float = np.inf
 
     @property

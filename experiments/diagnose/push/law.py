@@ -156,10 +156,7 @@ _Own = tuple[tuple[Term, Push | None], ...]
 
 
 def _compiled(lines: Mapping[str, Sequence[str]], hooks: Mapping[str, Callable[..., Any]], name: str) -> list[Any]:
-    """Functions written out as text, a line a hook, as `rigid.model.model` does it for tumbles, compiled by Taichi.
-
-    `lines`: head of each function -> its lines; `hooks`: what they call.
-    """
+    """Functions (head -> lines) that call `hooks`, written out as text and compiled by Taichi."""
     import taichi as ti
 
     names = {"ti": ti} | {key: for_taichi(hook, mobilised=for_taichi(mobilised)) for key, hook in hooks.items()}

@@ -1,7 +1,5 @@
 """What an engineer also says of driven trials: K and its spread, how it goes with the diameter, if C can be told."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -21,8 +19,7 @@ class Push:
     depth: Array
     speed: Array
     force: Array
-    spring: Array
-    """Force of the best model with C = 0 [N]."""
+    spring: Array  # force of the best model with C = 0 [N]
 
 
 def remarks(pushes: Sequence[Push], added: Sequence[str]) -> list[str]:

@@ -6,8 +6,6 @@ likelihood (`PenetrationProblem.rewhiten`), where rows above the surface tell th
 rows has it from the others.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -21,26 +19,19 @@ from .data import Prepared
 
 __all__ = ["ForceZeros", "find_force_zeros"]
 
-_FEWEST = 8
-"""Rows above the surface that tell a zero."""
-_CLEAR = 4.0
-"""Standard errors of the smoothed depth by which such a row is above."""
-_SURE = 1e-4
-"""Chance below which zeros differ."""
-_EDGE = 0.5
-"""Pushes must be told to this share of all for their spread to be that of all of them."""
-_WITHIN = 4.0
-"""Spreads within which a zero is one of them."""
+_FEWEST = 8  # rows above the surface that tell a zero
+_CLEAR = 4.0  # standard errors of the smoothed depth by which such a row is above
+_SURE = 1e-4  # chance below which zeros differ
+_EDGE = 0.5  # pushes must be told to this share of all for their spread to be that of all of them
+_WITHIN = 4.0  # spreads within which a zero is one of them
 
 
 @dataclass(frozen=True)
 class ForceZeros:
     """How far the zeros of the pushes' forces differ."""
 
-    std: float
-    """Of one push's zero about that of all [N]."""
-    zeros: dict[str, float]
-    """As read above the surface [N], by trial."""
+    std: float  # of one push's zero about that of all [N]
+    zeros: dict[str, float]  # as read above the surface [N], by trial
     finding: Finding
 
     def usual(self, trial: str) -> bool:

@@ -1,18 +1,13 @@
 """The candidates as a person wants to see them: a line a set of names, and why one that looks better has no name."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 __all__ = ["candidate_rows", "no_better", "unnamed_sentence"]
 
-_MORE = 0.05
-"""Nats by which a set of names must beat each of its parts to be listed."""
-_SETS = 4
-"""Sets of names that are listed beside the one that is told."""
-_WORTH_SAYING = 1.0
-"""Nats by which a candidate must beat what is told to be spoken of."""
+_MORE = 0.05  # nats by which a set of names must beat each of its parts to be listed
+_SETS = 4  # sets of names that are listed beside the one that is told
+_WORTH_SAYING = 1.0  # nats by which a candidate must beat what is told to be spoken of
 
 Row = Mapping[str, Any]
 

@@ -9,8 +9,6 @@ series/<trial>.<channel>.csv    t_s,measured,before,after,std,std_after,phase (a
 ```
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +16,12 @@ import numpy as np
 
 from experiments.diagnose.core.effect_equations import SYMBOLS, equations_of, with_comments
 from experiments.diagnose.core.outcome import Diagnosis
-from experiments.diagnose.core.scatter_gap import gap_with_scatter, scatter_std, sensor_std
+from experiments.diagnose.core.scatter_gap import gap_with_scatter, scatter_std
 from experiments.diagnose.core.sizes import effect_sizes
 from experiments.diagnose.fit.evidence import excess, inflation
 from experiments.diagnose.fit.fitting import Fit
 from experiments.diagnose.fit.gaps import Gaps
-from experiments.diagnose.fit.localise import phases_of
+from experiments.diagnose.fit.localise import Place, phases_of
 from experiments.diagnose.fit.problem import Form
 from experiments.diagnose.noise.spectrum import line_rows
 from experiments.runs.folder import write_json, write_series, write_text
@@ -43,11 +41,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
         "verdict": found.verdict,
         "effects": effects,
         "alternatives": list(found.alternatives) if found.verdict == "ambiguous" else [],
-        "where": [
-            {"trial": p.trial, "channel": p.channel, "phase": p.phase, "from_s": p.from_s, "to_s": p.to_s,
-             "excess": p.excess, "settings": settings[p.trial]}
-            for p in found.where
-        ],
+        "where": [{**_place(p), "settings": settings[p.trial]} for p in found.where],
         "gap": {
             "before": {"fit": found.before.fit, "held_out": found.before.held_out},
             "after": {"fit": found.after.fit, "held_out": found.after.held_out},
@@ -65,23 +59,16 @@ def document(found: Diagnosis) -> dict[str, Any]:
         }  # fmt: skip
     if found.verdict == "unknown":
         said["leading"] = _leading(found)
-        said["left"] = [
-            {"trial": p.trial, "channel": p.channel, "phase": p.phase, "from_s": p.from_s, "to_s": p.to_s,
-             "excess": p.excess}
-            for p in found.left
-        ]  # fmt: skip
+        said["left"] = [_place(p) for p in found.left]
         said["latent"] = {"file": "latent.csv", "depends_on": found.depends_on, "explained": dict(found.shares),
                           "lines": line_rows(found.lines)}  # fmt: skip
     said["base"] = _base_values(found)
+    gates = {"before": found.gate_before, "after": found.gate_after, "held_out": found.gate_held_out}
     said["gate"] = {
-        "before": {"passed": found.gate_before.passed, "score": found.gate_before.score,
-                   "threshold": found.gate_before.threshold},
-        "after": {"passed": found.gate_after.passed, "score": found.gate_after.score,
-                  "threshold": found.gate_after.threshold},
-    }  # fmt: skip
-    if found.gate_held_out is not None:
-        said["gate"]["held_out"] = {"passed": found.gate_held_out.passed, "score": found.gate_held_out.score,
-                                    "threshold": found.gate_held_out.threshold}  # fmt: skip
+        stage: {"passed": gate.passed, "score": gate.score, "threshold": gate.threshold}
+        for stage, gate in gates.items()
+        if gate is not None
+    }
     said["at_bounds"] = {
         stage: [{"parameter": b.parameter, "value": b.value, "unit": b.unit, "sigmas": b.sigmas, "at_bound": b.at_bound}
                 for b in bounds]
@@ -104,6 +91,11 @@ def document(found: Diagnosis) -> dict[str, Any]:
     ]  # fmt: skip
     said["next_experiment"] = found.next_experiment
     return said
+
+
+def _place(p: Place) -> dict[str, str | float]:
+    return {"trial": p.trial, "channel": p.channel, "phase": p.phase, "from_s": p.from_s, "to_s": p.to_s,
+            "excess": p.excess}  # fmt: skip
 
 
 def _equations(found: Diagnosis) -> list[dict[str, Any]]:
@@ -160,8 +152,8 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
         samples = problem.samples(trial.id)
         phases = phases_of(problem, found.base_values, (), trial.id)
         wide = scatter_std(problem, found.model_std, found.best_values, found.forms, trial.id)
-        noises = [sensor_std(problem, found.base_values, (), trial.id),
-                  sensor_std(problem, found.best_values, found.forms, trial.id)]  # fmt: skip
+        noises = [problem.sensor_std(found.base_values, (), trial.id),
+                  problem.sensor_std(found.best_values, found.forms, trial.id)]  # fmt: skip
         for channel, columns in before.items():
             if not len(columns["t_s"]):  # a sensor that recorded nothing
                 continue
@@ -236,7 +228,7 @@ def _evidence_base(found: Diagnosis) -> dict[str, Any]:
     if found.choice is None:
         return {}
     base = found.choice.base.fit
-    return {"left": _beyond_noise(base), "with_scatter": bool(getattr(base.model.problem, "calmed", {}))}
+    return {"left": _beyond_noise(base), "with_scatter": bool(base.model.problem.calmed)}
 
 
 def _leading(found: Diagnosis) -> dict[str, Any]:

@@ -1,8 +1,6 @@
 """The first lines of a diagnosis: what is missing, how far that closes the gap, how sure it is, what is left, and what
 to do next; a few sentences made of diagnosis.json alone."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -18,10 +16,8 @@ __all__ = ["scatter_sentence", "summary_sentences", "title_words"]
 
 _WORTH_SAYING = 0.5
 """Share of what is beyond the noise that a candidate without the best evidence must close to be called likeliest."""
-_AS_LIKELY = 1.0
-"""Nats within which another name is said beside the likeliest."""
-_NAMES = 3
-"""Candidates that are said where none is certain."""
+_AS_LIKELY = 1.0  # nats within which another name is said beside the likeliest
+_NAMES = 3  # candidates that are said where none is certain
 
 
 def _only_stated_wrong(said: Mapping[str, Any]) -> str:
@@ -184,8 +180,7 @@ def _candidates(said: Mapping[str, Any]) -> list[str]:
     return [*sentences, *_why_unknown(said)]
 
 
-_LOST = 100.0
-"""A standard error over the value itself [1] past which it is none: the curvature there is round-off."""
+_LOST = 100.0  # A standard error over the value itself [1] past which it is none: the curvature there is round-off
 
 
 def _numbers(leading: Mapping[str, Any]) -> list[str]:

@@ -1,7 +1,5 @@
 """What a diagnosis says to a person: what is left by phase and channel, and in which settings the model fails."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -21,16 +19,13 @@ __all__ = [
 ]  # fmt: skip
 
 _UNITS = {"N_m": "N m", "m_s2": "m/s2", "m_s": "m/s", "m": "m"}
-_OTHER = 0.01
-"""Relative difference from which on two settings are two."""
+_OTHER = 0.01  # relative difference from which on two settings are two
 _SMALL_SHARE, _SMALL_BESIDE = 0.05, 0.2
 """Share of the force up to which an effect is called small, and of the largest one's signature."""
-_STANDING = 2.0
-"""Chi-square per sample of a platform that stands from which on it is explained."""
+_STANDING = 2.0  # chi-square per sample of a platform that stands from which on it is explained
 _WORSE_OF_ALL, _WORSE_CELL, _TOLD_WORSE = 1.1, 1.5, 3
 """Factor from which on a condition, and a channel in a phase, is said to have got worse; how many of each are said."""
-_MAINLY = 0.5
-"""Share of what is beyond the noise from which on a phase, a channel or a setting is said to hold it."""
+_MAINLY = 0.5  # share of what is beyond the noise from which on a phase, a channel or a setting is said to hold it
 
 
 class PhaseTable:
@@ -232,8 +227,7 @@ def shares_words(places: Sequence[Mapping[str, Any]], key: str, total: float) ->
 
 
 def _settings(said: Mapping[str, Any]) -> str:
-    """Values of settings at which a sample holds most of what is beyond the noise, where trials differ in them: a slow
-    trial has many samples."""
+    """Values of settings at which a sample holds most of what is beyond the noise, where trials differ in them."""
     rows = [row for row in said.get("by_condition", []) if row["before"] > 1.0]
     names = dict.fromkeys(name for row in rows for name in row["settings"])
     shown = []

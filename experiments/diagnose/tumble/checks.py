@@ -5,20 +5,18 @@ a clock that jumps forward, long gaps. What needs the model (a trial at odds wit
 statistics' affair.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from experiments.check.lags import find_lag, pieces
 from experiments.diagnose.fit.problem import Finding
-from experiments.diagnose.noise.lags import find_lag, pieces
 from experiments.diagnose.noise.stuck import clipped, clipped_wheel, stuck_rows
 
 from .data import CHANNELS, TrialData, TumbleData
-from .spikes import spikes
+from .spikes import aside, spikes
 
 __all__ = ["checked"]
 
@@ -55,23 +53,17 @@ def checked(data: TumbleData) -> tuple[TumbleData, list[Finding]]:
             values = trial.value[mine]
             for end in clipped(values) if name != "wheel" else clipped_wheel(values, float(trial.std[mine[0]])):
                 keep[mine[end.rows]] = False
-                findings.append(Finding(
-                    trial=trial.id, channel=name, from_s=float(trial.time[mine[end.rows[0]]]),
-                    to_s=float(trial.time[mine[end.rows[-1]]]), set_aside=True,
-                    what=f"{len(end.rows)} readings of {name} {end.words}",
-                ))  # fmt: skip
+                what = f"{len(end.rows)} readings of {name} {end.words}"
+                findings.append(aside(trial, name, trial.time[mine[end.rows]], what))
             mine = mine[keep[mine]]
             if len(mine) < 8:
                 continue
             stuck = stuck_rows(trial.value[mine]) if name != "wheel" else mine[:0]  # in a hop it turns evenly
             if len(stuck):
                 keep[mine[stuck]] = False
-                findings.append(Finding(
-                    trial=trial.id, channel=name, from_s=float(trial.time[mine[stuck[0]]]),
-                    to_s=float(trial.time[mine[stuck[-1]]]), set_aside=True,
-                    what=f"{len(stuck)} rows of {name} repeat the one before where it never does otherwise: the sensor "
-                    f"is stuck, they are set aside",
-                ))  # fmt: skip
+                what = f"{len(stuck)} rows of {name} repeat the one before where it never does otherwise: the sensor "
+                what += "is stuck, they are set aside"
+                findings.append(aside(trial, name, trial.time[mine[stuck]], what))
                 mine = np.delete(mine, stuck)
             if name in ("x", "y", "theta"):
                 _jumps(trial, name, mine, keep, findings)
@@ -88,8 +80,7 @@ def checked(data: TumbleData) -> tuple[TumbleData, list[Finding]]:
 def _jumps(
     trial: TrialData, name: str, mine: NDArray[np.intp], keep: NDArray[np.bool_], findings: list[Finding]
 ) -> None:
-    """Rows between two opposite steps that no motion makes, however far apart, and the shorter side of a step that is
-    never taken back."""
+    """Rows between two opposite steps that no motion makes, and the shorter side of a step that is never taken back."""
     time, value, std = trial.time[mine], trial.value[mine], trial.std[mine[0]]
     steps_in_time = np.diff(time)
     lost = np.maximum(steps_in_time / max(float(np.median(steps_in_time)), 1e-12), 1.0)
@@ -113,27 +104,12 @@ def _jumps(
     if not odd.any():
         return
     if odd.mean() > _SHARE and times > _OFTEN:
-        findings.append(
-            Finding(
-                trial=trial.id,
-                channel=name,
-                what=f"{name} jumps so often that {100 * odd.mean():.0f} % of its rows would be lost: kept",
-            )
-        )
+        what = f"{name} jumps so often that {100 * odd.mean():.0f} % of its rows would be lost: kept"
+        findings.append(Finding(trial=trial.id, channel=name, what=what))
         return
     keep[mine[odd]] = False
-    when = time[odd]
-    findings.append(
-        Finding(
-            trial=trial.id,
-            channel=name,
-            from_s=float(when[0]),
-            to_s=float(when[-1]),
-            set_aside=True,
-            what=f"{int(odd.sum())} row(s) of {name} stand apart by a jump that no motion makes (the camera lost its "
-            f"marker): set aside",
-        )
-    )
+    what = f"{int(odd.sum())} row(s) of {name} stand apart by a jump that no motion makes (the camera lost its "
+    findings.append(aside(trial, name, time[odd], what + "marker): set aside"))
 
 
 def _clocks(trial: TrialData, keep: NDArray[np.bool_], findings: list[Finding]) -> None:
@@ -159,11 +135,8 @@ def _clocks(trial: TrialData, keep: NDArray[np.bool_], findings: list[Finding]) 
                 continue
             whole = np.isin(trial.channel, [CHANNELS.index(name) for name in _ALL[sensor]])
             keep &= ~(whole & (trial.time > clock[k]))
-            findings.append(Finding(
-                trial=trial.id, channel=names[0], from_s=float(clock[k + 1]), to_s=float(clock[-1]), set_aside=True,
-                what=f"the clock of {sensor} jumps forward by {steps[k] - usual:.3g} s while the motion goes on as if "
-                f"it had not: all that follows is set aside",
-            ))  # fmt: skip
+            what = f"the clock of {sensor} jumps forward by {steps[k] - usual:.3g} s while the motion goes on as if "
+            findings.append(aside(trial, names[0], clock[k + 1 :], what + "it had not: all that follows is set aside"))
             break
     _clocks_apart(trial, keep, findings)
 
@@ -199,12 +172,9 @@ def _clocks_apart(trial: TrialData, keep: NDArray[np.bool_], findings: list[Find
             whole = np.isin(trial.channel, [CHANNELS.index(name) for name in _ALL[sensor]])
             keep &= ~(whole & (trial.time > before))
             other = "camera's angle" if sensor == "the IMU" else "gyro"
-            findings.append(Finding(
-                trial=trial.id, channel=_SENSORS[sensor][0], from_s=start, to_s=float(trial.time[rows].max()),
-                set_aside=True,
-                what=f"the clock of {sensor} jumps forward by about {jumped:.2g} s while the motion, as the {other} "
-                f"has it, goes on as if it had not: all that follows is set aside",
-            ))  # fmt: skip
+            what = f"the clock of {sensor} jumps forward by about {jumped:.2g} s while the motion, as the {other} "
+            what += "has it, goes on as if it had not: all that follows is set aside"
+            findings.append(aside(trial, _SENSORS[sensor][0], np.array([start, trial.time[rows].max()]), what))
             return
 
 
@@ -235,8 +205,7 @@ def _surprise(
 
 
 def _ends(trial: TrialData, name: str, keep: NDArray[np.bool_], findings: list[Finding]) -> None:
-    """A channel that begins later or ends earlier than what is kept of the others; not one whose clock is off, which
-    does both."""
+    """A channel that begins later or ends earlier than what is kept of the others; one whose clock is off does both."""
     time, whole = trial.time[trial.of(name)], trial.time[keep]
     longest = max(float(np.ptp(own)) for other in CHANNELS if len(own := trial.time[trial.of(other) & keep]))
     least = max(10 * float(np.median(np.diff(time))), _END)
@@ -258,13 +227,6 @@ def _gaps(trial: TrialData, name: str, mine: NDArray[np.intp], findings: list[Fi
     steps = np.diff(time)
     usual = float(np.median(steps))
     for k in np.flatnonzero(steps > max(10 * usual, 0.02)):
-        findings.append(
-            Finding(
-                trial=trial.id,
-                channel=name,
-                from_s=float(time[k]),
-                to_s=float(time[k + 1]),
-                what=f"{name} has no valid row for {steps[k]:.3g} s, where one every {usual:.3g} s is usual: kept as a "
-                f"gap (a clock that jumped forward looks the same)",
-            )
-        )
+        what = f"{name} has no valid row for {steps[k]:.3g} s, where one every {usual:.3g} s is usual: kept as a "
+        what += "gap (a clock that jumped forward looks the same)"
+        findings.append(replace(aside(trial, name, time[k : k + 2], what), set_aside=False))

@@ -14,19 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.campaign import Campaign, TumbleCampaign
+from experiments.diagnose.fit.problem import Array
 
 __all__ = ["CHANNELS", "TrialData", "TumbleData", "tumble_data"]
-
-Array = NDArray[np.float64]
 
 CHANNELS = ("x", "y", "theta", "gyro", "ax", "ay", "wheel")
 """Channels of a diagnosis, in the order of a trial's samples."""
 
-_LATEST = 1e3
-"""Seconds after the torque by which a trial must have begun: unix time would be simulated for years."""
+_LATEST = 1e3  # seconds after the torque by which a trial must have begun: unix time would be simulated for years
 _FELT = ("ax", "ay")
-_SWITCH = 1e-3
-"""How far from the moment at which the torque sets in or ends a force read at an instant must be [s]."""
+_SWITCH = 1e-3  # how far from the moment at which the torque sets in or ends a force read at an instant must be [s]
 _COLUMNS = {
     "x": ("pose", "x_m", 0), "y": ("pose", "y_m", 1), "theta": ("pose", "theta_rad", 2),
     "gyro": ("imu", "gyro_rad_s", 0), "ax": ("imu", "ax_m_s2", 1), "ay": ("imu", "ay_m_s2", 2),
@@ -39,24 +36,17 @@ class TrialData:
     """One trial: its conditions and its samples, shape [sample_count] each."""
 
     id: str
-    gravity_sim: float
-    """As stated [m/s2]."""
-    counterweight: float
-    """[kg], 0 without a rig."""
-    local_gravity: float | None
-    """[m/s2]; None for a free platform, whose local gravity is gravity_sim."""
+    gravity_sim: float  # as stated [m/s2]
+    counterweight: float  # [kg], 0 without a rig
+    local_gravity: float | None  # [m/s2]; None for a free platform, whose local gravity is gravity_sim
     torque: float
     torque_until: float
     actuator: str
     wheel_speed_0: float
-    time: Array = field(repr=False)
-    """On the sensor's own clock [s]."""
-    value: Array = field(repr=False)
-    """As measured, in the format's units."""
-    std: Array = field(repr=False)
-    """As stated."""
-    channel: NDArray[np.int8] = field(repr=False)
-    """Number into CHANNELS."""
+    time: Array = field(repr=False)  # on the sensor's own clock [s]
+    value: Array = field(repr=False)  # as measured, in the format's units
+    std: Array = field(repr=False)  # as stated
+    channel: NDArray[np.int8] = field(repr=False)  # number into CHANNELS
 
     @property
     def end(self) -> float:
@@ -127,20 +117,10 @@ def tumble_data(campaign: Campaign) -> TumbleData:
         time, value, std, channel = (np.concatenate(column) for column in zip(*parts, strict=True))
         if time.min() > _LATEST:
             raise ValueError(f"trial {trial.id!r} begins at t_s = {time.min():.10g}: t = 0 is when the torque starts")
-        trials.append(
-            TrialData(
-                id=trial.id,
-                gravity_sim=trial.gravity_sim,
-                counterweight=tables.counterweight_of(trial),
-                local_gravity=None if tables.rig is None else tables.rig.gravity,
-                torque=trial.torque,
-                torque_until=trial.torque_until,
-                actuator=trial.actuator,
-                wheel_speed_0=trial.wheel_speed_0,
-                time=time,
-                value=value,
-                std=std,
-                channel=channel,
-            )
-        )
+        trials.append(TrialData(
+            id=trial.id, gravity_sim=trial.gravity_sim, counterweight=tables.counterweight_of(trial),
+            local_gravity=None if tables.rig is None else tables.rig.gravity, torque=trial.torque,
+            torque_until=trial.torque_until, actuator=trial.actuator, wheel_speed_0=trial.wheel_speed_0,
+            time=time, value=value, std=std, channel=channel,
+        ))  # fmt: skip
     return TumbleData(tables=tables, trials=tuple(trials))

@@ -11,18 +11,16 @@ generator that asks for residuals at a list of points; all fits that are under w
 batched model.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from experiments.diagnose.fit.problem import Array, Form
 from experiments.diagnose.fit.together import each
 
-from .forms import TumbleForm
+from .forms import physical
 from .forward import OWN_TO_A_TRIAL, SHARED, Forward
 from .steps import (
     EASY,
@@ -41,8 +39,6 @@ from .steps import (
 
 __all__ = ["Fit", "Fitter"]
 
-Array = NDArray[np.float64]
-
 _SCAN = np.linspace(-3.0, 3.0, 25)  # of a trial's gravity, in its sigmas
 
 
@@ -50,17 +46,12 @@ _SCAN = np.linspace(-3.0, 3.0, 25)  # of a trial's gravity, in its sigmas
 class Fit:
     """Where a fit ended."""
 
-    forms: tuple[TumbleForm, ...]
-    values: dict[str, float]
-    """Shared numbers and effects' parameters."""
-    gravity: Array
-    """Each trial's over its stated one."""
-    cost: float
-    """Sum of squared whitened residuals and of squared prior deviations."""
-    residuals: list[Array] = field(repr=False)
-    """Whitened, one array a trial."""
-    names: tuple[str, ...]
-    """Of the rows of `normal`: the shared ones, then gravity of each trial."""
+    forms: tuple[Form, ...]
+    values: dict[str, float]  # shared numbers and effects' parameters
+    gravity: Array  # each trial's over its stated one
+    cost: float  # sum of squared whitened residuals and of squared prior deviations
+    residuals: list[Array] = field(repr=False)  # whitened, one array a trial
+    names: tuple[str, ...]  # of the rows of `normal`: the shared ones, then gravity of each trial
     normal: Array = field(repr=False)
     """Normal matrix (half the Hessian of the cost) in units of `scale`, priors included."""
     scale: Array = field(repr=False)
@@ -89,11 +80,11 @@ class Fitter:
         self.sigma_gravity = told.gravity_sim
         self._places = {trial.id: k for k, trial in enumerate(forward.data.trials)}
 
-    def residuals(self, points: list[Point], forms: Sequence[TumbleForm]) -> Answers:
+    def residuals(self, points: list[Point], forms: Sequence[Form]) -> Answers:
         """Whitened residuals at points of (values, gravity): one array [point_count, sample_count] a trial."""
         return self._answer([(tuple(forms), points, 1.0)])[0]
 
-    def signatures(self, asked: Sequence[tuple[Sequence[TumbleForm], Mapping[str, float], Array]]) -> list[Answers]:
+    def signatures(self, asked: Sequence[tuple[Sequence[Form], Mapping[str, float], Array]]) -> list[Answers]:
         """Whitened residuals, one array a trial, at points with forms of their own: (forms, values, gravity)."""
         answers = self._answer([(tuple(forms), [(values, gravity)], 1.0) for forms, values, gravity in asked])
         return [[rows[0] for rows in answer] for answer in answers]
@@ -129,7 +120,7 @@ class Fitter:
                     done[k] = end.value
         return [done[k] for k in range(len(starts))]
 
-    def _answer(self, asked: list[tuple[tuple[TumbleForm, ...], list[Point], float]]) -> list[Answers]:
+    def _answer(self, asked: list[tuple[tuple[Form, ...], list[Point], float]]) -> list[Answers]:
         """Residuals for several lists of points, by one call of the model for each horizon."""
         answers: dict[int, Answers] = {}
         for horizon in dict.fromkeys(horizon for _, _, horizon in asked):
@@ -138,7 +129,7 @@ class Fitter:
                 answers[k] = answer
         return [answers[k] for k in range(len(asked))]
 
-    def _together(self, asked: list[tuple[tuple[TumbleForm, ...], list[Point]]], horizon: float) -> list[Answers]:
+    def _together(self, asked: list[tuple[tuple[Form, ...], list[Point]]], horizon: float) -> list[Answers]:
         """The same for one horizon."""
         total = sum(len(points) for _, points in asked)
         columns = {name: np.full(total, value) for name, value in self.forward.nominal.items()}
@@ -158,7 +149,7 @@ class Fitter:
                 given = {
                     p.name: np.array([values.get(p.name, p.value) for values, _ in points]) for p in form.parameters
                 }
-                for name, array in form.physical(given).items():
+                for name, array in physical(form, given).items():
                     columns.setdefault(name, np.full(total, self.forward.neutral(name)))[rows] = array
             at += len(points)
         predictions = self.forward.predict(
@@ -203,18 +194,9 @@ class Fitter:
                 low, high = (p.lowest - p.value) / p.scale, (p.highest - p.value) / p.scale
                 rows.append((p.name, p.value, p.scale, p.std / p.scale, low, high, (p.step or 1e-2) / p.scale))
         table = np.array([row[1:] for row in rows], dtype=float).reshape(-1, 6)
-        return Space(
-            names=tuple(row[0] for row in rows),
-            value=table[:, 0],
-            scale=table[:, 1],
-            std=table[:, 2],
-            low=table[:, 3],
-            high=table[:, 4],
-            step=table[:, 5],
-            gravities=gravities,
-            trials=len(self.trials),
-            kinds=len(kinds),
-        )
+        names = tuple(row[0] for row in rows)
+        value, scale, std, low, high, step = table.T
+        return Space(names, value, scale, std, low, high, step, gravities, len(self.trials), len(kinds))
 
     def _descend(self, start: Start, steps: int) -> Generator[tuple[list[Point], float], Answers, Fit]:
         space = self._space(start)

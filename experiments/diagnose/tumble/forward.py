@@ -6,8 +6,6 @@ motion is sampled at the measured times themselves, and at both ends and the mid
 mean specific force is taken by parts as in `rigid.sensors`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.diagnose.fit.own import OwnEffect
+from experiments.diagnose.fit.problem import Array
 from experiments.diagnose.fit.together import each
 from rigid.model.model import parameter_names
 from rigid.terms import EFFECTS, Term
@@ -26,19 +25,15 @@ from .readings import Grid, Optics
 
 __all__ = ["Forward", "OWN_TO_A_TRIAL", "Prediction", "SHARED", "neutral"]
 
-Array = NDArray[np.float64]
-
 SHARED = ("mass", "inertia", "stiffness", "damping", "mu_s", "mu_d")
 """Numbers that all trials share and that may be uncertain."""
 OWN_TO_A_TRIAL = ("gravity", "friction", "static_friction", "bed", "torque")
 """Factors that every trial has of its own: on its gravity, on mu_s and mu_d, on mu_s beside it, on K and C, and on the
 torque."""
-_MOST_BYTES = 1.5e8
-"""Of the sampled motion of the lanes that share the end of their last step."""
+_MOST_BYTES = 1.5e8  # of the sampled motion of the lanes that share the end of their last step
 _HELD_BYTES = 3.2e7
 """Of the sampled motion held at a time, in a buffer that is kept: it stays near the caches, and needs no new pages."""
-_SETS_AT_ONCE = 64
-"""Sets of parameters whose samples one thread turns into readings at a time."""
+_SETS_AT_ONCE = 64  # sets of parameters whose samples one thread turns into readings at a time
 
 
 @dataclass(frozen=True)
@@ -47,8 +42,7 @@ class Prediction:
 
     value: Array
     """Shape [set_count, sample_count], in the order of `TrialData.value`; NaN where a set cannot stand or run."""
-    state: NDArray[np.int8]
-    """Number into rigid.STATES at each sample, shape [set_count, sample_count]; or [.., 0]."""
+    state: NDArray[np.int8]  # number into rigid.STATES at each sample, shape [set_count, sample_count]; or [.., 0]
     motion: Array
     """x, y, theta, vx, vy, omega, wheel_speed at each sample, shape [set_count, sample_count, 7]; or [.., 0, 7]."""
 
@@ -268,8 +262,7 @@ class Forward:
 
 
 def _pieces(lanes: Sequence[tuple[int, int, int]], rows: slice) -> Iterator[tuple[int, int, int, int, int]]:
-    """What of the lanes lies within some rows, in pieces of `_SETS_AT_ONCE` sets: trial, first set of its lanes, first
-    set of the piece, set after its last, and the first's row among those rows."""
+    """Pieces of the lanes in `rows`: trial, first set of its lanes, first set of the piece, set after it, its row."""
     at = 0
     for trial, first, last in lanes:
         low, high = max(first, first + rows.start - at), min(last, first + rows.stop - at)

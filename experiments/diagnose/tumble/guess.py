@@ -5,46 +5,34 @@ own (`tumble_fit`): growing horizons, several starts, a scan of each trial's gra
 looked for together, so that the batched model has its hands full.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from experiments.diagnose.fit.problem import Parameter, Values
+from experiments.diagnose.fit.problem import Array, Form, Parameter, Values
 
 from .data import TumbleData
 from .fit import Fit, Fitter
-from .forms import TumbleForm
 from .forward import SHARED, Forward
 from .steps import Start
 
 __all__ = ["Guesser"]
 
-Array = NDArray[np.float64]
-
-_STEP = 1e-3
-"""Of the integration while looking [s]; what follows is finer."""
+_STEP = 1e-3  # of the integration while looking [s]; what follows is finer
 _THIN = 5
 _GROWING = (0.3, 0.6, 1.0)
-_POOR = 1.1
-"""Chi-square per sample beyond which the base model is looked for from more places."""
+_POOR = 1.1  # chi-square per sample beyond which the base model is looked for from more places
 _AWAY = (0.0, 1.0, -1.0)
 """Standard deviations of mu_s from which the base model is fitted once more where it leaves something."""
-_NEAR = 2.0
-"""Chi-square per sample up to which the base model's fit is near enough to begin from."""
-_FOLLOWED = 8
-"""Effects that are looked for over the whole of every trial."""
+_NEAR = 2.0  # chi-square per sample up to which the base model's fit is near enough to begin from
+_FOLLOWED = 8  # effects that are looked for over the whole of every trial
 _ROUNDS, _MORE_ROUNDS = 6, 12
 """Steps over the whole of every trial, of all that are followed and of those that are near the best."""
-_ALL_THE_WAY = 4
-"""So many sets of effects at a time are refined with as many steps as are followed to the end."""
+_ALL_THE_WAY = 4  # so many sets of effects at a time are refined with as many steps as are followed to the end
 _SAME, _NEAR_BY = 0.003, 0.05
 """Of their cost, and of the scale of a form's parameters, by which two fits may differ that have come to one place."""
-_HOPELESS = 30.0
-"""Times the best one's chi-square, over part of a trial, beyond which a start is given up."""
+_HOPELESS = 30.0  # times the best one's chi-square, over part of a trial, beyond which a start is given up
 
 
 def _thinned(data: TumbleData) -> TumbleData:
@@ -63,7 +51,7 @@ def _kinds(apart: Sequence[Parameter]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(f"{p.kind} {p.std:.4g}" for p in apart))
 
 
-def _alike(form: TumbleForm, one: Fit, other: Fit) -> bool:
+def _alike(form: Form, one: Fit, other: Fit) -> bool:
     """Whether two fits of one form have come to the same place, as nearly as fits end."""
     if abs(one.cost - other.cost) > _SAME * max(one.cost, other.cost):
         return False
@@ -73,7 +61,7 @@ def _alike(form: TumbleForm, one: Fit, other: Fit) -> bool:
 class Guesser:
     """Guesses for one campaign. They are kept: the same question is answered once."""
 
-    def __init__(self, forward: Forward, forms: Sequence[TumbleForm]) -> None:
+    def __init__(self, forward: Forward, forms: Sequence[Form]) -> None:
         self.forward = Forward(_thinned(forward.data), time_step=_STEP, threads=forward.threads, own=forward.own)
         self.forms = tuple(forms)
         self._ids = [trial.id for trial in forward.data.trials]
@@ -82,7 +70,7 @@ class Guesser:
         self._warm: dict[tuple[str, ...], tuple[dict[str, float], float]] = {}
 
     def guess(
-        self, forms: Sequence[TumbleForm], trials: Sequence[str], values: Values, *, held: bool = False,
+        self, forms: Sequence[Form], trials: Sequence[str], values: Values, *, held: bool = False,
         apart: Sequence[Parameter] = (),
     ) -> dict[str, float]:  # fmt: skip
         """Values near the best for the base model with `forms` on `trials`, beginning from `values`.
@@ -118,7 +106,7 @@ class Guesser:
         return self._told(kept[new[-1].id], trials, values)
 
     def refine(
-        self, asked: Sequence[tuple[Sequence[TumbleForm], Values]], trials: Sequence[str],
+        self, asked: Sequence[tuple[Sequence[Form], Values]], trials: Sequence[str],
         *, apart: Sequence[Parameter] = (),
     ) -> list[dict[str, float]]:  # fmt: skip
         """Values near the best for each (forms, values): from there, and from nominal numbers over growing horizons."""
@@ -139,7 +127,7 @@ class Guesser:
                 best[k] = min(best[k], found, key=lambda fit: fit.cost)
         return [self._told(found, trials, values) for found, (_, values) in zip(best, asked, strict=True)]
 
-    def _start(self, forms: Sequence[TumbleForm], values: Values, apart: Sequence[Parameter]) -> Start:
+    def _start(self, forms: Sequence[Form], values: Values, apart: Sequence[Parameter]) -> Start:
         gravity = np.array(
             [values.get(f"gravity_sim[{i}]", g) / g for i, g in zip(self._ids, self._stated, strict=True)]
         )
@@ -202,14 +190,12 @@ class Guesser:
         return [replace(start, values=known | place, gravity=found.gravity, scan=True, horizons=_GROWING)
                 for place in (places if fitter.sigma["mu_s"] > 0 else places[:1])]  # fmt: skip
 
-    def _candidates(
-        self, fitter: Fitter, old: Sequence[TumbleForm], forms: Sequence[TumbleForm], start: Start
-    ) -> dict[str, Fit]:
+    def _candidates(self, fitter: Fitter, old: Sequence[Form], forms: Sequence[Form], start: Start) -> dict[str, Fit]:
         """The best fit found for each form added to `old`."""
         begun = [(form, point) for form in forms for point in form.starts]
         best: dict[str, Fit] = {}
 
-        def keep(whose: Sequence[TumbleForm], fits: Sequence[Fit]) -> None:
+        def keep(whose: Sequence[Form], fits: Sequence[Fit]) -> None:
             for form, found in zip(whose, fits, strict=True):
                 if form.id not in best or found.cost < best[form.id].cost:
                     best[form.id] = found
@@ -230,8 +216,8 @@ class Guesser:
         return best
 
     def _race(
-        self, fitter: Fitter, begun: Sequence[tuple[TumbleForm, Values]], bare: Start,
-        keep: Callable[[Sequence[TumbleForm], Sequence[Fit]], None],
+        self, fitter: Fitter, begun: Sequence[tuple[Form, Values]], bare: Start,
+        keep: Callable[[Sequence[Form], Sequence[Fit]], None],
     ) -> None:  # fmt: skip
         """Every form from all its starts and nominal numbers, over growing horizons; on the way most drop out.
 
@@ -267,7 +253,7 @@ class Guesser:
         return dict(start.values), np.ones(len(self._ids)) if start.gravity is None else start.gravity
 
     def _add(
-        self, start: Start, old: Sequence[TumbleForm], form: TumbleForm, values: Values,
+        self, start: Start, old: Sequence[Form], form: Form, values: Values,
         *, horizons: tuple[float, ...] = (1.0,),
     ) -> Start:  # fmt: skip
         return Start(
@@ -276,13 +262,13 @@ class Guesser:
         )  # fmt: skip
 
     def _screened(
-        self, fitter: Fitter, old: Sequence[TumbleForm], begun: Sequence[tuple[TumbleForm, Values]], start: Start
-    ) -> list[tuple[TumbleForm, dict[str, float]]]:
+        self, fitter: Fitter, old: Sequence[Form], begun: Sequence[tuple[Form, Values]], start: Start
+    ) -> list[tuple[Form, dict[str, float]]]:
         """For each form the start from which a linear step, the base model's included, promises most."""
         space = fitter.linearised(replace(start, forms=tuple(old)))
         gravity = np.ones(len(self._ids)) if start.gravity is None else start.gravity
         answers = fitter.signatures([((*old, form), {**start.values, **point}, gravity) for form, point in begun])
-        best: dict[str, tuple[float, TumbleForm, dict[str, float]]] = {}
+        best: dict[str, tuple[float, Form, dict[str, float]]] = {}
         for (form, point), residuals in zip(begun, answers, strict=True):
             gain, share = space.promise(residuals)
             share = float(np.clip(share, 0.1, 4.0))

@@ -1,4 +1,4 @@
-"""What the model of a tumble lacks, as a force and a torque over time: `latent_columns`.
+"""What the model of a tumble lacks, as a force and a torque over time, and up to when it follows what was measured.
 
 At every row of the IMU, measured less modelled specific force, turned into the surface's axes by the measured attitude,
 times the inertia that resists (m along the surface, m + m_b along the normal in the rig); and J times the difference
@@ -8,19 +8,22 @@ differ, and it is the sum of what is missing and of what follows from it; the fi
 an IMU has it from the camera's rows: inertia times the second derivative of measured less modelled place and angle.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.diagnose.fit.problem import Array
 from experiments.diagnose.fit.slopes import acceleration, slope
 
 from .data import CHANNELS, TrialData
 from .forward import Prediction
 
-__all__ = ["latent_columns"]
+__all__ = ["followed_until", "latent_columns"]
 
-Array = NDArray[np.float64]
+_PIECE = 24  # samples that are judged together
+_FAR = 6.0  # standard deviations of a piece's sum of squares from which it is off; coloured noise makes 2 of 1.4
+_BEFORE = 1.2  # mean square of all before, at most
+_LEAST = 0.3  # share of a trial's time after the torque sets in, at least
+_AFTER_EVENT = 0.3  # how long after a change of the model's state two ways may take to part visibly [s]
 _ROWS = 5  # over which the slope of the gyro is taken
 
 
@@ -66,3 +69,29 @@ def _gaps(data: TrialData, value: Array, names: tuple[str, ...]) -> tuple[Array,
         shared = np.intersect1d(shared, data.time[rows[name]])
     at = {name: own[np.searchsorted(data.time[own], shared)] for name, own in rows.items()}
     return shared, {name: data.value[own] - value[own] for name, own in at.items()}, at[names[0]]
+
+
+def followed_until(trial: TrialData, residual: Array, state: NDArray[np.int8]) -> float | None:
+    """The moment [s] from which these residuals (in standard deviations) are off; None where that is too early.
+
+    Gyro and accelerometers are looked at: the camera's unknown zero spreads a late error over a whole recording. None
+    too where nothing is off, where little is right before, or where no state of the model (`state`, at the same
+    samples) ended shortly before: ways part where something touches, catches or lets go.
+    """
+    seen = np.flatnonzero(trial.of("gyro") | trial.of("ax") | trial.of("ay"))
+    order = seen[np.argsort(trial.time[seen], kind="stable")]
+    if len(order) < 4 * _PIECE:
+        return None
+    time, square, at = trial.time[order], residual[order] ** 2, state[order]
+    pieces = np.array_split(np.arange(len(order)), len(order) // _PIECE)
+    for piece in pieces:
+        count = len(piece)
+        if square[piece].sum() - count <= _FAR * np.sqrt(2.0 * count):
+            continue
+        first = int(piece[0])
+        moment = float(time[first])
+        right = first > 0 and float(square[:first].mean()) <= _BEFORE
+        changes = time[1:][(at[1:] != at[:-1]) & (time[1:] > 0)]
+        parted = bool(((changes > moment - _AFTER_EVENT) & (changes <= float(time[piece[-1]]))).any())
+        return moment if right and parted and moment >= _LEAST * trial.end else None
+    return None

@@ -1,10 +1,8 @@
 """Tumbles as the statistics of `hedgebed diagnose` see them (`experiments.diagnose.fit.problem`).
 
 A trial's own nuisance is its simulated gravity. The camera's zero is no parameter: it is marginalised in the whitening
-(`tumble_fit.whiten`) and, for the gap that a person reads, put at its most probable value.
+(`steps.whiten`) and, for the gap that a person reads, put at its most probable value.
 """
-
-from __future__ import annotations
 
 import hashlib
 import json
@@ -18,8 +16,9 @@ from numpy.typing import NDArray
 
 from experiments.campaign import Campaign, EffectTable, TumbleModel, write_model
 from experiments.diagnose.core.effect_words import advice
+from experiments.diagnose.fit.forms import shapes_of
 from experiments.diagnose.fit.own import OwnEffect
-from experiments.diagnose.fit.problem import Finding, Form, Parameter, Samples, TrialInfo, Values
+from experiments.diagnose.fit.problem import Array, Finding, Form, Parameter, Problem, Samples, TrialInfo, Values
 from experiments.diagnose.fit.together import each
 from experiments.diagnose.noise.jitter import Shaken
 from experiments.diagnose.noise.replicates import parted
@@ -27,16 +26,13 @@ from rigid.planar.trajectory import STATES
 from rigid.terms import EFFECTS
 
 from .data import CHANNELS, TumbleData, tumble_data
-from .follow import followed_until
-from .forms import TumbleForm, shaped, tumble_forms
+from .forms import physical, tumble_forms
 from .forward import OWN_TO_A_TRIAL, SHARED, Forward, Prediction
 from .guess import Guesser
-from .latent import latent_columns
+from .latent import followed_until, latent_columns
 from .steps import LOST, ZERO_STD, whiten
 
 __all__ = ["TumbleProblem", "make_problem"]
-
-Array = NDArray[np.float64]
 
 _UNITS = {"mass": "kg", "inertia": "kg m2", "stiffness": "N/m", "damping": "N s/m", "mu_s": "1", "mu_d": "1"}
 _STEP = 0.02  # of finite differences, in sigmas: contacts make smaller ones rough
@@ -44,26 +40,19 @@ _SCAN = np.linspace(-3.0, 3.0, 25)
 """Standard deviations of a trial's simulated gravity that are looked at where it goes its own way."""
 _SWITCH = 5e-4
 """From the moment of a reading [s] within which a model that jumps leaves it in doubt: one step of the integration."""
-_SEEN = 3.0
-"""Standard deviations of the noise from which on a change of what the model reads is a jump."""
+_SEEN = 3.0  # standard deviations of the noise from which on a change of what the model reads is a jump
 _IMU = tuple(CHANNELS.index(name) for name in ("gyro", "ax", "ay"))
-_SCATTER_STD = 0.1
-"""How far replicates may differ, in each kind, while they are asked whether they do [1]."""
+_SCATTER_STD = 0.1  # how far replicates may differ, in each kind, while they are asked whether they do [1]
 
 
-class TumbleProblem:
-    """One campaign of tumbles: a `Problem`."""
+class TumbleProblem(Problem):
+    """One campaign of tumbles."""
 
     kind = "tumble"
     whole = "the platform, the rig or the surface"
     clocks = (("x", "y", "theta"), ("gyro", "ax", "ay"), ("wheel",))
-    """Channels whose times come from one clock."""
-    least_scatter = 0.01
-    """Contact makes each trial's friction and bed uncertain by some tenths of a percent; less is not asked for."""
-
-    left_by_forms = 0.1
-    """Share of what the base model leaves that a right name's form may leave, where the gate sees it: of 70 right names
-    in five counts none left more than 0.05 and more than 1.025 a sample."""
+    least_scatter = 0.01  # contact makes each trial's friction and bed uncertain by some tenths of a percent
+    left_by_forms = 0.1  # of 70 right names in five counts none left more than 0.05 and more than 1.025 a sample
 
     def __init__(
         self, data: TumbleData, *, findings: Sequence[Finding] = (), threads: int | None = None,
@@ -78,110 +67,66 @@ class TumbleProblem:
         self.own = {effect.id: effect for effect in own}
         self.forward = Forward(data, threads=threads, own=own)
         self.findings = tuple(findings)
+        self.contacts = self
+        self.trials = self._trials()
+        self.base = self._base()
+        self.scatter = {
+            kind: tuple(
+                Parameter(name=f"{kind}[{trial.id}]", unit="1", value=0.0, std=_SCATTER_STD, scale=0.02, lowest=-0.5,
+                          highest=1.0, trial=trial.id, kind=kind, step=1e-3)
+                for trial in data.trials
+            )
+            for kind in OWN_TO_A_TRIAL[1:]
+        }  # fmt: skip
+        self.forms: tuple[Form, ...] = self._forms()
+        self.shapes = shapes_of(self.forms)
+        self.design = self._design()
         self._index = {trial.id: k for k, trial in enumerate(data.trials)}
         self._shaken: dict[str, Shaken] = {}
         self._along: Mapping[str, Array] = {}
         self._switches: dict[str, Array] = {}
 
-    @cached_property
-    def trials(self) -> tuple[TrialInfo, ...]:
-        """In the campaign's order."""
-        told = [
-            TrialInfo(
-                id=trial.id,
-                condition=trial.condition,
-                settings={"torque_N_m": trial.torque, "gravity_m_s2": trial.gravity_sim},
-            )
-            for trial in self.data.trials
-        ]
-        return parted(told, {trial.id: (max(trial.end, 1e-9),) for trial in self.data.trials})
+    def _trials(self) -> tuple[TrialInfo, ...]:
+        trials = self.data.trials
+        settings = [{"torque_N_m": trial.torque, "gravity_m_s2": trial.gravity_sim} for trial in trials]
+        infos = [TrialInfo(id=t.id, condition=t.condition, settings=s) for t, s in zip(trials, settings, strict=True)]
+        return parted(infos, {trial.id: (max(trial.end, 1e-9),) for trial in trials})
 
-    @cached_property
-    def base(self) -> tuple[Parameter, ...]:
+    def _base(self) -> tuple[Parameter, ...]:
         """Shared numbers that are uncertain, and each trial's gravity."""
-        told = self.data.tables.uncertainty
-        found = []
-        for name in SHARED:
-            value, sigma = self.forward.nominal[name], getattr(told, name)
-            if sigma > 0 and value > 0:
-                size = sigma * value
-                lowest, highest = value * max(1 - 6 * sigma, 0.05), value * (1 + 6 * sigma)
-                found.append(
-                    Parameter(
-                        name=name,
-                        unit=_UNITS[name],
-                        value=value,
-                        std=size,
-                        scale=size,
-                        lowest=lowest,
-                        highest=highest,
-                        step=_STEP * size,
-                    )
-                )
-        if told.gravity_sim > 0:
-            for trial in self.data.trials:
-                size = told.gravity_sim * trial.gravity_sim
-                found.append(
-                    Parameter(
-                        name=f"gravity_sim[{trial.id}]",
-                        unit="m/s2",
-                        value=trial.gravity_sim,
-                        std=size,
-                        scale=size,
-                        lowest=trial.gravity_sim * max(1 - 6 * told.gravity_sim, 0.05),
-                        trial=trial.id,
-                        highest=trial.gravity_sim * (1 + 6 * told.gravity_sim),
-                        kind="gravity_sim",
-                        step=_STEP * size,
-                    )
-                )
+        stated = self.data.tables.uncertainty
+
+        def uncertain(
+            name: str, unit: str, value: float, sigma: float, *, trial: str | None = None, kind: str = ""
+        ) -> Parameter:
+            lowest, highest, size = value * max(1 - 6 * sigma, 0.05), value * (1 + 6 * sigma), sigma * value
+            return Parameter(name=name, unit=unit, value=value, std=size, scale=size, step=_STEP * size, lowest=lowest,
+                             highest=highest, trial=trial, kind=kind)  # fmt: skip
+
+        shared = [(name, self.forward.nominal[name], getattr(stated, name)) for name in SHARED]
+        found = [uncertain(name, _UNITS[name], value, s) for name, value, s in shared if s > 0 and value > 0]
+        if (sigma := stated.gravity_sim) > 0:
+            found += [uncertain(f"gravity_sim[{t.id}]", "m/s2", t.gravity_sim, sigma, trial=t.id, kind="gravity_sim")
+                      for t in self.data.trials]  # fmt: skip
         return tuple(found)
 
-    @cached_property
-    def scatter(self) -> dict[str, tuple[Parameter, ...]]:
-        """What may differ between replicates beyond the sensors: kind -> one nuisance a trial, mostly not fitted."""
-        return {
-            kind: tuple(
-                Parameter(name=f"{kind}[{trial.id}]", unit="1", value=0.0, std=_SCATTER_STD, scale=0.02, lowest=-0.5,
-                          highest=1.0, trial=trial.id, kind=kind, step=1e-3)
-                for trial in self.data.trials
-            )
-            for kind in OWN_TO_A_TRIAL[1:]
-        }  # fmt: skip
-
-    @cached_property
-    def forms(self) -> tuple[TumbleForm, ...]:
+    def _forms(self) -> tuple[Form, ...]:
         """The library, scaled to this campaign."""
-        weights = [
-            (self.forward.nominal["mass"] + trial.counterweight) * trial.gravity_sim for trial in self.data.trials
-        ]
-        weight = float(np.mean(weights))
-        wheel_inertia = self.data.tables.wheel.inertia
+        trials, (mass, stiffness) = self.data.trials, (self.forward.nominal[name] for name in ("mass", "stiffness"))
+        weight = float(np.mean([(mass + trial.counterweight) * trial.gravity_sim for trial in trials]))
+        carried = mass + float(np.mean([trial.counterweight for trial in trials]))
+        inertia = self.data.tables.wheel.inertia
         wheel = [
-            trial.wheel_speed_0
-            if trial.actuator == "brake"
-            else trial.wheel_speed_0 + trial.torque * min(trial.torque_until, trial.end) / wheel_inertia
-            for trial in self.data.trials
+            t.wheel_speed_0 + (0 if t.actuator == "brake" else t.torque * min(t.torque_until, t.end) / inertia)
+            for t in trials
         ]
-        stiffness = self.forward.nominal["stiffness"]
-        carried = self.forward.nominal["mass"] + float(np.mean([trial.counterweight for trial in self.data.trials]))
         return tumble_forms(
-            rig=self.forward.rig,
-            sinkage=0.5 * weight / stiffness,
+            rig=self.forward.rig, sinkage=0.5 * weight / stiffness, weight=weight,
             lift_speed=0.5 * weight / math.sqrt(stiffness * carried),
-            weight=weight,
-            wheel_speed=max(10.0, 0.5 * float(np.mean(wheel))),
-            own=tuple(self.own.values()),
-        )
+            wheel_speed=max(10.0, 0.5 * float(np.mean(wheel))), own=tuple(self.own.values()),
+        )  # fmt: skip
 
-    @cached_property
-    def shapes(self) -> dict[str, tuple[TumbleForm, ...]]:
-        """Forms of another shape, to go on to from the plain ones, by the id of these."""
-        return shaped(self.forms)
-
-    @cached_property
-    def design(self) -> str:
-        """Digest of sampling, conditions, noise and priors."""
+    def _design(self) -> str:
         tables = self.data.tables
         told = {
             "tables": tables.model_dump(mode="json", exclude={"name", "notes", "trial"}),
@@ -198,15 +143,9 @@ class TumbleProblem:
         return Samples(time=data.time, channel=np.array(CHANNELS)[data.channel], std=data.std)
 
     def evaluate(
-        self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[str]
+        self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[str], share: float = 1.0
     ) -> list[dict[str, Array]]:
-        """Whitened residuals of each trial at each point."""
-        return self.evaluate_until(points, forms, trials, 1.0)
-
-    def evaluate_until(
-        self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[str], share: float
-    ) -> list[dict[str, Array]]:
-        """The same of the first share of each trial's time, which alone is simulated; 0 after it."""
+        """Whitened residuals of the first share of each trial's time, which alone is simulated; 0 after it."""
         found = self._predict(points, forms, trials, states=False, horizon=share)
 
         def whitened(place: int) -> Array:
@@ -247,7 +186,7 @@ class TumbleProblem:
         return found
 
     def readings(self, values: Values, forms: Sequence[Form], trials: Sequence[str], late: float) -> dict[str, Array]:
-        """What the model reads `late` seconds after each sample's time, over the stated noise, shape [sample_count]."""
+        """See `Problem`."""
         moved = replace(self.data, trials=tuple(replace(trial, time=trial.time + late) for trial in self.data.trials))
         forward = Forward(moved, threads=self.forward.threads, own=self.forward.own) if late else self.forward
         found = self._predict([values], forms, trials, states=False, forward=forward)
@@ -257,11 +196,7 @@ class TumbleProblem:
         }
 
     def shake(self, along: Mapping[str, Array]) -> None:
-        """Take times that jitter into the whitening from now on.
-
-        `along`: what one standard deviation of jitter changes in each sample, over its stated noise, by trial; {} for
-        times as they stand. Readings of one clock with one time share an error.
-        """
+        """See `Problem`; readings of one clock with one time share an error."""
         self._along = dict(along)
         self._take_in()
 
@@ -280,6 +215,13 @@ class TumbleProblem:
                 zeros = [ZERO_STD * data.of(name) for name in ("x", "y", "theta")]
                 self._shaken[id] = Shaken.of(own, row, np.column_stack(zeros))
 
+    def sensor_std(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
+        """As stated; endless where a contact switches."""
+        channel = np.array(CHANNELS)[self.data.trials[self._index[trial]].channel]
+        doubtful = self.switches(values, forms, [trial])[trial] != 0
+        found = super().sensor_std(values, forms, trial)
+        return {name: np.where(doubtful[channel == name], np.inf, std) for name, std in found.items()}
+
     def chi_square(self, values: Values, forms: Sequence[Form], trial: str) -> tuple[float, int]:
         """With the camera's zero at its most probable value; readings at a switch of the contact say nothing."""
         data = self.data.trials[self._index[trial]]
@@ -287,10 +229,6 @@ class TumbleProblem:
         valid = self.switches(values, forms, [trial])[trial] == 0
         residual = (residual - self._zero(data.channel, residual))[valid]
         return float(residual @ residual), len(residual)
-
-    def noise(self, random: np.random.Generator, trial: str) -> Array:
-        """White."""
-        return random.standard_normal(len(self.data.trials[self._index[trial]].time))
 
     def phases(self, values: Values, forms: Sequence[Form], trial: str) -> NDArray[np.str_]:
         """stand, pivot, slip or hop at each sample."""
@@ -305,7 +243,6 @@ class TumbleProblem:
 
     def form_std(self, form: Form) -> dict[str, float]:
         """Relative uncertainty of what is reported of a form, for nature's law is not the form's: name -> std."""
-        assert isinstance(form, TumbleForm)
         return {form.amplitude.partition(".")[2]: form.form_std} if form.form_std else {}
 
     def remarks(self, values: Values, forms: Sequence[Form]) -> tuple[str, ...]:
@@ -333,7 +270,7 @@ class TumbleProblem:
             forward.predict({"com-offset.x": np.zeros(1)}, trials=[0], horizon=0.01)
 
     def latent(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
-        """Force and torque that the model lacks, and what they might depend on (`tumble_latent`)."""
+        """Force and torque that the model lacks, and what they might depend on (`latent_columns`)."""
         data = self.data.trials[self._index[trial]]
         prediction = self._predict([values], forms, [trial], motion=True)[0]
         mass = values.get("mass", self.forward.nominal["mass"])
@@ -400,19 +337,18 @@ class TumbleProblem:
         self, forms: Sequence[Form], trials: Sequence[str], values: Values, *, held: bool = False,
         apart: Sequence[Parameter] = (),
     ) -> dict[str, float]:  # fmt: skip
-        """Values near the best, from which a local fit may begin (`tumble_guess`)."""
-        return self._guesser.guess(_ours(forms), trials, values, held=held, apart=_of(apart, trials))
+        """Values near the best, from which a local fit may begin (`Guesser`)."""
+        return self._guesser.guess(forms, trials, values, held=held, apart=_of(apart, trials))
 
     def refine(
         self, asked: Sequence[tuple[Sequence[Form], Values]], trials: Sequence[str], *, apart: Sequence[Parameter] = ()
     ) -> list[dict[str, float]]:
-        """The same for several sets of forms at once, all of whose values are given (`tumble_guess`)."""
-        mine = [(_ours(forms), values) for forms, values in asked]
-        return self._guesser.refine(mine, trials, apart=_of(apart, trials))
+        """The same for several sets of forms at once, all of whose values are given (`Guesser`)."""
+        return self._guesser.refine(asked, trials, apart=_of(apart, trials))
 
     def follows(self, values: Values, forms: Sequence[Form], trial: str) -> float | None:
         """The moment [s] up to which the model follows a trial, with the simulated gravity that takes it farthest; None
-        where that is no good part of it (`tumble_follow`)."""
+        where that is no good part of it (`followed_until`)."""
         data, sigma = self.data.trials[self._index[trial]], self.data.tables.uncertainty.gravity_sim
         scan = 1 + sigma * _SCAN if sigma > 0 else np.ones(1)
         points = [values, *({**values, f"gravity_sim[{trial}]": data.gravity_sim * float(g)} for g in scan)]
@@ -452,9 +388,8 @@ class TumbleProblem:
                 [[1 + values.get(f"{kind}[{t.id}]", 0.0) for t in self.data.trials] for values in points]
             )
         for form in forms:
-            assert isinstance(form, TumbleForm)
             own = {p.name: np.array([values.get(p.name, p.value) for values in points]) for p in form.parameters}
-            columns |= form.physical(own)
+            columns |= physical(form, own)
         chosen = [self._index[trial] for trial in trials]
         return (forward or self.forward).predict(columns, trials=chosen, states=states, motion=motion, horizon=horizon)
 
@@ -476,17 +411,12 @@ class TumbleProblem:
 
     @staticmethod
     def _physical(values: Mapping[str, float], form: Form) -> dict[str, float]:
-        assert isinstance(form, TumbleForm)
         own = {p.name: np.array([values.get(p.name, p.value)]) for p in form.parameters}
-        return {name: float(array[0]) for name, array in form.physical(own).items()}
+        return {name: float(array[0]) for name, array in physical(form, own).items()}
 
 
 def _of(apart: Sequence[Parameter], trials: Sequence[str]) -> list[Parameter]:
     return [p for p in apart if p.trial in trials]
-
-
-def _ours(forms: Sequence[Form]) -> list[TumbleForm]:
-    return [form for form in forms if isinstance(form, TumbleForm)]
 
 
 def make_problem(campaign: Campaign, *, own: Sequence[OwnEffect] = ()) -> TumbleProblem:

@@ -1,18 +1,17 @@
 """When one tumble is to be sampled, and how the samples of its motion become readings of its sensors."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.diagnose.fit.problem import Array
+
 from .data import CHANNELS, TrialData
 
 __all__ = ["Grid", "Optics"]
 
-Array = NDArray[np.float64]
 Places = NDArray[np.intp]
 
 _X, _Y, _THETA, _VX, _VY, _OMEGA, _AX, _AY, _WHEEL, _STATE = range(10)  # channels of the batch's series
@@ -24,27 +23,21 @@ _MOTION = (_X, _Y, _THETA, _VX, _VY, _OMEGA, _WHEEL)
 class Optics:
     """What lies between the motion and the readings, for several sets of parameters."""
 
-    clock: Array
-    """By what the IMU's is off [s] and what it gains in a second [1], shape [set_count, 2]."""
-    pull: Array
-    """Local gravity [m/s2], shape [set_count] like the rest."""
-    slope: Array
-    """Of the surface [rad]."""
-    lens: Array
-    """The camera's scale [1] and what it grows by with the distance's square [1/m2], shape [set_count, 2]."""
+    clock: Array  # by what the IMU's is off [s] and what it gains in a second [1], shape [set_count, 2]
+    pull: Array  # local gravity [m/s2], shape [set_count] like the rest
+    slope: Array  # of the surface [rad]
+    lens: Array  # the camera's scale [1] and what it grows by with the distance's square [1/m2], shape [set_count, 2]
 
 
 @dataclass(frozen=True)
 class _Part:
-    """Samples of one channel that are read: `count` of them from `first` on, and the last one where others are left
-    out between (it tells whether the motion stayed finite)."""
+    """Samples of one channel that are read: `count` from `first` on, and the last where others are left out between."""
 
     name: str
     first: int
     count: int
     last: int | None
-    rows: Places
-    """Of the clock's times, shape [count (+ 1)]."""
+    rows: Places  # of the clock's times, shape [count (+ 1)]
 
     def put(self, into: NDArray, readings: NDArray) -> None:
         """Readings, shape [set_count, count (+ 1)], to where they belong."""

@@ -5,8 +5,6 @@ A touch of the ground is no such reading: a tip stays on its spring for half a p
 a parabola as closely as the sensor's noise lets them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,7 +14,7 @@ from experiments.diagnose.fit.problem import Finding
 
 from .data import CHANNELS, TrialData
 
-__all__ = ["spikes"]
+__all__ = ["aside", "spikes"]
 
 _NAMES = ("gyro", "ax", "ay", "wheel")
 _FAR = 12.0  # stds of the sensor: white noise does not get there
@@ -49,15 +47,18 @@ def spikes(trials: Sequence[TrialData]) -> tuple[dict[str, NDArray[np.intp]], li
             gone.append(rows[alone])
             when = trial.time[rows[alone]]
             size = float(np.abs(off[alone]).max())
-            findings.append(Finding(
-                trial=trial.id, channel=name, from_s=float(when[0]), to_s=float(when[-1]), set_aside=True,
-                what=f"{len(alone)} single reading(s) of {name} at {', '.join(f'{t:.3f}' for t in when[:4])}"
-                f"{' ...' if len(when) > 4 else ''} s lie up to {size:.0f} std from their neighbours, which agree: "
-                f"set aside",
-            ))  # fmt: skip
+            what = f"{len(alone)} single reading(s) of {name} at {', '.join(f'{t:.3f}' for t in when[:4])}"
+            what += f"{' ...' if len(when) > 4 else ''} s lie up to {size:.0f} std from their neighbours, which agree: "
+            findings.append(aside(trial, name, when, what + "set aside"))
         if gone:
             told[trial.id] = np.concatenate(gone)
     return told, findings
+
+
+def aside(trial: TrialData, channel: str, times: NDArray[np.float64], what: str) -> Finding:
+    """That readings of a channel, at `times` [s], are set aside."""
+    return Finding(trial=trial.id, channel=channel, from_s=float(times[0]), to_s=float(times[-1]), what=what,
+                   set_aside=True)  # fmt: skip
 
 
 def _apart(trial: TrialData, name: str) -> tuple[NDArray[np.intp], NDArray[np.float64]]:

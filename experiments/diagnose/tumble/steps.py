@@ -1,18 +1,14 @@
 """What the fits of tumbles are made of: whitening, coordinates, normal equations, steps to try."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from experiments.diagnose.fit.problem import Parameter
+from experiments.diagnose.fit.problem import Array, Form, Parameter
 
 from .data import TrialData
-from .forms import TumbleForm
 
 __all__ = [
     "LOST",
@@ -29,24 +25,18 @@ __all__ = [
     "whiten",
 ]
 
-Array = NDArray[np.float64]
-
 ZERO_STD = 3.0 / np.sqrt(3.0)
 """Std of the camera's zero over the sensor's: it may be off by up to 3 of them, evenly (docs/diagnose.md)."""
-LOST = 1e3
-"""Residual where the model cannot stand or run [1]."""
+LOST = 1e3  # residual where the model cannot stand or run [1]
 TRIES = ((0.0, 1.0), (0.0, 0.4), (1e-2, 1.0), (1.0, 1.0), (30.0, 1.0))
 """Steps that are tried at once: damping on the diagonal of the normal matrix, and length."""
-EASY = 3
-"""How many of them are as good as undamped."""
-SETTLED = 0.05
-"""A step that gains less than this in chi-square ends a fit."""
+EASY = 3  # how many of them are as good as undamped
+SETTLED = 0.05  # A step that gains less than this in chi-square ends a fit
 
 Point = tuple[Mapping[str, float], Array]
 """Values of shared numbers, effects' parameters and what else is a trial's own, and each trial's gravity over its
 stated one."""
-Answers = list[Array]
-"""Whitened residuals, one array [point_count, sample_count] a trial."""
+Answers = list[Array]  # whitened residuals, one array [point_count, sample_count] a trial
 
 
 def whiten(trial: TrialData, value: Array, *, until: float = np.inf) -> Array:
@@ -74,17 +64,14 @@ def whiten(trial: TrialData, value: Array, *, until: float = np.inf) -> Array:
 class Start:
     """Where a fit begins, and what it may change."""
 
-    forms: tuple[TumbleForm, ...] = ()
+    forms: tuple[Form, ...] = ()
     values: Mapping[str, float] = field(default_factory=dict)
     """Shared numbers and effects' parameters; what is left out has its nominal value."""
-    gravity: Array | None = None
-    """Each trial's over its stated one, shape [trial_count]; None: 1."""
-    frozen: frozenset[str] = frozenset()
-    """Shared names that stay."""
+    gravity: Array | None = None  # each trial's over its stated one, shape [trial_count]; None: 1
+    frozen: frozenset[str] = frozenset()  # shared names that stay
     apart: tuple[Parameter, ...] = ()
     """Further numbers of single trials that are fitted: what differs between replicates."""
-    scan: bool = False
-    """Whether to scan each trial's gravity before the first step."""
+    scan: bool = False  # whether to scan each trial's gravity before the first step
     horizons: tuple[float, ...] = (1.0,)
     """Shares of a trial's time that are fitted, one after another; the last is 1. What happens early is smooth in the
     parameters and tells most of them, so that later contacts are met on the right branch."""
@@ -104,8 +91,7 @@ class Space:
     step: Array
     gravities: int
     trials: int
-    kinds: int = 0
-    """Of further numbers that each trial has of its own."""
+    kinds: int = 0  # of further numbers that each trial has of its own
 
     @property
     def shared(self) -> int:

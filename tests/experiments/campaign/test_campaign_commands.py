@@ -12,8 +12,8 @@ from penetration_campaigns import campaign_of, driven_trial, drop_trial
 from experiments.campaign import Campaign, Recording, read_campaign, write_campaign
 from experiments.campaign import tables as known
 from experiments.campaign.templates import new_campaign
-from experiments.check.experiment import find_faults
 from experiments.cli.main import main
+from experiments.diagnose.inspection import find_faults
 from experiments.penetrate import beds
 from experiments.penetrate import experiment as penetrate
 from experiments.penetrate.recorded import SpikeSensors, campaign_of_run

@@ -11,26 +11,27 @@ import numpy as np
 import pytest
 
 from experiments.diagnose.core.effect_equations import PENETRATION, TUMBLE, equation, equations_of, with_comments
-from experiments.diagnose.push.forms import Scales, make_library, physical
+from experiments.diagnose.fit.forms import shapes_of
+from experiments.diagnose.push.forms import Scales, physical, push_forms
 from experiments.diagnose.push.law import SLOTS, push, slot_table
-from experiments.diagnose.tumble.forms import shaped, tumble_forms
+from experiments.diagnose.tumble import forms as tumble
 from rigid.terms import EFFECTS
 
 K, C, DEEPEST, SPEED, D, H = 900.0, 4.0, 0.02, 0.05, 0.015, 0.006
 SCALES = Scales(depth=D, speed=SPEED, force=K * D)
-LIBRARY = make_library(SCALES, retreats=True, speeds_differ=True)
-FORMS = {form.id: form for form in (*LIBRARY.forms, *(form for bent in LIBRARY.shapes.values() for form in bent))}
+LIBRARY = push_forms(retreats=True, speeds_differ=True)
+SHAPES = shapes_of(LIBRARY, again=True)
+FORMS = {form.id: form for form in (*LIBRARY, *(form for bent in SHAPES.values() for form in bent))}
 
 
 def numbers_of(form) -> dict[str, float]:
     """The form's slots, at a place where it changes the force by some tens of per cent."""
-    plain = next((FORMS[plain] for plain, bent in LIBRARY.shapes.items() if form in bent), form)
+    plain = next((FORMS[plain] for plain, bent in SHAPES.items() if form in bent), form)
     start = {p.name: p.value for p in form.parameters} | dict(plain.starts[0]) | dict((form.starts or ({},))[0])
     start[form.amplitude] = start[form.amplitude] or 0.2
     start |= {"depth-hardening.hardening_steeper": 0.4, "plastic-sinkage.crater_bend": 0.7}
-    slots = LIBRARY.slots[form.id]
     return {
-        slots[p.name].name: physical(slots[p.name], start[p.name], SCALES, stiffness=K, size=1.0)
+        form.slots[p.name].name: physical(form.slots[p.name], start[p.name], SCALES, stiffness=K, size=1.0)
         for p in form.parameters
     }
 
@@ -89,13 +90,13 @@ def test_the_equation_of_a_push_is_what_is_computed(form_id):
 def test_every_form_has_an_equation_in_the_names_of_its_parameters():
     for form in FORMS.values():
         said = equation("penetration", form)
-        missing = [slot.name for slot in LIBRARY.slots[form.id].values() if slot.name not in said]
+        missing = [slot.name for slot in form.numbers if slot.name not in said]
         assert said and not missing, (form.id, missing)
-    forms = tumble_forms(rig=True, sinkage=1e-3, weight=1.0)
-    for form in (*forms, *(form for bent in shaped(forms).values() for form in bent)):
+    forms = tumble.tumble_forms(rig=True, sinkage=1e-3, weight=1.0)
+    for form in (*forms, *(form for bent in shapes_of(forms).values() for form in bent)):
         values = {p.name: np.array(0.1) for p in form.parameters}
         said = equation("tumble", form)
-        missing = [name for key in form.physical(values) if (name := key.partition(".")[2]) not in said]
+        missing = [name for key in tumble.physical(form, values) if (name := key.partition(".")[2]) not in said]
         assert said and not missing, (form.id, missing)
     assert set(TUMBLE) <= set(EFFECTS)
 

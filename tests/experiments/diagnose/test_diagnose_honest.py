@@ -15,7 +15,7 @@ from experiments.diagnose.fit.bounds import bends_little_away, bounds_met
 from experiments.diagnose.fit.evidence import Hypothesis
 from experiments.diagnose.fit.fitting import Model, Whitener, fit, settled
 from experiments.diagnose.fit.gate import held_out_gate, open_gate
-from experiments.diagnose.fit.problem import Parameter, Samples, TrialInfo
+from experiments.diagnose.fit.problem import Parameter, Problem, Samples, TrialInfo
 from experiments.diagnose.noise.colour import find_colours, find_loud
 from experiments.diagnose.noise.replicates import (
     Scatter,
@@ -40,7 +40,7 @@ def pushed(force, speeds):
     return [(f"{k}", "driven", v, driven_trial(force, speed=v, retreat=True, seed=k)) for k, v in enumerate(speeds)]
 
 
-class Line:
+class Line(Problem):
     """y = k t with unit noise, and a branch: for k beyond `jump` the model is off by 5 everywhere."""
 
     kind = "line"
@@ -60,7 +60,7 @@ class Line:
     def samples(self, trial):
         return Samples(time=self.time, channel=np.full(COUNT, "y"), std=np.ones(COUNT))
 
-    def evaluate(self, points, forms, trials):
+    def evaluate(self, points, forms, trials, share=1.0):
         models = [p["k"] * self.time + 5.0 * (p["k"] > self.jump) for p in points]
         return [{id: self.measured[id] - model for id in trials} for model in models]
 

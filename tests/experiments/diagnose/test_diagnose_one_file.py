@@ -17,7 +17,7 @@ from experiments.campaign import read_model
 from experiments.cli.main import main
 from experiments.diagnose.fit.own import load_own
 from experiments.diagnose.push.law import push, slot_places, slot_table
-from experiments.diagnose.tumble.forms import tumble_forms
+from experiments.diagnose.tumble.forms import physical, tumble_forms
 
 ROOT = Path(experiments.__file__).parents[1]
 MUD = ROOT / "experiments" / "terms" / "sticky_mud.py"
@@ -65,7 +65,7 @@ def test_it_is_a_candidate_of_tumbles_too():
     assert form.id == "sticky-mud:bounded" and form.starts[0] == {
         "sticky-mud.force": pytest.approx(0.06), "sticky-mud.log_speed": 0.0
     }  # fmt: skip
-    columns = form.physical({"sticky-mud.force": np.array([0.2]), "sticky-mud.log_speed": np.array([1.0])})
+    columns = physical(form, {"sticky-mud.force": np.array([0.2]), "sticky-mud.log_speed": np.array([1.0])})
     assert columns["sticky-mud.speed"] == pytest.approx(0.01 * math.e)
 
 

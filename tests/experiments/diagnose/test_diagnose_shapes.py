@@ -21,8 +21,9 @@ from experiments.diagnose.core.diagnosis import diagnose
 from experiments.diagnose.core.renoised import whitened_fit
 from experiments.diagnose.fit.evidence import best_start
 from experiments.diagnose.fit.fitting import Model, Whitener
+from experiments.diagnose.fit.forms import shapes_of
 from experiments.diagnose.noise.replicates import split_trials
-from experiments.diagnose.push.forms import Scales, make_library
+from experiments.diagnose.push.forms import push_forms
 from experiments.diagnose.push.law import SLOTS, fall, push, slot_table
 from experiments.diagnose.push.problem import make_problem
 
@@ -156,8 +157,7 @@ def test_a_drag_that_grows_until_the_tip_is_in_has_a_corner_there():
 
 
 def test_what_is_bent_may_be_bent_once_more_each_way_once():
-    scales = Scales(depth=0.015, speed=0.05, force=13.0)
-    shapes = make_library(scales, retreats=True, speeds_differ=True).shapes
+    shapes = shapes_of(push_forms(retreats=True, speeds_differ=True), again=True)
     (twice,) = shapes["shaft-friction:by a power of depth, setting in"]
     assert twice.id == "shaft-friction:by a power of depth, setting in, rising with speed"
     names = {p.name.partition(".")[2] for p in twice.parameters}

@@ -9,8 +9,7 @@ from experiments.diagnose.core.effect_words import confirmation
 from experiments.diagnose.core.next_steps import _follow
 from experiments.diagnose.fit.gaps import Gaps, numeral
 from experiments.diagnose.fit.localise import Place
-from experiments.diagnose.noise.colour import Colour
-from experiments.diagnose.noise.words import together
+from experiments.diagnose.noise.colour import Colour, together
 from experiments.diagnose.report.candidates import candidate_rows, unnamed_sentence
 from experiments.diagnose.report.summary import _numbers, scatter_sentence, summary_sentences, title_words
 from experiments.diagnose.report.telling import (

@@ -12,10 +12,11 @@ from tumble_campaigns import CONDITIONS, campaign
 from experiments.campaign import Campaign, Recording, read_model
 from experiments.diagnose.core import deciding
 from experiments.diagnose.fit.fitting import Model, Whitener, fit
+from experiments.diagnose.fit.forms import shapes_of
 from experiments.diagnose.tumble.checks import checked
 from experiments.diagnose.tumble.data import CHANNELS, tumble_data
 from experiments.diagnose.tumble.fit import Fitter
-from experiments.diagnose.tumble.forms import shaped, tumble_forms
+from experiments.diagnose.tumble.forms import physical, tumble_forms
 from experiments.diagnose.tumble.forward import Forward
 from experiments.diagnose.tumble.guess import Guesser
 from experiments.diagnose.tumble.problem import TumbleProblem, make_problem
@@ -314,11 +315,11 @@ def test_a_sensor_without_noise_is_refused():
 
 def test_a_cable_may_hang_wound_up_with_drag_of_any_power_beside():
     forms = tumble_forms(rig=True, sinkage=3e-5, weight=0.88)
-    bent = {form.name: form for form in shaped(forms)["umbilical:both"]}
+    bent = {form.name: form for form in shapes_of(forms)["umbilical:both"]}
     assert set(bent) == {"both, of any shape", "both, wound up", "both, wound up, of any shape"}
     form = bent["both, wound up, of any shape"]
     values = {p.name: np.zeros(1) for p in form.parameters} | {"umbilical.rest_change": np.array([-0.3])}
-    told = form.physical(values)
+    told = physical(form, values)
     assert told["umbilical.rest"] == -0.3 and told["umbilical.drag_power"] == 1.0
     names = [f"umbilical.{name}_change" for name in ("rest", "drag_power")]
     assert {tuple(start[name] > 0 for name in names) for start in form.starts} == set(product((False, True), repeat=2))
@@ -337,12 +338,12 @@ def test_a_friction_of_the_rig_above_the_weight_on_the_surface_is_said_to_be_har
 @pytest.mark.parametrize(("effect", "level"), [("bearing-drag", "torque"), ("rig-friction", "force")])
 def test_dry_friction_may_be_more_near_rest_from_none_at_all(effect, level):
     forms = tumble_forms(rig=True, sinkage=3e-5, weight=0.88)
-    (form,) = shaped(forms)[f"{effect}:dry"]
+    (form,) = shapes_of(forms)[f"{effect}:dry"]
     assert form.name == "dry, more near rest" and form.amplitude == f"{effect}.{level}"
     plain = {p.name: np.zeros(1) for p in form.parameters} | {form.amplitude: np.array([0.02])}
-    told = form.physical(plain)
+    told = physical(form, plain)
     assert told[f"{effect}.excess"] == 0.0 and told[f"{effect}.{level}"] == 0.02
-    faster = form.physical(plain | {f"{effect}.log_speed": np.array([1.0])})
+    faster = physical(form, plain | {f"{effect}.log_speed": np.array([1.0])})
     assert faster[f"{effect}.speed"] == pytest.approx(math.e * told[f"{effect}.speed"], rel=1e-12)
     assert all(start[f"{effect}.excess_change"] > 0 for start in form.starts)
     assert next(p for p in form.parameters if p.name.endswith("excess_change")).lowest == 0.0

@@ -5,8 +5,6 @@ without a model: sensors that are missing, gaps, a marker that jumped, a clock t
 replicates. `hedgebed diagnose` finds the same and sets it aside.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -16,8 +14,9 @@ from threadpoolctl import threadpool_limits
 
 from experiments.campaign import Campaign, PenetrationCampaign, Recording, TumbleCampaign, read_campaign
 from experiments.campaign.tables import PenetrationTrial
-from experiments.diagnose.fit.problem import Finding
-from experiments.diagnose.report.telling import findings_in_words
+from experiments.check import find_implausible, loud_sensors, missing_sensors, said_once, without_companions
+from experiments.check.replicas import Condition, condition_of, condition_words, odd_replicates
+from experiments.check.settings import CheckSettings
 from experiments.grains.spells import spells
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
@@ -26,16 +25,13 @@ from experiments.runs.result import Result
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import whole_run
 
-from . import find_implausible, loud_sensors, missing_sensors, said_once, without_companions
-from .replicas import Condition, condition_of, condition_words, odd_replicates
-from .settings import CheckSettings
+from .fit.problem import Finding
+from .report.telling import findings_in_words
 
 __all__ = ["check", "find_faults", "resume", "run", "unnamed_files"]
 
-_LONG = 10.0
-"""A step of the time this many times the usual one is a gap."""
-_LISTED = 4
-"""Files that are listed by name."""
+_LONG = 10.0  # A step of the time this many times the usual one is a gap
+_LISTED = 4  # files that are listed by name
 
 
 def check(settings: CheckSettings) -> None:

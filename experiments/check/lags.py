@@ -4,8 +4,6 @@ theta(t) = c + b t + G(t - lag), G being the integral of the rate: c is the unkn
 known of a lag where the rate stays the same; where it changes, at a touch or while the torque acts, the lag stands out.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -16,32 +14,22 @@ __all__ = ["Lag", "find_lag", "pieces"]
 
 Array = NDArray[np.float64]
 
-_REACH = 0.6
-"""Seconds to either side that are looked at."""
-_STEP = 0.005
-"""Between lags that are tried first [s]."""
-_FEW = 16
-"""Rows of either sensor below which nothing is said."""
-_SURE = 50.0
-"""Chi-square by which a lag must be better than the one that was expected."""
-_ZERO = 3.0
-"""The gyro's zero in standard deviations of its noise, one sigma."""
+_REACH = 0.6  # seconds to either side that are looked at
+_STEP = 0.005  # between lags that are tried first [s]
+_FEW = 16  # rows of either sensor below which nothing is said
+_SURE = 50.0  # chi-square by which a lag must be better than the one that was expected
+_ZERO = 3.0  # the gyro's zero in standard deviations of its noise, one sigma
 
 
 @dataclass(frozen=True)
 class Lag:
     """Of the angle behind the integral of the rate."""
 
-    value: float
-    """[s]; positive where the angle comes late."""
-    error: float
-    """One standard error [s]."""
-    left: float
-    """Mean squared misfit at this lag, over the noise's."""
-    without: float
-    """The same at the lag that was expected; infinite where the two do not overlap there."""
-    count: int
-    """Rows of the angle that were compared."""
+    value: float  # [s]; positive where the angle comes late
+    error: float  # one standard error [s]
+    left: float  # mean squared misfit at this lag, over the noise's
+    without: float  # the same at the lag that was expected; infinite where the two do not overlap there
+    count: int  # rows of the angle that were compared
 
     @property
     def is_right(self) -> bool:

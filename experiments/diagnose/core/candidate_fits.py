@@ -1,0 +1,257 @@
+"""Fits of the candidates of a search: alone, of another shape, in one another's noise, from where they promise most."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from experiments.diagnose.fit.evidence import Hypothesis, best_start, excess
+from experiments.diagnose.fit.fitting import Fit, Model, fit
+from experiments.diagnose.fit.gate import Verdict, open_gate
+from experiments.diagnose.fit.problem import Finding, Form, Values
+
+from .pairs import FormsStart
+
+__all__ = ["FOLLOWED", "WORTH", "CandidateFits", "Tell", "said"]
+
+WORTH = 3.0  # nats by which an effect must raise the tempered evidence
+BEHIND = 30.0
+"""Nats behind the best beyond which a candidate is not fitted to the end: its chi-square is seven times as large."""
+_FINISHED, _NEAR_BY = 8, 8.0
+"""So many candidates are fitted to the end, and all within so many nats of the best."""
+FOLLOWED = 3
+_SMALL_PART, _PARTS = 0.3, (0.1, 1.0)
+"""Of the amplitude that a form has alone, and of those that its starts have, for fits of it beside others."""
+
+Tell = Callable[[str, float], None]
+
+
+class CandidateFits:
+    """Fits of candidates on one set of trials: each effect alone, bent, beside others; all that was tried is kept."""
+
+    def __init__(
+        self, base: Fit, *, tell: Tell, seed: int = 0, recoloured: Callable[[Fit], Fit] | None = None,
+        own_ways: Callable[[Fit, Fit], tuple[Finding, ...]] | None = None,
+    ) -> None:  # fmt: skip
+        self.base = Hypothesis.of(base)
+        self._own_ways = own_ways
+        self.tell = tell
+        self.seed = seed
+        self._recoloured = recoloured
+        self.table: list[tuple[str, Hypothesis]] = []
+        self._alone: dict[str, Hypothesis] = {}
+        self._most = self.base.score
+        """The best single form's."""
+
+    def _gate(self, hypothesis: Hypothesis) -> Verdict:
+        """With the noise as it shows beside the hypothesis: a colour calls for no further name."""
+        told = open_gate(hypothesis.fit, seed=self.seed)[1]
+        if told.passed or self._recoloured is None or not hypothesis.effects:
+            return told
+        other = self._recoloured(hypothesis.fit)
+        return told if other is hypothesis.fit else open_gate(other, seed=self.seed)[1]
+
+    def _try(self, what: str, start: Hypothesis, forms: Sequence[Form], *, rounds: int = 6) -> Hypothesis:
+        """`start` with `forms` added, all refitted."""
+        model: Model = start.fit.model.with_forms((*start.forms, *forms))
+        alone = self._alone.get(forms[0].id)
+        if alone is None:
+            found = best_start(model, forms[0], start.fit.values, rounds=rounds)
+        else:  # where it stood alone is a good place to begin from beside others, and a small amplitude is another
+            amplitude = forms[0].amplitude
+            values = {**{p.name: alone.fit.values[p.name] for p in forms[0].parameters}, **start.fit.values}
+            places: list[Values] = [values, {**values, amplitude: _SMALL_PART * values[amplitude]}]
+            if forms[0].effect in start.effects and model.problem.contacts is None:
+                # What it was alone, another form of the effect now is: little of it, in all its shapes.
+                for own in forms[0].starts:
+                    places += [{**start.fit.values, **own, amplitude: part * own[amplitude]} for part in _PARTS]
+            first = [fit(model, place, rounds=4) for place in places]
+            best = min(first, key=lambda f: f.objective)
+            found = fit(model, best.values)
+        if not start.forms:
+            self._alone[forms[0].id] = Hypothesis(found, 0.0)
+        made = Hypothesis.of(found)
+        self.table.append((what, made))
+        return made
+
+    def _singles(self) -> list[Hypothesis]:
+        """The best form of each effect, the likeliest effect first."""
+        model = self.base.fit.model
+        forms = model.problem.forms
+        contacts = model.problem.contacts
+        if contacts is not None and forms:  # which looks for all of them together
+            self.tell("looking for where the candidates' fits begin", 0.0)
+            contacts.guess(forms[:1], model.trials, self.base.fit.values, apart=model.scatter)
+        made: list[Hypothesis] = []
+        for k, form in enumerate(forms):
+            self.tell(f"trying {form.effect} ({form.name})", k / max(1, len(forms)))
+            made.append(self._try(form.id, self.base, [form], rounds=6 if contacts is None else 1))
+        if contacts is not None:
+            most = max((h.score for h in made), default=0.0)
+            ranked = sorted((h.score for h in made), reverse=True)
+            least = min(ranked[:_FINISHED][-1], most - _NEAR_BY)
+            for k, begun in enumerate(made):
+                if begun.score > most - BEHIND and begun.score >= least:
+                    self.tell(f"fitting {forms[k].effect} ({forms[k].name})", k / len(forms))
+                    found = fit(begun.fit.model, begun.fit.values)
+                    made[k] = Hypothesis.of(found)
+                    self._alone[forms[k].id] = Hypothesis(found, 0.0)
+                    self.table.append((forms[k].id, made[k]))
+        best: dict[str, Hypothesis] = {}
+        for form, one in zip(forms, made, strict=True):
+            if form.effect not in best or one.score > best[form.effect].score:
+                best[form.effect] = one
+        if contacts is None:
+            best = {effect: self._from_its_like(one) for effect, one in best.items()}
+        return sorted(best.values(), key=lambda h: -h.score)
+
+    def _base_again(self, first: Sequence[Hypothesis]) -> None:
+        """The base model from where the best names ended: they may only have brought a trial back to its branch."""
+        for one in first[:FOLLOWED]:
+            if WORTH < one.score - self.base.score < BEHIND:
+                found = fit(self.base.fit.model, one.fit.values)
+                if found.objective < self.base.fit.objective - 1.0:
+                    self.base = Hypothesis.of(found)
+
+    def _from_its_like(self, one: Hypothesis) -> Hypothesis:
+        """The best of the forms that share scales with this single one, begun where it ended."""
+        best, (plain,) = one, one.forms
+        if one.score < self.base.score + WORTH or excess(one.fit) < 0.5 * np.sqrt(2.0 * one.fit.count):
+            return one
+        scales = {p.name for p in plain.parameters} - {plain.amplitude}
+        for form in one.fit.model.problem.forms:
+            if form is plain or form.effect != plain.effect or not scales & {p.name for p in form.parameters}:
+                continue
+            start = form.starts[0] if form.starts else {}
+            values = {**start, **one.fit.values, form.amplitude: one.fit.values[plain.amplitude]}
+            found = fit(one.fit.model.with_forms([form]), values)
+            made = Hypothesis.of(found)
+            self.table.append((form.id, made))
+            if form.id not in self._alone or found.objective < self._alone[form.id].fit.objective:
+                self._alone[form.id] = Hypothesis(found, 0.0)
+            best = made if made.score > best.score else best
+        return best
+
+    def _bent(self, hypothesis: Hypothesis) -> Hypothesis:
+        """With forms of another shape where that helps, from where the plain ones are, and of a second one."""
+        best = hypothesis
+        shapes = best.fit.model.problem.shapes
+        plain = list(hypothesis.forms) if hypothesis.score > self._most - BEHIND else []
+        while plain:
+            form, start = plain.pop(0), best
+            known = {p.name for p in form.parameters}
+            if excess(start.fit) < 0.5 * np.sqrt(2.0 * start.fit.count):
+                break
+            for finer in shapes.get(form.id, ()):
+                found = self._fitted_bend(start.fit, form, finer, known)
+                made = Hypothesis.of(found)
+                self.table.append((said(made), made))
+                if made.score > max(best.score, start.score + 1.0):
+                    best = made
+                    if len(made.forms) == 1:
+                        self._alone[finer.id] = made
+            plain += [made for made in best.forms if made not in start.forms]
+        return best
+
+    @staticmethod
+    def _fitted_bend(start: Fit, plain: Form, finer: Form, known: set[str]) -> Fit:
+        """With the `finer` form in place of the plain one, whose parameters are `known`."""
+        model = start.model.with_forms([finer if form is plain else form for form in start.model.forms])
+        bends = _once([{k: v for k, v in point.items() if k not in known} for point in finer.starts])
+        places: list[Values] = [{**start.values, **bend} for bend in bends]
+        begun = [fit(model, values, rounds=3) for values in places]
+        contacts = model.problem.contacts
+        if contacts is not None:  # a bend alone may put trials on other branches: from their beginnings, too
+            asked = [(model.forms, values) for values in places]
+            found_anew = contacts.refine(asked, model.trials, apart=model.scatter)
+            begun += [fit(model, values, rounds=3) for values in found_anew]
+        return fit(model, min(begun, key=lambda one: one.objective).values)
+
+    def _siblings(self, hypothesis: Hypothesis) -> list[Hypothesis]:
+        """Other forms of a single name, alone: bent, one that was behind may come nearer than the one that leads."""
+        problem = hypothesis.fit.model.problem
+        if len(hypothesis.forms) != 1 or problem.contacts is not None:
+            return []
+        shapes = problem.shapes.keys() & {form.id for form in problem.forms}
+        found: dict[str, Hypothesis] = {}
+        for _, tried in self.table:
+            if len(tried.forms) != 1 or tried.effects != hypothesis.effects or tried.forms == hypothesis.forms:
+                continue
+            known = found.get(tried.forms[0].id)
+            near = tried.score > hypothesis.score - BEHIND and (known is None or tried.score > known.score)
+            if near and tried.forms[0].id in shapes:
+                found[tried.forms[0].id] = tried
+        return list(found.values())
+
+    def _enriched(self, hypothesis: Hypothesis) -> Hypothesis:
+        """Of another shape or with a second form of an effect, where that helps: nature's is between the library's."""
+        best = max([self._bent(one) for one in (hypothesis, *self._siblings(hypothesis))], key=lambda h: h.score)
+        for _ in range(2):
+            start = best
+            if excess(start.fit) < 0.5 * np.sqrt(2.0 * start.fit.count):
+                break
+            taken = {p.name for form in start.forms for p in form.parameters}
+            for form in start.fit.model.problem.forms:
+                if form.effect not in start.effects or any(p.name in taken for p in form.parameters):
+                    continue
+                made = self._try(f"{said(start)} + {form.id}", start, [form])
+                if made.score > best.score + 1.0:
+                    best = made
+            if best is start:
+                break
+        return best
+
+    def _likeliest(self, best: Hypothesis, tried: Sequence[Hypothesis]) -> Hypothesis:
+        """The likeliest of `tried`, with the noise as it shows where the least is left: until then colour is misfit."""
+        first = max(tried, key=lambda h: h.score)
+        least = min(tried, key=lambda h: h.fit.objective)
+        pair = self._in_its_noise(first, least) if least is not first else None
+        return least if pair is not None and pair[1].score > pair[0].score else first
+
+    def _in_its_noise(self, one: Hypothesis, other: Hypothesis) -> tuple[Hypothesis, Hypothesis] | None:
+        """Both weighed with the noise that `other` leaves; None where that is the noise they were weighed with."""
+        found = self._recoloured(other.fit) if self._recoloured is not None else other.fit
+        if found is other.fit:
+            return None
+        same = fit(replace(one.fit.model, whitener=found.model.whitener), one.fit.values)
+        return Hypothesis.of(same), Hypothesis.of(found)
+
+    def _begun(self, model: Model, starts: Sequence[FormsStart]) -> list[Hypothesis]:
+        """Fits of what `starts` add to `model`; the most promising in full."""
+        places = [start.values for start in starts]
+        contacts = model.problem.contacts
+        if contacts is not None and starts:  # a search of its own, for models whose contacts make a likelihood jump
+            asked = [((*model.forms, *start.forms), start.values) for start in starts]
+            places = list(contacts.refine(asked, model.trials, apart=model.scatter))
+        begun = []
+        models = [model.with_forms((*model.forms, *start.forms)) for start in starts]
+        if contacts is not None:  # these are near their ends: the better half goes on
+            left = [float(np.square(one.evaluate([point])[0]).sum()) for one, point in zip(models, places, strict=True)]
+            kept = sorted(range(len(left)), key=lambda k: left[k])[: max(FOLLOWED, (len(left) + 1) // 2)]
+            models, places = [models[k] for k in kept], [places[k] for k in kept]
+        for longer, values in zip(models, places, strict=True):
+            for share in (0.4, 0.7) if model.problem.rough else ():
+                values = fit(longer.until(share), values, rounds=6).values
+            begun.append(fit(longer, values, rounds=5))
+        begun.sort(key=lambda found: found.objective)
+        made = []
+        for one in begun[:FOLLOWED]:
+            found = fit(one.model, one.values)
+            made.append(Hypothesis.of(found))
+            self.table.append((said(made[-1]), made[-1]))
+        return made
+
+    def _best_forms(self, effect: str) -> list[Form]:
+        """Forms of an effect, in the order of how well they did alone."""
+        alone = [h for what, h in self.table if len(h.forms) == 1 and h.effects == (effect,)]
+        return [h.forms[0] for h in sorted(alone, key=lambda h: -h.score)]
+
+
+def _once(places: Sequence[Values]) -> list[Values]:
+    """Each of them once."""
+    return [dict(numbers) for numbers in dict.fromkeys(tuple(place.items()) for place in places)]
+
+
+def said(hypothesis: Hypothesis) -> str:
+    """Its forms, as the table has them."""
+    return " + ".join(form.id for form in hypothesis.forms)

@@ -1,0 +1,82 @@
+"""What the error of a smoothed depth leaves in doubt of a driven trial's force: at the surface, and where it turns."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.diagnose.fit.problem import Array
+
+from .data import Prepared
+from .depth import SmoothDepth
+
+__all__ = ["off_rest", "off_surface", "path_error", "reversing", "touching", "turning"]
+
+_BESIDE = 5  # rows before and after a turn that tell the force there
+_AT_TURN = 6
+"""Rows that a turn may last; where a spike is slow for longer it is held, or eased, and its direction is what it is."""
+
+
+def path_error(smooth: SmoothDepth, by_depth: Array, by_row: Array) -> Array:
+    """What the error of a smoothed depth makes of the force [N], shape [n, error_count].
+
+    A force on the way back goes with two depths, where the spike is and how deep it has been, whose errors are not one:
+    a crater that is steep on the way out sees their difference.
+    """
+    deepest = np.maximum.accumulate(np.where(smooth.depth >= np.maximum.accumulate(smooth.depth),
+                                             np.arange(len(smooth.depth)), 0))  # fmt: skip
+    far = (by_depth - by_row)[:, None] * smooth.depth_error[deepest]
+    return by_row[:, None] * smooth.depth_error + far
+
+
+def touching(trial: Prepared) -> NDArray[np.bool_]:
+    """Rows of a driven trial that may lie on either side of the surface."""
+    assert trial.smooth is not None
+    return np.abs(trial.smooth.depth) < off_surface(trial)
+
+
+def off_surface(trial: Prepared) -> Array:
+    """How far from the surface [m] a row may be and yet lie on its other side: the depth's error, and the way of one
+    row, since depth and force are not read at one and the same instant."""
+    assert trial.smooth is not None
+    smooth = trial.smooth
+    return 3 * smooth.depth_std + np.abs(smooth.speed) * np.gradient(trial.time)
+
+
+def off_rest(trial: Prepared) -> Array:
+    """How far from rest [m/s] a row may be and yet move the other way: the speed's error, and what it changes by within
+    a row."""
+    assert trial.smooth is not None
+    return 3 * trial.smooth.speed_std + np.abs(np.gradient(trial.smooth.speed))
+
+
+def reversing(trial: Prepared) -> NDArray[np.bool_]:
+    """The few rows at which a driven spike may already come back or still go on; none of those where it is held."""
+    assert trial.smooth is not None
+    speed, off = trial.smooth.speed, off_rest(trial)
+    found = np.zeros(len(speed), dtype=bool)
+    unsure = np.concatenate([[0], (np.abs(speed) < off).astype(int), [0]])
+    edges = np.flatnonzero(np.diff(unsure))
+    for low, high in zip(edges[::2], edges[1::2], strict=True):
+        low, high = max(0, int(low) - 1), min(len(speed) - 1, int(high))
+        if high - low <= _AT_TURN and speed[low] * speed[high] < 0:
+            found[low + 1 : high] = True
+    for k in np.flatnonzero(speed[1:] * speed[:-1] < 0):  # between two rows, neither of which is in doubt
+        found[k + int(abs(speed[k + 1]) < abs(speed[k]))] = True
+    return found
+
+
+def turning(speed: Array, std: Array, force: Array, noise: float) -> Array:
+    """How far the force is in doubt where the direction of motion is: by its jump from before to after [N].
+
+    Dry friction changes sign where a spike turns; the smoothed depth tells when to within some rows only.
+    """
+    doubt = np.zeros(len(speed))
+    unsure = np.concatenate([[0], (np.abs(speed) < 3 * std).astype(int), [0]])
+    edges = np.flatnonzero(np.diff(unsure))
+    for low, high in zip(edges[::2], edges[1::2], strict=True):
+        before, after = force[max(0, low - _BESIDE) : low], force[high : high + _BESIDE]
+        if len(before) < _BESIDE or len(after) < _BESIDE:
+            continue
+        jump = abs(float(np.median(after) - np.median(before)))
+        if jump > 3 * noise:
+            doubt[max(0, low - 1) : high + 1] = jump
+    return doubt

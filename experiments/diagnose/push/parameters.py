@@ -1,0 +1,132 @@
+"""What is fitted of pushes and drops beside effects: K and C by diameter, and what may differ from trial to trial."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from experiments.campaign import PenetrationCampaign
+from experiments.diagnose.fit.problem import Array, Parameter
+
+from .data import Prepared, stds
+from .forms import Scales
+
+__all__ = ["base_parameters", "comes_back", "diameters_of", "find_scales", "named", "scatter_parameters", "speeds_of"]
+
+_ZERO_DEPTH = 0.1  # how far a depth's zero may differ between pushes while it is asked whether it does, over D
+_LEAST_ZERO = 0.2  # zeros that differ by less than this share of the noise say nothing
+_BED_STD = 0.5  # how far the bed may differ between replicates while it is asked whether it does [1]
+
+
+def diameters_of(trials: Sequence[Prepared]) -> list[float]:
+    """Rising [m]."""
+    return sorted({trial.diameter for trial in trials})
+
+
+def named(name: str, diameter: float, diameters: Sequence[float]) -> str:
+    """The name of the parameter that is K or C of a diameter."""
+    return name if len(diameters) == 1 else f"{name}@{diameter:g}"
+
+
+def base_parameters(tables: PenetrationCampaign, trials: Sequence[Prepared]) -> tuple[Parameter, ...]:
+    """K and C of each diameter, where they are uncertain."""
+    surface, doubt, diameters = tables.surface, tables.uncertainty, diameters_of(trials)
+    guess_k, guess_c = max(surface.stiffness, 1e-9), max(surface.damping, 1e-9)
+    found = []
+    for diameter in diameters:
+        for name, unit, value, relative, size in (
+            ("stiffness", "N/m", surface.stiffness, doubt.stiffness, guess_k),
+            ("damping", "N s/m", surface.damping, doubt.damping, guess_c),
+        ):
+            if relative == 0:
+                continue
+            free = relative >= 1
+            start = _straight_stiffness(tables, trials, diameter) if free and name == "stiffness" else value
+            if free and name == "damping":
+                size = max(size, 1e-3 * _straight_stiffness(tables, trials, diameter))
+            found.append(Parameter(
+                name=named(name, diameter, diameters), unit=unit, value=start,
+                std=math.inf if free else relative * value,
+                scale=max(0.02 * (start if name == "stiffness" else size), 1e-12), lowest=0.0,
+                step=1e-4 * max(start, size),
+            ))  # fmt: skip
+    return tuple(found)
+
+
+def scatter_parameters(
+    tables: PenetrationCampaign, trials: Sequence[Prepared], scales: Scales
+) -> dict[str, tuple[Parameter, ...]]:
+    """What may differ between replicates beyond the sensors: kind -> one nuisance a trial, mostly not fitted.
+
+    A factor on K and C, and one on C alone; of pushes where the depth is counted from, and what the force reads
+    at none.
+    """
+    found = {kind: tuple(
+        Parameter(name=f"{kind}[{id}]", unit="1", value=0.0, std=_BED_STD, scale=0.02, lowest=-0.95, highest=5.0,
+                  trial=id, kind=kind, step=1e-4)
+        for id in (trial.info.id for trial in trials)
+    ) for kind in ("bed", "bed damping")}  # fmt: skip
+    pushes = [trial.info.id for trial in trials if trial.driven]
+    if not pushes:
+        return found
+    far = _ZERO_DEPTH * scales.depth
+    noises = dict(zip(("depth zero", "force zero"), stds(tables, True), strict=True))
+    ends = {"depth zero": far, "force zero": far * scales.force / scales.depth}
+    return found | {kind: tuple(
+        Parameter(name=f"{kind}[{id}]", unit=unit, value=0.0, std=ends[kind], scale=0.1 * max(ends[kind], 1e-12),
+                  lowest=-2 * ends[kind], highest=2 * ends[kind], trial=id, kind=kind, step=1e-3 * ends[kind],
+                  least=_LEAST_ZERO * noises[kind])
+        for id in pushes
+    ) for kind, unit in (("depth zero", "m"), ("force zero", "N"))}  # fmt: skip
+
+
+def _straight_stiffness(tables: PenetrationCampaign, trials: Sequence[Prepared], diameter: float) -> float:
+    """F / z by least squares over the driven trials of this diameter; from the depth of drops where there is none.
+
+    A drop from speed v to depth z without loss: K z^2 / 2 = m v^2 / 2 + m g z.
+    """
+    driven = [trial for trial in trials if trial.driven and trial.diameter == diameter]
+    below = [(t, t.has_other & (t.smooth.depth > 0)) for t in driven if t.smooth is not None]
+    top = sum(float((t.smooth.depth * t.other)[rows].sum()) for t, rows in below if t.smooth is not None)
+    down = sum(float((t.smooth.depth**2)[rows].sum()) for t, rows in below if t.smooth is not None)
+    if down > 0 and top > 0:
+        return top / down
+    found = []
+    for trial in trials:
+        if not trial.driven and trial.diameter == diameter and trial.has_depth.any():
+            z = max(float(trial.depth[trial.has_depth].max()), 1e-6)
+            mass, speed = tables.spike.mass or 1.0, trial.table.speed or 0.0
+            found.append(mass * (speed**2 + 2 * trial.table.gravity * z) / z**2)
+    return float(np.median(found)) if found else max(tables.surface.stiffness, 1e-9)
+
+
+def find_scales(tables: PenetrationCampaign, trials: Sequence[Prepared], base: Sequence[Parameter]) -> Scales:
+    """What is typical of the campaign."""
+    deepest = [float((t.smooth.depth if t.smooth is not None else t.depth[t.has_depth]).max()) for t in trials]
+    depth = max(0.75 * max(deepest), 1e-9)
+    speed = max(max(speeds_of(trial).max() for trial in trials), 1e-9)
+    diameters = diameters_of(trials)
+    middle = named("stiffness", diameters[len(diameters) // 2], diameters)
+    stiffness = next((p.value for p in base if p.name == middle), tables.surface.stiffness)
+    return Scales(depth=depth, speed=speed, force=max(stiffness, 1e-9) * depth)
+
+
+def comes_back(trials: Sequence[Prepared]) -> bool:
+    """Whether a spike comes out again, by more than its depth's error."""
+    for trial in trials:
+        if not trial.driven:
+            return True
+        assert trial.smooth is not None
+        back = np.maximum.accumulate(trial.smooth.depth) - trial.smooth.depth
+        if back.max() > 0.02 * max(trial.smooth.depth.max(), 1e-12) + 5 * trial.smooth.depth_std.max():
+            return True
+    return False
+
+
+def speeds_of(trial: Prepared) -> Array:
+    """Slow and fast on the way in [m/s]."""
+    if trial.smooth is None:
+        return np.array([0.0, trial.table.speed or 0.0])
+    inside = trial.smooth.depth > 0
+    fast = trial.smooth.speed[inside] if inside.any() else trial.smooth.speed
+    return np.percentile(np.maximum(fast, 0.0), [20, 90])
