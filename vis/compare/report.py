@@ -74,9 +74,6 @@ def _columns(path: Path) -> tuple[dict[str, Array], tuple[States, States]]:
     return numbers, (np.array(by_name["state_1"]), np.array(by_name["state_2"]))
 
 
-# Pictures -------------------------------------------------------------------------------------------------------------
-
-
 def _folders(report: Report) -> list[Path]:
     return [(report.folder / run["folder"]).resolve() for run in report.result["runs"]]
 
@@ -116,9 +113,6 @@ def _alike(reels: Sequence[Reel]) -> list[Reel]:
     ]
 
 
-# Penetrations ---------------------------------------------------------------------------------------------------------
-
-
 def _drives(report: Report, labels: Labels) -> list[Block]:
     """Force against depth of the drives that both have."""
     runs = [{run.id: run for run in read_folder(home).of_kind("driven")} for home in _folders(report)]
@@ -138,9 +132,6 @@ def _drives(report: Report, labels: Labels) -> list[Block]:
         legend_of_runs(drawing, labels)
     caption = "The same drives in both: force against depth, in and out."
     return [report.draw(Plot("drives", "Drag against depth", caption, drawing))]
-
-
-# Tables ---------------------------------------------------------------------------------------------------------------
 
 
 def _tiles(result: Result) -> list[Tile]:

@@ -168,9 +168,6 @@ class Sheet:
         bar.outline.set_visible(False)  # type: ignore[operator]
 
 
-# Jobs -----------------------------------------------------------------------------------------------------------------
-
-
 def draw_reels(
     reels: Sequence[AnyReel],
     stills: Stills,

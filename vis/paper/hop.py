@@ -40,9 +40,6 @@ def write_hop_report(folder: str | Path, *, progress: Progress | None = None) ->
     return report.write(sections, lead=["hop", str(result["actuator"]), str(result["surface"])], tiles=_tiles(result))
 
 
-# Figures --------------------------------------------------------------------------------------------------------------
-
-
 def _flights(report: Report) -> Plot:
     """Height against the way along the ground, theory's and the model's, both axes in one scale."""
     result, series = report.result, report.folder / "series"
@@ -92,9 +89,6 @@ def _launch(report: Report) -> Plot:
         "the torque until a little after it has left."
     )
     return Plot("launch", f"The launch from {report.result['surface']}", caption, drawing)
-
-
-# The page -------------------------------------------------------------------------------------------------------------
 
 
 def _said(result: Result, name: str, scale: float = 1.0, unit: str | None = None) -> str:

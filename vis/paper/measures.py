@@ -70,9 +70,6 @@ def _draw_measures(axis: Axes, paper: PaperRun, surface: str, rig: float, key: s
             axis.plot(at, scale * fixed, "o", color=INK, mfc="none", ms=7.5, mew=0.8)
 
 
-# The sweep ------------------------------------------------------------------------------------------------------------
-
-
 def figure_sweep(paper: PaperRun) -> Plot | None:
     """What halving and doubling does to the trajectory angle and to the first hop."""
     if not paper.sweep:

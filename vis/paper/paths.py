@@ -78,9 +78,6 @@ def figure_5(paper: PaperRun) -> Plot | None:
     return Plot("figure5", "Figure 5: the start on steel", caption, drawing)
 
 
-# Figure 6 -------------------------------------------------------------------------------------------------------------
-
-
 _ROWS = (("low", "μ low"), ("nominal", "μ"), ("high", "μ high"), ("paper", "1 ms step"))
 
 
@@ -134,9 +131,6 @@ def _nearest(edges: Sequence[float], one: float, other: float) -> float:
     middle = 0.5 * (one + other)
     between = [edge for edge in edges if min(one, other) - 1e-9 <= edge <= max(one, other) + 1e-9]
     return min(between, key=lambda edge: abs(edge - middle)) if between else middle
-
-
-# Figure 7 -------------------------------------------------------------------------------------------------------------
 
 
 def _parabola(launch: Result) -> tuple[Array, Array]:

@@ -232,9 +232,6 @@ def spread_plot(run: RunFolder) -> Plot | None:
     return Plot("spread", "Spread between beds", caption, figure)
 
 
-# ---- parts ---------------------------------------------------------------------------------------------------------
-
-
 def _first_touch(series: Series | None) -> float:
     """Time from the first grain felt to depth 0 [s], below 0; 0 where no grain sticks out."""
     part = above_surface(series)

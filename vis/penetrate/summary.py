@@ -64,9 +64,6 @@ def summarise(run: RunFolder) -> dict[str, Any]:
     }
 
 
-# ---- the answer ----------------------------------------------------------------------------------------------------
-
-
 def _banner(run: RunFolder) -> str:
     if run.status == "done":
         return ""

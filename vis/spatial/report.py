@@ -109,9 +109,6 @@ def _numbers(result: Result) -> Block:
     return table(("quantity", "value", *(("spring-damper",) if beside else ()), "unit", "note"), rows, words=True)
 
 
-# Figures --------------------------------------------------------------------------------------------------------------
-
-
 def _states(home: Path, path: Columns, states: States) -> list[Plot]:
     """The states over time and turn, and on grains those of the spring-damper beside them."""
     turn = np.degrees(path["turn_rad"])

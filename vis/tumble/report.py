@@ -138,9 +138,6 @@ def _degrees(result: Result, name: str) -> str:
     return "none" if value is None else f"{short(math.degrees(value), 3)}°"
 
 
-# Figures --------------------------------------------------------------------------------------------------------------
-
-
 def _trajectory(result: Result, numbers: Columns, states: States) -> Plot:
     far = max(float(np.ptp(numbers["x_m"])), float(np.ptp(numbers["y_m"])))
     with styled():
@@ -219,9 +216,6 @@ def _energy(result: Result, motion: Columns) -> Plot:
         f"damping took. Right: what is left over. Its largest, over the work of the torque or W l, is {residual_words}."
     )
     return Plot("energy", "The energy book", caption, drawing)
-
-
-# Animation ------------------------------------------------------------------------------------------------------------
 
 
 def _animate(path: Path, result: Result, numbers: Columns, states: States) -> Path:
