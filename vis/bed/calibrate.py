@@ -12,10 +12,12 @@ from vis.page.numbers import quote
 from vis.page.page import Section, Tile, code, text
 from vis.page.plots import Plot, handle, legend_above, new_panels, smooth_ratio
 from vis.page.report import Progress, Report, Result, again, tables
+from vis.page.sentences import Sentences
 from vis.page.style import BED, GREY, INK, MODEL, styled
 
 __all__ = ["write_calibration_report"]
 
+say = Sentences(__package__)
 _COLOURS = (BED, MODEL, INK, GREY)
 
 
@@ -113,7 +115,7 @@ def _residuals(result: Result) -> Plot:
             handle("compared only", GREY, marker="s", ls=""),
         ]
         legend_above(drawing, handles)
-    return Plot("residuals", "What is left", "Bars: two standard errors of the check.", drawing)
+    return Plot.said(say, "residuals", drawing)
 
 
 def _checked(result: Result) -> list[Result]:
@@ -141,7 +143,7 @@ def _tests(report: Report) -> list[Plot]:
         axes[0].set_ylabel("shear over normal stress, at the lid [1]")
         handles = [handle(f"{p:g} Pa", _COLOURS[k % 4]) for k, p in enumerate(pressures)]
         legend_above(drawing, handles)
-    return [Plot("tests", "The check's tests", "A line a seed, smoothed over a sixtieth of the strain.", drawing)]
+    return [Plot.said(say, "tests", drawing)]
 
 
 def _slopes(report: Report) -> list[Plot]:
@@ -158,4 +160,4 @@ def _slopes(report: Report) -> list[Plot]:
             title = f"seed {test['seed']}: {test['angle']:.1f} ± {test['error']:.1f}°"
             axis.set(title=title, xlabel="x [mm]", ylim=(0.0, None))
         axes[0].set_ylabel("thickness [mm]")
-    return [Plot("slopes", "Slopes of the check's beds", "Heights are not to the scale of x.", drawing)]
+    return [Plot.said(say, "slopes", drawing)]

@@ -9,6 +9,7 @@ from vis.page.numbers import short
 from vis.page.page import Block, Section, Tile, figure, listing
 from vis.page.plots import DASHED, Plot, handle, legend_above, new_panels, shades
 from vis.page.report import Progress, Report, again, tables
+from vis.page.sentences import Sentences
 from vis.page.style import styled
 from vis.pictures.canvas import colour_values, nice_above
 from vis.pictures.frames import grains_box, read_frames
@@ -16,6 +17,8 @@ from vis.pictures.pictures import Counter, carry_out
 from vis.pictures.render import PictureJob, View, run_job
 
 __all__ = ["write_bed_report"]
+
+say = Sentences(__package__)
 
 
 def write_bed_report(folder: str | Path, *, progress: Progress | None = None) -> Path:
@@ -74,11 +77,7 @@ def _profiles(report: Report) -> Plot:
         vertical.set(xlabel="vertical stress [Pa]", xlim=(0.0, None))
         sideways.set(xlabel="horizontal stresses [Pa]", xlim=(0.0, None))
         legend_above(drawing, handles)
-    words = (
-        "Means over layers of one and a half diameters, after each stage. Stress is that of the contacts' springs "
-        "(Love, Weber); right: along x, and dashed along y."
-    )
-    return Plot("profiles", "Packing and stress against height", words, drawing)
+    return Plot.said(say, "profiles", drawing)
 
 
 def _passes(report: Report) -> list[Plot]:
@@ -93,8 +92,7 @@ def _passes(report: Report) -> list[Plot]:
             axis.plot(columns["pass"], columns["packing"], color=colour, marker=".", label=stage["stage"])
         axis.set(xlabel="taps, or presses of the lid, that were kept [1]", ylabel="packing fraction [1]")
         legend_above(drawing, axis.get_legend_handles_labels()[0])
-    words = "Between two points the bed is at rest. A tap that went too far was taken back and is not shown."
-    return [Plot("passes", "How the bed was compacted", words, drawing)]
+    return [Plot.said(say, "passes", drawing)]
 
 
 def _picture(report: Report) -> tuple[list[Block], str]:

@@ -17,11 +17,13 @@ from vis.page.numbers import quote
 from vis.page.page import Section, Tile, text
 from vis.page.plots import Plot, handle, legend_above, new_panels, shades, smooth_ratio
 from vis.page.report import Progress, Report, Result, again, tables
+from vis.page.sentences import Sentences
 from vis.page.style import BED, MODEL, styled
 from vis.pictures.frames import read_frames
 
-__all__ = ["CUT_METHOD", "FALLEN_SHARE", "flank_lines", "said", "write_shear_report", "write_test_report"]
+__all__ = ["FALLEN_SHARE", "flank_lines", "said", "write_shear_report", "write_test_report"]
 
+say = Sentences(__package__)
 Grains = Mapping[str, NDArray[Any]]
 
 
@@ -29,19 +31,17 @@ def write_test_report(folder: str | Path, *, progress: Progress | None = None) -
     """Make figures/ and report.html of the folder of such a test, shear aside, and return the report."""
     report = Report(folder, progress)
     result, command = report.result, report.result["experiment"]
-    plots, tiles, method = _TESTS[command.rpartition(" ")[2]]
+    kind = command.rpartition(" ")[2]
+    plots, tiles = _TESTS[kind]
     drawn = report.draw_all(plots(report))
     report.tell(0.9)
     one = result["runs"][0]
-    bed = (
-        f"{one['material']}, {one['grain_count']} grains of {1e3 * one['grain']:.3g} mm in "
-        f"{' x '.join(f'{1e3 * side:.3g}' for side in one['size'][:2])} mm, {1e3 * one['surface']:.3g} mm deep, "
-        f"packing {one['packing_fraction']:.3f}, {one['gravity']:.3g} m/s2; grains of {1e-6 * one['young']:.3g} MPa, "
-        f"steps of {1e6 * one['time_step']:.3g} us."
-    )
+    sides = " x ".join(f"{1e3 * side:.3g}" for side in one["size"][:2])
+    scaled = {"mm": 1e3 * one["grain"], "deep": 1e3 * one["surface"], "mpa": 1e-6 * one["young"]}
+    bed = say("first_bed", one=one, sides=sides, step=1e6 * one["time_step"], **scaled)
     sections = [
         Section("", tables(result) + drawn),
-        Section("How it is measured", [*(text(words) for words in method), text(f"First bed: {bed}")]),
+        Section("How it is measured", [*(text(say(f"{kind}_method_{k}")) for k in (1, 2)), text(bed)]),
         report.numbers(std=True),
         again(f"hedgebed {command} run.toml"),
     ]
@@ -60,16 +60,15 @@ def _side_plot(
     report: Report,
     run: Result,
     draw: Callable[[Axes], None],
+    key: str,
     *,
-    title: str,
-    caption: str,
     top: float = 5.0,
     shown: Callable[[Grains], Grains] = lambda grains: grains,
 ) -> list[Plot]:
     """The grains of a run's last frame from the side, coloured by how far each has moved; none where no frame is.
 
     Args:
-        draw: draws over them, in mm. top: end of the colours' scale [mean diameters].
+        draw: draws over them, in mm. key: of its sentences. top: end of the colours' scale [mean diameters].
         shown: which grains, and where.
     """
     frames = read_frames(report.folder, run["frames"])
@@ -83,7 +82,7 @@ def _side_plot(
         drawn = _draw_grains(axis, grains, period=period, unit=run["grain"], top=top)
         draw(axis)
         drawing.colorbar(drawn, ax=axis, shrink=0.8, extend="max", label="way since it was made [d]")
-    return [Plot("side", title, caption, drawing)]
+    return [Plot.said(say, key, drawing, name="side")]
 
 
 def _draw_grains(axis: Axes, grains: Grains, *, period: float, unit: float, top: float) -> Any:
@@ -107,14 +106,6 @@ def _draw_grains(axis: Axes, grains: Grains, *, period: float, unit: float, top:
 
 
 # A cone goes in -------------------------------------------------------------------------------------------------------
-
-
-_CONE_METHOD = (
-    "A cone on a thinner shaft goes straight down at constant speed into a bed that is periodic sideways, each push "
-    "into a fresh copy of its bed. Cone index: vertical force over the area of the cone's base. Depth is that of the "
-    "base, 0 where the cone is just all in, counted from the height where the bed's packing falls to half.",
-    "Gradient: slope of a straight line by least squares over all depths of the base from 0 on.",
-)
 
 
 def _cone_tiles(result: Result) -> list[Tile]:
@@ -152,11 +143,7 @@ def _indices(report: Report) -> Plot:
         for panel in (axis, lines):
             panel.set(xlim=(0.0, None), xlabel="cone index [kPa]")
         legend_above(drawing, handles)
-    words = (
-        "Means over a 200th of the way. Dashed: the cone is just all in; before, its index counts the whole base while "
-        "only the tip is in the bed."
-    )
-    return Plot("index", "Cone index against depth", words, drawing)
+    return Plot.said(say, "index", drawing)
 
 
 def _cone_side(report: Report) -> list[Plot]:
@@ -177,8 +164,7 @@ def _cone_side(report: Report) -> list[Plot]:
         for x, z in (([0.0, half, -half], [tip, base, base]), ([-shaft, shaft, shaft, -shaft], [base, base, top, top])):
             axis.fill(x, z, facecolor="#d9d9d9", edgecolor="black", lw=0.8)
 
-    words = "The half of the bed behind the cone's axis, grains coloured by how far each has moved."
-    return _side_plot(report, run, draw, title="The cone at its deepest", caption=words, top=2.0, shown=behind)
+    return _side_plot(report, run, draw, "cone_side", top=2.0, shown=behind)
 
 
 # A face is cut --------------------------------------------------------------------------------------------------------
@@ -186,18 +172,6 @@ def _cone_side(report: Report) -> list[Plot]:
 
 FALLEN_SHARE = 0.2
 """Of a wedge's grains: `dem.measure.cutting`'s, which a test holds it to; reports read run folders only."""
-
-CUT_METHOD = (
-    "A strip is dug out of a level bed at a tenth of its gravity, which leaves two vertical faces as high as the bed. "
-    "Then gravity rises by factors of 1.41, up to four times the bed's own, as in a centrifuge: a face of height h at "
-    "n g is loaded as one of n h at g. A face has fallen once a fifth of the grains in front of Rankine's plane behind "
-    "it (60 degrees from the horizontal) have moved by more than a diameter; between the last gravity that both faces "
-    "bore and the one at which one of them fell the middle is tried as well.",
-    "Critical height: geometric middle of the heights, at the bed's own gravity, that stood and that fell. Cohesion by "
-    "Terzaghi's plane wedge without tension cracks, c = gamma H / 4 tan(45 + phi / 2); an upper bound solution, so "
-    "that the soil may have a little more cohesion than this says. Angle and cohesion are those of Mohr's circle; on "
-    "the plane of shear a shear box reads less of both.",
-)
 
 
 def _cut_tiles(result: Result) -> list[Tile]:
@@ -231,11 +205,7 @@ def _cut_side(report: Report) -> list[Plot]:
         if run["flanks"]:
             flank_lines(axis, run, start=0.0, period=run["size"][0], colour=MODEL)
 
-    words = (
-        "All grains from the side at the end, at the bed's own gravity, coloured by how far each has moved. Dashed: "
-        "the faces as they were cut; lines: the slopes that were fitted, if one fell."
-    )
-    return _side_plot(report, run, draw, title="What became of the faces", caption=words)
+    return _side_plot(report, run, draw, "cut_side")
 
 
 def _cut_profiles(report: Report) -> Plot:
@@ -250,10 +220,7 @@ def _cut_profiles(report: Report) -> Plot:
             axis.set(title=run["id"], xlabel="x [mm]", ylim=(0.0, None))
         axes[0].set_ylabel("thickness [mm]")
         legend_above(drawing, [handle("stood last", BED, lw=1.2), handle("at the end", MODEL, ls="--", lw=1.2)])
-    words = (
-        "Solid volume over area and packing fraction, in columns of half a diameter. Heights are not to the scale of x."
-    )
-    return Plot("profiles", "Profiles, run by run", words, drawing)
+    return Plot.said(say, "tests_profiles", drawing, name="profiles")
 
 
 def _trials(runs: Sequence[Result]) -> Plot:
@@ -277,25 +244,10 @@ def _trials(runs: Sequence[Result]) -> Plot:
             ylabel="grains of the wedge\nthat have moved [1]",
         )
         legend_above(drawing, handles)
-    words = (
-        "Share of the wedge's grains that have moved by more than a diameter; a face has fallen above the dashed line."
-    )
-    return Plot("trials", "Gravity by gravity", words, drawing)
+    return Plot.said(say, "trials", drawing)
 
 
 # A slot drains the bed ------------------------------------------------------------------------------------------------
-
-
-_REPOSE_METHOD = (
-    "The bed is set on a rough plate with a slot along all of its width in y, and drains into a pit below. Once "
-    "nothing has drained for two of the times in which a grain falls the bed's height, and the grains are at rest "
-    "without drag (1e-5 m g d of kinetic energy each), the slopes on both sides are measured: the drained angle of "
-    "repose. The bed is periodic along y, so that the slopes have no side walls.",
-    "Profile: solid volume in columns half a mean diameter wide, over their area and the packing fraction of the bed "
-    "before. Each slope is fitted by least squares from three diameters, or a fifth of the crest's height, to four "
-    "fifths of it: the foot at the slot and the crest are left out. The angle of a run is the mean of both slopes; its "
-    "error is that of the fits and half the difference of the slopes, in quadrature.",
-)
 
 
 def _repose_tiles(result: Result) -> list[Tile]:
@@ -338,12 +290,7 @@ def _repose_side(report: Report) -> list[Plot]:
             axis.fill(1e3 * ends, 1e3 * heights, color="#444444", zorder=2)
         axis.set_title(f"{run['id']}: {run['flanks'][1]['angle']:.1f}° and {run['flanks'][0]['angle']:.1f}°")
 
-    words = (
-        "All grains from the side, those in front over those behind, coloured by how far each has moved. Lines: the "
-        "fitted slopes, dotted down to the plate; below it the pit with what drained. The lines follow the mean "
-        "thickness over y, and single grains lie above them."
-    )
-    return _side_plot(report, run, draw, title="What the slot left", caption=words)
+    return _side_plot(report, run, draw, "repose_side")
 
 
 def _repose_profiles(report: Report) -> Plot:
@@ -365,15 +312,15 @@ def _repose_profiles(report: Report) -> Plot:
                 handle("surface before", "#888888", ls="--", lw=0.8),
             ],
         )
-    return Plot("profiles", "Profile and fitted slopes, run by run", "Heights are not to the scale of x.", drawing)
+    return Plot.said(say, "repose_profiles", drawing, name="profiles")
 
 
-_TESTS: dict[str, tuple[Callable[[Report], list[Plot]], Callable[[Result], list[Tile]], Sequence[str]]] = {
-    "cone": (_cone_plots, _cone_tiles, _CONE_METHOD),
-    "cut": (_cut_plots, _cut_tiles, CUT_METHOD),
-    "repose": (_repose_plots, _repose_tiles, _REPOSE_METHOD),
+_TESTS: dict[str, tuple[Callable[[Report], list[Plot]], Callable[[Result], list[Tile]]]] = {
+    "cone": (_cone_plots, _cone_tiles),
+    "cut": (_cut_plots, _cut_tiles),
+    "repose": (_repose_plots, _repose_tiles),
 }
-"""What draws, the numbers on top, and how the test is made, a paragraph each."""
+"""What draws, and the numbers on top."""
 
 
 # A lid shears it ------------------------------------------------------------------------------------------------------
@@ -422,7 +369,7 @@ def _curves(report: Report) -> Plot:
         for axis in (ratio, height):
             axis.set_xlabel("way of the lid [diameters]")
         legend_above(drawing, handles)
-    return Plot("shear", "The lid's way", "Both stresses smoothed over a sixtieth of the way.", drawing)
+    return Plot.said(say, "shear", drawing)
 
 
 def _lines(result: Result) -> Plot:
@@ -439,4 +386,4 @@ def _lines(result: Result) -> Plot:
             handles.append(handle(kind, colour, marker=mark))
         axis.set(xlim=(0.0, None), ylim=(0.0, None), xlabel="normal stress [Pa]", ylabel="shear stress [Pa]")
         legend_above(drawing, handles)
-    return Plot("mohr-coulomb", "Mohr-Coulomb", "Least squares; bars: standard error of the critical stress.", drawing)
+    return Plot.said(say, "mohr_coulomb", drawing, name="mohr-coulomb")

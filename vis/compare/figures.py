@@ -9,64 +9,40 @@ from matplotlib.figure import Figure
 
 from vis.page.plots import DASHED, Array, Plot, handle, legend_above, sheet
 from vis.page.report import Result
+from vis.page.sentences import Sentences
 from vis.page.states import LINES, States, draw_bands, legend_of_runs
 from vis.page.style import BED, GREY, INK, MODEL, as_it_lies, styled
 
-__all__ = ["plots_in_space", "plots_in_the_plane"]
+__all__ = ["plots"]
 
+say = Sentences(__package__)
 Columns = Mapping[str, Array]
 Both = tuple[States, States]
 Labels = tuple[str, str]
-_ENERGY = (
-    "Work of the torque; what was dissipated, in the ground and in friction; and what is left over: energy gained less "
-    "the work plus what was dissipated; on grains that is platform and exchange only, since there what was dissipated "
-    "is what the bed took less what it holds more."
-)
 _ROWS = (BED, "#E69F00", "#009E73", "#CC79A7", GREY, "#56B4E9", INK, MODEL)
 
 
-def plots_in_the_plane(result: Result, columns: Columns, states: Both, labels: Labels) -> list[Plot]:
-    """The figures of two tumbles in the plane, drawn from series/compared.csv."""
-    rows = [str(row) for row in range(int(result["spike_count"]))]
-    forces = (("lift_N", "force upwards [N]"), ("push_N", "force along the motion [N]"))
+def plots(result: Result, columns: Columns, states: Both, labels: Labels) -> list[Plot]:
+    """The figures of two tumbles, drawn from series/compared.csv."""
+    in_space = result["kind"] == "tumble spatial"
+    kind, angle, label = ("space", "turn_rad", "turn [degrees]") if in_space else ("plane", "theta_rad", "θ [degrees]")
+    forces = {"lift_N": "force upwards [N]", "push_N": "force along the motion [N]"}
+    if in_space:
+        forces = {"lift_N": "force upwards [N]", "push_x_N": "force along x [N]", "push_y_N": "force along y [N]"}
+        names, called = result["spikes"], "spike"
+    else:
+        names, called = [str(row) for row in range(int(result["spike_count"]))], "row"
     with styled():
-        path, in_proportion = _draw_path(columns, labels)
-        shape = "in proportion" if in_proportion else "heights stretched"
-        return [
-            Plot("path", "Path and speed", f"Left: the centre from its start, {shape}. Right: its speed, and dθ/dt.",
-                 path),
-            Plot("states", "Angle and states", "Above: the angle. Below: the states as bands; stand: two rows or more "
-                 "stick, pivot: one sticks, slip: all that touch slide, hop: none touches.",
-                 _draw_states(columns, "theta_rad", states, labels, "θ [degrees]")),
-            Plot("sinkage", "Sinkage of each row of spikes", "Depth of the lowest point of each row below the "
-                 "undisturbed surface. Both panels have the same scale; rows that never touch are left out.",
-                 _draw_spikes(columns, rows, labels, called="row")),
-            Plot("forces", "Forces of the ground", "Left: upwards; the dashed line is the weight. Right: along the "
-                 "motion. Means over 5 ms, of all rows together, as the platform's acceleration has them.",
-                 _draw_forces(result["weights"], columns, forces, labels)),
-            Plot("energy", "Energy books", _ENERGY, _draw_energy(columns, labels)),
-        ]  # fmt: skip
-
-
-def plots_in_space(result: Result, columns: Columns, states: Both, labels: Labels) -> list[Plot]:
-    """The figures of two tumbles in space, drawn from series/compared.csv."""
-    forces = (("lift_N", "force upwards [N]"), ("push_x_N", "force along x [N]"), ("push_y_N", "force along y [N]"))
-    with styled():
-        return [
-            Plot("path", "Way and speed", "Above: way of the centre of mass from each run's own start. Below: its "
-                 "speed, the angular velocity, and the angle of the one turn between both attitudes.",
-                 _draw_way(columns, labels)),
-            Plot("states", "Turn and states", "Above: the angle of the one turn from each run's own start. Below: the "
-                 "states as bands; stand: three spikes stick that are not in a line, pivot: those that stick lie in "
-                 "one line, or one does, slip: all that touch slide, hop: none touches.",
-                 _draw_states(columns, "turn_rad", states, labels, "turn [degrees]")),
-            Plot("sinkage", "Sinkage of each spike", "Depth of the lowest point of each spike below the undisturbed "
-                 "surface. Both panels have the same scale; spikes that never go in are left out.",
-                 _draw_spikes(columns, result["spikes"], labels, called="spike")),
-            Plot("forces", "Forces of the ground", "On the platform, means over 5 ms; the dashed line is the weight.",
-                 _draw_forces(result["weights"], columns, forces, labels)),
-            Plot("energy", "Energy books", _ENERGY, _draw_energy(columns, labels)),
-        ]  # fmt: skip
+        path, in_proportion = _draw_way(columns, labels) if in_space else _draw_path(columns, labels)
+        drawings = {
+            "path": path,
+            "states": _draw_states(columns, angle, states, labels, label),
+            "sinkage": _draw_spikes(columns, names, labels, called=called),
+            "forces": _draw_forces(result["weights"], columns, forces, labels),
+            "energy": _draw_energy(columns, labels),
+        }
+    shape = "in proportion" if in_proportion else "heights stretched"
+    return [Plot.said(say, f"{kind}_{name}", one, name=name, shape=shape) for name, one in drawings.items()]
 
 
 def _draw_path(columns: Columns, labels: Labels) -> tuple[Figure, bool]:
@@ -88,7 +64,8 @@ def _draw_path(columns: Columns, labels: Labels) -> tuple[Figure, bool]:
     return drawing, in_proportion
 
 
-def _draw_way(columns: Columns, labels: Labels) -> Figure:
+def _draw_way(columns: Columns, labels: Labels) -> tuple[Figure, bool]:
+    """The figure; its panels are in proportion, over time as they are."""
     drawing, (ways, rates) = sheet(2, 3, 5.0, sharex=True)
     time = columns["t_s"]
     vectors = ("vx_m_s", "vy_m_s", "vz_m_s"), ("wx_rad_s", "wy_rad_s", "wz_rad_s")
@@ -104,7 +81,7 @@ def _draw_way(columns: Columns, labels: Labels) -> Figure:
     for axis, label in zip(rates, words, strict=True):
         axis.set(ylabel=label, xlabel="time [s]")
     legend_of_runs(drawing, labels)
-    return drawing
+    return drawing, True
 
 
 def _draw_states(columns: Columns, angle: str, states: Both, labels: Labels, label: str) -> Figure:
@@ -135,12 +112,10 @@ def _draw_spikes(columns: Columns, names: Sequence[str], labels: Labels, *, call
     return drawing
 
 
-def _draw_forces(
-    weights: Sequence[float], columns: Columns, forces: Sequence[tuple[str, str]], labels: Labels
-) -> Figure:
+def _draw_forces(weights: Sequence[float], columns: Columns, forces: Mapping[str, str], labels: Labels) -> Figure:
     """Forces of the ground, column and words of each; in the first panel, that of the lift, the weights [N] too."""
     drawing, (axes,) = sheet(1, len(forces), 3.0)
-    for axis, (name, words) in zip(axes, forces, strict=True):
+    for axis, (name, words) in zip(axes, forces.items(), strict=True):
         for number, style in enumerate(LINES, 1):
             if f"{name}_{number}" in columns:
                 axis.plot(columns["t_s"], columns[f"{name}_{number}"], **(style | {"lw": 1.1}))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vis.compare.figures import plots_in_space, plots_in_the_plane
+from vis.compare.figures import plots
 from vis.film.film import shown
 from vis.film.reel import NAME, Reel
 from vis.page.folder import read_folder
@@ -15,6 +15,7 @@ from vis.page.numbers import short
 from vis.page.page import Block, Section, Tile, listing, table, text
 from vis.page.plots import Array, Plot, sheet
 from vis.page.report import Progress, Report, Result, again, unit_text
+from vis.page.sentences import Sentences
 from vis.page.states import LINES, States, legend_of_runs
 from vis.page.style import styled
 from vis.pictures.frames import frame_names
@@ -23,6 +24,7 @@ from vis.tumble.pictures import draw_tumbles, moments
 
 __all__ = ["write_compare_report"]
 
+say = Sentences(__package__)
 Labels = tuple[str, str]
 
 
@@ -49,7 +51,6 @@ def write_compare_report(folder: str | Path, *, progress: Progress | None = None
 def _tumbles(report: Report, labels: Labels) -> list[Section]:
     """Figures and pictures of two tumbles."""
     result, in_space = report.result, report.result["kind"] == "tumble spatial"
-    plots = plots_in_space if in_space else plots_in_the_plane
     path, states, *ground, energy = report.draw_all(plots(result, *_columns(report.folder / result["series"]), labels))
     report.tell(0.3)
 
@@ -130,8 +131,7 @@ def _drives(report: Report, labels: Labels) -> list[Block]:
             axis.set(title=name, xlabel="depth [mm]")
         axes[0].set_ylabel("force on the spike [N]")
         legend_of_runs(drawing, labels)
-    caption = "The same drives in both: force against depth, in and out."
-    return [report.draw(Plot("drives", "Drag against depth", caption, drawing))]
+    return [report.draw(Plot.said(say, "drives", drawing))]
 
 
 def _tiles(result: Result) -> list[Tile]:

@@ -13,11 +13,13 @@ from vis.page.page import Section, Tile, table, text
 from vis.page.palette import line_handles, line_styles
 from vis.page.plots import Plot, legend_above, sheet
 from vis.page.report import Progress, Report, Result, again
+from vis.page.sentences import Sentences
 from vis.page.style import styled
 from vis.page.tumble_series import read_columns
 
 __all__ = ["write_campaign_report"]
 
+say = Sentences(__package__)
 _CHANNELS = (
     ("pose", "x_m", 1e3, "x [mm]"),
     ("pose", "y_m", 1e3, "y [mm]"),
@@ -34,12 +36,8 @@ def write_campaign_report(folder: str | Path, *, progress: Progress | None = Non
     """Make figures/ and report.html of the folder of a made-up campaign, and return the report."""
     report = Report(folder, progress, dpi=130)
     result, quantities = report.result, report.result["quantities"]
-    caption = (
-        "What camera, IMU and wheel recorded, with their noise; before 0 the platform stands still. Replicates share a "
-        "colour; at most twelve trials are drawn."
-    )
     drawing = _draw(report.folder / result["campaign"], result["trials"])
-    drawn = report.draw(Plot("recordings", "The recordings", caption, drawing))
+    drawn = report.draw(Plot.said(say, "recordings", drawing))
     report.tell(0.9)
     rows = [
         (trial["id"], f"{trial['gravity_sim']:.5g}", f"{trial['true_gravity_sim']:.5g}", f"{trial['torque']:g}",

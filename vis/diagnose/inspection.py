@@ -16,10 +16,12 @@ from vis.page.page import Section, Tile, listing, table, text
 from vis.page.palette import RED, line_handles, line_styles
 from vis.page.plots import Array, Plot, handle, legend_above, sheet
 from vis.page.report import Progress, Report, Result, again, capital
+from vis.page.sentences import Sentences
 from vis.page.style import BED, GREY, MODEL, styled
 
 __all__ = ["write_inspection_report"]
 
+say = Sentences(__package__)
 _MOST = 12
 """Trials drawn at most, those with findings first."""
 _MOST_LINES = 60
@@ -40,16 +42,11 @@ def write_inspection_report(folder: str | Path, *, progress: Progress | None = N
     """Make figures/ and report.html of the folder of a checked campaign, and return the report."""
     report = Report(folder, progress, dpi=130)
     result, quantities = report.result, report.result["quantities"]
-    recorded = (
-        "Every channel of every trial, as recorded; replicates share a colour. At most twelve trials are drawn, those "
-        "in which something was found first. Red: where, or a trial that is at odds with its replicates."
-    )
-    covered = "A line for each recording, from its first to its last row; white are gaps, red is what was found."
     with styled():
         drawing = (_draw_tumbles if result["kind"] == "tumble" else _draw_penetrations)(report)
-        drawn = [report.draw(Plot("recordings", "What was recorded", recorded, drawing))]
+        drawn = [report.draw(Plot.said(say, "inspection_recordings", drawing, name="recordings"))]
         report.tell(0.4)
-        drawn.append(report.draw(Plot("coverage", "What is there", covered, _draw_coverage(result))))
+        drawn.append(report.draw(Plot.said(say, "coverage", _draw_coverage(result))))
         report.tell(0.8)
     (trials,) = result["tables"]
     head = ("recording", "rows", "rate [Hz]", "from [s]", "to [s]", "rows with gaps", "longest gap [s]")

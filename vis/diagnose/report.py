@@ -11,43 +11,16 @@ from vis.page.numbers import plain, short
 from vis.page.page import Block, Section, Tile, listing, table, text
 from vis.page.plots import Plot
 from vis.page.report import Progress, Report, Result, again, unit_text
+from vis.page.sentences import Sentences
 from vis.page.style import styled
 
 __all__ = ["write_diagnosis_report"]
 
+say = Sentences(__package__)
 _MOST_PLACES = 8
 """Stretches that are listed."""
 _DASH = "\N{EN DASH}"
-_SEARCHED = (
-    "Every candidate in every form is in evidence.csv. Chi-square here is that of the search, beyond the noise as it "
-    "was found (its jitter, its correlation, replicates' scatter) and without those held out; the gap above is counted "
-    "with the noise that campaign.toml states, so the two are not the same number."
-)
-_FIGURES = {
-    "trajectories": (
-        "Measured and modelled",
-        "The channels in which the base model fails most, held-out trials last: left measured (dots) and modelled, "
-        "right what is left over the sensor's noise, and, where replicates differ by more, how far that is. The band "
-        "along the top is the phase of the base model's motion.",
-    ),
-    "residuals": (
-        "What is left, by phase and channel",
-        "Chi-square per sample with the noise that campaign.toml states. Trials held out took no part in fitting or "
-        "choosing.",
-    ),
-    "evidence": (
-        "What every candidate explains",
-        "The best form of each name, and of sets of names those that beat all of their parts. Left: log evidence over "
-        "the base model, tempered for misfit of form. Right: what each leaves of the trials that were fitted, and how "
-        "much of what the base model leaves beyond the noise it takes away.",
-    ),
-    "latent": (
-        "What no effect explains",
-        "What the best model lacks, over time and over what it goes with most. Shares are those of the variance that "
-        "a binned mean explains, judged on rows that took no part in making it.",
-    ),
-}
-"""Title and caption by the name of the file."""
+_FIGURES = ("trajectories", "residuals", "evidence", "latent")
 
 
 def write_diagnosis_report(folder: str | Path, *, progress: Progress | None = None) -> Path:
@@ -96,10 +69,10 @@ def _drawn(report: Report, said: Result) -> dict[str, list[Block]]:
         lambda: draw_latent(report.folder, said, channels),
     )
     drawn: dict[str, list[Block]] = {}
-    for (name, words), draw in zip(_FIGURES.items(), draws, strict=True):
+    for name, draw in zip(_FIGURES, draws, strict=True):
         with styled():
             drawing = draw()
-        drawn[name] = [] if drawing is None else [report.draw(Plot(name, *words, drawing))]
+        drawn[name] = [] if drawing is None else [report.draw(Plot.said(say, name, drawing))]
         report.tell(0.2 * len(drawn))
     return drawn
 
@@ -269,7 +242,7 @@ def _evidence(said: Result) -> list[Block]:
         blocks.append(table(head, better, title=title, words=True))
     if worse:
         blocks.append(text(f"No better than the base model with its parameters fitted: {', '.join(worse)}."))
-    blocks.append(text(_SEARCHED, small=True))
+    blocks.append(text(say("searched"), small=True))
     return blocks
 
 

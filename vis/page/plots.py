@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from vis.page.sentences import Sentences
 from vis.page.style import styled
 
 __all__ = [
@@ -35,6 +36,12 @@ class Plot:
     title: str
     caption: str
     figure: Figure
+
+    @classmethod
+    def said(cls, say: Sentences, key: str, figure: Figure, *, name: str = "", **values: Any) -> Plot:
+        """A figure called `name`, or as its key, with its title and caption from the table `key` of a package's
+        sentences."""
+        return cls(name or key, say(f"{key}.title", **values), say(f"{key}.caption", **values), figure)
 
     def save(self, folder: Path, dpi: int | None = None) -> Path:
         """Write `<folder>/<name>.png`."""

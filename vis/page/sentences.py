@@ -23,8 +23,11 @@ class Sentences:
 
     @cached_property
     def templates(self) -> dict[str, str]:
-        """Key to template, from ``sentences.toml``."""
-        return tomllib.loads(files(self.package).joinpath("sentences.toml").read_text(encoding="utf-8"))
+        """Key to template, from ``sentences.toml``; within its table ``[path]``, ``title`` has the key path.title."""
+        found = tomllib.loads(files(self.package).joinpath("sentences.toml").read_text(encoding="utf-8"))
+        groups = {name: group for name, group in found.items() if isinstance(group, dict)}
+        within = {f"{name}.{key}": text for name, group in groups.items() for key, text in group.items()}
+        return {key: text for key, text in found.items() if key not in groups} | within
 
     def __call__(self, key: str, /, **values: Any) -> str:
         """The sentence `key`, its placeholders filled. Raises KeyError for a key or a placeholder without a value."""

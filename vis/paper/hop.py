@@ -11,11 +11,14 @@ from vis.page.numbers import short
 from vis.page.page import Section, Tile, listing
 from vis.page.plots import DASHED, Plot, handle
 from vis.page.report import Progress, Report, Result, again, given
+from vis.page.sentences import Sentences
 from vis.page.states import by_state, legend_of_states, panels
 from vis.page.style import BED, GREY, MODEL, styled
 from vis.page.tumble_series import read_columns
 
 __all__ = ["write_hop_report"]
+
+say = Sentences(__package__)
 
 
 def write_hop_report(folder: str | Path, *, progress: Progress | None = None) -> Path:
@@ -62,8 +65,7 @@ def _flights(report: Report) -> Plot:
     missing = "" if first.exists() else " From rigid ground it escapes: see the warnings."
     missing += "" if other.exists() else " The planar model has no flight that ends: see the warnings."
     sought = "sought for rigid ground" if result.get("asks_for", "distance") == "distance" else "the same on both"
-    caption = f"One scale both ways. The wheel is {sought}; what gives way springs back.{missing}"
-    return Plot("flights", "The flight", caption, drawing)
+    return Plot.said(say, "flights", drawing, sought=sought, missing=missing)
 
 
 def _launch(report: Report) -> Plot:
@@ -84,11 +86,7 @@ def _launch(report: Report) -> Plot:
         path.set(xlabel="centre along the ground [mm]", ylabel="centre upwards [mm]")
         path.set_aspect("equal", adjustable="datalim")
         legend_of_states(drawing, states, (handle("launch on rigid ground", **dashed),), columns=6)
-    caption = (
-        "The planar model, events located in time. Left: speed of the centre; right: its path, both from the start of "
-        "the torque until a little after it has left."
-    )
-    return Plot("launch", f"The launch from {report.result['surface']}", caption, drawing)
+    return Plot.said(say, "launch", drawing, surface=report.result["surface"])
 
 
 def _said(result: Result, name: str, scale: float = 1.0, unit: str | None = None) -> str:

@@ -8,11 +8,13 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 
 from vis.page.plots import Plot, handle, legend_above, sheet
+from vis.page.sentences import Sentences
 from vis.page.style import GREY, INK, styled
 from vis.paper.run import PaperRun, in_order
 
 __all__ = ["figure_8", "figure_sweep"]
 
+say = Sentences(__package__)
 _MEASURES = (
     ("trajectory_angle", 180 / math.pi, "trajectory angle [degrees]"),
     ("max_speed", 1e3, "largest speed [mm/s]"),
@@ -45,12 +47,7 @@ def figure_8(paper: PaperRun) -> Plot:
         hollow = handle("the paper's 1 ms step", INK, marker="o", mfc="none", ls="", ms=7)
         dots = [handle(paper.label(t), paper.colour(t), marker="o", ls="", ms=5) for t in paper.torques]
         legend_above(drawing, [*dots, hollow, dashed], columns=3)
-    caption = (
-        "The centre's angle over its first 10 mm, and its largest speed and angular velocity before it is 40 mm away. "
-        "Bars: friction at both ends of its band; rings: the paper's fixed step. The text: about 22.5° at low torque "
-        "on brick, growing to about 60°; negative angles for the brake on grains. Sand and JSC-1A are spring-dampers."
-    )
-    return Plot("figure8", "Figure 8: angle, speed, angular velocity", caption, drawing)
+    return Plot.said(say, "figure8", drawing)
 
 
 def _draw_measures(axis: Axes, paper: PaperRun, surface: str, rig: float, key: str, scale: float, place: int) -> None:
@@ -120,11 +117,7 @@ def figure_sweep(paper: PaperRun) -> Plot | None:
             handle(f"mu_d = {ratio:g} mu_s", INK, marker="D", ls="", ms=_diamond(ratio, ratios)) for ratio in ratios
         ]
         legend_above(drawing, [*paper.handles(), *marks], columns=5)
-    caption = (
-        f"At {rig:g} g: the numbers that the paper does not give, one at a time; the line is the value as it is, with "
-        "mu_d half of mu_s on steel and brick."
-    )
-    return Plot("sweep", "What the paper does not give", caption, drawing)
+    return Plot.said(say, "sweep", drawing, rig=rig)
 
 
 def _diamond(ratio: float, ratios: Sequence[float]) -> float:

@@ -12,12 +12,14 @@ from matplotlib.patches import Patch
 
 from vis.page.plots import Array, Plot, handle, legend_above, sheet
 from vis.page.report import Result
+from vis.page.sentences import Sentences
 from vis.page.style import GREY, INK, styled
 from vis.page.tumble_series import STATES, state_runs
 from vis.paper.run import PaperRun
 
 __all__ = ["figure_5", "figure_6", "figure_7"]
 
+say = Sentences(__package__)
 _SHOWN = 0.045
 """How far Figure 5 goes [m]: a little more than what the paper trusts."""
 
@@ -69,13 +71,7 @@ def figure_5(paper: PaperRun) -> Plot | None:
         band = Patch(color=GREY, alpha=0.35, lw=0, label="friction band")
         dotted = handle("the paper's 1 ms step", INK, lw=1.1, ls=(0, (1, 1.6)))
         legend_above(drawing, [*paper.handles(), band, dotted], columns=5)
-    caption = (
-        f"Steel, {rig:g} g, to the end of the first hop or {1e3 * _SHOWN:g} mm from the start (the paper trusts its "
-        "rig for 40 mm). Shaded: between friction at both ends of its band. Dotted: the paper's fixed step, at most "
-        f"{gap:.2g} mm from the located integrator at the same time. Dashed: the angles that the text states for low "
-        "and high torque."
-    )
-    return Plot("figure5", "Figure 5: the start on steel", caption, drawing)
+    return Plot.said(say, "figure5", drawing, rig=rig, shown=1e3 * _SHOWN, gap=gap)
 
 
 _ROWS = (("low", "μ low"), ("nominal", "μ"), ("high", "μ high"), ("paper", "1 ms step"))
@@ -104,12 +100,7 @@ def figure_6(paper: PaperRun) -> Plot | None:
         handles = [handle(name, colour, lw=6) for name, colour in STATES.items()]
         handles.append(handle("first hop", INK, marker="v", ls="", ms=5))
         legend_above(drawing, handles, columns=5)
-    caption = (
-        f"State by angle at {rig:g} g, up to {widest:g} degrees or the end of the trial; in each panel friction low, "
-        "as it is and high by the located integrator, and the paper's fixed step. The text: at the brake's torque the "
-        "platform slips almost at once, and short tumbles end in a brief hop (triangle: the first one begins)."
-    )
-    return Plot("figure6", "Figure 6: pivot, slip, hop", caption, drawing)
+    return Plot.said(say, "figure6", drawing, rig=rig, widest=widest)
 
 
 def _state_bar(axis: Axes, paper: PaperRun, case: Result, row: int) -> None:
@@ -165,12 +156,8 @@ def figure_7(paper: PaperRun) -> Plot | None:
         gravities = [handle(f"{rig:g} g", INK, ls=style, lw=1.6) for rig, style in styles.items()]
         band = Patch(color=GREY, alpha=0.35, lw=0, label="friction band")
         legend_above(drawing, [*paper.handles(), *gravities, band], columns=6)
-    caption = (
-        "The first hop of each trial, extrapolated without a ground from where it begins until it is back at that "
-        "height; above those of the motors, below all. Shaded: friction at both ends of its band."
-        + (f" No hop that rises: {'; '.join(flat)}." if flat else "")
-    )
-    return Plot("figure7", "Figure 7: hops as parabolas", caption, drawing)
+    missing = f" No hop that rises: {'; '.join(flat)}." if flat else ""
+    return Plot.said(say, "figure7", drawing, missing=missing)
 
 
 def _motors(paper: PaperRun) -> list[float]:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from vis.page.page import Section, Tile, table, text
 from vis.page.report import Progress, Result, again
+from vis.page.sentences import Sentences
 from vis.paper.assumed import grains_blocks, ours, sliding_blocks
 from vis.paper.measures import figure_8, figure_sweep
 from vis.paper.paths import figure_5, figure_6, figure_7
@@ -18,12 +19,8 @@ from vis.paper.run import PaperRun
 
 __all__ = ["write_paper_report"]
 
+say = Sentences(__package__)
 _FIGURES = (figure_5, figure_6, figure_7, figure_8, figure_sweep)
-_ABOUT = (
-    "Reid, Roveda, Nesnas and Pavone, “Contact Dynamics of Internally-Actuated Platforms for the Exploration of Small "
-    "Solar System Bodies” (i-SAIRAS 2014), with our model. The paper's curves are printed in no table, so none of them "
-    "is drawn here: only what its text states in numbers."
-)
 _MEASURES = (
     ("trajectory_angle", 180 / math.pi),
     ("max_speed", 1e3),
@@ -56,7 +53,7 @@ def write_paper_report(folder: str | Path, *, progress: Progress | None = None) 
     numbers = [_number_row(paper, case) for case in paper.cases if case["variant"] == "nominal"]
     small = "In brackets: friction at both ends of its band; after the semicolon: the paper's 1 ms step."
     sections = [
-        Section("", [text(_ABOUT)]),
+        Section("", [text(say("about"))]),
         Section("What the text states, and what comes out", [table(_CLAIMS, _claims(result), words=True)]),
         Section("The figures", list(blocks.values())),
         Section("What the paper does not give", [*swept, *sliding_blocks(paper), *grains_blocks(paper)]),

@@ -13,11 +13,14 @@ from numpy.typing import NDArray
 from vis.page.folder import Run, RunFolder, Series
 from vis.page.numbers import plain, quote, short
 from vis.page.plots import DASHED, Array, Plot, handle, legend_above, new_panels, sheet
+from vis.page.sentences import Sentences
 from vis.page.style import BED, GREY, INK, MODEL, styled
 from vis.penetrate.plot_parts import above_surface, by_speed, has_model, pair_of_handles, speed_words, spread_words
 from vis.penetrate.summary_parts import Departure, departure_rows, value_of
 
 __all__ = ["drag_plot", "gap_plot", "work_plot"]
+
+say = Sentences(__package__)
 
 
 def drag_plot(run: RunFolder) -> Plot | None:
@@ -61,20 +64,15 @@ def drag_plot(run: RunFolder) -> Plot | None:
         legend_above(figure, handles)
     many = any(sum(r.speed == s for r in driven) > 1 for s in speeds)
     width = _bin_width([_way(r.bed, "in") for r in driven])
-    spread = f"Thick: mean over {width} of depth" if width else "Thick: mean over slices of depth"
-    spread += f"{' and over the beds' if many else ''}. Faint: as recorded{', each bed' if many else ''}. "
-    spread += "Band: one standard deviation between beds. " if many else ""
-    if above:
-        spread += (
-            "Left of 0, pale: before the tip has reached the surface it is carried by grains that stick out of it; the "
-            "fit leaves that out. "
-        )
-    if law:
-        spread += "Dashed: the fitted spring-damper in the same motion"
-        spread += "; dotted: its way out, predicted, not fitted." if out else "."
+    parts = [
+        say("drag_thick", width=width or "slices"),
+        say("drag_beds") if many else say("drag_bed"),
+        say("drag_left") if above else "",
+        say("drag_law") + say("drag_law_out" if out else "drag_law_in") if law else "",
+    ]
     moved = f"driven in{' and pulled out' if out else ''}"
-    caption = f"The ground's force on the spike, upwards, while it is {moved} at constant speed. {spread}".strip()
-    return Plot("drag", "Drag against depth", caption, figure)
+    caption = say("drag.caption", moved=moved, parts="".join(parts)).strip()
+    return Plot("drag", say("drag.title"), caption, figure)
 
 
 def gap_plot(run: RunFolder) -> Plot | None:
@@ -117,12 +115,8 @@ def gap_plot(run: RunFolder) -> Plot | None:
         bar = figure.colorbar(image, ax=axis, pad=0.015, fraction=0.05)
         bar.set_label("spring-damper − bed [N]")
         bar.outline.set_visible(False)
-    caption = (
-        "Mean drag of the spring-damper minus the bed's on the way in, by depth and speed; in brackets as a share of "
-        "the bed's. Orange: the spring-damper pushes back too hard; purple: too softly."
-        + (" Below: of how many beds; ±: the standard deviation of the bed's drag between them." if told else "")
-    )
-    return Plot("gap", "Where the spring-damper departs", caption, figure)
+    told_below = say("gap_told") if told else ""
+    return Plot.said(say, "gap", figure, told=told_below)
 
 
 def work_plot(run: RunFolder) -> Plot | None:
@@ -157,11 +151,7 @@ def work_plot(run: RunFolder) -> Plot | None:
             axis.axhline(0.0, color=GREY, lw=0.8)
         _label(axes, "speed [m/s]", "work [mJ]")
         legend_above(figure, pair_of_handles(bars=True)[: 2 if law else 1])
-    caption = (
-        "Work done on the ground on the way in, and got back from it on the way out; below zero, pulling out took "
-        f"work as well.{_returned_words(driven)}{spread_words(driven)}"
-    )
-    return Plot("work", "Work in and out", caption, figure)
+    return Plot.said(say, "work", figure, words=_returned_words(driven) + spread_words(driven))
 
 
 def _label(axes: list[Axes], x: str, y: str) -> None:

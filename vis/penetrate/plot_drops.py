@@ -9,11 +9,14 @@ from vis.page.folder import Run, RunFolder, Series
 from vis.page.numbers import quote
 from vis.page.plots import DASHED, Array, Plot, handle, legend_above, new_panels, sheet
 from vis.page.report import capital
+from vis.page.sentences import Sentences
 from vis.page.style import BED, GREY, INK, MODEL, styled
 from vis.penetrate.plot_parts import above_surface, by_speed, has_model, pair_of_handles, speed_words, spread_words
 from vis.penetrate.summary_parts import fit_error, joined, std_of, value_of
 
 __all__ = ["drop_peaks_plot", "drops_plot", "set_down_plot", "spread_plot"]
+
+say = Sentences(__package__)
 
 
 def drops_plot(run: RunFolder) -> Plot | None:
@@ -68,14 +71,8 @@ def drops_plot(run: RunFolder) -> Plot | None:
         bed, *model = pair_of_handles()[: 2 if has_model(drops) else 1]
         legend_above(figure, [bed, recorded, *model, peaks])
     each = ", a line for each bed" if len({(r.speed, r.seed) for r in drops}) > len(speeds) else ""
-    caption = (
-        f"Depth (downwards) and the ground's force against time since touch-down{each}. Of the bed's force the running "
-        f"mean over {quote(window, 0.0, 's')} is drawn full, what was recorded faint; the peaks are those of what was "
-        "recorded."
-        + (" Left of 0, pale: grains that stick out of the surface, which the fit leaves out." if free else "")
-        + (" The fit uses each drop up to its first stop; what follows is predicted." if has_model(drops) else "")
-    )
-    return Plot("drops", "Drops", caption, figure)
+    left, later = say("drops_left") if free else "", say("drops_later") if has_model(drops) else ""
+    return Plot.said(say, "drops", figure, each=each, window=quote(window, 0.0, "s"), left=left, later=later)
 
 
 def drop_peaks_plot(run: RunFolder) -> Plot | None:
@@ -107,8 +104,7 @@ def drop_peaks_plot(run: RunFolder) -> Plot | None:
         law = any(value_of(r.quantities, "model_peak_force") is not None for r in drops)
         legend_above(figure, pair_of_handles(markers=True)[: 2 if law else 1])
     listed = joined([title[0].lower() + title[1:] for _, title, *_ in columns])
-    caption = f"{capital(listed)} of the drops by their speed at touch-down.{spread_words(drops)}"
-    return Plot("drop_peaks", "Peaks of the drops", caption, figure)
+    return Plot.said(say, "drop_peaks", figure, listed=capital(listed), spread=spread_words(drops))
 
 
 def set_down_plot(run: RunFolder) -> Plot | None:
@@ -224,12 +220,7 @@ def spread_plot(run: RunFolder) -> Plot | None:
             axis.grid(False, axis="x")
     known = any(fit_error(f, key) is not None for f in fits for key in ("stiffness", "damping"))
     bars = "; bars: standard error of the fit" if known else "; how well each fit is determined is not known"
-    caption = (
-        f"The spring-damper fitted to each bed by itself, on the runs that every bed has{bars}. Line: fitted to all "
-        "runs of all beds; band: one standard deviation between beds about it. K and C of one bed are not independent: "
-        "where one comes out high the other comes out low. The axes do not start at zero."
-    )
-    return Plot("spread", "Spread between beds", caption, figure)
+    return Plot.said(say, "spread", figure, bars=bars)
 
 
 def _first_touch(series: Series | None) -> float:

@@ -10,14 +10,12 @@ import numpy as np
 from vis.film.film import MOST_FRAMES, draw_reels
 from vis.film.reel import SpaceReel
 from vis.page.report import Progress
+from vis.page.sentences import Sentences
 from vis.pictures.pictures import Pictures
 
 __all__ = ["ARROWS", "draw_in_space"]
 
-ARROWS = (
-    "Red arrows: the force on a spike, to the scale of the weight's above the picture; on the spring-damper without "
-    "friction."
-)
+ARROWS = Sentences(__package__)("arrows")
 
 
 def draw_in_space(

@@ -15,6 +15,7 @@ from vis.page.numbers import quantity
 from vis.page.page import Block, Section, Tile, listing, table, text
 from vis.page.plots import DASHED, DOTTED, Array, Plot, legend_above, mean_over, sheet
 from vis.page.report import Progress, Report, Result, again, given, number_text, unit_text
+from vis.page.sentences import Sentences
 from vis.page.states import States, draw_bands, draw_states, passages
 from vis.page.style import BED, GREY, INK, MODEL, styled
 from vis.page.tumble_series import read_columns
@@ -24,6 +25,7 @@ from vis.spatial.pictures import ARROWS, draw_in_space
 
 __all__ = ["write_spatial_report"]
 
+say = Sentences(__package__)
 Columns = Mapping[str, Array]
 _AXES = {"x": BED, "y": "#009E73", "z": MODEL}
 _TURN = "turn from the start [degrees]"
@@ -112,34 +114,24 @@ def _numbers(result: Result) -> Block:
 def _states(home: Path, path: Columns, states: States) -> list[Plot]:
     """The states over time and turn, and on grains those of the spring-damper beside them."""
     turn = np.degrees(path["turn_rad"])
-    caption = (
-        "Left: the angle of the one turn from the start, at most 180 degrees. Right: state against it: stand (three "
-        "spikes stick that are not in a line), pivot (those that stick lie in one line, or one does), slip (all that "
-        "touch slide), hop (none touches)."
-    )
-    plots = [Plot("states", "Pivot, slip, hop", caption, draw_states(path["t_s"], turn, states, label=_TURN))]
+    plots = [Plot.said(say, "states", draw_states(path["t_s"], turn, states, label=_TURN))]
     beside = home / "series" / "spring-damper.csv"
     if beside.exists():
         other, others = read_columns(beside)
         runs = [(path["t_s"], turn, states), (other["t_s"], np.degrees(other["turn_rad"]), others)]
         with styled():
             bands = draw_bands(runs, ("grains", "spring-damper"), label=_TURN)
-        caption = "The same trial on both: above the turn, below the states."
-        plots.append(Plot("beside", "Grains and spring-damper", caption, bands))
+        plots.append(Plot.said(say, "beside", bands))
     return plots
 
 
 def _plots(path: Columns, motion: Columns) -> list[Plot]:
     with styled():
         return [
-            Plot("path", "Where it goes", "Way of the centre of mass from its start, and its velocity.",
-                 _draw_path(path)),
-            Plot("turning", "How it turns", "Angular velocity in axes of the ground; speeds of its wheels.",
-                 _draw_turning(path, motion)),
-            Plot("ground", "What the ground does", "Force on the platform, mean over 5 ms; depth of the deepest spike.",
-                 _draw_ground(motion)),
-            Plot("energy", "The energy book", "Left: what the torques put in, what the platform gained, what the "
-                 "ground took. Right: what is left over of platform and exchange.", _draw_energy(motion)),
+            Plot.said(say, "path", _draw_path(path)),
+            Plot.said(say, "turning", _draw_turning(path, motion)),
+            Plot.said(say, "ground", _draw_ground(motion)),
+            Plot.said(say, "energy", _draw_energy(motion)),
         ]  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from vis.page.numbers import short
 from vis.page.page import Section, figure, table, text
 from vis.page.plots import DASHED, Array, Plot, legend_above, mean_over, sheet
 from vis.page.report import Result
+from vis.page.sentences import Sentences
 from vis.page.states import States
 from vis.page.style import BED, GREY, INK, MODEL, as_it_lies, styled
 from vis.tumble.beside import HEAD, beside_rows, beside_words
@@ -21,23 +22,7 @@ __all__ = ["grains_section"]
 Columns = Mapping[str, Array]
 _ROWS = (BED, MODEL, "#009E73", "#CC79A7", GREY, "#56B4E9", "#E69F00", INK)
 """Colours of the rows of spikes."""
-_FIGURES = {
-    "beside": (
-        "Grains and spring-damper",
-        "The same trial on the bed of grains and on the spring-damper of the same surface.",
-    ),
-    "feet": (
-        "What each row feels",
-        "Above: upward force, mean over 5 ms. Below: how deep its lowest point is under the surface.",
-    ),
-    "books": (
-        "Where the energy went",
-        "Left: work of the torque; energy that platform and counterweight gained; what the grains hold more (moving, "
-        "lifted, in springs), and lost to dashpots, friction and rolling resistance: all measured, none by difference. "
-        "Right: what is left over, of all together and of platform and exchange alone.",
-    ),
-}
-"""Title and caption by the name of the file."""
+say = Sentences(__package__)
 
 
 def grains_section(result: Result, figures: Path, tables: Mapping[str, tuple[Columns, States]]) -> Section:
@@ -45,12 +30,12 @@ def grains_section(result: Result, figures: Path, tables: Mapping[str, tuple[Col
     columns = {name: held for name, (held, _) in tables.items()}
     with styled():
         plots = [
-            Plot("beside", *_FIGURES["beside"], _draw_paths(columns["own"], columns["beside"])),
-            Plot("feet", *_FIGURES["feet"], _draw_feet(columns["feet"])),
+            Plot.said(say, "beside", _draw_paths(columns["own"], columns["beside"])),
+            Plot.said(say, "feet", _draw_feet(columns["feet"])),
         ]
         if "damping_lost_J" in columns.get("bed", {}):
             book = _books(columns["motion"], columns["feet"], columns["bed"])
-            plots.append(Plot("books", *_FIGURES["books"], _draw_books(book)))
+            plots.append(Plot.said(say, "books", _draw_books(book)))
     drawn = [figure(plot.save(figures, 130), title=plot.title, caption=plot.caption) for plot in plots]
     grains = result["grains"]
     facts = (

@@ -16,6 +16,7 @@ from vis.page.numbers import quantity, short
 from vis.page.page import Block, Section, Tile, figure, table, text
 from vis.page.plots import DASHED, DOTTED, Array, Plot, handle
 from vis.page.report import Progress, Report, Result, again, given
+from vis.page.sentences import Sentences
 from vis.page.states import States, by_state, draw_states, legend_of_states, panels, passages
 from vis.page.style import BED, GREY, INK, MODEL, styled
 from vis.page.tumble_series import STATES, read_columns
@@ -26,16 +27,12 @@ from vis.tumble.sweep import sweep_section
 
 __all__ = ["write_tumble_report"]
 
+say = Sentences(__package__)
 Columns = Mapping[str, Array]
 _FOLLOWED = 1.2
 """How far from its start the animation follows the centre [m]."""
 _JOULES = (("mJ", 1.0), ("µJ", 1e3), ("nJ", 1e6), ("pJ", 1e9), ("fJ", 1e12))
 """Units of energy, and how many of them a mJ has."""
-_CAMERA = (
-    "In front of the spikes' plane the grains are left out. Red arrows: the force on a row, to the scale of the "
-    "weight's above the picture; one that would leave the picture ends at its edge, with its number. The black line "
-    "from the centre to where row 0 begins shows how far the platform has turned."
-)
 
 
 def write_tumble_report(
@@ -69,9 +66,8 @@ def write_tumble_report(
         _animate(home / "animation.gif", result, numbers, states),
         half=True,
         show_file=True,
-        title="The section of the platform on its way",
-        caption=f"In real time, until the centre is {_FOLLOWED:g} m away; a spike stands for the row at its corner. "
-        "The dot is the centre, behind it the way it has come, both in the colour of the state of that moment.",
+        title=say("moving.title"),
+        caption=say("moving.caption", far=_FOLLOWED),
     )
     tell(0.4)
     sections = [
@@ -95,7 +91,7 @@ def write_tumble_report(
         sections.insert(1, grains_section(result, report.figures, held | {"motion": (motion, states)}))
     if pictures if pictures is not None else "grains" in result and (home / "frames" / "tumble.pvd").exists():
         seen = make_tumble_pictures(home, by=colour, film=film, progress=lambda done: tell(0.4 + 0.55 * done))
-        notes = [text(_CAMERA, small=True), *(text(note) for note in seen.notes)]
+        notes = [text(say("camera"), small=True), *(text(note) for note in seen.notes)]
         sections.insert(1, Section("Seen from near", [*shown(seen), *notes]))
     lead = ["tumble", f"{result['duration']:g} s", f"{len(numbers['t_s'])} rows"]
     return report.write(sections, lead=lead, tiles=_tiles(result))
@@ -156,11 +152,7 @@ def _trajectory(result: Result, numbers: Columns, states: States) -> Plot:
         other.spines["right"].set_visible(True)
         legend_of_states(drawing, states, more)
     shape = " in proportion" if far >= 1e-4 else ", heights stretched"
-    caption = (
-        f"Left: path of the geometric centre{shape}, coloured by state, from the dot on. Right: speed of the "
-        "centre, and angular velocity (dotted)."
-    )
-    return Plot("trajectory", "The path", caption, drawing)
+    return Plot.said(say, "trajectory", drawing, shape=shape)
 
 
 def _draw_path(path: Axes, numbers: Columns, states: States, far: float, angle: float | None) -> str:
@@ -186,11 +178,7 @@ def _draw_path(path: Axes, numbers: Columns, states: States, far: float, angle: 
 
 def _states(numbers: Columns, states: States) -> Plot:
     drawing = draw_states(numbers["t_s"], np.degrees(numbers["theta_rad"]), states)
-    caption = (
-        "Left: the angle over time. Right: state against angle, as in Figure 6 of the paper: stand (two or more spikes "
-        "stick), pivot (one sticks), slip (all that touch slide), hop (none touches)."
-    )
-    return Plot("states", "Pivot, slip, hop", caption, drawing)
+    return Plot.said(say, "states", drawing)
 
 
 def _energy(result: Result, motion: Columns) -> Plot:
@@ -211,11 +199,7 @@ def _energy(result: Result, motion: Columns) -> Plot:
         rest.set(xlabel="time [s]", ylabel=f"gained − work + dissipated [{unit}]")
     own = result["quantities"].get("coupling_residual")
     residual_words = quantity(own if own is not None else result["quantities"].get("energy_residual"))
-    caption = (
-        f"Left: what the torque put in, what the platform, counterweight and surface hold, and what friction and "
-        f"damping took. Right: what is left over. Its largest, over the work of the torque or W l, is {residual_words}."
-    )
-    return Plot("energy", "The energy book", caption, drawing)
+    return Plot.said(say, "energy", drawing, residual_words=residual_words)
 
 
 def _animate(path: Path, result: Result, numbers: Columns, states: States) -> Path:

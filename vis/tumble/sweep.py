@@ -13,10 +13,12 @@ from matplotlib.figure import Figure
 from vis.page.page import Section, listing
 from vis.page.plots import Array, Plot, legend_above, sheet
 from vis.page.report import Report, Result, tables
+from vis.page.sentences import Sentences
 from vis.page.style import BED, styled
 
 __all__ = ["sweep_section"]
 
+say = Sentences(__package__)
 _PANELS = (
     ("trajectory_angle_rad", 180 / math.pi, "trajectory angle [degrees]"),
     ("max_speed_m_s", 1.0, "largest speed [m/s]"),
@@ -32,11 +34,7 @@ def sweep_section(report: Report) -> Section:
     with styled():
         drawing = _draw(sweep["keys"], report.columns(sweep["file"]))
     names = " and ".join(key["key"] for key in sweep["keys"])
-    caption = (
-        f"{sweep['trials']} trials by the batched model, nothing but {names} changed. Gaps: the centre never got 10 mm "
-        "away, or the platform cannot stand."
-    )
-    drawn = report.draw(Plot("sweep", f"Over {names}", caption, drawing))
+    drawn = report.draw(Plot.said(say, "sweep", drawing, trials=sweep["trials"], names=names))
     told = tables(report.result) if "tables" in report.result else []
     return Section("The sweep", [drawn, *told, listing(sweep["sentences"])])
 

@@ -168,7 +168,7 @@ def test_defaults_can_be_run():
 
 def test_the_line_above_which_a_face_has_fallen_is_drawn_where_it_falls():
     assert bed_cut.FALLEN_SHARE == cutting.FALLEN_SHARE
-    assert "A face has fallen once a fifth of the grains" in " ".join(bed_cut.CUT_METHOD)
+    assert "A face has fallen once a fifth of the grains" in bed_cut.say("cut_method_1")
 
 
 @pytest.mark.parametrize(
