@@ -20,12 +20,6 @@ __all__ = ["summarise"]
 
 _REAL_GRAINS = {"sand": 2e-4}
 """Diameter of real grains [m]: 0.2 mm is where fine sand ends and medium sand begins (ISO 14688-1)."""
-_STATUS = {
-    "stopped": "This run was stopped before it was finished; what follows is what it had by then. `hedgebed resume` on "
-    "its folder finishes it.",
-    "failed": "This run failed; what follows is what it had by then.",
-    "running": "This run was still under way when the report was written; what follows is what it had by then.",
-}
 
 
 def summarise(run: RunFolder) -> dict[str, Any]:
@@ -67,7 +61,8 @@ def summarise(run: RunFolder) -> dict[str, Any]:
 def _banner(run: RunFolder) -> str:
     if run.status == "done":
         return ""
-    text = _STATUS.get(run.status, "" if run.result else "Whether this run was finished is not known.")
+    unknown = "" if run.result else "Whether this run was finished is not known."
+    text = words.say.templates.get(f"status_{run.status}", unknown)
     reason = f" Reason: {words.sentence(run.reason)}" if run.reason and text else ""
     return text + reason
 

@@ -7,12 +7,13 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
 from vis.page.folder import PYTHON_RUNS, Run, RunFolder, Setting
 from vis.page.numbers import column, plain, quantity, quote, short
+from vis.page.sentences import Sentences
 
 __all__ = [
     "Departure", "NBSP", "SHARES", "Table", "bed_part", "cell_text", "departure_rows", "departures_part",
@@ -22,45 +23,7 @@ __all__ = [
 ]  # fmt: skip
 
 NBSP = "\N{NO-BREAK SPACE}"
-_NAMES = {
-    "stiffness": "stiffness K",
-    "damping": "damping C",
-    "stiffness_error": "stiffness K, standard error of the fit",
-    "damping_error": "damping C, standard error of the fit",
-    "sinkage_dem": "sinkage at rest, bed",
-    "sinkage_spring_damper": "sinkage at rest, spring-damper",
-    "drag_gap": "drag gap, spring-damper against bed",
-    "work_returned_dem": "work given back, bed",
-    "work_returned_amended": "work given back, model's law",
-    "sinkage_amended": "sinkage, model's law",
-    "force_gap_spring_damper": "off over whole driven runs, spring-damper",
-    "force_gap_amended": "off over whole driven runs, model's law",
-    "work_returned_spring_damper": "work given back, spring-damper",
-    "load": "load set down",
-    "drop_mass": "mass dropped",
-    "stiffness_standing": "stiffness for a foot that stands (load over sinkage)",
-    "surface_force": "force at depth 0, driven",
-    "surface_roughness": "how far grains stick out under the tip",
-    "grain_count": "grains",
-    "packing_fraction": "packing fraction",
-    "coordination_number": "contacts per grain",
-    "surface": "height of the surface above the floor",
-    "young": "Young's modulus of the softened grains",
-    "time_step": "time step",
-    "max_overlap": "largest overlap of two grains",
-    "size": "size (x, y, depth)",
-    "grain": "mean diameter of a grain",
-    "grain_diameter": "mean diameter of a grain",
-    "spread": "spread of the diameters",
-    "gravity": "gravity of the grains",
-    "seeds": "seeds",
-    "material": "material",
-    "pressure": "pressure expected under the tip",
-    "speed": "speed expected",
-    "real": "Young's modulus of the real grain",
-    "factor": "softer than the real grain by a factor of",
-    "overlap": "overlap expected",
-}
+say = Sentences(__package__)
 _UNITS = {
     "size": "m", "grain": "m", "grain_diameter": "m", "surface": "m", "gravity": "m/s2", "young": "Pa", "real": "Pa",
     "pressure": "Pa", "time_step": "s",
@@ -154,7 +117,7 @@ def cell_text(key: str, value: Any) -> str:
 
 def label_of(key: str) -> str:
     """The name of a key, as a person reads it."""
-    return _NAMES.get(key, key.replace("_", " "))
+    return say.templates.get(f"label.{key}", key.replace("_", " "))
 
 
 def mapping_of(value: Any) -> Mapping[str, Any]:
@@ -224,12 +187,16 @@ def sentence(text: str) -> str:
     return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".") if text else ""
 
 
-#: {"head": [...], "rows": [[...], ...]}; the first column is text, the others are numbers unless "text" is set.
-Table = dict[str, Any]
+class Table(TypedDict, total=False):
+    """The first column is text, the others are numbers unless `text`."""
+
+    head: list[str]
+    rows: list[list[str]]
+    text: bool
+
+
+_OF_THE_BED = ("grain_count", "packing_fraction", "coordination_number", "surface", "young", "time_step", "max_overlap")
 _BARE_UNITS = {"1", "m", "m/s", "m/s2", "s", "kg", "N", "N/m", "N s/m", "Pa", "degrees"}
-
-
-# ---- tables --------------------------------------------------------------------------------------------------------
 
 
 def fit_part(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -238,42 +205,26 @@ def fit_part(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> dict[s
         return None
     own = [mapping_of(fit) for fit in list_of(result.get("fits"))]
     one = len(own) < 2
-    rows = [
-        [
-            "this bed" if one else "all beds together",
-            fitted(quantities, "stiffness"),
-            fitted(quantities, "damping"),
-            quantity(quantities.get("drag_gap"), unit="%"),
-        ]
-    ]
-    if one:
-        said = "± is the standard error of the fit, leaving out one run at a time; how much K and C differ from bed to "
-        said += "bed is not known."
-        known = value_of(quantities, "stiffness_error") is not None
-        return {"table": {"head": ["fitted to", "K", "C", "drag gap"], "rows": rows}, "note": said if known else ""}
-    for i, fit in enumerate(own):
-        rows.append(
-            [
-                f"bed {fit.get('seed', i + 1)} by itself",
-                quote(value_of(fit, "stiffness"), fit_error(fit, "stiffness"), "N/m"),
-                quote(value_of(fit, "damping"), fit_error(fit, "damping"), "N s/m"),
-                quote(value_of(fit, "drag_gap"), None, "%") if "drag_gap" in fit else "\N{EN DASH}",
-            ]
-        )
+    gap = quantity(quantities.get("drag_gap"), unit="%")
+    together = "this bed" if one else "all beds together"
+    rows = [[together, fitted(quantities, "stiffness"), fitted(quantities, "damping"), gap]]
+    for i, fit in enumerate([] if one else own):
+        gap = quote(value_of(fit, "drag_gap"), None, "%") if "drag_gap" in fit else "\N{EN DASH}"
+        units = {"stiffness": "N/m", "damping": "N s/m"}
+        numbers = (quote(value_of(fit, key), fit_error(fit, key), unit) for key, unit in units.items())
+        rows.append([f"bed {fit.get('seed', i + 1)} by itself", *numbers, gap])
     errors = [
         f"{name} {quantity(quantities[key])}"
         for name, key in (("K", "stiffness_error"), ("C", "damping_error"))
         if value_of(quantities, key) is not None
     ]
-    said_of: list[str] = []
-    if errors:
-        said_of.append(f"Standard error of the fit to all beds, leaving out one run at a time: {joined(errors)}.")
-    if any(fit_error(fit, key) is not None for fit in own for key in ("stiffness", "damping")):
-        said_of.append(
-            "± is the spread between beds in the first row, the standard error of that bed's fit in the others."
-        )
-    note = " ".join(said_of)
-    return {"table": {"head": ["fitted to", "K", "C", "drag gap"], "rows": rows}, "note": note}
+    if one:
+        notes = [say("fit_one_bed")] if value_of(quantities, "stiffness_error") is not None else []
+    else:
+        told = any(fit_error(fit, key) is not None for fit in own for key in ("stiffness", "damping"))
+        notes = [say("fit_errors", errors=joined(errors))] if errors else []
+        notes += [say("fit_spread")] if told else []
+    return {"table": {"head": ["fitted to", "K", "C", "drag gap"], "rows": rows}, "note": " ".join(notes)}
 
 
 def departures_part(result: Mapping[str, Any]) -> dict[str, Any]:
@@ -313,14 +264,8 @@ def reference_part(result: Mapping[str, Any]) -> dict[str, Any] | None:
         moved = mapping_of(entry)
         unit = "%" if key in SHARES else str(moved.get("unit") or "1")
         change = plain_value(moved.get("change"))
-        rows.append(
-            [
-                label_of(key),
-                quote(plain_value(moved.get("before")), plain_value(moved.get("before_std")), unit),
-                quote(plain_value(moved.get("now")), plain_value(moved.get("now_std")), unit),
-                signed_percent(change) if change is not None else "\N{EN DASH}",
-            ]
-        )
+        sides = (quote(*(plain_value(moved.get(name)) for name in (of, f"{of}_std")), unit) for of in ("before", "now"))
+        rows.append([label_of(key), *sides, "\N{EN DASH}" if change is None else signed_percent(change)])
     if not rows:
         return None
     return {"file": str(reference.get("file") or ""), "table": {"head": ["", "there", "here", "change"], "rows": rows}}
@@ -331,17 +276,7 @@ def bed_part(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> dict[s
     bed = mapping_of(result.get("bed"))
     listed = [mapping_of(entry) for entry in list_of(bed.get("seeds")) if isinstance(entry, Mapping)]
     own = {key: value for key, value in bed.items() if not (key == "seeds" and listed) and key != "softening"}
-    for key in (
-        "grain_count",
-        "packing_fraction",
-        "coordination_number",
-        "surface",
-        "young",
-        "time_step",
-        "max_overlap",
-    ):
-        if key in quantities:
-            own[key] = quantities[key]
+    own |= {key: quantities[key] for key in _OF_THE_BED if key in quantities}
     seeds = None
     if len(listed) > 1:
         keys = [key for key in listed[0] if key != "seed"]
@@ -353,22 +288,17 @@ def bed_part(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> dict[s
 
 def runs_table(run: RunFolder) -> Table | None:
     """The runs, one a row."""
-    columns = [
-        ("depth", "max_depth", "m"),
-        ("at rest", "sinkage", "m"),
-        ("peak force", "peak_force", "N"),
-        ("work in", "work_in", "J"),
-        ("work out", "work_out", "J"),
-        ("drag gap", "drag_gap", "%"),
-    ]
+    units = {"max_depth": "m", "sinkage": "m", "peak_force": "N", "work_in": "J", "work_out": "J", "drag_gap": "%"}
+    titles = {"max_depth": "depth", "sinkage": "at rest"}
     runs = [r for kind in ("driven", "drop", "set_down") for r in run.of_kind(kind)]
     runs += [r for r in run.runs if r not in runs]
     many = len({r.seed for r in runs}) > 1
     head, cells = ["run"], [[run_words(r, which_bed=many) for r in runs]]
-    for title, key, unit in columns:
+    for key, unit in units.items():
         bed = [value_of(r.quantities, key) for r in runs]
         model = [value_of(r.quantities, f"model_{key}") for r in runs]
         shown, texts = column([*bed, *model], unit)  # one unit for both
+        title = titles.get(key, key.replace("_", " "))
         for name, values, part in ((title, bed, texts[: len(runs)]), ("spring-damper", model, texts[len(runs) :])):
             if any(value is not None for value in values):
                 head.append(f"{name} [{shown}]")
