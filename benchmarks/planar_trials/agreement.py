@@ -93,14 +93,13 @@ class Agreement:
     def summary(self) -> dict[str, Any]:
         """What goes into bench.json."""
         names = dict(zip(CHANNELS, self.differences.T, strict=True))
+        plain = [ratio for ratio, kind in zip(self.ratios, self.kinds, strict=True) if kind != "branch"]
         return {
             "trials": len(self.kinds),
             "tolerance": TOLERANCE,
             "share_promised": SHARE_WITHIN,
             "counts": {kind: self.kinds.count(kind) for kind in ("within", "step", "branch", "unexplained")},
-            "largest_over_tolerance_no_branch": float(
-                max((r for r, kind in zip(self.ratios, self.kinds, strict=True) if kind != "branch"), default=0.0)
-            ),
+            "largest_over_tolerance_no_branch": float(max(plain, default=0.0)),
             "differences": {
                 name: {
                     "median": float(np.median(values)),
@@ -188,13 +187,11 @@ def _batched(trials: Sequence[Trial], time_step: float) -> tuple[Array, NDArray[
 
 def _branches(trial: Trial, path: Array) -> bool:
     """Whether the accurate integrator, pushed a little at the start, leaves its own `path`."""
-    moved = [
-        max(
-            float((np.abs(_pushed(trial, size, np.random.default_rng(k)) - path) / _LIMITS).max())
-            for k in range(_DIRECTIONS)
-        )
-        for size in _PUSHES
-    ]
+
+    def off(size: float, k: int) -> float:
+        return float((np.abs(_pushed(trial, size, np.random.default_rng(k)) - path) / _LIMITS).max())
+
+    moved = [max(off(size, k) for k in range(_DIRECTIONS)) for size in _PUSHES]
     growth = _PUSHES[1] / _PUSHES[0]
     return moved[0] > 1 or moved[1] > max(1.0, _JUMP * growth * moved[0])
 

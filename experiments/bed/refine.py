@@ -59,13 +59,9 @@ def refined_options(settings: BedRefineSettings) -> tuple[Json, Prepared]:
         "stages": stages,
         "size": tuple(recipe["size"]),
         "grain": _scaled(sizes, share),
-        "gravity": recipe["gravity"],
         "seed": recipe["seed"] if settings.seed is None else settings.seed,
-        "max_overlap": recipe["max_overlap"],
-        "precision": recipe["precision"],
-        "arch": recipe["arch"],
         "threads": settings.threads,
-    }
+    } | {key: recipe[key] for key in ("gravity", "max_overlap", "precision", "arch")}
     if recipe["floor"] is not None:
         from dem.grains.materials import Facing
 

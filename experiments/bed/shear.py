@@ -177,7 +177,6 @@ def _result(settings: BedShearSettings, runs: list[Shearing], grain: float, reci
         warnings.append("fewer than three pressures: the line through them has no error that could be told")
     if doubt := caveat(bed.material):
         warnings.append(doubt)
-    kept = ("normal", "peak", "critical", "critical_error")
     return Result.make(
         "bed test shear",
         title=f"{settings.bed}: sheared under a lid",
@@ -186,7 +185,7 @@ def _result(settings: BedShearSettings, runs: list[Shearing], grain: float, reci
         runs=[
             {"id": f"shear-{pressure:g}", "series": f"series/shear-{pressure:g}.csv"}
             | picked(run, "pressure", "speed")
-            | picked(strength, *kept)
+            | picked(strength, "normal", "peak", "critical", "critical_error")
             for pressure, run, strength in zip(settings.pressures, runs, strengths, strict=True)
         ],
         grain=grain,

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from dem.grains.materials import MATERIAL_FORMAT, MATERIALS, Material
-from experiments.bed.tests import table
+from experiments.bed.tests import picked, table
 from experiments.runs.folder import RunFolder, toml_value
 from experiments.runs.result import Result
 from experiments.runs.types import Json
@@ -99,12 +99,9 @@ def _entry(
     """What the result says of one figure: wanted, measured, and what the response surface expects."""
     got, error = found if found is not None else (None, None)
     return {
-        "name": target.name,
-        "figure": target.figure,
-        "unit": target.unit,
+        **picked(target, "name", "figure", "unit"),
         "wanted": target.value,
-        "tolerance": target.tolerance,
-        "source": target.source,
+        **picked(target, "tolerance", "source"),
         "plane": target.plane if "friction_angle" in target.figure or target.plane == "mohr" else None,
         "state": target.state or None,
         "fitted": target.fit,

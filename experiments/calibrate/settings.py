@@ -48,12 +48,7 @@ FIGURES = {
     "bulk_density_loose": Figure("kg/m3", "", "bulk density of a bed rained in and fluffed"),
     "bulk_density_dense": Figure("kg/m3", "", "bulk density of a bed rained in and tapped until taps gain nothing"),
 }
-FREE = {
-    "friction": "1",
-    "rolling_friction": "1",
-    "surface_energy": "J/m2",
-    "bond_number": "1",
-}
+FREE = {"friction": "1", "rolling_friction": "1", "surface_energy": "J/m2", "bond_number": "1"}
 """What may be free, with its unit. bond_number: pull-off force of two grains over the weight of one."""
 _BOUNDS = {"degrees": (0.0, 90.0), "1": (0.0, 1.0)}
 """Of a figure's value, by its unit; the others are 0 or more."""

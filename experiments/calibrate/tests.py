@@ -14,7 +14,7 @@ a vertical cut, is reckoned with. Where volume stays, the plane of shear has c c
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ import numpy as np
 from dem.grains.materials import Material
 from dem.measure.element import ElementShear, shear_element
 from experiments.bed.repose import BEARING
-from experiments.bed.tests import stiff_enough
+from experiments.bed.tests import picked, stiff_enough
 from experiments.runs.types import Json
 
 from .settings import CalibrateSettings, Target
@@ -123,17 +123,8 @@ def _drain(
     )
     packing = bed.packing_fraction
     found = angle_of_repose(bed, tell=lambda share: tell(0.5 + 0.5 * share))
-    summary = {
-        "angle": found.angle,
-        "error": found.error,
-        "flanks": [asdict(flank) for flank in found.flanks],
-        "slot": found.slot,
-        "size": list(bed.size),
-        "packing_before": packing,
-        "young": bed.material.young,
-        "grain_count": bed.grain_count,
-        "max_overlap": bed.max_overlap,
-    }
+    of_bed = {"size": list(bed.size), "packing_before": packing, "young": bed.material.young}
+    summary = picked(found, "angle", "error", "flanks", "slot") | of_bed | picked(bed, "grain_count", "max_overlap")
     return summary, {"x_m": found.distance, "thickness_m": found.thickness}
 
 
@@ -165,9 +156,7 @@ def summary_of(run: ElementShear, density: float) -> Json:
         "bulk_density": run.packing_before * density,
         "packing_before": run.packing_before,
         "packing_critical": float(run.packing[late].mean()),
-        "young": run.young,
-        "grain_count": run.grain_count,
-        "max_overlap": run.max_overlap,
+        **picked(run, "young", "grain_count", "max_overlap"),
     }
 
 
@@ -246,12 +235,8 @@ def _line(
     off = normal - normal.mean()
     along = off / (off @ off)
     level = 1 / len(normal) - normal.mean() * along
-    return (
-        float(level @ shear),
-        float(along @ shear),
-        math.sqrt(float(level**2 @ error**2)),
-        math.sqrt(float(along**2 @ error**2)),
-    )
+    errors = (math.sqrt(float(part**2 @ error**2)) for part in (level, along))
+    return (float(level @ shear), float(along @ shear), *errors)
 
 
 def laboratory_figure(

@@ -62,12 +62,7 @@ class _OneStage(Stages):
 
 
 def staged_bed(
-    material: Material,
-    stages: Sequence[str],
-    *,
-    progress: Progress,
-    asked_to_stop: Callable[[], bool],
-    **options: Any,
+    material: Material, stages: Sequence[str], *, progress: Progress, asked_to_stop: Callable[[], bool], **options: Any
 ) -> Bed:
     """The bed that `hedgebed bed make` with these stages would make; kept under ``HEDGEBED_CACHE``, as rained ones are.
 

@@ -96,13 +96,7 @@ def drop(
 
 
 def drive_down(
-    bed: Bed,
-    shape: Any,
-    *,
-    at: Sequence[float],
-    speed: float,
-    depth: float,
-    tell: Tell = lambda share: None,
+    bed: Bed, shape: Any, *, at: Sequence[float], speed: float, depth: float, tell: Tell = lambda share: None
 ) -> dict[str, np.ndarray]:
     """A body whose lowest point is its origin, driven down at (x, y). The bed is used up by it.
 

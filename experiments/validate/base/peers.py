@@ -61,10 +61,7 @@ class Peer:
         return Outcome(skipped=f"{self.name} is not installed (apt install {self.package})")
 
 
-PEERS = {
-    "liggghts": Peer("LIGGGHTS", ("liggghts",), "liggghts"),
-    "lammps": Peer("LAMMPS", ("lmp", "lammps"), "lammps"),
-}
+PEERS = {"liggghts": Peer("LIGGGHTS", ("liggghts",), "liggghts"), "lammps": Peer("LAMMPS", ("lmp", "lammps"), "lammps")}
 
 
 @dataclass(frozen=True)

@@ -105,13 +105,11 @@ def _elastic_gas(tell: Tell) -> Outcome:
         worst.append(float(np.abs(drift).max()))
         curves.append(Curve(f"dt = {1e6 * step:g} us", times, drift))
     slope = float(np.polyfit(np.log(steps), np.log(worst), 1)[0])
-    return Outcome(
-        [
-            Comparison("order of the drift", "1", 2.0, slope, 0.5, False),
-            near_zero("largest drift at dt = 5 us, over the energy", worst[-1], 1e-4),
-        ],
-        [Plot("Energy of an elastic gas", "time [ms]", "change of the energy, relative", curves)],
-    )
+    rows = [
+        Comparison("order of the drift", "1", 2.0, slope, 0.5, False),
+        near_zero("largest drift at dt = 5 us, over the energy", worst[-1], 1e-4),
+    ]
+    return Outcome(rows, [Plot("Energy of an elastic gas", "time [ms]", "change of the energy, relative", curves)])
 
 
 PARTS = {
@@ -172,13 +170,12 @@ def _floor_weight(tell: Tell) -> Outcome:
     grains = bed.grains()
     weight = cloud.STUFF.density * 4 / 3 * math.pi * float((grains.radius**3).sum()) * 9.81
     uneven = np.abs(grains.force).max() / (weight / bed.grain_count)
-    return Outcome(
-        [
-            Comparison("floor force", "N", weight, bed.floor_force, 1e-4),
-            near_zero("largest force left on a grain over its weight", uneven, 1e-2),
-        ],
-        remarks=[f"64 grains, coordination number {bed.coordination_number:.2f}. The bulk band of the design is 1 %."],
-    )
+    rows = [
+        Comparison("floor force", "N", weight, bed.floor_force, 1e-4),
+        near_zero("largest force left on a grain over its weight", uneven, 1e-2),
+    ]
+    remark = f"64 grains, coordination number {bed.coordination_number:.2f}. The bulk band of the design is 1 %."
+    return Outcome(rows, remarks=[remark])
 
 
 _ROUGH_WITHOUT_ROLLING = {"energy-hertz": (0.0, 0.6), "energy-undamped": (0.5, 1.0), "energy-friction": (0.5, 0.6)}

@@ -18,10 +18,7 @@ STEPS = 1000  # in a contact
 CLOSED_BAND, PUBLISHED_BAND = 1e-5, 5e-4  # of the closed form; of figures with four digits
 UNITS = (("largest overlap", "um", 1e6), ("largest force", "kN", 1e-3), ("contact time", "us", 1e6))
 
-T1 = {
-    "glass": (2800.0, 48e9, 0.20, (274.11, 10.697, 40.34)),
-    "limestone": (2500.0, 20e9, 0.25, (368.30, 7.108, 54.20)),
-}
+T1 = {"glass": (2800.0, 48e9, 0.20, (274.11, 10.697, 40.34)), "limestone": (2500.0, 20e9, 0.25, (368.30, 7.108, 54.20))}
 T2 = {
     "aluminium alloy": (2699.0, 70e9, 0.30, (49.72, 11.370, 731.7)),
     "magnesium alloy": (1800.0, 40e9, 0.35, (52.12, 7.233, 767.1)),
@@ -137,10 +134,7 @@ def force_curve(tell: Tell) -> Outcome:
     delta, pushed = delta[delta > 0], pushed[delta > 0]
     worst = float(np.abs(pushed - k * delta**1.5).max())
     line = np.linspace(0, overlap, 100)
-    curves = [
-        Curve("4/3 E* sqrt(R*) delta^1.5", 1e6 * line, k * line**1.5, False),
-        Curve("bed", 1e6 * delta, pushed),
-    ]
+    curves = [Curve("4/3 E* sqrt(R*) delta^1.5", 1e6 * line, k * line**1.5, False), Curve("bed", 1e6 * delta, pushed)]
     return Outcome(
         [near_zero("largest departure from k delta^1.5, over the largest force", worst / force, 1e-9)],
         [Plot("Force over overlap, in and out", "overlap [um]", "force [N]", curves)],

@@ -133,13 +133,9 @@ def errors_of_pair(along: bool) -> tuple[np.ndarray, np.ndarray]:
         start, after, _ = oblique_pair(0.7 * contact / count, steps=count, along=along)
         if count == COUNTS[0]:
             y = _reference(_unknowns(start), 0.7 * contact, m, RADIUS, star, shear)
-        errors.append(
-            [
-                np.abs(after.velocity[[0, 5]] - y[[1, 4]]).max(),
-                np.abs(after.position[[0, 5]] - y[[0, 3]]).max() / contact,
-                np.abs(after.spin[[0, 5]] - y[[2, 5]]).max() * RADIUS,
-            ]
-        )
+        off = after.velocity[[0, 5]] - y[[1, 4]], after.position[[0, 5]] - y[[0, 3]], after.spin[[0, 5]] - y[[2, 5]]
+        velocity, position, spin = (np.abs(one).max() for one in off)
+        errors.append([velocity, position / contact, spin * RADIUS])
     found = np.array(errors)[:, : 2 if along else 3]
     return found, -np.polyfit(np.log(COUNTS), np.log(found), 1)[0]
 
@@ -188,13 +184,11 @@ def _bouncing(tell: Tell) -> Outcome:
         Curve("order 2.5", counts, errors[0] * (counts[0] / counts) ** 2.5, False),
         Curve("worst of sixteen phases", counts, errors),
     ]
-    return Outcome(
-        [
-            Comparison("order of the rebound speed's error", "1", 2.5, order, 0.2, False),
-            near_zero("largest error of the rebound at 16 steps a contact", errors[0], 2e-3),
-        ],
-        [Plot("Error of an elastic rebound", "steps in a contact", "error [1]", curves, log="xy")],
-    )
+    rows = [
+        Comparison("order of the rebound speed's error", "1", 2.5, order, 0.2, False),
+        near_zero("largest error of the rebound at 16 steps a contact", errors[0], 2e-3),
+    ]
+    return Outcome(rows, [Plot("Error of an elastic rebound", "steps in a contact", "error [1]", curves, log="xy")])
 
 
 CASES = {"order-head-on": partial(_order, True), "order-oblique": partial(_order, False), "order-rebound": _bouncing}

@@ -58,12 +58,11 @@ def _free_fall(tell: Tell) -> Outcome:
         t, grains = bed.time, bed.grains()
         worst[0] = max(worst[0], np.abs(grains.velocity - v0 - down * t).max())
         worst[1] = max(worst[1], np.abs(grains.displacement - v0 * t - 0.5 * down * t**2).max())
-    return Outcome(
-        [
-            near_zero("largest error of the velocity", worst[0], 1e-13, "m/s"),
-            near_zero("largest error of the path", worst[1], 1e-13, "m"),
-        ]
-    )
+    rows = [
+        near_zero("largest error of the velocity", worst[0], 1e-13, "m/s"),
+        near_zero("largest error of the path", worst[1], 1e-13, "m"),
+    ]
+    return Outcome(rows)
 
 
 def _at_rest(tell: Tell) -> Outcome:
@@ -72,13 +71,12 @@ def _at_rest(tell: Tell) -> Outcome:
     bed.advance(3000)
     after = bed.grains()
     moved = np.abs(after.position - before.position).max()
-    return Outcome(
-        [
-            Comparison("floor force over the weight", "1", 1.0, bed.floor_force / (SIXTEEN * MASS * GRAVITY), 1e-9),
-            near_zero("path in 3000 steps", moved, 1e-12, "m"),
-            near_zero("speed afterwards", np.abs(after.velocity).max(), 1e-12, "m/s"),
-        ]
-    )
+    rows = [
+        Comparison("floor force over the weight", "1", 1.0, bed.floor_force / (SIXTEEN * MASS * GRAVITY), 1e-9),
+        near_zero("path in 3000 steps", moved, 1e-12, "m"),
+        near_zero("speed afterwards", np.abs(after.velocity).max(), 1e-12, "m/s"),
+    ]
+    return Outcome(rows)
 
 
 def _sliding(tell: Tell) -> Outcome:
