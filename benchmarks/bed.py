@@ -127,8 +127,9 @@ def run(out: Path, *, progress: Any) -> Json:
     for remark in remarks:
         progress.message(remark)
     progress.plan(dict(_plan(settings, with_peers=bool(peers))))
+    said = [f"{key}={value!r}" for key, value in sorted(os.environ.items()) if key.startswith("HEDGEBED_BENCH_")]
     bench = head("bed") | {
-        "command": _command(),
+        "command": " ".join([*said, "hedgebed bench bed"]),
         "machine": describe_machine(cores, load),
         "peers": {peer.name: None for peer in (LIGGGHTS, LAMMPS)},
         "unit": "grain steps per second",
@@ -145,7 +146,8 @@ def run(out: Path, *, progress: Any) -> Json:
         best = pick_best(lanes)
         entrants = [lane.as_dict() for lane in lanes]
         bench["beds"].append(bed | {"best_peer": best.label if best else None, "entrants": entrants})
-        bench["ratios"][str(count)] = _ratio(lanes[0], best)
+        ours, theirs = lanes[0].speed, best and best.speed
+        bench["ratios"][str(count)] = ours / theirs if ours and theirs else None
         ran = [(lane.entrant, lane.heats[-1]) for lane in lanes if lane.heats]
         bench["peers"] |= {entrant.peer.name: heat.version for entrant, heat in ran if isinstance(entrant, Theirs)}
         remarks += [f"{count:,} grains: {remark}" for lane in lanes for remark in _remarks(lane)]
@@ -223,7 +225,9 @@ def _heats(stage: str, lanes: list[Lane], steps: int, progress: Any) -> None:
     for done, lane in enumerate(lanes, start=1):
         lane.go(steps)
         progress.update(done)
-        progress.message(f"{lane.label}: {_outcome(lane)}")
+        speed = lane.heats[-1].speed if not lane.failure else 0.0
+        went = f"failed: {lane.failure}" if lane.failure else f"{1e-6 * speed:.2f} million grain-steps/s"
+        progress.message(f"{lane.label}: {went}")
 
 
 _LAWS = {
@@ -283,25 +287,8 @@ def pick_best(lanes: list[Lane]) -> Lane | None:
     return max(reversed(fit), key=lambda lane: lane.speed or 0.0, default=None)
 
 
-def _ratio(ours: Lane, best: Lane | None) -> float | None:
-    """Our speed over the best peer's."""
-    if best is None or best.speed is None or ours.speed is None:
-        return None
-    return ours.speed / best.speed
-
-
-def _outcome(lane: Lane) -> str:
-    return f"failed: {lane.failure}" if lane.failure else f"{1e-6 * lane.heats[-1].speed:.2f} million grain-steps/s"
-
-
 def _remarks(lane: Lane) -> Iterator[str]:
     if lane.failure:
         yield f"{lane.label}: {lane.failure}"
     elif lane.other_work and not lane.entrant.rolling:
         yield f"{lane.label} did other work than ours ({lane.other_work}) and is not counted"
-
-
-def _command() -> str:
-    """How this was called, with what the environment said."""
-    said = [f"{key}={value!r}" for key, value in sorted(os.environ.items()) if key.startswith("HEDGEBED_BENCH_")]
-    return " ".join([*said, "hedgebed bench bed"])

@@ -81,7 +81,11 @@ def run(
     wanted = baselines == "yes" and not missing
     progress.plan({f"diagnose {one}": float(count) for one in kinds})
     _mend(out / CASES_FILE)
-    done = {_key(case): case for case in read_cases(out) if _current(case)}
+    done = {
+        _key(case): case
+        for case in read_cases(out)
+        if case.get("code") == digest("code") and case.get("suite") == digest(_maker(case["kind"]))
+    }
     with _asking(ask) as asked:
         for one, cases in plans.items():
             left = [case for case in cases if not _finished(done.get(_key({"kind": one, "case": case})), wanted)]
@@ -169,10 +173,6 @@ def _finished(record: Json | None, wanted: bool) -> bool:
 def _maker(kind: str) -> str:
     """What `digest` calls the sources that make campaigns of this kind up."""
     return "rig" if kind == "rig" else "suite"
-
-
-def _current(record: Json) -> bool:
-    return record.get("code") == digest("code") and record.get("suite") == digest(_maker(record["kind"]))
 
 
 def _key(record: Json) -> str:

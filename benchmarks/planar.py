@@ -114,13 +114,6 @@ def _timed(base: Trial, vary: dict[str, np.ndarray], rounds: int) -> tuple[list[
     return speeds, compiling, statistics.median(busy)
 
 
-def _agreement(count: int, *, all_terms: bool) -> Json:
-    """How near `count` random trials come to the accurate integrator (see `benchmarks.planar_trials.agreement`)."""
-    rng = np.random.default_rng(2026)
-    effects = tuple(AMPLITUDES) if all_terms else ()
-    return compare([random_trial(rng, effects, AMPLITUDES) for _ in range(count)]).summary()
-
-
 def run(out: Path, *, progress: Any) -> Json:
     """Time the batch and compare it; show the table; return what goes into bench.json. Nothing is written to `out`.
 
@@ -146,7 +139,9 @@ def run(out: Path, *, progress: Any) -> Json:
         progress.stage(name, total=1.0)
         base, vary = drawn_trials(settings.trials, seed=1, all_terms=all_terms)
         speeds, compiling, processor = _timed(base, vary, settings.rounds)
-        compared = settings.compared if not all_terms else max(1, settings.compared // 3)
+        rng, on = np.random.default_rng(2026), tuple(AMPLITUDES) if all_terms else ()
+        count = settings.compared if not all_terms else max(1, settings.compared // 3)
+        trials = [random_trial(rng, on, AMPLITUDES) for _ in range(count)]
         bench["sets"][name] = {
             "trials_per_s": statistics.median(speeds),
             "rounds": speeds,
@@ -154,7 +149,7 @@ def run(out: Path, *, progress: Any) -> Json:
             "trials_per_s_idle_cores": cores / processor,
             "first_call_s": compiling,
             "effects": [effect.id for effect in base.effects],
-            "agreement": _agreement(compared, all_terms=all_terms),
+            "agreement": compare(trials).summary(),
         }
     bench["trials_per_s"] = bench["sets"]["base"]["trials_per_s"]
     bench["trials_per_s_all_terms"] = bench["sets"]["all terms"]["trials_per_s"]

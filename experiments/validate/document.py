@@ -27,12 +27,8 @@ def band_of(row: Mapping[str, Any]) -> str:
     return f"±{100 * row['band']:.2g} %" if row["relative"] else f"±{row['band']:.2g}"
 
 
-def _unit(row: Mapping[str, Any]) -> str:
-    return "" if row["unit"] == "1" else f" {row['unit']}"
-
-
 def _cells(row: Mapping[str, Any]) -> str:
-    unit = _unit(row)
+    unit = "" if row["unit"] == "1" else f" {row['unit']}"
     return f"{number(row['reference'])}{unit} | {number(row['ours'])}{unit} | {difference_of(row)} | {band_of(row)}"
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from experiments.runs.types import Json
 
 __all__ = [
-    "Case", "Comparison", "Compute", "Curve", "Outcome", "Plot", "Tell", "compared", "near_zero", "told",
+    "Case", "Comparison", "Compute", "Curve", "Outcome", "Plot", "Tell", "compared", "worst", "near_zero", "told",
 ]  # fmt: skip
 Item = TypeVar("Item")
 
@@ -128,6 +128,11 @@ def told(items: Iterable[Item], tell: Tell) -> Iterator[Item]:
     for done, item in enumerate(rows, 1):
         yield item
         tell(done / len(rows))
+
+
+def worst(found: Any, wanted: float) -> float:
+    """Of several numbers the one that is farthest off."""
+    return float(np.ravel(found)[np.argmax(np.abs(found - wanted))])
 
 
 def near_zero(quantity: str, ours: float, band: float, unit: str = "1") -> Comparison:

@@ -6,7 +6,6 @@ against 2/5 k delta^2.5, which it meets to second order in the step; what dashpo
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +13,7 @@ import numpy as np
 from dem import Bed
 from dem.contact.law import TURNING_DAMPING_RATIO, damping_factor, effective_moduli
 
-__all__ = ["Book", "keep_book"]
+__all__ = ["Book", "flat", "keep_book", "within"]
 
 Array = np.ndarray
 
@@ -51,6 +50,17 @@ class Book:
         return float((np.maximum.accumulate(lost) - lost).max())
 
 
+def flat(u: Array, normals: Array) -> Array:
+    """The parts of vectors across normals, shape [n, 3]."""
+    return u - (u * normals).sum(axis=1)[:, None] * normals
+
+
+def within(force: Array, bound: Array) -> Array:
+    """Forces cut to bounds, shape [n, 3]."""
+    size = np.linalg.norm(force, axis=1)
+    return force * np.where(size > bound, bound / np.where(size > 0, size, 1.0), 1.0)[:, None]
+
+
 class _Springs:
     """A spring, a dashpot and a bound for each pair, vectors of shape [pair, 3]."""
 
@@ -62,18 +72,16 @@ class _Springs:
     def stored(self) -> float:
         return 0.5 * float(self.stiffness @ (self.stretch**2).sum(axis=1))
 
-    def load(self, stiffness: Array, damping: Array, rate: Array, bound: Array, dt: float, project: Callable) -> Array:
-        """A step on: the force of each, shape [pair, 3]. ``project`` brings the stretch into the contact's plane."""
+    def load(self, stiffness: Array, damping: Array, rate: Array, bound: Array, dt: float) -> Array:
+        """A step on: the force of each, shape [pair, 3]."""
         self.stiffness = stiffness
-        self.stretch = project(self.stretch) + rate * dt
+        self.stretch = self.stretch + rate * dt
         pull = stiffness * np.linalg.norm(self.stretch, axis=1)
         slides = pull > bound
         self.stretch *= np.where(slides, bound / np.where(slides, pull, 1.0), 1.0)[:, None]
         self.stretch[stiffness == 0] = 0.0
         force = -stiffness[:, None] * self.stretch
-        force -= np.where(slides, 0.0, damping)[:, None] * rate
-        size = np.linalg.norm(force, axis=1)
-        return force * np.where(size > bound, bound / np.where(size > 0, size, 1.0), 1.0)[:, None]
+        return within(force - np.where(slides, 0.0, damping)[:, None] * rate, bound)
 
 
 class _Dashpot:
@@ -167,7 +175,8 @@ class _Contacts:
             v_t = path - v_n[:, None] * middle - np.cross(back[:, None] * (w[i] + w[j]), normals)
             v_t = np.where(touching[:, None], v_t, 0.0)
             damping = factor * math.sqrt(4 * self.shear / self.star) * root
-            f_t = self.slide.load(k_t, damping, v_t, mu * np.abs(f_n), took, _in_plane(normals))
+            self.slide.stretch = flat(self.slide.stretch, normals)
+            f_t = self.slide.load(k_t, damping, v_t, mu * np.abs(f_n), took)
         if self.mu_r > 0:
             spin = np.where(touching[:, None], w[i] - w[j], 0.0)
             along = (spin * normals).sum(axis=1)[:, None] * normals
@@ -178,9 +187,9 @@ class _Contacts:
             self.twist.stretch = (angle * normals).sum(axis=1)[:, None] * normals
             self.roll.stretch = angle - self.twist.stretch
             bound = self.mu_r * self.radius * np.abs(f_n)
-            torque = self.roll.load(k_r, share * np.sqrt(k_r), spin - along, bound, took, _as_it_is)
+            torque = self.roll.load(k_r, share * np.sqrt(k_r), spin - along, bound, took)
             bound = 3 * math.pi / 16 * mu * a * np.abs(f_n)
-            torque += self.twist.load(k_w, share * np.sqrt(k_w), along, bound, took, _as_it_is)
+            torque += self.twist.load(k_w, share * np.sqrt(k_w), along, bound, took)
         return _Forces(i, j, normals, arm, overlap, f_n - elastic, f_n, f_t, torque)
 
     def stored(self, overlap: Array) -> tuple[float, float, float]:
@@ -231,11 +240,3 @@ def keep_book(bed: Bed, steps: int, *, every: int = 20, tensile: bool = False) -
     if not weight.any():
         del parts["potential"]
     return Book(columns[0], parts, worst / largest if largest else 0.0)
-
-
-def _in_plane(normals: Array) -> Callable[[Array], Array]:
-    return lambda u: u - (u * normals).sum(axis=1)[:, None] * normals
-
-
-def _as_it_is(u: Array) -> Array:
-    return u

@@ -136,7 +136,10 @@ def ours(assembly: Assembly, restitution: float, friction: float) -> np.ndarray:
 
 def theirs(peer: str, assembly: Assembly, restitution: float, friction: float) -> np.ndarray:
     """The same by a peer, in one process. Raises RuntimeError with its last lines where it fails."""
-    text = run_peer(peer, _data(assembly), _deck(peer, assembly, restitution, friction), "dump.txt", limit=LIMIT)
+    atoms = spheres(assembly.radii, assembly.positions, DENSITY)
+    moving = [digits(row) for row in np.hstack([assembly.velocities, assembly.spins])]
+    data = data_file(box_of(*assembly.period, assembly.height), atoms, moving)
+    text = run_peer(peer, data, _deck(peer, assembly, restitution, friction), "dump.txt", limit=LIMIT)
     return _read_dump(text, assembly)
 
 
@@ -181,12 +184,6 @@ def digits(values: Iterable[float]) -> str:
 def box_of(*sides: float) -> list[str]:
     """The lines of a box from 0 on."""
     return [f"0 {side:.17g} {axis}lo {axis}hi" for axis, side in zip("xyz", sides, strict=True)]
-
-
-def _data(assembly: Assembly) -> str:
-    atoms = spheres(assembly.radii, assembly.positions, DENSITY)
-    moving = [digits(row) for row in np.hstack([assembly.velocities, assembly.spins])]
-    return data_file(box_of(*assembly.period, assembly.height), atoms, moving)
 
 
 def lammps_restitution(restitution: float) -> float:

@@ -16,7 +16,7 @@ from dem import Bed, Material
 from dem.contact.law import effective_moduli
 from dem.engine.energy import bed_energies
 from experiments.runs.types import Json
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, worst
 from experiments.validate.base.spheres import RADIUS, SIXTEEN, mass_of, plane_modulus, row_of_grains
 
 from .books import PARTS, cluster, moments
@@ -164,13 +164,9 @@ def _no_load(name: str) -> list[Comparison]:
     z = bed.grains().position[:, 2]
     found = {"pair": 2 * RADIUS - (z[1:8:2] - z[:8:2]), "plane": RADIUS - z[8:]}
     return [
-        Comparison(f"overlap at no load, {text}", "um", 1e6 * law.free, 1e6 * _furthest(found[what], law.free), 1e-5)
+        Comparison(f"overlap at no load, {text}", "um", 1e6 * law.free, 1e6 * worst(found[what], law.free), 1e-5)
         for what, law, text in (("pair", pair, "two grains"), ("plane", plane, "grain and floor"))
     ]
-
-
-def _furthest(found: np.ndarray, wanted: float) -> float:
-    return float(found[np.argmax(np.abs(found - wanted))])
 
 
 def _sliding(name: str, law: Law) -> list[Comparison]:
@@ -186,7 +182,7 @@ def _sliding(name: str, law: Law) -> list[Comparison]:
         found = (bed.grains().velocity - first)[:, 0] / (bed.time - start) / pull
         closed = max(0.0, 1 - 1 / share)
         about = f"acceleration at {share:g} of mu load, over the pull's"
-        rows.append(Comparison(about, "1", closed, _furthest(found, closed), band, False))
+        rows.append(Comparison(about, "1", closed, worst(found, closed), band, False))
     return rows
 
 

@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dem.contact.law import damping_factor, effective_moduli
+from experiments.validate.base.energy import flat, within
 
 if TYPE_CHECKING:
     from experiments.validate.base.peers import Assembly
@@ -116,31 +117,22 @@ class _Grains:
     def turned(self, u: Array, n: Array, slid: Array) -> Array:
         """The springs in the contacts' planes, with what has been slid since."""
         if self.law != "lammps":
-            return _flat(u + slid, n)
-        flat = _flat(u, n)
-        was, now = np.linalg.norm(u, axis=1), np.linalg.norm(flat, axis=1)
-        return flat * np.where(now > 0, was / np.where(now > 0, now, 1.0), 1.0)[:, None] + slid
+            return flat(u + slid, n)
+        across = flat(u, n)
+        was, now = np.linalg.norm(u, axis=1), np.linalg.norm(across, axis=1)
+        return across * np.where(now > 0, was / np.where(now > 0, now, 1.0), 1.0)[:, None] + slid
 
     def sideways(self, u: Array, slip: Array, k_t: Array, c_t: Array, bound: Array) -> tuple[Array, Array]:
         """Force on the first of each pair, and the springs as they are left."""
         spring, dashpot = -k_t[:, None] * u, -c_t[:, None] * slip
         if self.law == "lammps":
             force = spring + dashpot
-            held = _within(force, bound)
+            held = within(force, bound)
             slides = (np.abs(held - force) > 0).any(axis=1)[:, None]
             fresh = (np.abs(u) == 0).all(axis=1)[:, None]  # grains in touch at the start, which have not slid yet
             return np.where(slides & fresh, 0.0, held), np.where(slides & ~fresh, -(held - dashpot) / k_t[:, None], u)
-        held = _within(spring, bound)
+        held = within(spring, bound)
         slides = (np.abs(held - spring) > 0).any(axis=1)[:, None]
         left = np.where(slides, -held / k_t[:, None], u)
         force = np.where(slides, held, spring + dashpot)
-        return (force if self.law == "liggghts" else _within(force, bound)), left
-
-
-def _flat(u: Array, n: Array) -> Array:
-    return u - (u * n).sum(axis=1)[:, None] * n
-
-
-def _within(force: Array, bound: Array) -> Array:
-    size = np.linalg.norm(force, axis=1)
-    return force * np.where(size > bound, bound / np.where(size > 0, size, 1.0), 1.0)[:, None]
+        return (force if self.law == "liggghts" else within(force, bound)), left

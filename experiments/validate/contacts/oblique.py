@@ -11,18 +11,9 @@ import numpy as np
 
 from dem import Material
 from dem.contact.law import damping_factor
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, compared, told
-from experiments.validate.base.spheres import (
-    ALUMINA,
-    HERTZ_TIME,
-    RADIUS,
-    Meeting,
-    hertz,
-    mass_of,
-    meet_floor,
-    plane_modulus,
-)
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, compared, told, worst
 
+from ..base.spheres import ALUMINA, HERTZ_TIME, RADIUS, Meeting, hertz, mass_of, meet_floor, plane_modulus
 from .microslip import tangential_restitution
 from .words import say
 
@@ -130,30 +121,19 @@ def _t4_spin(tell: Tell) -> Outcome:
     ]
     bare = spin_of(angles, law_alone(angles, dashpot=False)) - quoted
     held = spin_of(angles, law_alone(angles)) - quoted
-    slipping = spin_of(angles, np.array([_by_rings(angle) for angle in angles]))
+    like = {"friction": MU, "restitution": E_N, "poisson": ALUMINA["poisson"]}
+    slipping = spin_of(angles, np.array([tangential_restitution(angle, **like) for angle in angles]))
     ten = int(np.abs(angles - 10).argmin())
-    worth = _slope(angles, found, ten) / 10
+    worth = float((found[ten + 1] - found[ten - 1]) / (angles[ten + 1] - angles[ten - 1])) / 10
     alone = {"off": held[ten], "bare_off": bare[ten], "rms": _rms(held), "bare_rms": _rms(bare)}
     lists = {"slipping": slipping, "angles": angles, "figure": quoted, "spring": bare + quoted}
     remarks = [
         say("figure_read", reading=reading, worth=worth, band=100 * PUBLISHED_BAND),
         say("law_alone", angle=angles[ten], finer=np.abs(fine - found).max(), book=100 * _book(), **alone),
-        say("rings", **{name: _listed(values[:3]) for name, values in lists.items()}),
+        say("rings", **{name: ", ".join(f"{v:.4g}" for v in values[:3]) for name, values in lists.items()}),
     ]
     curves.append(Curve("rings that slip one by one", angles, slipping, False))
     return Outcome(rows, [Plot("Spin after the impact", "angle of impact [deg]", "spin [rad/s]", curves)], remarks)
-
-
-def _by_rings(angle: float) -> float:
-    return tangential_restitution(angle, friction=MU, restitution=E_N, poisson=ALUMINA["poisson"])
-
-
-def _listed(values: np.ndarray) -> str:
-    return ", ".join(f"{value:.4g}" for value in values)
-
-
-def _slope(x: np.ndarray, y: np.ndarray, at: int) -> float:
-    return float((y[at + 1] - y[at - 1]) / (x[at + 1] - x[at - 1]))
 
 
 def _rms(values: np.ndarray) -> float:
@@ -213,14 +193,10 @@ def _t5(tell: Tell) -> Outcome:
         overlap = hertz(mass_of(density, T5_RADIUS), T5_RADIUS, plane_modulus(young, poisson), T5_SPEED)[0]
         band = CLOSED_BAND + overlap / T5_RADIUS  # the arm is shorter by the overlap at most
         rows += compared(f"{name}: spin r over mu v_n", labels, 5 * alike, scaled[slides], band=band)
-        worst = float(_worst(after.velocity[:, 2] / T5_SPEED, 1.0))
-        rows.append(Comparison(f"{name}: e_n, worst", "1", 1.0, worst, 1e-3))
+        e_n = worst(after.velocity[:, 2] / T5_SPEED, 1.0)
+        rows.append(Comparison(f"{name}: e_n, worst", "1", 1.0, e_n, 1e-3))
         curves.append(Curve(name, T5_RATIOS, scaled))
     return Outcome(rows, [Plot("Spin after the impact", "tan / mu [1]", "spin r / (mu v_n) [1]", curves)])
-
-
-def _worst(found: np.ndarray, wanted: float) -> float:
-    return found[np.argmax(np.abs(found - wanted))]
 
 
 CASES = {"t4-e-t": _t4_tangential, "t4-spin": _t4_spin, "t4-sliding": _t4_sliding, "t5": _t5}

@@ -8,7 +8,7 @@ import numpy as np
 from dem import Bed, Material
 from dem.contact.law import damping_factor
 from dem.contact.timestep import time_step_for
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, told
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, told, worst
 from experiments.validate.base.spheres import ALUMINA, RADIUS, SIXTEEN, row_of_grains
 
 from .words import say
@@ -88,8 +88,8 @@ def _fine(tensile: bool, tell: Tell) -> Outcome:
     rows, curves = [], []
     for asked in told(RESTITUTIONS, tell):
         found = rebound(asked, tensile, FINE_STEP)
-        worst = found[np.argmax(np.abs(found - asked))]
-        rows.append(Comparison(f"worst of 16 speeds, {asked} asked for", "1", asked, worst, _FINE_BAND, False))
+        about = f"worst of 16 speeds, {asked} asked for"
+        rows.append(Comparison(about, "1", asked, worst(found, asked), _FINE_BAND, False))
         curves.append(Curve(f"{asked:g}", SPEEDS, found - asked))
     plot = Plot("Rebound less what was asked for", "speed [m/s]", "difference [1]", curves, log="x")
     return Outcome(rows, [plot])
@@ -100,9 +100,8 @@ def _own_step(tell: Tell) -> Outcome:
     rows, curves, means, highest, lowest = [], [], [], 0.0, 0.0
     for done, asked in enumerate(RESTITUTIONS, 1):
         found = np.array([rebound(asked, False, phase=phase) for phase in np.arange(_PHASES) / _PHASES]) - asked
-        worst = found.flat[np.argmax(np.abs(found))]
         about = f"worst of 16 speeds, 8 phases, {asked} asked for"
-        rows.append(Comparison(about, "1", asked, asked + worst, _OWN_BAND, False))
+        rows.append(Comparison(about, "1", asked, asked + worst(found, 0.0), _OWN_BAND, False))
         curves.append(Curve(f"{asked:g}", np.tile(SPEEDS, _PHASES), found.ravel()))
         means.append(f"{found.mean():+.4f} at {asked:g}")
         highest, lowest = max(highest, found.max()), min(lowest, found.min())
