@@ -12,8 +12,6 @@ force would look like the term of the sparse law that moves most.
 They need ``pip install .[bench]``; `missing` says so where they are not there.
 """
 
-from __future__ import annotations
-
 import math
 import time
 import warnings
@@ -21,7 +19,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 import numpy as np
 from scipy import stats
@@ -51,7 +49,7 @@ class Regressor(Protocol):
     terms: list[tuple[str, str, float]]
     """(target, term, size over the noise of a row), the largest first; none where it has none."""
 
-    def fit(self, rows: Sequence[Rows]) -> Regressor:
+    def fit(self, rows: Sequence[Rows]) -> Self:
         """Learn, settings of its own and all."""
 
     def predict(self, state: Array) -> Array:
@@ -60,10 +58,8 @@ class Regressor(Protocol):
 
 def missing() -> str:
     """What to install, in a sentence; empty where all is there."""
-    lacking = [name for name in ("pysindy", "sklearn") if find_spec(name) is None]
-    if not lacking:
-        return ""
-    return f"no baselines: {' and '.join(lacking)} not installed (pip install .[bench])"
+    lacking = " and ".join(name for name in ("pysindy", "sklearn") if find_spec(name) is None)
+    return f"no baselines: {lacking} not installed (pip install .[bench])" if lacking else ""
 
 
 def try_all(
@@ -108,7 +104,7 @@ def _try(
     told: dict[str, Any] = {"alarm": alarm, "before": before, "after": before}
     if learnt.terms or isinstance(learnt, SparseLaw):
         told |= {"terms": [list(term) for term in learnt.terms[:8]] if alarm else [],
-                 "points_to": sorted(points_to(problem.kind, learnt.terms)) if alarm else []}  # fmt: skip
+                 "points_to": sorted(points_to(learnt.terms)) if alarm else []}  # fmt: skip
     if alarm:
         std = rows[0].std
         lowest = np.min([learnt.predict(one.state).min(axis=0) for one in rows], axis=0)
@@ -135,9 +131,6 @@ def _better(gains: Array) -> bool:
     return bool(stats.wilcoxon(gains, alternative="greater").pvalue <= _LEVEL)
 
 
-# pysindy --------------------------------------------------------------------------------------------------------------
-
-
 class SparseLaw:
     """STLSQ of pysindy on polynomials of degree 2 and the usual friction and drag terms, a threshold for each target.
 
@@ -146,19 +139,13 @@ class SparseLaw:
 
     def __init__(self, kind: str) -> None:
         self._kind = kind
-        self._thresholds: list[float] = []
-        self._weights: Array = np.zeros((0, 0))
-        self._scale: Array = np.zeros(0)
-        self._names: list[str] = []
-        self._range: tuple[Array, Array] = (np.zeros(0), np.zeros(0))
         self.terms: list[tuple[str, str, float]] = []
 
-    def fit(self, rows: Sequence[Rows]) -> SparseLaw:
+    def fit(self, rows: Sequence[Rows]) -> Self:
         """See `Regressor`."""
         states = np.concatenate([_thinned(one.state, _FULL) for one in rows])
         self._scale = np.maximum(np.std(states, axis=0), 1e-12)
-        self._thresholds = self._choose(rows)
-        self._weights = self._solve(*self._columns(rows), self._thresholds)
+        self._weights = self._solve(*self._columns(rows), self._choose(rows))
         library = self._library(states)
         targets = np.concatenate([one.target / one.std for one in rows])
         self._range = (targets.min(axis=0), targets.max(axis=0))  # polynomials run away beyond what was seen
@@ -242,9 +229,6 @@ def _polynomials(kind: str) -> tuple[Array, tuple[str, ...]]:
     return powers, tuple(name.replace(" ", "*") for name in library.get_feature_names(names))
 
 
-# Gaussian process -----------------------------------------------------------------------------------------------------
-
-
 class Process:
     """A Gaussian process for each target: squared exponential with a length a state, plus white noise.
 
@@ -252,16 +236,10 @@ class Process:
     """
 
     def __init__(self, kind: str) -> None:
-        self._kind = kind
-        self._scale: Array = np.zeros(0)
-        self._centre: Array = np.zeros(0)
-        self._rows: Array = np.zeros((0, 0))
-        self._lengths: list[Array] = []
-        self._sizes: list[float] = []
-        self._weights: list[Array] = []
         self.terms: list[tuple[str, str, float]] = []
+        self._laws: list[tuple[float, Array, Array]] = []
 
-    def fit(self, rows: Sequence[Rows]) -> Process:
+    def fit(self, rows: Sequence[Rows]) -> Self:
         """See `Regressor`."""
         from sklearn.gaussian_process import GaussianProcessRegressor
         from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
@@ -276,16 +254,15 @@ class Process:
             kernel = kernel + WhiteKernel(1.0, (0.3, 1e4))
             law = GaussianProcessRegressor(kernel, alpha=1e-8, optimizer=_climb)
             law.fit(self._rows, targets[:, j])
-            self._sizes.append(float(law.kernel_.k1.k1.constant_value))
-            self._lengths.append(np.atleast_1d(law.kernel_.k1.k2.length_scale))
-            self._weights.append(np.asarray(law.alpha_).ravel())
+            size, lengths = float(law.kernel_.k1.k1.constant_value), np.atleast_1d(law.kernel_.k1.k2.length_scale)
+            self._laws.append((size, lengths, np.asarray(law.alpha_).ravel()))
         return self
 
     def predict(self, state: Array) -> Array:
         """See `Regressor`."""
         here = (state - self._centre) / self._scale
         columns = []
-        for size, lengths, weights in zip(self._sizes, self._lengths, self._weights, strict=True):
+        for size, lengths, weights in self._laws:
             away = (here[:, None, :] - self._rows[None]) / lengths
             columns.append(size * np.exp(-0.5 * np.einsum("ijk,ijk->ij", away, away)) @ weights)
         return np.stack(columns, axis=1)
@@ -304,9 +281,7 @@ METHODS: dict[str, Callable[[str], Regressor]] = {"pysindy": SparseLaw, "gaussia
 
 def _thinned(values: Array, most: int) -> Array:
     """At most `most` rows, evenly."""
-    if len(values) <= most:
-        return values
-    return values[np.linspace(0, len(values) - 1, most).round().astype(int)]
+    return values[np.linspace(0, len(values) - 1, min(most, len(values))).round().astype(int)]
 
 
 _POINTS: Mapping[str, Sequence[tuple[str, str, str]]] = {
@@ -333,12 +308,11 @@ _POINTS: Mapping[str, Sequence[tuple[str, str, str]]] = {
 own (tip-radius, pulley-inertia, clock-offset, camera-scale): nothing points to them."""
 
 
-def points_to(kind: str, terms: Sequence[tuple[str, str, float]]) -> set[str]:
+def points_to(terms: Sequence[tuple[str, str, float]]) -> set[str]:
     """Effects that the loudest term of a sparse law would come from; empty where there is none."""
     if not terms:
         return set()
     target, name, _ = max(terms, key=lambda term: term[2])
-    del kind
     return {
         effect
         for effect, signs in _POINTS.items()

@@ -34,9 +34,6 @@ def held_out_gap(problem: Any, values: Mapping[str, float], trials: Sequence[str
     return total / count if count else None
 
 
-# Tumbles --------------------------------------------------------------------------------------------------------------
-
-
 def _tumble(problem: Any, values: Mapping[str, float], trial: str, force: Force | None) -> Array:
     """Residuals over the noise, by the accurate integrator."""
     from rigid import Effect, Trial, simulate
@@ -122,9 +119,6 @@ def _residual(data: Any, motion: Any, window: float, pull: float) -> Array:
             rest = rest - np.clip(rest.mean(), -3.0, 3.0)
         parts.append(rest)
     return np.concatenate(parts)
-
-
-# Penetration ----------------------------------------------------------------------------------------------------------
 
 
 def _penetration(problem: Any, values: Mapping[str, float], trial: str, force: Force | None) -> Array:

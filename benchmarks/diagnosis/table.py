@@ -204,9 +204,6 @@ def _share(of: Sequence[Any], flag: Callable[[Any], bool]) -> Json:
     return {"share": float(np.mean([bool(flag(one)) for one in of])) if of else None, "of": len(of)}
 
 
-# Shown ----------------------------------------------------------------------------------------------------------------
-
-
 def show(kind: str, summary: Json) -> None:
     """Print the table of one kind of trial."""
     _print(f"diagnose, {kind}: {summary['cases']} campaigns", ("figure", "value", "of"),

@@ -79,9 +79,6 @@ def make_rig(
                             len(clean), rig.persistence["depth"], extra)  # fmt: skip
 
 
-# What comes of it -----------------------------------------------------------------------------------------------------
-
-
 def _moved(rig: Rig, trial: Trial, laws: Sequence[Law] = (), amplitude: float = 0.0, k: float = 1.0, c: float = 1.0
            ) -> _Columns:  # fmt: skip
     """A trial without noise, zeros or rows, K and C times `k` and `c`: time, depth, and force or acceleration."""
@@ -183,9 +180,6 @@ def _signature(changes: Sequence[tuple[Array, dict[str, Array]]]) -> float:
     explained = x.T @ d
     left = float(d @ d) - float(explained @ np.linalg.solve(np.eye(x.shape[1]) + x.T @ x, explained))
     return math.sqrt(max(left, 0.0) / len(d))
-
-
-# What is written ------------------------------------------------------------------------------------------------------
 
 
 def _record(

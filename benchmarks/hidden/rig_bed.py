@@ -292,9 +292,6 @@ def _friction(law: Law, most: float) -> Callable[[float, float], float]:
     return lambda z, speed: most * min(1.0, z / onset)
 
 
-# Motions --------------------------------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Path:
     """What a drive does, in steps finer than the rows: time [s], depth [m], speed [m/s], each of shape [step_count]."""

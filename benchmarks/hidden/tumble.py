@@ -295,9 +295,6 @@ def _parameters(effects: Sequence[str], settings: Mapping[str, float]) -> dict[s
     return {name: float(of(settings)) for effect in effects for name, of in named.get(effect, {}).items()}
 
 
-# Motion and sensors ---------------------------------------------------------------------------------------------------
-
-
 def _measure(
     plan: _Plan, true: Mapping[str, float], gravity: np.ndarray, settings: Mapping[str, float], step: float
 ) -> list[dict[str, np.ndarray]]:

@@ -17,18 +17,13 @@ across the normal of the step's end. It is of first order in the step, so that t
 to first order.
 """
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dem.contact.law import damping_factor, effective_moduli
 from experiments.validate.base.energy import flat, within
-
-if TYPE_CHECKING:
-    from experiments.validate.base.peers import Assembly
+from experiments.validate.base.peers import Assembly
 
 __all__ = ["SLIDING", "written_again"]
 

@@ -162,9 +162,7 @@ def _book() -> float:
     return float(np.abs(spin_of(ANGLES, after.velocity[:, 0] / start) / after.spin[:, 1] - 1).max())
 
 
-# ---------------------------------------------------------------------------- T5: normal speed held, angle varied
-
-T5 = {"steel": (7850.0, 208e9, 0.30), "polyethylene": (1400.0, 1e9, 0.40)}
+T5 = {"steel": (7850.0, 208e9, 0.30), "polyethylene": (1400.0, 1e9, 0.40)}  # normal speed held, angle varied
 T5_MU, T5_SPEED, T5_RADIUS = 0.3, 5.0, 1e-5
 T5_RATIOS = np.array([0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.5, 10.0, 15.0, 20.0])  # tan / mu
 
