@@ -235,8 +235,8 @@ def _line(
     off = normal - normal.mean()
     along = off / (off @ off)
     level = 1 / len(normal) - normal.mean() * along
-    errors = (math.sqrt(float(part**2 @ error**2)) for part in (level, along))
-    return (float(level @ shear), float(along @ shear), *errors)
+    start_error, slope_error = (math.sqrt(float(part**2 @ error**2)) for part in (level, along))
+    return float(level @ shear), float(along @ shear), start_error, slope_error
 
 
 def laboratory_figure(

@@ -63,7 +63,7 @@ def upright_walls(width: float, depth: float, margin: float) -> Iterator[tuple[i
         for sign in (1, -1):
             at = [margin, margin, 0.0]
             at[axis] += 0.0 if sign > 0 else side
-            yield axis, sign, Plane(normal=tuple(sign * (k == axis) for k in range(3))), tuple(at)
+            yield axis, sign, Plane(normal=(sign * (axis == 0), sign * (axis == 1), 0)), tuple(at)
 
 
 def row_of_grains(height: float = RADIUS, **options: Any) -> tuple[np.ndarray, np.ndarray, Json]:
