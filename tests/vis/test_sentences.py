@@ -10,6 +10,7 @@ from vis.page.sentences import Sentences
 
 ROOT = Path(__file__).resolve().parents[2]
 FILES = sorted(path for room in ("experiments", "vis") for path in (ROOT / room).rglob("sentences.toml"))
+CAPTIONS = sorted((ROOT / "vis").rglob("figures.toml"))
 
 
 def keys_used(folder: Path) -> set[str]:
@@ -28,6 +29,21 @@ def keys_used(folder: Path) -> set[str]:
 def test_code_and_the_file_of_sentences_name_the_same_keys(path):
     there = set(tomllib.loads(path.read_text(encoding="utf-8")))
     assert keys_used(path.parent) == there
+
+
+def figures_named(folder: Path) -> set[str]:
+    """The strings of a package's modules, and those of two of them with _ between: what a figure may be called."""
+    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in folder.glob("*.py")]
+    words = {node.value for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Constant)}
+    words = {word.partition(".")[0] for word in words if isinstance(word, str) and len(word) < 30}
+    return words | {f"{one}_{other}" for one in words for other in words}
+
+
+@pytest.mark.parametrize("path", CAPTIONS, ids=lambda path: str(path.parent.relative_to(ROOT)))
+def test_every_figure_with_a_caption_is_named_by_the_code(path):
+    there = tomllib.loads(path.read_text(encoding="utf-8"))
+    assert set(there) <= figures_named(path.parent)
+    assert all(set(words) == {"title", "caption"} for words in there.values())
 
 
 def test_a_key_or_a_value_that_is_not_there_is_an_error(tmp_path, monkeypatch):

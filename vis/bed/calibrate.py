@@ -17,7 +17,7 @@ from vis.page.style import BED, GREY, INK, MODEL, styled
 
 __all__ = ["write_calibration_report"]
 
-say = Sentences(__package__)
+captions = Sentences(__package__, "figures.toml")
 _COLOURS = (BED, MODEL, INK, GREY)
 
 
@@ -115,7 +115,7 @@ def _residuals(result: Result) -> Plot:
             handle("compared only", GREY, marker="s", ls=""),
         ]
         legend_above(drawing, handles)
-    return Plot.said(say, "residuals", drawing)
+    return Plot.said(captions, "residuals", drawing)
 
 
 def _checked(result: Result) -> list[Result]:
@@ -143,7 +143,7 @@ def _tests(report: Report) -> list[Plot]:
         axes[0].set_ylabel("shear over normal stress, at the lid [1]")
         handles = [handle(f"{p:g} Pa", _COLOURS[k % 4]) for k, p in enumerate(pressures)]
         legend_above(drawing, handles)
-    return [Plot.said(say, "tests", drawing)]
+    return [Plot.said(captions, "tests", drawing)]
 
 
 def _slopes(report: Report) -> list[Plot]:
@@ -160,4 +160,4 @@ def _slopes(report: Report) -> list[Plot]:
             title = f"seed {test['seed']}: {test['angle']:.1f} ± {test['error']:.1f}°"
             axis.set(title=title, xlabel="x [mm]", ylim=(0.0, None))
         axes[0].set_ylabel("thickness [mm]")
-    return [Plot.said(say, "slopes", drawing)]
+    return [Plot.said(captions, "slopes", drawing)]

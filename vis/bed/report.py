@@ -18,7 +18,7 @@ from vis.pictures.render import PictureJob, View, run_job
 
 __all__ = ["write_bed_report"]
 
-say = Sentences(__package__)
+captions = Sentences(__package__, "figures.toml")
 
 
 def write_bed_report(folder: str | Path, *, progress: Progress | None = None) -> Path:
@@ -77,7 +77,7 @@ def _profiles(report: Report) -> Plot:
         vertical.set(xlabel="vertical stress [Pa]", xlim=(0.0, None))
         sideways.set(xlabel="horizontal stresses [Pa]", xlim=(0.0, None))
         legend_above(drawing, handles)
-    return Plot.said(say, "profiles", drawing)
+    return Plot.said(captions, "profiles", drawing)
 
 
 def _passes(report: Report) -> list[Plot]:
@@ -92,7 +92,7 @@ def _passes(report: Report) -> list[Plot]:
             axis.plot(columns["pass"], columns["packing"], color=colour, marker=".", label=stage["stage"])
         axis.set(xlabel="taps, or presses of the lid, that were kept [1]", ylabel="packing fraction [1]")
         legend_above(drawing, axis.get_legend_handles_labels()[0])
-    return [Plot.said(say, "passes", drawing)]
+    return [Plot.said(captions, "passes", drawing)]
 
 
 def _picture(report: Report) -> tuple[list[Block], str]:

@@ -23,7 +23,7 @@ from vis.pictures.frames import read_frames
 
 __all__ = ["FALLEN_SHARE", "flank_lines", "said", "write_shear_report", "write_test_report"]
 
-say = Sentences(__package__)
+say, captions = Sentences(__package__), Sentences(__package__, "figures.toml")
 Grains = Mapping[str, NDArray[Any]]
 
 
@@ -31,8 +31,7 @@ def write_test_report(folder: str | Path, *, progress: Progress | None = None) -
     """Make figures/ and report.html of the folder of such a test, shear aside, and return the report."""
     report = Report(folder, progress)
     result, command = report.result, report.result["experiment"]
-    kind = command.rpartition(" ")[2]
-    plots, tiles = _TESTS[kind]
+    plots, tiles, method = _TESTS[command.rpartition(" ")[2]]
     drawn = report.draw_all(plots(report))
     report.tell(0.9)
     one = result["runs"][0]
@@ -41,7 +40,7 @@ def write_test_report(folder: str | Path, *, progress: Progress | None = None) -
     bed = say("first_bed", one=one, sides=sides, step=1e6 * one["time_step"], **scaled)
     sections = [
         Section("", tables(result) + drawn),
-        Section("How it is measured", [*(text(say(f"{kind}_method_{k}")) for k in (1, 2)), text(bed)]),
+        Section("How it is measured", [*(text(words) for words in method), text(bed)]),
         report.numbers(std=True),
         again(f"hedgebed {command} run.toml"),
     ]
@@ -82,7 +81,7 @@ def _side_plot(
         drawn = _draw_grains(axis, grains, period=period, unit=run["grain"], top=top)
         draw(axis)
         drawing.colorbar(drawn, ax=axis, shrink=0.8, extend="max", label="way since it was made [d]")
-    return [Plot.said(say, key, drawing, name="side")]
+    return [Plot.said(captions, key, drawing, name="side")]
 
 
 def _draw_grains(axis: Axes, grains: Grains, *, period: float, unit: float, top: float) -> Any:
@@ -143,7 +142,7 @@ def _indices(report: Report) -> Plot:
         for panel in (axis, lines):
             panel.set(xlim=(0.0, None), xlabel="cone index [kPa]")
         legend_above(drawing, handles)
-    return Plot.said(say, "index", drawing)
+    return Plot.said(captions, "index", drawing)
 
 
 def _cone_side(report: Report) -> list[Plot]:
@@ -220,7 +219,7 @@ def _cut_profiles(report: Report) -> Plot:
             axis.set(title=run["id"], xlabel="x [mm]", ylim=(0.0, None))
         axes[0].set_ylabel("thickness [mm]")
         legend_above(drawing, [handle("stood last", BED, lw=1.2), handle("at the end", MODEL, ls="--", lw=1.2)])
-    return Plot.said(say, "tests_profiles", drawing, name="profiles")
+    return Plot.said(captions, "tests_profiles", drawing, name="profiles")
 
 
 def _trials(runs: Sequence[Result]) -> Plot:
@@ -244,7 +243,7 @@ def _trials(runs: Sequence[Result]) -> Plot:
             ylabel="grains of the wedge\nthat have moved [1]",
         )
         legend_above(drawing, handles)
-    return Plot.said(say, "trials", drawing)
+    return Plot.said(captions, "trials", drawing)
 
 
 # A slot drains the bed ------------------------------------------------------------------------------------------------
@@ -312,15 +311,15 @@ def _repose_profiles(report: Report) -> Plot:
                 handle("surface before", "#888888", ls="--", lw=0.8),
             ],
         )
-    return Plot.said(say, "repose_profiles", drawing, name="profiles")
+    return Plot.said(captions, "repose_profiles", drawing, name="profiles")
 
 
-_TESTS: dict[str, tuple[Callable[[Report], list[Plot]], Callable[[Result], list[Tile]]]] = {
-    "cone": (_cone_plots, _cone_tiles),
-    "cut": (_cut_plots, _cut_tiles),
-    "repose": (_repose_plots, _repose_tiles),
+_TESTS: dict[str, tuple[Callable[[Report], list[Plot]], Callable[[Result], list[Tile]], list[str]]] = {
+    "cone": (_cone_plots, _cone_tiles, [say("cone_method_1"), say("cone_method_2")]),
+    "cut": (_cut_plots, _cut_tiles, [say("cut_method_1"), say("cut_method_2")]),
+    "repose": (_repose_plots, _repose_tiles, [say("repose_method_1"), say("repose_method_2")]),
 }
-"""What draws, and the numbers on top."""
+"""What draws, the numbers on top, and how the test is made, a paragraph each."""
 
 
 # A lid shears it ------------------------------------------------------------------------------------------------------
@@ -369,7 +368,7 @@ def _curves(report: Report) -> Plot:
         for axis in (ratio, height):
             axis.set_xlabel("way of the lid [diameters]")
         legend_above(drawing, handles)
-    return Plot.said(say, "shear", drawing)
+    return Plot.said(captions, "shear", drawing)
 
 
 def _lines(result: Result) -> Plot:
@@ -386,4 +385,4 @@ def _lines(result: Result) -> Plot:
             handles.append(handle(kind, colour, marker=mark))
         axis.set(xlim=(0.0, None), ylim=(0.0, None), xlabel="normal stress [Pa]", ylabel="shear stress [Pa]")
         legend_above(drawing, handles)
-    return Plot.said(say, "mohr_coulomb", drawing, name="mohr-coulomb")
+    return Plot.said(captions, "mohr_coulomb", drawing, name="mohr-coulomb")

@@ -15,7 +15,7 @@ from vis.page.style import BED, GREY, INK, MODEL, as_it_lies, styled
 
 __all__ = ["plots"]
 
-say = Sentences(__package__)
+captions = Sentences(__package__, "figures.toml")
 Columns = Mapping[str, Array]
 Both = tuple[States, States]
 Labels = tuple[str, str]
@@ -42,7 +42,7 @@ def plots(result: Result, columns: Columns, states: Both, labels: Labels) -> lis
             "energy": _draw_energy(columns, labels),
         }
     shape = "in proportion" if in_proportion else "heights stretched"
-    return [Plot.said(say, f"{kind}_{name}", one, name=name, shape=shape) for name, one in drawings.items()]
+    return [Plot.said(captions, f"{kind}_{name}", one, name=name, shape=shape) for name, one in drawings.items()]
 
 
 def _draw_path(columns: Columns, labels: Labels) -> tuple[Figure, bool]:

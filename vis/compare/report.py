@@ -24,7 +24,7 @@ from vis.tumble.pictures import draw_tumbles, moments
 
 __all__ = ["write_compare_report"]
 
-say = Sentences(__package__)
+captions = Sentences(__package__, "figures.toml")
 Labels = tuple[str, str]
 
 
@@ -131,7 +131,7 @@ def _drives(report: Report, labels: Labels) -> list[Block]:
             axis.set(title=name, xlabel="depth [mm]")
         axes[0].set_ylabel("force on the spike [N]")
         legend_of_runs(drawing, labels)
-    return [report.draw(Plot.said(say, "drives", drawing))]
+    return [report.draw(Plot.said(captions, "drives", drawing))]
 
 
 def _tiles(result: Result) -> list[Tile]:

@@ -19,7 +19,7 @@ from vis.page.tumble_series import read_columns
 
 __all__ = ["write_campaign_report"]
 
-say = Sentences(__package__)
+captions = Sentences(__package__, "figures.toml")
 _CHANNELS = (
     ("pose", "x_m", 1e3, "x [mm]"),
     ("pose", "y_m", 1e3, "y [mm]"),
@@ -37,7 +37,7 @@ def write_campaign_report(folder: str | Path, *, progress: Progress | None = Non
     report = Report(folder, progress, dpi=130)
     result, quantities = report.result, report.result["quantities"]
     drawing = _draw(report.folder / result["campaign"], result["trials"])
-    drawn = report.draw(Plot.said(say, "recordings", drawing))
+    drawn = report.draw(Plot.said(captions, "recordings", drawing))
     report.tell(0.9)
     rows = [
         (trial["id"], f"{trial['gravity_sim']:.5g}", f"{trial['true_gravity_sim']:.5g}", f"{trial['torque']:g}",

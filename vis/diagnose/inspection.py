@@ -21,7 +21,7 @@ from vis.page.style import BED, GREY, MODEL, styled
 
 __all__ = ["write_inspection_report"]
 
-say = Sentences(__package__)
+captions = Sentences(__package__, "figures.toml")
 _MOST = 12
 """Trials drawn at most, those with findings first."""
 _MOST_LINES = 60
@@ -44,9 +44,9 @@ def write_inspection_report(folder: str | Path, *, progress: Progress | None = N
     result, quantities = report.result, report.result["quantities"]
     with styled():
         drawing = (_draw_tumbles if result["kind"] == "tumble" else _draw_penetrations)(report)
-        drawn = [report.draw(Plot.said(say, "inspection_recordings", drawing, name="recordings"))]
+        drawn = [report.draw(Plot.said(captions, "inspection_recordings", drawing, name="recordings"))]
         report.tell(0.4)
-        drawn.append(report.draw(Plot.said(say, "coverage", _draw_coverage(result))))
+        drawn.append(report.draw(Plot.said(captions, "coverage", _draw_coverage(result))))
         report.tell(0.8)
     (trials,) = result["tables"]
     head = ("recording", "rows", "rate [Hz]", "from [s]", "to [s]", "rows with gaps", "longest gap [s]")

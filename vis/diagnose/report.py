@@ -16,7 +16,7 @@ from vis.page.style import styled
 
 __all__ = ["write_diagnosis_report"]
 
-say = Sentences(__package__)
+say, captions = Sentences(__package__), Sentences(__package__, "figures.toml")
 _MOST_PLACES = 8
 """Stretches that are listed."""
 _DASH = "\N{EN DASH}"
@@ -72,7 +72,7 @@ def _drawn(report: Report, said: Result) -> dict[str, list[Block]]:
     for name, draw in zip(_FIGURES, draws, strict=True):
         with styled():
             drawing = draw()
-        drawn[name] = [] if drawing is None else [report.draw(Plot.said(say, name, drawing))]
+        drawn[name] = [] if drawing is None else [report.draw(Plot.said(captions, name, drawing))]
         report.tell(0.2 * len(drawn))
     return drawn
 

@@ -38,10 +38,9 @@ class Plot:
     figure: Figure
 
     @classmethod
-    def said(cls, say: Sentences, key: str, figure: Figure, *, name: str = "", **values: Any) -> Plot:
-        """A figure called `name`, or as its key, with its title and caption from the table `key` of a package's
-        sentences."""
-        return cls(name or key, say(f"{key}.title", **values), say(f"{key}.caption", **values), figure)
+    def said(cls, captions: Sentences, key: str, figure: Figure, *, name: str = "", **values: Any) -> Plot:
+        """A figure called `name`, or as its key, with its title and caption from the table `key` of figures.toml."""
+        return cls(name or key, captions(f"{key}.title", **values), captions(f"{key}.caption", **values), figure)
 
     def save(self, folder: Path, dpi: int | None = None) -> Path:
         """Write `<folder>/<name>.png`."""

@@ -16,15 +16,19 @@ __all__ = ["Sentences"]
 
 
 class Sentences:
-    """The sentences of one package, read when the first one is asked for."""
+    """The sentences of one package, read when the first one is asked for.
 
-    def __init__(self, package: str | None) -> None:
-        self.package = package or ""
+    `file` is another than ``sentences.toml``: ``figures.toml`` has a table for each figure; title and caption of the
+    table path have the keys path.title and path.caption.
+    """
+
+    def __init__(self, package: str | None, file: str = "sentences.toml") -> None:
+        self.package, self.file = package or "", file
 
     @cached_property
     def templates(self) -> dict[str, str]:
-        """Key to template, from ``sentences.toml``; within its table ``[path]``, ``title`` has the key path.title."""
-        found = tomllib.loads(files(self.package).joinpath("sentences.toml").read_text(encoding="utf-8"))
+        """Key to template, from the file."""
+        found = tomllib.loads(files(self.package).joinpath(self.file).read_text(encoding="utf-8"))
         groups = {name: group for name, group in found.items() if isinstance(group, dict)}
         within = {f"{name}.{key}": text for name, group in groups.items() for key, text in group.items()}
         return {key: text for key, text in found.items() if key not in groups} | within

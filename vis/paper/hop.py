@@ -18,7 +18,7 @@ from vis.page.tumble_series import read_columns
 
 __all__ = ["write_hop_report"]
 
-say = Sentences(__package__)
+captions = Sentences(__package__, "figures.toml")
 
 
 def write_hop_report(folder: str | Path, *, progress: Progress | None = None) -> Path:
@@ -65,7 +65,7 @@ def _flights(report: Report) -> Plot:
     missing = "" if first.exists() else " From rigid ground it escapes: see the warnings."
     missing += "" if other.exists() else " The planar model has no flight that ends: see the warnings."
     sought = "sought for rigid ground" if result.get("asks_for", "distance") == "distance" else "the same on both"
-    return Plot.said(say, "flights", drawing, sought=sought, missing=missing)
+    return Plot.said(captions, "flights", drawing, sought=sought, missing=missing)
 
 
 def _launch(report: Report) -> Plot:
@@ -86,7 +86,7 @@ def _launch(report: Report) -> Plot:
         path.set(xlabel="centre along the ground [mm]", ylabel="centre upwards [mm]")
         path.set_aspect("equal", adjustable="datalim")
         legend_of_states(drawing, states, (handle("launch on rigid ground", **dashed),), columns=6)
-    return Plot.said(say, "launch", drawing, surface=report.result["surface"])
+    return Plot.said(captions, "launch", drawing, surface=report.result["surface"])
 
 
 def _said(result: Result, name: str, scale: float = 1.0, unit: str | None = None) -> str:

@@ -14,7 +14,7 @@ from vis.paper.run import PaperRun, in_order
 
 __all__ = ["figure_8", "figure_sweep"]
 
-say = Sentences(__package__)
+captions = Sentences(__package__, "figures.toml")
 _MEASURES = (
     ("trajectory_angle", 180 / math.pi, "trajectory angle [degrees]"),
     ("max_speed", 1e3, "largest speed [mm/s]"),
@@ -47,7 +47,7 @@ def figure_8(paper: PaperRun) -> Plot:
         hollow = handle("the paper's 1 ms step", INK, marker="o", mfc="none", ls="", ms=7)
         dots = [handle(paper.label(t), paper.colour(t), marker="o", ls="", ms=5) for t in paper.torques]
         legend_above(drawing, [*dots, hollow, dashed], columns=3)
-    return Plot.said(say, "figure8", drawing)
+    return Plot.said(captions, "figure8", drawing)
 
 
 def _draw_measures(axis: Axes, paper: PaperRun, surface: str, rig: float, key: str, scale: float, place: int) -> None:
@@ -117,7 +117,7 @@ def figure_sweep(paper: PaperRun) -> Plot | None:
             handle(f"mu_d = {ratio:g} mu_s", INK, marker="D", ls="", ms=_diamond(ratio, ratios)) for ratio in ratios
         ]
         legend_above(drawing, [*paper.handles(), *marks], columns=5)
-    return Plot.said(say, "sweep", drawing, rig=rig)
+    return Plot.said(captions, "sweep", drawing, rig=rig)
 
 
 def _diamond(ratio: float, ratios: Sequence[float]) -> float:

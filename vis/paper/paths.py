@@ -19,7 +19,7 @@ from vis.paper.run import PaperRun
 
 __all__ = ["figure_5", "figure_6", "figure_7"]
 
-say = Sentences(__package__)
+captions = Sentences(__package__, "figures.toml")
 _SHOWN = 0.045
 """How far Figure 5 goes [m]: a little more than what the paper trusts."""
 
@@ -71,7 +71,7 @@ def figure_5(paper: PaperRun) -> Plot | None:
         band = Patch(color=GREY, alpha=0.35, lw=0, label="friction band")
         dotted = handle("the paper's 1 ms step", INK, lw=1.1, ls=(0, (1, 1.6)))
         legend_above(drawing, [*paper.handles(), band, dotted], columns=5)
-    return Plot.said(say, "figure5", drawing, rig=rig, shown=1e3 * _SHOWN, gap=gap)
+    return Plot.said(captions, "figure5", drawing, rig=rig, shown=1e3 * _SHOWN, gap=gap)
 
 
 _ROWS = (("low", "μ low"), ("nominal", "μ"), ("high", "μ high"), ("paper", "1 ms step"))
@@ -100,7 +100,7 @@ def figure_6(paper: PaperRun) -> Plot | None:
         handles = [handle(name, colour, lw=6) for name, colour in STATES.items()]
         handles.append(handle("first hop", INK, marker="v", ls="", ms=5))
         legend_above(drawing, handles, columns=5)
-    return Plot.said(say, "figure6", drawing, rig=rig, widest=widest)
+    return Plot.said(captions, "figure6", drawing, rig=rig, widest=widest)
 
 
 def _state_bar(axis: Axes, paper: PaperRun, case: Result, row: int) -> None:
@@ -157,7 +157,7 @@ def figure_7(paper: PaperRun) -> Plot | None:
         band = Patch(color=GREY, alpha=0.35, lw=0, label="friction band")
         legend_above(drawing, [*paper.handles(), *gravities, band], columns=6)
     missing = f" No hop that rises: {'; '.join(flat)}." if flat else ""
-    return Plot.said(say, "figure7", drawing, missing=missing)
+    return Plot.said(captions, "figure7", drawing, missing=missing)
 
 
 def _motors(paper: PaperRun) -> list[float]:

@@ -20,7 +20,7 @@ from vis.penetrate.summary_parts import Departure, departure_rows, value_of
 
 __all__ = ["drag_plot", "gap_plot", "work_plot"]
 
-say = Sentences(__package__)
+say, captions = Sentences(__package__), Sentences(__package__, "figures.toml")
 
 
 def drag_plot(run: RunFolder) -> Plot | None:
@@ -71,8 +71,8 @@ def drag_plot(run: RunFolder) -> Plot | None:
         say("drag_law") + say("drag_law_out" if out else "drag_law_in") if law else "",
     ]
     moved = f"driven in{' and pulled out' if out else ''}"
-    caption = say("drag.caption", moved=moved, parts="".join(parts)).strip()
-    return Plot("drag", say("drag.title"), caption, figure)
+    caption = captions("drag.caption", moved=moved, parts="".join(parts)).strip()
+    return Plot("drag", captions("drag.title"), caption, figure)
 
 
 def gap_plot(run: RunFolder) -> Plot | None:
@@ -116,7 +116,7 @@ def gap_plot(run: RunFolder) -> Plot | None:
         bar.set_label("spring-damper − bed [N]")
         bar.outline.set_visible(False)
     told_below = say("gap_told") if told else ""
-    return Plot.said(say, "gap", figure, told=told_below)
+    return Plot.said(captions, "gap", figure, told=told_below)
 
 
 def work_plot(run: RunFolder) -> Plot | None:
@@ -151,7 +151,7 @@ def work_plot(run: RunFolder) -> Plot | None:
             axis.axhline(0.0, color=GREY, lw=0.8)
         _label(axes, "speed [m/s]", "work [mJ]")
         legend_above(figure, pair_of_handles(bars=True)[: 2 if law else 1])
-    return Plot.said(say, "work", figure, words=_returned_words(driven) + spread_words(driven))
+    return Plot.said(captions, "work", figure, words=_returned_words(driven) + spread_words(driven))
 
 
 def _label(axes: list[Axes], x: str, y: str) -> None:

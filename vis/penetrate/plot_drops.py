@@ -16,7 +16,7 @@ from vis.penetrate.summary_parts import fit_error, joined, std_of, value_of
 
 __all__ = ["drop_peaks_plot", "drops_plot", "set_down_plot", "spread_plot"]
 
-say = Sentences(__package__)
+say, captions = Sentences(__package__), Sentences(__package__, "figures.toml")
 
 
 def drops_plot(run: RunFolder) -> Plot | None:
@@ -72,7 +72,7 @@ def drops_plot(run: RunFolder) -> Plot | None:
         legend_above(figure, [bed, recorded, *model, peaks])
     each = ", a line for each bed" if len({(r.speed, r.seed) for r in drops}) > len(speeds) else ""
     left, later = say("drops_left") if free else "", say("drops_later") if has_model(drops) else ""
-    return Plot.said(say, "drops", figure, each=each, window=quote(window, 0.0, "s"), left=left, later=later)
+    return Plot.said(captions, "drops", figure, each=each, window=quote(window, 0.0, "s"), left=left, later=later)
 
 
 def drop_peaks_plot(run: RunFolder) -> Plot | None:
@@ -104,7 +104,7 @@ def drop_peaks_plot(run: RunFolder) -> Plot | None:
         law = any(value_of(r.quantities, "model_peak_force") is not None for r in drops)
         legend_above(figure, pair_of_handles(markers=True)[: 2 if law else 1])
     listed = joined([title[0].lower() + title[1:] for _, title, *_ in columns])
-    return Plot.said(say, "drop_peaks", figure, listed=capital(listed), spread=spread_words(drops))
+    return Plot.said(captions, "drop_peaks", figure, listed=capital(listed), spread=spread_words(drops))
 
 
 def set_down_plot(run: RunFolder) -> Plot | None:
@@ -220,7 +220,7 @@ def spread_plot(run: RunFolder) -> Plot | None:
             axis.grid(False, axis="x")
     known = any(fit_error(f, key) is not None for f in fits for key in ("stiffness", "damping"))
     bars = "; bars: standard error of the fit" if known else "; how well each fit is determined is not known"
-    return Plot.said(say, "spread", figure, bars=bars)
+    return Plot.said(captions, "spread", figure, bars=bars)
 
 
 def _first_touch(series: Series | None) -> float:

@@ -14,6 +14,7 @@ import numpy as np
 from vis.page.folder import RunFolder
 from vis.page.numbers import plain, quantity, quote, short
 from vis.penetrate import summary_parts as words
+from vis.penetrate.summary_parts import say
 from vis.pictures.frames import frame_names
 
 __all__ = ["summarise"]
@@ -62,7 +63,8 @@ def _banner(run: RunFolder) -> str:
     if run.status == "done":
         return ""
     unknown = "" if run.result else "Whether this run was finished is not known."
-    text = words.say.templates.get(f"status_{run.status}", unknown)
+    known = {"stopped": say("status_stopped"), "failed": say("status_failed"), "running": say("status_running")}
+    text = known.get(run.status, unknown)
     reason = f" Reason: {words.sentence(run.reason)}" if run.reason and text else ""
     return text + reason
 

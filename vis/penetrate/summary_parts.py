@@ -23,7 +23,7 @@ __all__ = [
 ]  # fmt: skip
 
 NBSP = "\N{NO-BREAK SPACE}"
-say = Sentences(__package__)
+say, labels = Sentences(__package__), Sentences(__package__, "labels.toml")
 _UNITS = {
     "size": "m", "grain": "m", "grain_diameter": "m", "surface": "m", "gravity": "m/s2", "young": "Pa", "real": "Pa",
     "pressure": "Pa", "time_step": "s",
@@ -117,7 +117,7 @@ def cell_text(key: str, value: Any) -> str:
 
 def label_of(key: str) -> str:
     """The name of a key, as a person reads it."""
-    return say.templates.get(f"label.{key}", key.replace("_", " "))
+    return labels.templates.get(key, key.replace("_", " "))
 
 
 def mapping_of(value: Any) -> Mapping[str, Any]:

@@ -15,7 +15,8 @@ from vis.pictures.pictures import Pictures
 
 __all__ = ["ARROWS", "draw_in_space"]
 
-ARROWS = Sentences(__package__)("arrows")
+say = Sentences(__package__)
+ARROWS = say("arrows")
 
 
 def draw_in_space(

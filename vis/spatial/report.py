@@ -25,7 +25,7 @@ from vis.spatial.pictures import ARROWS, draw_in_space
 
 __all__ = ["write_spatial_report"]
 
-say = Sentences(__package__)
+captions = Sentences(__package__, "figures.toml")
 Columns = Mapping[str, Array]
 _AXES = {"x": BED, "y": "#009E73", "z": MODEL}
 _TURN = "turn from the start [degrees]"
@@ -114,24 +114,24 @@ def _numbers(result: Result) -> Block:
 def _states(home: Path, path: Columns, states: States) -> list[Plot]:
     """The states over time and turn, and on grains those of the spring-damper beside them."""
     turn = np.degrees(path["turn_rad"])
-    plots = [Plot.said(say, "states", draw_states(path["t_s"], turn, states, label=_TURN))]
+    plots = [Plot.said(captions, "states", draw_states(path["t_s"], turn, states, label=_TURN))]
     beside = home / "series" / "spring-damper.csv"
     if beside.exists():
         other, others = read_columns(beside)
         runs = [(path["t_s"], turn, states), (other["t_s"], np.degrees(other["turn_rad"]), others)]
         with styled():
             bands = draw_bands(runs, ("grains", "spring-damper"), label=_TURN)
-        plots.append(Plot.said(say, "beside", bands))
+        plots.append(Plot.said(captions, "beside", bands))
     return plots
 
 
 def _plots(path: Columns, motion: Columns) -> list[Plot]:
     with styled():
         return [
-            Plot.said(say, "path", _draw_path(path)),
-            Plot.said(say, "turning", _draw_turning(path, motion)),
-            Plot.said(say, "ground", _draw_ground(motion)),
-            Plot.said(say, "energy", _draw_energy(motion)),
+            Plot.said(captions, "path", _draw_path(path)),
+            Plot.said(captions, "turning", _draw_turning(path, motion)),
+            Plot.said(captions, "ground", _draw_ground(motion)),
+            Plot.said(captions, "energy", _draw_energy(motion)),
         ]  # fmt: skip
 
 

@@ -22,7 +22,7 @@ __all__ = ["grains_section"]
 Columns = Mapping[str, Array]
 _ROWS = (BED, MODEL, "#009E73", "#CC79A7", GREY, "#56B4E9", "#E69F00", INK)
 """Colours of the rows of spikes."""
-say = Sentences(__package__)
+captions = Sentences(__package__, "figures.toml")
 
 
 def grains_section(result: Result, figures: Path, tables: Mapping[str, tuple[Columns, States]]) -> Section:
@@ -30,12 +30,12 @@ def grains_section(result: Result, figures: Path, tables: Mapping[str, tuple[Col
     columns = {name: held for name, (held, _) in tables.items()}
     with styled():
         plots = [
-            Plot.said(say, "beside", _draw_paths(columns["own"], columns["beside"])),
-            Plot.said(say, "feet", _draw_feet(columns["feet"])),
+            Plot.said(captions, "beside", _draw_paths(columns["own"], columns["beside"])),
+            Plot.said(captions, "feet", _draw_feet(columns["feet"])),
         ]
         if "damping_lost_J" in columns.get("bed", {}):
             book = _books(columns["motion"], columns["feet"], columns["bed"])
-            plots.append(Plot.said(say, "books", _draw_books(book)))
+            plots.append(Plot.said(captions, "books", _draw_books(book)))
     drawn = [figure(plot.save(figures, 130), title=plot.title, caption=plot.caption) for plot in plots]
     grains = result["grains"]
     facts = (

@@ -27,7 +27,7 @@ from vis.tumble.sweep import sweep_section
 
 __all__ = ["write_tumble_report"]
 
-say = Sentences(__package__)
+say, captions = Sentences(__package__), Sentences(__package__, "figures.toml")
 Columns = Mapping[str, Array]
 _FOLLOWED = 1.2
 """How far from its start the animation follows the centre [m]."""
@@ -66,8 +66,8 @@ def write_tumble_report(
         _animate(home / "animation.gif", result, numbers, states),
         half=True,
         show_file=True,
-        title=say("moving.title"),
-        caption=say("moving.caption", far=_FOLLOWED),
+        title=captions("moving.title"),
+        caption=captions("moving.caption", far=_FOLLOWED),
     )
     tell(0.4)
     sections = [
@@ -152,7 +152,7 @@ def _trajectory(result: Result, numbers: Columns, states: States) -> Plot:
         other.spines["right"].set_visible(True)
         legend_of_states(drawing, states, more)
     shape = " in proportion" if far >= 1e-4 else ", heights stretched"
-    return Plot.said(say, "trajectory", drawing, shape=shape)
+    return Plot.said(captions, "trajectory", drawing, shape=shape)
 
 
 def _draw_path(path: Axes, numbers: Columns, states: States, far: float, angle: float | None) -> str:
@@ -178,7 +178,7 @@ def _draw_path(path: Axes, numbers: Columns, states: States, far: float, angle: 
 
 def _states(numbers: Columns, states: States) -> Plot:
     drawing = draw_states(numbers["t_s"], np.degrees(numbers["theta_rad"]), states)
-    return Plot.said(say, "states", drawing)
+    return Plot.said(captions, "states", drawing)
 
 
 def _energy(result: Result, motion: Columns) -> Plot:
@@ -199,7 +199,7 @@ def _energy(result: Result, motion: Columns) -> Plot:
         rest.set(xlabel="time [s]", ylabel=f"gained − work + dissipated [{unit}]")
     own = result["quantities"].get("coupling_residual")
     residual_words = quantity(own if own is not None else result["quantities"].get("energy_residual"))
-    return Plot.said(say, "energy", drawing, residual_words=residual_words)
+    return Plot.said(captions, "energy", drawing, residual_words=residual_words)
 
 
 def _animate(path: Path, result: Result, numbers: Columns, states: States) -> Path:

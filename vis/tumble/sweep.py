@@ -18,7 +18,7 @@ from vis.page.style import BED, styled
 
 __all__ = ["sweep_section"]
 
-say = Sentences(__package__)
+captions = Sentences(__package__, "figures.toml")
 _PANELS = (
     ("trajectory_angle_rad", 180 / math.pi, "trajectory angle [degrees]"),
     ("max_speed_m_s", 1.0, "largest speed [m/s]"),
@@ -34,7 +34,7 @@ def sweep_section(report: Report) -> Section:
     with styled():
         drawing = _draw(sweep["keys"], report.columns(sweep["file"]))
     names = " and ".join(key["key"] for key in sweep["keys"])
-    drawn = report.draw(Plot.said(say, "sweep", drawing, trials=sweep["trials"], names=names))
+    drawn = report.draw(Plot.said(captions, "sweep", drawing, trials=sweep["trials"], names=names))
     told = tables(report.result) if "tables" in report.result else []
     return Section("The sweep", [drawn, *told, listing(sweep["sentences"])])
 
