@@ -30,11 +30,10 @@ STRENGTHS = (0.7, 50.0)
 
 _SHARES = {"effect": 0.53, "null": 0.22, "outside": 0.17, "pair": 0.08}
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
-_MODULES = {"penetration": hidden_penetration, "tumble": hidden_tumble, "rig": hidden_rig}
-_MAKERS: dict[str, Callable[..., tuple[Campaign, Any]]] = {
-    "penetration": hidden_penetration.make_hidden,
-    "tumble": hidden_tumble.make_hidden_tumble,
-    "rig": hidden_rig.make_rig,
+_MAKERS: dict[str, tuple[Any, Callable[..., tuple[Campaign, Any]]]] = {
+    "penetration": (hidden_penetration, hidden_penetration.make_hidden),
+    "tumble": (hidden_tumble, hidden_tumble.make_hidden_tumble),
+    "rig": (hidden_rig, hidden_rig.make_rig),
 }
 
 
@@ -46,7 +45,8 @@ def suite(kind: str, count: int, *, seed: int = 1, only: str | None = None, tria
     """
     if kind not in KINDS:
         raise ValueError(f"kind = {kind!r}: {' or '.join(KINDS)} was expected")
-    names = {"effect": _MODULES[kind].EFFECTS, "outside": _MODULES[kind].OUTSIDE, "null": ("null",), "pair": ("pair",)}
+    maker, _ = _MAKERS[kind]
+    names = {"effect": maker.EFFECTS, "outside": maker.OUTSIDE, "null": ("null",), "pair": ("pair",)}
     every = [name for group in names.values() for name in group]
     if only is not None and only not in every:
         raise ValueError(f"only = {only!r}: one of {', '.join(every)} was expected")
@@ -72,7 +72,7 @@ def suite(kind: str, count: int, *, seed: int = 1, only: str | None = None, tria
 
 def make_case(kind: str, case: Mapping[str, Any]) -> tuple[Campaign, Any]:
     """The campaign of a case of `suite`, and what is hidden in it."""
-    return _MAKERS[kind](**case)
+    return _MAKERS[kind][1](**case)
 
 
 def write_suite(folder: Path, answers: Path, kind: str, cases: Sequence[Mapping[str, Any]]) -> None:

@@ -17,7 +17,6 @@ from experiments.campaign import Campaign, Recording, TumbleCampaign
 from experiments.runs.types import Json
 
 from .penetration import correlated, draw_hidden
-from .tumble_motion import COLUMNS, STEP, move
 
 __all__ = ["EFFECTS", "OUTSIDE", "HiddenTumble", "make_hidden_tumble"]
 
@@ -30,6 +29,7 @@ OUTSIDE = ("floor-vibration", "magnet", "loose-mass", "shock", "unbalance", "win
 _RIG = ("pendulum", "rig-friction", "pulley-inertia")
 _PRIORS = ("mass", "inertia", "stiffness", "damping", "mu_s", "mu_d")
 _GRAVITY = 9.80665
+_Numbers = Mapping[str, float]
 _CHANNELS = ("x", "y", "theta", "gyro", "ax", "ay", "wheel")
 _COARSE = 5e-5  # step while an amplitude is looked for [s]
 _TRIES = 9  # of amplitudes
@@ -109,7 +109,7 @@ def make_hidden_tumble(
         seen = _Signature(plan, true, gravity)
         settings = _merged(forms, [_amplitude(seen, form, strength) for form in forms])
         signature = seen.of(settings)
-    readings = _measure(plan, true, gravity, settings, STEP)
+    readings = _measure(plan, true, gravity, settings)
     coloured = bool(random.random() < 0.25)
     campaign = _record(random, plan, readings, coloured, _wires(np.random.default_rng((seed, 1)), plan, settings))
     told = HiddenTumble(
@@ -223,7 +223,7 @@ def _merged(forms: Sequence[Any], amplitudes: Sequence[float]) -> dict[str, floa
 class _Signature:
     """What a change leaves of itself: see `HiddenTumble.signature`."""
 
-    def __init__(self, plan: _Plan, true: Mapping[str, float], gravity: np.ndarray) -> None:
+    def __init__(self, plan: _Plan, true: _Numbers, gravity: np.ndarray) -> None:
         self._plan, self._true, self._gravity = plan, true, gravity
         clean = _measure(plan, true, gravity, {}, _COARSE)
         self._base = self._stacked(clean)
@@ -244,7 +244,7 @@ class _Signature:
         self._matrix = np.array(rows)
         self._normal = self._matrix @ self._matrix.T + np.eye(len(rows))
 
-    def of(self, settings: Mapping[str, float]) -> float:
+    def of(self, settings: _Numbers) -> float:
         """With these numbers of what is hidden."""
         made = _measure(self._plan, self._true, self._gravity, settings, _COARSE)
         change = self._stacked(made) - self._base
@@ -279,7 +279,7 @@ def _amplitude(seen: _Signature, form: Any, strength: float) -> float:
     return min(found)[1]
 
 
-def _parameters(effects: Sequence[str], settings: Mapping[str, float]) -> dict[str, float]:
+def _parameters(effects: Sequence[str], settings: _Numbers) -> dict[str, float]:
     """Those that docs/diagnose.md names."""
     named = {
         "pendulum": {"pendulum.length": lambda s: 1 / s["wire_curvature"]},
@@ -296,9 +296,11 @@ def _parameters(effects: Sequence[str], settings: Mapping[str, float]) -> dict[s
 
 
 def _measure(
-    plan: _Plan, true: Mapping[str, float], gravity: np.ndarray, settings: Mapping[str, float], step: float
+    plan: _Plan, true: _Numbers, gravity: np.ndarray, settings: _Numbers, step: float | None = None
 ) -> list[dict[str, np.ndarray]]:
     """What the sensors read without noise, one table a trial: by channel, with `<sensor>_t` for the times."""
+    from .tumble_motion import COLUMNS, STEP, move  # loads Taichi
+
     numbers = np.zeros((len(plan.trials), len(COLUMNS)))
     for row, trial, factor in zip(numbers, plan.trials, gravity, strict=True):
         g = trial["gravity_sim"] * float(factor)
@@ -311,7 +313,7 @@ def _measure(
         given |= {name: value for name, value in settings.items() if name in COLUMNS}
         for name, value in given.items():
             row[COLUMNS.index(name)] = value
-    time, motions = move(numbers, plan.duration + 0.15, step=step)
+    time, motions = move(numbers, plan.duration + 0.15, step=step or STEP)
     found = []
     for motion, trial, factor in zip(motions, plan.trials, gravity, strict=True):
         pull = _GRAVITY if plan.rig else trial["gravity_sim"] * float(factor)
@@ -319,9 +321,7 @@ def _measure(
     return found
 
 
-def _read(
-    plan: _Plan, time: np.ndarray, motion: np.ndarray, pull: float, settings: Mapping[str, float]
-) -> dict[str, np.ndarray]:
+def _read(plan: _Plan, time: np.ndarray, motion: np.ndarray, pull: float, settings: _Numbers) -> dict[str, np.ndarray]:
     camera, imu, wheel = (
         np.arange(math.ceil(-plan.lead * rate), math.floor(plan.duration * rate) + 1) / rate for rate in plan.rates
     )
@@ -356,7 +356,7 @@ def _read(
     return found
 
 
-def _wires(random: np.random.Generator, plan: _Plan, settings: Mapping[str, float]) -> float | None:
+def _wires(random: np.random.Generator, plan: _Plan, settings: _Numbers) -> float | None:
     """Length of the wires [m], stated in half of the rig's campaigns: that says nothing of a pendulum."""
     stated = bool(random.random() < 0.5)
     if not plan.rig or not stated:
