@@ -17,7 +17,6 @@ import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
-from importlib import import_module
 from importlib.util import find_spec
 from typing import Any, Protocol, Self
 
@@ -25,6 +24,7 @@ import numpy as np
 from scipy import stats
 
 from experiments.campaign import Campaign
+from experiments.diagnose.experiment import make_problem
 
 from .motion import held_out_gap
 from .rows import NAMES, STANDING, Array, Rows, make_rows
@@ -67,11 +67,13 @@ def try_all(
 ) -> dict[str, dict[str, Any]]:
     """What each baseline says of a campaign: alarm, terms, before, after, seconds.
 
-    ``campaign``: as diagnose read it. ``values``: of the fitted base model, the held-out trials' own nuisances with it.
-    ``fitted``: trials to learn from. ``held_out``: trials to be predicted.
+    Args:
+        campaign: as diagnose read it.
+        values: of the fitted base model, the held-out trials' own nuisances with it.
+        fitted: trials to learn from.
+        held_out: trials to be predicted.
     """
-    package = "push" if campaign.tables.kind == "penetration" else "tumble"
-    problem = import_module(f"experiments.diagnose.{package}.problem").make_problem(campaign)
+    problem = make_problem(campaign)
     rows = make_rows(problem, values, fitted)
     before = {"fit": None, "held_out": held_out_gap(problem, values, held_out, None)}
     told = {}

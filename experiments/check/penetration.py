@@ -10,7 +10,7 @@ from experiments.campaign import PenetrationCampaign, Recording
 from experiments.campaign.tables import PenetrationTrial
 from rigid.platform.rig import STANDARD_GRAVITY
 
-from .words import OFF, ZERO, Odd, said, std_of, times
+from .words import OFF, ZERO, Odd, oddity, said, std_of, times
 
 __all__ = ["penetration_oddities"]
 
@@ -33,26 +33,15 @@ def penetration_oddities(tables: PenetrationCampaign, trial: PenetrationTrial, d
     deepest, std = float(depth[known].max()), std_of(tables.sensors.depth)
     highest = -float(depth[known].min())
     if deepest <= 3 * std or (trial.mode == "driven" and highest > 3 * deepest + 3 * std):
-        yield said(
-            "depth",
-            f"the depth goes from {-1e3 * highest:.3g} to {1e3 * deepest:.3g} mm, hardly into the bed; ",
-            "it is positive downwards from the undisturbed surface",
-        )
+        yield oddity("depth", "hardly_in_the_bed", from_mm=-1e3 * highest, deepest_mm=1e3 * deepest)
         return
     diameter = tables.diameter_of(trial)
     if deepest > max(_DEEP * diameter, _DEEP_METRES):
-        yield said(
-            "depth",
-            f"the depth goes to {deepest:.3g} m, {deepest / diameter:.0f} diameters: is depth_m in mm? depth_mm would ",
-            "say so",
-        )
+        yield oddity("depth", "depth_in_mm", deepest=deepest, diameters=deepest / diameter)
         return
     if diameter > _WIDE_METRES and deepest < _SHALLOW * diameter:
-        yield said(
-            "depth",
-            f"diameter = {diameter:g} m, {diameter / deepest:.0f} times the greatest depth, {1e3 * deepest:.3g} mm: ",
-            f"is it in mm? {1e-3 * diameter:g} m would fit",
-        )
+        yield oddity("depth", "diameter_in_mm", diameter=diameter, depths=diameter / deepest,
+                     deepest_mm=1e3 * deepest, metres=1e-3 * diameter)  # fmt: skip
     yield from _off_scale(tables, trial, depth, data)
     if trial.mode == "driven":
         yield from _driven(tables, trial, time, depth, data["force_N"], std)
@@ -76,11 +65,8 @@ def _off_scale(tables: PenetrationCampaign, trial: PenetrationTrial, depth: Arra
     also = ", or the force in mN" if trial.mode == "driven" else ""
     met = float(np.nanmedian(np.where(near, push, np.nan))) if np.isfinite(push[near]).any() else 0.0
     if met > 0 and not 1 / _OFF_SCALE < met / spring < _OFF_SCALE:
-        yield said(
-            "force" if trial.mode == "driven" else "accel",
-            f"{what} is {met:.3g} N at {1e3 * depth[last]:.3g} mm where stiffness = {tables.surface.stiffness:g} N/m ",
-            f"makes {spring:.3g} N: is {key} in other units (N/mm, g){also}?",
-        )
+        yield oddity("force" if trial.mode == "driven" else "accel", "off_scale", what=what, met=met, tables=tables,
+                     depth_mm=1e3 * depth[last], spring=spring, key=key, also=also)  # fmt: skip
 
 
 def _driven(
@@ -90,21 +76,13 @@ def _driven(
     into = np.arange(len(depth)) <= last
     deep = into & (depth > 0.3 * depth[last]) & np.isfinite(force)
     if deep.sum() >= 8 and float(np.median(force[deep])) < -4 * std_of(tables.sensors.force):
-        yield said(
-            "force",
-            f"the force is {np.median(force[deep]):.3g} N in the middle of the way in, downwards; the bed's force on ",
-            "the spike, upwards, was expected",
-        )
+        yield oddity("force", "force_downwards", force=np.median(force[deep]))
     above = into & (depth < -3 * std - 0.02 * depth[last]) & np.isfinite(force)
     if above.sum() >= 3:
         zero = float(np.median(force[above]))
         error = 1.25 * std_of(tables.sensors.force) / math.sqrt(above.sum())
         if abs(zero) > max(OFF * error, std_of(tables.sensors.force)) and not _rises(force[above]):
-            yield said(
-                "force",
-                f"the force reads {zero:.3g} N above the surface, {times(abs(zero) / std_of(tables.sensors.force))} ",
-                "its noise: its zero, or the spike's weight, is to be taken off",
-            )
+            yield oddity("force", "force_zero", zero=zero, ratio=times(abs(zero) / std_of(tables.sensors.force)))
     if trial.speed:
         # Until it is first so deep: rows of a hold that the noise lifts are none of the way in.
         moving = into & (depth > 0.05 * depth[last]) & (np.fmax.accumulate(depth) < 0.95 * depth[last])
@@ -131,21 +109,14 @@ def _drop(
     first = float(time[np.isfinite(depth)][0])
     if first > max(_FEW_ROWS * float(np.median(np.diff(time))), 0.2 * float(np.nanmax(depth)) / trial.speed):
         there = float(depth[np.isfinite(depth)][0])
-        yield said(
-            "depth",
-            f"no row before {1e3 * first:.3g} ms, where the depth is {1e3 * there:.3g} mm; t = 0 is the first touch: ",
-            "either that is not recorded, or the clock was started late and all times are off",
-        )
+        yield oddity("depth", "drop_begins_late", first_ms=1e3 * first, there_mm=1e3 * there)
         return
     known = np.isfinite(depth) & (np.abs(time) < 0.2 * max(float(np.nanmax(depth)), 1e-9) / trial.speed)
     if known.sum() >= 6 and np.ptp(time[known]) > 0:
         (_, speed, start), covariance = np.polyfit(time[known], depth[known], 2, cov="unscaled")
         errors = max(std, 1e-12) * np.sqrt(np.diag(covariance))
         if abs(start) > max(OFF * errors[2], ZERO * std):
-            yield said(
-                "depth",
-                f"the depth is {1e3 * start:.3g} mm at t = 0; t = 0 is the first touch, where it was expected to be 0",
-            )
+            yield oddity("depth", "touches_later", start_mm=1e3 * start)
         elif abs(speed - trial.speed) > max(OFF * errors[1], 0.2 * trial.speed):
             yield said("depth", f"speed = {trial.speed:g} m/s at the surface, but the depth goes in at {speed:.3g} m/s")
 

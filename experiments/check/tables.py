@@ -7,7 +7,7 @@ from experiments.campaign import TumbleCampaign
 from experiments.campaign.tables import TumbleTrial
 from rigid.platform.rig import STANDARD_GRAVITY
 
-from .words import Odd, said, say
+from .words import Odd, oddity, say
 
 __all__ = ["gravity_oddities"]
 
@@ -35,8 +35,5 @@ def gravity_oddities(tables: TumbleCampaign, trial: TumbleTrial) -> Iterator[Odd
         words = f"it looks like units of g: {trial.gravity_sim * STANDARD_GRAVITY:.4g} m/s2 would fit"
     elif abs(trial.gravity_sim * mass / hung - 1) < _LEAST:
         words = say("weight_reading")
-    yield said(
-        "gravity",
-        f"counterweight = {other:.5g} kg leaves {hung:.3g} N on the surface, that is gravity_sim = {gives:.4g} m/s2, ",
-        f"and gravity_sim = {trial.gravity_sim:g} m/s2 says {weight:.3g} N; {words or 'one of the two is another'}",
-    )
+    yield oddity("gravity", "counterweight", other=other, hung=hung, gives=gives, trial=trial, weight=weight,
+                 words=words or "one of the two is another")  # fmt: skip

@@ -11,7 +11,7 @@ from experiments.campaign.tables import TumbleTrial
 
 from .tables import gravity_oddities
 from .turning import clock_oddities, sideways_oddities, turning_oddities
-from .words import OFF, ZERO, Odd, said, times, unit_words
+from .words import OFF, ZERO, Odd, oddity, said, times, unit_words
 
 __all__ = ["tumble_oddities"]
 
@@ -24,11 +24,7 @@ def tumble_oddities(campaign: Campaign, tables: TumbleCampaign, trial: TumbleTri
     pose, imu, wheel = (campaign.recording(trial.id, sensor) for sensor in ("pose", "imu", "wheel"))
     for name, recording in (("pose", pose), ("imu", imu), ("wheel", wheel)):
         if recording is not None and len(recording) and not recording.time[0] < 1.0 <= 1.0 + recording.time[-1]:
-            yield said(
-                name,
-                f"{name} runs from {recording.time[0]:.7g} to {recording.time[-1]:.7g} s; t = 0 is when the torque ",
-                "starts",
-            )
+            yield oddity(name, "other_zero_of_time", name=name, first=recording.time[0], last=recording.time[-1])
             return
     yield from _begins_late(tables, trial, {"pose": pose, "imu": imu, "wheel": wheel})
     yield from gravity_oddities(tables, trial)
@@ -75,11 +71,7 @@ def _begins_late(
                 if abs(began) > max(doubt, _LATE)
                 else "; the wheel's speed fits the clock: the beginning was not recorded"
             )
-    yield said(
-        "clock",
-        f"no sensor has a row before {first[name]:.3g} s, and t = 0 is when the torque starts: either the beginning, ",
-        f"which tells most, is not recorded, or the clock was started late and all times are off{words}",
-    )
+    yield oddity("clock", "begins_late", first=first[name], words=words)
 
 
 def _start(tables: TumbleCampaign, trial: TumbleTrial, pose: Recording, *, angle: bool) -> Iterator[Odd]:
@@ -93,11 +85,7 @@ def _start(tables: TumbleCampaign, trial: TumbleTrial, pose: Recording, *, angle
     sunk = tables.weight_of(trial) / (2 * tables.surface.stiffness)
     height = tables.platform.spike_length * math.cos(math.pi / tables.platform.rows) - sunk
     if height <= 0:
-        yield said(
-            "y",
-            f"[surface] stiffness = {tables.surface.stiffness:g}: by it the platform would stand {sunk:.2g} m deep; ",
-            "is it in other units than N/m, of a row of spikes?",
-        )
+        yield oddity("y", "stands_deep", tables=tables, sunk=sunk)
         return
     expected = {"y_m": (height, "m", 1), "x_m": (0.0, "m", 0), "theta_rad": (0.0, "rad", 2)}
     for column, (value, unit, place) in expected.items():
@@ -108,10 +96,8 @@ def _start(tables: TumbleCampaign, trial: TumbleTrial, pose: Recording, *, angle
         there = float(np.median(early))
         if value and abs(there / value * 1e3 - 1) < 0.15:
             length = tables.platform.spike_length
-            yield said(
-                channel,
-                f"{column} is {there:.4g} at the start where spike_length = {length:g} puts it at {value:.4g} m: ",
-                f"[platform] spike_length looks like mm, {1e-3 * length:g} m would fit",
+            yield oddity(
+                channel, "length_in_mm", column=column, there=there, length=length, value=value, metres=1e-3 * length
             )
             return
         words = unit_words(there / value) if value else None
@@ -123,12 +109,8 @@ def _start(tables: TumbleCampaign, trial: TumbleTrial, pose: Recording, *, angle
         of_the_surface = sunk if column == "y_m" else 0.0
         if abs(there - value) > (ZERO + OFF / math.sqrt(len(early))) * std + of_the_surface:
             within = f" within {of_the_surface:.2g}" if of_the_surface > std else ""
-            yield said(
-                channel,
-                f"{column} is {there:.4g} {unit} at the start where {value:.4g}{within} was expected, ",
-                f"{times(abs(there - value) / std)} the camera's noise: its zero is to be taken off (up to 3 times ",
-                "is allowed for)",
-            )
+            yield oddity(channel, "camera_zero", column=column, there=there, unit=unit, value=value, within=within,
+                         ratio=times(abs(there - value) / std))  # fmt: skip
 
 
 def _at_rest(tables: TumbleCampaign, trial: TumbleTrial, imu: Recording) -> Iterator[Odd]:
@@ -184,11 +166,7 @@ def _wheel(tables: TumbleCampaign, trial: TumbleTrial, wheel: Recording) -> Iter
         if abs(slope / expected * 1e3 - 1) < 0.15:
             words = f"torque = {trial.torque:g} looks like mN m: {1e-3 * trial.torque:g} N m would fit"
     if words is not None:
-        yield said(
-            "wheel",
-            f"the wheel's speed changes by {slope:.4g} rad/s2 at first where torque / [wheel] inertia = ",
-            f"{expected:.4g}; {words}",
-        )
+        yield oddity("wheel", "wheel_changes", slope=slope, expected=expected, words=words)
 
 
 def _onset(time: Array, speed: Array, start: float, slope: float, std: float) -> float | None:

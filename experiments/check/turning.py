@@ -11,7 +11,7 @@ from experiments.campaign import Recording, TumbleCampaign
 from experiments.campaign.tables import TumbleTrial
 
 from .lags import Lag, find_lag, pieces
-from .words import Odd, said
+from .words import Odd, oddity, said
 
 __all__ = ["clock_oddities", "sideways_oddities", "turning_oddities"]
 
@@ -60,10 +60,7 @@ def clock_oddities(tables: TumbleCampaign, pose: Recording, imu: Recording) -> t
             return [], True
         first, second = ("camera's angle", "gyro") if whole.value > 0 else ("gyro", "camera's angle")
         gap = f", or jumped in the gap after {imu.time[felt][parts[0][1] - 1]:.3g} s" if len(parts) > 1 else ""
-        return [said(
-            "gyro", f"the {first} comes {abs(whole.value):.2g} s after the {second} all along the trial: one of the ",
-            f"two clocks is off{gap}; t = 0 of every sensor is when the torque starts",
-        )], True  # fmt: skip
+        return [oddity("gyro", "clock_lags", first=first, lag=abs(whole.value), second=second, gap=gap)], True
     if len(parts) > 1 or len(pieces(pose.time[seen])) > 1:
         return [], False
     middle = int(felt.sum()) // 2
@@ -74,10 +71,7 @@ def clock_oddities(tables: TumbleCampaign, pose: Recording, imu: Recording) -> t
     late = lag(slice(middle, None), before)
     if late is None or not late.is_another or late.left > _ONE_MOTION or abs(late.value - before) < _APART:
         return [], False
-    return [said(
-        "gyro", f"the camera's angle comes {before:.2g} s after the gyro in the first half and {late.value:.2g} s in ",
-        "the second: one of the two clocks jumped or runs at another pace",
-    )], True  # fmt: skip
+    return [oddity("gyro", "clock_jumps", before=before, later=late.value)], True
 
 
 def turning_oddities(pose: Recording, imu: Recording) -> Iterator[Odd]:
@@ -117,17 +111,11 @@ def sideways_oddities(
     if known.sum() < 8 or np.ptp(angle[known]) < max(0.1, 10 * sensor.std[2]):
         return
     if len(far) and angle[far[0]] < 0:
-        yield said(
-            "theta", "theta falls at the start where the torque turns the platform clockwise: theta is counted ",
-            "anticlockwise; clockwise is positive, of the gyro too",
-        )  # fmt: skip
+        yield oddity("theta", "anticlockwise")
         return
     moved = float(np.polyfit(angle[known], x[known], 1)[0])
     if moved < -0.3 * tables.platform.spike_length and np.corrcoef(angle[known], x[known])[0, 1] < -_SURE_OF_AXES:
-        yield said(
-            "x", "x falls while theta rises at the start: x is counted to the left; +x is where a platform that ",
-            "turns clockwise goes",
-        )  # fmt: skip
+        yield oddity("x", "counted_to_the_left")
         return
     if imu is None or tables.rig is None or tables.sensors.imu is None:
         return
@@ -140,8 +128,4 @@ def sideways_oddities(
     if np.ptp(tilt) < max(1.0, 20 * tables.sensors.imu.std[1]) or np.ptp(ax) == 0:
         return
     if np.corrcoef(tilt, ax)[0, 1] < -_SURE_OF_AXES:
-        yield said(
-            "ax",
-            "ax_m_s2 rises as the platform turns clockwise where it should fall with -g sin(theta): the sign is ",
-            "reversed, body x points towards +x at theta = 0",
-        )
+        yield oddity("ax", "ax_reversed")

@@ -12,7 +12,7 @@ from experiments.campaign.tables import DepthSensor
 from rigid.platform.rig import STANDARD_GRAVITY
 from vis.page.sentences import Sentences
 
-__all__ = ["OFF", "ZERO", "Finding", "Odd", "factor_words", "said", "say", "std_of", "times", "unit_words"]
+__all__ = ["OFF", "ZERO", "Finding", "Odd", "factor_words", "said", "say", "std_of", "oddity", "times", "unit_words"]
 
 say = Sentences(__package__)
 OFF = 6.0  # standard errors by which a zero or a speed must be off
@@ -69,6 +69,11 @@ class Odd(NamedTuple):
 def said(channel: str, *parts: str) -> Odd:
     """The parts as one sentence."""
     return Odd(channel, "".join(parts))
+
+
+def oddity(channel: str, key: str, /, **values: object) -> Odd:
+    """A sentence of the package's file."""
+    return Odd(channel, say(key, **values))
 
 
 def unit_words(ratio: float) -> str | None:

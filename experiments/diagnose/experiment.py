@@ -4,7 +4,6 @@ import shutil
 from collections.abc import Sequence
 from dataclasses import replace
 from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +20,14 @@ from experiments.runs.result import Result
 from .core.diagnosis import diagnose
 from .core.outcome import Diagnosis
 from .fit.bounds import is_strained
-from .fit.own import load_own
+from .fit.own import OwnEffect, load_own
 from .fit.problem import Problem
 from .noise.colour import together
 from .report.document import write_diagnosis
 from .report.summary import summary_sentences, title_words
 from .report.telling import findings_in_words, told_tables, where_sentences
 
-__all__ = ["check", "diagnose_campaign", "resume", "run"]
+__all__ = ["check", "diagnose_campaign", "make_problem", "resume", "run"]
 
 
 def check(settings: DiagnoseSettings) -> None:
@@ -85,12 +84,15 @@ def diagnose_campaign(
 def _make_problem(folder: Path, effect_file: Sequence[str | Path]) -> tuple[Campaign, Problem]:
     campaign = read_campaign(folder)
     own = tuple(load_own(file) for file in effect_file)
-    package = {"penetration": "push", "tumble": "tumble"}.get(campaign.tables.kind, "")
-    name = f"experiments.diagnose.{package}.problem"
-    if not package or find_spec(name) is None:
-        raise ValueError(f"{folder}: kind = {campaign.tables.kind!r} cannot be diagnosed yet")
     with threadpool_limits(1):
-        return campaign, import_module(name).make_problem(campaign, own=own)
+        return campaign, make_problem(campaign, own=own)
+
+
+def make_problem(campaign: Campaign, *, own: Sequence[OwnEffect] = ()) -> Problem:
+    """The problem of a campaign of either kind, `own` among its candidates. Raises ValueError where there is none."""
+    package = {"penetration": "push", "tumble": "tumble"}[campaign.tables.kind]
+    found: Problem = import_module(f"experiments.diagnose.{package}.problem").make_problem(campaign, own=own)
+    return found
 
 
 def _carry_out(settings: DiagnoseSettings, folder: RunFolder, progress: Progress) -> Result:

@@ -30,7 +30,6 @@ class FormsStart:
 
     forms: tuple[Form, ...]
     values: Values
-    promised: float  # chi-square that would be left if changes added up
 
 
 def pair_starts(model: Model, values: Values, forms: Sequence[Form], *, most: int) -> list[FormsStart]:
@@ -52,7 +51,7 @@ def pair_starts(model: Model, values: Values, forms: Sequence[Form], *, most: in
         if pair in found:
             continue
         start = seen.start((i, j), (sizes[0][i, j], sizes[1][i, j]))
-        found[pair] = FormsStart((whose[i], whose[j]), start, float(left[i, j]))
+        found[pair] = FormsStart((whose[i], whose[j]), start)
     return list(found.values())
 
 
@@ -66,7 +65,7 @@ def next_starts(model: Model, values: Values, forms: Sequence[Form], *, most: in
     for k in np.argsort(left).tolist():
         form = seen.whose[k]
         if form.effect not in found and len(found) < most:
-            found[form.effect] = FormsStart((form,), seen.start((k,), (sizes[k],)), float(left[k]))
+            found[form.effect] = FormsStart((form,), seen.start((k,), (sizes[k],)))
     return list(found.values())
 
 

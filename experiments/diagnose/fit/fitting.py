@@ -188,20 +188,6 @@ class Fit:
         inverse = np.linalg.pinv(hessian / np.outer(size, size), rcond=1e-12, hermitian=True)
         return inverse / np.outer(size, size) * np.outer(scales, scales)
 
-    def evidence(self) -> float:
-        """Laplace's log evidence, up to what is common to models of one campaign [nats].
-
-        A parameter at a bound has half a Gaussian at most: it is counted as held there.
-        """
-        total = -0.5 * self.objective
-        precision = self.prior_precision()
-        hessian = self.hessian()
-        free = self.free
-        if free.any():
-            total -= 0.5 * float(np.linalg.slogdet(hessian[np.ix_(free, free)])[1])
-        known = precision > 0
-        return total + 0.5 * float(np.log(precision[known]).sum() - np.log(precision[known & ~free]).sum())
-
 
 def fit(model: Model, start: Values | None = None, *, rounds: int = _ROUNDS) -> Fit:
     """The best values near `start` (the parameters' own values where it names none)."""

@@ -118,7 +118,7 @@ def depends_on(table: Mapping[str, NDArray[np.generic]]) -> tuple[str, dict[str,
             share = _explained(x[good], y[good])
             shares[name] = max(shares.get(name, 0.0), share)
     ranked = sorted(shares.items(), key=lambda pair: -pair[1])
-    told = [(column_words(name), share) for name, share in ranked if share > 0.1]
+    told = [(_WORDS.get(name, name), share) for name, share in ranked if share > 0.1]
     if not told:
         return "nothing that was recorded: no column explains a tenth of it", shares
     best = told[0]
@@ -143,11 +143,6 @@ _WORDS = {
     "vx_m_s": "velocity along the surface", "vy_m_s": "velocity upwards", "omega_rad_s": "rate of rotation",
     "wheel_rad_s": "speed of the wheel",
 }  # fmt: skip
-
-
-def column_words(name: str) -> str:
-    """What a column of latent.csv is called in a sentence."""
-    return _WORDS.get(name, name)
 
 
 def _explained(x: Array, y: Array) -> float:

@@ -20,7 +20,7 @@ from rigid.terms.candidate import Form, Number, Push, Tumble
 
 from .problem import Parameter, Values
 
-__all__ = ["PENETRATION_HOOKS", "OwnEffect", "load_own", "own_parameters", "own_starts", "parameters_of"]
+__all__ = ["PENETRATION_HOOKS", "OwnEffect", "load_own", "own_starts", "parameters_of"]
 
 PENETRATION_HOOKS = ("stiffen", "rate_force", "hold")
 _FINE = 0.2  # scale of a change that can be seen, over the typical size
@@ -131,11 +131,6 @@ def load_own(file: str | Path) -> OwnEffect:
         raise ValueError(f"{said}: FIT[{first.name!r}]: off = {off!r}: the value that changes nothing was expected")
     path = Path(file).resolve()
     return OwnEffect(term=term, file=path, off=float(off), typical=typical, candidate=candidate)
-
-
-def own_parameters(own: OwnEffect) -> tuple[Parameter, ...]:
-    """What is fitted: the amplitude from 0, the others about their typical size, to within that size."""
-    return parameters_of(own.id, own.form.numbers)
 
 
 def own_starts(own: OwnEffect, parameters: Sequence[Parameter]) -> tuple[Values, ...]:

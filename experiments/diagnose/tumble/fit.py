@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from experiments.diagnose.fit.problem import Array, Form
+from experiments.diagnose.fit.problem import Array, Form, Parameter
 from experiments.diagnose.fit.together import each
 
 from .forms import physical
@@ -170,29 +170,22 @@ class Fitter:
         return Way(space, start, self.trials, len(self.forward.data.trials), self.sigma_gravity)
 
     def _space(self, start: Start) -> Space:
-        rows: list[tuple[str, float, float, float, float, float, float]] = []
-        for name in SHARED:
-            sigma, nominal = self.sigma[name], self.forward.nominal[name]
-            if sigma > 0 and nominal > 0 and name not in start.frozen:
-                low = max(-6.0, -0.95 / sigma)
-                rows.append((name, nominal, sigma * nominal, 1.0, low, 6.0, 0.02))
-        for form in start.forms:
-            for p in form.parameters:
-                if p.name not in start.frozen:
-                    low, high = (p.lowest - p.value) / p.scale, (p.highest - p.value) / p.scale
-                    rows.append((p.name, p.value, p.scale, p.std / p.scale, low, high, (p.step or 1e-2) / p.scale))
+        def stated(name: str, value: float, sigma: float) -> tuple[str, float, float, float, float, float, float]:
+            return name, value, sigma * value, 1.0, max(-6.0, -0.95 / sigma), 6.0, 0.02
+
+        def fitted(p: Parameter) -> tuple[str, float, float, float, float, float, float]:
+            low, high = (p.lowest - p.value) / p.scale, (p.highest - p.value) / p.scale
+            return p.name, p.value, p.scale, p.std / p.scale, low, high, (p.step or 1e-2) / p.scale
+
+        shared = [(name, self.forward.nominal[name], self.sigma[name]) for name in SHARED if name not in start.frozen]
+        rows = [stated(name, value, sigma) for name, value, sigma in shared if sigma > 0 and value > 0]
+        rows += [fitted(p) for form in start.forms for p in form.parameters if p.name not in start.frozen]
         gravities = len(self.trials) if self.sigma_gravity > 0 else 0
-        for trial in self.trials[:gravities]:
-            name = f"gravity_sim[{self.forward.data.trials[trial].id}]"
-            low = max(-6.0, -0.95 / self.sigma_gravity)
-            rows.append((name, 1.0, self.sigma_gravity, 1.0, low, 6.0, 0.02))
+        ids = [self.forward.data.trials[trial].id for trial in self.trials]
+        rows += [stated(f"gravity_sim[{id}]", 1.0, self.sigma_gravity) for id in ids[:gravities]]
         kinds = list(dict.fromkeys(p.kind for p in start.apart))
-        for kind in kinds:
-            own = {p.trial: p for p in start.apart if p.kind == kind}
-            for trial in self.trials:
-                p = own[self.forward.data.trials[trial].id]
-                low, high = (p.lowest - p.value) / p.scale, (p.highest - p.value) / p.scale
-                rows.append((p.name, p.value, p.scale, p.std / p.scale, low, high, (p.step or 1e-2) / p.scale))
+        own = {(p.kind, p.trial): p for p in start.apart}
+        rows += [fitted(own[kind, id]) for kind in kinds for id in ids]
         table = np.array([row[1:] for row in rows], dtype=float).reshape(-1, 6)
         names = tuple(row[0] for row in rows)
         value, scale, std, low, high, step = table.T

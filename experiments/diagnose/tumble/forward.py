@@ -82,8 +82,6 @@ class Forward:
         }  # fmt: skip
         self._grids = [Grid(trial, data.window) for trial in data.trials]
         self._buffer = np.empty(0)
-        self.simulated = 0
-        """How many trials have been simulated so far."""
 
     def neutral(self, name: str) -> float:
         """The value of "<effect>.<parameter>" that changes nothing."""
@@ -225,7 +223,6 @@ class Forward:
                 )  # fmt: skip
 
             each(read, list(_pieces(lanes, rows)), threads=self.threads)
-        self.simulated += total
 
     def _held(self, *shape: int) -> Array:
         """Room for the motion of some lanes; what is in it is of no meaning, and its next user overwrites it."""
