@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.campaign import Campaign, PenetrationCampaign, TumbleCampaign
 from experiments.campaign.tables import PenetrationTrial, TumbleTrial
@@ -14,12 +13,10 @@ from experiments.campaign.tables import PenetrationTrial, TumbleTrial
 from .force_units import force_units
 from .penetration import penetration_oddities
 from .tumble import tumble_oddities
-from .words import Finding, say, times, unit_words
+from .words import Array, Finding, say, times, unit_words
 from .zeros import depth_zeros
 
 __all__ = ["find_implausible", "loud_sensors", "missing_sensors", "said_once", "without_companions"]
-
-Array = NDArray[np.float64]
 
 _MANY = 4  # trials of which the same is said once
 _LOUD = 2.0  # times the stated noise from which on a sensor is called louder

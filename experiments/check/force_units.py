@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.campaign import Campaign, PenetrationCampaign, Recording
 from experiments.campaign.tables import PenetrationTrial
@@ -18,8 +17,6 @@ from rigid.platform.rig import STANDARD_GRAVITY
 from .words import say, times
 
 __all__ = ["force_units"]
-
-Array = NDArray[np.float64]
 
 _POUND = 4.4482216152605  # newtons of a pound of force
 

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
+
+from .words import Array
 
 __all__ = ["Lag", "find_lag", "pieces"]
-
-Array = NDArray[np.float64]
 
 _REACH = 0.6  # seconds to either side that are looked at
 _STEP = 0.005  # between lags that are tried first [s]

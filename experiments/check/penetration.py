@@ -4,17 +4,14 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.campaign import PenetrationCampaign, Recording
 from experiments.campaign.tables import PenetrationTrial
 from rigid.platform.rig import STANDARD_GRAVITY
 
-from .words import OFF, ZERO, Odd, oddity, said, std_of, times
+from .words import OFF, ZERO, Array, Odd, oddity, said, std_of, times
 
 __all__ = ["penetration_oddities"]
-
-Array = NDArray[np.float64]
 
 _DEEP = 30.0  # diameters beyond which a depth over `_DEEP_METRES` is doubted
 _DEEP_METRES = 0.3

@@ -3,16 +3,14 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.campaign import Campaign, PenetrationCampaign, Recording, TumbleCampaign
 from experiments.campaign.tables import PenetrationTrial, TumbleTrial
 
-from .words import Finding, factor_words, say
+from .words import Array, Finding, factor_words, say
 
 __all__ = ["Condition", "condition_of", "condition_words", "odd_replicates"]
 
-Array = NDArray[np.float64]
 Condition = tuple[object, ...]
 
 _AT_ODDS = 20.0

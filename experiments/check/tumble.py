@@ -4,18 +4,15 @@ import math
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.campaign import Campaign, Recording, TumbleCampaign
 from experiments.campaign.tables import TumbleTrial
 
 from .tables import gravity_oddities
 from .turning import clock_oddities, sideways_oddities, turning_oddities
-from .words import OFF, ZERO, Odd, oddity, said, times, unit_words
+from .words import OFF, ZERO, Array, Odd, oddity, said, times, unit_words
 
 __all__ = ["tumble_oddities"]
-
-Array = NDArray[np.float64]
 
 _LATE = 0.03  # seconds by which the wheel may begin to change late before t = 0 is doubted
 

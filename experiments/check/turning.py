@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from experiments.campaign import Recording, TumbleCampaign
@@ -14,8 +13,6 @@ from .lags import Lag, find_lag, pieces
 from .words import Odd, oddity, said
 
 __all__ = ["clock_oddities", "sideways_oddities", "turning_oddities"]
-
-Array = NDArray[np.float64]
 
 _SCALE = 0.1  # relative difference of gyro and camera that neither noise nor a clock makes
 _TURNS = {

@@ -12,8 +12,22 @@ from experiments.campaign.tables import DepthSensor
 from rigid.platform.rig import STANDARD_GRAVITY
 from vis.page.sentences import Sentences
 
-__all__ = ["OFF", "ZERO", "Finding", "Odd", "factor_words", "said", "say", "std_of", "oddity", "times", "unit_words"]
+__all__ = [
+    "OFF",
+    "ZERO",
+    "Array",
+    "Finding",
+    "Odd",
+    "factor_words",
+    "said",
+    "say",
+    "std_of",
+    "oddity",
+    "times",
+    "unit_words",
+]
 
+Array = NDArray[np.float64]
 say = Sentences(__package__)
 OFF = 6.0  # standard errors by which a zero or a speed must be off
 ZERO = 5.0  # and standard deviations of the sensor
@@ -91,7 +105,7 @@ def std_of(sensor: DepthSensor | None) -> float:
     return 0.0 if sensor is None else float(sensor.std[0])
 
 
-def factor_words(channel: str, own: NDArray[np.float64], others: Sequence[NDArray[np.float64]]) -> str:
+def factor_words(channel: str, own: Array, others: Sequence[Array]) -> str:
     """What to add to "at odds" where `own` is its replicates' curve, times a factor between two units; else nothing.
 
     Curves at the same places, shape [n], NaN where there is nothing.

@@ -4,16 +4,13 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.campaign import Campaign, PenetrationCampaign
 from experiments.campaign.tables import PenetrationTrial
 
-from .words import say, std_of
+from .words import Array, say, std_of
 
 __all__ = ["depth_zeros", "force_onset"]
-
-Array = NDArray[np.float64]
 
 _ROWS = 8  # rows that are averaged to tell whether there is a force
 _SURE = 4.0  # standard errors from which on there is

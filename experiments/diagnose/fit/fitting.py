@@ -19,12 +19,13 @@ from scipy.fft import dct
 from .problem import Array, Form, Parameter, Problem, Values
 from .together import each
 
-__all__ = ["Fit", "Model", "Whitener", "by_beginnings", "fit", "linearised", "scanned", "settled", "settled_slopes"]
+__all__ = ["SCAN", "Fit", "Model", "Whitener", "by_beginnings", "fit", "linearised", "scanned", "settled",
+           "settled_slopes"]  # fmt: skip
 
 _ROUNDS = 30
 _DAMPINGS = (0.0, 1e-3, 1e-1, 10.0)
 _SETTLING = 3  # rounds in which the steps of a settled Jacobian are found
-_SCAN = np.linspace(-3.0, 3.0, 25)  # standard deviations of a trial's own number that are looked at for another valley
+SCAN = np.linspace(-3.0, 3.0, 25)  # standard deviations of a trial's own number that are looked at for another valley
 _PASSES = 3
 _BEGINNINGS = (0.3, 0.5, 0.7, 0.85)  # shares of their time that are looked at one after the other (`by_beginnings`)
 _MANY = 2**15  # residuals from which threads are worth their while
@@ -290,7 +291,7 @@ def _along(found: Fit, values: Values, kind: str) -> dict[str, float]:
         place = own.index(here)
         ways[trial] = own, covariance[:, place] / max(float(covariance[place, place]), 1e-300)
     points = [dict(values)]
-    for z in _SCAN:
+    for z in SCAN:
         point = dict(values)
         for trial, here in mine.items():
             p = parameters[here]

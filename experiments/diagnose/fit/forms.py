@@ -11,15 +11,14 @@ from .problem import Form
 __all__ = ["plain_form", "shapes_of"]
 
 
-def plain_form(effect: str, form: declared.Form, bends: Sequence[declared.Bend], *, linear: bool = False) -> Form:
+def plain_form(effect: str, form: declared.Form, bends: Sequence[declared.Bend]) -> Form:
     """A candidate; `bends`: of the effect's forms."""
     parameters = parameters_of(effect, form.numbers)
     names = [p.name for p in parameters]
     return Form(
         effect=effect, name=form.name, parameters=parameters, amplitude=names[0], numbers=form.numbers,
         starts=tuple(dict(zip(names, start, strict=True)) for start in form.starts), redefines=form.redefines,
-        linear=linear and len(names) == 1, form_std=form.form_std,
-        bends=tuple(bend for bend in bends if form.name in bend.of),
+        form_std=form.form_std, bends=tuple(bend for bend in bends if form.name in bend.of),
     )  # fmt: skip
 
 
@@ -42,6 +41,6 @@ def _bent(form: Form, place: int) -> Form:
     places = [dict(zip((p.name for p in more), start, strict=True)) for start in bend.starts]
     return replace(
         form, name=bend.name.format(form.name), parameters=(*form.parameters, *more),
-        numbers=(*form.numbers, *bend.numbers), linear=False, bends=form.bends[place + 1 :],
+        numbers=(*form.numbers, *bend.numbers), bends=form.bends[place + 1 :],
         starts=tuple({**start, **bend} for bend in places for start in form.starts or ({},)),
     )  # fmt: skip

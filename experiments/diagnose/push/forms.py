@@ -37,7 +37,7 @@ def push_forms(*, retreats: bool, speeds_differ: bool, own: Sequence[OwnEffect] 
     library = [(found.push.rank, id, found.push) for id, found in CANDIDATES.items() if found.push is not None]
 
     def of(id: str, push: Push) -> list[Form]:
-        return [plain_form(id, form, push.bends, linear=True) for form in push.forms if shown[form.needs]]
+        return [plain_form(id, form, push.bends) for form in push.forms if shown[form.needs]]
 
     made = [form for _, id, push in sorted(library, key=lambda row: row[:2]) for form in of(id, push)]
     for mine in own:

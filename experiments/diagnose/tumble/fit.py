@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from experiments.diagnose.fit.fitting import SCAN
 from experiments.diagnose.fit.problem import Array, Form, Parameter
 from experiments.diagnose.fit.together import each
 
@@ -38,8 +39,6 @@ from .steps import (
 )
 
 __all__ = ["Fit", "Fitter"]
-
-_SCAN = np.linspace(-3.0, 3.0, 25)  # of a trial's gravity, in its sigmas
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -242,14 +241,14 @@ class Fitter:
         for block in way.space.blocks():
             std = way.space.std[block.start]
             points = []
-            for z in _SCAN:
+            for z in SCAN:
                 v = u.copy()
                 v[block] = np.clip(z * std, way.space.low[block], way.space.high[block])
                 points.append(way.point(v))
             answer = yield points, horizon
             for k, rows in enumerate(answer):
                 here = block.start + k
-                tried = np.clip(_SCAN * std, way.space.low[here], way.space.high[here])
+                tried = np.clip(SCAN * std, way.space.low[here], way.space.high[here])
                 now = float(residuals[k] @ residuals[k]) + (u[here] / std) ** 2
                 prices = np.einsum("ij,ij->i", rows, rows) + (tried / std) ** 2
                 best = int(np.argmin(prices))

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from experiments.campaign import Campaign, EffectTable, TumbleModel, write_model
 from experiments.diagnose.core.effect_words import advice
+from experiments.diagnose.fit.fitting import SCAN
 from experiments.diagnose.fit.forms import shapes_of
 from experiments.diagnose.fit.own import OwnEffect
 from experiments.diagnose.fit.problem import Array, Finding, Form, Parameter, Problem, Samples, TrialInfo, Values
@@ -36,8 +37,6 @@ __all__ = ["TumbleProblem", "make_problem"]
 
 _UNITS = {"mass": "kg", "inertia": "kg m2", "stiffness": "N/m", "damping": "N s/m", "mu_s": "1", "mu_d": "1"}
 _STEP = 0.02  # of finite differences, in sigmas: contacts make smaller ones rough
-_SCAN = np.linspace(-3.0, 3.0, 25)
-"""Standard deviations of a trial's simulated gravity that are looked at where it goes its own way."""
 _SWITCH = 5e-4
 """From the moment of a reading [s] within which a model that jumps leaves it in doubt: one step of the integration."""
 _SEEN = 3.0  # standard deviations of the noise from which on a change of what the model reads is a jump
@@ -350,7 +349,7 @@ class TumbleProblem(Problem):
         """The moment [s] up to which the model follows a trial, with the simulated gravity that takes it farthest; None
         where that is no good part of it (`followed_until`)."""
         data, sigma = self.data.trials[self._index[trial]], self.data.tables.uncertainty.gravity_sim
-        scan = 1 + sigma * _SCAN if sigma > 0 else np.ones(1)
+        scan = 1 + sigma * SCAN if sigma > 0 else np.ones(1)
         points = [values, *({**values, f"gravity_sim[{trial}]": data.gravity_sim * float(g)} for g in scan)]
         found = self._predict(points, forms, [trial])[0]
         moments = [
