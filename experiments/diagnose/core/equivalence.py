@@ -13,6 +13,7 @@ import numpy as np
 
 from experiments.diagnose.fit.evidence import Hypothesis, inflation
 from experiments.diagnose.fit.fitting import Fit
+from experiments.diagnose.fit.gate import column_basis
 from experiments.diagnose.fit.problem import Array
 
 from .prediction import Predicted
@@ -68,10 +69,7 @@ def compare(effect: str, best: Hypothesis, other: Hypothesis, rest: Fit) -> Riva
     columns = [names.index(p.name) for p in shared]
     weights = np.array([0.0 if math.isinf(p.std) else 1 / p.std for p in shared])
     scales = np.array([p.scale for p in shared])
-    joint = np.vstack([best.fit.jacobian[:, columns], np.diag(weights * scales)])
-    joint = joint / np.maximum(np.linalg.norm(joint, axis=0), 1e-300)
-    left, sizes, _ = np.linalg.svd(joint, full_matrices=False)
-    basis = left[:, sizes > 1e-9 * max(float(sizes.max(initial=0.0)), 1e-300)]
+    basis = column_basis(np.vstack([best.fit.jacobian[:, columns], np.diag(weights * scales)]))
 
     def point(found: Fit) -> Array:
         return np.concatenate([found.modes, weights * np.array([found.values[p.name] for p in shared])])

@@ -26,7 +26,7 @@ from scipy import stats
 from .fitting import Fit, Model, fit, settled_slopes
 from .problem import Array, Values
 
-__all__ = ["Gate", "Verdict", "held_out_gate", "low_modes", "open_gate"]
+__all__ = ["Gate", "Verdict", "column_basis", "held_out_gate", "low_modes", "open_gate"]
 
 LOW_MODES = 16  # modes of a channel that count as slow: half a period up to eight periods over its record
 _DRAWS = 600
@@ -255,11 +255,15 @@ def _basis(found: Fit) -> tuple[Array, Array]:
 
 
 def _split_basis(joint: Array, count: int) -> tuple[Array, Array]:
-    """An orthonormal basis of the columns of `joint`: its first `count` rows, and the others."""
+    basis = column_basis(joint)
+    return basis[:count], basis[count:]
+
+
+def column_basis(joint: Array) -> Array:
+    """An orthonormal basis of the columns of `joint`, whatever their sizes."""
     joint = joint / np.maximum(np.linalg.norm(joint, axis=0), 1e-300)
     left, sizes, _ = np.linalg.svd(joint, full_matrices=False)
-    left = left[:, sizes > 1e-9 * max(float(sizes.max(initial=0.0)), 1e-300)]
-    return left[:count], left[count:]
+    return left[:, sizes > 1e-9 * max(float(sizes.max(initial=0.0)), 1e-300)]
 
 
 def _refitted(found: Fit, random: np.random.Generator, tell: Callable[[float], None] | None, done: float) -> Array:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.grains.spells import spells
+
 __all__ = ["Clipped", "clipped", "clipped_wheel", "cut_rows", "stuck_rows"]
 
 _LONG = 12  # equal readings in a row that noise does not make
@@ -55,8 +57,7 @@ def clipped(values: NDArray[np.float64]) -> list[Clipped]:
         if end == 0 or at.sum() < _AT_THE_END or not len(others):
             continue
         near = others.max() if highest else others.min()
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], at.astype(int), [0]])))
-        longest = int((edges[1::2] - edges[::2]).max())
+        longest = max(last - first for first, last in spells(at))
         repeats = float(np.mean(np.diff(own)[~(at[1:] & at[:-1])] == 0)) if not at.all() else 1.0
         if longest >= _IN_A_ROW and int((own == near).sum()) <= _NEXT and repeats <= _USUAL:
             found.append(Clipped(known[at], float(end), highest))
@@ -113,11 +114,9 @@ def stuck_rows(values: NDArray[np.float64]) -> NDArray[np.int64]:
     if len(known) < 3 * _LONG:
         return known[:0]
     same = (np.diff(values[known]) == 0) & (values[known][1:] != 0)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(int), [0]])))
-    runs = [(low, high) for low, high in zip(edges[::2], edges[1::2], strict=True) if high - low >= _LONG - 1]
     stuck = np.zeros(len(same), dtype=bool)
-    for low, high in runs:
-        stuck[low:high] = True
+    for low, high in spells(same):
+        stuck[low:high] = high - low >= _LONG - 1
     if not stuck.any() or stuck.all() or same[~stuck].mean() > _USUAL:
         return known[:0]
     return known[1:][stuck]

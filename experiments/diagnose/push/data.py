@@ -15,6 +15,7 @@ from experiments.diagnose.fit.problem import Array, Finding, TrialInfo
 from experiments.diagnose.noise.colour import Colour, colour_of, together
 from experiments.diagnose.noise.replicates import parted
 from experiments.diagnose.noise.stuck import clipped, cut_rows, stuck_rows
+from experiments.grains.spells import spells
 
 from .depth import SmoothDepth, smooth_depth
 from .drive import Holds, Weights
@@ -379,8 +380,7 @@ def _lone_readings(values: Array, std: float) -> NDArray[np.int64]:
     away = np.abs(v - middle)
     spread = median_filter(away, 15, mode="nearest")
     suspect = away > np.maximum(_OUTLIER * std, 12 * spread)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], suspect.astype(int), [0]])))
-    for low, high in zip(edges[::2], edges[1::2], strict=True):
+    for low, high in spells(suspect):
         # A touch or a turn is sharp as well, but what is before it and after it differs.
         alike = low > 0 and high < len(v) and abs(v[low - 1] - v[high]) < 0.3 * away[low:high].min()
         if high - low > 3 or not alike:

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.diagnose.fit.problem import Array
+from experiments.grains.spells import spells
 
 from .data import Prepared
 from .depth import SmoothDepth
@@ -53,10 +54,8 @@ def reversing(trial: Prepared) -> NDArray[np.bool_]:
     assert trial.smooth is not None
     speed, off = trial.smooth.speed, off_rest(trial)
     found = np.zeros(len(speed), dtype=bool)
-    unsure = np.concatenate([[0], (np.abs(speed) < off).astype(int), [0]])
-    edges = np.flatnonzero(np.diff(unsure))
-    for low, high in zip(edges[::2], edges[1::2], strict=True):
-        low, high = max(0, int(low) - 1), min(len(speed) - 1, int(high))
+    for low, high in spells(np.abs(speed) < off):
+        low, high = max(0, low - 1), min(len(speed) - 1, high)
         if high - low <= _AT_TURN and speed[low] * speed[high] < 0:
             found[low + 1 : high] = True
     for k in np.flatnonzero(speed[1:] * speed[:-1] < 0):  # between two rows, neither of which is in doubt
@@ -70,9 +69,7 @@ def turning(speed: Array, std: Array, force: Array, noise: float) -> Array:
     Dry friction changes sign where a spike turns; the smoothed depth tells when to within some rows only.
     """
     doubt = np.zeros(len(speed))
-    unsure = np.concatenate([[0], (np.abs(speed) < 3 * std).astype(int), [0]])
-    edges = np.flatnonzero(np.diff(unsure))
-    for low, high in zip(edges[::2], edges[1::2], strict=True):
+    for low, high in spells(np.abs(speed) < 3 * std):
         before, after = force[max(0, low - _BESIDE) : low], force[high : high + _BESIDE]
         if len(before) < _BESIDE or len(after) < _BESIDE:
             continue
