@@ -67,11 +67,8 @@ def try_all(
 ) -> dict[str, dict[str, Any]]:
     """What each baseline says of a campaign: alarm, terms, before, after, seconds.
 
-    Args:
-        campaign: as diagnose read it.
-        values: of the fitted base model, the held-out trials' own nuisances with it.
-        fitted: trials to learn from.
-        held_out: trials to be predicted.
+    ``campaign``: as diagnose read it. ``values``: of the fitted base model, the held-out trials' own nuisances with it.
+    ``fitted``: trials to learn from. ``held_out``: trials to be predicted.
     """
     problem = make_problem(campaign)
     rows = make_rows(problem, values, fitted)
