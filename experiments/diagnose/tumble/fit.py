@@ -21,7 +21,7 @@ from experiments.diagnose.fit.fitting import SCAN
 from experiments.diagnose.fit.problem import Array, Form, Parameter
 from experiments.diagnose.fit.together import each
 
-from .forms import physical
+from .forms import physical_at
 from .forward import OWN_TO_A_TRIAL, SHARED, Forward
 from .steps import (
     EASY,
@@ -145,10 +145,7 @@ class Fitter:
                 if kind in apart:
                     apart[kind][rows, self._places[id]] = [1 + values[name] for values, _ in points]
             for form in forms:
-                given = {
-                    p.name: np.array([values.get(p.name, p.value) for values, _ in points]) for p in form.parameters
-                }
-                for name, array in physical(form, given).items():
+                for name, array in physical_at(form, [values for values, _ in points]).items():
                     columns.setdefault(name, np.full(total, self.forward.neutral(name)))[rows] = array
             at += len(points)
         predictions = self.forward.predict(

@@ -7,11 +7,11 @@ import numpy as np
 
 from experiments.diagnose.fit.forms import plain_form
 from experiments.diagnose.fit.own import OwnEffect
-from experiments.diagnose.fit.problem import Array, Form
+from experiments.diagnose.fit.problem import Array, Form, Values
 from rigid.terms import CANDIDATES, EFFECTS
 from rigid.terms.candidate import Typical
 
-__all__ = ["physical", "tumble_forms"]
+__all__ = ["physical", "physical_at", "tumble_forms"]
 
 
 def _inverse(value: Array, typical: float) -> Array:
@@ -38,6 +38,13 @@ def physical(form: Form, values: Mapping[str, Array]) -> dict[str, Array]:
             found = _HOWS[number.how](value, number.typical)
         columns[f"{form.effect}.{number.name}"] = found
     return columns
+
+
+def physical_at(form: Form, points: Sequence[Values]) -> dict[str, Array]:
+    """The same at points that name the form's parameters, or leave them as they are; one number a point."""
+    return physical(
+        form, {p.name: np.array([values.get(p.name, p.value) for values in points]) for p in form.parameters}
+    )
 
 
 def tumble_forms(*, rig: bool, own: Sequence[OwnEffect] = (), **typical: float) -> tuple[Form, ...]:

@@ -27,7 +27,7 @@ from rigid.planar.trajectory import STATES
 from rigid.terms import EFFECTS
 
 from .data import CHANNELS, TumbleData, tumble_data
-from .forms import physical, tumble_forms
+from .forms import physical_at, tumble_forms
 from .forward import OWN_TO_A_TRIAL, SHARED, Forward, Prediction
 from .guess import Guesser
 from .latent import followed_until, latent_columns
@@ -293,39 +293,23 @@ class TumbleProblem(Problem):
         tables = self.data.tables
         numbers = {name: float(values.get(name, self.forward.nominal[name])) for name in SHARED}
         numbers["mu_d"] = min(numbers["mu_d"], numbers["mu_s"])
-        kept = tables.model_dump(include={"format", "kind", "name", "notes"})
-        used = {trial.id for trial in self.data.trials}
+        used = [trial for trial in tables.trial if trial.id in self._index]
+        gravity = [float(values.get(f"gravity_sim[{trial.id}]", trial.gravity_sim)) for trial in used]
+        effects: dict[str, dict[str, float]] = {}
+        for form in forms:
+            mine = effects.setdefault(form.effect, {})
+            mine |= {name: value for name, (value, _) in self.reported(values, form).items() if math.isfinite(value)}
         model = TumbleModel(
-            **kept,
+            **tables.model_dump(include={"format", "kind", "name", "notes"}),
             platform=tables.platform.model_copy(update={name: numbers[name] for name in ("mass", "inertia")}),
-            wheel=tables.wheel,
-            rig=tables.rig,
-            surface=tables.surface.model_copy(
-                update={name: numbers[name] for name in ("stiffness", "damping", "mu_s", "mu_d")}
-            ),
-            uncertainty=tables.uncertainty,
-            sensors=tables.sensors,
-            trial=tuple(
-                trial.model_copy(update={"gravity_sim": float(values.get(f"gravity_sim[{trial.id}]", stated))})
-                for trial in tables.trial
-                if trial.id in used
-                for stated in (trial.gravity_sim,)
-            ),
+            surface=tables.surface.model_copy(update={name: numbers[name] for name in SHARED[2:]}),
+            wheel=tables.wheel, rig=tables.rig, uncertainty=tables.uncertainty, sensors=tables.sensors,
+            trial=tuple(t.model_copy(update={"gravity_sim": g}) for t, g in zip(used, gravity, strict=True)),
             effect=tuple(
-                EffectTable(
-                    id=effect,
-                    file=self.own[effect].file.name if effect in self.own else None,
-                    parameters={
-                        name.partition(".")[2]: value
-                        for form in forms
-                        if form.effect == effect
-                        for name, value in self._physical(values, form).items()
-                        if math.isfinite(value)
-                    },
-                )
-                for effect in dict.fromkeys(form.effect for form in forms)
+                EffectTable(id=effect, file=self.own[effect].file.name if effect in self.own else None, parameters=mine)
+                for effect, mine in effects.items()
             ),
-        )
+        )  # fmt: skip
         write_model(path, model)
 
     def next_experiment(self, first: Form, second: Form, values: Values) -> str:
@@ -366,29 +350,20 @@ class TumbleProblem(Problem):
 
     def gravity(self, points: Sequence[Values]) -> Array:
         """Of each trial over its stated one, shape [point_count, trial_count]."""
-        return np.array(
-            [
-                [values.get(f"gravity_sim[{t.id}]", t.gravity_sim) / t.gravity_sim for t in self.data.trials]
-                for values in points
-            ]
-        )
+        stated = [(f"gravity_sim[{trial.id}]", trial.gravity_sim) for trial in self.data.trials]
+        return np.array([[values.get(name, own) / own for name, own in stated] for values in points])
 
     def _predict(
         self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[str], *, states: bool = True,
         motion: bool = False, forward: Forward | None = None, horizon: float = 1.0,
     ) -> list[Prediction]:  # fmt: skip
-        columns = {
-            name: np.array([values.get(name, value) for values in points])
-            for name, value in self.forward.nominal.items()
-        }
+        known, ids = self.forward.nominal.items(), tuple(self._index)
+        columns = {name: np.array([values.get(name, value) for values in points]) for name, value in known}
         columns["gravity"] = self.gravity(points)
         for kind in OWN_TO_A_TRIAL[1:]:
-            columns[kind] = np.array(
-                [[1 + values.get(f"{kind}[{t.id}]", 0.0) for t in self.data.trials] for values in points]
-            )
+            columns[kind] = np.array([[1 + values.get(f"{kind}[{id}]", 0.0) for id in ids] for values in points])
         for form in forms:
-            own = {p.name: np.array([values.get(p.name, p.value) for values in points]) for p in form.parameters}
-            columns |= physical(form, own)
+            columns |= physical_at(form, points)
         chosen = [self._index[trial] for trial in trials]
         return (forward or self.forward).predict(columns, trials=chosen, states=states, motion=motion, horizon=horizon)
 
@@ -410,8 +385,7 @@ class TumbleProblem(Problem):
 
     @staticmethod
     def _physical(values: Mapping[str, float], form: Form) -> dict[str, float]:
-        own = {p.name: np.array([values.get(p.name, p.value)]) for p in form.parameters}
-        return {name: float(array[0]) for name, array in physical(form, own).items()}
+        return {name: float(array[0]) for name, array in physical_at(form, [values]).items()}
 
 
 def _of(apart: Sequence[Parameter], trials: Sequence[str]) -> list[Parameter]:
