@@ -30,7 +30,7 @@ from .report.telling import findings_in_words
 
 __all__ = ["check", "find_faults", "resume", "run", "unnamed_files"]
 
-_LONG = 10.0  # A step of the time this many times the usual one is a gap
+_LONG = 10.0  # a step of the time this many times the usual one is a gap
 _LISTED = 4  # files that are listed by name
 
 
@@ -77,9 +77,6 @@ def _faults_of_data(campaign: Campaign) -> list[Finding]:
     from experiments.diagnose.tumble.data import tumble_data
 
     return findings_in_words(checked(tumble_data(campaign))[1])
-
-
-# The result -----------------------------------------------------------------------------------------------------------
 
 
 def _carry_out(settings: CheckSettings, folder: RunFolder, progress: Progress) -> Result:

@@ -146,8 +146,6 @@ class _Course:
             return self._nothing(choice.left)
         return self._decided(choice)
 
-    # The base model ---------------------------------------------------------------------------------------------------
-
     def _fit_base(self) -> None:
         """Split and fitted, trials at odds with their replicates, and those that are to take no part, aside."""
         problem, asked = self.problem, self.asked
@@ -211,8 +209,6 @@ class _Course:
             draws=_REFITS if asked.thorough else _DRAWS, folder=asked.gates,
             tell=lambda done: self.tell("making the gate's null", done),
         )[1]  # fmt: skip
-
-    # What is missing --------------------------------------------------------------------------------------------------
 
     def _recoloured(self) -> Callable[[Fit], Fit]:
         return partial(recoloured, colours=self.colours)
@@ -393,8 +389,6 @@ class _Course:
             best, seed=self.asked.seed, refit=True, draws=_REFITS, folder=self.asked.gates,
             tell=lambda done: self.tell("making the null of what is left", done),
         )[1]  # fmt: skip
-
-    # The verdict ------------------------------------------------------------------------------------------------------
 
     def _decided(self, choice: Choice) -> Diagnosis:
         """Named, ambiguous or unknown; a trial that goes its own way, or replicates that do, are asked for first."""

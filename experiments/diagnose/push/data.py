@@ -367,9 +367,6 @@ def _info(tables: PenetrationCampaign, table: PenetrationTrial, speed: float) ->
     )
 
 
-# Faults ---------------------------------------------------------------------------------------------------------------
-
-
 def _lone_readings(values: Array, std: float) -> NDArray[np.int64]:
     """Rows that lie far from the median of the seven around them, while those seven agree among themselves."""
     known = np.flatnonzero(np.isfinite(values))

@@ -113,14 +113,10 @@ class PenetrationProblem(Problem):
         self._along: Mapping[str, Array] = {}
         self.rewhiten({}, ())
 
-    # What is fitted ---------------------------------------------------------------------------------------------------
-
     def explains(self, finding: Finding) -> bool:
         """Whether something odd about a recording is one of the zeros that are taken into account."""
         read = finding.channel == "force" and "above the surface" in finding.what
         return read and self._zeros is not None and self._zeros.usual(finding.trial)
-
-    # The model --------------------------------------------------------------------------------------------------------
 
     def _numbers(self, values: Values, forms: Sequence[Form], trial: Prepared, into: Array) -> None:
         """Fill one lane's slots."""
@@ -320,8 +316,6 @@ class PenetrationProblem(Problem):
             doubt = np.where(turn, np.maximum(doubt, 0.5 * np.abs(fast - slow)), doubt)
         return np.hypot(stds(self.tables, True)[1], doubt[this.has_other])
 
-    # What is seen -----------------------------------------------------------------------------------------------------
-
     def samples(self, trial: str) -> Samples:
         """See `Problem`."""
         this = self._trials[trial]
@@ -398,8 +392,6 @@ class PenetrationProblem(Problem):
             )
             if rows.any()  # a sensor that this trial lacks is none of its channels
         }  # fmt: skip
-
-    # What is written --------------------------------------------------------------------------------------------------
 
     def write_model(self, path: str, values: Values, forms: Sequence[Form]) -> None:
         """model.toml. The slots of `penetration_law` are the parameters of an effect; where trials have several

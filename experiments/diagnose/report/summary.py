@@ -133,9 +133,6 @@ def _rests_on(weighed: Mapping[str, Any]) -> str:
     return f"; what replicates differ by rests on {freedom} degree{'s' if freedom > 1 else ''} of freedom"
 
 
-# Where something has no name ------------------------------------------------------------------------------------------
-
-
 def _likeliest(said: Mapping[str, Any]) -> str:
     """The names of the best model, or of the candidate that closes most; empty where it is little."""
     leading = said.get("leading", {})

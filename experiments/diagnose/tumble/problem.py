@@ -346,8 +346,6 @@ class TumbleProblem(Problem):
     def _guesser(self) -> Guesser:
         return Guesser(self.forward, self.forms)
 
-    # Helpers ----------------------------------------------------------------------------------------------------------
-
     def gravity(self, points: Sequence[Values]) -> Array:
         """Of each trial over its stated one, shape [point_count, trial_count]."""
         stated = [(f"gravity_sim[{trial.id}]", trial.gravity_sim) for trial in self.data.trials]
