@@ -25,7 +25,6 @@ class Lag:
     """Of the angle behind the integral of the rate."""
 
     value: float  # [s]; positive where the angle comes late
-    error: float  # one standard error [s]
     left: float  # mean squared misfit at this lag, over the noise's
     without: float  # the same at the lag that was expected; infinite where the two do not overlap there
     count: int  # rows of the angle that were compared
@@ -78,11 +77,9 @@ def find_lag(
     small = [misfit(lag) for lag in fine]
     least = min(range(len(fine)), key=lambda k: small[k][0])
     lowest, count = small[least]
-    bend = (costs[best - 1] - 2 * costs[best] + costs[best + 1]) / _STEP**2 * count  # of chi-square
-    if bend <= 0:
+    if costs[best - 1] - 2 * costs[best] + costs[best + 1] <= 0:
         return None
-    error = float(np.sqrt(2 * max(lowest, 1.0) / bend))
-    return Lag(float(fine[least]), error, lowest, misfit(near)[0], count)
+    return Lag(float(fine[least]), lowest, misfit(near)[0], count)
 
 
 def pieces(time: Array) -> list[tuple[int, int]]:

@@ -84,10 +84,6 @@ class OwnEffect:
             return self.off
         return self.typical[name] if self.typical else self.term.values({})[name]
 
-    def actual(self, name: str, value: float) -> float:
-        """The term's parameter, from what is fitted: an amplitude is counted from `off`."""
-        return value + self.off if name == self.amplitude else value
-
     def _number(self, name: str) -> Number:
         """An amplitude is fitted from 0, another number about its typical size, to within that size."""
         p = next(p for p in self.term.parameters if p.name == name)

@@ -110,8 +110,6 @@ class Samples:
     std: Array
     """Of the sensor as campaign.toml states it, in the channel's unit (of a driven force at the base model's fit,
     the smoothed depth's error included)."""
-    block: Array | None = None
-    """Which samples share noise that is not white: equal numbers. None: time and channel say it all."""
 
 
 class Contacts(Protocol):
@@ -213,10 +211,6 @@ class Problem(Protocol):
         where a tumble was read while a contact switched."""
         samples = self.samples(trial)
         return {name: samples.std[samples.channel == name] for name in dict.fromkeys(samples.channel.tolist())}
-
-    def noise(self, random: np.random.Generator, trial: str) -> Array:
-        """A draw of the whitened residuals of a right model, shape [sample_count]; mostly standard normal."""
-        return random.standard_normal(len(self.samples(trial).time))
 
     def readings(self, values: Values, forms: Sequence[Form], trials: Sequence[str], late: float) -> dict[str, Array]:
         """What the model reads `late` seconds after each sample's time, over the stated noise, shape [sample_count]."""

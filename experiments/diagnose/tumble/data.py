@@ -78,13 +78,6 @@ class TumbleData:
         imu = self.tables.sensors.imu
         return 0.0 if imu is None else imu.window
 
-    def only(self, ids: set[str]) -> TumbleData:
-        """The same campaign with these trials. Raises KeyError for an id there is not."""
-        missing = ids - {trial.id for trial in self.trials}
-        if missing:
-            raise KeyError(f"there is no trial {sorted(missing)}")
-        return TumbleData(tables=self.tables, trials=tuple(trial for trial in self.trials if trial.id in ids))
-
 
 def tumble_data(campaign: Campaign) -> TumbleData:
     """The samples of `campaign`. Raises ValueError for one of another kind, a sensor with a std of 0, no sample,

@@ -75,7 +75,7 @@ def test_the_command_names_an_effect_from_a_file_and_the_model_brings_the_file_a
 def test_amplitudes_are_counted_from_what_changes_nothing():
     own = load_own(RISES)
     (rise,) = parameters_of(own.id, own.form.numbers)
-    assert rise.value == 0.0 and own.actual("rise", rise.value) == 1e-4
+    assert rise.value == 0.0 and own.neutral("rise") == 1e-4
     assert rise.lowest == 0.0
     assert [start["torque-rise.rise"] for start in own_starts(own, (rise,))] == [0.0125, 0.05, 0.2]
 
