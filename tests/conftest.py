@@ -5,6 +5,7 @@ import tomllib
 from collections import Counter
 from pathlib import Path
 
+import golden
 import pytest
 from hypothesis import settings
 
@@ -43,9 +44,11 @@ def heavy_files(durations: dict[str, float]) -> set[str]:
 
 def pytest_addoption(parser):
     parser.addoption("--write-durations", action="store_true", help="write tests/durations.toml after the run")
+    parser.addoption("--update-golden", action="store_true", help="write tests/golden/*.txt instead of comparing")
 
 
 def pytest_configure(config):
+    golden.UPDATE = config.getoption("--update-golden")
     config.pluginmanager.register(_Stopwatch(config))
 
 
