@@ -15,6 +15,7 @@ from experiments.runs.types import Json
 
 __all__ = ["EFFECTS", "OUTSIDE", "Hidden", "correlated", "draw_hidden", "draw_kind", "make_hidden"]
 
+Random = np.random.Generator
 EFFECTS = ("inertial-drag", "depth-hardening", "plastic-sinkage", "adhesion", "shaft-friction", "layering")
 OUTSIDE = ("floor-vibration", "loose-mass", "shock", "load-cell-drift", "sloshing")
 _STEP = 5e-6
@@ -128,9 +129,7 @@ def make_hidden(
     return campaign, Hidden(effects, outside, settings, measure, coloured, len(clean), persistence)
 
 
-def draw_kind(
-    random: np.random.Generator, effects: Sequence[str], outside: Sequence[str], *, nulls: float = 0.25
-) -> str:
+def draw_kind(random: Random, effects: Sequence[str], outside: Sequence[str], *, nulls: float = 0.25) -> str:
     """Nothing in a share `nulls`, something outside the library in 17 %, a pair in 8 %, else an effect."""
     draw = random.random()
     if draw < nulls:
@@ -141,7 +140,7 @@ def draw_kind(
 
 
 def draw_hidden(
-    random: np.random.Generator,
+    random: Random,
     kind: str | None,
     strength: float | None,
     effects: Sequence[str],
@@ -159,7 +158,7 @@ def draw_hidden(
     return kind, strength, own, kind if kind in outside else None
 
 
-def _plan(random: np.random.Generator, *, retreat: bool, drops: bool, faster: bool, wanted: int | None) -> Json:
+def _plan(random: Random, *, retreat: bool, drops: bool, faster: bool, wanted: int | None) -> Json:
     """What is done: trials, the true K, C, what is believed of them, noise."""
     k, mass = float(np.exp(random.uniform(math.log(300), math.log(4000)))), float(random.uniform(0.2, 1.0))
     c = float(random.uniform(0.05, 0.3)) * 2 * math.sqrt(k * mass)
@@ -198,7 +197,7 @@ def _plan(random: np.random.Generator, *, retreat: bool, drops: bool, faster: bo
 
 
 def _shape(
-    random: np.random.Generator, plan: Json, effects: tuple[str, ...], outside: str | None
+    random: Random, plan: Json, effects: tuple[str, ...], outside: str | None
 ) -> Callable[[float], dict[str, float]]:
     """What an amplitude means, relative to the force at full depth."""
     k, depth = plan["k"], plan["depth"]
@@ -331,9 +330,7 @@ def correlated(white: np.ndarray, persistence: float) -> np.ndarray:
     return white
 
 
-def _record(
-    random: np.random.Generator, plan: Json, made: list[_Columns], coloured: bool, depth_persistence: float
-) -> Campaign:
+def _record(random: Random, plan: Json, made: list[_Columns], coloured: bool, depth_persistence: float) -> Campaign:
     persistence = float(random.uniform(0.3, 0.8)) if coloured else 0.0
     trials, recordings = [], {}
     for index, (this, data) in enumerate(zip(plan["trials"], made, strict=True)):

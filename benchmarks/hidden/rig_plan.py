@@ -11,6 +11,7 @@ from .rig_bed import Path, drive
 
 __all__ = ["NUISANCES", "SIZES", "Rig", "Trial", "draw_rig"]
 
+Random = np.random.Generator
 NUISANCES = {"bed": 0.2, "force-zero": 0.2, "depth-zero": 0.15, "loud": 0.2}
 """How often what is wrong beside: K (and C) differ from trial to trial, zeros of pushes, noise 1.3 times as loud."""
 SIZES = (0.012, 0.02, 0.032)
@@ -71,9 +72,7 @@ class Rig:
     trials: tuple[Trial, ...]
 
 
-def draw_rig(
-    random: np.random.Generator, effects: tuple[str, ...], outside: str | None, wanted: int | None
-) -> tuple[Rig, Json]:
+def draw_rig(random: Random, effects: tuple[str, ...], outside: str | None, wanted: int | None) -> tuple[Rig, Json]:
     """A rig, its bed and its trials, and the design in words and numbers."""
 
     def between(low: float, high: float) -> float:
@@ -146,19 +145,19 @@ def draw_rig(
         "small units": rig.small_units, "noise": noise}}  # fmt: skip
 
 
-def _louder(random: np.random.Generator, loud: float) -> dict[str, float]:
+def _louder(random: Random, loud: float) -> dict[str, float]:
     which = str(random.choice(["force", "depth", "all"]))
     return {name: loud if loud and which in (name, "all", "force" if name == "accel" else "") else 1.0
             for name in ("depth", "force", "accel")}  # fmt: skip
 
 
-def _persistence(random: np.random.Generator) -> dict[str, float]:
+def _persistence(random: Random) -> dict[str, float]:
     force = float(random.uniform(0.3, 0.8)) * bool(random.random() < 0.25)
     depth = float(random.uniform(0.3, 0.7)) * bool(random.random() < 0.2)
     return {"force": force, "accel": force, "depth": depth}
 
 
-def _own(random: np.random.Generator, rig: Rig, trial: Trial, style: Json, *, both: bool) -> Trial:
+def _own(random: Random, rig: Rig, trial: Trial, style: Json, *, both: bool) -> Trial:
     """The trial with what is its own, and its path."""
     bed, (f, g, h) = rig.wandering["bed"], random.standard_normal(3)
     luck, shallow = random.random(), random.random() < 0.4

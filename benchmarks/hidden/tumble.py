@@ -20,6 +20,7 @@ from .penetration import correlated, draw_hidden
 
 __all__ = ["EFFECTS", "OUTSIDE", "HiddenTumble", "make_hidden_tumble"]
 
+Random = np.random.Generator
 EFFECTS = (
     "wheel-vibration", "pendulum", "com-offset", "slope", "tip-radius", "rig-friction", "pulley-inertia", "torque-fade",
     "inertial-drag", "depth-hardening", "plastic-sinkage", "adhesion", "rate-friction", "umbilical", "bearing-drag",
@@ -119,7 +120,7 @@ def make_hidden_tumble(
     return campaign, told
 
 
-def _plan(random: np.random.Generator, *, rig: bool, count: int | None) -> _Plan:
+def _plan(random: Random, *, rig: bool, count: int | None) -> _Plan:
     rig = rig or bool(random.random() < 0.8)
     surface, stiffness, damping, mu = (
         ("steel", 1.5e4, 60.0, 0.25),
@@ -158,9 +159,7 @@ def _plan(random: np.random.Generator, *, rig: bool, count: int | None) -> _Plan
     )  # fmt: skip
 
 
-def _form(
-    random: np.random.Generator, name: str, plan: _Plan
-) -> tuple[dict[str, float], dict[str, float], float, float]:
+def _form(random: Random, name: str, plan: _Plan) -> tuple[dict[str, float], dict[str, float], float, float]:
     """What grows with the amplitude (per unit), what does not, a typical amplitude, and the largest one."""
     weight = (plan.stated["mass"] + plan.trials[0]["counterweight"]) * plan.trials[0]["gravity_sim"]
     sinkage = 0.5 * weight / plan.stated["stiffness"]
@@ -356,7 +355,7 @@ def _read(plan: _Plan, time: np.ndarray, motion: np.ndarray, pull: float, settin
     return found
 
 
-def _wires(random: np.random.Generator, plan: _Plan, settings: _Numbers) -> float | None:
+def _wires(random: Random, plan: _Plan, settings: _Numbers) -> float | None:
     """Length of the wires [m], stated in half of the rig's campaigns: that says nothing of a pendulum."""
     stated = bool(random.random() < 0.5)
     if not plan.rig or not stated:
@@ -367,7 +366,7 @@ def _wires(random: np.random.Generator, plan: _Plan, settings: _Numbers) -> floa
 
 
 def _record(
-    random: np.random.Generator, plan: _Plan, readings: list[dict[str, np.ndarray]], coloured: bool, wires: float | None
+    random: Random, plan: _Plan, readings: list[dict[str, np.ndarray]], coloured: bool, wires: float | None
 ) -> Campaign:
     persistence = float(random.uniform(0.2, 0.6)) if coloured else 0.0
 

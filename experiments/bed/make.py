@@ -65,7 +65,7 @@ def _carry_out(settings: BedSettings, folder: RunFolder, progress: Progress) -> 
         if own.cohesion != "none":
             _add_adhesion(told, settings, own, prepared.bed.material)
         title = f"A bed of {prepared.recipe['material']['name']}: {' '.join(settings.stages)}"
-        return finish_bed(folder, prepared, progress, experiment="bed make", title=title, name=settings.name, **told)
+        return finish_bed(folder, prepared, progress, title=title, name=settings.name, told=told)
 
 
 def _add_adhesion(told: Json, settings: BedSettings, own: Material, now: Material) -> None:

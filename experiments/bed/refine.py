@@ -130,11 +130,8 @@ def _carry_out(settings: BedRefineSettings, folder: RunFolder, progress: Progres
         graded = isinstance(options["grain"], Graded)
         told = grading_told(prepared) if graded else {}
         title = f"{settings.bed} with grains of {1e3 * options['grain'].mean:.4g} mm"
-        return finish_bed(
-            folder, prepared, progress, experiment="bed refine", title=title, name=settings.name,
-            tables=[table, *told.get("tables", [])], warnings=[*said, *told.get("warnings", [])],
-            quantities=told.get("quantities"),
-        )  # fmt: skip
+        told |= {"tables": [table, *told.get("tables", [])], "warnings": [*said, *told.get("warnings", [])]}
+        return finish_bed(folder, prepared, progress, title=title, name=settings.name, told=told)
 
 
 run, resume = whole_run("bed refine", BedRefineSettings, _carry_out, check=check)

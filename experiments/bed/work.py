@@ -78,18 +78,12 @@ def prepared_in(folder: RunFolder, progress: Progress, options: Mapping[str, Any
 
 
 def finish_bed(
-    folder: RunFolder,
-    prepared: Prepared,
-    progress: Progress,
-    *,
-    experiment: str,
-    title: str,
-    name: str | None,
-    tables: list[Json] | None = None,
-    warnings: list[str] | None = None,
-    quantities: Json | None = None,
+    folder: RunFolder, prepared: Prepared, progress: Progress, *, title: str, name: str | None, told: Json
 ) -> Result:
-    """Write series, frame, result and report of a prepared bed; return the result. ``quantities``: more of them."""
+    """Write series, frame, result and report of a prepared bed; return the result.
+
+    ``told``: further tables, warnings and quantities, each where there are any.
+    """
     bed, last = prepared.bed, prepared.reports[-1]
     assert bed is not None
     entries = []
@@ -119,14 +113,14 @@ def finish_bed(
         "max_overlap": (max(r.max_overlap for r in reports), "1", "while it was made, over diameter"),
     }
     result = Result.make(
-        experiment,
+        folder.command,
         code=prepared.recipe["code"],
         title=title,
-        quantities=quantities_of(own, std=None) | (quantities or {}),
+        quantities=quantities_of(own, std=None) | told.get("quantities", {}),
         stages=entries,
-        tables=[_stage_table(prepared.reports), *(tables or [])],
+        tables=[_stage_table(prepared.reports), *told.get("tables", [])],
         bed={"file": "bed.npz", "name": name, "surface": {"value": bed.surface, "unit": "m"}, **prepared.recipe},
-        warnings=[*(warnings or []), *_warnings(prepared)],
+        warnings=[*told.get("warnings", []), *_warnings(prepared)],
     )
     folder.write_result(result)
     progress.stage("report", total=1.0)

@@ -101,6 +101,10 @@ class Wanted:
     tolerance: float
 
 
+Surfaces, Goals, Ranges = Mapping[str, Response], Mapping[str, Wanted], Mapping[str, Sequence[float]]
+"""Of every observable the response, of every figure what it should be, of every parameter both ends."""
+
+
 @dataclass(frozen=True)
 class Fit:
     """The parameters found. Arrays of shape [parameter_count], in the parameters' units.
@@ -125,7 +129,7 @@ class Fit:
     vague: tuple[str, ...]
 
 
-def design(ranges: Mapping[str, Sequence[float]], count: int, *, seed: int) -> np.ndarray:
+def design(ranges: Ranges, count: int, *, seed: int) -> np.ndarray:
     """The first points to simulate, in units, shape [count, parameter_count].
 
     One parameter: evenly from end to end. Several: a Latin hypercube whose points keep off one another (scipy's
@@ -141,7 +145,7 @@ def design(ranges: Mapping[str, Sequence[float]], count: int, *, seed: int) -> n
 
 
 def _weigh(
-    responses: Mapping[str, Response], wanted: Mapping[str, Wanted], x: np.ndarray
+    responses: Surfaces, wanted: Goals, x: np.ndarray
 ) -> tuple[np.ndarray, dict[str, tuple[np.ndarray, np.ndarray]]]:
     chi2, found = np.zeros(len(x)), {}
     for name, response in responses.items():
@@ -155,9 +159,7 @@ def _box(width: int) -> np.ndarray:
     return qmc.Sobol(width, scramble=False).random(_TRIES)
 
 
-def find_best(
-    responses: Mapping[str, Response], wanted: Mapping[str, Wanted], ranges: Mapping[str, Sequence[float]]
-) -> Fit:
+def find_best(responses: Surfaces, wanted: Goals, ranges: Ranges) -> Fit:
     """The parameters whose expected figures come nearest to those wanted, and how well they are known."""
     names = list(ranges)
     low, high = np.array([tuple(pair) for pair in ranges.values()]).T
@@ -206,12 +208,7 @@ def _quantiles(x: np.ndarray, weight: np.ndarray) -> tuple[float, float]:
 
 
 def next_point(
-    responses: Mapping[str, Response],
-    wanted: Mapping[str, Wanted],
-    ranges: Mapping[str, Sequence[float]],
-    done: np.ndarray,
-    *,
-    enough: float,
+    responses: Surfaces, wanted: Goals, ranges: Ranges, done: np.ndarray, *, enough: float
 ) -> np.ndarray | None:
     """Where one more simulation tells most, in units, shape [parameter_count]; None where no more is needed.
 

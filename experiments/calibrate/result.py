@@ -8,11 +8,11 @@ import numpy as np
 from dem.grains.materials import MATERIAL_FORMAT, MATERIALS, Material
 from experiments.bed.tests import picked, table
 from experiments.runs.folder import RunFolder, toml_value
-from experiments.runs.result import Result
+from experiments.runs.result import Result, quantity
 from experiments.runs.types import Json
 from experiments.runs.version import __version__
 
-from .fit import Fit, Response
+from .fit import Fit, Surfaces
 from .settings import FREE, CalibrateSettings, Target
 from .words import say
 
@@ -20,6 +20,10 @@ __all__ = ["Simulated", "calibration_result", "material_toml"]
 
 _CURVE = 41
 """Points of a response's curve."""
+Values = Mapping[str, float]
+"""Of the parameters, by name."""
+Measured = tuple[float, float | None] | None
+"""Value and standard error of a figure; None where it could not be measured."""
 _UNSOURCED = ("name", "cohesion", "grain")
 
 
@@ -36,15 +40,15 @@ class Simulated:
     points: list[dict[str, float]]
     figures: list[dict[str, tuple[float, float]]]
     tests: list[Json]
-    measured: Mapping[str, tuple[float, float | None] | None]
+    measured: Mapping[str, Measured]
 
 
 def calibration_result(
     settings: CalibrateSettings,
     done: Simulated,
     fit: Fit,
-    responses: Mapping[str, Response],
-    best: Mapping[str, float],
+    responses: Surfaces,
+    best: Values,
     stuff: Material,
     folder: RunFolder,
 ) -> Result:
@@ -53,24 +57,20 @@ def calibration_result(
     quantities: Json = {}
     for k, (key, value) in enumerate(best.items()):
         low, high = settings.free[key]
-        quantities[key] = {
-            "value": value,
-            "std": float(fit.std[k]),
-            "unit": FREE[key],
-            "note": say("found_between", low=low, high=high, lower=fit.low[k], upper=fit.high[k]),
-        }
+        note = say("found_between", low=low, high=high, lower=fit.low[k], upper=fit.high[k])
+        quantities[key] = quantity(value, FREE[key], note, std=float(fit.std[k]))
     if "bond_number" in best:
         note = f"for grains of {settings.grain:g} m"
-        quantities["surface_energy"] = {"value": stuff.surface_energy, "std": None, "unit": "J/m2", "note": note}
+        quantities["surface_energy"] = quantity(stuff.surface_energy, "J/m2", note, std=None)
     reach = _reach(responses)
     entries = [_entry(target, measured[target.name], fit, reach.get(target.name)) for target in targets]
     warnings = _warnings(settings, fit)
     for target, entry in zip(targets, entries, strict=True):
         got, error, verdict = entry["measured"], entry["error"], entry["verdict"]
         note = f"{verdict}; wanted {target.value:g} +- {target.tolerance:g}"
-        quantities[target.name] = {"value": got, "std": error, "unit": target.unit, "note": note}
+        quantities[target.name] = quantity(got, target.unit, note, std=error)
         if verdict != "met":
-            warnings.append(_unmet(target, got, error, verdict, entry["reach"]))
+            warnings.append(_unmet(target, entry))
     if settings.name in MATERIALS and MATERIALS[settings.name] != stuff:
         warnings.append(say("name_ships_otherwise", s=settings))
     over = max((test["max_overlap"] for test in done.tests), default=0.0)
@@ -93,9 +93,7 @@ def calibration_result(
     )
 
 
-def _entry(
-    target: Target, found: tuple[float, float | None] | None, fit: Fit, reach: tuple[float, float] | None
-) -> Json:
+def _entry(target: Target, found: Measured, fit: Fit, reach: tuple[float, float] | None) -> Json:
     """What the result says of one figure: wanted, measured, and what the response surface expects."""
     got, error = found if found is not None else (None, None)
     return {
@@ -123,9 +121,8 @@ def _verdict(target: Target, value: float | None, error: float | None) -> str:
     return "met within the tests' noise" if off <= target.tolerance + 2 * (error or 0.0) else "not met"
 
 
-def _unmet(
-    target: Target, value: float | None, error: float | None, verdict: str, reach: tuple[float, float] | None
-) -> str:
+def _unmet(target: Target, entry: Json) -> str:
+    value, error, verdict, reach = (entry[key] for key in ("measured", "error", "verdict", "reach"))
     wanted = f"{target.value:g} +- {target.tolerance:g} {target.unit} was wanted"
     if value is None:
         return f"{target.name} could not be measured: {wanted}"
@@ -148,7 +145,7 @@ def _warnings(settings: CalibrateSettings, fit: Fit) -> list[str]:
     return said
 
 
-def _reach(responses: Mapping[str, Response]) -> dict[str, tuple[float, float]]:
+def _reach(responses: Surfaces) -> dict[str, tuple[float, float]]:
     """From where to where each figure's surface goes over the whole box."""
     found = {}
     for name, response in responses.items():
@@ -159,15 +156,13 @@ def _reach(responses: Mapping[str, Response]) -> dict[str, tuple[float, float]]:
     return found
 
 
-def _box(settings: CalibrateSettings, values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
+def _box(settings: CalibrateSettings, values: Values) -> tuple[np.ndarray, np.ndarray]:
     """The ends of the ranges, shape [parameter_count, 2], and where these values lie between them."""
     ends = np.array(list(settings.free.values()))
     return ends, (np.array(list(values.values())) - ends[:, 0]) / (ends[:, 1] - ends[:, 0])
 
 
-def _points(
-    settings: CalibrateSettings, done: Simulated, responses: Mapping[str, Response], best: Mapping[str, float]
-) -> list[Json]:
+def _points(settings: CalibrateSettings, done: Simulated, responses: Surfaces, best: Values) -> list[Json]:
     """The points explored; ``moved``: each figure along the surface to the parameters found, but for the one named."""
     _, at = _box(settings, best)
     found = []
@@ -183,9 +178,7 @@ def _points(
     return found
 
 
-def _curves(
-    settings: CalibrateSettings, responses: Mapping[str, Response], best: Mapping[str, float], folder: RunFolder
-) -> dict[str, str]:
+def _curves(settings: CalibrateSettings, responses: Surfaces, best: Values, folder: RunFolder) -> dict[str, str]:
     """Each fitted figure along each parameter through the best point, as series; parameter -> file."""
     ends, at = _box(settings, best)
     files = {}

@@ -38,6 +38,9 @@ __all__ = [
     "triaxial_angle",
 ]
 
+Tell = Callable[[float], None]
+Kept = tuple[Json, dict[str, np.ndarray]]
+"""What is kept of a test, and its series."""
 _WINDOW = 0.05
 """Strain over which the largest strength is averaged."""
 _PARTS = 5
@@ -68,9 +71,7 @@ def tests_for(settings: CalibrateSettings, targets: Sequence[Target], *, seed: i
     return [SampleTest(state, p, seed) for state in states for p in ((0.0,) if state == "drained" else pressures)]
 
 
-def run_test(
-    stuff: Material, test: SampleTest, settings: CalibrateSettings, *, tell: Callable[[float], None]
-) -> tuple[Json, dict[str, np.ndarray]]:
+def run_test(stuff: Material, test: SampleTest, settings: CalibrateSettings, *, tell: Tell) -> Kept:
     """Carry a test out: what is kept of it, of a sheared sample as ``summary_of`` gives it, and its series.
 
     Raises BedFailure.
@@ -89,7 +90,7 @@ def run_test(
 class _Preparing:
     """Shows the preparation of a bed as the first half of a test."""
 
-    def __init__(self, tell: Callable[[float], None]) -> None:
+    def __init__(self, tell: Tell) -> None:
         self.tell, self.part = tell, 0
 
     def stage(self, name: str, total: float | None = None) -> None:
@@ -101,9 +102,7 @@ class _Preparing:
         self.tell(0.5 - 0.5 ** (self.part + min(1.0, max(0.0, done))))
 
 
-def _drain(
-    stuff: Material, test: SampleTest, settings: CalibrateSettings, tell: Callable[[float], None]
-) -> tuple[Json, dict[str, np.ndarray]]:
+def _drain(stuff: Material, test: SampleTest, settings: CalibrateSettings, tell: Tell) -> Kept:
     """The angle of repose of one bed as rained, as ``hedgebed bed test repose`` has it."""
     from dem import Bed
     from dem.measure.repose import angle_of_repose

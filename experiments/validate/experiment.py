@@ -44,8 +44,7 @@ def resume(folder: str | Path, *, progress: Progress | None = None) -> Result:
 
 
 def check(settings: ValidateSettings) -> None:
-    """Raise ValueError, naming key, value and what would do, for a case there is not or a file that cannot be "
-    "written."""
+    """Raise ValueError, naming key, value and what would do, for an unknown case or a file that cannot be written."""
     chosen(settings.only, quick=settings.quick)
     if settings.document is not None and not Path(settings.document).resolve().parent.is_dir():
         raise ValueError(f"document = {settings.document!r} lies in a folder that does not exist: make it first")

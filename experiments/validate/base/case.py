@@ -63,19 +63,14 @@ class Comparison:
 
 
 def compared(
-    quantity: str,
-    labels: Sequence[Any],
-    reference: Any,
-    ours: Any,
-    *,
-    unit: str = "1",
-    band: float,
-    relative: bool = True,
+    quantity: str, labels: Sequence[Any], reference: Any, ours: Any, *, unit: str = "1", band: float
 ) -> list[Comparison]:
-    """A comparison for each of several numbers, called ``<quantity> at <label>``. Raises ValueError for other "
-    "lengths."""
+    """A comparison for each of several numbers, called ``<quantity> at <label>``.
+
+    Raises ValueError for other lengths.
+    """
     rows = zip(labels, np.asarray(reference, dtype=float), np.asarray(ours, dtype=float), strict=True)
-    return [Comparison(f"{quantity} at {label}", unit, float(a), float(b), band, relative) for label, a, b in rows]
+    return [Comparison(f"{quantity} at {label}", unit, float(a), float(b), band) for label, a, b in rows]
 
 
 @dataclass(frozen=True)

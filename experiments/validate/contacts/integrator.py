@@ -123,8 +123,7 @@ def _unknowns(grains: Grains) -> np.ndarray:
 
 
 def errors_of_pair(along: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Errors of velocity, position over contact time and spin times radius [m/s] at each of ``COUNTS``; their "
-    "orders."""
+    """Errors of velocity, position over contact time, spin times radius [m/s] at each of ``COUNTS``; their orders."""
     star, shear = effective_moduli(YOUNG, POISSON, YOUNG, POISSON)
     m = mass_of(DENSITY, RADIUS)
     contact = hertz(m / 2, RADIUS / 2, star, 1.0)[2]

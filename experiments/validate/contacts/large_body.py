@@ -58,8 +58,7 @@ def _time_to(ratio: float, angle: float) -> float:
 
 
 def roll_off(ratio: float, step: float | None = None) -> tuple[np.ndarray, np.ndarray, float]:
-    """Times [s], phi [rad] of a small grain between two fixed balls ``ratio`` times larger, and the spin over "
-    "v / (r sin b)."""
+    """Times [s], phi [rad] of a small grain between two fixed balls ``ratio`` times larger, spin over v / (r sin b)."""
     large = ratio * SMALL
     rho, _ = _geometry(ratio)
     width = max(0.02, 5 * large)
