@@ -8,7 +8,7 @@ import numpy as np
 
 from vis.diagnose.figures import Channel, read_channel, worst
 from vis.diagnose.report import write_diagnosis_report
-from vis.page.palette import line_handles, line_styles
+from vis.page.plots import line_handles, line_styles
 
 
 def write_folder(folder, *, trials: dict[str, float], scatter: float | None = None) -> None:

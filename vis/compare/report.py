@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from vis.compare.figures import plots
-from vis.film.film import shown
+from vis.film.film import ARROWS, draw_in_space, shown
 from vis.film.reel import NAME, Reel
 from vis.page.folder import read_folder
 from vis.page.numbers import short
@@ -19,7 +19,6 @@ from vis.page.sentences import Sentences
 from vis.page.states import LINES, States, legend_of_runs
 from vis.page.style import styled
 from vis.pictures.frames import frame_names
-from vis.spatial.pictures import ARROWS, draw_in_space
 from vis.tumble.pictures import draw_tumbles, moments
 
 __all__ = ["write_compare_report"]

@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 
 from vis.page.numbers import short
 from vis.page.page import Section, Tile, table, text
-from vis.page.palette import line_handles, line_styles
-from vis.page.plots import Plot, legend_above, sheet
+from vis.page.plots import Plot, legend_above, line_handles, line_styles, sheet
 from vis.page.report import Progress, Report, Result, again
 from vis.page.sentences import Sentences
 from vis.page.style import styled

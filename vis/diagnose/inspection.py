@@ -13,8 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from vis.page.page import Section, Tile, listing, table, text
-from vis.page.palette import RED, line_handles, line_styles
-from vis.page.plots import Array, Plot, handle, legend_above, sheet
+from vis.page.plots import RED, Array, Plot, handle, legend_above, line_handles, line_styles, sheet
 from vis.page.report import Progress, Report, Result, again, capital
 from vis.page.sentences import Sentences
 from vis.page.style import BED, GREY, MODEL, styled

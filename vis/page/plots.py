@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,13 +19,19 @@ from vis.page.sentences import Sentences
 from vis.page.style import styled
 
 __all__ = [
-    "DASHED", "DOTTED", "WIDTH", "Array", "Plot", "handle", "legend_above", "mean_over", "new_figure", "new_panels",
-    "shades", "sheet", "smooth_ratio",
+    "DASHED", "DOTTED", "RED", "WIDTH", "Array", "Plot", "handle", "legend_above", "line_handles", "line_styles",
+    "mean_over", "new_figure", "new_panels", "shades", "sheet", "smooth_ratio",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
 WIDTH = 8.6  # inches; all plots are as wide as the report's column
 DASHED, DOTTED = (0, (4, 2)), (0, (1, 1.2))
+
+
+RED = "#c0392b"
+"""What was found to be wrong, in every figure."""
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#222222", "#E69F00", "#56B4E9", "#8a6d3b")
+_DASHES: tuple[Any, ...] = ("-", (0, (4, 1.6)), (0, (1, 1.4)))
 
 
 @dataclass(frozen=True)
@@ -104,3 +110,26 @@ def smooth_ratio(way: Array, columns: dict[str, Array]) -> tuple[Array, Array]:
     count = max(1, len(way) // 60)
     shear, normal = (np.convolve(columns[name], np.ones(count) / count, "valid") for name in ("shear_Pa", "normal_Pa"))
     return way[count // 2 : count // 2 + len(shear)], shear / normal
+
+
+def line_styles(keys: Sequence[Hashable]) -> dict[Hashable, Mapping[str, Any]]:
+    """Colour and dash of a line for each different key, in their order: replicates that share a key share a line.
+
+    Beyond 24 keys they begin again.
+    """
+    count = len(_COLOURS)
+    return {
+        key: {"color": _COLOURS[place % count], "ls": _DASHES[place // count % len(_DASHES)]}
+        for place, key in enumerate(dict.fromkeys(keys))
+    }
+
+
+def line_handles(labels: Sequence[str], keys: Sequence[Hashable]) -> list[Line2D]:
+    """For the legend: a line for each different key, followed by the labels that share it."""
+    styles = line_styles(keys)
+    named = {key: [label for label, own in zip(labels, keys, strict=True) if own == key] for key in styles}
+    return [handle(f"{key}: {_listed(named[key])}", lw=1.6, **style) for key, style in styles.items()]
+
+
+def _listed(labels: Sequence[str]) -> str:
+    return ", ".join(labels) if len(labels) <= 4 else f"{labels[0]} to {labels[-1]} ({len(labels)})"

@@ -162,15 +162,8 @@ class FrameWriter:
         root = ElementTree.Element("VTKFile", type="Collection", version="1.0", byte_order="LittleEndian")
         collection = ElementTree.SubElement(root, "Collection")
         for entry in self._entries:
-            ElementTree.SubElement(
-                collection,
-                "DataSet",
-                timestep=repr(entry.time),
-                group=self.name,
-                part=str(entry.part),
-                name=entry.name,
-                file=entry.file,
-            )
+            place = {"timestep": repr(entry.time), "group": self.name, "part": str(entry.part)}
+            ElementTree.SubElement(collection, "DataSet", place, name=entry.name, file=entry.file)
         ElementTree.indent(root)
         temporary = self.path.with_name(self.path.name + ".part")
         temporary.write_text('<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n")
@@ -405,43 +398,39 @@ def _write_xml(path: Path, writer: Any, content: Any) -> None:
     temporary.replace(path)
 
 
-def _read_vti(path: Path) -> HeightMap:
+def _read(path: Path, reader: Any, kind: str) -> tuple[Any, dict[str, NDArray[Any]]]:
+    """What VTK's `reader` finds in a file of its kind, and the fields of its points. Raises ValueError for another."""
+    if not path.exists():
+        raise ValueError(f"{path} is missing though its PVD lists it")
+    if not reader.CanReadFile(str(path)):
+        raise ValueError(f"{path} is no {kind} file")
     from vtkmodules.util.numpy_support import vtk_to_numpy
-    from vtkmodules.vtkIOXML import vtkXMLImageDataReader
 
-    reader = vtkXMLImageDataReader()
-    if not path.exists() or not reader.CanReadFile(str(path)):
-        raise ValueError(f"{path} is {'no VTI file' if path.exists() else 'missing though its PVD lists it'}")
     reader.SetFileName(str(path))
     reader.Update()
-    image = reader.GetOutput()
+    found = reader.GetOutput()
+    data = found.GetPointData()
+    arrays = (data.GetArray(i) for i in range(data.GetNumberOfArrays()))
+    return found, {array.GetName(): vtk_to_numpy(array).copy() for array in arrays}
+
+
+def _read_vti(path: Path) -> HeightMap:
+    from vtkmodules.vtkIOXML import vtkXMLImageDataReader
+
+    image, fields = _read(path, vtkXMLImageDataReader(), "VTI")
     columns, rows, _ = image.GetDimensions()
-    data = image.GetPointData()
-    fields = {
-        data.GetArrayName(i): vtk_to_numpy(data.GetArray(i)).reshape(rows, columns).copy()
-        for i in range(data.GetNumberOfArrays())
-    }
-    return HeightMap(image.GetOrigin()[:2], image.GetSpacing()[:2], fields)
+    shaped = {name: field.reshape(rows, columns) for name, field in fields.items()}
+    return HeightMap(image.GetOrigin()[:2], image.GetSpacing()[:2], shaped)
 
 
 def _read_vtu(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64], dict[str, NDArray[Any]], dict[str, float]]:
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
-    if not path.exists():
-        raise ValueError(f"{path} is missing though its PVD lists it")
-    reader = vtkXMLUnstructuredGridReader()
-    if not reader.CanReadFile(str(path)):
-        raise ValueError(f"{path} is no VTU file")
-    reader.SetFileName(str(path))
-    reader.Update()
-    grid = reader.GetOutput()
+    grid, fields = _read(path, vtkXMLUnstructuredGridReader(), "VTU")
     points = vtk_to_numpy(grid.GetPoints().GetData()).astype(np.float64)
-    connectivity = vtk_to_numpy(grid.GetCells().GetConnectivityArray()).astype(np.int64)
-    triangles = (
-        connectivity.reshape(-1, 3) if len(connectivity) == 3 * grid.GetNumberOfCells() else np.zeros((0, 3), int)
-    )
-    data, extra = grid.GetPointData(), grid.GetFieldData()
-    fields = {data.GetArrayName(i): vtk_to_numpy(data.GetArray(i)).copy() for i in range(data.GetNumberOfArrays())}
+    links = vtk_to_numpy(grid.GetCells().GetConnectivityArray()).astype(np.int64)
+    triangles = links.reshape(-1, 3) if len(links) == 3 * grid.GetNumberOfCells() else np.zeros((0, 3), int)
+    extra = grid.GetFieldData()
     values = {extra.GetArrayName(i): float(extra.GetArray(i).GetTuple1(0)) for i in range(extra.GetNumberOfArrays())}
     return points, triangles, fields, values

@@ -116,15 +116,7 @@ def revolve(profile: ArrayLike, *, segments: int = 72) -> Mesh:
     return points, np.vstack(parts).astype(np.int64)
 
 
-def spike_mesh(
-    tip: str = "sphere",
-    *,
-    diameter: float,
-    length: float,
-    shaft_diameter: float | None = None,
-    cone_angle: float = 60.0,
-    segments: int = 72,
-) -> Mesh:
+def spike_mesh(tip: str = "sphere", *, segments: int = 72, **sizes: Any) -> Mesh:
     """Closed mesh of a spike, its lowest point at the origin, its axis along +z; arguments as `spike_profile`.
 
     Returns:
@@ -133,10 +125,7 @@ def spike_mesh(
     Raises:
         ValueError: as `spike_profile`.
     """
-    profile = spike_profile(
-        tip, diameter=diameter, length=length, shaft_diameter=shaft_diameter, cone_angle=cone_angle, segments=segments
-    )
-    return revolve(profile, segments=segments)
+    return revolve(spike_profile(tip, segments=segments, **sizes), segments=segments)
 
 
 def mesh_volume(points: ArrayLike, triangles: ArrayLike) -> float:
@@ -178,8 +167,15 @@ def in_place(points: ArrayLike, position: ArrayLike, turn: ArrayLike = (1.0, 0.0
     return given + q[0] * twist + np.cross(q[1:], twist) + np.asarray(position, dtype=np.float64)
 
 
-def _frustum(shape: Any, segments: int) -> Mesh:
-    low, high = (shape.radius,) * 2 if hasattr(shape, "radius") else (shape.bottom_radius, shape.top_radius)
+def _cylinder(shape: Any, segments: int) -> Mesh:
+    return _frustum(shape, shape.radius, shape.radius, segments)
+
+
+def _cone(shape: Any, segments: int) -> Mesh:
+    return _frustum(shape, shape.bottom_radius, shape.top_radius, segments)
+
+
+def _frustum(shape: Any, low: float, high: float, segments: int) -> Mesh:
     outline = [(0.0, shape.bottom), (low, shape.bottom), (high, shape.top), (0.0, shape.top)]
     return revolve([p for k, p in enumerate(outline) if k in (0, 3) or p[0] > 0.0], segments=segments)
 
@@ -248,8 +244,8 @@ _SURFACES: dict[str, Callable[[Any, int], Mesh]] = {
     "Ball": _ball_in_place,
     "Box": _box,
     "Capsule": _capsule,
-    "Cone": _frustum,
-    "Cylinder": _frustum,
+    "Cone": _cone,
+    "Cylinder": _cylinder,
     "Mesh": _triangles,
     "Placed": _placed,
     "Polyhedron": _triangles,

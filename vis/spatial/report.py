@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from vis.film.film import shown
+from vis.film.film import ARROWS, draw_in_space, shown
 from vis.film.reel import NAME
 from vis.page.numbers import quantity
 from vis.page.page import Block, Section, Tile, listing, table, text
@@ -21,7 +21,6 @@ from vis.page.style import BED, GREY, INK, MODEL, styled
 from vis.page.tumble_series import read_columns
 from vis.pictures.canvas import COLOURS
 from vis.pictures.frames import frame_names
-from vis.spatial.pictures import ARROWS, draw_in_space
 
 __all__ = ["write_spatial_report"]
 
