@@ -44,17 +44,10 @@ def write_report(folder: str | Path, *, pictures: bool = True, progress: Progres
 
     Parts that are missing (a run that was stopped, no frames, no OpenGL) are said in the report.
 
-    Args:
-        folder: The run folder; `figures/`, `animation.gif` and `report.html` are written into it.
-        pictures: Whether to draw pictures and the animation; otherwise the report says that they were not asked for.
-        progress: Called with the share that is done, 0 to 1.
-
-    Returns:
-        The report.
-
-    Raises:
-        FileNotFoundError: there is no such folder.
-        OSError: the folder cannot be written.
+    ``folder``: The run folder; `figures/`, `animation.gif` and `report.html` are written into it. ``pictures``: Whether
+    to draw pictures and the animation; otherwise the report says that they were not asked for. ``progress``: Called
+    with the share that is done, 0 to 1. Returns the report. Raises FileNotFoundError: there is no such folder. OSError:
+    the folder cannot be written.
     """
     tell = progress if progress is not None else lambda done: None
     run = read_folder(folder)

@@ -66,9 +66,8 @@ def _side_plot(
 ) -> list[Plot]:
     """The grains of a run's last frame from the side, coloured by how far each has moved; none where no frame is.
 
-    Args:
-        draw: draws over them, in mm. key: of its sentences. top: end of the colours' scale [mean diameters].
-        shown: which grains, and where.
+    ``draw``: draws over them, in mm. key: of its sentences. top: end of the colours' scale [mean diameters]. ``shown``:
+    which grains, and where.
     """
     frames = read_frames(report.folder, run["frames"])
     if not len(frames):

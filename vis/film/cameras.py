@@ -27,8 +27,7 @@ _STEADY = 0.03
 class Camera(Protocol):
     """Sees one run.
 
-    Attributes:
-        arrow: Length of the arrow of the whole weight, over the picture's height; 0: forces are not shown.
+    ``arrow``: Length of the arrow of the whole weight, over the picture's height; 0: forces are not shown.
     """
 
     arrow: float

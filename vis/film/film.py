@@ -73,12 +73,9 @@ class FilmJob(TypedDict):
 class Sheet:
     """Draws the pictures of one or two runs.
 
-    Args:
-        reels: The runs, one or two, of one kind.
-        size: Of the sheet [pixels].
-        by: What grains are coloured by, a key of `vis.pictures.canvas.COLOURS`.
-        opengl: Whether to render with OpenGL.
-        labels: What to call two runs; by their ground or title if not given.
+    ``reels``: The runs, one or two, of one kind. ``size``: Of the sheet [pixels]. ``by``: What grains are coloured by,
+    a key of `vis.pictures.canvas.COLOURS`. ``opengl``: Whether to render with OpenGL. ``labels``: What to call two
+    runs; by their ground or title if not given.
     """
 
     def __init__(
@@ -184,10 +181,8 @@ def draw_reels(
 ) -> Pictures:
     """Stills and film of one or two runs, by OpenGL in a child process or flat.
 
-    Args:
-        film: Its file; None: none is made.
-        times: Of its pictures [s].
-        about: What its caption says after their number.
+    ``film``: Its file; None: none is made. ``times``: Of its pictures [s]. ``about``: What its caption says after their
+    number.
     """
     kind = reels[0]
     job: FilmJob = {
@@ -221,14 +216,9 @@ def draw_in_space(
 ) -> Pictures:
     """Draw figures/STEM-start.png, -middle, -end and film.gif in `home`, by OpenGL in a child process or flat.
 
-    Args:
-        folders: One run folder or two, all with frames.
-        home: Where the pictures go.
-        stem: How the stills' names begin.
-        by: What grains are coloured by, a key of `vis.pictures.canvas.COLOURS`.
-        film: Whether to make the film.
-        progress: Called with the share that is done, 0 to 1.
-        labels: What to call two runs.
+    ``folders``: One run folder or two, all with frames. ``home``: Where the pictures go. ``stem``: How the stills'
+    names begin. ``by``: What grains are coloured by, a key of `vis.pictures.canvas.COLOURS`. ``film``: Whether to make
+    the film. ``progress``: Called with the share that is done, 0 to 1. ``labels``: What to call two runs.
     """
     reels = [SpaceReel(folder) for folder in folders]
     coarse, fine = (of(reels, key=len).times for of in (min, max))

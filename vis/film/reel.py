@@ -37,13 +37,9 @@ _BLOCK, _THIN = 0.08, 0.06
 class _Filmed:
     """What runs in the plane and in space share.
 
-    Attributes:
-        folder: The run folder.
-        result: Its result.json.
-        series: The columns of trajectory.csv.
-        states: Its states, a word a row; none in a folder of an older hedgebed.
-        times: When there is a picture [s], increasing.
-        frames: Its frames; None: the ground is a law that has none.
+    ``folder``: The run folder. ``result``: Its result.json. ``series``: The columns of trajectory.csv. ``states``: Its
+    states, a word a row; none in a folder of an older hedgebed. ``times``: When there is a picture [s], increasing.
+    ``frames``: Its frames; None: the ground is a law that has none.
     """
 
     folder: Path
@@ -179,8 +175,7 @@ class Reel(_Filmed):
     def open(cls, folder: str | Path, *, count: int = 500, like: tuple[float, float] | None = None) -> Reel:
         """Of the tumble in a run folder; on a law with `count` pictures to choose from.
 
-        Raises:
-            FileNotFoundError: there is no trajectory.csv or result.json.
+        Raises FileNotFoundError: there is no trajectory.csv or result.json.
         """
         home = Path(folder)
         result = json.loads((home / "result.json").read_text(encoding="utf-8"))

@@ -35,12 +35,8 @@ _COLUMNS = ("t_s", "depth_m", "velocity_m_s", "force_N", "phase")
 class Series:
     """One penetration. All arrays have shape (n,); force is the ground's on the spike, positive upwards.
 
-    Attributes:
-        time: Time [s].
-        depth: Depth of the tip [m], positive downwards.
-        velocity: Downward velocity [m/s].
-        force: Force [N].
-        phase: One of `PHASES` per row.
+    ``time``: Time [s]. ``depth``: Depth of the tip [m], positive downwards. ``velocity``: Downward velocity [m/s].
+    ``force``: Force [N]. ``phase``: One of `PHASES` per row.
     """
 
     time: NDArray[np.float64]
@@ -90,14 +86,9 @@ class Setting:
 class RunFolder:
     """What a run folder holds.
 
-    Attributes:
-        path: The folder.
-        result: result.json, `{}` where it is missing or unreadable.
-        runs: Its runs with their series.
-        settings: The lines of run.toml in order.
-        missing: Sentences on what is missing or unreadable.
-        status: "done", "stopped", "failed", "running" or "unknown".
-        reason: Why a run stopped or failed.
+    ``path``: The folder. ``result``: result.json, `{}` where it is missing or unreadable. ``runs``: Its runs with their
+    series. ``settings``: The lines of run.toml in order. ``missing``: Sentences on what is missing or unreadable.
+    ``status``: "done", "stopped", "failed", "running" or "unknown". ``reason``: Why a run stopped or failed.
     """
 
     path: Path
@@ -121,8 +112,7 @@ class RunFolder:
 def read_folder(folder: str | Path) -> RunFolder:
     """Read a run folder; nothing in it is required.
 
-    Raises:
-        FileNotFoundError: there is no such folder.
+    Raises FileNotFoundError: there is no such folder.
     """
     path = Path(folder)
     if not path.is_dir():
@@ -168,9 +158,8 @@ def from_python(run: RunFolder) -> bool:
 def read_series(path: str | Path) -> Series:
     """Read one series file.
 
-    Raises:
-        FileNotFoundError: there is no such file.
-        ValueError: a column is missing, a number cannot be read, or it has no rows.
+    Raises FileNotFoundError: there is no such file. ValueError: a column is missing, a number cannot be read, or it has
+    no rows.
     """
     with Path(path).open(newline="", encoding="utf-8") as file:
         reader = csv.DictReader(line for line in file if not line.startswith("#"))

@@ -62,12 +62,9 @@ def column(values: Sequence[float | None], unit: str, *, significant: int = 3) -
 def quote(value: float | None, std: float | None = None, unit: str = "1", *, significant: int = 3) -> str:
     """A number with its uncertainty and unit.
 
-    Args:
-        value: The number in SI; None reads "unknown".
-        std: Its standard deviation; 0 for what is exact, None where unknown: neither is shown, nor is one below a
-            ten-thousandth of the value.
-        unit: An SI unit; "1" for none, "%" for a share to be shown in per cent.
-        significant: Digits where the uncertainty does not set them.
+    ``value``: The number in SI; None reads "unknown". ``std``: Its standard deviation; 0 for what is exact, None where
+    unknown: neither is shown, nor is one below a ten-thousandth of the value. ``unit``: An SI unit; "1" for none, "%"
+    for a share to be shown in per cent. ``significant``: Digits where the uncertainty does not set them.
     """
     if value is None:
         return "unknown"
@@ -96,11 +93,9 @@ def foldable(text: str) -> str:
 def quantity(entry: Any, *, unit: str | None = None, significant: int | None = None) -> str:
     """A quantity of result.json, `{"value", "std", "unit"}` or a bare number; "unknown" where it is missing.
 
-    Args:
-        entry: The quantity.
-        unit: In place of its own unit, such as "%" for a share.
-        significant: Digits where the uncertainty does not set them; by default two where that is unknown (a std of
-            null), more would claim what no one knows.
+    ``entry``: The quantity. ``unit``: In place of its own unit, such as "%" for a share. ``significant``: Digits where
+    the uncertainty does not set them; by default two where that is unknown (a std of null), more would claim what no
+    one knows.
     """
     if isinstance(entry, Mapping):
         value, std, own = entry.get("value"), entry.get("std"), str(entry.get("unit") or "1")

@@ -21,12 +21,8 @@ __all__ = ["PLOTS", "make_plots"]
 def make_plots(run: RunFolder, folder: str | Path | None = None) -> tuple[list[tuple[Plot, Path]], list[str]]:
     """Draw and write every plot the folder has data for.
 
-    Args:
-        run: The run folder.
-        folder: Where the PNGs go; by default the run's `figures/`.
-
-    Returns:
-        The plots with their files, and a sentence on each that could not be drawn.
+    ``run``: The run folder. ``folder``: Where the PNGs go; by default the run's `figures/`. Returns the plots with
+    their files, and a sentence on each that could not be drawn.
     """
     target = Path(folder) if folder is not None else run.path / "figures"
     target.mkdir(parents=True, exist_ok=True)

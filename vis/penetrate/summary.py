@@ -26,10 +26,9 @@ _REAL_GRAINS = {"sand": 2e-4}
 def summarise(run: RunFolder) -> dict[str, Any]:
     """Everything the report says but its images.
 
-    Returns:
-        A dict with "title", "status", "banner", "lead" (facts under the title), "tiles", "answers", "fit",
-        "departures", "reference", "bed", "spike", "runs", "numbers", "settings", "warnings", "missing", "frames" and
-        "reproduce"; "caveat" is what to know before any number.
+    Returns a dict with "title", "status", "banner", "lead" (facts under the title), "tiles", "answers", "fit",
+    "departures", "reference", "bed", "spike", "runs", "numbers", "settings", "warnings", "missing", "frames" and
+    "reproduce"; "caveat" is what to know before any number.
     """
     result = run.result
     quantities = words.mapping_of(result.get("quantities"))

@@ -37,9 +37,7 @@ Place = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 class ColourScale:
     """A colour scale that stays the same over the pictures it is used for.
 
-    Attributes:
-        by: A key of `COLOURS`.
-        top: Upper end of the scale, in the unit of its label; the lower end is 0.
+    ``by``: A key of `COLOURS`. ``top``: Upper end of the scale, in the unit of its label; the lower end is 0.
     """
 
     by: str
@@ -66,8 +64,7 @@ def colourmap() -> Colormap:
 def colour_values(grains: dict[str, NDArray[Any]], by: str) -> NDArray[np.float64]:
     """What a grain is coloured by, in the unit of the scale's label, shape (n,).
 
-    Raises:
-        ValueError: an unknown `by`, or a frame without the field it needs.
+    Raises ValueError: an unknown `by`, or a frame without the field it needs.
     """
     if by not in COLOURS:
         raise ValueError(f"colour is {by!r}; it must be one of {', '.join(COLOURS)}")
@@ -105,9 +102,7 @@ def nice_above(value: float) -> float:
 class Page:
     """A page of 4:3 for pictures that share a colour scale.
 
-    Args:
-        size: Width and height [pixels].
-        scale: The colour scale.
+    ``size``: Width and height [pixels]. ``scale``: The colour scale.
     """
 
     def __init__(self, size: tuple[int, int], scale: ColourScale) -> None:
@@ -132,14 +127,10 @@ class Page:
     ) -> NDArray[np.uint8]:
         """The finished picture, shape (height, width, 3).
 
-        Args:
-            caption: Its words.
-            image: The rendered scene, shape (height, width, 3), or
-            draw: a function that draws on an axes that fills the page, in the page's fractions.
-            place: Where a point of the bed lies on the page.
-            section: Of the plane of the cut: x of its left and right end, its y, z of the floor and of the undisturbed
-                surface [m].
-            note: Small print at the foot.
+        ``caption``: Its words. ``image``: The rendered scene, shape (height, width, 3), or. ``draw``: a function that
+        draws on an axes that fills the page, in the page's fractions. ``place``: Where a point of the bed lies on the
+        page. ``section``: Of the plane of the cut: x of its left and right end, its y, z of the floor and of the
+        undisturbed surface [m]. ``note``: Small print at the foot.
         """
         width, height = self.size
         dpi = width / 8.0

@@ -44,10 +44,8 @@ _Part = tuple[str, NDArray[np.float32], dict[str, NDArray[Any]], NDArray[np.int6
 class HeightMap:
     """Values on a level grid.
 
-    Attributes:
-        origin: x and y of the first point [m].
-        spacing: Between points along x and y [m].
-        fields: Name -> values, shape (points along y, points along x). `height` [m] is what a viewer warps by.
+    ``origin``: x and y of the first point [m]. ``spacing``: Between points along x and y [m]. ``fields``: Name ->
+    values, shape (points along y, points along x). `height` [m] is what a viewer warps by.
     """
 
     origin: tuple[float, float]
@@ -58,14 +56,10 @@ class HeightMap:
 class FrameWriter:
     """Writes the frames of one run.
 
-    Args:
-        folder: The run folder; frames go to its `frames/`.
-        name: The run's id, also the PVD's name.
-        resume: Continue an existing series; otherwise the old frames of this name are removed.
-        keep_until: With `resume`, frames later than this time [s] are removed and will be written again.
-
-    Raises:
-        ValueError: a name that is no plain file name; `keep_until` without `resume`; a PVD that cannot be read.
+    ``folder``: The run folder; frames go to its `frames/`. ``name``: The run's id, also the PVD's name. ``resume``:
+    Continue an existing series; otherwise the old frames of this name are removed. ``keep_until``: With `resume`,
+    frames later than this time [s] are removed and will be written again. Raises ValueError: a name that is no plain
+    file name; `keep_until` without `resume`; a PVD that cannot be read.
     """
 
     def __init__(
@@ -112,22 +106,13 @@ class FrameWriter:
     ) -> Path:
         """Write one frame.
 
-        Args:
-            time: Time [s], on the clock of the run's series, not before the last frame; a frame at the last frame's
-                time takes its place (a run resumed from a checkpoint may write that frame again).
-            grains: `position` [m], shape (n, 3), and any of `GRAIN_FIELDS`; a vector field may be given as its
-                magnitude, shape (n,).
-            bodies: Name -> (points [m], shape (n, 3), triangles, shape (m, 3)).
-            values: Scalars of this frame, such as depth [m] and force [N].
-            clouds: Name -> (points [m], shape (n, 3), fields), a field of shape (n,) or (n, 3): what glyphs are of.
-            maps: Name -> height map.
-
-        Returns:
-            The PVD file.
-
-        Raises:
-            ValueError: a time before the last frame's, arrays of unequal length or wrong shape, values
-                that are not finite, an unknown grain field.
+        ``time``: Time [s], on the clock of the run's series, not before the last frame; a frame at the last frame's
+        time takes its place (a run resumed from a checkpoint may write that frame again). ``grains``: `position` [m],
+        shape (n, 3), and any of `GRAIN_FIELDS`; a vector field may be given as its magnitude, shape (n,). ``bodies``:
+        Name -> (points [m], shape (n, 3), triangles, shape (m, 3)). ``values``: Scalars of this frame, such as depth
+        [m] and force [N]. ``clouds``: Name -> (points [m], shape (n, 3), fields), a field of shape (n,) or (n, 3): what
+        glyphs are of. ``maps``: Name -> height map. Returns the PVD file. Raises ValueError: a time before the last
+        frame's, arrays of unequal length or wrong shape, values that are not finite, an unknown grain field.
         """
         time = float(time)
         last = self._entries[-1].time if self._entries else -np.inf
@@ -174,13 +159,10 @@ class FrameWriter:
 class Frame:
     """One frame of a run as it was written.
 
-    Attributes:
-        time: Time [s].
-        grains: `position` [m], shape (n, 3), and the fields of `GRAIN_FIELDS` that were written.
-        bodies: Name -> (points [m], shape (n, 3), triangles, shape (m, 3)).
-        values: Scalars of this frame (depth [m], force [N], ...).
-        clouds: Name -> (points [m], shape (n, 3), fields), what glyphs are drawn of.
-        maps: Name -> height map.
+    ``time``: Time [s]. ``grains``: `position` [m], shape (n, 3), and the fields of `GRAIN_FIELDS` that were written.
+    ``bodies``: Name -> (points [m], shape (n, 3), triangles, shape (m, 3)). ``values``: Scalars of this frame (depth
+    [m], force [N], ...). ``clouds``: Name -> (points [m], shape (n, 3), fields), what glyphs are drawn of. ``maps``:
+    Name -> height map.
     """
 
     time: float
@@ -239,9 +221,8 @@ class Frames(Sequence[Frame]):
 def read_frames(folder: str | Path, name: str = "frames") -> Frames:
     """Frames of the run `name` in a run folder, by increasing time.
 
-    Raises:
-        FileNotFoundError: the run has no frames.
-        ValueError: its PVD, or when a frame is asked for its VTU, cannot be read.
+    Raises FileNotFoundError: the run has no frames. ValueError: its PVD, or when a frame is asked for its VTU, cannot
+    be read.
     """
     return Frames(Path(folder) / "frames", name)
 

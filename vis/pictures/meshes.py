@@ -29,20 +29,11 @@ def spike_profile(
 ) -> NDArray[np.float64]:
     """Outline of a spike from its lowest point (0, 0) to the middle of its top.
 
-    Args:
-        tip: "sphere", "cone" or "flat".
-        diameter: Diameter of the tip [m].
-        length: From the tip's lowest point to the shaft's upper end [m].
-        shaft_diameter: Diameter of the shaft [m], at most the tip's; None: as the tip.
-        cone_angle: Full angle of a conical tip [degrees].
-        segments: Segments of a full circle.
-
-    Returns:
-        Radius and height [m], shape (k, 2).
-
-    Raises:
-        ValueError: an unknown tip, a size that is not positive, a shaft thicker than the tip or thinner than a flat
-            one, an angle out of range, a length within the tip, fewer than 3 segments.
+    ``tip``: "sphere", "cone" or "flat". ``diameter``: Diameter of the tip [m]. ``length``: From the tip's lowest point
+    to the shaft's upper end [m]. ``shaft_diameter``: Diameter of the shaft [m], at most the tip's; None: as the tip.
+    ``cone_angle``: Full angle of a conical tip [degrees]. ``segments``: Segments of a full circle. Returns radius and
+    height [m], shape (k, 2). Raises ValueError: an unknown tip, a size that is not positive, a shaft thicker than the
+    tip or thinner than a flat one, an angle out of range, a length within the tip, fewer than 3 segments.
     """
     shaft_diameter = diameter if shaft_diameter is None else shaft_diameter
     for name, value in (("diameter", diameter), ("shaft_diameter", shaft_diameter), ("length", length)):
@@ -81,13 +72,9 @@ def spike_profile(
 def revolve(profile: ArrayLike, *, segments: int = 72) -> Mesh:
     """Closed surface of revolution of an outline about +z.
 
-    Args:
-        profile: Radius and height [m], shape (k, 2), from the lowest point on the axis to the highest one on the axis;
-            only the two ends lie on the axis.
-        segments: Segments of a full circle.
-
-    Raises:
-        ValueError: an outline of another shape, one that does not start and end on the axis, or touches it between.
+    ``profile``: Radius and height [m], shape (k, 2), from the lowest point on the axis to the highest one on the axis;
+    only the two ends lie on the axis. ``segments``: Segments of a full circle. Raises ValueError: an outline of another
+    shape, one that does not start and end on the axis, or touches it between.
     """
     outline = np.asarray(profile, dtype=np.float64)
     if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
@@ -119,11 +106,7 @@ def revolve(profile: ArrayLike, *, segments: int = 72) -> Mesh:
 def spike_mesh(tip: str = "sphere", *, segments: int = 72, **sizes: Any) -> Mesh:
     """Closed mesh of a spike, its lowest point at the origin, its axis along +z; arguments as `spike_profile`.
 
-    Returns:
-        Points [m], shape (n, 3), and triangles, shape (m, 3).
-
-    Raises:
-        ValueError: as `spike_profile`.
+    Returns points [m], shape (n, 3), and triangles, shape (m, 3). Raises ValueError: as `spike_profile`.
     """
     return revolve(spike_profile(tip, segments=segments, **sizes), segments=segments)
 
@@ -137,13 +120,9 @@ def mesh_volume(points: ArrayLike, triangles: ArrayLike) -> float:
 def shape_mesh(shape: Any, *, segments: int = 72) -> Mesh:
     """Surface of a shape that grains touch, or of several, in the body's frame; where several overlap, both are shown.
 
-    Args:
-        shape: What `Bed.add_body` takes: an object that is called Ball, Box, Capsule, Cone, Cylinder, Mesh, Placed,
-            Polyhedron or Tube and has the sizes [m] of `dem`'s shape of that name, or a sequence of such.
-        segments: Segments of a full circle.
-
-    Raises:
-        ValueError: another shape (a Plane has no end), no shape at all.
+    ``shape``: What `Bed.add_body` takes: an object that is called Ball, Box, Capsule, Cone, Cylinder, Mesh, Placed,
+    Polyhedron or Tube and has the sizes [m] of `dem`'s shape of that name, or a sequence of such. ``segments``:
+    Segments of a full circle. Raises ValueError: another shape (a Plane has no end), no shape at all.
     """
     if isinstance(shape, (list, tuple)):
         if not shape:

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from vis.page.folder import Run, RunFolder, read_folder
 from vis.page.numbers import quote
+from vis.page.plots import Array
 from vis.page.report import Progress
 from vis.pictures.canvas import colour_values, nice_above
 from vis.pictures.frames import Frame, Frames, frame_names, grains_box, read_frames
@@ -52,11 +53,8 @@ class Picture:
 class Pictures:
     """What was drawn.
 
-    Attributes:
-        stills: Pictures at chosen moments.
-        animation: The animated GIF, or None.
-        method: "opengl", "sections" (drawn with matplotlib) or "none".
-        notes: Sentences on what stands in for what, and why.
+    ``stills``: Pictures at chosen moments. ``animation``: The animated GIF, or None. ``method``: "opengl", "sections"
+    (drawn with matplotlib) or "none". ``notes``: Sentences on what stands in for what, and why.
     """
 
     stills: list[Picture] = field(default_factory=list)
@@ -100,20 +98,11 @@ def make_pictures(
 ) -> Pictures:
     """Draw the stills (`figures/bed-*.png`) and `animation.gif` of a run folder.
 
-    Args:
-        folder: The run folder.
-        size: Of the stills [pixels].
-        animation_size: Of the animation [pixels].
-        animate: Whether to make the animation.
-        stall: The child process is given up when it finishes no picture for this long [s].
-        progress: Called with the share that is done, 0 to 1.
-
-    Returns:
-        What was drawn. A folder without frames gives `method="none"` and a note; nothing that goes wrong with OpenGL
-        is raised.
-
-    Raises:
-        FileNotFoundError: there is no such folder.
+    ``folder``: The run folder. ``size``: Of the stills [pixels]. ``animation_size``: Of the animation [pixels].
+    ``animate``: Whether to make the animation. ``stall``: The child process is given up when it finishes no picture for
+    this long [s]. ``progress``: Called with the share that is done, 0 to 1. Returns what was drawn. A folder without
+    frames gives `method="none"` and a note; nothing that goes wrong with OpenGL is raised. Raises FileNotFoundError:
+    there is no such folder.
     """
     run = read_folder(folder)
     notes: list[str] = []
@@ -160,9 +149,8 @@ def carry_out(
 ) -> tuple[str, list[str]]:
     """Draw a job with OpenGL in a child process, `python -m module`, or where that does not do it by `flat`.
 
-    Returns:
-        "opengl" or "sections", and a note on what stands in: `failed` where OpenGL did not do it, `without` where there
-        is none.
+    Returns "opengl" or "sections", and a note on what stands in: `failed` where OpenGL did not do it, `without` where
+    there is none.
     """
     if not opengl_available():
         note = f"This machine has no OpenGL for off-screen pictures; {without}."
@@ -223,77 +211,71 @@ def _pass_on(child: subprocess.Popen[str], lines: queue.SimpleQueue[str]) -> Non
     lines.put("")
 
 
-# ---- what to draw --------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Story:
-    """The frames of a run with what is needed to choose among them."""
+    """The frames of a run with what is needed to choose among them; a depth or force that is not known is NaN."""
 
     name: str
-    run: Run | None
+    run: Run
     frames: Frames
-    depth: list[float | None]
-    force: list[float | None]
+    depth: Array
+    force: Array
 
     @property
     def deepest(self) -> int:
         """The deepest frame before the pull-out; of several as deep, the first: it is still, or was just, moving."""
-        known = np.array([d if d is not None else -np.inf for d in self.depth])
         before = self._before_the_way_out()
-        top = known[before].max()
+        known = np.where(np.isfinite(self.depth), self.depth, -np.inf)[before]
+        top = known.max()
         if not np.isfinite(top):
-            return len(known) - 1
-        return int(before[np.argmax(known[before] >= top - 0.002 * abs(top))])
+            return len(self.frames) - 1
+        return int(before[np.argmax(known >= top - 0.002 * abs(top))])
 
     def _before_the_way_out(self) -> NDArray[np.int64]:
         """Indices of the frames before the run's first row of the way out; all where it has none, or no series."""
-        every = np.arange(len(self.frames))
-        if self.run is None or self.run.bed is None:
+        every, bed = np.arange(len(self.frames)), self.run.bed
+        out = np.flatnonzero(bed.phase == "out") if bed is not None and self.kind == "driven" else every[:0]
+        if bed is None or not len(out):
             return every
-        out = np.flatnonzero(self.run.bed.phase == "out")
-        if self.kind != "driven" or not len(out):
-            return every
-        before = every[np.asarray(self.frames.times) < self.run.bed.time[out[0]]]
+        before = every[np.asarray(self.frames.times) < bed.time[out[0]]]
         return before if len(before) else every
 
     def held(self, index: int) -> bool:
         """Whether a driven spike was held still at this frame, its force falling off from what it was on the way in."""
-        if self.run is None or self.run.bed is None or self.kind != "driven":
+        bed = self.run.bed
+        if bed is None or self.kind != "driven":
             return False
-        row = int(np.searchsorted(self.run.bed.time, self.frames.times[index], side="right")) - 1
-        return bool(self.run.bed.phase[max(row, 0)] == "rest")
+        row = int(np.searchsorted(bed.time, self.frames.times[index], side="right")) - 1
+        return bool(bed.phase[max(row, 0)] == "rest")
 
     @property
     def rested(self) -> bool:
         """Whether it was set down and came to rest, so that its last frame shows it at rest."""
-        sinkage = self.run.quantities.get("sinkage") if self.run else None
+        sinkage = self.run.quantities.get("sinkage")
         value = sinkage.get("value") if isinstance(sinkage, dict) else sinkage
         return self.kind == "set_down" and value is not None
 
     @property
     def kind(self) -> str:
-        return self.run.kind if self.run else ""
+        return self.run.kind
 
     @property
     def speed(self) -> float:
-        return (self.run.speed or 0.0) if self.run else 0.0
+        return self.run.speed or 0.0
 
     @property
     def title(self) -> str:
-        if self.run is None:
-            return self.name
         speed = f" at {self.speed:.3g} m/s"
         words = {"driven": f"Driven{speed}", "drop": f"Dropped{speed}", "set_down": "Set down"}
         return words.get(self.kind, self.name)
 
     def line(self, index: int) -> str:
-        parts = [f"bed {self.run.seed}"] if self.run and self.run.seed is not None else []
+        parts = [f"bed {self.run.seed}"] if self.run.seed is not None else []
         parts.append(f"t = {float(self.frames.times[index]):.3f} s")
-        if (depth := self.depth[index]) is not None:
-            parts.append(f"depth {1e3 * depth:.1f} mm".replace("-", "\N{MINUS SIGN}"))
-        if (force := self.force[index]) is not None:
-            parts.append(f"force {quote(force, unit='N')}")
+        if np.isfinite(self.depth[index]):
+            parts.append(f"depth {1e3 * self.depth[index]:.1f} mm".replace("-", "\N{MINUS SIGN}"))
+        if np.isfinite(self.force[index]):
+            parts.append(f"force {quote(float(self.force[index]), unit='N')}")
         return "\n".join(parts)
 
 
@@ -301,13 +283,11 @@ def _tell(run: RunFolder, name: str) -> _Story | None:
     frames = read_frames(run.path, name)
     if not len(frames):
         return None
-    by_id = {r.id: r for r in run.runs}
-    match = by_id.get(name) or next((r for r in run.runs if r.id.startswith(name + "-")), None)
-    depth: list[float | None] = [None] * len(frames)
-    force: list[float | None] = [None] * len(frames)
-    if match is not None and match.bed is not None and len(match.bed):
-        depth = [float(d) for d in np.interp(frames.times, match.bed.time, match.bed.depth)]
-        force = [float(f) for f in np.interp(frames.times, match.bed.time, match.bed.force)]
+    own = [r for r in run.runs if r.id == name] or [r for r in run.runs if r.id.startswith(name + "-")]
+    match = own[0] if own else Run(id=name, kind="", seed=None, speed=None, bed=None, model=None)
+    depth, force = np.full((2, len(frames)), np.nan)
+    if match.bed is not None and len(match.bed):
+        depth, force = (np.interp(frames.times, match.bed.time, row) for row in (match.bed.depth, match.bed.force))
     for index, frame in enumerate(frames):
         depth[index] = frame.values.get("depth", depth[index])
         force[index] = frame.values.get("force", force[index])
@@ -359,8 +339,7 @@ def _plan(
         still(main, half, "speed", nice_above(fast), "speed", "the grains' speed half way in")
     last = len(main.frames) - 1
     if last != main.deepest and main.kind == "driven":
-        depth = main.depth[last]
-        inside = depth is not None and depth > 0.0
+        inside = main.depth[last] > 0.0
         still(main, last, "displacement", top, "end", "near the end of the pull-out" if inside else "pulled out")
     for story in chosen[1:]:
         deep(story)
@@ -388,11 +367,9 @@ def _choose(stories: list[_Story]) -> list[_Story]:
 
 def _half_way(story: _Story) -> int:
     end = story.deepest
-    deepest = story.depth[end]
-    if deepest is None or end == 0:
+    if not np.isfinite(story.depth[end]) or end == 0:
         return end // 2
-    way_in = [abs((d if d is not None else 0.0) - 0.5 * deepest) for d in story.depth[:end]]
-    return int(np.argmin(way_in))
+    return int(np.argmin(np.abs(np.nan_to_num(story.depth[:end]) - 0.5 * story.depth[end])))
 
 
 def _high(frame: Frame, by: str) -> float:
@@ -418,7 +395,7 @@ def _view(
     stated = stated.get("value") if isinstance(stated, dict) else stated
     if body is not None:
         cut = 0.5 * float(body[0][:, 1].min() + body[0][:, 1].max())
-    if body is not None and story.depth[0] is not None:
+    if body is not None and np.isfinite(story.depth[0]):
         surface = float(body[0][:, 2].min()) + float(story.depth[0])
     elif isinstance(stated, int | float):
         surface = float(stated)

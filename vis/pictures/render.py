@@ -65,10 +65,8 @@ _ROOM = 256 - len(_KEPT)
 def run_job(job: PictureJob, *, opengl: bool, step: Callable[[], None] = lambda: None) -> None:
     """Draw every picture of a job.
 
-    Args:
-        job: Its views, with lengths in m and sizes in pixels.
-        opengl: With `vis.pictures.scene`, else with `vis.pictures.sections`.
-        step: Called after each frame.
+    ``job``: Its views, with lengths in m and sizes in pixels. ``opengl``: With `vis.pictures.scene`, else with
+    `vis.pictures.sections`. ``step``: Called after each frame.
     """
     folder = Path(job["folder"])
     for view in job["stills"]:

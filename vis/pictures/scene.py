@@ -109,11 +109,9 @@ class Rendered:
 class Scene(Rendered):
     """A camera on a bed; the same for every frame it renders.
 
-    Args:
-        size: Width and height of the image [pixels].
-        low, high: Corners of the undisturbed bed [m].
-        cut: Grains with y below this [m], and the part of a body in front of it, are left out.
-        radius: Typical radius of a grain [m], for the shading of the gaps between them.
+    ``size``: Width and height of the image [pixels]. ``low``, ``high``: Corners of the undisturbed bed [m]. ``cut``:
+    Grains with y below this [m], and the part of a body in front of it, are left out. ``radius``: Typical radius of a
+    grain [m], for the shading of the gaps between them.
     """
 
     def __init__(self, size: tuple[int, int], low: Array, high: Array, *, cut: float, radius: float) -> None:
@@ -137,9 +135,7 @@ class Scene(Rendered):
     def render(self, frame: Frame, colours: Array) -> NDArray[np.uint8]:
         """Image of a frame, shape (height, width, 3).
 
-        Args:
-            frame: The frame.
-            colours: A colour per grain, shape (n, 3 or 4), 0 to 1.
+        ``frame``: The frame. ``colours``: A colour per grain, shape (n, 3 or 4), 0 to 1.
         """
         self._clear()
         position = frame.grains["position"]

@@ -26,11 +26,8 @@ _LIGHT = np.array([-0.45, -0.75, 0.48])
 class Section:
     """A view along +y on the plane of the cut, in proportion.
 
-    Args:
-        size: Width and height of the page [pixels].
-        low, high: Corners of the undisturbed bed [m].
-        cut: The plane's y [m].
-        radius: Typical radius of a grain [m]; the slab is eight of them thick.
+    ``size``: Width and height of the page [pixels]. ``low``, ``high``: Corners of the undisturbed bed [m]. ``cut``: The
+    plane's y [m]. ``radius``: Typical radius of a grain [m]; the slab is eight of them thick.
     """
 
     def __init__(self, size: tuple[int, int], low: Array, high: Array, *, cut: float, radius: float) -> None:
@@ -91,10 +88,8 @@ def discs(
 ) -> None:
     """Grains as discs, those up to `thick` behind the cut, the far ones first and darker.
 
-    Args:
-        places, sizes: In fractions of the page, shape (n, 2), and across and up, shape (n,).
-        behind: How far each is behind the cut [m]. shown: Which may be seen.
-        edge, line: Opacity and width of the rims.
+    ``places``, ``sizes``: In fractions of the page, shape (n, 2), and across and up, shape (n,). ``behind``: How far
+    each is behind the cut [m]. shown: Which may be seen. ``edge``, ``line``: Opacity and width of the rims.
     """
     slab = np.flatnonzero(shown & (behind >= 0.0) & (behind <= thick))
     slab = slab[np.argsort(-behind[slab])]

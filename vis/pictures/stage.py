@@ -27,11 +27,8 @@ _COLOURS = {"hull": (0.80, 0.82, 0.85), "spikes": (0.52, 0.55, 0.60)}
 class Eye:
     """Where a point lies on a picture of `width` [m] across whose middle is at the focus.
 
-    Args:
-        size: Of the picture [pixels].
-        width: What it shows across [m].
-        cut: y of the plane that is looked at [m].
-        pitch: How far the view goes downwards [radians].
+    ``size``: Of the picture [pixels]. ``width``: What it shows across [m]. ``cut``: y of the plane that is looked at
+    [m]. ``pitch``: How far the view goes downwards [radians].
     """
 
     def __init__(self, size: tuple[int, int], *, width: float, cut: float, pitch: float = 0.0) -> None:
@@ -53,10 +50,8 @@ class Eye:
 class Stage(Eye, Rendered):
     """Renders frames with VTK. Needs OpenGL: use it only in a process that may die.
 
-    Args:
-        low, high: Corners of the bed [m]; without grains, of a block of ground.
-        radius: Typical radius of a grain [m], for the shading of gaps; None: a block of ground in place of grains.
-        (the others as `Eye`)
+    ``low``, ``high``: Corners of the bed [m]; without grains, of a block of ground. ``radius``: Typical radius of a
+    grain [m], for the shading of gaps; None: a block of ground in place of grains. (the others as `Eye`)
     """
 
     def __init__(

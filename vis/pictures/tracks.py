@@ -23,11 +23,7 @@ def lying(position: ArrayLike, radius: ArrayLike) -> NDArray[np.bool_]:
     at most, joins to these. So a string of grains up a spike that stands in the sand is joined to the bed too, and
     remains a tower in the height map.
 
-    Args:
-        position: Centres of the grains [m], shape (n, 3). radius: Their radii [m], shape (n,).
-
-    Returns:
-        shape (n,).
+    ``position``: Centres of the grains [m], shape (n, 3). radius: Their radii [m], shape (n,). Returns shape (n,).
     """
     centres, radii = np.asarray(position, dtype=float), np.asarray(radius, dtype=float)
     found = np.ones(len(radii), dtype=bool)
@@ -53,19 +49,11 @@ def height_map(
 ) -> HeightMap:
     """Height of the grains' tops over a grid on a bed that is periodic along x and y.
 
-    Args:
-        position: Centres of the grains [m], shape (n, 3).
-        radius: Their radii [m], shape (n,).
-        size: Length of the bed along x and y [m]; the grid covers it once.
-        spacing: Wanted between the points [m]; as near to it as divides the bed.
-        lies: Which of them count, shape (n,), as `lying` tells; all when None.
-
-    Returns:
-        A map with `height` [m]: z of the highest point of a sphere over each point of the grid, 0 (the floor) where
-        there is none.
-
-    Raises:
-        ValueError: a spacing that is not above 0.
+    ``position``: Centres of the grains [m], shape (n, 3). ``radius``: Their radii [m], shape (n,). ``size``: Length of
+    the bed along x and y [m]; the grid covers it once. ``spacing``: Wanted between the points [m]; as near to it as
+    divides the bed. ``lies``: Which of them count, shape (n,), as `lying` tells; all when None. Returns a map with
+    `height` [m]: z of the highest point of a sphere over each point of the grid, 0 (the floor) where there is none.
+    Raises ValueError: a spacing that is not above 0.
     """
     if not spacing > 0:
         raise ValueError(f"spacing is {spacing!r}; it must be above 0 (in m)")

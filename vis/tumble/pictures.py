@@ -27,15 +27,9 @@ def make_tumble_pictures(
 ) -> Pictures:
     """Draw figures/tumble-*.png, figures/tracks.png and film.gif of a tumble's run folder.
 
-    Args:
-        folder: The run folder; without frames the ground is drawn as a block.
-        by: What grains are coloured by, a key of `vis.pictures.canvas.COLOURS`.
-        film: Whether to make the film.
-        progress: Called with the share that is done, 0 to 1.
-
-    Raises:
-        FileNotFoundError: there is no trajectory.csv or result.json.
-        ValueError: an unknown `by`.
+    ``folder``: The run folder; without frames the ground is drawn as a block. ``by``: What grains are coloured by, a
+    key of `vis.pictures.canvas.COLOURS`. ``film``: Whether to make the film. ``progress``: Called with the share that
+    is done, 0 to 1. Raises FileNotFoundError: there is no trajectory.csv or result.json. ValueError: an unknown `by`.
     """
     if by not in COLOURS:
         raise ValueError(f"colour is {by!r}; it must be one of {', '.join(COLOURS)}")
