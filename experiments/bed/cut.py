@@ -78,22 +78,15 @@ def _result(runs: list[Json], friction_angle: float | None, most: float) -> Json
     def half(run: Json) -> float | None:
         return None if run["critical_height"] is None else 0.5 * (run["high"] - run["low"])
 
+    stands = "of a vertical face at the bed's own gravity; null where no face stood, or none fell"
+    told = "give friction_angle, that of Mohr's circle"
+    if friction_angle is not None:
+        told = f"gamma H_c / 4 tan(45 + phi / 2) with phi = {friction_angle:g} degrees"
     quantities = {
-        "critical_height": of(
-            "critical_height",
-            "m",
-            "of a vertical face at the bed's own gravity; null where no face stood, or none fell",
-            error=half,
-        ),
+        "critical_height": of("critical_height", "m", stands, error=half),
         "stands_to": of("low", "m", "largest height that stood, at the bed's own gravity"),
         "falls_from": of("high", "m", "least height that fell, likewise"),
-        "cohesion": of(
-            lambda run: None if friction_angle is None else cohesion(run, friction_angle),
-            "Pa",
-            "give friction_angle, that of Mohr's circle"
-            if friction_angle is None
-            else f"gamma H_c / 4 tan(45 + phi / 2) with phi = {friction_angle:g} degrees",
-        ),
+        "cohesion": of(lambda run: None if friction_angle is None else cohesion(run, friction_angle), "Pa", told),
         "slumped_to": of("slumped_to", "degrees", "slope of a fallen face, fitted as the angle of repose is"),
         "unit_weight": of("unit_weight", "N/m3", "bulk density times the bed's own gravity"),
         "packing_fraction": of("packing_fraction", "1", "of the bed before"),

@@ -58,13 +58,9 @@ def _result(runs: list[Json]) -> Json:
     def slope(flank: Json) -> str:
         return f"{flank['angle']:.1f} +- {flank['error']:.1f}"
 
+    fitted = "drained; mean of two slopes a run, fitted from three diameters to four fifths of the crest's height"
     quantities = {
-        "angle_of_repose": of(
-            "angle",
-            "degrees",
-            "drained; mean of two slopes a run, fitted from three diameters to four fifths of the crest's height",
-            error="error",
-        ),
+        "angle_of_repose": of("angle", "degrees", fitted, error="error"),
         "crest": of("crest", "m", "height of what stayed"),
         "drained": of("drained", "1", "grains that fell out"),
         "packing_fraction": of("packing_fraction", "1", "of the bed before"),

@@ -11,6 +11,7 @@ from dem.grains.graded import THROAT, Graded
 from dem.measure.grading import MOST_DRAINED, MOST_STRAYED
 from dem.prepare.report import Prepared
 from experiments.platform.tips import tip_angles, tip_depth
+from experiments.runs.result import quantities_of
 from experiments.runs.types import Json
 from rigid.planar.trajectory import Trajectory
 
@@ -51,25 +52,17 @@ def grading_told(prepared: Prepared) -> Json:
             f"farther out than it belongs, {100 * found['drained_share']:.2g} % could fall through"
         )
     zone_head = ["zone", "grains", "solid [%]", "wanted [mm]", "mean [mm]", "smallest [mm]", "largest [mm]", "packing"]
+    layer_head = ["height [mm]", "under footprints [mm]", "elsewhere [mm]"]
+    stage_head = ["after", "strayed [% of solid]", "could drain [% of solid]", "farthest [diameters]"]
+    small = "Small grains among large ones: farther out than they belong by a diameter, and below "
+    small += f"{THROAT:.3f} of the largest there, so that they could drain"
     return {
         "tables": [
             {"title": "Sizes by place, at the end", "head": zone_head, "rows": zones},
-            {
-                "title": "Mean diameter by height",
-                "head": ["height [mm]", "under footprints [mm]", "elsewhere [mm]"],
-                "rows": layers,
-            },
-            {
-                "title": f"Small grains among large ones: farther out than they belong by a diameter, and below "
-                f"{THROAT:.3f} of the largest there, so that they could drain",
-                "head": ["after", "strayed [% of solid]", "could drain [% of solid]", "farthest [diameters]"],
-                "rows": stages,
-            },
+            {"title": "Mean diameter by height", "head": layer_head, "rows": layers},
+            {"title": small, "head": stage_head, "rows": stages},
         ],
-        "quantities": {
-            key: {"value": value, "std": None, "unit": unit, "note": note}
-            for key, (value, unit, note) in quantities.items()
-        },
+        "quantities": quantities_of(quantities, std=None),
         "warnings": warnings,
     }
 
