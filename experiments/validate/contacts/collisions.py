@@ -13,6 +13,7 @@ from experiments.validate.base.spheres import ALUMINA, CAST_IRON, RADIUS, hertz,
 
 __all__ = ["CASES", "force_curve", "head_on", "on_a_plane"]
 
+Floats = tuple[float, ...]
 SMALL, LARGE = 0.01, 0.1  # radii of T1 and T2 [m]
 STEPS = 1000  # in a contact
 CLOSED_BAND, PUBLISHED_BAND = 1e-5, 5e-4  # of the closed form; of figures with four digits
@@ -36,24 +37,21 @@ def _table(material: Material, speed_of_pair: float, speed_of_large: float, step
     )  # fmt: skip
 
 
-def _measure(bed: Bed, grain: int, contact_time: float, gap_and_speed: Callable) -> tuple[float, float]:
-    """Largest force [N] and contact time [s] of a collision that starts at time 0.
+def _met(
+    name: str, bed: Bed, grain: int, radius: float, closed: Floats, published: Floats, gap_and_speed: Callable
+) -> list[Comparison]:
+    """A collision that starts at time 0 against Hertz's closed form, and against the figures as they are quoted.
 
     The force is read in nine steps about the middle; the end comes from the gap after it, divided by the speed.
     """
-    half, step = round(0.5 * contact_time / bed.time_step), bed.time_step
-    bed.advance(half - 4)
-    forces = []
+    time, step, forces = closed[2], bed.time_step, []
+    bed.advance(round(0.5 * time / step) - 4)
     for _ in range(9):
         forces.append(float(np.linalg.norm(bed.grains().force[grain])))
         bed.advance(1)
-    bed.advance(round(1.1 * contact_time / step) - bed.steps)
+    bed.advance(round(1.1 * time / step) - bed.steps)
     gap, speed = gap_and_speed(bed.grains())
-    return max(forces), bed.time - gap / speed
-
-
-def _rows(name: str, measured, closed, published) -> list[Comparison]:
-    """Against Hertz's closed form, and against the figures as they are quoted."""
+    measured = (bed.max_overlap * 2 * radius, max(forces), bed.time - gap / speed)
     rows = []
     for (what, unit, scale), found, form, quoted in zip(UNITS, measured, closed, published, strict=True):
         rows.append(Comparison(f"{name}: {what}, closed form", unit, form * scale, found * scale, CLOSED_BAND))
@@ -73,8 +71,7 @@ def head_on(name: str) -> list[Comparison]:
         apart = np.linalg.norm(grains.position[0] - grains.position[1]) - 2 * SMALL
         return apart, grains.velocity[1, 0] - grains.velocity[0, 0]
 
-    force, time = _measure(bed, 0, closed[2], gap)
-    rows = _rows(name, (bed.max_overlap * 2 * SMALL, force, time), closed, published)
+    rows = _met(name, bed, 0, SMALL, closed, published, gap)
     after = bed.grains().velocity[:2, 0]
     return [*rows, Comparison(f"{name}: rebound speed", "m/s", speed, 0.5 * (after[1] - after[0]), CLOSED_BAND)]
 
@@ -89,8 +86,7 @@ def on_a_plane(name: str) -> list[Comparison]:
     def gap(grains):
         return grains.position[2, 2] - LARGE, grains.velocity[2, 2]
 
-    force, time = _measure(bed, 2, closed[2], gap)
-    return _rows(name, (bed.max_overlap * 2 * LARGE, force, time), closed, published)
+    return _met(name, bed, 2, LARGE, closed, published, gap)
 
 
 def _thrown_down(name: str, numbers: Json, speed: float, step: float) -> Bed:
@@ -106,16 +102,14 @@ def small_on_a_plane(name: str) -> list[Comparison]:
     """T3's elastic part: a sphere of 2.5 mm on a rigid plane at 3.9 m/s."""
     numbers, published = T3[name]
     speed = 3.9
-    closed = hertz(
-        mass_of(numbers["density"], RADIUS), RADIUS, plane_modulus(numbers["young"], numbers["poisson"]), speed
-    )
+    star = plane_modulus(numbers["young"], numbers["poisson"])
+    closed = hertz(mass_of(numbers["density"], RADIUS), RADIUS, star, speed)
     bed = _thrown_down(name, numbers, speed, closed[2] / STEPS)
 
     def gap(grains):
         return grains.position[0, 2] - RADIUS, grains.velocity[0, 2]
 
-    force, time = _measure(bed, 0, closed[2], gap)
-    rows = _rows(name, (bed.max_overlap * 2 * RADIUS, force, time), closed[:3], published)
+    rows = _met(name, bed, 0, RADIUS, closed[:3], published, gap)
     return [*rows, Comparison(f"{name}: rebound speed", "m/s", speed, bed.grains().velocity[0, 2], CLOSED_BAND)]
 
 
@@ -146,6 +140,8 @@ def _all(measure: Callable[[str], list[Comparison]], names: Iterable[str], tell:
 
 
 CASES = {
-    "hertz-force": force_curve, "t1": partial(_all, head_on, T1), "t2": partial(_all, on_a_plane, T2),
+    "hertz-force": force_curve,
+    "t1": partial(_all, head_on, T1),
+    "t2": partial(_all, on_a_plane, T2),
     "t3-elastic": partial(_all, small_on_a_plane, T3),
-}  # fmt: skip
+}

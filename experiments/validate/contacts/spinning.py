@@ -51,37 +51,32 @@ def _spin_rows(name: str, along: np.ndarray, spin: np.ndarray, share: float, rad
     ]
 
 
-def _pair(
-    material: Material, radii: tuple[float, float], speeds: tuple[float, float], spins, step: float, time: float
-) -> Meeting:
-    """Two spheres that touch at time 0 and come together along x; spins about z."""
-    r, s = radii
-    middle = 2 * (r + s)
+def _pair(name: str, radii: tuple[float, float], speeds: tuple[float, float], spins: tuple[float, float]) -> Meeting:
+    """Two spheres of a metal that touch at time 0 and come together along x; spins about z."""
+    density, young, poisson = METALS[name]
+    (r, s), (m, k) = radii, (mass_of(density, r) for r in radii)
+    time = hertz(m * k / (m + k), r * s / (r + s), plane_modulus(young, poisson) / 2, speeds[0] - speeds[1])[2]
+    middle, step = 2 * (r + s), time / 300
     bed = Bed.from_grains(
-        material, positions=np.array([[middle - r, middle, middle], [middle + s, middle, middle]]),
+        Material(name, density, young, poisson, SPIN_MU, SPIN_E),
+        positions=np.array([[middle - r, middle, middle], [middle + s, middle, middle]]),
         radii=np.array(radii), velocities=np.array([[speeds[0], 0, 0], [speeds[1], 0, 0]]),
         spins=np.outer(spins, [0.0, 0.0, 1.0]),
         size=(2 * middle + 6 * max(radii), 2 * middle + 6 * max(radii), 2 * middle), height=3 * middle, gravity=0.0,
         floor=False, time_step=step,
     )  # fmt: skip
-    bed.advance(round(time / step))
+    bed.advance(round(4 * time / step))
     return Meeting(bed)
 
 
-def _pair_time(density: float, young: float, poisson: float, radii: tuple[float, float], speed: float) -> float:
-    m, k = (mass_of(density, r) for r in radii)
-    r, s = radii
-    return hertz(m * k / (m + k), r * s / (r + s), plane_modulus(young, poisson) / 2, speed)[2]
+ALIKE, TOGETHER = (SPIN_RADIUS, SPIN_RADIUS), (SPIN_SPEED, -SPIN_SPEED)
 
 
 def _t7(tell: Tell) -> Outcome:
     rows: list[Comparison] = []
-    for name, (density, young, poisson) in told(METALS.items(), tell):
-        stuff = Material(name, density, young, poisson, SPIN_MU, SPIN_E)
-        radii = (SPIN_RADIUS, SPIN_RADIUS)
-        time = _pair_time(density, young, poisson, radii, 2 * SPIN_SPEED)
+    for name in told(METALS, tell):
         for spin in (0.5, 4.0, 22.0):
-            after = _pair(stuff, radii, (SPIN_SPEED, -SPIN_SPEED), (spin, -spin), time / 300, 4 * time)
+            after = _pair(name, ALIKE, TOGETHER, (spin, -spin))
             sideways, back = np.abs(after.velocity[:, 1:]).max(), after.velocity[1, 0] / SPIN_SPEED
             rows += [
                 near_zero(f"{name}: tangential speed at {spin:g} rad/s", sideways, 1e-12, "m/s"),
@@ -134,11 +129,8 @@ def sliding_share(restitution: float, ratio: float, *, spring_alone: bool, steps
 def _t7_same_way(tell: Tell) -> Outcome:
     """Turning the same way their surfaces meet at 2 r omega: they slide throughout."""
     rows: list[Comparison] = []
-    for name, (density, young, poisson) in told(METALS.items(), tell):
-        radii = (SPIN_RADIUS, SPIN_RADIUS)
-        time = _pair_time(density, young, poisson, radii, 2 * SPIN_SPEED)
-        stuff = Material(name, density, young, poisson, SPIN_MU, SPIN_E)
-        after = _pair(stuff, radii, (SPIN_SPEED, -SPIN_SPEED), (22.0, 22.0), time / 300, 4 * time)
+    for name in told(METALS, tell):
+        after = _pair(name, ALIKE, TOGETHER, (22.0, 22.0))
         speed, lost = float(np.abs(after.velocity[0, 1])), 22.0 - after.spin[0, 2]
         rows.append(Comparison(f"{name}: tangential speed", "m/s", _KICK, speed, 2 * E_BAND))
         rows.append(Comparison(f"{name}: loss of spin", "rad/s", 2.5 * _KICK / SPIN_RADIUS, lost, 3 * E_BAND))
@@ -147,15 +139,8 @@ def _t7_same_way(tell: Tell) -> Outcome:
 
 def _t8(tell: Tell) -> Outcome:
     name, radii = "aluminium alloy", (SPIN_RADIUS, 5 * SPIN_RADIUS)
-    density, young, poisson = METALS[name]
-    time = _pair_time(density, young, poisson, radii, SPIN_SPEED)
-    after = []
-    for spin in told(SPINS, tell):
-        after.append(_pair(
-            Material(name, density, young, poisson, SPIN_MU, SPIN_E), radii, (SPIN_SPEED, 0.0), (spin, 0.0), time / 300,
-            4 * time,
-        ))  # fmt: skip
-    first, second = (mass_of(density, r) for r in radii)
+    after = [_pair(name, radii, (SPIN_SPEED, 0.0), (spin, 0.0)) for spin in told(SPINS, tell)]
+    first, second = (mass_of(METALS[name][0], r) for r in radii)
     share = second / (first + second)
     speed, spin = np.array([a.velocity[0, 1] for a in after]), np.array([a.spin[0, 2] for a in after])
     other = np.array([a.spin[1, 2] for a in after])
