@@ -15,7 +15,7 @@ from experiments.runs.types import Json
 
 __all__ = ["EFFECTS", "OUTSIDE", "Hidden", "correlated", "draw_hidden", "draw_kind", "make_hidden"]
 
-Random = np.random.Generator
+Random, Names = np.random.Generator, Sequence[str]
 EFFECTS = ("inertial-drag", "depth-hardening", "plastic-sinkage", "adhesion", "shaft-friction", "layering")
 OUTSIDE = ("floor-vibration", "loose-mass", "shock", "load-cell-drift", "sloshing")
 _STEP = 5e-6
@@ -101,7 +101,7 @@ def make_hidden(
     `trials`: how many; None draws 6 to 24.
     """
     random = np.random.default_rng(seed)
-    kind, strength, effects, outside = draw_hidden(random, kind, strength, EFFECTS, OUTSIDE, between=(0.4, 40.0))
+    kind, strength, effects, outside = draw_hidden(random, kind, strength, EFFECTS, OUTSIDE, (0.4, 40.0))
     plan = _plan(
         random, retreat=bool({"plastic-sinkage", "adhesion", "shaft-friction"} & set(effects)),
         drops=outside in ("loose-mass",), faster=bool({"inertial-drag"} & set(effects)), wanted=trials,
@@ -129,7 +129,7 @@ def make_hidden(
     return campaign, Hidden(effects, outside, settings, measure, coloured, len(clean), persistence)
 
 
-def draw_kind(random: Random, effects: Sequence[str], outside: Sequence[str], *, nulls: float = 0.25) -> str:
+def draw_kind(random: Random, effects: Names, outside: Names, *, nulls: float = 0.25) -> str:
     """Nothing in a share `nulls`, something outside the library in 17 %, a pair in 8 %, else an effect."""
     draw = random.random()
     if draw < nulls:
@@ -140,13 +140,7 @@ def draw_kind(random: Random, effects: Sequence[str], outside: Sequence[str], *,
 
 
 def draw_hidden(
-    random: Random,
-    kind: str | None,
-    strength: float | None,
-    effects: Sequence[str],
-    outside: Sequence[str],
-    *,
-    between: tuple[float, float],
+    random: Random, kind: str | None, strength: float | None, effects: Names, outside: Names, between: Sequence[float]
 ) -> tuple[str, float, tuple[str, ...], str | None]:
     """Kind, strength, the effects and what is outside: as given, or drawn; strengths evenly in their logarithm."""
     kind = kind or draw_kind(random, effects, outside)

@@ -94,7 +94,7 @@ def make_hidden_tumble(
     Raises ValueError for a kind there is not.
     """
     random = np.random.default_rng(seed)
-    kind, strength, effects, outside = draw_hidden(random, kind, strength, EFFECTS, OUTSIDE, between=(0.5, 50.0))
+    kind, strength, effects, outside = draw_hidden(random, kind, strength, EFFECTS, OUTSIDE, (0.5, 50.0))
     if kind not in ("null", "pair", *EFFECTS, *OUTSIDE):
         raise ValueError(f"kind = {kind!r}: null, pair, an effect or one of {', '.join(OUTSIDE)} was expected")
     plan = _plan(random, rig=bool(set(_RIG) & set(effects)), count=trials)

@@ -7,12 +7,13 @@ docs/images/planar-*.png.
 
 import math
 import sys
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import matplotlib
 import numpy as np
 
-from rigid import EFFECTS, Trajectory, Trial, simulate, simulate_batch
+from rigid import EFFECTS, Trial, simulate, simulate_batch
 from rigid.planar.dynamics import System
 from rigid.planar.located import integrate
 
@@ -37,24 +38,8 @@ def case(level: float, torque: float, mu_s: float) -> Trial:
     )  # fmt: skip
 
 
-def _degrees(angle: float | None) -> str:
-    return "-" if angle is None or math.isnan(angle) else f"{math.degrees(angle):.2f}"
-
-
-def _row(label: str, run: Trajectory, paper: Trajectory, batch: tuple[float, float, float, float]) -> str:
-    def three(located: float | None, fixed: float | None, many: float, show) -> str:
-        return f"{show(located)} / {show(fixed)} / {show(many)}"
-
-    angle, speed, spin, hop = batch
-    cells = (
-        label,
-        three(run.trajectory_angle, paper.trajectory_angle, angle, _degrees),
-        three(run.max_speed, paper.max_speed, speed, lambda v: f"{v:.4f}"),
-        three(run.max_angular_velocity, paper.max_angular_velocity, spin, lambda v: f"{v:.3f}"),
-        three(run.transition_angle("hop"), paper.transition_angle("hop"), hop, _degrees),
-        f"{run.energy_residual:.0e} / {paper.energy_residual:.0e}",
-    )
-    return f"| {' | '.join(cells)} |"
+def _three(values: Iterable[float | None], show: Callable[[float], str]) -> str:
+    return " / ".join("-" if value is None or math.isnan(value) else show(value) for value in values)
 
 
 def table() -> str:
@@ -66,17 +51,26 @@ def table() -> str:
         for surface, mu_s in SURFACES.items():
             for torque in (0.125, 0.22, 6.0):
                 trial = case(level, torque, mu_s)
-                run = simulate(trial, duration=DURATION)
-                paper = simulate(trial, duration=DURATION, method="paper")
+                runs = [simulate(trial, duration=DURATION, method=method) for method in ("located", "paper")]
                 many = simulate_batch([trial], duration=DURATION)
-                batch = (
-                    float(many.trajectory_angle[0]),
-                    float(many.max_speed[0]),
-                    float(many.max_angular_velocity[0]),
-                    float(many.transition_angles["hop"][0]),
+                angles = [*(run.trajectory_angle for run in runs), float(many.trajectory_angle[0])]
+                speeds = [*(run.max_speed for run in runs), float(many.max_speed[0])]
+                spins = [*(run.max_angular_velocity for run in runs), float(many.max_angular_velocity[0])]
+                hops = [*(run.transition_angle("hop") for run in runs), float(many.transition_angles["hop"][0])]
+                cells = (
+                    f"{level:g} g, {surface}, {torque:g} N m",
+                    _three(angles, _degrees),
+                    _three(speeds, lambda v: f"{v:.4f}"),
+                    _three(spins, lambda v: f"{v:.3f}"),
+                    _three(hops, _degrees),
+                    " / ".join(f"{run.energy_residual:.0e}" for run in runs),
                 )
-                lines.append(_row(f"{level:g} g, {surface}, {torque:g} N m", run, paper, batch))
+                lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
+
+
+def _degrees(angle: float) -> str:
+    return f"{math.degrees(angle):.2f}"
 
 
 def effects() -> str:

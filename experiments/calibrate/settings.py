@@ -183,7 +183,7 @@ class CalibrateSettings(StrictSettings):
 
     @model_validator(mode="after")
     def _can_be(self) -> Self:
-        base = self._base()
+        base = self.base
         if self.name == material(self.material).name:
             raise ValueError(say("own_name", s=self))
         _check_free(self.free, base, self.fixed)
@@ -208,7 +208,9 @@ class CalibrateSettings(StrictSettings):
             raise ValueError(f"size = {' '.join(f'{s:g}' for s in self.size)}: at least six diameters each way")
         return self
 
-    def _base(self) -> Material:
+    @property
+    def base(self) -> Material:
+        """The material with its fixed numbers; what is free has a number that stands in for it."""
         for key in (*self.fixed, *self.sources):
             if key not in _FIXED:
                 raise ValueError(f"fixed.{key} is no number of a material; {nearest(key, _FIXED)}")
@@ -225,11 +227,6 @@ class CalibrateSettings(StrictSettings):
         sources = {key: f"as {found.name}: {text}" for key, text in found.sources.items()}
         sources |= {key: self.sources.get(key, "given") for key in self.fixed}
         return Material(**(kept | numbers | {"name": self.name, "grain": None, "sources": sources}))
-
-    @property
-    def base(self) -> Material:
-        """The material with its fixed numbers; what is free has a number that stands in for it."""
-        return self._base()
 
     @property
     def wanted(self) -> dict[str, Target]:
