@@ -224,35 +224,32 @@ def _point_table(settings: CalibrateSettings, done: Simulated) -> Json:
 
 def material_toml(stuff: Material, settings: CalibrateSettings, fit: Fit, figures: list[Json]) -> str:
     """The text of material.toml, which ``dem.grains.materials.read_material`` reads."""
-    found = {"surface_energy" if key == "bond_number" else key for key in settings.free}
+    found_keys = {"surface_energy" if key == "bond_number" else key for key in settings.free}
     said = ", ".join(f"{t.name} {t.value:g} +- {t.tolerance:g} {t.unit}" for t in settings.wanted.values() if t.fit)
-    sources = dict(stuff.sources) | dict.fromkeys(found, f"calibrated to {said}")
+    sources = dict(stuff.sources) | dict.fromkeys(found_keys, f"calibrated to {said}")
     shown = [f.name for f in fields(stuff) if f.name != "sources" and getattr(stuff, f.name) is not None]
     if stuff.cohesion == "none":
         shown = [key for key in shown if key not in ("cohesion", "surface_energy", "grain")]
+    stds = {f"{key}_std": float(f"{std:.2g}") for key, std in zip(settings.free, fit.std, strict=True)}
     lines = [
         "# A material of hedgebed bed calibrate: `--material FILE` of penetrate and bed make takes it.",
-        f"format = {toml_value(MATERIAL_FORMAT)}",
-        *(f"{key} = {toml_value(getattr(stuff, key))}" for key in shown),
+        *_pairs({"format": MATERIAL_FORMAT} | {key: getattr(stuff, key) for key in shown}),
         "",
         "[sources]",
-        *(f"{key} = {toml_value(sources.get(key, 'not given'))}" for key in shown if key not in _UNSOURCED),
+        *_pairs({key: sources.get(key, "not given") for key in shown if key not in _UNSOURCED}),
         "",
         "[calibration]",
-        f"version = {toml_value(__version__)}",
-        f"grain = {toml_value(settings.grain)}",
-        *(f"{key}_std = {toml_value(float(f'{std:.2g}'))}" for key, std in zip(settings.free, fit.std, strict=True)),
+        *_pairs({"version": __version__, "grain": settings.grain} | stds),
     ]
     for entry in figures:
         value, error = entry["measured"], entry["error"]
-        lines += [
-            "",
-            f"[calibration.{entry['name']}]",
-            f"wanted = {toml_value(entry['wanted'])}",
-            f"tolerance = {toml_value(entry['tolerance'])}",
-            *([] if value is None else [f"measured = {toml_value(float(f'{value:.5g}'))}"]),
-            *([] if error is None else [f"error = {toml_value(float(f'{error:.2g}'))}"]),
-            f"verdict = {toml_value(entry['verdict'])}",
-            f"source = {toml_value(entry['source'])}",
-        ]
+        found = {"wanted": entry["wanted"], "tolerance": entry["tolerance"]}
+        found |= {} if value is None else {"measured": float(f"{value:.5g}")}
+        found |= {} if error is None else {"error": float(f"{error:.2g}")}
+        found |= {"verdict": entry["verdict"], "source": entry["source"]}
+        lines += ["", f"[calibration.{entry['name']}]", *_pairs(found)]
     return "\n".join(lines) + "\n"
+
+
+def _pairs(values: Json) -> list[str]:
+    return [f"{key} = {toml_value(value)}" for key, value in values.items()]

@@ -76,10 +76,9 @@ def energy(depth: np.ndarray, *, start: float, d1: float, k_over_m: float, gravi
 
 def fit_law(falls: Sequence[dict[str, np.ndarray]]) -> tuple[float, float]:
     """d1 [m] and k/m [1/s2] that fit v^2 over depth of all drops, each weighted by its largest v^2."""
-    sampled = []
-    for fall in falls:
-        grid = np.linspace(0.0, 0.98 * fall["depth"][-1], POINTS)
-        sampled.append((grid, np.interp(grid, fall["depth"], fall["velocity"] ** 2)))
+    grids = [np.linspace(0.0, 0.98 * fall["depth"][-1], POINTS) for fall in falls]
+    pairs = zip(grids, falls, strict=True)
+    sampled = [(grid, np.interp(grid, fall["depth"], fall["velocity"] ** 2)) for grid, fall in pairs]
 
     def off(logs: np.ndarray) -> np.ndarray:
         d1, k_over_m = np.exp(logs)
