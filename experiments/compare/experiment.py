@@ -18,10 +18,9 @@ from experiments.grains.settings import OF_THE_MASTER, GrainsSettings, TumbleBed
 from experiments.runs.folder import RunFolder, read_json
 from experiments.runs.kept_results import PATH_AND_MOTION, require_files
 from experiments.runs.progress import Progress
-from experiments.runs.reporting import write_report
 from experiments.runs.result import Result
 from experiments.runs.types import Json
-from experiments.runs.whole_runs import whole_run
+from experiments.runs.whole_runs import computed_run
 from experiments.spatial.settings import ON_ANY_GROUND
 
 from . import spatial as compare_spatial
@@ -68,37 +67,32 @@ def _finished(path: str) -> RunFolder:
     return folder
 
 
-def _carry_out(settings: CompareSettings, folder: RunFolder, progress: Progress) -> Result:
-    with folder.lock():
-        first, second = (_finished(path) for path in settings.runs)
-        results = [read_json(one.path / "result.json") for one in (first, second)]
-        labels = _labels((first, second), results)
-        result: Json = {
-            "kind": first.command, "title": f"{labels[0]} and {labels[1]}", "status": "done",
-            "runs": [
-                {"folder": os.path.relpath(one.path, folder.path), "label": label, "title": str(found.get("title", ""))}
-                for one, label, found in zip((first, second), labels, results, strict=True)
-            ],
-            "quantities": {}, "departures": {"sentences": []},
-            "compared": [], "compared_over": None, "differs": _differs(first, second, results),
-            "colour": settings.colour, "pictures": settings.pictures and first.command != "penetrate",
-            "warnings": _whose(labels, [one["warnings"] for one in results]),
-        }  # fmt: skip
-        if first.command != "penetrate":
-            progress.stage("series", total=1.0)
-            _add_motion(result, (first, second), results, labels, folder)
-        else:
-            result["compared"] = _compared(results)
-        result["tables"] = [
-            *_numbers(result, labels),
-            *([_row_sinkage(result["rows"], labels)] if result.get("rows") else []),
-            *([_differing(labels, result["differs"])] if result["differs"] else []),
-        ]
-        made = Result.make("compare", **result)
-        folder.write_result(made)
-        progress.stage("report", total=1.0)
-        write_report(folder.path, progress)
-    return made
+def _compute(settings: CompareSettings, folder: RunFolder, progress: Progress) -> Result:
+    first, second = (_finished(path) for path in settings.runs)
+    results = [read_json(one.path / "result.json") for one in (first, second)]
+    labels = _labels((first, second), results)
+    result: Json = {
+        "kind": first.command, "title": f"{labels[0]} and {labels[1]}", "status": "done",
+        "runs": [
+            {"folder": os.path.relpath(one.path, folder.path), "label": label, "title": str(found.get("title", ""))}
+            for one, label, found in zip((first, second), labels, results, strict=True)
+        ],
+        "quantities": {}, "departures": {"sentences": []},
+        "compared": [], "compared_over": None, "differs": _differs(first, second, results),
+        "colour": settings.colour, "pictures": settings.pictures and first.command != "penetrate",
+        "warnings": _whose(labels, [one["warnings"] for one in results]),
+    }  # fmt: skip
+    if first.command != "penetrate":
+        progress.stage("series", total=1.0)
+        _add_motion(result, (first, second), results, labels, folder)
+    else:
+        result["compared"] = _compared(results)
+    result["tables"] = [
+        *_numbers(result, labels),
+        *([_row_sinkage(result["rows"], labels)] if result.get("rows") else []),
+        *([_differing(labels, result["differs"])] if result["differs"] else []),
+    ]
+    return Result.make("compare", **result)
 
 
 def _relative(first: float, second: float) -> float | None:
@@ -292,4 +286,4 @@ def _differing(labels: tuple[str, str], rows: list[Json]) -> Json:
     return {"title": "Settings and numbers that differ", "head": ["key", *labels, "unit"], "rows": shown}
 
 
-run, resume = whole_run("compare", CompareSettings, _carry_out, check=check)
+run, resume = computed_run("compare", CompareSettings, _compute, check=check)

@@ -20,10 +20,9 @@ from experiments.check.settings import CheckSettings
 from experiments.grains.spells import spells
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
-from experiments.runs.reporting import write_report
 from experiments.runs.result import Result
 from experiments.runs.types import Json
-from experiments.runs.whole_runs import whole_run
+from experiments.runs.whole_runs import publish, whole_run
 
 from .fit.problem import Finding
 from .report.telling import findings_in_words
@@ -94,11 +93,7 @@ def _carry_out(settings: CheckSettings, folder: RunFolder, progress: Progress) -
                 recordings.append(
                     {"trial": trial.id, "sensor": sensor, "series": f"series/{name}.csv"} | _facts(recording)
                 )
-        result = _result(campaign, recordings, findings)
-        folder.write_result(result)
-        progress.stage("report", total=1.0)
-        write_report(folder.path, progress)
-    return result
+        return publish(folder, _result(campaign, recordings, findings), progress)
 
 
 def _facts(recording: Recording) -> Json:

@@ -20,10 +20,10 @@ from dem.grains.materials import material as find_material
 from experiments.platform.surfaces import find_surface, surface_names
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
-from experiments.runs.reporting import write_report
 from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
 from experiments.runs.types import Json
+from experiments.runs.whole_runs import publish
 from rigid.platform.rig import STANDARD_GRAVITY
 
 from .bed_progress import BedProgress
@@ -289,9 +289,6 @@ def finish_run(
         run, folder, progress, frames=frames, checkpoint_interval=checkpoint_interval, sinkage=lambda: sinkage(run),
         write_series=lambda: write_series(folder.path, run),
     )  # fmt: skip
-    result = conclude()
-    folder.write_result(result)
-    progress.stage("report", total=1.0)
-    write_report(folder.path, progress)
+    result = publish(folder, conclude(), progress)
     folder.drop_checkpoint(CHECKPOINT)
     return result

@@ -10,10 +10,9 @@ from __future__ import annotations
 from experiments.platform.kept_platform import keep_platform
 from experiments.runs.folder import RunFolder, write_series
 from experiments.runs.progress import Progress
-from experiments.runs.reporting import write_report
 from experiments.runs.result import Result, quantity
 from experiments.runs.types import Json
-from experiments.runs.whole_runs import whole_run
+from experiments.runs.whole_runs import computed_run
 from experiments.tumble.result import trajectory_columns
 from rigid.hop import Flight, Launch, escape_speed, impulsive_launch, launch_speed_for, least_viable_angle
 from rigid.model.trial import Trial
@@ -37,20 +36,15 @@ def check(settings: HopSettings) -> None:
         simulate(trial, duration=1e-3)  # that it can stand on this ground
 
 
-def _carry_out(settings: HopSettings, folder: RunFolder, progress: Progress) -> Result:
-    with folder.lock():
-        plan, hop = find_hop(settings, keep_platform(settings.platform, folder.path, progress.message))
-        for sentence in plan.sentences():
-            progress.message(sentence)
-        progress.stage("hop", total=1.0)
-        given, wanted = _on_surface(settings, plan, hop)
-        progress.update(1.0)
-        _write_series(settings, folder, hop, given)
-        result = _result(settings, plan, hop, given, wanted)
-        folder.write_result(result)
-        progress.stage("report", total=1.0)
-        write_report(folder.path, progress)
-    return result
+def _compute(settings: HopSettings, folder: RunFolder, progress: Progress) -> Result:
+    plan, hop = find_hop(settings, keep_platform(settings.platform, folder.path, progress.message))
+    for sentence in plan.sentences():
+        progress.message(sentence)
+    progress.stage("hop", total=1.0)
+    given, wanted = _on_surface(settings, plan, hop)
+    progress.update(1.0)
+    _write_series(settings, folder, hop, given)
+    return _result(settings, plan, hop, given, wanted)
 
 
 # On ground that gives -------------------------------------------------------------------------------------------------
@@ -203,4 +197,4 @@ def _model_quantities(
     }
 
 
-run, resume = whole_run("hop", HopSettings, _carry_out, check=check)
+run, resume = computed_run("hop", HopSettings, _compute, check=check)

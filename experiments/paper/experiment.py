@@ -23,10 +23,9 @@ from experiments.platform.surfaces import find_surface
 from experiments.runs.folder import RunFolder
 from experiments.runs.memory import cores_there
 from experiments.runs.progress import Progress
-from experiments.runs.reporting import write_report
 from experiments.runs.result import Result, quantity
 from experiments.runs.types import Json
-from experiments.runs.whole_runs import whole_run
+from experiments.runs.whole_runs import computed_run
 from experiments.tumble.result import trajectory_columns
 from experiments.tumble.settings import TumbleSettings
 from experiments.tumble.trial import plan_tumble, turns_of
@@ -180,23 +179,18 @@ def _all(jobs: Sequence[Job], workers: int, progress: Progress) -> list[Json]:
     return found
 
 
-def _carry_out(settings: PaperSettings, folder: RunFolder, progress: Progress) -> Result:
+def _compute(settings: PaperSettings, folder: RunFolder, progress: Progress) -> Result:
     workers = settings.workers or cores_there()
-    with folder.lock():
-        jobs = plan_jobs(settings, keep_platform(settings.platform, folder.path, progress.message))
-        progress.plan({"trials": float(len(jobs)), "report": 0.1 * len(jobs)})
-        progress.stage("trials", total=float(len(jobs)))
-        progress.message(f"{len(jobs)} integrations on {workers} process{'es' if workers > 1 else ''}")
-        found = _all(jobs, workers, progress)
-        for entry in found:
-            rows = entry.pop("rows")
-            if rows is not None and entry["surface"] in HARD:
-                entry["series"] = folder.write_series(entry["id"], rows)
-        result = _result(settings, jobs, found)
-        folder.write_result(result)
-        progress.stage("report", total=1.0)
-        write_report(folder.path, progress)
-    return result
+    jobs = plan_jobs(settings, keep_platform(settings.platform, folder.path, progress.message))
+    progress.plan({"trials": float(len(jobs)), "report": 0.1 * len(jobs)})
+    progress.stage("trials", total=float(len(jobs)))
+    progress.message(f"{len(jobs)} integrations on {workers} process{'es' if workers > 1 else ''}")
+    found = _all(jobs, workers, progress)
+    for entry in found:
+        rows = entry.pop("rows")
+        if rows is not None and entry["surface"] in HARD:
+            entry["series"] = folder.write_series(entry["id"], rows)
+    return _result(settings, jobs, found)
 
 
 def _result(settings: PaperSettings, jobs: Sequence[Job], found: list[Json]) -> Result:
@@ -265,4 +259,4 @@ def _quantities(cases: list[Json], stated: list[Json], met: list[Json]) -> Json:
     }
 
 
-run, resume = whole_run("paper", PaperSettings, _carry_out, check=check)
+run, resume = computed_run("paper", PaperSettings, _compute, check=check)

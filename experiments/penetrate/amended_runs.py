@@ -17,10 +17,10 @@ from coupling import Penetration
 from experiments.campaign import read_model
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
-from experiments.runs.reporting import write_report
 from experiments.runs.result import Result, quantities_of
 from experiments.runs.types import Json
 from experiments.runs.version import __version__
+from experiments.runs.whole_runs import publish
 
 from .amended import AmendedLaw, read_law
 from .settings import PenetrateSettings
@@ -126,7 +126,7 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
             "work_returned_spring_damper": (_returned(driven, plain), "1", "work out over work in, driven"),
             "work_returned_amended": (_returned(driven, runs), "1", f"the same with {law.words}"),
         }
-        result = Result.make(
+        made = Result.make(
             "penetrate",
             ground=settings.ground,
             version=__version__,
@@ -138,10 +138,7 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
             departures={"sentences": _spike_words(settings, law)},
             warnings=law.warnings(),
         )
-        folder.write_result(result)
-        progress.stage("report", total=1.0)
-        write_report(folder.path, progress)
-    return result
+        return publish(folder, made, progress)
 
 
 def _spike_words(settings: PenetrateSettings, law: AmendedLaw) -> list[str]:

@@ -20,9 +20,10 @@ from experiments.grains.kept_material import MATERIAL_COPY, keep_material
 from experiments.grains.softening import Softening
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
-from experiments.runs.reporting import PictureCosts, write_report
+from experiments.runs.reporting import PictureCosts
 from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
+from experiments.runs.whole_runs import draw_report
 
 from . import beds
 from .amended_runs import keep_model, run_without_bed
@@ -82,8 +83,7 @@ def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progres
             campaign = campaign_of(settings, result, folder, sensors_of(settings))
             target = place_campaign(settings.campaign, campaign, keep_out=folder.path)
             progress.message(f"campaign {target}: `hedgebed diagnose {target}` says what the spring-damper lacks")
-        progress.stage("report", total=1.0)
-        write_report(folder.path, progress, _picture_costs(folder.path, result))
+        draw_report(folder, progress, _picture_costs(folder.path, result))
     return result
 
 

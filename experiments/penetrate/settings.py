@@ -146,7 +146,7 @@ class PenetrateSettings(StrictSettings):
     def _bed_decides(cls, given: Any) -> Any:
         """A bed that is there already has a size, grains and a gravity."""
         if isinstance(given, dict) and isinstance(given.get("bed"), str) and given["bed"]:
-            from .bed_given import settings_of_bed
+            from .given import settings_of_bed
 
             return settings_of_bed(given)
         return given
@@ -156,7 +156,7 @@ class PenetrateSettings(StrictSettings):
     def _model_decides(cls, given: Any) -> Any:
         """Without a bed nothing but the model says what the spike is."""
         if isinstance(given, dict) and given.get("ground") == "spring-damper" and given.get("model"):
-            from .model_given import settings_of_model
+            from .given import settings_of_model
 
             return settings_of_model(given)
         return given

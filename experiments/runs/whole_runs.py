@@ -1,4 +1,4 @@
-"""`run` and `resume` of an experiment without checkpoints: it is over so soon that resuming it is doing it again."""
+"""The skeleton of an experiment: `run` and `resume`, and how its result and its report come into the folder."""
 
 from __future__ import annotations
 
@@ -10,11 +10,41 @@ from pydantic import BaseModel
 
 from .folder import RunFolder
 from .progress import Progress
+from .reporting import PictureCosts, write_report
 from .result import Result
 
-__all__ = ["whole_run"]
+__all__ = ["computed_run", "draw_report", "publish", "whole_run"]
 
 Settings = TypeVar("Settings", bound=BaseModel)
+
+
+def publish(folder: RunFolder, result: Result, progress: Progress) -> Result:
+    """Write the result into the folder, then the report of it; return the result."""
+    folder.write_result(result)
+    draw_report(folder, progress)
+    return result
+
+
+def draw_report(folder: RunFolder, progress: Progress, *costs: PictureCosts) -> None:
+    """The report of a folder that has its result, as the last stage of a run."""
+    progress.stage("report", total=1.0)
+    write_report(folder.path, progress, *costs)
+
+
+def computed_run(
+    name: str,
+    settings_class: type[Settings],
+    compute: Callable[[Settings, RunFolder, Progress], Result],
+    *,
+    check: Callable[[Settings], None],
+) -> tuple[Callable[..., Result], Callable[..., Result]]:
+    """As `whole_run`, of an experiment that only computes: the folder is held, result and report are written for it."""
+
+    def carry_out(settings: Settings, folder: RunFolder, progress: Progress) -> Result:
+        with folder.lock():
+            return publish(folder, compute(settings, folder, progress), progress)
+
+    return whole_run(name, settings_class, carry_out, check=check)
 
 
 def whole_run(
@@ -27,6 +57,7 @@ def whole_run(
 ) -> tuple[Callable[..., Result], Callable[..., Result]]:
     """The `run` and the `resume` of the experiment `name`, whose work on a folder is `carry_out`.
 
+    It is over so soon, or keeps its own checkpoints, that resuming it is carrying it out again.
     ``material_copy``: the file in the folder that `resume` takes the material from, where there is one.
     """
 

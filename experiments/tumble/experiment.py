@@ -17,10 +17,9 @@ from experiments.platform.kept_platform import keep_platform
 from experiments.platform.numbers import PlatformNumbers, platform_numbers, torque_within_limit
 from experiments.runs.folder import RunFolder, write_series
 from experiments.runs.progress import Progress
-from experiments.runs.reporting import write_report
 from experiments.runs.result import Result
 from experiments.runs.types import Json
-from experiments.runs.whole_runs import whole_run
+from experiments.runs.whole_runs import publish, whole_run
 from rigid.planar.simulate import PAPER_STEP, check_step, simulate
 from rigid.planar.trajectory import Trajectory
 
@@ -130,11 +129,7 @@ def _on_law(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> 
         _add_sweep(result, settings, folder, copied, platform)
     made = write_tumble_campaign(settings, plan, folder.path, progress)
     result |= {"campaign": made} if made is not None else {}
-    whole = Result.make("tumble", **result)
-    folder.write_result(whole)
-    progress.stage("report", total=1.0)
-    write_report(folder.path, progress)
-    return whole
+    return publish(folder, Result.make("tumble", **result), progress)
 
 
 def _add_sweep(

@@ -32,11 +32,10 @@ from experiments.platform.numbers import torque_within_limit
 from experiments.platform.surfaces import find_surface
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
-from experiments.runs.reporting import write_report
 from experiments.runs.result import Result, quantity
 from experiments.runs.types import Json
 from experiments.runs.version import __version__
-from experiments.runs.whole_runs import whole_run
+from experiments.runs.whole_runs import computed_run
 from experiments.tumble.settings import TrialSettings, TumbleSettings
 from experiments.tumble.trial import TumblePlan, plan_tumble, turns_of
 from rigid.model.trial import Effect, Trial
@@ -142,23 +141,18 @@ def _true_trial(settings: CampaignSettings, condition: _Condition, number: int, 
     return replace(condition.plan.trial, gravity_sim=gravity, **truth)
 
 
-def _carry_out(settings: CampaignSettings, folder: RunFolder, progress: Progress) -> Result:
+def _compute(settings: CampaignSettings, folder: RunFolder, progress: Progress) -> Result:
     conditions = _conditions(settings)
     first = conditions[0].plan
-    with folder.lock():
-        for sentence in first.sentences():
-            progress.message(sentence)
-        made = _make(settings, conditions, progress)
-        target = folder.path / "campaign"
-        if target.exists():  # of a run that was stopped
-            shutil.rmtree(target)
-        write_campaign(target, made.campaign)
-        write_model(folder.path / TRUTH, made.truth)
-        result = _result(settings, first, made, folder.path)
-        folder.write_result(result)
-        progress.stage("report", total=1.0)
-        write_report(folder.path, progress)
-    return result
+    for sentence in first.sentences():
+        progress.message(sentence)
+    made = _make(settings, conditions, progress)
+    target = folder.path / "campaign"
+    if target.exists():  # of a run that was stopped
+        shutil.rmtree(target)
+    write_campaign(target, made.campaign)
+    write_model(folder.path / TRUTH, made.truth)
+    return _result(settings, first, made, folder.path)
 
 
 @dataclass(frozen=True)
@@ -332,4 +326,4 @@ def _result(settings: CampaignSettings, plan: TumblePlan, made: _Made, folder: P
     )
 
 
-run, resume = whole_run("campaign", CampaignSettings, _carry_out, check=check)
+run, resume = computed_run("campaign", CampaignSettings, _compute, check=check)

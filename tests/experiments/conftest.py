@@ -24,8 +24,7 @@ def unreported(tmp_path, monkeypatch, request):
     """Runs go to `tmp_path`; only what asks for it with ``reported`` draws a report."""
     monkeypatch.chdir(tmp_path)
     if "reported" not in request.fixturenames:
-        for module in ("hop.experiment", "tumble.synthesis", "tumble.experiment"):
-            monkeypatch.setattr(f"experiments.{module}.write_report", lambda folder, progress: None)
+        monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda folder, progress: None)
 
 
 @pytest.fixture

@@ -28,7 +28,7 @@ def test_a_run_goes_on_without_the_file_that_its_material_came_from(tmp_path, mo
     monkeypatch.setattr(
         beds, "prepare_bed", lambda settings, seed, young, progress: FakeBed(size=settings.bed_size, seed=seed)
     )
-    monkeypatch.setattr(penetrate, "write_report", lambda *given: None)
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *given: None)
     monkeypatch.setattr(beds, "bed_step", lambda settings, young: 2e-5)
     given, out = tmp_path / "mine.toml", tmp_path / "run"
     given.write_text(FILE)

@@ -119,7 +119,7 @@ def tumbles(tmp_path_factory):
     )
     folder = tmp_path_factory.mktemp("made")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(synthesis, "write_report", lambda *given: None)
+        patch.setattr("experiments.runs.whole_runs.write_report", lambda *given: None)
         synthesis.run(settings, folder / "run")
     return read_campaign(folder / "run" / "campaign")
 
@@ -206,7 +206,7 @@ def grains(tmp_path_factory):
             ),
         )  # fmt: skip
         patch.setattr(beds, "find_material", lambda name: sand)
-        patch.setattr(penetrate, "write_report", lambda *given: None)
+        patch.setattr("experiments.runs.whole_runs.write_report", lambda *given: None)
         patch.setattr(beds, "bed_step", lambda settings, young: 2e-5)
         penetrate.run(PenetrateSettings(**settings.model_dump()), folder)
     from experiments.runs.folder import RunFolder
@@ -253,7 +253,7 @@ def test_what_is_recorded_is_the_run_plus_the_noise_that_is_stated(grains):
 @pytest.mark.parametrize("more", [(), ("--also", "other")])
 def test_a_run_of_another_kind_is_refused_by_what_it_is(tmp_path, capsys, more):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("experiments.grains.on_bed.write_report", lambda *_: None)
+        patch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
         spatial = ("tumble", "spatial", "--torque", "0", "0.02", "0", "--duration", "0.02", "--quiet")
         assert main([*spatial, "--out", str(tmp_path / "run")]) == 0
     capsys.readouterr()

@@ -21,7 +21,7 @@ def runs(tmp_path_factory):
     """The same tumble on the spring-damper of sand, by the master, and on that of brick, longer."""
     home = tmp_path_factory.mktemp("runs")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("experiments.tumble.experiment.write_report", lambda folder, progress: None)
+        patch.setattr("experiments.runs.whole_runs.write_report", lambda folder, progress: None)
         common = ("tumble", "--rig", "0.0085", "--torque", "0.22", "--quiet")
         sand = ("--surface", "sand", "--method", "coupled", "--duration", "0.2")
         assert main([*common, *sand, "--out", str(home / "sand")]) == 0
@@ -111,7 +111,7 @@ def test_a_spring_damper_s_sinkage_is_its_compression_below_the_undisturbed_surf
 def test_ball_tips_sink_in_as_deep_as_points_on_a_slope_too(effects, tmp_path, monkeypatch):
     """Each of two rows bears half of W cos(slope), so their mean depth is W cos(slope) / 2K: of a ball's lowest point,
     (l - r) cos a + r - y. Read from the folder, of today's result and of an older one, it is the same."""
-    monkeypatch.setattr("experiments.tumble.experiment.write_report", lambda folder, progress: None)
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda folder, progress: None)
     run = tmp_path / "run"
     given = [word for effect in effects for word in ("--effects", effect)]
     assert main(["tumble", "--rig", "0.0085", *given, "--duration", "0.02", "--quiet", "--out", str(run)]) == 0

@@ -9,7 +9,6 @@ import pytest
 from tumble_runs import SMALL, prepare_small
 
 from experiments.cli.main import main
-from experiments.grains import on_bed
 from experiments.grains.settings import TumbleBedSettings
 from experiments.runs.folder import read_series
 from experiments.tumble import experiment as tumble
@@ -26,8 +25,7 @@ def runs(tmp_path_factory):
     home = tmp_path_factory.mktemp("runs")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(PlanarOnBed, "prepare", prepare_small)
-        for module in (tumble, on_bed):
-            patch.setattr(module, "write_report", lambda *_: None)
+        patch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
         tumble.run(TumbleSettings(**SMALL), home / "bed")
         tumble.run(TumbleSettings(**SMALL | LIGHT), home / "light")
         own = {key: value for key, value in SMALL.items() if key not in TumbleBedSettings.model_fields}

@@ -30,9 +30,9 @@ def runs(tmp_path_factory):
     (home / "cube.toml").write_text(CUBE.read_text())
     thrown = THROWN | {"platform": str(home / "cube.toml")}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("experiments.grains.on_bed.write_report", lambda *_: None)
+        patch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
         patch.setattr("experiments.spatial.on_grains.SpatialOnBed.prepare", small_bed)
-        patch.setattr("experiments.tumble.experiment.write_report", lambda folder, progress: None)
+        patch.setattr("experiments.runs.whole_runs.write_report", lambda folder, progress: None)
         spatial.run(SpatialSettings(**thrown), home / "law")
         on_bed = {"ground": "bed", "bed_size": (0.14, 0.14, 0.05), "grain": 0.006, "young": 1e6, "max_overlap": 0.2}
         spatial.run(SpatialSettings(**thrown, **on_bed, threads=1, substeps=4), home / "bed")

@@ -9,7 +9,7 @@ from fake_bed import FakeBed
 
 from experiments.campaign import read_campaign
 from experiments.cli.main import main
-from experiments.penetrate import amended_runs, beds
+from experiments.penetrate import beds
 from experiments.penetrate import experiment as penetrate
 from experiments.penetrate.amended import AmendedGround, read_law
 from experiments.penetrate.settings import PenetrateSettings
@@ -173,8 +173,8 @@ def test_beside_a_bed_that_does_not_spring_back_the_amended_law_closes_the_gap(t
     )  # fmt: skip
     monkeypatch.setattr(beds, "find_material", lambda name: sand)
     monkeypatch.setattr(beds, "bed_step", lambda settings, young: STEP)
-    monkeypatch.setattr(penetrate, "write_report", lambda *given: None)
-    monkeypatch.setattr(amended_runs, "write_report", lambda *given: None)
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *given: None)
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *given: None)
     (tmp_path / "model.toml").write_text(MODEL + CRATER)
     settings = PenetrateSettings(
         **QUICK, model=str(tmp_path / "model.toml"), campaign=str(tmp_path / "c"), campaign_force_std=0.01

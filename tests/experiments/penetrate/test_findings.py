@@ -27,7 +27,7 @@ def fake(monkeypatch):
 
     monkeypatch.setattr(beds, "prepare_bed", prepare)
     monkeypatch.setattr(beds, "find_material", lambda name: SAND)
-    monkeypatch.setattr(penetrate, "write_report", lambda *given: None)
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *given: None)
     monkeypatch.setattr(beds, "bed_step", lambda settings, young: 2e-5)
 
 

@@ -101,7 +101,7 @@ def test_a_platform_without_spikes_has_no_grains_to_touch():
 
 def test_set_down_by_the_hand_on_the_spring_damper_it_stands_as_deep_as_its_load_says(tmp_path, monkeypatch, capsys):
     """Four tips with K of a row halved: W / (4 K); then two wheels turn it over two sides."""
-    monkeypatch.setattr("experiments.grains.on_bed.write_report", lambda *_: None)
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
     out = tmp_path / "run"
     given = ("--surface", "sand", "--torque", "0.05", "0.06", "0", "--duration", "0.1", "--frame-count", "3")
     assert main(["tumble", "spatial", *given, "--quiet", "--out", str(out)]) == 0
@@ -121,7 +121,7 @@ def test_set_down_by_the_hand_on_the_spring_damper_it_stands_as_deep_as_its_load
 
 def test_a_drop_tells_its_impact_and_a_hop(tmp_path, monkeypatch, cube):
     """From 1 mm at 1 m/s2 with no damping: sqrt(2 g h) + what v0 adds, and back up with all of it on a level cube."""
-    monkeypatch.setattr("experiments.grains.on_bed.write_report", lambda *_: None)
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
     settings = SpatialSettings(
         surface="brick", platform=cube, gravity=1.0, height=1e-3, damping=0.0, duration=0.15, frame_count=0,
     )  # fmt: skip
@@ -135,7 +135,7 @@ def test_a_drop_tells_its_impact_and_a_hop(tmp_path, monkeypatch, cube):
 
 def test_on_grains_a_stopped_run_goes_on_to_the_same_bits_with_its_books_and_overlaps_told(tmp_path, monkeypatch, cube):
     monkeypatch.setattr(SpatialOnBed, "prepare", small_bed)
-    monkeypatch.setattr("experiments.grains.on_bed.write_report", lambda *_: None)
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
     settings = SpatialSettings(
         surface="sand", ground="bed", platform=cube, gravity=1.0, turn=(0.3, 0.2, 0.0), velocity=(0.05, 0.02, -0.15),
         angular_velocity=(0.0, 1.0, 2.0), torque=(0.001, 0.0, 0.0), duration=0.03, bed_size=(0.14, 0.14, 0.05),
@@ -217,7 +217,7 @@ def _check_report(folder):
 def test_the_flat_pictures_are_drawn_where_there_is_no_opengl(tmp_path, monkeypatch, cube):
     from vis.spatial.report import write_spatial_report
 
-    monkeypatch.setattr("experiments.grains.on_bed.write_report", lambda *_: None)
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
     monkeypatch.setenv("HEDGEBED_NO_OPENGL", "1")
     settings = SpatialSettings(platform=cube, gravity=1.0, height=1e-3, duration=0.02, frame_count=2)
     spatial.run(settings, tmp_path / "law")
@@ -268,7 +268,7 @@ def test_in_flight_it_is_said_that_the_surface_s_stiffness_is_of_grains_at_1_g(g
 
 def test_the_wheels_columns_are_of_the_axes_that_they_turn_about(tmp_path, monkeypatch):
     """One wheel, about y: its speed stands under y whatever its place in the file."""
-    monkeypatch.setattr("experiments.grains.on_bed.write_report", lambda *_: None)
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
     text = CUBE.read_text()
     axes = next(line for line in text.splitlines() if line.startswith("axes"))
     mine = tmp_path / "mine.toml"

@@ -15,7 +15,6 @@ from coupling import CoupledTumble, LawGround, LeftTheBedError
 from dem import SAND, BedFailure
 from experiments.cli.main import main
 from experiments.grains import following
-from experiments.grains import on_bed as on_bed_module
 from experiments.grains.softening import Softening, run_limit
 from experiments.platform.numbers import platform_numbers
 from experiments.runs.folder import RunFolder
@@ -513,7 +512,7 @@ def test_a_landing_that_lets_go_of_the_sand_on_its_way_down_has_not_rebounded():
 def test_a_run_stopped_by_ctrl_c_is_taken_up_again_to_the_same_numbers(repeats, tmp_path, monkeypatch):
     """On one bed, and on a piece laid end to end four times."""
     monkeypatch.setattr(PlanarOnBed, "prepare", prepare_small)
-    monkeypatch.setattr(on_bed_module, "write_report", lambda *_: None)
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
     size = (SMALL["bed_size"][0] / repeats, *SMALL["bed_size"][1:])
     settings = TumbleSettings(**SMALL | {"bed_size": size}, sleep=True, bed_repeats=repeats)
     whole = tumble.run(settings, tmp_path / "whole")

@@ -21,7 +21,7 @@ def runs(tmp_path_factory):
     """Two torques on the spring-damper of sand by the master, whose folders are as those of grains; one on brick."""
     home = tmp_path_factory.mktemp("runs")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("experiments.tumble.experiment.write_report", lambda folder, progress: None)
+        patch.setattr("experiments.runs.whole_runs.write_report", lambda folder, progress: None)
         for name, more in (("weak", ("sand", "0.125")), ("strong", ("sand", "0.22")), ("brick", ("brick", "0.22"))):
             given = ("--surface", more[0], "--torque", more[1], "--rig", "0.0085", "--duration", "0.3", "--quiet")
             assert main(["tumble", *given, "--method", "coupled", "--out", str(home / name)]) == 0
