@@ -1,4 +1,10 @@
-"""Campaigns: measured or made-up trials in a folder, and the models fitted to them (docs/campaigns.md)."""
+"""Campaigns: measured or made-up trials in a folder, and the models fitted to them (docs/campaigns.md).
+
+`Settings`, `check`, `run` and `resume` are those of `hedgebed campaign`; they are loaded when they are first used.
+Imports `experiments.runs` and `rigid` only.
+"""
+
+from experiments.runs.registry import face
 
 from .files import Campaign, read_campaign, read_model, write_campaign, write_model
 from .recording import Recording
@@ -10,10 +16,16 @@ __all__ = [
     "PenetrationCampaign",
     "PenetrationModel",
     "Recording",
+    "Settings",
     "TumbleCampaign",
     "TumbleModel",
+    "check",
     "read_campaign",
     "read_model",
+    "resume",
+    "run",
     "write_campaign",
     "write_model",
 ]
+
+__getattr__ = face("campaign")

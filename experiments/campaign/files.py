@@ -9,8 +9,6 @@ model = read_model("model.toml")                  # the same tables with [[effec
 ```
 """
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -5,8 +5,6 @@ that are not asked for are kept as text and written back. An empty cell and ``na
 is left out. Times rise, or stay the same where a clock is coarse.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import math

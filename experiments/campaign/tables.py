@@ -4,11 +4,9 @@ The text of a field says its unit and is what an error quotes as expected. SI un
 rules where two could, is written down in docs/campaigns.md.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence, Set
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
@@ -108,7 +106,7 @@ class TumbleSurface(Table):
     mu_d: NotNegative | None = Field(None, description="coefficient of sliding friction; half of mu_s if left out")
 
     @model_validator(mode="after")
-    def _slides_easier(self) -> TumbleSurface:
+    def _slides_easier(self) -> Self:
         if self.mu_d is not None and self.mu_d > self.mu_s:
             raise ValueError(f"mu_d = {self.mu_d:g} is above mu_s = {self.mu_s:g}: at most that was expected")
         return self
@@ -190,7 +188,7 @@ class TumbleTrial(Table):
     _relative = field_validator("pose", "imu", "wheel")(_file_name)
 
     @model_validator(mode="after")
-    def _can_brake(self) -> TumbleTrial:
+    def _can_brake(self) -> Self:
         if self.actuator == "brake" and self.wheel_speed_0 == 0:
             raise ValueError("wheel_speed_0 = 0 leaves nothing to brake: the wheel's speed in rad/s was expected")
         return self
@@ -273,7 +271,7 @@ class TumbleCampaign(_TumbleTables):
     trial: tuple[TumbleTrial, ...] = Field(min_length=1, description="at least one [[trial]]")
 
     @model_validator(mode="after")
-    def _body_fits(self) -> TumbleCampaign:
+    def _body_fits(self) -> Self:
         body, wheel = self.platform, self.wheel.inertia
         most = body.mass * body.spike_length**2
         if body.inertia > most:
@@ -289,7 +287,7 @@ class TumbleCampaign(_TumbleTables):
         return self
 
     @model_validator(mode="after")
-    def _trials_fit(self) -> TumbleCampaign:
+    def _trials_fit(self) -> Self:
         _check_trials(self.trial, self.sensors, self._odd_trial)
         return self
 
@@ -313,7 +311,7 @@ class SpikeTable(Table):
     cone_angle: float | None = Field(None, gt=0, lt=180, description="degrees, full, for a cone")
 
     @model_validator(mode="after")
-    def _cone_has_an_angle(self) -> SpikeTable:
+    def _cone_has_an_angle(self) -> Self:
         if self.tip == "cone" and self.cone_angle is None:
             raise ValueError("cone_angle is missing: a cone's full angle in degrees was expected")
         return self
@@ -364,7 +362,7 @@ class PenetrationTrial(Table):
     _relative = field_validator("data")(_file_name)
 
     @model_validator(mode="after")
-    def _drop_has_a_speed(self) -> PenetrationTrial:
+    def _drop_has_a_speed(self) -> Self:
         if self.mode == "drop" and self.speed is None:
             raise ValueError("speed is missing: a drop's speed at the surface in m/s was expected")
         return self
@@ -414,7 +412,7 @@ class PenetrationCampaign(_PenetrationTables):
     trial: tuple[PenetrationTrial, ...] = Field(min_length=1, description="at least one [[trial]]")
 
     @model_validator(mode="after")
-    def _trials_fit(self) -> PenetrationCampaign:
+    def _trials_fit(self) -> Self:
         _check_trials(self.trial, self.sensors, self._odd_trial)
         return self
 

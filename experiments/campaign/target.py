@@ -1,7 +1,5 @@
 """The folder that a campaign is written into: refused where it is in use, kept where the campaign is there already."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Campaigns to begin one's own with: annotated tables and short recordings, copied as they ship."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 from typing import Literal

@@ -1,1 +1,1 @@
-"""experiments/cli."""
+"""The command line. Imports every package of `experiments`; nothing imports it."""

@@ -1,7 +1,5 @@
 """`hedgebed bed list`, `bed show`, `bed share`: the beds there are, what one of them is, and one as a file to send."""
 
-from __future__ import annotations
-
 import json as json_module
 import sys
 from pathlib import Path

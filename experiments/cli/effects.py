@@ -1,7 +1,5 @@
 """`hedgebed effects`: the terms that may be added to the base model of tumbles, on the terminal."""
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Sequence

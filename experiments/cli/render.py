@@ -1,7 +1,5 @@
 """`hedgebed render RUN`: the pictures of a finished run once more, off screen, from what its folder holds."""
 
-from __future__ import annotations
-
 import json as json_module
 from pathlib import Path
 from typing import Annotated, Literal

@@ -4,8 +4,6 @@ A largest value, a state at the end and an event are taken from the series that 
 own number was met within that time, it is that number, to the bit.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field

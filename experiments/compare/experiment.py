@@ -6,8 +6,6 @@ go with that are compared over the time that both last; those of each whole run 
 compared, and the drives both have.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Mapping, Sequence

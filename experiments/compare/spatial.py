@@ -4,8 +4,6 @@ An attitude is a quaternion; two are as far apart as the angle of the one turn t
 pi. `turn` is that angle from each run's own start.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Two tumbles on one grid of time: where they were, what held them up, how far they went apart."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,4 +1,11 @@
 """A hop: the wheel speed or torque for a distance, on rigid ground and on ground that gives.
 
+`Settings`, `check`, `run` and `resume` are those of `hedgebed hop`; they are loaded when they are first used.
 Imports `experiments.tumble` and what that may import.
 """
+
+from experiments.runs.registry import face
+
+__all__ = ["Settings", "check", "resume", "run"]
+
+__getattr__ = face("hop")

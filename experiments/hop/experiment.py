@@ -5,8 +5,6 @@ under a motor the torque; a motor's wheel then turns as fast as it has become wh
 then does the same hop from ground that gives (`experiments.hop.on_surface`): both stand in the result.
 """
 
-from __future__ import annotations
-
 from experiments.platform.kept_platform import keep_platform
 from experiments.runs.folder import RunFolder, write_series
 from experiments.runs.progress import Progress

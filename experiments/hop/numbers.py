@@ -1,7 +1,5 @@
 """From the settings of a hop to its numbers, each with where it comes from."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

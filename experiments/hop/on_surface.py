@@ -4,8 +4,6 @@ Hop theory has rigid ground. A spring-damper gives part of its energy back when 
 leave more steeply, tips that slide keep the angle that friction sets and leave faster.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise

@@ -4,8 +4,6 @@ Under a brake the torque is known and the wheel's speed is sought, under a motor
 ground does not let it go is refused with what each ground allows.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Sentences on a hop: theory on rigid ground, the planar model on ground that gives, and how near escape is."""
 
-from __future__ import annotations
-
 import math
 
 from rigid.hop import Flight, Launch, least_viable_angle

@@ -1,4 +1,11 @@
 """The trials of Reid, Roveda, Nesnas and Pavone (i-SAIRAS 2014) beside what the paper states.
 
+`Settings`, `check`, `run` and `resume` are those of `hedgebed paper`; they are loaded when they are first used.
 Imports `experiments.tumble` and what that may import.
 """
+
+from experiments.runs.registry import face
+
+__all__ = ["Settings", "check", "resume", "run"]
+
+__getattr__ = face("paper")

@@ -5,8 +5,6 @@ and whether it is met (None where nothing can be compared). The paper prints no 
 round one; an angle is judged by the five degrees within which the paper calls model and measurement in agreement.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass

@@ -5,8 +5,6 @@ the paper's fixed step; then what the paper does not give, varied (`experiments.
 states is compared in `experiments.paper.claims`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor

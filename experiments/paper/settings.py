@@ -1,7 +1,5 @@
 """Settings of `hedgebed paper`: the paper's trials again, with what the paper does not give stated."""
 
-from __future__ import annotations
-
 from typing import Literal, Self
 
 from pydantic import Field, model_validator

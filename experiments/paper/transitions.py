@@ -4,8 +4,6 @@ The paper calls transition angles of model and measurement in agreement within f
 ones in a figure only. Whoever has read them off gives them as `SURFACE-TORQUE-STATE=DEGREES`, "brick-0.125-hop=20".
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -4,8 +4,6 @@ Numbers of platform and contact, halved and doubled; sliding friction, from the 
 up to all of it; and for the brake trials on grains how stiff the ground is by how much it gives back.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path

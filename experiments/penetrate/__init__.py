@@ -1,1 +1,11 @@
-"""experiments/penetrate."""
+"""A spike driven into, dropped on and set down on beds of grains, beside the spring-damper fitted to it.
+
+`Settings`, `check`, `run` and `resume` are those of `hedgebed penetrate`; they are loaded when they are first used.
+Imports `experiments.runs`, `campaign`, `grains` and `diagnose` (the law with effects), and what those may import.
+"""
+
+from experiments.runs.registry import face
+
+__all__ = ["Settings", "check", "resume", "run"]
+
+__getattr__ = face("penetrate")

@@ -6,8 +6,6 @@ are those of the model's diameter: on another one forces on a section go with it
 what belongs to the spring with the K that the model gives.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -42,7 +40,7 @@ _CREEP = 1e-4
 """Below this share of a set-down's lowering speed the direction of the motion is not certain."""
 
 
-def read_law(path: str | Path, settings: PenetrateSettings) -> AmendedLaw:
+def read_law(path: str | Path, settings: PenetrateSettings) -> "AmendedLaw":
     """The law in the model.toml at `path`, for the spike of `settings`.
 
     Raises ValueError, naming file and key, for a file that is no model of penetration, and for an effect or a

@@ -4,8 +4,6 @@ With a bed, every run of it is made on the law as well. Without one (``--ground 
 are made on the model's own K and C alone, and on the law.
 """
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass

@@ -1,7 +1,5 @@
 """The beds of a penetrate run: their material, how soft their grains are made, and each bed of a seed."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

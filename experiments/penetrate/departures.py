@@ -4,8 +4,6 @@ All from the way in of driven runs, in bands of depth; runs of one speed on seve
 standard deviation between beds is told: without it nobody sees what is the law's fault and what another bed would give.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any

@@ -6,8 +6,6 @@ contacts included, so that a run that was stopped or killed continues bitwise. T
 the same runs are made on it, and the two are compared.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from contextlib import suppress

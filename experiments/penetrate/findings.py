@@ -7,12 +7,10 @@ Grains stick out of the surface, depth 0, so that some of them carry a spike bef
 include that, and `experiments.penetrate.remarks` reports how much it is.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -44,7 +42,7 @@ class BedFacts:
     time_step: float
 
     @classmethod
-    def of(cls, bed: Any, seed: int, softening: Softening) -> BedFacts:
+    def of(cls, bed: Any, seed: int, softening: Softening) -> Self:
         """The facts of `bed`, whose grains are softened to `softening`."""
         return cls(
             seed=seed, grain_count=int(bed.grain_count), packing_fraction=float(bed.packing_fraction),

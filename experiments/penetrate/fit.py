@@ -8,8 +8,6 @@ Standard errors come from leaving out one run at a time (jackknife): var = (n - 
 of one run are far from independent, so that the scatter of rows would claim much too small an error.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The frames of one run: the grains and the spike as files for ParaView and for the report."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from coupling import BedGround, Run

@@ -1,7 +1,5 @@
 """The settings of `penetrate` that a file decides: that of a bed, or, without a bed, that of a model."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

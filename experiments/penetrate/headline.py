@@ -3,8 +3,6 @@
 Everything else is in the report and in result.json, and with ``--verbose`` on the terminal too.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from statistics import fmean, stdev

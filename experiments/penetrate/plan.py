@@ -5,8 +5,6 @@ learns how long a step takes here. What the next bed or the same run on the next
 last.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Sequence

@@ -9,8 +9,6 @@ A sample is taken every whole number of the run's macro steps. Force and acceler
 between samples, as a sensor's filter gives them; the depth is that of the moment. White noise is added to each.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -4,8 +4,6 @@ K, C and what follows from them are fitted anew on both sides, to the runs whose
 at other speeds do not pass for a change of grain. Each condition weighs on both sides what it weighs in the reference.
 """
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Settings of a penetrate run that this machine or the grains' material cannot serve, refused before any work."""
 
-from __future__ import annotations
-
 import math
 
 from experiments.campaign.target import check_target

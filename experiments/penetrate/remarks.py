@@ -3,8 +3,6 @@
 Each is a sentence without its capital and full stop, or None where there is nothing to say.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from coupling import overdamped_below

@@ -1,7 +1,5 @@
 """From the finished runs of a folder to the result of penetrate: the fit, the same runs on the law, what departs."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from pathlib import Path
 

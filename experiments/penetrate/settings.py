@@ -4,10 +4,8 @@ SI units. What is wrong in a single value or between two of them is refused here
 the machine or the grains' material is refused by the experiment's `check`.
 """
 
-from __future__ import annotations
-
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -170,7 +168,7 @@ class PenetrateSettings(StrictSettings):
         return given
 
     @model_validator(mode="after")
-    def _fits_together(self) -> PenetrateSettings:
+    def _fits_together(self) -> Self:
         bed = None if self.ground == "spring-damper" else self._bed()  # there is none then
         for finding in (self._spike(), bed, self._runs(), self._beside()):
             if finding:

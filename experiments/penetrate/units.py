@@ -3,8 +3,6 @@
 A piece is finished or it is not; what is finished is never computed again.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

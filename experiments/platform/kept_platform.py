@@ -1,7 +1,5 @@
 """A platform that is given as a file: the run's folder has a copy, for who reads it and for `hedgebed resume`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Lengths that no platform has, as a rule millimetres where metres are expected, refused by what it has itself."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -4,8 +4,6 @@ The wheel's limit is one rule, here as in `rigid.spatial.spatial`: a start above
 wheel comes to it gives no more torque.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -4,8 +4,6 @@ A number that is not given comes from the surface or the platform (`experiments.
 prints it.
 """
 
-from __future__ import annotations
-
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator

@@ -3,8 +3,6 @@
 Each keeps where it comes from, so that a run can print every default.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The materials behind ``--surface``: stiffness, damping and friction of each, with where the numbers come from."""
 
-from __future__ import annotations
-
 import tomllib
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """Where the tips of a platform's rows are."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

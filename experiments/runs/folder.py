@@ -13,7 +13,6 @@ checkpoint/<name>.npz     arrays to carry on from; checkpoint/<name>.done.json s
 ```
 """
 
-import fcntl
 import json
 import math
 import os
@@ -21,11 +20,12 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from datetime import date, datetime, time
+from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
+from filelock import FileLock, Timeout
 from pydantic import BaseModel
 
 from experiments.runs.version import __version__
@@ -50,7 +50,6 @@ Status = Literal["running", "stopped", "failed", "done"]
 
 RUN_FORMAT = "hedgebed-run/1"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")
-_locks: dict[Path, tuple[int, int]] = {}  # resolved folder -> (file descriptor, times taken by this process)
 
 
 # Files ---------------------------------------------------------------------------------------------------------------
@@ -100,21 +99,16 @@ def read_json(path: Path) -> Any:
 
 def toml_value(value: Any) -> str:
     """`value` as TOML writes it."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, int):
-        return str(value)
-    if isinstance(value, float):
-        return repr(value)  # inf and nan are TOML's words too
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, date | time):  # a datetime is a date
-        return value.isoformat()
+    import tomlkit  # where the first file is written: the command line starts without it
+
     if isinstance(value, list | tuple):
         return "[" + ", ".join(toml_value(item) for item in value) + "]"
-    if isinstance(value, Mapping):
+    if isinstance(value, Mapping):  # keys in quotes; tomlkit writes them bare
         return "{" + ", ".join(f"{toml_value(str(key))} = {toml_value(item)}" for key, item in value.items()) + "}"
-    raise TypeError(f"a setting of type {type(value).__name__} cannot be written to run.toml: {value!r}")
+    try:
+        return tomlkit.item(value).as_string()
+    except (TypeError, ValueError):
+        raise TypeError(f"a setting of type {type(value).__name__} cannot be written to run.toml: {value!r}") from None
 
 
 def settings_toml(command: str, settings: BaseModel, version: str, code: str = "") -> str:
@@ -281,31 +275,22 @@ class RunFolder:
         Raises ValueError, naming the other process, if that one is alive and has it. A process that died, however it
         died, has left it free.
         """
-        key = self.path.resolve()
-        descriptor, count = _locks.get(key, (-1, 0))
-        if count == 0:
-            descriptor = os.open(self.path / "lock", os.O_RDWR | os.O_CREAT, 0o644)
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                owner = os.pread(descriptor, 64, 0).decode(errors="replace").strip() or "another"
-                os.close(descriptor)
-                raise ValueError(
-                    f"{str(self.path)!r} is being written by process {owner}: wait for it or stop it first"
-                ) from None
-            os.ftruncate(descriptor, 0)
-            os.pwrite(descriptor, f"{os.getpid()}\n".encode(), 0)
-        _locks[key] = (descriptor, count + 1)
+        path = self.path.resolve() / "lock"
+        lock = FileLock(path, timeout=0, is_singleton=True, thread_local=False)
+        try:
+            lock.acquire()
+        except Timeout:
+            owner = path.read_text(encoding="utf-8", errors="replace").strip() or "another"
+            raise ValueError(
+                f"{str(self.path)!r} is being written by process {owner}: wait for it or stop it first"
+            ) from None
+        path.write_text(f"{os.getpid()}\n", encoding="utf-8")
         try:
             yield
         finally:
-            descriptor, count = _locks[key]
-            if count > 1:
-                _locks[key] = (descriptor, count - 1)
-            else:
-                del _locks[key]
-                os.ftruncate(descriptor, 0)
-                os.close(descriptor)
+            if lock.lock_counter == 1:
+                path.write_text("", encoding="utf-8")
+            lock.release()
 
     # How far
 

@@ -1,7 +1,5 @@
 """Whether a run folder still holds what its pictures and curves are made of: a kept result does not."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 

@@ -6,8 +6,6 @@ later process then finds the cache locked, compiles everything anew and keeps no
 stays an empty file, which would never be written again either.
 """
 
-from __future__ import annotations
-
 import os
 import time
 from pathlib import Path

@@ -18,7 +18,7 @@ from pydantic import BaseModel
 
 from experiments.runs.headline import Headline
 
-__all__ = ["EXPERIMENTS", "Experiment", "Preset", "find_experiment"]
+__all__ = ["EXPERIMENTS", "Experiment", "Preset", "face", "find_experiment"]
 
 CASES = Path(__file__).parents[1] / "cases"
 
@@ -208,3 +208,20 @@ def find_experiment(name: str) -> Experiment:
     if name not in EXPERIMENTS:
         raise ValueError(f"there is no experiment {name!r}: there is {', '.join(EXPERIMENTS)}")
     return EXPERIMENTS[name]
+
+
+def face(command: str) -> Callable[[str], Any]:
+    """The ``__getattr__`` of a package whose public names are those of the experiment `command`.
+
+    `Settings` is its settings class, `run`, `resume` and `check` are those of its module.
+    """
+
+    def __getattr__(name: str) -> Any:  # noqa: N807
+        experiment = EXPERIMENTS[command]
+        if name == "Settings":
+            return experiment.settings_class()
+        if name in ("check", "resume", "run"):
+            return getattr(import_module(experiment.module), name)
+        raise AttributeError(f"the package of {command!r} has no attribute {name!r}")
+
+    return __getattr__

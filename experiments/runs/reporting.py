@@ -1,7 +1,5 @@
 """The report of a run folder, whatever the experiment: `vis.write_report` knows each."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise

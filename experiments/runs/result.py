@@ -8,8 +8,6 @@ result.to_dataframe()
 result.schema.json beside this file is its JSON schema: ``python -m experiments.runs.result`` prints it.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Ctrl-C and SIGTERM where work may only stop between two of its pieces."""
 
-from __future__ import annotations
-
 import signal
 import sys
 from collections.abc import Callable, Iterator

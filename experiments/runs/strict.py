@@ -1,7 +1,5 @@
 """What every settings class shares: closed, frozen, and true to kind."""
 
-from __future__ import annotations
-
 from types import UnionType
 from typing import Annotated, Any, Literal, get_args, get_origin
 

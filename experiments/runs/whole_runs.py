@@ -1,7 +1,5 @@
 """The skeleton of an experiment: `run` and `resume`, and how its result and its report come into the folder."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar

@@ -1,4 +1,11 @@
 """A platform in six degrees of freedom on the spring-damper or on grains.
 
+`Settings`, `check`, `run` and `resume` are those of `hedgebed tumble spatial`, loaded when they are first used.
 Imports `experiments.tumble` and what that may import.
 """
+
+from experiments.runs.registry import face
+
+__all__ = ["Settings", "check", "resume", "run"]
+
+__getattr__ = face("tumble spatial")

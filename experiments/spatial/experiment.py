@@ -4,8 +4,6 @@ Both go through the coupling's master. On a bed the same trial on the spring-dam
 and how deep the bed must reach, and stands beside the result.
 """
 
-from __future__ import annotations
-
 from experiments.grains.on_bed import finish_run
 from experiments.platform.kept_platform import keep_platform
 from experiments.runs.folder import RunFolder

@@ -1,7 +1,5 @@
 """Frames of a platform in space for ParaView: all of its spikes, and its hull (grains meet the ball inside)."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

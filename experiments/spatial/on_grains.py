@@ -1,7 +1,5 @@
 """A platform in space on a bed of grains; what a run in the plane does alike is in `experiments.grains.on_bed`."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """A platform in space on the spring-damper, as the coupling's master steps it: by itself, or beside a run on grains."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What comes of a platform in space: its series and its result."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Settings of `hedgebed tumble spatial`: a platform in six degrees of freedom on a surface, options with units."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator

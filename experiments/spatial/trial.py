@@ -1,7 +1,5 @@
 """The numbers of a platform in space as they are settled, and the `SpatialTrial` of them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from pathlib import Path

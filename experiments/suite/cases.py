@@ -5,8 +5,6 @@ once docs/results/<case>/ holds result.json; what is under way is a run folder b
 is a process of its own, so that one that fails or is stopped leaves the others alone.
 """
 
-from __future__ import annotations
-
 import functools
 import re
 import shutil

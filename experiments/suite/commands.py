@@ -1,7 +1,5 @@
 """`hedgebed experiments list`, `run` and `sinking`: the platform's experiments on grains, as named cases that ship."""
 
-from __future__ import annotations
-
 import json as json_module
 import sys
 from pathlib import Path

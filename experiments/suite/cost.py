@@ -1,7 +1,5 @@
 """What a tumble on grains will cost, from its settings alone: grains, steps, time on two cores."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

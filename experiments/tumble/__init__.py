@@ -1,4 +1,11 @@
 """A tumble in the plane: on the spring-damper or a law, over a range, on grains; campaigns made of tumbles.
 
+`Settings`, `check`, `run` and `resume` are those of `hedgebed tumble`; they are loaded when they are first used.
 Imports `experiments.runs`, `campaign`, `platform` and `grains`, and what those may import.
 """
+
+from experiments.runs.registry import face
+
+__all__ = ["Settings", "check", "resume", "run"]
+
+__getattr__ = face("tumble")

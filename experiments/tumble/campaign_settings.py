@@ -1,7 +1,5 @@
 """Settings of `hedgebed campaign`: synthetic trials over gravities and torques, seen through noisy sensors."""
 
-from __future__ import annotations
-
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator

@@ -1,7 +1,5 @@
 """Tables of a tumble's campaign.toml that are written alike for trials made up and for runs on grains."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, Literal
 

@@ -4,8 +4,6 @@ What comes out is that of `rigid.planar.simulate` to its tolerance (docs/couplin
 spring-damper that is stepped, booked and read as grains are, so that only the ground differs between two runs.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

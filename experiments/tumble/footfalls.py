@@ -1,7 +1,5 @@
 """Rows of spikes that come down one after the other: how deep each goes, and whether the later ones go deeper."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

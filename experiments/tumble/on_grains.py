@@ -4,8 +4,6 @@ In the rig the grains are at 1 g and the platform hangs on its counterweight; wi
 run in space does alike is in `experiments.grains.on_bed`.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Frames of a tumble on grains for ParaView: the simulated slice, one spike a row and the hull's cylinder."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

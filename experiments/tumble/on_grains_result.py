@@ -1,7 +1,5 @@
 """What comes of a tumble on grains: its series, and the result that stands beside the spring-damper's."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import cast
 

@@ -1,7 +1,5 @@
 """What is said of a tumble on grains before its bed is made: what was set, what follows from it, what it may lack."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import replace

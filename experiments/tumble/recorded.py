@@ -6,8 +6,6 @@ penetrate is named (`fitted`, twice a spike's), else as the run has them. What i
 it. The start is the run's own: on grains theta and x are near 0 at t = 0, not exactly 0.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping

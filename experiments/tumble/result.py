@@ -1,7 +1,5 @@
 """The result of one tumble: its quantities, the columns of its series, and what result.json holds."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from experiments.platform.tips import ball_radius, tip_depth

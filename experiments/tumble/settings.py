@@ -4,8 +4,6 @@ A number that is not given comes from `model` where there is one, else from the 
 `experiments.tumble.trial` holds and every run prints.
 """
 
-from __future__ import annotations
-
 from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator

@@ -1,7 +1,5 @@
 """Which stepper a tumble's settings ask for: one tumble, several in a row, or a landing."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any

@@ -4,8 +4,6 @@ All trials are integrated at once by the batched model (`rigid.simulate_batch`).
 nearest to it that can stand, is the run's own, integrated accurately; it and the corners tell how far the batch is off.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Ranges to sweep a number over, as they are typed: KEY=FROM:TO:STEP."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

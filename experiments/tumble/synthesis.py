@@ -6,8 +6,6 @@ DIR/truth.toml is the model that made it: the true numbers, the terms beyond the
 A tumble's campaign goes where it is asked for, and the truth into the tumble's run folder.
 """
 
-from __future__ import annotations
-
 import math
 import shutil
 from collections.abc import Sequence

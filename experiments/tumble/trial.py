@@ -3,8 +3,6 @@
 What is given wins over the model, the model over the surface's numbers and over the defaults below.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

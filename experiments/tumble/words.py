@@ -1,7 +1,5 @@
 """What is said of a tumble in the end: the way through its states, and when it was fastest."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

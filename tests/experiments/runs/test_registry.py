@@ -1,5 +1,9 @@
 """What every experiment owes the command line: described settings with units, cases that are valid."""
 
+import inspect
+import subprocess
+import sys
+from importlib import import_module
 from typing import get_args
 
 import pytest
@@ -73,3 +77,34 @@ def test_every_case_that_ships_is_of_some_experiment():
 def test_an_experiment_there_is_not_is_refused_by_name():
     with pytest.raises(ValueError, match=r"'dig'.*penetrate"):
         find_experiment("dig")
+
+
+PACKAGES = {
+    "penetrate": "penetrate",
+    "tumble": "tumble",
+    "spatial": "tumble spatial",
+    "hop": "hop",
+    "paper": "paper",
+    "bed": "bed make",
+    "calibrate": "bed calibrate",
+    "compare": "compare",
+    "diagnose": "diagnose",
+    "campaign": "campaign",
+}
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_a_package_offers_its_settings_and_its_run(package):
+    module, experiment = import_module(f"experiments.{package}"), EXPERIMENTS[PACKAGES[package]]
+    assert {"Settings", "check", "resume", "run"} <= set(module.__all__)
+    assert module.Settings is experiment.settings_class()
+    assert list(inspect.signature(module.run).parameters)[:2] == ["settings", "folder"]
+    assert next(iter(inspect.signature(module.resume).parameters)) == "folder" and callable(module.check)
+    with pytest.raises(AttributeError, match="no attribute 'runn'"):
+        module.runn
+
+
+def test_the_packages_load_no_taichi_before_they_are_used():
+    names = ", ".join(PACKAGES)
+    code = f"from experiments import {names}; import sys; print('taichi' in sys.modules or 'matplotlib' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
