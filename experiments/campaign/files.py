@@ -9,6 +9,7 @@ model = read_model("model.toml")                  # the same tables with [[effec
 ```
 """
 
+import shutil
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -32,7 +33,7 @@ from .tables import (
     trial_faults,
 )
 
-__all__ = ["Campaign", "read_campaign", "read_model", "write_campaign", "write_model"]
+__all__ = ["Campaign", "MODEL_COPY", "keep_model", "read_campaign", "read_model", "write_campaign", "write_model"]
 
 _CAMPAIGNS: dict[str, type[BaseModel]] = {"tumble": TumbleCampaign, "penetration": PenetrationCampaign}
 _ALL = frozenset(("pose", "imu", "wheel", "depth", "force", "accel"))
@@ -122,6 +123,25 @@ def read_model(path: str | Path) -> TumbleModel | PenetrationModel:
 def write_model(path: str | Path, model: TumbleModel | PenetrationModel) -> None:
     """Write a model.toml, which reads back as the same."""
     write_text(Path(path), _tables_toml(model))
+
+
+MODEL_COPY = "model.toml"
+"""The model that was run, in the run's folder; effects of one's own lie beside it."""
+
+
+def keep_model(model: str | Path | None, folder: Path) -> Path | None:
+    """Copy a model.toml and the files of its effects into a run's folder, once; return the copy, None for no model."""
+    if model is None:
+        return None
+    copy, source = folder / MODEL_COPY, Path(model)
+    if not copy.exists():
+        for effect in read_model(source).effect:
+            if effect.file is not None:
+                target = folder / effect.file
+                target.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(source.parent / effect.file, target)
+        shutil.copyfile(source, copy)
+    return copy
 
 
 # Reading --------------------------------------------------------------------------------------------------------------

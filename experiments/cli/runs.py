@@ -14,9 +14,9 @@ from rich.text import Text
 
 from experiments.runs import registry
 from experiments.runs.folder import RunFolder, write_text
-from experiments.runs.headline import Headline
 from experiments.runs.kernel_cache import free_kernel_cache
 from experiments.runs.progress import Progress, make_progress
+from experiments.runs.registry import Headline
 from experiments.runs.streams import RefusedError, say, stdout_to_stderr
 from vis.page.numbers import digits_for
 

@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.runs.folder import read_series
+from experiments.runs.result import as_quantities
 from experiments.runs.types import Json
 from rigid.spatial.quaternions import angle_between
 
-from .sentences import say
-from .tumbles import ENERGIES, as_quantities, deepest, gap_entries, lasting, mean_over, on_one_grid, same_state
+from . import say
+from .tumbles import ENERGIES, deepest, gap_entries, lasting, mean_over, on_one_grid, same_state
 
 __all__ = ["MovedInSpace", "compared_columns", "gaps", "read_moved", "told_apart"]
 

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from experiments.platform.tips import tip_angles, tip_depth
 from experiments.runs.folder import read_series
+from experiments.runs.result import as_quantities
 from experiments.runs.types import Json
 
-from .sentences import say
+from . import say
 
 __all__ = [
-    "ENERGIES", "Moved", "as_quantities", "compared_columns", "deepest", "gap_entries", "gaps", "lasting", "mean_over",
+    "ENERGIES", "Moved", "compared_columns", "deepest", "gap_entries", "gaps", "lasting", "mean_over",
     "on_one_grid", "read_moved", "row_sinkage", "same_state", "told_apart",
 ]  # fmt: skip
 
@@ -166,13 +167,6 @@ def same_state(columns: Mapping[str, Any]) -> tuple[float, str, str]:
     """Share of the time in which both are in the same state."""
     same = np.asarray(columns["state_1"]) == np.asarray(columns["state_2"])
     return float(same.mean()), "1", "share of the time in which both are in the same state"
-
-
-def as_quantities(found: Entries) -> dict[str, Json]:
-    """As a result has them."""
-    return {
-        name: {"value": value, "std": 0.0, "unit": unit, "note": note} for name, (value, unit, note) in found.items()
-    }
 
 
 def _away(columns: Mapping[str, Any], name: str, unit: str) -> Array:

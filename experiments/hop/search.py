@@ -13,9 +13,9 @@ import numpy as np
 
 from rigid.hop import Flight, Launch, brake_launch, flight, impulsive_launch, launch, launch_speed_for
 
+from . import say
 from .numbers import HopPlan, plan_hop
 from .on_surface import hop_on_surface, hop_trial
-from .sentences import say
 from .settings import HopSettings
 
 __all__ = ["Hop", "find_hop", "longest_flight"]

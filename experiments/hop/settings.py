@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 from experiments.platform.settings import PlatformSettings, Positive
 from experiments.runs.strict import StrictSettings
 
-from .sentences import say
+from . import say
 
 __all__ = ["DEFAULT_DISTANCE", "HopSettings"]
 

@@ -13,7 +13,7 @@ from typing import Any
 from experiments.runs.types import Json
 from rigid.model.trial import Trial
 
-from .sentences import say
+from . import say
 from .settings import PaperSettings
 from .transitions import HARD, TRANSITIONS, hop_words, is_brief, measured_angles, transition_angle
 

@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .sentences import say
+from . import say
 
 __all__ = ["HARD", "TRANSITIONS", "hop_words", "is_brief", "measured_angles", "slip_before_hop", "transition_angle"]
 

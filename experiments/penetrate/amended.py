@@ -25,9 +25,9 @@ from experiments.runs.types import Json
 from rigid import SpringDamper
 from rigid.ground.reaction import Reaction
 
+from . import say
 from .settings import PenetrateSettings
 from .units import Unit, make_run
-from .words import say
 
 __all__ = ["AmendedGround", "AmendedLaw", "read_law"]
 

@@ -4,7 +4,6 @@ With a bed, every run of it is made on the law as well. Without one (``--ground 
 are made on the model's own K and C alone, and on the law.
 """
 
-import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -12,23 +11,21 @@ from pathlib import Path
 import numpy as np
 
 from coupling import Penetration
-from experiments.campaign import read_model
+from experiments.campaign.files import MODEL_COPY, keep_model
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
-from experiments.runs.result import Result, quantities_of
+from experiments.runs.result import Result, as_quantities
 from experiments.runs.types import Json
 from experiments.runs.version import __version__
 from experiments.runs.whole_runs import publish
 
+from . import say
 from .amended import AmendedLaw, read_law
 from .settings import PenetrateSettings
 from .units import Unit, make_run, make_spike, plan_units
-from .words import say
 
-__all__ = ["Beside", "keep_model", "kept_law", "run_beside", "run_without_bed"]
+__all__ = ["Beside", "kept_law", "run_beside", "run_without_bed"]
 
-MODEL_COPY = "model.toml"
-"""The model that was run, in the run's folder; effects of one's own lie beside it."""
 _ROWS = 400
 """Macro steps in which the fastest run passes the driven depth, where no bed says how long a step is."""
 
@@ -53,19 +50,6 @@ class Beside:
                 | {"amended_series": f"series/{entry['id']}.amended.csv", "quantities": entry["quantities"] | numbers}
             )
         return found
-
-
-def keep_model(settings: PenetrateSettings, folder: Path) -> None:
-    """Copy the model and the files of its effects into the folder, once."""
-    if settings.model is None or (folder / MODEL_COPY).exists():
-        return
-    source = Path(settings.model)
-    for effect in read_model(source).effect:
-        if effect.file is not None:
-            target = folder / effect.file
-            target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(source.parent / effect.file, target)
-    shutil.copyfile(source, folder / MODEL_COPY)
 
 
 def kept_law(settings: PenetrateSettings, folder: Path) -> AmendedLaw | None:
@@ -93,13 +77,13 @@ def run_beside(law: AmendedLaw, units: Sequence[Unit], beds: Runs, models: Runs,
     sentences = []
     if plain is not None and amended is not None:
         sentences.append(say("off_by", law=law, amended=100 * amended, plain=100 * plain))
-    return Beside(runs, quantities_of(quantities, std=None), sentences)
+    return Beside(runs, as_quantities(quantities, std=None), sentences)
 
 
 def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Result:
     """The runs of the first seed on the model's K and C, and on the law; write and return the result."""
     with folder.lock():
-        keep_model(settings, folder.path)
+        keep_model(settings.model, folder.path)
         law = kept_law(settings, folder.path)
         assert law is not None  # the settings see to it
         units = plan_units(settings.model_copy(update={"seeds": settings.seeds[:1]}))
@@ -129,7 +113,7 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
             ground=settings.ground,
             version=__version__,
             title=f"A {1e3 * settings.tip_diameter:g} mm spike on the spring-damper, and with {law.words}",
-            quantities=quantities_of(found, std=None),
+            quantities=as_quantities(found, std=None),
             runs=[_entry(unit, plain[unit.id], runs[unit.id]) for unit in units],
             spike=asdict(make_spike(settings)) | {"load": settings.weight},
             model={"file": settings.model, "effects": list(law.effects)},

@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from coupling import BedGround, Run
+from experiments.campaign.files import keep_model
 from experiments.campaign.target import place_campaign
 from experiments.grains.kept_material import MATERIAL_COPY, keep_material
 from experiments.grains.softening import Softening
@@ -21,10 +22,10 @@ from experiments.runs.progress import Progress
 from experiments.runs.reporting import PictureCosts
 from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
-from experiments.runs.whole_runs import draw_report
+from experiments.runs.whole_runs import draw_report, whole_run
 
-from . import beds
-from .amended_runs import keep_model, run_without_bed
+from . import beds, say
+from .amended_runs import run_without_bed
 from .beds import fingerprint
 from .findings import BedFacts
 from .frames import Frames
@@ -35,28 +36,8 @@ from .remarks import softening_note
 from .result import conclude
 from .settings import PenetrateSettings
 from .units import Unit, expected_time, make_run, make_spike, plan_units, share_done, shown_units
-from .words import say
 
 __all__ = ["check", "fingerprint", "resume", "run"]
-
-
-def run(settings: PenetrateSettings, folder: str | Path, *, progress: Progress | None = None) -> Result:
-    """Carry the experiment out into `folder` and return the result, as result.json has it.
-
-    Takes up what the folder already holds of the same settings. Raises ValueError for settings that will not do,
-    before any work; RuntimeError (the bed's) where a run cannot go on, its state saved in checkpoint/.
-    """
-    check(settings)
-    kept = RunFolder.ensure(Path(folder), "penetrate", settings, code=beds.fingerprint())
-    return _carry_out(settings, kept, progress or Progress())
-
-
-def resume(folder: str | Path, *, progress: Progress | None = None) -> Result:
-    """Finish the run in `folder`. Raises ValueError where there is none; otherwise as `run`."""
-    kept = RunFolder.open(Path(folder))
-    copy = kept.path / MATERIAL_COPY
-    given = kept.settings | ({"material": str(copy)} if copy.exists() else {})
-    return _carry_out(PenetrateSettings(**given), kept, progress or Progress())
 
 
 def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Result:
@@ -66,7 +47,7 @@ def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progres
     softening = beds.choose_softness(settings)
     units = plan_units(settings)
     with folder.lock():
-        keep_model(settings, folder.path)
+        keep_model(settings.model, folder.path)
         progress.message(softening_note(settings, softening))
         dropped = f", a dropped spike moves {settings.mass:.4g} kg" if settings.drop_speeds else ""
         progress.message(f"the load is {settings.weight:.4g} N{dropped}")
@@ -182,3 +163,14 @@ def _remedy(error: RuntimeError) -> str:
     if "rest" in str(error) or "rain" in str(error):
         return "change gravity, bed_size or the seed"
     return "change time_step (shorter), young or the speeds"
+
+
+run, resume = whole_run(
+    "penetrate",
+    PenetrateSettings,
+    _carry_out,
+    check=check,
+    material_copy=MATERIAL_COPY,
+    code=lambda: beds.fingerprint(),
+    as_given=False,
+)

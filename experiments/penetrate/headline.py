@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from statistics import fmean, stdev
 from typing import Any
 
-from experiments.runs.headline import Headline
+from experiments.runs.registry import Headline
 from vis.page.numbers import foldable, quote
 
 __all__ = ["penetrate_headline"]

@@ -8,12 +8,11 @@ from experiments.grains.softening import check_young, drop_depth
 from experiments.grains.where import check_where
 from experiments.runs.memory import memory_there
 
-from . import beds
+from . import beds, say
 from .amended import read_law
 from .reference import read_reference
 from .settings import PenetrateSettings
 from .units import deepest, expected_time, plan_units
-from .words import say
 
 __all__ = ["check"]
 

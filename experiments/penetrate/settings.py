@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from experiments.runs.strict import StrictSettings
 
-from .words import say
+from . import say
 
 __all__ = ["STANDARD_GRAVITY", "PenetrateSettings"]
 

@@ -2,3 +2,9 @@
 
 Imports `experiments.runs`, `rigid` and `vis.page` only.
 """
+
+from vis.page.sentences import Sentences
+
+__all__ = ["say"]
+
+say = Sentences(__package__)

@@ -6,7 +6,7 @@ from pathlib import Path
 from experiments.runs.folder import write_text
 from rigid.platform.files import find_platform
 
-from .sentences import say
+from . import say
 
 __all__ = ["PLATFORM_COPY", "keep_platform"]
 

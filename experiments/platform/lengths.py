@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from .sentences import say
+from . import say
 from .settled import Number
 
 __all__ = ["check_lengths", "check_spike_length"]

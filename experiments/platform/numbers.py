@@ -17,7 +17,7 @@ from rigid.planar.trajectory import Trajectory
 from rigid.platform.files import find_platform
 from rigid.platform.platform import Platform
 
-from .sentences import say
+from . import say
 
 __all__ = ["PlatformNumbers", "platform_numbers", "torque_within_limit"]
 

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from experiments.runs.strict import StrictSettings
 
-from .sentences import say
+from . import say
 
 __all__ = ["NotNegative", "PlatformSettings", "Positive"]
 

@@ -10,8 +10,8 @@ from typing import Any, Literal
 
 from rigid.platform.rig import STANDARD_GRAVITY
 
+from . import say
 from .numbers import PlatformNumbers
-from .sentences import say
 from .surfaces import DEFAULT_SURFACE, find_surface
 
 __all__ = [
@@ -33,27 +33,20 @@ __all__ = [
 OTHER_BODY = 0.2
 """A mass, inertia or spike length that is off the platform's by more than this share is another body's."""
 
-UNITS = {
-    "mass": "kg",
-    "inertia": "kg m2",
-    "spike_length": "m",
-    "lean": "rad",
-    "wheel_inertia": "kg m2",
-    "max_wheel_speed": "rad/s",
-    "max_motor_torque": "N m",
-    "stiffness": "N/m",
-    "damping": "N s/m",
-    "mu_s": "1",
-    "mu_d": "1",
-    "gravity_sim": "m/s2",
-    "gravity": "m/s2",
-    "counterweight": "kg",
-    "torque": "N m",
-    "torque_until": "s",
-    "wheel_speed_0": "rad/s",
-    "distance": "m",
-    "body_radius": "m",
+_OF_UNIT = {
+    "kg": ("mass", "counterweight"),
+    "kg m2": ("inertia", "wheel_inertia"),
+    "m": ("spike_length", "distance", "body_radius"),
+    "rad": ("lean",),
+    "rad/s": ("max_wheel_speed", "wheel_speed_0"),
+    "N m": ("max_motor_torque", "torque"),
+    "N/m": ("stiffness",),
+    "N s/m": ("damping",),
+    "1": ("mu_s", "mu_d"),
+    "m/s2": ("gravity_sim", "gravity"),
+    "s": ("torque_until",),
 }
+UNITS = {name: unit for unit, names in _OF_UNIT.items() for name in names}
 
 
 @dataclass(frozen=True)

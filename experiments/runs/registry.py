@@ -1,4 +1,5 @@
-"""Which experiments there are. A further one is one line in `EXPERIMENTS`, one settings class and one module.
+"""Which experiments there are: `EXPERIMENTS`, from registry.toml. A further one is one table there, one settings class
+and one module.
 
 The module of an experiment offers
 ``run(settings, folder: Path, *, progress: Progress) -> dict`` (the result, as result.json has it) and
@@ -8,6 +9,7 @@ the settings class cannot see; if it has ``fingerprint() -> str``, a digest of w
 Both names are text here so that help does not wait for Taichi.
 """
 
+import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
@@ -16,11 +18,21 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from experiments.runs.headline import Headline
-
-__all__ = ["EXPERIMENTS", "Experiment", "Preset", "face", "find_experiment"]
+__all__ = ["EXPERIMENTS", "Experiment", "Headline", "Preset", "face", "find_experiment"]
 
 CASES = Path(__file__).parents[1] / "cases"
+
+
+@dataclass(frozen=True)
+class Headline:
+    """The short form of a result that the terminal shows when a run ends: a table and what is said below it."""
+
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    warnings: tuple[str, ...]
+    sentences: tuple[str, ...]
+    left: int
+    """Findings that are left to the report."""
 
 
 @dataclass(frozen=True)
@@ -79,128 +91,15 @@ class Experiment:
             check(settings)
 
 
-EXPERIMENTS: dict[str, Experiment] = {
-    experiment.name: experiment
-    for experiment in [
-        Experiment(
-            "penetrate",
-            "How far a spike sinks into a bed, what the bed pushes back with, and how wrong the spring-damper is.",
-            settings="experiments.penetrate.settings:PenetrateSettings",
-            module="experiments.penetrate.experiment",
-            headline="experiments.penetrate.headline:penetrate_headline",
-            presets=(
-                Preset(
-                    "full",
-                    "penetrate-full.toml",
-                    "Start from the fine case: overlaps of at most 1 %, ten grains across, slower speeds, all seeds.",
-                ),
-            ),
-        ),
-        Experiment(
-            "hop",
-            "The wheel speed that a hop over a distance takes, or how far one goes; launch, flight, escape.",
-            settings="experiments.hop.settings:HopSettings",
-            module="experiments.hop.experiment",
-        ),
-        Experiment(
-            "tumble",
-            "One trial of a platform on spikes that a flywheel turns over: pivot, slip, hop.",
-            settings="experiments.tumble.settings:TumbleSettings",
-            module="experiments.tumble.experiment",
-        ),
-        Experiment(
-            "tumble spatial",
-            "A platform in six degrees of freedom, driven or thrown, on a bed of grains or on the spring-damper.",
-            settings="experiments.spatial.settings:SpatialSettings",
-            module="experiments.spatial.experiment",
-        ),
-        Experiment(
-            "paper",
-            "Redoes Figures 5 to 8 of the paper beside what its text states in numbers.",
-            settings="experiments.paper.settings:PaperSettings",
-            module="experiments.paper.experiment",
-        ),
-        Experiment(
-            "campaign",
-            "Makes up a campaign of tumbles: every gravity and torque, recorded by noisy sensors, and what is true.",
-            settings="experiments.tumble.campaign_settings:CampaignSettings",
-            module="experiments.tumble.synthesis",
-        ),
-        Experiment(
-            "campaign check",
-            "Is a campaign fit to be diagnosed? Every fault by file and line, a table of its trials, plots of what is "
-            "in it.",
-            settings="experiments.check.settings:CheckSettings",
-            module="experiments.diagnose.inspection",
-            subject="campaign",
-        ),
-        Experiment(
-            "diagnose",
-            "Measured trials: where the model fails, which effect it lacks, how sure that is, and the gap it closes.",
-            settings="experiments.diagnose.settings:DiagnoseSettings",
-            module="experiments.diagnose.experiment",
-            subject="campaign",
-        ),
-        Experiment(
-            "compare",
-            "Two finished runs side by side: numbers with their differences, curves, states, pictures.",
-            settings="experiments.compare.settings:CompareSettings",
-            module="experiments.compare.experiment",
-            subject="runs",
-        ),
-        Experiment(
-            "bed make",
-            "Prepares a bed as in a laboratory: rain, level, fluff, compact, cut, tilt; a report of every stage.",
-            settings="experiments.bed.settings:BedSettings",
-            module="experiments.bed.make",
-        ),
-        Experiment(
-            "bed refine",
-            "The same bed with smaller grains, beside the one it is made from.",
-            settings="experiments.bed.settings:BedRefineSettings",
-            module="experiments.bed.refine",
-            subject="bed",
-        ),
-        Experiment(
-            "bed test shear",
-            "A bed sheared under a lid at several pressures: peak and critical friction angle, cohesion.",
-            settings="experiments.bed.test_settings:BedShearSettings",
-            module="experiments.bed.shear",
-            subject="bed",
-        ),
-        Experiment(
-            "bed test repose",
-            "Angle of repose: beds drain through a slot, and the slopes that stay are measured.",
-            settings="experiments.bed.test_settings:BedReposeSettings",
-            module="experiments.bed.repose",
-        ),
-        Experiment(
-            "bed test cone",
-            "A cone penetrometer pushed into beds: cone index against depth, and its gradient.",
-            settings="experiments.bed.test_settings:BedConeSettings",
-            module="experiments.bed.cone",
-        ),
-        Experiment(
-            "bed test cut",
-            "A vertical face cut in beds, gravity rising until it falls: critical height and cohesion.",
-            settings="experiments.bed.test_settings:BedCutSettings",
-            module="experiments.bed.cut",
-        ),
-        Experiment(
-            "bed calibrate",
-            "Grain parameters from bulk figures: a response surface over sheared samples, and a material.toml.",
-            settings="experiments.calibrate.settings:CalibrateSettings",
-            module="experiments.calibrate.experiment",
-            example="calibrate-sand.toml",
-        ),
-        Experiment(
-            "validate",
-            "Verifies the bed: closed forms, published figures and other codes, beside what comes out.",
-            settings="experiments.validate.settings:ValidateSettings",
-            module="experiments.validate.experiment",
-        ),
-    ]
-}
+def _read() -> dict[str, Experiment]:
+    tables = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))["experiment"]
+    for table in tables:
+        table.setdefault("module", f"{table['settings'].rpartition('.')[0]}.experiment")
+        table["presets"] = tuple(Preset(**preset) for preset in table.get("presets", ()))
+    return {table["name"]: Experiment(**table) for table in tables}
+
+
+EXPERIMENTS = _read()
 
 
 def find_experiment(name: str) -> Experiment:

@@ -52,11 +52,14 @@ def whole_run(
     *,
     check: Callable[[Settings], None],
     material_copy: str = "",
+    code: Callable[[], str] = str,
+    as_given: bool = True,
 ) -> tuple[Callable[..., Result], Callable[..., Result]]:
     """The `run` and the `resume` of the experiment `name`, whose work on a folder is `carry_out`.
 
     It is over so soon, or keeps its own checkpoints, that resuming it is carrying it out again.
-    ``material_copy``: the file in the folder that `resume` takes the material from, where there is one.
+    `material_copy`: the file in the folder that `resume` takes the material from, where there is one; `code`: a digest
+    of what computes; `as_given`: whether settings at their defaults count as not given when the run is resumed.
     """
 
     def run(settings: Settings, folder: str | Path, *, progress: Progress | None = None) -> Result:
@@ -65,14 +68,18 @@ def whole_run(
         Raises ValueError for settings that will not do, before any work; RuntimeError where it cannot go on.
         """
         check(settings)
-        return carry_out(settings, RunFolder.ensure(Path(folder), name, settings), progress or Progress())
+        return carry_out(settings, RunFolder.ensure(Path(folder), name, settings, code=code()), progress or Progress())
 
     def resume(folder: str | Path, *, progress: Progress | None = None) -> Result:
         """Carry out again, from its start, what `folder` was made for."""
         kept = RunFolder.open(Path(folder))
         fields = settings_class.model_fields
         # run.toml has them all: those at their defaults are said to be so again.
-        given = {k: value for k, value in kept.settings.items() if k not in fields or value != fields[k].default}
+        given = {
+            name: value
+            for name, value in kept.settings.items()
+            if not as_given or name not in fields or value != fields[name].default
+        }
         if material_copy and (kept.path / material_copy).is_file():
             given["material"] = str(kept.path / material_copy)
         return carry_out(settings_class(**given), kept, progress or Progress())

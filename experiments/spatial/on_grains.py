@@ -18,10 +18,10 @@ from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from rigid.spatial.quaternions import to_matrix
 
+from . import say
 from .frames import SpatialFrames
 from .on_law import feet_count, run_on_law, start_of
 from .result import conclude
-from .sentences import say
 from .settings import SpatialSettings
 from .trial import SpatialPlan
 

@@ -18,12 +18,12 @@ from experiments.grains.bed_result import (
 )
 from experiments.grains.softening import Softening
 from experiments.runs.folder import write_series
-from experiments.runs.result import Result
+from experiments.runs.result import Result, as_quantities
 from experiments.runs.types import Json
 from experiments.tumble.words import way_through
 from rigid.spatial.quaternions import to_matrix
 
-from .sentences import say
+from . import say
 from .settings import SpatialSettings
 from .trial import SpatialPlan
 
@@ -167,10 +167,7 @@ def quantities_of(run: SpatialRun) -> dict[str, Json]:
         found["angular_momentum_residual"] = (angular, "N m s", say("angular_momentum"))
         for name, values in run.losses.items():
             found[f"dissipated_{name}"] = (float(values[-1]), "J", say("by_grains"))
-    return {
-        name: {"value": value, "std": None, "unit": unit} | ({"note": note} if note else {})
-        for name, (value, unit, note) in found.items()
-    }
+    return as_quantities(found, std=None)
 
 
 def _first_entries(run: SpatialRun) -> dict[str, tuple[float | None, str, str]]:

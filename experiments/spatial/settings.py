@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 from experiments.grains.settings import GrainsSettings
 from experiments.platform.settings import NotNegative, Positive
 
-from .sentences import say
+from . import say
 
 __all__ = ["ON_ANY_GROUND", "SpatialSettings"]
 

@@ -15,7 +15,7 @@ from rigid.platform.platform import Platform
 from rigid.platform.rig import STANDARD_GRAVITY, Rig
 from rigid.spatial.spatial import SpatialTrial
 
-from .sentences import say
+from . import say
 from .settings import ZERO, SpatialSettings
 
 __all__ = ["SpatialPlan", "plan_spatial"]

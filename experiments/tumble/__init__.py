@@ -5,7 +5,9 @@ Imports `experiments.runs`, `campaign`, `platform` and `grains`, and what those 
 """
 
 from experiments.runs.registry import face
+from vis.page.sentences import Sentences
 
 __all__ = ["Settings", "check", "resume", "run"]
 
+say = Sentences(__package__)
 __getattr__ = face("tumble")

@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from experiments.platform.settings import NotNegative, Positive
 
-from .sentences import say
+from . import say
 from .settings import TrialSettings
 
 __all__ = ["CampaignSettings"]

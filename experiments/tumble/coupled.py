@@ -13,11 +13,12 @@ from experiments.grains.bed_result import unsettled_warning
 from experiments.platform.tips import tip_depth
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
+from experiments.runs.result import as_quantities
 from experiments.runs.types import Json
 from rigid.planar.trajectory import Trajectory
 
+from . import say
 from .result import title_of
-from .sentences import say
 from .settings import TumbleSettings
 from .steppers import own_quantities, own_warning, stepper_of, words
 from .trial import TumblePlan
@@ -81,9 +82,7 @@ def coupled_quantities(run: CoupledTumble) -> tuple[dict[str, Json], Json]:
         ),
     }  # fmt: skip
     own, more = own_quantities(run, sinkage, normal)
-    return {
-        name: {"value": value, "std": 0.0, "unit": unit, "note": note} for name, (value, unit, note) in found.items()
-    } | own, more
+    return as_quantities(found) | own, more
 
 
 def feet_columns(run: CoupledTumble) -> Json:

@@ -5,12 +5,11 @@ on the spring-damper (`coupled`), or the planar model, for which a sweep and a c
 trajectory.csv, series/motion.csv (accelerations, wheel, energies), result.json, figures and a report.
 """
 
-import shutil
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from experiments.campaign.files import read_model
+from experiments.campaign.files import keep_model
 from experiments.platform.kept_platform import keep_platform
 from experiments.platform.numbers import PlatformNumbers, platform_numbers, torque_within_limit
 from experiments.runs.folder import RunFolder, write_series
@@ -28,9 +27,6 @@ from .synthesis import check_tumble_campaign, write_tumble_campaign
 from .trial import TumblePlan, plan_tumble
 
 __all__ = ["check", "resume", "run"]
-
-MODEL_COPY = "model.toml"
-"""The model that was run, in the run's folder; effects of one's own lie beside it."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +102,7 @@ def _integrate(settings: TumbleSettings, plan: TumblePlan, *, duration: float) -
 
 def _on_law(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> Result:
     """A tumble on the spring-damper or another law, with its sweep and its campaign where they are asked for."""
-    copied = _keep_model(settings, folder)
+    copied = keep_model(settings.model, folder.path)
     platform = platform_numbers(settings.platform, file=keep_platform(settings.platform, folder.path, progress.message))
     middle = middle_of_sweep(settings, model_file=copied, platform=platform)
     plan = plan_tumble(middle, model_file=copied, platform=platform)
@@ -138,21 +134,6 @@ def _add_sweep(
     result["departures"]["sentences"] += swept["sweep"]["sentences"]
     result["title"] += ", one trial of a sweep of " + " and ".join(settings.sweep)
     result |= swept
-
-
-def _keep_model(settings: TumbleSettings, folder: RunFolder) -> Path | None:
-    """Copy the model and the files of its effects into the folder, once; return the copy."""
-    if settings.model is None:
-        return None
-    copy, source = folder.path / MODEL_COPY, Path(settings.model)
-    if not copy.exists():
-        for effect in read_model(source).effect:
-            if effect.file is not None:
-                target = folder.path / effect.file
-                target.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copyfile(source.parent / effect.file, target)
-        shutil.copyfile(source, copy)
-    return copy
 
 
 run, resume = whole_run("tumble", TumbleSettings, _carry_out, check=check)

@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from experiments.grains.spells import spells
+from experiments.runs.result import quantity
 from experiments.runs.types import Json
 
-from .sentences import say
+from . import say
 
 __all__ = ["Footfall", "Sinking", "find_footfalls", "footfall_quantities", "footfall_table", "sinking_over"]
 
@@ -132,4 +133,4 @@ def footfall_quantities(falls: Sequence[Footfall]) -> dict[str, Json]:
     """`sinkage_per_footfall` of one bed, for a result; its value is None where too few rows came down."""
     own = sinking_over([falls])
     value, std = (own.slope, own.error) if own else (None, None)
-    return {"sinkage_per_footfall": {"value": value, "std": std, "unit": "m", "note": say("of_footfall")}}
+    return {"sinkage_per_footfall": quantity(value, "m", say("of_footfall"), std=std)}

@@ -30,10 +30,10 @@ from experiments.runs.result import Result
 from rigid.planar.simulate import simulate
 from rigid.planar.trajectory import Trajectory
 
+from . import say
 from .on_grains_frames import TumbleFrames
 from .on_grains_result import conclude, sinkage_start, write_trajectory
 from .opening import opening, short_of_way
-from .sentences import say
 from .settings import TumbleSettings
 from .steppers import is_plain, stepper_of
 from .trial import plan_tumble, spikes_of

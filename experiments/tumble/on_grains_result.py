@@ -21,12 +21,13 @@ from experiments.grains.graded import coarsest_touched, tips_in_ground
 from experiments.grains.softening import Softening
 from experiments.platform.surfaces import find_surface
 from experiments.runs.folder import RunFolder, write_series
+from experiments.runs.result import as_quantities
 from experiments.runs.types import Json
 from rigid.planar.trajectory import Trajectory
 from vis.tumble.beside import HEAD, beside_rows, beside_words
 
+from . import say
 from .result import motion_columns, passages, quantities_of, result_of, trajectory_columns
-from .sentences import say
 from .settings import TumbleSettings
 from .steppers import own_quantities, own_warning, words
 from .trial import TumblePlan
@@ -165,6 +166,4 @@ def _own_quantities(run: CoupledTumble) -> dict[str, Json]:
         found[f"dissipated_{name}"] = float(values[-1]), "J", say("dissipated_by_grains", what=notes[name])
     coupled = float(np.abs(run.balance).max()) / run.energy_scale
     found["coupling_residual"] = coupled, "1", say("of_coupling")
-    return {
-        name: {"value": value, "std": None, "unit": unit, "note": note} for name, (value, unit, note) in found.items()
-    }
+    return as_quantities(found, std=None)

@@ -13,7 +13,7 @@ from experiments.runs.types import Json
 from rigid.planar.simulate import simulate
 from rigid.planar.trajectory import LAUNCH_DISTANCE, Trajectory
 
-from .sentences import say
+from . import say
 from .settings import TumbleSettings
 from .steppers import is_plain
 from .trial import TumblePlan

@@ -25,9 +25,9 @@ from experiments.runs.types import Json
 from experiments.runs.version import __version__
 from rigid.sensors import Motion, SensorSet, measure, sensor_times
 
+from . import say
 from .campaign_settings import CampaignSettings
 from .campaign_tables import platform_table, sensor_set, sensor_tables, trial_table
-from .sentences import say
 
 __all__ = ["TumbleRecording", "campaign_of_tumbles", "write_tumbles_campaign"]
 

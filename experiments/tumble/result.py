@@ -3,10 +3,11 @@
 import numpy as np
 
 from experiments.platform.tips import ball_radius, tip_depth
+from experiments.runs.result import quantity
 from experiments.runs.types import Json
 from rigid.planar.trajectory import Trajectory
 
-from .sentences import say
+from . import say
 from .settings import TumbleSettings
 from .trial import TumblePlan
 from .words import stayed_words, tumble_sentences
@@ -23,17 +24,17 @@ def quantities_of(trajectory: Trajectory) -> dict[str, Json]:
     )
     sinkage = np.maximum(tips, 0.0)
     return {
-        "trajectory_angle": _quantity(trajectory.trajectory_angle, "rad", say("of_angle")),
-        "max_speed": _quantity(trajectory.max_speed, "m/s", "of the centre"),
-        "time_of_max_speed": _quantity(trajectory.time_of_max_speed, "s", "when the centre is that fast"),
-        "max_angular_velocity": _quantity(trajectory.max_angular_velocity, "rad/s", ""),
-        "transition_angle_slip": _quantity(trajectory.transition_angle("slip"), "rad", entry),
-        "transition_angle_hop": _quantity(trajectory.transition_angle("hop"), "rad", entry),
-        "tipping_torque": _quantity(trial.tipping_torque, "N m", say("of_tipping", base=base)),
-        "slip_torque": _quantity(trial.slip_torque, "N m", say("of_slip", base=base)),
-        "energy_residual": _quantity(trajectory.energy_residual, "1", say("of_residual")),
-        "sinkage_start": _quantity(float(sinkage[0, [0, -1]].mean()), "m", say("of_sinkage_start")),
-        "sinkage_largest": _quantity(float(sinkage.max()), "m", say("of_any_row_then")),
+        "trajectory_angle": quantity(trajectory.trajectory_angle, "rad", say("of_angle")),
+        "max_speed": quantity(trajectory.max_speed, "m/s", "of the centre"),
+        "time_of_max_speed": quantity(trajectory.time_of_max_speed, "s", "when the centre is that fast"),
+        "max_angular_velocity": quantity(trajectory.max_angular_velocity, "rad/s", ""),
+        "transition_angle_slip": quantity(trajectory.transition_angle("slip"), "rad", entry),
+        "transition_angle_hop": quantity(trajectory.transition_angle("hop"), "rad", entry),
+        "tipping_torque": quantity(trial.tipping_torque, "N m", say("of_tipping", base=base)),
+        "slip_torque": quantity(trial.slip_torque, "N m", say("of_slip", base=base)),
+        "energy_residual": quantity(trajectory.energy_residual, "1", say("of_residual")),
+        "sinkage_start": quantity(float(sinkage[0, [0, -1]].mean()), "m", say("of_sinkage_start")),
+        "sinkage_largest": quantity(float(sinkage.max()), "m", say("of_any_row_then")),
     }
 
 
@@ -49,11 +50,6 @@ def trajectory_columns(trajectory: Trajectory) -> Json:
         "omega_rad_s": trajectory.omega,
         "state": np.array(trajectory.state_names),
     }
-
-
-def _quantity(value: float | None, unit: str, note: str) -> Json:
-    known = {"value": None, "std": None} if value is None else {"value": float(value), "std": 0.0}
-    return known | {"unit": unit} | ({"note": note} if note else {})
 
 
 def motion_columns(trajectory: Trajectory) -> Json:

@@ -13,7 +13,7 @@ from experiments.platform.settings import NotNegative, PlatformSettings, Positiv
 from experiments.runs.reading import nearest
 from rigid.ground.laws import GROUNDS
 
-from .sentences import say
+from . import say
 from .sweep_ranges import parse_sweep
 
 __all__ = ["TrialSettings", "TumbleSettings"]

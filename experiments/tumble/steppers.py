@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupling import CoupledTumble, Ground, Landing, Rest, TumblesInARow
+from experiments.runs.result import quantity
 from experiments.runs.types import Json
 from rigid.model.trial import Trial
 
+from . import say
 from .footfalls import find_footfalls, footfall_quantities, footfall_table
-from .sentences import say
 from .settings import TumbleSettings
 
 __all__ = ["is_plain", "own_quantities", "own_warning", "stepper_of", "words"]
@@ -64,10 +65,6 @@ def own_quantities(
     return {}, {}
 
 
-def _quantity(value: float | None, unit: str, note: str) -> Json:
-    return {"value": value, "std": None if value is None else 0.0, "unit": unit, "note": note}
-
-
 def _row(run: TumblesInARow) -> tuple[dict[str, Json], Json]:
     rests = run.rests
     done = max(len(rests["time"]) - 1, 0)
@@ -80,10 +77,10 @@ def _row(run: TumblesInARow) -> tuple[dict[str, Json], Json]:
         error = float(np.sqrt((left @ left) / (done - 2) / ((number - number.mean()) ** 2).sum()))
     noted = say("of_rest")
     added = {
-        "tumbles_done": _quantity(float(run.ended), "1", say("of_done")),
-        "tumbles_at_rest": _quantity(float(rests["at_rest"][1:].sum()), "1", say("of_at_rest")),
-        "sinkage_per_tumble": _quantity(slope, "m", say("of_slope", noted=noted)) | {"std": error},
-        "sinkage_last": _quantity(
+        "tumbles_done": quantity(float(run.ended), "1", say("of_done")),
+        "tumbles_at_rest": quantity(float(rests["at_rest"][1:].sum()), "1", say("of_at_rest")),
+        "sinkage_per_tumble": quantity(slope, "m", say("of_slope", noted=noted)) | {"std": error},
+        "sinkage_last": quantity(
             float(rests["sinkage"][-1]) if len(rests["sinkage"]) else None, "m",
             say("of_last", noted=noted),
         ),
@@ -136,8 +133,8 @@ def _landing(run: Landing) -> dict[str, Json]:
     energy = rows["kinetic_energy"]
     kept = None if left is None or touched is None else float(energy[left] / energy[touched])
     return {
-        "impact_speed": _quantity(came, "m/s", say("of_impact")),
-        "restitution": _quantity(share, "1", say("of_restitution")),
-        "energy_kept": _quantity(kept, "1", say("of_kept")),
-        "settling_time": _quantity(settled, "s", say("of_settling", slow=1e3 * slow)),
+        "impact_speed": quantity(came, "m/s", say("of_impact")),
+        "restitution": quantity(share, "1", say("of_restitution")),
+        "energy_kept": quantity(kept, "1", say("of_kept")),
+        "settling_time": quantity(settled, "s", say("of_settling", slow=1e3 * slow)),
     }

@@ -23,7 +23,7 @@ from rigid.planar.dynamics import System
 from rigid.planar.simulate import PAPER_STEP, longest_step, simulate
 from rigid.planar.statics import standing
 
-from .sentences import say
+from . import say
 from .settings import TumbleSettings
 from .sweep_ranges import SweepRange, parse_sweep, unit_of
 from .trial import plan_tumble

@@ -40,9 +40,9 @@ from rigid.model.trial import Effect, Trial
 from rigid.planar.simulate import simulate
 from rigid.sensors import Measured, Motion, SensorSet, measure, sensor_times
 
+from . import say
 from .campaign_settings import CampaignSettings
 from .campaign_tables import platform_table, sensor_set, sensor_tables, trial_table
-from .sentences import say
 
 __all__ = ["TRUTH", "check", "check_tumble_campaign", "record", "resume", "run", "write_tumble_campaign"]
 

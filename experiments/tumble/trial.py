@@ -30,7 +30,7 @@ from rigid.model.trial import Effect, Ground, Trial
 from rigid.platform.rig import STANDARD_GRAVITY, Rig
 from rigid.terms import EFFECTS
 
-from .sentences import say
+from . import say
 from .settings import TumbleSettings
 
 __all__ = ["DEFAULT_RIG", "Spikes", "TumblePlan", "model_trial", "plan_tumble", "spikes_of", "turns_of"]

@@ -7,7 +7,7 @@ import numpy as np
 
 from rigid.planar.trajectory import Trajectory, Transition
 
-from .sentences import say
+from . import say
 
 __all__ = ["MOST", "stayed_words", "tumble_sentences", "way_through"]
 
