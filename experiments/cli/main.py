@@ -23,6 +23,7 @@ from experiments.runs.folder import RunFolder, fresh_path, write_json
 from experiments.runs.progress import Progress, make_progress
 from experiments.runs.reading import Layer, find_case, option, read_case, settings_from
 from experiments.runs.registry import Experiment, find_experiment
+from experiments.runs.result import Result
 from experiments.runs.streams import (
     RefusedError,
     fault_words,
@@ -97,7 +98,7 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
                 code = experiment.code()
             folder = RunFolder.create(out or fresh_path(experiment.name), experiment.name, settings, code=code)
 
-        def work(progress: Progress) -> dict[str, Any]:
+        def work(progress: Progress) -> Result:
             return experiment.run(settings, folder.path, progress=progress)
 
         return carry_out(folder, work, as_json=json, quiet=quiet, verbose=verbose)
@@ -167,7 +168,7 @@ def _resume(
     if run.version != __version__:
         say(f"warning: the run was begun by version {run.version}, this is {__version__}")
 
-    def work(progress: Progress) -> dict[str, Any]:
+    def work(progress: Progress) -> Result:
         return experiment.resume(run.path, progress=progress)
 
     return carry_out(run, work, as_json=json, quiet=quiet, verbose=verbose)

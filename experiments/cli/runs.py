@@ -5,7 +5,7 @@ import shutil
 import sys
 import textwrap
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from rich.console import Console
@@ -17,6 +17,7 @@ from experiments.runs.folder import RunFolder, write_text
 from experiments.runs.kernel_cache import free_kernel_cache
 from experiments.runs.progress import Progress, make_progress
 from experiments.runs.registry import Headline
+from experiments.runs.result import Result
 from experiments.runs.streams import RefusedError, say, stdout_to_stderr
 from vis.page.numbers import digits_for
 
@@ -28,7 +29,7 @@ DONE, FAILED, BAD_INPUT, STOPPED = 0, 1, 2, 3
 
 def carry_out(
     folder: RunFolder,
-    work: Callable[[Progress], dict[str, Any]],
+    work: Callable[[Progress], Result],
     *,
     as_json: bool,
     quiet: bool,
@@ -170,7 +171,7 @@ def _show_headline(headline: Headline, console: Console) -> None:
             print("\n".join(folded))
 
 
-def _show_all(result: dict[str, Any], console: Console) -> None:
+def _show_all(result: Mapping[str, Any], console: Console) -> None:
     """What it comes to, every quantity, the tables, findings and warnings."""
     for sentence in result.get("summary", []):
         console.print(f"- {sentence}", markup=False)

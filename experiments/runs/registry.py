@@ -2,21 +2,24 @@
 and one module.
 
 The module of an experiment offers
-``run(settings, folder: Path, *, progress: Progress) -> dict`` (the result, as result.json has it) and
-``resume(folder: Path, *, progress: Progress) -> dict``;
+``run(settings, folder: Path, *, progress: Progress) -> Result`` (as result.json has it) and
+``resume(folder: Path, *, progress: Progress) -> Result``;
 if it also has ``check(settings) -> None``, that is called before a folder is made and raises ValueError for what
 the settings class cannot see; if it has ``fingerprint() -> str``, a digest of what computes, run.toml keeps it.
 Both names are text here so that help does not wait for Taichi.
 """
 
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel
+
+if TYPE_CHECKING:
+    from experiments.runs.result import Result
 
 __all__ = ["EXPERIMENTS", "Experiment", "Headline", "Preset", "face", "find_experiment"]
 
@@ -66,15 +69,15 @@ class Experiment:
         module, _, name = self.settings.partition(":")
         return getattr(import_module(module), name)
 
-    def run(self, settings: BaseModel, folder: Path, *, progress: Any) -> dict[str, Any]:
+    def run(self, settings: BaseModel, folder: Path, *, progress: Any) -> "Result":
         """Run it into `folder`; return the result."""
         return import_module(self.module).run(settings, folder, progress=progress)
 
-    def resume(self, folder: Path, *, progress: Any) -> dict[str, Any]:
+    def resume(self, folder: Path, *, progress: Any) -> "Result":
         """Finish the run in `folder`; return the result."""
         return import_module(self.module).resume(folder, progress=progress)
 
-    def headline_of(self, result: dict[str, Any]) -> Headline | None:
+    def headline_of(self, result: Mapping[str, Any]) -> Headline | None:
         """The short form of a result; None where it is shown in full."""
         module, _, name = self.headline.partition(":")
         return getattr(import_module(module), name)(result) if module else None
