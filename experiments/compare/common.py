@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.runs.folder import read_series
-from experiments.runs.result import as_quantities
+from experiments.runs.result import quantities_of
 from experiments.runs.types import Json
 from rigid.planar.trajectory import LAUNCH_DISTANCE
 
@@ -80,7 +80,7 @@ def numbers_until(
 def sinkage_of(moved: Moved) -> dict[str, Json]:
     """`sinkage_start` and `sinkage_largest` as a tumble on grains has them, of a run whose result lacks them."""
     stood, deepest = float(moved.sinkage[0, [0, -1]].mean()), float(moved.sinkage.max())
-    return as_quantities(
+    return quantities_of(
         {
             "sinkage_start": (stood, "m", "of the two rows it stands on, mean, when the torque begins"),
             "sinkage_largest": (deepest, "m", "of any row"),

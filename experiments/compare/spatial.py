@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.runs.folder import read_series
-from experiments.runs.result import as_quantities
+from experiments.runs.result import quantities_of
 from experiments.runs.types import Json
 from rigid.spatial.quaternions import angle_between
 
@@ -121,7 +121,7 @@ def gaps(columns: Mapping[str, Any]) -> dict[str, Json]:
     found["same_state"] = same_state(columns)
     depths = [deepest(columns, number) for number in (1, 2)]
     found["gap_sinkage"] = (depths[1] - depths[0], "m", say("spike_gap"))
-    return as_quantities(found)
+    return quantities_of(found)
 
 
 def _distance(columns: Mapping[str, Any], names: tuple[str, ...], *, from_start: bool = False) -> Array:

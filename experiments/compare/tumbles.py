@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from experiments.platform.tips import tip_angles, tip_depth
 from experiments.runs.folder import read_series
-from experiments.runs.result import as_quantities
+from experiments.runs.result import quantities_of
 from experiments.runs.types import Json
 
 from . import say
@@ -144,7 +144,7 @@ def gaps(columns: Mapping[str, Any]) -> dict[str, Json]:
     found["same_state"] = same_state(columns)
     depths = [deepest(columns, number) for number in (1, 2)]
     found["gap_sinkage"] = (depths[1] - depths[0], "m", say("row_gap"))
-    return as_quantities(found)
+    return quantities_of(found)
 
 
 Entries = dict[str, tuple[float, str, str]]

@@ -14,7 +14,7 @@ from coupling import Penetration
 from experiments.campaign.files import MODEL_COPY, keep_model
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
-from experiments.runs.result import Result, as_quantities
+from experiments.runs.result import Result, quantities_of
 from experiments.runs.types import Json
 from experiments.runs.version import __version__
 from experiments.runs.whole_runs import publish
@@ -77,7 +77,7 @@ def run_beside(law: AmendedLaw, units: Sequence[Unit], beds: Runs, models: Runs,
     sentences = []
     if plain is not None and amended is not None:
         sentences.append(say("off_by", law=law, amended=100 * amended, plain=100 * plain))
-    return Beside(runs, as_quantities(quantities, std=None), sentences)
+    return Beside(runs, quantities_of(quantities, std=None), sentences)
 
 
 def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Result:
@@ -113,7 +113,7 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
             ground=settings.ground,
             version=__version__,
             title=f"A {1e3 * settings.tip_diameter:g} mm spike on the spring-damper, and with {law.words}",
-            quantities=as_quantities(found, std=None),
+            quantities=quantities_of(found, std=None),
             runs=[_entry(unit, plain[unit.id], runs[unit.id]) for unit in units],
             spike=asdict(make_spike(settings)) | {"load": settings.weight},
             model={"file": settings.model, "effects": list(law.effects)},

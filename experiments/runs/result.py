@@ -20,7 +20,7 @@ from experiments.runs.types import Json
 from experiments.runs.version import __version__
 from rigid.series import RESULT_FORMAT, ResultFormat, Series, pandas
 
-__all__ = ["Departures", "Quantity", "Result", "Series", "Table", "as_quantities", "quantity", "schema"]
+__all__ = ["Departures", "Quantity", "Result", "Series", "Table", "quantities_of", "quantity", "schema"]
 
 Number = StrictInt | StrictFloat | None
 
@@ -142,7 +142,7 @@ def quantity(value: float | None, unit: str, note: str = "", *, std: float | Non
     return entry | {"note": note} if note else entry
 
 
-def as_quantities(found: Mapping[str, tuple[float | None, str, str]], *, std: float | None = 0.0) -> dict[str, Json]:
+def quantities_of(found: Mapping[str, tuple[float | None, str, str]], *, std: float | None = 0.0) -> dict[str, Json]:
     """Name -> (value, unit, note) as entries of a result, all with the same `std`."""
     return {name: quantity(value, unit, note, std=std) for name, (value, unit, note) in found.items()}
 

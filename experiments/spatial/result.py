@@ -18,7 +18,8 @@ from experiments.grains.bed_result import (
 )
 from experiments.grains.softening import Softening
 from experiments.runs.folder import write_series
-from experiments.runs.result import Result, as_quantities
+from experiments.runs.result import Result
+from experiments.runs.result import quantities_of as as_quantities
 from experiments.runs.types import Json
 from experiments.tumble.words import way_through
 from rigid.spatial.quaternions import to_matrix

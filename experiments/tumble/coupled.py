@@ -13,7 +13,7 @@ from experiments.grains.bed_result import unsettled_warning
 from experiments.platform.tips import tip_depth
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
-from experiments.runs.result import as_quantities
+from experiments.runs.result import quantities_of
 from experiments.runs.types import Json
 from rigid.planar.trajectory import Trajectory
 
@@ -82,7 +82,7 @@ def coupled_quantities(run: CoupledTumble) -> tuple[dict[str, Json], Json]:
         ),
     }  # fmt: skip
     own, more = own_quantities(run, sinkage, normal)
-    return as_quantities(found) | own, more
+    return quantities_of(found) | own, more
 
 
 def feet_columns(run: CoupledTumble) -> Json:

@@ -21,7 +21,7 @@ from experiments.grains.graded import coarsest_touched, tips_in_ground
 from experiments.grains.softening import Softening
 from experiments.platform.surfaces import find_surface
 from experiments.runs.folder import RunFolder, write_series
-from experiments.runs.result import as_quantities
+from experiments.runs.result import quantities_of as as_quantities
 from experiments.runs.types import Json
 from rigid.planar.trajectory import Trajectory
 from vis.tumble.beside import HEAD, beside_rows, beside_words
