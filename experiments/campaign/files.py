@@ -144,9 +144,6 @@ def keep_model(model: str | Path | None, folder: Path) -> Path | None:
     return copy
 
 
-# Reading --------------------------------------------------------------------------------------------------------------
-
-
 def _read_tables(path: Path, kinds: Mapping[str, type[BaseModel]]) -> BaseModel:
     tables, faults = _make_tables(path, _read_toml(path, kinds), kinds)
     if tables is None:
@@ -269,9 +266,6 @@ def _table_in(hint: Any) -> type[BaseModel] | None:
 def _short(value: Any) -> str:
     text = repr(list(value)) if isinstance(value, tuple) else repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
-
-
-# Writing --------------------------------------------------------------------------------------------------------------
 
 
 def _tables_toml(tables: BaseModel) -> str:

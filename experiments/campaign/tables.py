@@ -60,9 +60,6 @@ class EffectTable(Table):
     file: str | None = Field(None, description="path of a user's own term, relative to model.toml")
 
 
-# Tumbles --------------------------------------------------------------------------------------------------------------
-
-
 HEDGEHOG_ROWS = 8
 """Rows of spikes that a platform has of which nothing is said."""
 
@@ -297,9 +294,6 @@ class TumbleModel(_TumbleTables):
 
     trial: tuple[TumbleTrial, ...] = Field((), description="[[trial]]")
     effect: tuple[EffectTable, ...] = Field((), description="[[effect]]")
-
-
-# Penetration ----------------------------------------------------------------------------------------------------------
 
 
 class SpikeTable(Table):

@@ -136,9 +136,6 @@ def _stray(word: str, settings_class: type[BaseModel]) -> str:
     return f"{word} belongs to no option: an option that describes one number takes one{several}"
 
 
-# Commands ------------------------------------------------------------------------------------------------------------
-
-
 _Json = Annotated[bool, Parameter(help="Print the result as JSON on stdout and nothing else.", negative="")]
 _Quiet = Annotated[bool, Parameter(help="Show no progress.", negative="")]
 _Verbose = Annotated[bool, Parameter(help="Print every number and finding, as the report has them.", negative="")]

@@ -45,9 +45,6 @@ def _compute(settings: HopSettings, folder: RunFolder, progress: Progress) -> Re
     return _result(settings, plan, hop, given, wanted)
 
 
-# On ground that gives -------------------------------------------------------------------------------------------------
-
-
 def _trial(settings: HopSettings, plan: HopPlan, hop: Hop) -> Trial | None:
     return hop_trial(plan, torque=hop.torque, wheel_speed=hop.effort if settings.actuator == "brake" else None)
 
@@ -83,9 +80,6 @@ def _write_series(settings: HopSettings, folder: RunFolder, hop: Hop, given: Sur
     for name, (left, flown) in flights.items():
         along, height = flight_path(left, flown, gravity=settings.gravity, radius=settings.body_radius)
         folder.write_series(name, {"along_m": along, "height_m": height})
-
-
-# The result -----------------------------------------------------------------------------------------------------------
 
 
 def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | None, sought: float | None) -> Result:

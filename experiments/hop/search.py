@@ -84,9 +84,6 @@ def longest_flight(plan: HopPlan, left: Launch) -> float:
     return 2 * left.time + 0.5 + 0.5 * flight(left.speed, left.angle, gravity=plan.tumbler.gravity).time  # type: ignore[union-attr]
 
 
-# What the actuator can do ---------------------------------------------------------------------------------------------
-
-
 def _by_brake(plan: HopPlan, settings: HopSettings) -> _Means:
     tumbler, wheel, torque = plan.tumbler, plan.wheel, plan.numbers["torque"].value
     if torque <= tumbler.tipping_torque:
@@ -130,9 +127,6 @@ def _impulsive_speed(plan: HopPlan, settings: HopSettings) -> float:
     sudden = impulsive_launch(plan.tumbler, plan.wheel.inertia)
     gravity, radius = settings.gravity, settings.body_radius
     return launch_speed_for(_wanted(plan), sudden.angle, gravity=gravity, radius=radius) / sudden.speed
-
-
-# The hop --------------------------------------------------------------------------------------------------------------
 
 
 def _hop(settings: HopSettings, means: _Means, effort: float) -> Hop | None:

@@ -52,9 +52,6 @@ RUN_FORMAT = "hedgebed-run/1"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")
 
 
-# Files ---------------------------------------------------------------------------------------------------------------
-
-
 def write_text(path: Path, text: str) -> None:
     """Write `text` to `path` (UTF-8), all of it or nothing."""
     with replacing(Path(path)) as temporary:
@@ -92,9 +89,6 @@ def write_json(path: Path, data: Any) -> None:
 def read_json(path: Path) -> Any:
     """The contents of the JSON file `path`."""
     return json.loads(Path(path).read_text(encoding="utf-8"))
-
-
-# run.toml ------------------------------------------------------------------------------------------------------------
 
 
 def toml_value(value: Any) -> str:
@@ -138,9 +132,6 @@ def settings_toml(command: str, settings: BaseModel, version: str, code: str = "
 def settings_in(table: Mapping[str, Any]) -> dict[str, Any]:
     """The settings in `table`, a run.toml read: name -> value, None for what is not set."""
     return {**dict.fromkeys(table.get("not_set", [])), **table["settings"]}
-
-
-# The folder ----------------------------------------------------------------------------------------------------------
 
 
 def _what_else(path: Path) -> str:

@@ -40,9 +40,6 @@ class _Computed:
     warnings: tuple[str, ...] = ()
 
 
-# The ground ----------------------------------------------------------------------------------------------------------
-
-
 def check(settings: TumbleSettings) -> None:
     """Raise ValueError, naming key, value and what would do, for what the settings class cannot see."""
     if settings.ground == "bed":
@@ -76,9 +73,6 @@ def _compute(settings: TumbleSettings, plan: TumblePlan, folder: RunFolder, prog
 
         return _Computed(*compute_coupled(settings, plan, folder, progress))
     return _Computed(*_integrate(settings, plan, duration=settings.duration))
-
-
-# The planar model ----------------------------------------------------------------------------------------------------
 
 
 def _check_planar(settings: TumbleSettings, plan: TumblePlan) -> None:

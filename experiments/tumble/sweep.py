@@ -133,9 +133,6 @@ def run_sweep(
     }
 
 
-# Its trials -----------------------------------------------------------------------------------------------------------
-
-
 def _plan(
     settings: TumbleSettings, *, model_file: Path | None = None, platform: PlatformNumbers | None = None
 ) -> list[_Point]:
@@ -225,9 +222,6 @@ def _shown(ranges: Sequence[SweepRange], points: Sequence[_Point]) -> int:
         else:
             return int(place)
     raise ValueError(f"sweep: none of its {len(points)} trials can stand; in the middle {why}")
-
-
-# What it says ---------------------------------------------------------------------------------------------------------
 
 
 def _gaps(duration: float, points: Sequence[_Point], found: dict[str, Array], places: Sequence[int]) -> Json:

@@ -184,9 +184,6 @@ def _make(settings: CampaignSettings, conditions: Sequence[_Condition], progress
     return _Made(campaign, _true_model(settings, first, truth, true_trials), rows)
 
 
-# A tumble's own campaign ----------------------------------------------------------------------------------------------
-
-
 def check_tumble_campaign(settings: TumbleSettings) -> None:
     """Raise ValueError for a tumble whose campaign cannot be written, before any work."""
     if settings.campaign is None:
