@@ -49,8 +49,7 @@ class Campaign:
 
     tables: TumbleCampaign | PenetrationCampaign
     recordings: Mapping[tuple[str, str], Recording] = field(repr=False)
-    folder: Path | None = None
-    """Where it was read from."""
+    folder: Path | None = None  # where it was read from
 
     def recording(self, trial: str, sensor: str) -> Recording | None:
         """What a sensor recorded in the trial of this id; None where it has none. Raises KeyError for an unknown id."""

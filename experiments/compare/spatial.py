@@ -39,14 +39,11 @@ NEEDED = {
 class MovedInSpace:
     """A tumble in space as its run folder has it."""
 
-    series: Mapping[str, Array]
-    """Of trajectory.csv, `state` among them."""
+    series: Mapping[str, Array]  # of trajectory.csv, `state` among them
     motion: Mapping[str, Array]
     feet: Mapping[str, Array]
-    weight: float
-    """(m + m_b) g_sim [N]."""
-    spikes: tuple[str, ...]
-    """Numbers of those that came down, and "hull" if it did."""
+    weight: float  # (m + m_b) g_sim [N]
+    spikes: tuple[str, ...]  # numbers of those that came down, and "hull" if it did
     notes: list[str] = field(default_factory=list)
 
     @property

@@ -35,21 +35,14 @@ ENERGIES = ("kinetic_J", "potential_J", "stored_J", "energy_J", "torque_work_J",
 class Moved:
     """A tumble as its run folder has it."""
 
-    series: Mapping[str, Array]
-    """Of trajectory.csv, `state` among them."""
+    series: Mapping[str, Array]  # of trajectory.csv, `state` among them
     motion: Mapping[str, Array]
-    count: int
-    """Rows of spikes."""
-    sinkage: Array
-    """Depth of the lowest point of each row [m], 0 above the surface, shape [time, row]."""
-    load: Array | None
-    """On each row, upwards [N], shape [time, row]; None where it is not known."""
-    lift: Array | None
-    """The ground's force, upwards [N], shape [time]."""
-    push: Array | None
-    """The same, along x [N]."""
-    weight: float = 0.0
-    """(m + m_b) g_sim [N]."""
+    count: int  # rows of spikes
+    sinkage: Array  # depth of the lowest point of each row [m], 0 above the surface, shape [time, row]
+    load: Array | None  # on each row, upwards [N], shape [time, row]; None where it is not known
+    lift: Array | None  # the ground's force, upwards [N], shape [time]
+    push: Array | None  # the same, along x [N]
+    weight: float = 0.0  # (m + m_b) g_sim [N]
     notes: list[str] = field(default_factory=list)
 
     @property

@@ -37,21 +37,15 @@ class HopPlan:
 
     platform: Platform
     wheel: Flywheel
-    brake: str
-    """What slows the wheel, in words."""
+    brake: str  # what slows the wheel, in words
     tumbler: Tumbler
     surface: str
-    stiffness: float
-    """K of a row [N/m]."""
-    damping: float
-    """C of a row [N s/m]."""
-    spike_count: int | None
-    """Rows of tips for the planar model; None where they are not at equal angles."""
-    distance: float | None
-    """How far to hop [m]; None where that is what is asked."""
+    stiffness: float  # K of a row [N/m]
+    damping: float  # C of a row [N s/m]
+    spike_count: int | None  # rows of tips for the planar model; None where they are not at equal angles
+    distance: float | None  # how far to hop [m]; None where that is what is asked
     numbers: Mapping[str, Number]
-    choices: Mapping[str, str]
-    """What else stands at its default: name -> value."""
+    choices: Mapping[str, str]  # what else stands at its default: name -> value
     warnings: tuple[str, ...] = ()
 
     @property

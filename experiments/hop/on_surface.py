@@ -30,12 +30,9 @@ CLOSE = 1e-4
 class SurfaceHop:
     """What the planar model does with the same torque and wheel."""
 
-    launch: Launch | None
-    """None: it does not leave the ground for good."""
-    flight: Flight | None
-    """None: it does not leave the ground, or does not come down."""
-    trajectory: Trajectory
-    """From the start of the torque until a little after it has left."""
+    launch: Launch | None  # None: it does not leave the ground for good
+    flight: Flight | None  # None: it does not leave the ground, or does not come down
+    trajectory: Trajectory  # from the start of the torque until a little after it has left
 
 
 def hop_trial(plan: HopPlan, *, torque: float, wheel_speed: float | None) -> Trial | None:

@@ -34,10 +34,8 @@ BEYOND = 10.0
 class Hop:
     """One hop: what the actuator did, how the platform left, how it flew (None: it does not come down)."""
 
-    effort: float
-    """Wheel speed of a brake [rad/s], torque of a motor [N m]."""
-    torque: float
-    """On the platform [N m]."""
+    effort: float  # wheel speed of a brake [rad/s], torque of a motor [N m]
+    torque: float  # on the platform [N m]
     launch: Launch
     flight: Flight | None
 
@@ -47,12 +45,10 @@ class _Means:
     """What the actuator can do."""
 
     leave: Callable[[float], Launch | None]
-    torque: Callable[[float], float]
-    """Of an effort [N m]."""
+    torque: Callable[[float], float]  # of an effort [N m]
     least: float
     most: float
-    what: str
-    """In words, at its most."""
+    what: str  # in words, at its most
     unit: str
 
 

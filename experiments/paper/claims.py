@@ -40,8 +40,7 @@ class Claim:
     ours: str
     difference: str = ""
     judged_by: str
-    met: bool | None
-    """None where nothing can be compared."""
+    met: bool | None  # None where nothing can be compared
     note: str = ""
 
 

@@ -46,8 +46,7 @@ class Job:
     """One integration."""
 
     id: str
-    rig: float
-    """g_sim [9.80665 m/s2]."""
+    rig: float  # g_sim [9.80665 m/s2]
     torque: float
     surface: str
     variant: str
@@ -58,8 +57,7 @@ class Job:
     max_wheel_speed: float = math.inf
     """Where a motor's torque ends [rad/s]; not known of a wheel with another inertia than the platform's."""
     kind: str = ""
-    varied: Mapping[str, Any] = field(default_factory=dict)
-    """As `paper_variants.Variant` has them."""
+    varied: Mapping[str, Any] = field(default_factory=dict)  # as `paper_variants.Variant` has them
 
     @property
     def method(self) -> Any:

@@ -106,8 +106,7 @@ class AmendedLaw:
 
     settings: PenetrateSettings
     model: PenetrationModel
-    slots: Mapping[str, float]
-    """Numbers of the library's effects, of this spike's diameter."""
+    slots: Mapping[str, float]  # numbers of the library's effects, of this spike's diameter
     own: tuple[OwnEffect, ...] = ()
 
     @property

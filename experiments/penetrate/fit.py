@@ -35,16 +35,11 @@ Array = NDArray[np.float64]
 class Fit:
     """A fitted spring-damper."""
 
-    stiffness: float
-    """K [N/m]."""
-    damping: float
-    """C [N s/m]."""
-    stiffness_error: float | None
-    """Standard error of K by jackknife over runs [N/m]; None below three runs."""
-    damping_error: float | None
-    """Standard error of C by jackknife over runs [N s/m]; None below three runs."""
-    runs: tuple[str, ...]
-    """Ids of the runs that counted."""
+    stiffness: float  # K [N/m]
+    damping: float  # C [N s/m]
+    stiffness_error: float | None  # standard error of K by jackknife over runs [N/m]; None below three runs
+    damping_error: float | None  # standard error of C by jackknife over runs [N s/m]; None below three runs
+    runs: tuple[str, ...]  # ids of the runs that counted
     correlation: float | None = None
     """Of the two estimates, -1 to 0: at -1 only a sum of both is known, not each (None where it was not fitted)."""
 
@@ -70,18 +65,12 @@ class Moments:
     With them a result.json can be fitted again, to some of its runs, when the series are gone.
     """
 
-    zz: float
-    """[m2]."""
-    zv: float
-    """[m2/s]."""
-    vv: float
-    """[m2/s2]."""
-    zf: float
-    """[N m]."""
-    vf: float
-    """[N m/s]."""
-    ff: float
-    """[N2]."""
+    zz: float  # [m2]
+    zv: float  # [m2/s]
+    vv: float  # [m2/s2]
+    zf: float  # [N m]
+    vf: float  # [N m/s]
+    ff: float  # [N2]
 
     @property
     def matrix(self) -> Array:

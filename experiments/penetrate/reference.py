@@ -47,13 +47,10 @@ def read_reference(reference: str | Path) -> Json:
 class _Side:
     """What is known of the runs of one result."""
 
-    conditions: Counter[Condition]
-    """How often each kind and speed was run, set-downs left out."""
-    moments: dict[str, tuple[Condition, Moments]]
-    """By id, of the runs that can be fitted."""
+    conditions: Counter[Condition]  # how often each kind and speed was run, set-downs left out
+    moments: dict[str, tuple[Condition, Moments]]  # by id, of the runs that can be fitted
     quantities: Mapping[str, Any]
-    whole: bool
-    """Whether every run that can be fitted tells its moments: results of versions before 0.1 do not."""
+    whole: bool  # whether every run that can be fitted tells its moments: results of versions before 0.1 do not
 
 
 def _side(result: Mapping[str, Any]) -> _Side:

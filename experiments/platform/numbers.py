@@ -33,18 +33,14 @@ class PlatformNumbers:
     mass: float
     inertia: float
     spike_length: float
-    lean: float
-    """Angle from the vertical of the line from the leading tips to the centre, at rest [rad]."""
-    spike_count: int | None
-    """Rows of tips at equal angles; None where they are not."""
+    lean: float  # angle from the vertical of the line from the leading tips to the centre, at rest [rad]
+    spike_count: int | None  # rows of tips at equal angles; None where they are not
     wheel_inertia: float
     motor_torque: float
     brake_torque: float
     max_wheel_speed: float
-    spike_diameter: float
-    """Of shafts and ball tips [m]; 0 where it has no spikes."""
-    spike_clear: float
-    """How far a spike stands out of the hull, along itself [m]; 0 where it has none."""
+    spike_diameter: float  # of shafts and ball tips [m]; 0 where it has no spikes
+    spike_clear: float  # how far a spike stands out of the hull, along itself [m]; 0 where it has none
 
     @property
     def max_motor_torque(self) -> float:

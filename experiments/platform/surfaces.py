@@ -20,24 +20,18 @@ class Surface:
     """Numbers of one material, per row of two spikes."""
 
     name: str
-    stiffness: float
-    """K [N/m]."""
-    damping: float
-    """C [N s/m], while going in."""
-    mu_s: float
-    """Coefficient of static friction [1]."""
-    mu_d: float
-    """Coefficient of sliding friction [1]."""
+    stiffness: float  # K [N/m]
+    damping: float  # C [N s/m], while going in
+    mu_s: float  # coefficient of static friction [1]
+    mu_d: float  # coefficient of sliding friction [1]
     source: str
     granular: bool = False
-    grains: str | None = None
-    """The material of `dem` whose grains a bed of it is made of."""
+    grains: str | None = None  # the material of `dem` whose grains a bed of it is made of
     packing: float | None = None
     """Packing fraction of the samples that those grains were calibrated with [1]; None: of no certain one."""
     spike: float | None = None
     """Diameter of the spikes with ball tips that K and C are of [m]; None: of no certain ones."""
-    guess: bool = False
-    """Whether nothing but judgement stands behind the numbers."""
+    guess: bool = False  # whether nothing but judgement stands behind the numbers
 
 
 @cache

@@ -34,8 +34,7 @@ class Headline:
     rows: tuple[tuple[str, ...], ...]
     warnings: tuple[str, ...]
     sentences: tuple[str, ...]
-    left: int
-    """Findings that are left to the report."""
+    left: int  # findings that are left to the report
 
 
 @dataclass(frozen=True)
@@ -51,8 +50,7 @@ class Preset:
 class Experiment:
     """One experiment: its name on the command line, one line of help, and where its settings and its code are."""
 
-    name: str
-    """On the command line; a second word makes it a command of the experiment that is called by the first."""
+    name: str  # on the command line; a second word makes it a command of the experiment that is called by the first
     summary: str
     settings: str  # "module:Class", a frozen pydantic model; every field with a description that gives the unit
     module: str

@@ -34,8 +34,7 @@ class SpatialForecast(Forecast):
 
     run: SpatialRun
     low: tuple[float, float]
-    high: tuple[float, float]
-    """Corners of where tips come down, x and y from the start [m]."""
+    high: tuple[float, float]  # corners of where tips come down, x and y from the start [m]
 
 
 class SpatialOnBed(PlatformOnBed[SpatialSettings, SpatialRun, SpatialForecast]):

@@ -43,16 +43,12 @@ CALM = 3.0
 class Cost:
     """An estimate."""
 
-    grains: float
-    """Of the whole bed."""
-    time_step: float
-    """[s]"""
-    bed_seconds: float
-    """Preparing the bed, once for all cases that share it [s]."""
+    grains: float  # of the whole bed
+    time_step: float  # [s]
+    bed_seconds: float  # preparing the bed, once for all cases that share it [s]
     run_seconds: float
     """The tumble [s]; a motor's with sleep, as many grains awake as in the looks, otherwise every grain computed."""
-    grain_steps: float
-    """Of the tumble."""
+    grain_steps: float  # of the tumble
 
     @property
     def seconds(self) -> float:

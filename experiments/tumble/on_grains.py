@@ -56,12 +56,9 @@ class PlanarForecast(Forecast):
 
     trajectory: Trajectory
     behind: float
-    ahead: float
-    """Where the tips come down, from the start [m]."""
-    sunk: float
-    """Depth of the tips that it stands on before it moves [m]."""
-    pushed: float
-    """Largest force of the rows together [N]."""
+    ahead: float  # where the tips come down, from the start [m]
+    sunk: float  # depth of the tips that it stands on before it moves [m]
+    pushed: float  # largest force of the rows together [N]
     farthest: float
     """Where tips may come down on grains, which hold a row and the torque with it as long as it acts [m]."""
 

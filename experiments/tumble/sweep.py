@@ -55,10 +55,8 @@ class _Point:
     """One trial of a sweep."""
 
     values: tuple[float, ...]
-    trial: Trial
-    """As planned: its torque does not yet end where the wheel is at its limit."""
-    max_wheel_speed: float
-    """[rad/s]."""
+    trial: Trial  # as planned: its torque does not yet end where the wheel is at its limit
+    max_wheel_speed: float  # [rad/s]
 
 
 def middle_of_sweep(

@@ -22,8 +22,7 @@ _TYPED = "KEY=FROM:TO:STEP such as mu_s=0.3:0.6:0.1"
 class SweepRange:
     """One number and its values."""
 
-    key: str
-    """A setting, or ``effect.parameter``."""
+    key: str  # A setting, or ``effect.parameter``
     values: tuple[float, ...]
 
     @property

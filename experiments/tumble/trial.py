@@ -47,12 +47,9 @@ SPIKES_PER_ROW = 2.0
 class Spikes:
     """What grains meet of a platform's spikes."""
 
-    diameter: float
-    """[m]"""
-    clear: float
-    """How far they stand out of the hull [m]."""
-    of_platform: tuple[str, ...]
-    """Which of the two were not given, and are the platform's: by the settings' names."""
+    diameter: float  # [m]
+    clear: float  # how far they stand out of the hull [m]
+    of_platform: tuple[str, ...]  # which of the two were not given, and are the platform's: by the settings' names
 
 
 def spikes_of(settings: TumbleSettings, own: PlatformNumbers) -> Spikes:
@@ -76,17 +73,12 @@ class TumblePlan:
 
     trial: Trial
     numbers: Mapping[str, Number]
-    surface: str
-    """Name of the material."""
-    choices: Mapping[str, str]
-    """What else was left at its default: name -> value, as a person would type it."""
-    platform: PlatformNumbers
-    """What gives the numbers that nothing else gives."""
-    spikes: Spikes
-    """What grains meet of its spikes."""
+    surface: str  # name of the material
+    choices: Mapping[str, str]  # what else was left at its default: name -> value, as a person would type it
+    platform: PlatformNumbers  # what gives the numbers that nothing else gives
+    spikes: Spikes  # what grains meet of its spikes
     warnings: tuple[str, ...] = ()
-    max_wheel_speed: float = math.inf
-    """Where a motor's torque ends [rad/s]."""
+    max_wheel_speed: float = math.inf  # where a motor's torque ends [rad/s]
 
     def sentences(self) -> list[str]:
         """One line for each number and choice that was not given: every default is said."""
