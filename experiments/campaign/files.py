@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, get_args
 
+import numpy as np
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
@@ -33,7 +34,17 @@ from .tables import (
     trial_faults,
 )
 
-__all__ = ["Campaign", "MODEL_COPY", "keep_model", "read_campaign", "read_model", "write_campaign", "write_model"]
+__all__ = [
+    "Campaign",
+    "MODEL_COPY",
+    "check_target",
+    "keep_model",
+    "place_campaign",
+    "read_campaign",
+    "read_model",
+    "write_campaign",
+    "write_model",
+]
 
 _CAMPAIGNS: dict[str, type[BaseModel]] = {"tumble": TumbleCampaign, "penetration": PenetrationCampaign}
 _ALL = frozenset(("pose", "imu", "wheel", "depth", "force", "accel"))
@@ -110,6 +121,43 @@ def write_campaign(folder: str | Path, campaign: Campaign) -> Path:
             write_recording(folder / name, recording)
     write_text(folder / "campaign.toml", _tables_toml(campaign.tables))  # last: without it there is no campaign
     return folder
+
+
+def check_target(target: str | Path, *, keep_out: Path | None = None) -> Path:
+    """The folder to write a campaign into. Raises ValueError where it is in use, or is, or lies around, `keep_out`."""
+    path = Path(target)
+    if path.exists() and (not path.is_dir() or any(path.iterdir())):
+        raise ValueError(f"campaign = {str(path)!r} is in use: a folder that is empty or does not exist yet would do")
+    if keep_out is not None and keep_out.resolve().is_relative_to(path.resolve()):
+        raise ValueError(
+            f"campaign = {str(path)!r} holds the run's own folder {str(keep_out)!r}, where the truth is kept: another "
+            f"folder would do"
+        )
+    return path
+
+
+def place_campaign(target: str | Path, campaign: Campaign, *, keep_out: Path | None = None) -> Path:
+    """Write `campaign` to `target`, unless just that is there already (of a run that is resumed); return the folder.
+
+    Raises ValueError as `check_target` does, where something else is there.
+    """
+    path = Path(target)
+    try:
+        there: Campaign | None = read_campaign(path)
+    except ValueError:
+        there = None
+    if there is None or not _same(there, campaign):
+        write_campaign(check_target(path, keep_out=keep_out), campaign)
+    return path
+
+
+def _same(one: Campaign, other: Campaign) -> bool:
+    alike = one.tables == other.tables and one.recordings.keys() == other.recordings.keys()
+    return alike and all(
+        np.array_equal(one.recordings[key][name], recording[name], equal_nan=True)
+        for key, recording in other.recordings.items()
+        for name in recording.columns
+    )
 
 
 def read_model(path: str | Path) -> TumbleModel | PenetrationModel:

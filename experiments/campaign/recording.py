@@ -17,7 +17,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.runs.folder import write_text
+from experiments.runs.folder import write_series
 
 __all__ = ["Recording", "read_recording", "write_recording"]
 
@@ -144,14 +144,8 @@ def _read_cells(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
 
 def write_recording(path: Path, recording: Recording) -> None:
     """Write `recording` to `path`; the numbers read back to the same bits."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([*recording.columns, *recording.extra])
-    cells = [
-        [repr(value) for value in np.asarray(values, dtype=float).tolist()] for values in recording.columns.values()
-    ]
-    writer.writerows(zip(*cells, *recording.extra.values(), strict=True))
-    write_text(path, out.getvalue())
+    numbers = {name: np.asarray(values, dtype=float) for name, values in recording.columns.items()}
+    write_series(path, numbers | dict(recording.extra))
 
 
 def _other_csv(path: Path, header: list[str], rows: list[tuple[int, list[str]]]) -> list[str]:

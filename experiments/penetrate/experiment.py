@@ -13,8 +13,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from coupling import BedGround, Run
-from experiments.campaign.files import keep_model
-from experiments.campaign.target import place_campaign
+from experiments.campaign.files import keep_model, place_campaign
 from experiments.grains.kept_material import MATERIAL_COPY, keep_material
 from experiments.grains.softening import Softening
 from experiments.runs.folder import RunFolder

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from experiments.campaign import Campaign, PenetrationCampaign, Recording, write_campaign
+from experiments.campaign.files import check_target
 from experiments.campaign.tables import (
     DepthSensor,
     PenetrationSensors,
@@ -27,7 +28,6 @@ from experiments.campaign.tables import (
     PenetrationUncertainty,
     SpikeTable,
 )
-from experiments.campaign.target import check_target
 from experiments.runs.folder import RunFolder, read_series
 from experiments.runs.strict import StrictSettings
 from experiments.runs.types import Json

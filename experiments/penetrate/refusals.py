@@ -2,7 +2,7 @@
 
 import math
 
-from experiments.campaign.target import check_target
+from experiments.campaign.files import check_target
 from experiments.grains.box import expected_grain_count
 from experiments.grains.softening import check_young, drop_depth
 from experiments.grains.where import check_where

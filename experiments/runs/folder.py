@@ -18,7 +18,7 @@ import math
 import os
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
@@ -371,10 +371,6 @@ class RunFolder:
     def done_data(self, name: str) -> Any:
         """What `mark_done(name, data)` was given."""
         return read_json(self.path / "checkpoint" / f"{_checked(name)}.done.json")
-
-    def done_names(self) -> Sequence[str]:
-        """The pieces of work that are finished, sorted."""
-        return sorted(path.name.removesuffix(".done.json") for path in (self.path / "checkpoint").glob("*.done.json"))
 
     @property
     def has_work(self) -> bool:

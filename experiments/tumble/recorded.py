@@ -16,8 +16,8 @@ import numpy as np
 from pydantic import Field
 
 from experiments.campaign import Campaign, Recording, TumbleCampaign, write_campaign
+from experiments.campaign.files import check_target
 from experiments.campaign.tables import RigTable, TumbleSurface, TumbleUncertainty, WheelTable
-from experiments.campaign.target import check_target
 from experiments.runs.folder import RunFolder, read_series
 from experiments.runs.kept_results import PATH_AND_MOTION, require_files
 from experiments.runs.strict import StrictSettings

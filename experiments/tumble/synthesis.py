@@ -24,8 +24,8 @@ from experiments.campaign import (
     write_campaign,
     write_model,
 )
+from experiments.campaign.files import check_target, place_campaign
 from experiments.campaign.tables import FORMAT, RigTable, TumbleSurface, TumbleTrial, TumbleUncertainty, WheelTable
-from experiments.campaign.target import check_target, place_campaign
 from experiments.platform.numbers import torque_within_limit
 from experiments.platform.surfaces import find_surface
 from experiments.runs.folder import RunFolder

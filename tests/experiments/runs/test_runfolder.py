@@ -214,7 +214,7 @@ def test_marks_of_finished_work(folder):
     folder.mark_done("seed-1", {"stiffness": 2.5})
     assert folder.is_done("seed-1")
     assert folder.done_data("seed-1") == {"stiffness": 2.5}
-    assert folder.done_names() == ["seed-1"]
+    assert not folder.is_done("seed-2")
     assert folder.has_work
 
 
