@@ -10,15 +10,7 @@ from types import FrameType
 
 from cyclopts import CoercionError, MissingArgumentError
 
-__all__ = [
-    "RefusedError",
-    "fault_words",
-    "is_number",
-    "refusing",
-    "say",
-    "stdout_to_stderr",
-    "terminate_like_ctrl_c",
-]
+__all__ = ["RefusedError", "fault_words", "is_number", "refusing", "say", "stdout_to_stderr", "terminate_like_ctrl_c"]
 
 
 class RefusedError(ValueError):
