@@ -101,17 +101,11 @@ def slot_table(count: int, own: Sequence[OwnEffect] = ()) -> NDArray[np.float64]
 def push(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDArray[np.int32],
          depth: NDArray[np.float64], speed: NDArray[np.float64],
          own: tuple[OwnEffect, ...] = ()) -> NDArray[np.float64]:  # fmt: skip
-    """Forces [N] of driven spikes along given paths.
+    """Forces [N] of driven spikes along given paths, shape [lane_count, longest path]; 0 beyond a path's end.
 
-    Args:
-        numbers: Shape [lane_count, slot_count].
-        lane_path: Which path a lane follows, shape [lane_count].
-        starts: First row of each path and the row after the last, shape [path_count + 1].
-        depth, speed: The paths [m, m/s], one after another.
-        own: Effects from files, whose parameters `numbers` holds.
-
-    Returns:
-        Shape [lane_count, longest path]; 0 beyond a path's end.
+    `numbers`: shape [lane_count, slot_count]. `lane_path`: which path a lane follows, shape [lane_count]. `starts`:
+    first row of each path and the row after the last, shape [path_count + 1]. `depth`, `speed`: the paths [m, m/s], one
+    after another. `own`: effects from files, whose parameters `numbers` holds.
     """
     ensure()
     longest = int(np.diff(starts).max())
@@ -124,19 +118,11 @@ def push(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDA
 def fall(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDArray[np.int32],
          times: NDArray[np.float64], speeds: NDArray[np.float64],
          own: tuple[OwnEffect, ...] = ()) -> NDArray[np.float64]:  # fmt: skip
-    """Motions of dropped spikes, at depth 0 at t = 0.
+    """Motions of dropped spikes, at depth 0 at t = 0: depth [m], NaN where a motion leaves all bounds, speed [m/s],
+    acceleration [m/s2] and phase (place in `PHASES`), shape [lane_count, longest, 4].
 
-    Args:
-        numbers: Shape [lane_count, slot_count].
-        lane_path: Which trial a lane is, shape [lane_count].
-        starts: As of `push`.
-        times: The trials' sample times [s], rising, one trial after another; before 0 in free flight.
-        speeds: Speed at the surface of each trial [m/s].
-        own: As of `push`.
-
-    Returns:
-        Depth [m], speed [m/s], acceleration [m/s2] and phase (place in `PHASES`), shape [lane_count, longest, 4]. NaN
-        depths where a motion leaves all bounds.
+    `numbers`, `lane_path`, `starts`, `own`: as of `push`. `times`: the trials' sample times [s], rising, one trial
+    after another; before 0 in free flight. `speeds`: speed at the surface of each trial [m/s].
     """
     ensure()
     longest = int(np.diff(starts).max())

@@ -48,12 +48,10 @@ def physical_at(form: Form, points: Sequence[Values]) -> dict[str, Array]:
 
 
 def tumble_forms(*, rig: bool, own: Sequence[OwnEffect] = (), **typical: float) -> tuple[Form, ...]:
-    """The library for one campaign.
+    """The library for one campaign, and effects from files (`own`).
 
-    Args:
-        rig: whether the campaign has the gravity-offloading rig; some effects need it.
-        own: effects from files.
-        typical: what is typical of the campaign (`rigid.terms.candidate.Typical`).
+    `rig`: whether the campaign has the gravity-offloading rig; some effects need it. `typical`: what is typical of it
+    (`rigid.terms.candidate.Typical`).
     """
     sizes = Typical(**typical)
     found = [(found.tumble.rank, id, found.tumble) for id, found in CANDIDATES.items() if found.tumble is not None]

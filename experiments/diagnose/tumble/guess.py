@@ -73,15 +73,7 @@ class Guesser:
         self, forms: Sequence[Form], trials: Sequence[str], values: Values, *, held: bool = False,
         apart: Sequence[Parameter] = (),
     ) -> dict[str, float]:  # fmt: skip
-        """Values near the best for the base model with `forms` on `trials`, beginning from `values`.
-
-        Args:
-            forms: effects that are on.
-            trials: their ids.
-            values: what is known; parameters of a form that are missing are looked for from the form's starts.
-            held: whether everything shared stays as it is.
-            apart: what else is fitted to single trials.
-        """
+        """Values near the best for the base model with `forms` on `trials`, beginning from `values`: see `Contacts`."""
         fitter = Fitter(self.forward, trials=[self._ids.index(trial) for trial in trials])
         start = self._start(forms, values, apart)
         if held:

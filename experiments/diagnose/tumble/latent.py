@@ -29,13 +29,8 @@ _ROWS = 5  # over which the slope of the gyro is taken
 
 def latent_columns(data: TrialData, prediction: Prediction, *, mass: float, inertia: float) -> dict[str, Array]:
     """Columns of latent.csv for one trial, one row an IMU's row with all three readings, or the camera's where there is
-    none; empty without either.
-
-    Args:
-        data: the trial.
-        prediction: of one set of parameters, with its motion.
-        mass: of the platform [kg].
-        inertia: of the platform [kg m2].
+    none; empty without either. `prediction`: of one set of parameters, with its motion. `mass` [kg], `inertia` [kg m2]:
+    of the platform.
     """
     shared, gap, rows = _gaps(data, prediction.value[0], ("gyro", "ax", "ay"))
     felt = len(shared) > 0

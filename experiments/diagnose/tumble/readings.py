@@ -120,14 +120,11 @@ class Grid:
     ) -> None:  # fmt: skip
         """Readings, and states and motion where they are wanted, from the sampled motion.
 
-        Args:
-            series: as the batch recorded it at `times`, shape [set_count, time_count, channel]; not to be kept.
-            place: as `times` has it.
-            optics: of the same sets.
-            horizon: share of the trial's time up to which is read; what comes later is left as it is.
-            value: shape [set_count, sample_count], is filled.
-            state: the same shape, or [.., 0] where it is not wanted.
-            motion: x, y, theta, vx, vy, omega, wheel_speed, shape [set_count, sample_count, 7], or [.., 0, 7].
+        `series`: as the batch recorded it at `times`, shape [set_count, time_count, channel]; not to be kept. `place`:
+        as `times` has it. `optics`: of the same sets. `horizon`: share of the trial's time up to which is read; what
+        comes later is left as it is. Filled are `value`, shape [set_count, sample_count]; `state`, the same shape, or
+        [.., 0] where it is not wanted; and `motion`: x, y, theta, vx, vy, omega, wheel_speed, shape [set_count,
+        sample_count, 7], or [.., 0, 7].
         """
         flat, channels = series.reshape(-1), series.shape[2]
         starts = series.shape[1] * channels * np.arange(len(series))[:, None]
