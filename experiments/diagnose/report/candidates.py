@@ -3,7 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-__all__ = ["candidate_rows", "no_better", "unnamed_sentence"]
+from vis.page.sentences import Sentences
+
+__all__ = ["candidate_rows", "no_better", "say", "unnamed_sentence"]
+
+say = Sentences(__package__)
 
 _MORE = 0.05  # nats by which a set of names must beat each of its parts to be listed
 _SETS = 4  # sets of names that are listed beside the one that is told
@@ -59,10 +63,8 @@ def unnamed_sentence(said: Mapping[str, Any]) -> list[str]:
         return []
     row = ahead[0]
     what = "is not told" if said["effects"] else "does not lead"
-    return [
-        f"Of all that was tried {' + '.join(row['effects'])} has the most evidence, {row['score'] - own['score']:.0f} "
-        f"nats more than {' + '.join(own['effects'])}, and {what}: it {row['note']}."
-    ]
+    names, ours = (" + ".join(one["effects"]) for one in (row, own))
+    return [say("most_evidence", names=names, more=row["score"] - own["score"], own=ours, what=what, row=row)]
 
 
 def _told(said: Mapping[str, Any]) -> tuple[str, ...]:

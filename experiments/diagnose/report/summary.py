@@ -9,7 +9,7 @@ from experiments.diagnose.fit.evidence import SMALL
 from experiments.diagnose.fit.gaps import numeral, size_words
 from experiments.diagnose.noise.spectrum import line_sentence
 
-from .candidates import unnamed_sentence
+from .candidates import say, unnamed_sentence
 from .telling import remark_sentences, shares_words, size_sentences, small_names, sure_sentences, worse_sentences
 
 __all__ = ["scatter_sentence", "summary_sentences", "title_words"]
@@ -63,21 +63,14 @@ def summary_sentences(said: Mapping[str, Any]) -> list[str]:
             f"{bound['parameter']} {bound['sigmas']:+.1f} sigma off" for bound in said["at_bounds"]["before"]
             if bound["sigmas"] is not None
         )  # fmt: skip
-        first = [
-            f"The base model leaves no more than noise, but with {said_so} what was stated: either what was stated of "
-            f"{wrong} is wrong, or a column is in another unit than its heading says, or both. No effect is missing "
-            "that these trials could show."
-        ]
+        first = [say("stated_wrong", said_so=said_so, wrong=wrong)]
     elif said["verdict"] == "unknown":
         first = [*_candidates(said), *_left(said), *worse_sentences(said)]
     else:
         first = [*sure_sentences(said), *worse_sentences(said)]
     ask = said["next_experiment"]
     if wrong:
-        ask = (
-            f"Check the units of the columns (a known weight on the load cell, a ruler beside the drive) and measure "
-            f"{wrong} by itself; then state what comes out."
-        )
+        ask = say("check_units", wrong=wrong)
     return [*_doubts(said), *first, *scatter_sentence(said), f"Next experiment: {ask}"]
 
 
@@ -95,16 +88,9 @@ def scatter_sentence(said: Mapping[str, Any]) -> list[str]:
     weighed = said.get("gap_with_scatter")
     if weighed is None:
         return []
-    if said["verdict"] == "none":
-        return [
-            f"What is beyond the noise is what replicates differ by{_scatter(said)}: weighed against that as well it "
-            f"is {_both(weighed['after'], weighed)}{_rests_on(weighed)}."
-        ]
-    return [
-        f"Weighed against what replicates differ by as well{_scatter(said)}, 1 being as near as another run of the "
-        f"same comes, the gap is {_both(weighed['before'])} with the base model and "
-        f"{_both(weighed['after'], weighed)} with the best one{_rests_on(weighed)}."
-    ]
+    key = "weighed_none" if said["verdict"] == "none" else "weighed_both"
+    before, after = _both(weighed["before"]), _both(weighed["after"], weighed)
+    return [say(key, scatter=_scatter(said), before=before, after=after, rests_on=_rests_on(weighed))]
 
 
 def _scatter(said: Mapping[str, Any]) -> str:
@@ -165,10 +151,7 @@ def _candidates(said: Mapping[str, Any]) -> list[str]:
     near = leading["nearest"]
     if near is not None:
         apart = "these trials tell the two apart" if near["told_apart"] else "these trials do not tell the two apart"
-        first += (
-            f"; the nearest other name, {near['effect']}, is {near['evidence_behind']:.0f} nats behind and "
-            f"{near['angle_deg']:.0f} degrees away in what it changes (0: the same): {apart}"
-        )
+        first += say("nearest", near=near, apart=apart)
     sentences.append(f"{first}.")
     sentences += [*_numbers(leading), *size_sentences(said), *remark_sentences(said), *unnamed_sentence(said)]
     rest = [row for row in _singles(said) if row["effects"][0] not in leading["effects"]][: _NAMES - 1]
@@ -253,11 +236,7 @@ def _left(said: Mapping[str, Any]) -> list[str]:
         phase, channel = (shares_words(places, key, total) for key in ("phase", "channel"))
         first = places[0]
         beyond = ", beyond what replicates differ by," if "gap_with_scatter" in said else ""
-        sentences.append(
-            f"What is left then{beyond} is in phase {phase} and channel {channel}, phases as that model has them; its "
-            f"worst stretch is "
-            f"{first['channel']} of trial {first['trial']} from {first['from_s']:.4g} to {first['to_s']:.4g} s."
-        )
+        sentences.append(say("left", beyond=beyond, phase=phase, channel=channel, first=first))
     if "latent" in said:
         sentences.append(f"The force that is missing goes with {said['latent']['depends_on']}.")
         sentences += [line_sentence(row) for row in said["latent"].get("lines", [])]

@@ -11,7 +11,7 @@ from experiments.diagnose.core.effect_words import meaning
 from experiments.diagnose.fit.gaps import numeral
 from experiments.diagnose.fit.problem import Array, Finding
 
-from .candidates import candidate_rows, no_better, unnamed_sentence
+from .candidates import candidate_rows, no_better, say, unnamed_sentence
 
 __all__ = [
     "PhaseTable", "findings_in_words", "remark_sentences", "setting_words", "shares_words", "size_sentences",
@@ -69,11 +69,7 @@ def where_sentences(said: Mapping[str, Any]) -> list[str]:
     total = sum(place["excess"] for place in places)
     phase, channel = (shares_words(places, key, total) for key in ("phase", "channel"))
     first = places[0]
-    said_first = (
-        f"The base model fails most in phase {phase} and channel {channel}, shares of the chi-square beyond the "
-        f"noise, phases as it has them; its worst stretch is {first['channel']} of trial {first['trial']} from "
-        f"{first['from_s']:.4g} to {first['to_s']:.4g} s."
-    )
+    said_first = say("fails_most", phase=phase, channel=channel, first=first)
     settings = _settings(said)
     return [said_first, *([f"Sample for sample most of it is at {settings}."] if settings else []), *_parted(said)]
 
@@ -173,14 +169,8 @@ def _size_words(size: Mapping[str, Any], *, is_small: bool) -> str:
         return f"{size['effect']} changes nothing that can be seen"
     share = f", {100 * size['share']:.2g} % of it" if size["share"] is not None else ""
     if is_small:
-        return (
-            f"{size['effect']} is small: it changes {size['channel']} by {size['most']:.2g} {size['unit']} at most"
-            f"{share}, {times}"
-        )
-    return (
-        f"{size['effect']} changes {size['channel']} by {size['rms']:.2g} {size['unit']} (root mean square; "
-        f"{size['most']:.2g} {size['unit']} at most){share}, {times}"
-    )
+        return say("is_small", size=size, share=share, times=times)
+    return say("changes", size=size, share=share, times=times)
 
 
 def _parted(said: Mapping[str, Any]) -> list[str]:
@@ -191,24 +181,15 @@ def _parted(said: Mapping[str, Any]) -> list[str]:
         times = [min(row["at_s"] for row in parted if row["trial"] == trial)
                  for trial in dict.fromkeys(row["trial"] for row in parted)]  # fmt: skip
         first = min(parted, key=lambda row: row["at_s"])
-        sentences.append(
-            f"Trials part from the base model at {min(times):.3g} to {max(times):.3g} s, first of all "
-            f"{first['channel']} of trial {first['trial']} at {first['at_s']:.3g} s (a running mean of nine "
-            f"samples beyond 5 sigma)."
-        )
+        sentences.append(say("parts_at", first_s=min(times), last_s=max(times), first=first))
     standing = [row for row in said.get("by_phase", []) if row["phase"] == "stand" and row["before"] > _STANDING
                 and row["channel"] in ("x", "y", "theta")]  # fmt: skip
     if standing:
         names = ", ".join(dict.fromkeys(row["channel"] for row in standing))
         felt = sorted({row["channel"] for row in said["by_phase"] if row["phase"] == "stand"
                        and row["before"] > _STANDING and row["channel"] in ("ax", "ay")})  # fmt: skip
-        sentences.append(
-            f"In phase stand, before, {names} are off by more than noise: the camera's zero is fitted to the whole "
-            f"trial, up to 3 std of the sensor, and follows what is missing later on"
-            + (f"; but {' and '.join(felt)} of the IMU, whose zero is not fitted, {_is_off(felt)} off there too: the "
-               f"platform stands otherwise than the model has it, higher, deeper or askew."
-               if felt else ". By itself that is no sign that it stands otherwise than the model has it.")
-        )  # fmt: skip
+        means = say("felt_standing", felt=" and ".join(felt), are=_is_off(felt)) if felt else say("no_sign_standing")
+        sentences.append(say("off_standing", names=names) + means)
     return sentences
 
 
