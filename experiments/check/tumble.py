@@ -7,14 +7,17 @@ import numpy as np
 
 from experiments.campaign import Campaign, Recording, TumbleCampaign
 from experiments.campaign.tables import TumbleTrial
+from rigid.platform.rig import STANDARD_GRAVITY
 
-from .tables import gravity_oddities
 from .turning import clock_oddities, sideways_oddities, turning_oddities
-from .words import OFF, ZERO, Array, Odd, oddity, said, times, unit_words
+from .words import OFF, ZERO, Array, Odd, oddity, said, say, times, unit_words
 
 __all__ = ["tumble_oddities"]
 
 _LATE = 0.03  # seconds by which the wheel may begin to change late before t = 0 is doubted
+_SIGMAS = 4.0
+_LEAST = 0.2
+"""Share of the weight within which counterweight and gravity may differ: both are rounded, and gravity_sim rules."""
 
 
 def tumble_oddities(campaign: Campaign, tables: TumbleCampaign, trial: TumbleTrial) -> Iterator[Odd]:
@@ -24,7 +27,7 @@ def tumble_oddities(campaign: Campaign, tables: TumbleCampaign, trial: TumbleTri
             yield oddity(name, "other_zero_of_time", name=name, first=recording.time[0], last=recording.time[-1])
             return
     yield from _begins_late(tables, trial, {"pose": pose, "imu": imu, "wheel": wheel})
-    yield from gravity_oddities(tables, trial)
+    yield from _gravity(tables, trial)
     turning: list[Odd] = []
     if pose is not None and imu is not None:
         clocks, told = clock_oddities(tables, pose, imu)
@@ -39,6 +42,29 @@ def tumble_oddities(campaign: Campaign, tables: TumbleCampaign, trial: TumbleTri
         yield from _at_rest(tables, trial, imu)
     if wheel is not None:
         yield from _wheel(tables, trial, wheel)
+
+
+def _gravity(tables: TumbleCampaign, trial: TumbleTrial) -> Iterator[Odd]:
+    """Is (m + m_b) g_sim what (m - m_b) g leaves on the surface, within what is stated and rounding?
+
+    The free-fall acceleration of the pair (`rigid.platform.rig`), which is what a campaign's gravity_sim means,
+    whichever reading of a stated gravity made it.
+    """
+    if tables.rig is None:
+        return
+    mass, other, local = tables.platform.mass, tables.counterweight_of(trial), tables.rig.gravity
+    hung, weight = (mass - other) * local, tables.weight_of(trial)
+    doubt = math.hypot(tables.uncertainty.mass * mass * local, tables.uncertainty.gravity_sim * weight)
+    if abs(hung - weight) <= max(_SIGMAS * doubt, _LEAST * weight):
+        return
+    gives = hung / (mass + other)
+    words = ""
+    if abs(trial.gravity_sim * STANDARD_GRAVITY / gives - 1) < _LEAST:
+        words = f"it looks like units of g: {trial.gravity_sim * STANDARD_GRAVITY:.4g} m/s2 would fit"
+    elif abs(trial.gravity_sim * mass / hung - 1) < _LEAST:
+        words = say("weight_reading")
+    yield oddity("gravity", "counterweight", other=other, hung=hung, gives=gives, trial=trial, weight=weight,
+                 words=words or "one of the two is another")  # fmt: skip
 
 
 def _begins_late(

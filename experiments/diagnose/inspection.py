@@ -16,7 +16,6 @@ from experiments.campaign import Campaign, PenetrationCampaign, Recording, Tumbl
 from experiments.campaign.tables import PenetrationTrial
 from experiments.check import find_implausible, loud_sensors, missing_sensors, said_once, without_companions
 from experiments.check.replicas import Condition, condition_of, condition_words, odd_replicates
-from experiments.check.settings import CheckSettings
 from experiments.grains.spells import spells
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
@@ -26,6 +25,7 @@ from experiments.runs.whole_runs import publish, whole_run
 
 from .fit.problem import Finding
 from .report.telling import findings_in_words
+from .settings import CheckSettings
 
 __all__ = ["check", "find_faults", "resume", "run", "unnamed_files"]
 

@@ -1,10 +1,10 @@
-"""Settings of `hedgebed diagnose`."""
+"""Settings of `hedgebed diagnose` and `hedgebed campaign check`."""
 
 from pydantic import Field
 
 from experiments.runs.strict import StrictSettings
 
-__all__ = ["DiagnoseSettings"]
+__all__ = ["CheckSettings", "DiagnoseSettings"]
 
 
 class DiagnoseSettings(StrictSettings):
@@ -19,3 +19,9 @@ class DiagnoseSettings(StrictSettings):
         json_schema_extra={"option_alias": "--effects-from"},
     )  # fmt: skip
     seed: int = Field(0, ge=0, description="Seed of the made-up data by which the gate is calibrated.")
+
+
+class CheckSettings(StrictSettings):
+    """What is checked."""
+
+    campaign: str = Field(min_length=1, description="Folder of the trials, with campaign.toml.")
