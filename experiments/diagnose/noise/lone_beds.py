@@ -9,7 +9,6 @@ is an effect, or a drift, and is said instead.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from scipy.stats import rankdata
@@ -35,7 +34,7 @@ _WITHOUT = 0.25
 def find_lone_scatter(found: Fit, kinds: Sequence[str]) -> tuple[Scatter, list[Finding]]:
     """The scatter of these kinds between trials none of which repeats another, asked of those of `found`; and what
     speaks against it."""
-    problem: Any = found.model.problem
+    problem = found.model.problem
     trials = [trial for trial in problem.trials if trial.id in found.model.trials]
     sets: dict[float, list[str]] = {}
     for trial in trials:
