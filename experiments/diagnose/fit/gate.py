@@ -270,18 +270,16 @@ def _refitted(found: Fit, random: np.random.Generator, tell: Callable[[float], N
     """Residual modes of a full refit to data made at the fitted values."""
     if tell is not None:
         tell(done)
-    at = found.modes
-    noise = random.standard_normal(found.count)
-    return fit(_Shifted(found.model, at - noise), found.values, rounds=8).modes
+    model, shift = found.model, found.modes - random.standard_normal(found.count)
+    made = _Shifted(model.problem, model.whitener, model.trials, model.forms, model.scatter, shift=shift)
+    return fit(made, found.values, rounds=8).modes
 
 
+@dataclass(frozen=True)
 class _Shifted(Model):
     """A model whose data are other ones: residuals less a constant."""
 
-    def __init__(self, model: Model, shift: Array) -> None:
-        super().__init__(model.problem, model.whitener, model.trials, model.forms, model.scatter)
-        object.__setattr__(self, "shift", shift)
+    shift: Array | float = 0.0
 
-    def evaluate(self, points: list[Values]) -> list[Array]:  # type: ignore[override]
-        shift = self.__dict__["shift"]
-        return [modes - shift for modes in super().evaluate(points)]
+    def evaluate(self, points: Sequence[Values]) -> list[Array]:
+        return [modes - self.shift for modes in super().evaluate(points)]
