@@ -6,6 +6,7 @@ law), shapes, engine (fields, kernels and the core of a bed), measure, prepare; 
 The names in ``__all__`` are public and are imported from here. They are looked up when they are first used, so that
 ``import dem`` does not start Taichi.
 """
+# ruff: noqa: F401  # the names below are in __all__, which is made of the table of modules
 
 from __future__ import annotations
 
@@ -13,38 +14,7 @@ import importlib
 import os
 from typing import TYPE_CHECKING, Any
 
-import hedgebed_renamed  # noqa: F401  (old names of modules)
-
-__all__ = [
-    "Ball",
-    "Bed",
-    "BedFailure",
-    "Box",
-    "Capsule",
-    "Cone",
-    "Cylinder",
-    "Facing",
-    "Graded",
-    "Grains",
-    "LogNormal",
-    "MATERIALS",
-    "Material",
-    "Mesh",
-    "Normal",
-    "Placed",
-    "Plane",
-    "Polyhedron",
-    "Prepared",
-    "SAND",
-    "Sieve",
-    "Sleep",
-    "StageReport",
-    "Tube",
-    "Uniform",
-    "material",
-    "measure_grading",
-    "mesh_from_file",
-]
+import hedgebed_renamed  # old names of modules
 
 # Taichi greets on stdout as it is imported; what a script prints is the script's.
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
@@ -76,6 +46,7 @@ _MODULES = {
     "shapes.mesh": ("Mesh", "Polyhedron", "mesh_from_file"),
     "shapes.solids": ("Box", "Capsule", "Placed", "Tube"),
 }
+__all__ = sorted(name for names in _MODULES.values() for name in names)
 
 
 def __getattr__(name: str) -> Any:

@@ -21,18 +21,7 @@ __all__ = ["BedBodies"]
 class BedBodies(BedBase):
     """A bed into which bodies are put; they move as they are set to, and the grains give way."""
 
-    def add_body(
-        self,
-        shape: AnyShape | Sequence[AnyShape],
-        *,
-        position: Sequence[float],
-        friction: float | None = None,
-        restitution: float | None = None,
-        rolling_friction: float | None = None,
-        young: float | None = None,
-        poisson: float = 0.3,
-        surface_energy: float | None = None,
-    ) -> int:
+    def add_body(self, shape: AnyShape | Sequence[AnyShape], *, position: Sequence[float], **facing: Any) -> int:
         """Put a body among the grains and return its number. It moves as it is told; see ``move_body``.
 
         Args:
@@ -40,23 +29,14 @@ class BedBodies(BedBase):
                 in the body's frame; their union is the body, and touches a grain once. What lies farther sideways from
                 the body's origin than half the bed's period touches nothing.
             position: of the body's origin [m].
-            friction, restitution, rolling_friction: of a grain on the body; the grains' own when None.
-            young, poisson: of the body; rigid when None. [Pa], [1].
-            surface_energy: of a grain and the body [J/m2], see ``dem.Facing``; the grains' own when None.
+            facing: as ``dem.Facing`` has it: friction, restitution, rolling_friction of a grain on the body, young [Pa]
+                and poisson of the body, surface_energy of the two [J/m2]; the grains' own, and rigid, if not given.
 
         Raises ValueError: no shape, a number that no pair can have, too many bodies, a grain already in contact by more
         than the overlap bound.
         """
         self.check_valid()
-        facing = Facing(
-            friction=friction,
-            restitution=restitution,
-            rolling_friction=rolling_friction,
-            young=young,
-            poisson=poisson,
-            surface_energy=surface_energy,
-        )
-        body = self.place_body(shape, position, facing)
+        body = self.place_body(shape, position, Facing(**facing))
         kept = self.max_overlap
         self.max_overlap = 0.0
         self.make_lists()

@@ -17,7 +17,7 @@ A bed without a balance has ``NO_BALANCE`` for a table, and its kernels are comp
 import numpy as np
 import taichi as ti
 
-from .lists import AWAKE, INDEX_BITS, INDEX_MASK, PERIOD_X, PERIOD_Y, SAME_IMAGE
+from .lists import INDEX_BITS, INDEX_MASK, SAME_IMAGE
 from .rows import put_rows, take_rows
 from .values import EnginePart
 
@@ -145,7 +145,7 @@ class BalanceKernels(EnginePart):
         if j >= start and j < end:
             share = ti.cast(1.0, self.real)
         if ti.static(rest.on):
-            if j >= self.count[AWAKE]:
+            if j >= self.count[self.AWAKE]:
                 share = ti.cast(1.0, self.real)
         balance.add(c, share * took)
 
@@ -166,11 +166,11 @@ class BalanceKernels(EnginePart):
         image = bits >> INDEX_BITS
         sleeps = False
         if ti.static(rest.on):
-            sleeps = j >= self.count[AWAKE]
+            sleeps = j >= self.count[self.AWAKE]
         if image != SAME_IMAGE or sleeps:
             shift = ti.Vector.zero(self.real, 3)
-            shift.x = ti.cast(image % 3 - 1, self.real) * self.box[PERIOD_X]
-            shift.y = ti.cast(image // 3 - 1, self.real) * self.box[PERIOD_Y]
+            shift.x = ti.cast(image % 3 - 1, self.real) * self.box[self.PERIOD_X]
+            shift.y = ti.cast(image // 3 - 1, self.real) * self.box[self.PERIOD_Y]
             # Across chunks both sides have a row; a sleeper has none.
             share = ti.cast(0.5, self.real)
             if sleeps or (j >= start and j < end):
@@ -187,8 +187,8 @@ class BalanceKernels(EnginePart):
         # From the grain to where the body has the contact: a period where an image of the body is met.
         off = at + arm + arm_i * n - self.position[i].xyz
         shift = ti.Vector.zero(self.real, 3)
-        shift.x = ti.round(off.x / self.box[PERIOD_X]) * self.box[PERIOD_X]
-        shift.y = ti.round(off.y / self.box[PERIOD_Y]) * self.box[PERIOD_Y]
+        shift.x = ti.round(off.x / self.box[self.PERIOD_X]) * self.box[self.PERIOD_X]
+        shift.y = ti.round(off.y / self.box[self.PERIOD_Y]) * self.box[self.PERIOD_Y]
         balance.turn(c, OUTSIDE, -dt * shift.cross(f))
         taken = dt * (t_body - at.cross(f))
         if b == 0:

@@ -30,19 +30,7 @@ from dem.shapes.basic import ROW_WIDTH
 
 from . import runtime
 from .dissipation import NO_BALANCE, Balance, BalanceKernels
-from .lists import (
-    AWAKE,
-    BOTTOM,
-    CACHE_LINE,
-    CELLS,
-    CHUNKS,
-    ITEMS_PER_THREAD,
-    MOST_BODIES,
-    SCAN_BLOCKS,
-    SORTED,
-    SORTED_CELLS,
-    Lists,
-)
+from .lists import CACHE_LINE, ITEMS_PER_THREAD, MOST_BODIES, SCAN_BLOCKS, Lists
 from .readings import TALLY_BLOCKS, Readings
 from .shape_table import PLAIN, Shapes
 from .sleep_kernels import EVERYONE, Rest, Sleepers
@@ -275,7 +263,7 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         self.grain_count = grain_count
         self.chunk_count = chunk_count
         self.nx, self.ny, self.nz = cells
-        self.bottom = box[BOTTOM]
+        self.bottom = box[self.BOTTOM]
         self.chunk_room = self.pair.shape[0] // chunk_count
         self.near_room = self.near_grain.shape[0] // chunk_count
         # Fewer awake have smaller chunks, so that all threads have some.
@@ -317,8 +305,8 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, BalanceKernels):
     def wake_all(self) -> None:
         """All are awake, and the kernels are those that know of no sleep."""
         self.rest = EVERYONE
-        self.count[AWAKE], self.count[CHUNKS] = self.grain_count, self.chunk_count
-        self.count[SORTED], self.count[SORTED_CELLS] = self.grain_count, self.count[CELLS]
+        self.count[self.AWAKE], self.count[self.CHUNKS] = self.grain_count, self.chunk_count
+        self.count[self.SORTED], self.count[self.SORTED_CELLS] = self.grain_count, self.count[self.CELLS]
 
     def open_balance(self, gravity: tuple[float, float, float]) -> None:
         """From here on kernels sum what contacts take."""

@@ -26,16 +26,16 @@ INDEX_BITS = 26
 INDEX_MASK = (1 << INDEX_BITS) - 1
 SAME_IMAGE = 1 + 3 * 1  # (0 + 1) + 3 * (0 + 1)
 
-# Places of the numbers in Engine.count and Engine.box. CHUNKS are those of the grains AWAKE (``dem.engine.sleep``: all,
-# unless a bed lets its grains sleep), of ALL_CHUNKS that there is room for. SORTED of the grains are sorted, into
-# SORTED_CELLS cells: all, but for sleepers that stay where they are.
-GRAINS, CHUNKS, CHUNK_ROOM, NEAR_ROOM, NX, NY, NZ, CELLS, AWAKE, ALL_CHUNKS, SORTED, SORTED_CELLS = range(12)
-PERIOD_X, PERIOD_Y, BOTTOM, TOP, CELL_X, CELL_Y, CELL_Z = range(7)
-
 
 @ti.data_oriented
 class Lists(EnginePart):
     """The part of the engine that finds neighbours."""
+
+    # Places of the numbers in ``count`` and ``box``. CHUNKS are those of the grains AWAKE (``dem.engine.sleep``: all,
+    # unless a bed lets its grains sleep), of ALL_CHUNKS that there is room for. SORTED of the grains are sorted, into
+    # SORTED_CELLS cells: all, but for sleepers that stay where they are.
+    GRAINS, CHUNKS, CHUNK_ROOM, NEAR_ROOM, NX, NY, NZ, CELLS, AWAKE, ALL_CHUNKS, SORTED, SORTED_CELLS = range(12)
+    PERIOD_X, PERIOD_Y, BOTTOM, TOP, CELL_X, CELL_Y, CELL_Z = range(7)
 
     @ti.func
     def next_chunk(self, w, first: ti.template()):
@@ -44,7 +44,7 @@ class Lists(EnginePart):
         Taichi gives a CPU thread at least 512 items of a loop, so each thread has that many and one of them works.
         Which thread takes a chunk does not matter to the result.
         """
-        c = self.count[CHUNKS]
+        c = self.count[self.CHUNKS]
         if ti.static(self.gpu):
             if ti.static(first):
                 c = w
@@ -54,8 +54,8 @@ class Lists(EnginePart):
 
     @ti.func
     def chunk_range(self, c):
-        n = self.count[AWAKE]
-        m = self.count[CHUNKS]
+        n = self.count[self.AWAKE]
+        m = self.count[self.CHUNKS]
         if ti.static(self.gpu):
             return c, c + 1
         base = n // m
@@ -67,9 +67,9 @@ class Lists(EnginePart):
     def chunk_of(self, i):
         result = i
         if ti.static(not self.gpu):
-            m = self.count[CHUNKS]
-            base = self.count[AWAKE] // m
-            rest = self.count[AWAKE] - base * m
+            m = self.count[self.CHUNKS]
+            base = self.count[self.AWAKE] // m
+            rest = self.count[self.AWAKE] - base * m
             wide = rest * (base + 1)
             result = ti.select(i < wide, i // (base + 1), rest + (i - wide) // ti.max(base, 1))
         return result
@@ -79,8 +79,8 @@ class Lists(EnginePart):
         """From a body's origin, or its nearest image's, to a point."""
         d = x - self.body_position[b]
         if self.body_extent[b] < 1e30:
-            d.x -= self.box[PERIOD_X] * ti.round(d.x / self.box[PERIOD_X])
-            d.y -= self.box[PERIOD_Y] * ti.round(d.y / self.box[PERIOD_Y])
+            d.x -= self.box[self.PERIOD_X] * ti.round(d.x / self.box[self.PERIOD_X])
+            d.y -= self.box[self.PERIOD_Y] * ti.round(d.y / self.box[self.PERIOD_Y])
         return d
 
     @ti.func
@@ -124,14 +124,16 @@ class Lists(EnginePart):
     @ti.func
     def cell_of(self, x):
         """Cell of a position inside the box, as three integers."""
-        i = ti.min(self.count[NX] - 1, ti.max(0, ti.floor(x.x / self.box[CELL_X], ti.i32)))
-        j = ti.min(self.count[NY] - 1, ti.max(0, ti.floor(x.y / self.box[CELL_Y], ti.i32)))
-        k = ti.min(self.count[NZ] - 1, ti.max(0, ti.floor((x.z - self.box[BOTTOM]) / self.box[CELL_Z], ti.i32)))
+        i = ti.min(self.count[self.NX] - 1, ti.max(0, ti.floor(x.x / self.box[self.CELL_X], ti.i32)))
+        j = ti.min(self.count[self.NY] - 1, ti.max(0, ti.floor(x.y / self.box[self.CELL_Y], ti.i32)))
+        k = ti.min(
+            self.count[self.NZ] - 1, ti.max(0, ti.floor((x.z - self.box[self.BOTTOM]) / self.box[self.CELL_Z], ti.i32))
+        )
         return i, j, k
 
     @ti.func
     def cell_index(self, i, j, k):
-        return (k * self.count[NY] + j) * self.count[NX] + i
+        return (k * self.count[self.NY] + j) * self.count[self.NX] + i
 
     @ti.kernel
     def sort(self, gx: float, gy: float, gz: float, awake: int, rest: ti.template(), balance: ti.template()):
@@ -142,17 +144,17 @@ class Lists(EnginePart):
         the order of sleepers begins where grains wake and fall asleep (``place_asleep``), and from SORTED on, behind
         the last that wakes, nothing changes: of the grains from its cell on as many lie before it as did.
         """
-        for k in range(self.count[SORTED_CELLS]):
+        for k in range(self.count[self.SORTED_CELLS]):
             self.cell_fill[k] = 0
         if ti.static(balance.on):
             for _ in range(1):  # one thread: the sum has one order
                 for i in range(awake):
                     x, v = self.position[i], self.velocity[i]
-                    a = -ti.floor(x.x / self.box[PERIOD_X]) * self.box[PERIOD_X]
-                    b = -ti.floor(x.y / self.box[PERIOD_Y]) * self.box[PERIOD_Y]
+                    a = -ti.floor(x.x / self.box[self.PERIOD_X]) * self.box[self.PERIOD_X]
+                    b = -ti.floor(x.y / self.box[self.PERIOD_Y]) * self.box[self.PERIOD_Y]
                     if a != 0.0 or b != 0.0:
                         balance.turn(0, balance.outside, v.w * ti.Vector([a, b, 0.0]).cross(v.xyz))
-        for i in range(self.count[SORTED]):
+        for i in range(self.count[self.SORTED]):
             cell = 0
             if i < awake:
                 self.wrap(i)
@@ -171,7 +173,7 @@ class Lists(EnginePart):
         for w in range(self.cpu_items if ti.static(not self.gpu) else SCAN_BLOCKS):
             b = self.first_block(w)
             while b < SCAN_BLOCKS:
-                self.block_sum[b] = self.scan(b, 0, self.count[SORTED_CELLS], False)
+                self.block_sum[b] = self.scan(b, 0, self.count[self.SORTED_CELLS], False)
                 b += self.block_stride
         for _ in range(1):
             total = 0
@@ -179,19 +181,19 @@ class Lists(EnginePart):
                 kept = self.block_sum[b]
                 self.block_sum[b] = total
                 total += kept
-            self.cell_start[self.count[SORTED_CELLS]] = total
+            self.cell_start[self.count[self.SORTED_CELLS]] = total
         for w in range(self.cpu_items if ti.static(not self.gpu) else SCAN_BLOCKS):
             b = self.first_block(w)
             while b < SCAN_BLOCKS:
-                self.scan(b, self.block_sum[b], self.count[SORTED_CELLS], True)
+                self.scan(b, self.block_sum[b], self.count[self.SORTED_CELLS], True)
                 b += self.block_stride
-        for i in range(self.count[SORTED]):
+        for i in range(self.count[self.SORTED]):
             slot = ti.atomic_add(self.cell_fill[self.key[i]], 1)
             self.came_from[slot] = i
         if ti.static(rest.on):
-            for i in range(self.count[SORTED], self.count[GRAINS]):
+            for i in range(self.count[self.SORTED], self.count[self.GRAINS]):
                 self.came_from[i] = i
-        for r in range(self.count[SORTED_CELLS]):
+        for r in range(self.count[self.SORTED_CELLS]):
             # Whatever thread came first, the order within a cell is that of the ids.
             for a in range(self.cell_start[r] + 1, self.cell_start[r + 1]):
                 moving = self.came_from[a]
@@ -200,7 +202,7 @@ class Lists(EnginePart):
                     self.came_from[b + 1] = self.came_from[b]
                     b -= 1
                 self.came_from[b + 1] = moving
-        for i in range(self.count[SORTED]):
+        for i in range(self.count[self.SORTED]):
             o = self.came_from[i]
             if not self.lies_on(i, awake, rest):
                 self.buffer4[0][i] = self.position[o]
@@ -208,7 +210,7 @@ class Lists(EnginePart):
                 self.buffer4[2][i] = self.spin[o]
                 self.buffer3[i] = self.origin[o]
                 self.buffer_id[i] = self.id[o]
-        for i in range(self.count[SORTED]):
+        for i in range(self.count[self.SORTED]):
             if not self.lies_on(i, awake, rest):
                 self.position[i] = self.buffer4[0][i]
                 self.velocity[i] = self.buffer4[1][i]
@@ -218,7 +220,7 @@ class Lists(EnginePart):
                 self.listed[i] = self.buffer4[0][i].xyz
                 self.force[i] = self.buffer4[1][i].w * ti.Vector([gx, gy, gz])
                 if ti.static(rest.on):
-                    if i >= self.count[AWAKE]:
+                    if i >= self.count[self.AWAKE]:
                         self.force[i] = ti.Vector.zero(self.real, 3)
                 self.torque[i] = ti.Vector.zero(self.real, 3)
 
@@ -226,14 +228,14 @@ class Lists(EnginePart):
     def wrap(self, i):
         """Put a grain back into the box, its origin with it; one that has left it for good is a problem."""
         x = self.position[i]
-        inside = x.z >= self.box[BOTTOM] and x.z <= self.box[TOP]
-        inside = inside and ti.abs(x.x) < 1e6 * self.box[PERIOD_X] and ti.abs(x.y) < 1e6 * self.box[PERIOD_Y]
+        inside = x.z >= self.box[self.BOTTOM] and x.z <= self.box[self.TOP]
+        inside = inside and ti.abs(x.x) < 1e6 * self.box[self.PERIOD_X] and ti.abs(x.y) < 1e6 * self.box[self.PERIOD_Y]
         if not inside:
             # Any of the lost ones will do; the host looks for the first id.
             self.problem[None] = ti.Vector([1, self.id[i]])
         else:
-            a = -ti.floor(x.x / self.box[PERIOD_X]) * self.box[PERIOD_X]
-            b = -ti.floor(x.y / self.box[PERIOD_Y]) * self.box[PERIOD_Y]
+            a = -ti.floor(x.x / self.box[self.PERIOD_X]) * self.box[self.PERIOD_X]
+            b = -ti.floor(x.y / self.box[self.PERIOD_Y]) * self.box[self.PERIOD_Y]
             self.position[i].x = self.position[i].x + a
             self.position[i].y = self.position[i].y + b
             self.origin[i].x = self.origin[i].x + a
@@ -244,14 +246,14 @@ class Lists(EnginePart):
         """Whether the grain for this place is a sleeper that has been in it."""
         result = False
         if ti.static(rest.on):
-            result = i >= self.count[AWAKE] and i >= awake and self.came_from[i] == i
+            result = i >= self.count[self.AWAKE] and i >= awake and self.came_from[i] == i
         return result
 
     @ti.func
     def place_asleep(self, r, rest: ti.template()):
         """Where the sleepers of the cell of rank r are listed: in the curve's order too, but begun elsewhere."""
         turned = r - rest.begins[None]
-        return self.count[CELLS] + ti.select(turned < 0, turned + self.count[CELLS], turned)
+        return self.count[self.CELLS] + ti.select(turned < 0, turned + self.count[self.CELLS], turned)
 
     @ti.func
     def first_block(self, w):
@@ -278,18 +280,18 @@ class Lists(EnginePart):
         """Put the lists aside, so that the new ones can take the history over."""
         for _ in range(1):
             self.ticket[QUEUE] = 0
-        for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
+        for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[self.CHUNKS]):
             c = self.next_chunk(w, True)
-            while c < self.count[CHUNKS]:
+            while c < self.count[self.CHUNKS]:
                 self.keep_chunk(c, rest, balance)
                 c = self.next_chunk(w, False)
         if ti.static(rest.on):
-            for i in range(self.count[AWAKE], rest.before(rest.kept, self.count[GRAINS])):
+            for i in range(self.count[self.AWAKE], rest.before(rest.kept, self.count[self.GRAINS])):
                 self.old_start[i] = 0
                 self.old_end[i] = 0
                 self.near_first[i] = -1
             for _ in range(1):
-                rest.kept[None] = self.count[AWAKE]
+                rest.kept[None] = self.count[self.AWAKE]
 
     @ti.func
     def keep_chunk(self, c, rest: ti.template(), balance: ti.template()):
@@ -310,7 +312,7 @@ class Lists(EnginePart):
                     if ti.static(balance.on):
                         balance.old_last[s] = balance.last[s]
         self.old_near_end[c] = self.near_end[c]
-        base = c * self.count[NEAR_ROOM]
+        base = c * self.count[self.NEAR_ROOM]
         for k in range(self.near_end[c] - base):
             s = self.near_end[c] - 1 - k
             i = self.near_grain[s]
@@ -340,22 +342,22 @@ class Lists(EnginePart):
             self.body_listed_turn[b] = self.body_turn[b]
         for _ in range(1):
             self.ticket[QUEUE] = 0
-        for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
+        for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[self.CHUNKS]):
             c = self.next_chunk(w, True)
-            while c < self.count[CHUNKS]:
+            while c < self.count[self.CHUNKS]:
                 self.list_chunk(c, ti.cast(skin, self.real), shapes, rest, balance)
                 c = self.next_chunk(w, False)
         if ti.static(rest.on):
-            for i in range(self.count[AWAKE], rest.before(rest.made, self.count[GRAINS])):
+            for i in range(self.count[self.AWAKE], rest.before(rest.made, self.count[self.GRAINS])):
                 self.pair_start[i] = 0
                 self.pair_end[i] = 0
-            for c in range(self.count[CHUNKS], self.count[ALL_CHUNKS]):
-                self.near_end[c] = c * self.count[NEAR_ROOM]
+            for c in range(self.count[self.CHUNKS], self.count[self.ALL_CHUNKS]):
+                self.near_end[c] = c * self.count[self.NEAR_ROOM]
             for _ in range(1):
                 if rest.news[BUILT] == 1:
                     rest.side[None] = 1 - rest.side[None]
                     rest.news[BUILT] = 0
-                rest.made[None] = self.count[AWAKE]
+                rest.made[None] = self.count[self.AWAKE]
                 rest.whole[None] = 0
                 rest.last[None] = -1
         for _ in range(1):
@@ -365,7 +367,7 @@ class Lists(EnginePart):
     @ti.func
     def list_chunk(self, c, skin, shapes: ti.template(), rest: ti.template(), balance: ti.template()):
         start, end = self.chunk_range(c)
-        base = c * self.count[CHUNK_ROOM]
+        base = c * self.count[self.CHUNK_ROOM]
         s = base
         for i in range(start, end):
             x_i = self.position[i]
@@ -373,22 +375,22 @@ class Lists(EnginePart):
             ci, cj, ck = self.cell_of(x_i)
             for dk in range(-1, 2):
                 k = ck + dk
-                if k >= 0 and k < self.count[NZ]:
+                if k >= 0 and k < self.count[self.NZ]:
                     for dj, di in ti.ndrange((-1, 2), (-1, 2)):
                         # Stepping out on the left means the neighbour's image one period to the left.
                         gi, gj = ci + di, cj + dj
                         mi, mj = 0, 0
                         if gi < 0:
-                            gi += self.count[NX]
+                            gi += self.count[self.NX]
                             mi = 1
-                        elif gi >= self.count[NX]:
-                            gi -= self.count[NX]
+                        elif gi >= self.count[self.NX]:
+                            gi -= self.count[self.NX]
                             mi = -1
                         if gj < 0:
-                            gj += self.count[NY]
+                            gj += self.count[self.NY]
                             mj = 1
-                        elif gj >= self.count[NY]:
-                            gj -= self.count[NY]
+                        elif gj >= self.count[self.NY]:
+                            gj -= self.count[self.NY]
                             mj = -1
                         r = self.rank[self.cell_index(gi, gj, k)]
                         for part in range(rest.sets):
@@ -400,18 +402,18 @@ class Lists(EnginePart):
                                 if j != i and (j > i or not own):
                                     x_j = self.position[j]
                                     d = x_i.xyz - x_j.xyz
-                                    d.x += ti.cast(mi, self.real) * self.box[PERIOD_X]
-                                    d.y += ti.cast(mj, self.real) * self.box[PERIOD_Y]
+                                    d.x += ti.cast(mi, self.real) * self.box[self.PERIOD_X]
+                                    d.y += ti.cast(mj, self.real) * self.box[self.PERIOD_Y]
                                     reach = x_i.w + x_j.w + skin
                                     if ti.static(self.cohesion == JKR):
                                         reach += adhesive_range(self.grain_pair[None], x_i.w * x_j.w / (x_i.w + x_j.w))
                                     if d.norm_sqr() < reach * reach:
-                                        if s < base + self.count[CHUNK_ROOM]:
+                                        if s < base + self.count[self.CHUNK_ROOM]:
                                             image = (mi + 1 + 3 * (mj + 1)) << INDEX_BITS
                                             self.list_pair(s, i, j, j | image, rest, balance)
                                         s += 1
-            self.pair_end[i] = ti.min(s, base + self.count[CHUNK_ROOM])
-        if s > base + self.count[CHUNK_ROOM]:
+            self.pair_end[i] = ti.min(s, base + self.count[self.CHUNK_ROOM])
+        if s > base + self.count[self.CHUNK_ROOM]:
             self.problem[None] = ti.Vector([2, s - base])
         self.list_near(c, start, end, skin, shapes, rest, balance)
 
@@ -447,7 +449,7 @@ class Lists(EnginePart):
 
     @ti.func
     def list_near(self, c, start, end, skin, shapes: ti.template(), rest: ti.template(), balance: ti.template()):
-        base = c * self.count[NEAR_ROOM]
+        base = c * self.count[self.NEAR_ROOM]
         s = base
         for i in range(start, end):
             x = self.position[i]
@@ -461,7 +463,7 @@ class Lists(EnginePart):
                     if distance < -x.w:
                         self.overlap[c] = ti.max(self.overlap[c], (x.w - distance) / (2.0 * x.w))
                 if distance < reach:
-                    if s < base + self.count[NEAR_ROOM]:
+                    if s < base + self.count[self.NEAR_ROOM]:
                         self.near_grain[s] = i
                         self.near_body[s] = b
                         self.near_slide[s] = ti.Vector.zero(self.real, 4)
@@ -479,15 +481,18 @@ class Lists(EnginePart):
                         if ti.static(rest.on):
                             self.wake_near(s, i, b, rest)
                     s += 1
-        self.near_end[c] = ti.min(s, base + self.count[NEAR_ROOM])
-        if s > base + self.count[NEAR_ROOM]:
+        self.near_end[c] = ti.min(s, base + self.count[self.NEAR_ROOM])
+        if s > base + self.count[self.NEAR_ROOM]:
             self.problem[None] = ti.Vector([3, s - base])
 
     @ti.func
     def next_near(self, o, i):
         """The row of the old near list behind row o if it is of the same grain (i, its old index), or -1."""
         result = o + 1
-        if result % self.count[NEAR_ROOM] == 0 or result >= self.old_near_end[result // self.count[NEAR_ROOM]]:
+        if (
+            result % self.count[self.NEAR_ROOM] == 0
+            or result >= self.old_near_end[result // self.count[self.NEAR_ROOM]]
+        ):
             result = -1
         elif self.old_near_grain[result] != i:
             result = -1

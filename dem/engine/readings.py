@@ -5,7 +5,7 @@ The kernels belong to ``dem.engine.engine.Engine``, whose fields they use.
 
 import taichi as ti
 
-from .lists import ALL_CHUNKS, CHUNKS, GRAINS, INDEX_MASK, MOST_BODIES, NEAR_ROOM
+from .lists import INDEX_MASK, MOST_BODIES
 from .values import EnginePart
 
 __all__ = ["TALLY_BLOCKS", "Readings"]
@@ -19,7 +19,7 @@ class Readings(EnginePart):
 
     @ti.kernel
     def clear_pushes(self):
-        for c, b in ti.ndrange(self.count[ALL_CHUNKS], MOST_BODIES):
+        for c, b in ti.ndrange(self.count[self.ALL_CHUNKS], MOST_BODIES):
             self.pushes[c, b] = ti.Vector.zero(self.real, 6)
 
     @ti.kernel
@@ -46,9 +46,9 @@ class Readings(EnginePart):
         """
         if ti.static(self.gpu):
             for block, b in ti.ndrange(TALLY_BLOCKS, MOST_BODIES + 1):
-                size = (self.count[ALL_CHUNKS] + TALLY_BLOCKS - 1) // TALLY_BLOCKS
+                size = (self.count[self.ALL_CHUNKS] + TALLY_BLOCKS - 1) // TALLY_BLOCKS
                 first = block * size
-                end = ti.min(first + size, self.count[ALL_CHUNKS])
+                end = ti.min(first + size, self.count[self.ALL_CHUNKS])
                 if b == MOST_BODIES:
                     self.block_overlap[block] = self.largest_overlap(self.overlap, first, end)
                 elif b < self.body_count[None]:
@@ -59,7 +59,7 @@ class Readings(EnginePart):
                 self.put_tally(rows, b, self.block_pushes, self.block_overlap, TALLY_BLOCKS)
         else:
             for b in range(MOST_BODIES + 1):
-                self.put_tally(rows, b, self.pushes, self.overlap, self.count[ALL_CHUNKS])
+                self.put_tally(rows, b, self.pushes, self.overlap, self.count[self.ALL_CHUNKS])
 
     @ti.func
     def put_tally(self, rows: ti.template(), b, pushes: ti.template(), overlaps: ti.template(), parts):
@@ -89,13 +89,13 @@ class Readings(EnginePart):
     @ti.kernel
     def mark_origin(self):
         """Count displacements from here."""
-        for i in range(self.count[GRAINS]):
+        for i in range(self.count[self.GRAINS]):
             self.origin[i] = self.position[i].xyz
 
     @ti.kernel
     def shift_velocities(self, time: float):
         """Kick all grains by the present forces for a time of either sign."""
-        for i in range(self.count[GRAINS]):
+        for i in range(self.count[self.GRAINS]):
             r = self.position[i].w
             share = ti.cast(time, self.real) / self.velocity[i].w
             for k in ti.static(range(3)):
@@ -105,9 +105,9 @@ class Readings(EnginePart):
     @ti.kernel
     def count_contacts(self, counts: ti.types.ndarray(dtype=ti.i32, ndim=1), shapes: ti.template()):
         """Contacts of each grain, by id."""
-        for i in range(self.count[GRAINS]):
+        for i in range(self.count[self.GRAINS]):
             counts[self.id[i]] = 0
-        for i in range(self.count[GRAINS]):
+        for i in range(self.count[self.GRAINS]):
             c = self.chunk_of(i)
             start, end = self.chunk_range(c)
             for s in range(self.pair_start[i], self.pair_end[i]):
@@ -117,8 +117,8 @@ class Readings(EnginePart):
                     ti.atomic_add(counts[self.id[i]], 1)
                     if j >= start and j < end:
                         ti.atomic_add(counts[self.id[j]], 1)
-        for c in range(self.count[CHUNKS]):
-            for s in range(c * self.count[NEAR_ROOM], self.near_end[c]):
+        for c in range(self.count[self.CHUNKS]):
+            for s in range(c * self.count[self.NEAR_ROOM], self.near_end[c]):
                 i = self.near_grain[s]
                 r = self.position[i].w
                 reach = r

@@ -4,6 +4,8 @@ A bed whose bodies are of planes, balls, cylinders and cones alone has ``PLAIN``
 compiled without all this. The table is a template argument of the kernels, so they are compiled anew for a larger one.
 """
 
+from typing import Any
+
 import numpy as np
 import taichi as ti
 
@@ -217,6 +219,7 @@ class ShapeTable:
 class Shapes(EnginePart):
     """The part of the engine that puts shapes into its fields and takes them out again."""
 
+    shapes: Any
     _kept: ShapeTable | None
     _meshes: list[Mesh]
 

@@ -28,7 +28,7 @@ from typing import Protocol
 import numpy as np
 
 from .engine import Engine
-from .lists import AWAKE, CHUNKS, INDEX_MASK
+from .lists import INDEX_MASK
 from .rows import put_rows, take_rows
 from .sleep_kernels import FULL, LEAVING, WOKEN
 from .values import BedFailure, State
@@ -139,7 +139,7 @@ class Sleeper:
     def read(self) -> None:
         """How many are awake, and the mass of the others."""
         e = self.bed.engine
-        self.awake, self.mass = int(e.count[AWAKE]), float(e.rest.mass[None])
+        self.awake, self.mass = int(e.count[e.AWAKE]), float(e.rest.mass[None])
 
     def on_floor(self) -> np.ndarray:
         """What sleepers add to the impulse on the floor over the last advance, over the time step [N], shape [3]."""
@@ -190,7 +190,7 @@ class Sleeper:
             "quiet": rest.quiet.to_numpy()[:n],
             "force": take_rows(rest.force, rows),
             "held": rest.held.to_numpy()[: e.chunk_count],
-            "numbers": np.array([self.awake, int(e.count[CHUNKS]), self.bed.grain_steps]),
+            "numbers": np.array([self.awake, int(e.count[e.CHUNKS]), self.bed.grain_steps]),
             "reals": np.array([self.mass, self.slept]),
             "order": np.array([int(rest.begins[None]), int(rest.block[None])]),
         }

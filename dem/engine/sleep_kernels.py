@@ -6,23 +6,7 @@ A bed whose grains do not sleep has ``EVERYONE`` for a table, and its kernels ar
 
 import taichi as ti
 
-from .lists import (
-    ALL_CHUNKS,
-    AWAKE,
-    BUILT,
-    CELL_X,
-    CELLS,
-    CHUNKS,
-    GRAINS,
-    INDEX_MASK,
-    NX,
-    NY,
-    NZ,
-    PERIOD_X,
-    QUEUE,
-    SORTED,
-    SORTED_CELLS,
-)
+from .lists import BUILT, INDEX_MASK, QUEUE
 from .values import EnginePart
 
 __all__ = ["EVERYONE", "FULL", "LEAVING", "Rest", "Sleepers", "WOKEN"]
@@ -148,7 +132,7 @@ class Sleepers(EnginePart):
             self.ticket[QUEUE] = 0
         for w in range(self.cpu_items):
             c = self.next_chunk(w, True)
-            while c < self.count[CHUNKS]:
+            while c < self.count[self.CHUNKS]:
                 self.look_around(
                     c, ti.cast(limit, self.real), ti.cast(share, self.real), ti.cast(fast, self.real), rest
                 )
@@ -157,7 +141,7 @@ class Sleepers(EnginePart):
     @ti.func
     def look_around(self, c, limit, share, fast, rest: ti.template()):
         start, end = self.chunk_range(c)
-        awake = self.count[AWAKE]
+        awake = self.count[self.AWAKE]
         for i in range(start, end):
             quick = self.velocity[i].xyz.norm_sqr() > fast * fast
             for s in range(self.pair_start[i], self.pair_end[i]):
@@ -177,7 +161,7 @@ class Sleepers(EnginePart):
         """Mark who may fall asleep, and count them."""
         for _ in range(1):
             rest.news[LEAVING] = 0
-        for i in range(self.count[AWAKE]):
+        for i in range(self.count[self.AWAKE]):
             k = self.id[i]
             r = self.position[i].w
             square = ti.cast(slow * slow, self.real)
@@ -185,19 +169,19 @@ class Sleepers(EnginePart):
             rest.quiet[k] = ti.select(still, rest.quiet[k] + 1, 0)
             rest.busy[k] = 0
             rest.leaves[k] = 0
-        for i in range(self.count[AWAKE]):
+        for i in range(self.count[self.AWAKE]):
             a = self.id[i]
             for s in range(self.pair_start[i], self.pair_end[i]):
                 code = self.pair[s]
                 if code < 0:
                     j = (~code) & INDEX_MASK
-                    if j < self.count[AWAKE]:
+                    if j < self.count[self.AWAKE]:
                         b = self.id[j]
                         if rest.quiet[a] == 0:
                             rest.busy[b] = 1
                         if rest.quiet[b] == 0:
                             rest.busy[a] = 1
-        for i in range(self.count[AWAKE]):
+        for i in range(self.count[self.AWAKE]):
             k = self.id[i]
             if rest.quiet[k] >= patience and rest.busy[k] == 0:
                 if not self.close_to_body(i, ti.cast(reach, self.real), shapes):
@@ -216,14 +200,14 @@ class Sleepers(EnginePart):
             if leaving == 1:
                 rest.whole[None] = 1
             self.find_bodies(rest)
-        for r in range(self.count[CELLS]):
+        for r in range(self.count[self.CELLS]):
             rest.flagged[r] = 0
-        for k in range(self.count[GRAINS]):
+        for k in range(self.count[self.GRAINS]):
             rest.was[k] = rest.asleep[k]
-        for i in range(self.count[AWAKE], self.count[GRAINS]):
+        for i in range(self.count[self.AWAKE], self.count[self.GRAINS]):
             if rest.woken[self.id[i]] == 1:
                 self.flag_around(rest.cell[self.id[i]], rest)
-        for i in range(self.count[AWAKE], self.count[GRAINS]):
+        for i in range(self.count[self.AWAKE], self.count[self.GRAINS]):
             k = self.id[i]
             flagged = rest.flagged[rest.cell[k]] == 1
             if not flagged and self.may_be_close(i, ti.cast(reach, self.real), rest):
@@ -231,8 +215,10 @@ class Sleepers(EnginePart):
             if flagged:
                 rest.asleep[k] = 0
                 rest.quiet[k] = 0
-                ti.atomic_max(rest.last[None], self.place_asleep(self.rank[rest.cell[k]], rest) - self.count[CELLS])
-        for c in range(self.count[CHUNKS]):
+                ti.atomic_max(
+                    rest.last[None], self.place_asleep(self.rank[rest.cell[k]], rest) - self.count[self.CELLS]
+                )
+        for c in range(self.count[self.CHUNKS]):
             if leaving == 1:
                 start, end = self.chunk_range(c)
                 for i in range(start, end):
@@ -246,7 +232,7 @@ class Sleepers(EnginePart):
                         v.xyz = ti.Vector.zero(self.real, 3)
                         self.velocity[i] = v
                         self.spin[i] = ti.Vector.zero(self.real, 4)
-        for k in range(self.count[GRAINS]):
+        for k in range(self.count[self.GRAINS]):
             rest.woken[k] = 0
 
     @ti.func
@@ -256,7 +242,7 @@ class Sleepers(EnginePart):
         And where sleepers begin in memory: that changes when the bodies have gone two blocks on.
         """
         first, last, below = ti.cast(0.0, self.real), ti.cast(0.0, self.real), ti.cast(1e30, self.real)
-        at, period = self.body_position[1].x, self.box[PERIOD_X]
+        at, period = self.body_position[1].x, self.box[self.PERIOD_X]
         for b in range(1, self.body_count[None]):
             x, extent = self.body_position[b], self.body_extent[b]
             ahead = x.x - at
@@ -269,9 +255,9 @@ class Sleepers(EnginePart):
         rest.near[_MIDDLE] = middle
         rest.near[_HALF] = 0.5 * (last - first)
         rest.near[_BELOW] = below
-        blocks = self.count[NX] // _BLOCK
+        blocks = self.count[self.NX] // _BLOCK
         if self.body_count[None] > 1 and last - first < period and blocks > 2 * _BEHIND:
-            block = ti.floor(middle / self.box[CELL_X], ti.i32) // _BLOCK - _BEHIND
+            block = ti.floor(middle / self.box[self.CELL_X], ti.i32) // _BLOCK - _BEHIND
             block += ti.select(block < 0, blocks, 0)
             if ti.abs(block - rest.block[None]) > 1:
                 rest.block[None] = block
@@ -284,38 +270,38 @@ class Sleepers(EnginePart):
         x = self.position[i]
         within = 1.01 * (x.w + reach)  # round-off decides nothing
         ahead = ti.abs(x.x - rest.near[_MIDDLE])
-        ahead = ti.min(ahead, self.box[PERIOD_X] - ahead)
+        ahead = ti.min(ahead, self.box[self.PERIOD_X] - ahead)
         return x.z > rest.near[_BELOW] - within and ahead < rest.near[_HALF] + within
 
     @ti.func
     def flag_around(self, cell, rest: ti.template()):
         """Flag a cell and those around it."""
-        row = cell // self.count[NX]
-        ci, cj, ck = cell - row * self.count[NX], row % self.count[NY], row // self.count[NY]
+        row = cell // self.count[self.NX]
+        ci, cj, ck = cell - row * self.count[self.NX], row % self.count[self.NY], row // self.count[self.NY]
         for dk, dj, di in ti.ndrange((-1, 2), (-1, 2), (-1, 2)):
             k = ck + dk
-            if k >= 0 and k < self.count[NZ]:
-                i = (ci + di + self.count[NX]) % self.count[NX]
-                j = (cj + dj + self.count[NY]) % self.count[NY]
+            if k >= 0 and k < self.count[self.NZ]:
+                i = (ci + di + self.count[self.NX]) % self.count[self.NX]
+                j = (cj + dj + self.count[self.NY]) % self.count[self.NY]
                 rest.flagged[self.cell_index(i, j, k)] = 1
 
     @ti.kernel
     def find_cells(self, rest: ti.template()):
         """The cells of the sleepers, of a state that was put back."""
-        for i in range(self.count[AWAKE], self.count[GRAINS]):
+        for i in range(self.count[self.AWAKE], self.count[self.GRAINS]):
             ci, cj, ck = self.cell_of(self.position[i])
             rest.cell[self.id[i]] = self.cell_index(ci, cj, ck)
 
     @ti.kernel
     def store_contacts(self, rest: ti.template()):
         """Fill the other store: contacts of sleepers with one another and with the floor, old and new."""
-        for i in range(self.count[GRAINS]):
+        for i in range(self.count[self.GRAINS]):
             k = self.id[i]
             rest.end[1 - rest.side[None], k] = self.freeze(i, 0, False, rest)
         for _ in range(1):
             side = 1 - rest.side[None]
             total = 0
-            for k in range(self.count[GRAINS]):
+            for k in range(self.count[self.GRAINS]):
                 kept = rest.end[side, k]
                 rest.start[side, k] = total
                 total += kept
@@ -323,7 +309,7 @@ class Sleepers(EnginePart):
             rest.news[BUILT] = 1
             if total > rest.who.shape[1]:
                 rest.news[FULL] = total
-        for i in range(self.count[GRAINS]):
+        for i in range(self.count[self.GRAINS]):
             if rest.news[FULL] == 0:
                 self.freeze(i, rest.start[1 - rest.side[None], self.id[i]], True, rest)
 
@@ -391,7 +377,7 @@ class Sleepers(EnginePart):
                 if ti.static(self.rolling):
                     self.roll[s] = sign * rest.roll[side, kept]
         f = self.position[i].xyz * 0.0
-        if j >= self.count[AWAKE] and self.pair[s] < 0:
+        if j >= self.count[self.AWAKE] and self.pair[s] < 0:
             if rest.was[a] == 0 and rest.was[b] == 1:
                 f = rest.old_force[old]
             else:
@@ -412,9 +398,9 @@ class Sleepers(EnginePart):
     def recount(self, grains_per_chunk: int, rest: ti.template()):
         """How many are awake, in how many chunks; the mass of the others; how many are to be sorted."""
         for _ in range(1):
-            sets = 2 * self.count[CELLS]
-            cells = ti.select(rest.whole[None] == 1, sets, self.count[CELLS] + rest.last[None] + 1)
-            until = self.count[GRAINS]
+            sets = 2 * self.count[self.CELLS]
+            cells = ti.select(rest.whole[None] == 1, sets, self.count[self.CELLS] + rest.last[None] + 1)
+            until = self.count[self.GRAINS]
             if cells < sets:
                 until = self.cell_start[cells]
             awake = 0
@@ -424,7 +410,7 @@ class Sleepers(EnginePart):
                     mass += ti.cast(self.velocity[i].w, ti.f64)
                     awake += 1
             rest.mass[None] = rest.total[None] - mass
-            self.count[SORTED], self.count[SORTED_CELLS] = until, cells
-            self.count[AWAKE] = awake
+            self.count[self.SORTED], self.count[self.SORTED_CELLS] = until, cells
+            self.count[self.AWAKE] = awake
             chunks = (awake + grains_per_chunk - 1) // grains_per_chunk
-            self.count[CHUNKS] = ti.max(1, ti.min(self.count[ALL_CHUNKS], chunks))
+            self.count[self.CHUNKS] = ti.max(1, ti.min(self.count[self.ALL_CHUNKS], chunks))

@@ -11,7 +11,7 @@ import numpy as np
 from dem.grains.materials import Material
 
 from .base import BedBase
-from .lists import AWAKE, CHUNKS, INDEX_BITS, INDEX_MASK
+from .lists import INDEX_BITS, INDEX_MASK
 from .rows import take_rows
 from .sleep import Sleep, Sleeper
 from .values import BedSettings, State
@@ -134,7 +134,7 @@ def put_back(bed: BedBase, state: State) -> None:
     bed.sleeper = None
     if "sleep_rules" in state:
         e.let_sleep()
-        e.count[AWAKE], e.count[CHUNKS] = int(awake), int(chunks)
+        e.count[e.AWAKE], e.count[e.CHUNKS] = int(awake), int(chunks)
         bed.sleeper = Sleeper(bed, Sleep(*state["sleep_rules"][:-1], every=int(state["sleep_rules"][-1])))
         bed.sleeper.restore(state, rows)
 

@@ -8,22 +8,7 @@ import taichi as ti
 from dem.contact.cohesion import JKR
 from dem.contact.law import adhesive_range, contact_force, turning_torque
 
-from .lists import (
-    AWAKE,
-    CACHE_LINE,
-    CHUNK_ROOM,
-    CHUNKS,
-    FINISHED,
-    GRAINS,
-    INDEX_BITS,
-    INDEX_MASK,
-    ITEMS_PER_THREAD,
-    NEAR_ROOM,
-    PERIOD_X,
-    PERIOD_Y,
-    QUEUE,
-    SAME_IMAGE,
-)
+from .lists import CACHE_LINE, FINISHED, INDEX_BITS, INDEX_MASK, ITEMS_PER_THREAD, QUEUE, SAME_IMAGE
 from .values import EnginePart
 
 __all__ = ["Steps"]
@@ -95,7 +80,7 @@ class Steps(EnginePart):
         """Forces between the grains of a chunk and all that they touch."""
         start, end = self.chunk_range(c)
         # First find out which pairs touch, without a branch that a processor would have to guess; then their forces.
-        base = c * self.count[CHUNK_ROOM]
+        base = c * self.count[self.CHUNK_ROOM]
         last = base
         rows = base
         if ti.static(rest.on):
@@ -182,13 +167,13 @@ class Steps(EnginePart):
                     self.force[j] = self.force[j] - f
                     self.torque[j] = self.torque[j] + (arm_j * t - turn)
             if ti.static(rest.on):
-                if j >= self.count[AWAKE]:
+                if j >= self.count[self.AWAKE]:
                     held -= f
             if ti.static(balance.on):
                 self.balance_pair(c, s, i, j, d, balance.parts(damped, f_t, turn), dt, rest, balance)
                 self.balance_turning(c, bits, f, f_t, turn, n, arm_j, dt, rest, balance)
             largest = ti.max(largest, overlap * by_sum)
-        for s in range(c * self.count[NEAR_ROOM], self.near_end[c]):
+        for s in range(c * self.count[self.NEAR_ROOM], self.near_end[c]):
             largest = ti.max(largest, self.push_near(c, s, dt, shapes, balance))
         self.overlap[c] = ti.max(self.overlap[c], largest)
         if ti.static(rest.on):
@@ -200,8 +185,8 @@ class Steps(EnginePart):
         d = x_i.xyz - x_j.xyz
         image = bits >> INDEX_BITS
         if image != SAME_IMAGE:
-            d.x += ti.cast(image % 3 - 1, self.real) * self.box[PERIOD_X]
-            d.y += ti.cast(image // 3 - 1, self.real) * self.box[PERIOD_Y]
+            d.x += ti.cast(image % 3 - 1, self.real) * self.box[self.PERIOD_X]
+            d.y += ti.cast(image // 3 - 1, self.real) * self.box[self.PERIOD_Y]
         return d
 
     @ti.func
@@ -299,16 +284,16 @@ class Steps(EnginePart):
         those of its own range first, so that a chunk mostly stays in one core's cache, then those that are left.
         Whoever raises a chunk's claim past p has it, so nobody waits for a thread that has not started.
         """
-        for c in range(self.count[CHUNKS]):
+        for c in range(self.count[self.CHUNKS]):
             self.claim[c * CACHE_LINE] = 0
         for _ in range(1):
             self.ticket[FINISHED] = 0
             self.done[None] = steps
         for w in range(self.cpu_items):
             if w % ITEMS_PER_THREAD == 0:
-                chunks = self.count[CHUNKS]
+                chunks = self.count[self.CHUNKS]
                 own = w // ITEMS_PER_THREAD * chunks // (self.cpu_items // ITEMS_PER_THREAD)
-                patience = PATIENCE * (1 + self.count[GRAINS] // chunks)
+                patience = PATIENCE * (1 + self.count[self.GRAINS] // chunks)
                 phase = 0
                 while phase < 2 * steps:
                     # In this order: who comes late to a phase that is over must not take the next move's word for it.
@@ -353,10 +338,10 @@ class Steps(EnginePart):
         balance: ti.template(),
     ):
         """One step on a GPU, where every grain is a chunk; nothing where new lists are needed, as in ``run``."""
-        for c in range(self.count[CHUNKS]):
+        for c in range(self.count[self.CHUNKS]):
             if self.halted[None] == 0:
                 self.move(c, dt, limit, ti.Vector([gx, gy, gz]), keep)
-        for c in range(self.count[CHUNKS]):
+        for c in range(self.count[self.CHUNKS]):
             if self.moved[None] == 0:
                 self.push(c, dt, shapes, rest, balance)
                 if c == 0:
@@ -369,8 +354,8 @@ class Steps(EnginePart):
         """The forces of the step that was interrupted by new lists."""
         for _ in range(1):
             self.ticket[QUEUE] = 0
-        for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[CHUNKS]):
+        for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[self.CHUNKS]):
             c = self.next_chunk(w, True)
-            while c < self.count[CHUNKS]:
+            while c < self.count[self.CHUNKS]:
                 self.push(c, dt, shapes, rest, balance)
                 c = self.next_chunk(w, False)

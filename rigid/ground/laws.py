@@ -157,7 +157,7 @@ def _make_rft(v: Mapping[str, float]) -> tuple[float, ...]:
     return (ring, drag, v["radius"], *shape, slope, wall)
 
 
-def _functions(loading: str, rate: str) -> dict[str, Callable[..., Any]]:
+def _functions(loading: str, rate: str) -> dict[str, Any]:
     """The four functions of a law, by the names that `rigid.ground.law_functions` gives them."""
     names = {"loading": f"{loading}_loading", "loading_work": f"{loading}_loading_work"}
     names |= {"rate_force": f"{rate}_rate_force", "rate_work": f"{rate}_rate_work"}

@@ -16,8 +16,7 @@ from typing import Any
 from rigid.terms import Term
 
 from .advance import make_advance
-from .columns import CHANNELS, FIXED_NUMBERS, SUMMARY
-from .parts import make_parts
+from .parts import CHANNELS, FIXED_NUMBERS, SUMMARY, make_parts
 from .stand import make_stand
 
 __all__ = ["CHANNELS", "FIXED_NUMBERS", "SUMMARY", "batch_kernel"]

@@ -8,17 +8,22 @@ from typing import Any
 from rigid.model.model import assemble, parameter_names
 from rigid.terms import STATE_FIELDS, Term
 
-from .columns import FIXED_NUMBERS
+__all__ = ["CHANNELS", "FIXED_NUMBERS", "SUMMARY", "make_parts"]
 
-__all__ = ["make_parts"]
-
-_SHARED = (
-    "vertical", "tip_radius", "torque_factor", "applied", "dry_friction", "inner_start", "inner", "contact", "arms",
-    "divide", "MEMORY", "SHEDS", "HOLDS", "DRY", "INNER", "BETA", "HALF", "TURN_COS", "TURN_SIN", "TWICE_COS",
-    "TWICE_SIN", "DIAGONAL", "NAN", "NEAR", "LAW", "LAW_SIZE", "load_parameters", "small_sine", "small_cosine",
-    "state_of", "trial_state", "trial_numbers", "set_mass", "count", "Motion", "Forces", "Modes", "Event", "Spikes",
-    "Tally",
+FIXED_NUMBERS = (
+    "mass", "inertia", "length", "stance", "counterweight", "gravity", "weight", "torque", "torque_until",
+    "wheel_inertia", "wheel_sign", "wheel_speed_0", "mu_s", "mu_d",
 )  # fmt: skip
+"""The first columns of the trials' numbers; those of the ground's law and of the effects follow."""
+SUMMARY = (
+    "trajectory_angle", "max_speed", "max_angular_velocity", "stand", "pivot", "slip", "hop", "status",
+    "x", "y", "theta", "vx", "vy", "omega", "wheel_speed", "splits", "longest_step",
+)  # fmt: skip
+"""Columns of the summary: launch, largest speeds, theta on entering each state first (NaN: never), status, end, and the
+longest step [s] for the coordinate that a term has of its own (NaN: there is none).
+
+Status: 0 done, 1 too deep, 2 no longer finite, 3 cannot stand, 4 the step is too long for a term's own coordinate."""
+CHANNELS = ("x", "y", "theta", "vx", "vy", "omega", "ax", "ay", "wheel_speed", "state")  # Channels of the series
 _MOTION = ("x", "y", "theta", "vx", "vy", "omega", "ax", "ay", "alpha", "wheel", "own", "own_v", "own_a")
 """The motion at one time; `own` is the coordinate that a term has of its own, with its speed and acceleration."""
 _FORCES = (
@@ -138,8 +143,7 @@ def make_parts(terms: tuple[Term, ...], ground: str, count: int) -> SimpleNamesp
     def divide(c: ti.template(), fx, fy, ft):
         return divide_mass(c.mxx, c.mxy, c.myy, c.mxt, c.myt, c.mtt, fx, fy, ft)
 
-    own = locals()
-    return SimpleNamespace(**{name: own[name] for name in _SHARED})
+    return SimpleNamespace(**locals())
 
 
 def _loader(names: tuple[str, ...], kind: Any, first: int) -> Any:

@@ -12,7 +12,7 @@ import pytest
 import dem.engine.engine
 from dem import Ball, Bed, Material, Sleep
 from dem.engine.energy import bed_energies
-from dem.engine.lists import SORTED
+from dem.engine.lists import Lists
 from dem.engine.sleep import Sleeper
 
 STUFF = Material("grain", 2600, 1e7, 0.25, 0.5, 0.3, 0.1)
@@ -243,7 +243,7 @@ def test_sleepers_that_lists_pass_over_are_where_sorting_all_would_put_them(monk
 
     def counted(self, **more):
         rearrange(self, **more)
-        sorted_ones.append(int(self.bed.engine.count[SORTED]))
+        sorted_ones.append(int(self.bed.engine.count[Lists.SORTED]))
 
     def all_of_them(self, **more):
         self.bed.engine.rest.whole[None] = 1

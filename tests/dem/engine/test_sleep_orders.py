@@ -12,7 +12,7 @@ import pytest
 
 import dem.engine.engine
 from dem import Ball, Bed, Material, Sleep
-from dem.engine.lists import SORTED
+from dem.engine.lists import Lists
 from dem.engine.sleep import Sleeper
 
 STUFF = Material("grain", 2600, 1e7, 0.25, 0.5, 0.3, 0.1)
@@ -84,7 +84,7 @@ def test_orders_drawn_by_chance_have_the_bits_of_sorting_all_grains_every_time(t
         if all_of_them:
             self.bed.engine.rest.whole[None] = 1
         rearrange(self, **more)
-        sorted_ones.append(int(self.bed.engine.count[SORTED]) / self.bed.grain_count)
+        sorted_ones.append(int(self.bed.engine.count[Lists.SORTED]) / self.bed.grain_count)
 
     monkeypatch.setattr(Sleeper, "rearrange", counted)
     found = told(two_layers(), np.random.default_rng(SEED), tmp_path)
