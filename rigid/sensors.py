@@ -15,10 +15,19 @@ motion sampled at `sensor_times` needs no acceleration at all, unless the window
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from .terms import Term, sensor_terms
+
+_FIELDS = {
+    "clock-offset": {"offset": "clock_offset", "drift": "clock_drift"},
+    "camera-scale": {"scale": "camera_scale", "bend": "camera_bend"},
+}
+"""Effects whose parameters a `SensorSet` has as fields."""
 
 __all__ = ["Measured", "Motion", "SensorSet", "measure", "sensor_times"]
 
@@ -73,6 +82,7 @@ class SensorSet:
     clock_offset: float = 0.0  # The IMU's time minus the true time at t = 0 [s]
     clock_drift: float = 0.0  # What the IMU's clock gains in a second [1]
     lead: float = 0.2  # How long before t = 0 recording starts [s]
+    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # Of `rigid.terms` on sensors: parameters
     camera_zero_spread: float = 3.0  # The camera's zero is drawn evenly from within this many `pose_std` [1]
 
     def __post_init__(self) -> None:
@@ -88,6 +98,9 @@ class SensorSet:
             values = getattr(self, name)
             if len(values) != 3 or not all(math.isfinite(value) and value >= 0 for value in values):
                 raise ValueError(f"{name} = {values!r} must be three numbers of 0 or more")
+        for id, names in _FIELDS.items():
+            for parameter in self.effects.get(id, ()):
+                object.__setattr__(self, names[parameter], self.effects[id][parameter])
         if not math.isfinite(self.clock_offset):
             raise ValueError(f"clock_offset = {self.clock_offset!r} is no number [s]")
         if not abs(self.clock_drift) <= 0.5:
@@ -97,7 +110,27 @@ class SensorSet:
 
     def true_times(self, written: Array) -> Array:
         """True times [s] of times on the IMU's clock."""
-        return (written - self.clock_offset) / (1.0 + self.clock_drift)
+        for term in sensor_terms("clock"):
+            written = term.hooks["clock"](written, *self._parameters(term, "clock"))
+        return written
+
+    def seen(self, square: Array) -> Array:
+        """What the camera makes of lengths [1] at these squares of the distance from the start [m2]."""
+        parts = (term.hooks["lens"](square, *self._parameters(term, "lens")) for term in sensor_terms("lens"))
+        return np.asarray(math.prod(parts))
+
+    def _parameters(self, term: Term, hook: str) -> list[float]:
+        own = {parameter: getattr(self, name) for parameter, name in _FIELDS.get(term.id, {}).items()}
+        values = term.values(own | dict(self.effects.get(term.id, {})))
+        return [values[name] for name in term.arguments(hook)]
+
+    @property
+    def _lateness(self) -> float:
+        """By how much the clocks of effects beyond `clock_offset` and `clock_drift` are off at t = 0 and 1 s [s]."""
+        others = [term for term in sensor_terms("clock") if term.id not in _FIELDS]
+        return sum(
+            abs(at - term.hooks["clock"](at, *self._parameters(term, "clock"))) for term in others for at in (0.0, 1.0)
+        )
 
 
 @dataclass(frozen=True)
@@ -162,7 +195,7 @@ def measure(
 
     at = _rows(sensors.camera_rate, sensors.lead, duration)
     x, y = np.interp(at, moving.time, moving.x), np.interp(at, moving.time, moving.y)
-    scale = sensors.camera_scale + sensors.camera_bend * ((x - motion.x[0]) ** 2 + (y - motion.y[0]) ** 2)
+    scale = sensors.seen((x - motion.x[0]) ** 2 + (y - motion.y[0]) ** 2)
     pose = {
         "t_s": at,
         "x_m": scale * x + zero[0],
@@ -192,7 +225,7 @@ def _rows(rate: float, lead: float, duration: float) -> Array:
 
 def _imu_times(sensors: SensorSet, duration: float) -> Array:
     """Times on the IMU's clock whose whole window, in true time, has been seen."""
-    late = abs(sensors.clock_offset) + abs(sensors.clock_drift) * duration
+    late = abs(sensors.clock_offset) + abs(sensors.clock_drift) * duration + sensors._lateness * (1.0 + duration)
     at = _rows(sensors.imu_rate, sensors.lead, duration + late)
     return at[sensors.true_times(at) + 0.5 * sensors.imu_window <= duration + 1e-9]
 
@@ -203,6 +236,7 @@ def _with_lead(motion: Motion, sensors: SensorSet) -> Motion:
         sensors.lead / (1.0 - abs(sensors.clock_drift))
         + 2.0 * abs(sensors.clock_offset)
         + sensors.imu_window
+        + sensors._lateness * (1.0 + sensors.lead)
         + 1.0 / min(sensors.camera_rate, sensors.imu_rate, sensors.wheel_rate)
     )
     begin = dict.fromkeys(("vx", "vy", "omega", "ax", "ay"), 0.0) | {"time": -before}

@@ -71,17 +71,11 @@ def record(
 ) -> tuple[Measured, Any]:
     """Integrate `trial` and record it; the trajectory stands beside it.
 
-    The effects `clock-offset`, `camera-scale` and `slope` of the trial alter the sensors; g_loc is the rig's gravity in
-    the rig, gravity_sim without one.
+    The trial's effects on sensors and its slope alter the sensors; g_loc is the rig's gravity in the rig, gravity_sim
+    without one.
     """
-    clock, camera, slope = (trial.effect_values(name) for name in ("clock-offset", "camera-scale", "slope"))
-    sensors = replace(
-        sensors,
-        clock_offset=clock["offset"] if clock else sensors.clock_offset,
-        clock_drift=clock["drift"] if clock else sensors.clock_drift,
-        camera_scale=camera["scale"] if camera else sensors.camera_scale,
-        camera_bend=camera["bend"] if camera else sensors.camera_bend,
-    )
+    slope = trial.effect_values("slope")
+    sensors = replace(sensors, effects={effect.id: effect.values for effect in trial.effects if effect.term.sensor})
     lean = slope["angle"] if slope else 0.0
     trajectory = simulate(trial, duration=duration, times=sensor_times(sensors, duration))
     motion = Motion(**{name: getattr(trajectory, name) for name in MOTION})

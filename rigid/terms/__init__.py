@@ -20,7 +20,7 @@ from .term import FIXED_ARGUMENTS, STATE_FIELDS, Parameter, Term
 
 __all__ = [
     "BASE", "CANDIDATES", "EFFECTS", "FIXED_ARGUMENTS", "STATE_FIELDS", "LOADED", "Candidate", "Parameter",
-    "Term", "find_candidate", "find_effect", "load_effect",
+    "Term", "find_candidate", "find_effect", "load_effect", "sensor_terms",
 ]  # fmt: skip
 
 
@@ -57,6 +57,11 @@ def find_effect(id: str) -> Term:
     if id not in EFFECTS:
         raise ValueError(f"effect {id!r} is unknown; there is {', '.join(EFFECTS)}")
     return EFFECTS[id]
+
+
+def sensor_terms(hook: str, own: Iterable[Term] = ()) -> tuple[Term, ...]:
+    """The sensors' effects that have this hook, `clock` or `lens`: those that ship, and of `own`."""
+    return tuple(term for term in (*EFFECTS.values(), *own) if term.sensor and hook in term.hooks)
 
 
 def load_effect(file: str | Path) -> Term:

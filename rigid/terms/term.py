@@ -32,13 +32,16 @@ the fixed ones listed below, then the term's own parameters, by name, in any num
 | `inner_start`        | s                         | that coordinate in static equilibrium, its force then is 0   |
 | `inner_force`        | s                         | force on it: inner_mass d2(inner)/dt2                        |
 | `inner_holds`        | s                         | positive as long as the present mode holds, in m or rad      |
+| `clock`              | written                   | true time [s] of a time on the IMU's clock                   |
+| `lens`               | square                    | x and y as the camera sees them over the true ones [1];      |
+|                      |                           | square: of the distance from the start [m2]                  |
 
-The last four go together and are for a term with something inside that moves: one coordinate `s.inner`, its rate
+The four of `inner` go together and are for a term with something inside that moves: one coordinate `s.inner`, its rate
 `s.inner_speed` and one of two modes, `s.inner_mode` = 1 at the start, else 0. It is integrated beside the platform's
 motion; `force`, `potential` and `loss` of the same term look at it. Where `inner_holds` passes through zero is an
 event: the mode changes there, and only there. At most one term of a model has one.
 
-Without hooks a term is a sensor's (`sensor=True`): it is declared here and applied where the sensors are.
+A sensor's term (`sensor=True`) has `clock` or `lens`, which get numpy arrays and are applied in `rigid.sensors`.
 """
 
 import inspect
@@ -73,6 +76,8 @@ FIXED_ARGUMENTS: dict[str, tuple[str, ...]] = {
     "inner_start": ("s",),
     "inner_force": ("s",),
     "inner_holds": ("s",),
+    "clock": ("written",),
+    "lens": ("square",),
 }
 """The hooks and what each gets before its parameters."""
 

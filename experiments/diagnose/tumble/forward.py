@@ -18,7 +18,7 @@ from experiments.diagnose.fit.own import OwnEffect
 from experiments.diagnose.fit.problem import Array
 from experiments.diagnose.fit.together import each
 from rigid.model.model import parameter_names
-from rigid.terms import EFFECTS, Term
+from rigid.terms import EFFECTS, Term, sensor_terms
 
 from .data import TrialData, TumbleData
 from .readings import Grid, Optics
@@ -80,7 +80,7 @@ class Forward:
             "stiffness": tables.surface.stiffness, "damping": tables.surface.damping,
             "mu_s": tables.surface.mu_s, "mu_d": tables.surface.sliding_friction,
         }  # fmt: skip
-        self._grids = [Grid(trial, data.window) for trial in data.trials]
+        self._grids = [Grid(trial, data.window, [own.term for own in self.own]) for trial in data.trials]
         self._buffer = np.empty(0)
 
     def neutral(self, name: str) -> float:
@@ -111,13 +111,9 @@ class Forward:
         count = max((np.shape(value)[0] for value in sets.values()), default=1)
         on = {name.partition(".")[0] for name in sets if "." in name}
         moving = any(id not in EFFECTS or not EFFECTS[id].sensor for id in on)
-        terms = (*_moving_terms(self.rig), *(own.term for own in self.own)) if moving else ()
+        terms = (*_moving_terms(self.rig), *(own.term for own in self.own if not own.term.sensor)) if moving else ()
         columns = self._columns(sets, count, terms)
-        clock, lens = np.empty((count, 2)), np.empty((count, 2))
-        for k, name in enumerate(("clock-offset.offset", "clock-offset.drift")):
-            clock[:, k] = sets.get(name, neutral(name))
-        for k, name in enumerate(("camera-scale.scale", "camera-scale.bend")):
-            lens[:, k] = sets.get(name, neutral(name))
+        clock, lens = (self._of_sensors(hook, sets, count) for hook in ("clock", "lens"))
         slope = np.asarray(sets.get("slope.angle", np.zeros(count)), dtype=float)
         found = {}
         for trial in chosen:
@@ -130,6 +126,15 @@ class Forward:
         for lanes in self._chunks(chosen, count):
             self._run(lanes, columns, terms, clock, lens, slope, horizon, found)
         return [found[trial] for trial in chosen]
+
+    def _of_sensors(self, hook: str, sets: Mapping[str, Array], count: int) -> Array:
+        """Parameters of the effects on sensors that have this hook, shape [set_count, parameter_count]."""
+        terms = sensor_terms(hook, [own.term for own in self.own])
+        names = [f"{term.id}.{name}" for term in terms for name in term.arguments(hook)]
+        found = np.empty((count, len(names)))
+        for k, name in enumerate(names):
+            found[:, k] = sets.get(name, self.neutral(name))
+        return found
 
     def _columns(self, sets: Mapping[str, Array], count: int, terms: tuple[Term, ...]) -> dict[str, Array]:
         every = (*EFFECTS.values(), *(own.term for own in self.own))

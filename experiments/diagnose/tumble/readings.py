@@ -1,12 +1,14 @@
 """When one tumble is to be sampled, and how the samples of its motion become readings of its sensors."""
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from experiments.diagnose.fit.problem import Array
+from rigid.terms import Term, sensor_terms
 
 from .data import CHANNELS, TrialData
 
@@ -23,10 +25,10 @@ _MOTION = (_X, _Y, _THETA, _VX, _VY, _OMEGA, _WHEEL)
 class Optics:
     """What lies between the motion and the readings, for several sets of parameters."""
 
-    clock: Array  # by what the IMU's is off [s] and what it gains in a second [1], shape [set_count, 2]
+    clock: Array  # parameters of the effects on the IMU's clock, shape [set_count, parameter_count]
     pull: Array  # local gravity [m/s2], shape [set_count] like the rest
     slope: Array  # of the surface [rad]
-    lens: Array  # the camera's scale [1] and what it grows by with the distance's square [1/m2], shape [set_count, 2]
+    lens: Array  # parameters of the effects on the camera's lens, shape [set_count, parameter_count]
 
 
 @dataclass(frozen=True)
@@ -46,11 +48,22 @@ class _Part:
             into[:, self.last] = readings[:, -1]
 
 
+def _hooks(name: str, own: Sequence[Term]) -> list[tuple[Callable[..., Array], range]]:
+    """Hooks of the sensors' effects, and which of the parameters of all are theirs, in the order of `sensor_terms`."""
+    found, at = [], 0
+    for term in sensor_terms(name, own):
+        count = len(term.arguments(name))
+        found.append((term.hooks[name], range(at, at + count)))
+        at += count
+    return found
+
+
 class Grid:
     """When one trial is to be sampled, and how its samples become readings."""
 
-    def __init__(self, trial: TrialData, window: float) -> None:
+    def __init__(self, trial: TrialData, window: float, own: Sequence[Term] = ()) -> None:
         self.window = window
+        self._clocks, self._lenses = (_hooks(name, own) for name in ("clock", "lens"))
         self.trial = trial
         imu = np.isin(trial.channel, [CHANNELS.index(name) for name in ("gyro", "ax", "ay")])
         force = np.isin(trial.channel, [CHANNELS.index(name) for name in ("ax", "ay")])
@@ -63,15 +76,23 @@ class Grid:
         half = 0.5 * window if self.parts == 3 else 0.0
         latest = max(self.camera_time[-1:].tolist() + (self.imu_time[-1:] + half).tolist())
         self.end = round(max(latest, 1e-3), 1)
-        self._sorted: dict[tuple[float, float], tuple[Array, Places]] = {}
+        self._sorted: dict[tuple[float, ...], tuple[Array, Places]] = {}
         self._read_until: dict[float, list[list[_Part]]] = {}
 
     def _true(self, clock: Array) -> Array:
-        """True times [s] of the IMU's rows by clocks that are off and gain, shape [set_count, time_count]."""
-        return (self.imu_time - clock[:, :1]) / (1.0 + clock[:, 1:])
+        """True times [s] of the IMU's rows by clocks with these parameters, shape [set_count, time_count]."""
+        times = np.broadcast_to(self.imu_time, (len(clock), len(self.imu_time)))
+        for hook, columns in self._clocks:
+            times = hook(times, *(clock[:, k : k + 1] for k in columns))
+        return times
 
-    def _plain(self, clock: tuple[float, float]) -> tuple[Array, Places]:
-        """Rising sample times for a clock that is off and gains, and where each reading's sample has gone."""
+    def _seen(self, square: Array, lens: Array) -> Array:
+        """x and y as the camera sees them, over the true ones [1], by the distance's square [m2]."""
+        parts = (hook(square, *(lens[:, k : k + 1] for k in columns)) for hook, columns in self._lenses)
+        return np.asarray(math.prod(parts))
+
+    def _plain(self, clock: tuple[float, ...]) -> tuple[Array, Places]:
+        """Rising sample times for a clock with these parameters, and where each reading's sample has gone."""
         if clock not in self._sorted:
             if len(self._sorted) > 64:
                 self._sorted.clear()
@@ -90,7 +111,7 @@ class Grid:
         clocks are alike, else one a set. After `until` [s] there is one more, at it, which stands for all later ones.
         """
         alike = bool((clock == clock[0]).all())
-        plain = [self._plain((float(offset), float(drift))) for offset, drift in (clock[:1] if alike else clock)]
+        plain = [self._plain(tuple(map(float, row))) for row in (clock[:1] if alike else clock)]
         times, place = (np.stack(rows) for rows in zip(*plain, strict=True))
         if np.isfinite(until):
             width = min(int((times < until).sum(axis=1).max()) + 1, self.size)
@@ -156,11 +177,11 @@ class Grid:
                 if "wheel" in names:
                     readings["wheel"] = np.abs(readings["wheel"])
                 if "x" in names or "y" in names:
-                    seen = optics.lens[:, :1]
-                    if optics.lens[:, 1].any():
+                    seen = self._seen(np.zeros(1), optics.lens)
+                    if (seen != self._seen(np.ones(1), optics.lens)).any():
                         first = at(np.zeros(1, dtype=np.intp))
                         away = (take(_X, index) - take(_X, first)) ** 2 + (take(_Y, index) - take(_Y, first)) ** 2
-                        seen = seen + optics.lens[:, 1:] * away
+                        seen = self._seen(away, optics.lens)
                     readings |= {name: seen * readings[name] for name in ("x", "y") if name in names}
             for part in together:
                 part.put(value, readings[part.name])

@@ -3,6 +3,12 @@
 from rigid.terms.candidate import Candidate, Form, Tumble, bent, free, shape
 from rigid.terms.term import Parameter, Term
 
+
+def scale_there(square, scale, bend):
+    """scale + bend d^2, d the distance from the start."""
+    return scale + bend * square
+
+
 TERM = Term(
     rank=180, id="camera-scale", summary="the camera's scale is off", acts="the camera's x and y", sensor=True,
     parameters=(
@@ -11,7 +17,7 @@ TERM = Term(
                   summary="added to it by the square of the distance from where the platform stood"),
     ),
     source="a ruler in the wrong plane; a lens that bends outwards or inwards",
-    limits="the same in x and y; the lens's axis is on the start",
+    limits="the same in x and y; the lens's axis is on the start", hooks={"lens": scale_there},
 )  # fmt: skip
 
 CANDIDATE = Candidate(

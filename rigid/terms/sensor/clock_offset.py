@@ -3,6 +3,12 @@
 from rigid.terms.candidate import Candidate, Form, Tumble, bent, free, shape
 from rigid.terms.term import Parameter, Term
 
+
+def true_time(written, offset, drift):
+    """True time of a time on a clock that is off by `offset` at 0 and gains `drift` a second."""
+    return (written - offset) / (1.0 + drift)
+
+
 TERM = Term(
     rank=170, id="clock-offset", summary="IMU against camera", acts="the IMU's times", sensor=True,
     parameters=(
@@ -10,6 +16,7 @@ TERM = Term(
         Parameter("drift", "1", 0.0, lowest=-0.5, highest=0.5, summary="what the IMU's clock gains in a second"),
     ),
     source="two clocks, read apart", limits="it gains evenly, in every trial from t = 0 on",
+    hooks={"clock": true_time},
 )  # fmt: skip
 
 CANDIDATE = Candidate(

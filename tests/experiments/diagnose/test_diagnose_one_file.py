@@ -11,13 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial, saved
+from tumble_campaigns import CONDITIONS, campaign
 
 import experiments
 from experiments.campaign import read_model
 from experiments.cli.main import main
 from experiments.diagnose.fit.own import load_own
 from experiments.diagnose.push.law import push, slot_places, slot_table
+from experiments.diagnose.tumble.data import tumble_data
 from experiments.diagnose.tumble.forms import physical, tumble_forms
+from experiments.diagnose.tumble.forward import Forward
 
 ROOT = Path(experiments.__file__).parents[1]
 MUD = ROOT / "experiments" / "terms" / "sticky_mud.py"
@@ -74,7 +77,9 @@ from experiments.cli.main import main
 from experiments.diagnose.core.effect_equations import PENETRATION
 from experiments.diagnose.core.effect_words import meaning
 from experiments.diagnose.push.law import SLOTS
+from experiments.diagnose.tumble.data import tumble_data
 from experiments.diagnose.tumble.forms import tumble_forms
+from experiments.diagnose.tumble.forward import Forward
 from rigid import Effect, Trial, simulate
 
 assert main(["effects", "sticky-mud"]) == 0
@@ -99,3 +104,61 @@ def test_a_file_put_into_the_package_is_an_effect_of_the_library(tmp_path):
     *_, words, last, moved = asked.stdout.strip().splitlines()
     assert words == "sticky-mud: mud resists a spike that goes in, up to a bound. True True"
     assert (last, moved) == ("sticky-mud:bounded", "True")
+
+
+_LATE = """
+from rigid.terms.candidate import Candidate, Form, Tumble, free
+from rigid.terms.term import Parameter, Term
+
+
+def earlier(written, delay):
+    return written - delay
+
+
+TERM = Term(
+    id="imu-delay", summary="the IMU is late", acts="the IMU's times", source="a test", limits="none", sensor=True,
+    parameters=(Parameter("delay", "s", 0.0, summary="by which it is late"),), hooks={"clock": earlier},
+)
+CANDIDATE = Candidate(
+    meaning="the IMU is late", confirm="knock on the platform",
+    tumble=Tumble(forms=lambda t: (Form("constant", (free("delay", "s", 1e-3, -0.5, 0.5),), ((3e-3,),)),),
+                  equation="the IMU's time = t + delay"),
+)
+"""
+
+_RECORDED = """
+import numpy as np
+from experiments.diagnose.tumble.forms import tumble_forms
+from experiments.tumble.synthesis import record
+from rigid import Effect, Trial
+from rigid.sensors import SensorSet
+
+late, same = (
+    record(Trial(gravity_sim=0.1, torque=0.2, effects=(effect,)), duration=0.2, sensors=SensorSet(), seed=1)[0].imu
+    for effect in (Effect(id="imu-delay", parameters={"delay": 0.01}),
+                   Effect(id="clock-offset", parameters={"offset": 0.01}))
+)
+rows = np.isin(late["t_s"], same["t_s"])
+print(all(np.allclose(late[name][rows], same[name], atol=0.2) for name in late), abs(late["gyro_rad_s"]).max() > 0)
+print("imu-delay:constant" in [form.id for form in tumble_forms(rig=False, sinkage=1e-3, weight=1.0)])
+"""
+
+
+def test_a_sensors_effect_from_a_file_reads_as_its_hook_says(tmp_path):
+    (tmp_path / "imu_delay.py").write_text(_LATE)
+    data = tumble_data(campaign(seed=1, conditions=CONDITIONS[:1]))
+    own = Forward(data, own=[load_own(tmp_path / "imu_delay.py")])
+    found = own.predict({"imu-delay.delay": np.array([0.01, 0.0])})[0].value
+    known = Forward(data).predict({"clock-offset.offset": np.array([0.01, 0.0])})[0].value
+    assert np.array_equal(found, known) and not np.array_equal(found[0], found[1])
+
+
+def test_a_sensors_file_put_into_the_package_is_recorded_and_a_candidate_without_another_edit(tmp_path):
+    shutil.copytree(ROOT / "rigid", tmp_path / "rigid", ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "rigid" / "terms" / "sensor" / "imu_delay.py").write_text(_LATE)
+    asked = subprocess.run(
+        [sys.executable, "-c", _RECORDED], cwd=tmp_path, env={**os.environ, "PYTHONPATH": f"{tmp_path}:{ROOT}"},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert asked.returncode == 0, asked.stderr
+    assert asked.stdout.split() == ["True", "True", "True"]
