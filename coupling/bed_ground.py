@@ -11,7 +11,7 @@ from typing import Any, Protocol, runtime_checkable
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dem.engine.values import Grains
 from rigid.ground.reaction import Contact, Facts, Reaction, State
@@ -232,7 +232,8 @@ class BedGround:
         raised = grains.position - np.array([0.0, 0.0, lift])
         for index in self._lowest(to_matrix(pose.turn)):
             member = self.members[index]
-            distance = self._surface_of(member, Pose(*self._member_pose(member, pose)), raised)[0]
+            at = self.origin + pose.position + to_matrix(pose.turn) @ member.at
+            distance = self._surface_of(member, Pose(at, multiply(pose.turn, member.turn)), raised)[0]
             worst = max(worst, (float((grains.radius - distance).max()), member.row))
         return worst
 
@@ -309,10 +310,6 @@ class BedGround:
         heights = (self._at @ matrix[2]).tolist()
         return [min(indices, key=heights.__getitem__) for indices in self._slots]
 
-    def _member_pose(self, member: Member, pose: Pose) -> tuple[Vector, NDArray[np.float64]]:
-        position = self.origin + pose.position + to_matrix(pose.turn) @ member.at
-        return position, multiply(pose.turn, member.turn)
-
     def energies(self) -> dict[str, float]:
         """Of the grains, `copies` times [J] (`dem.engine.energy.bed_energies`)."""
         from dem.engine.energy import bed_energies
@@ -340,22 +337,21 @@ class BedGround:
 
     def _surfaces(self) -> dict[int, Any]:
         """Each DEM body's surface, as `dem.engine.energy` wants it."""
+        poses = {body: Pose(self.bed.body_position(body), self.bed.body_turn(body)) for body in self.bodies}
         return {
-            body: partial(self._surface_of, self.members[index], pose)
-            for body, index, pose in zip(self.bodies, self._used, self._posed(), strict=True)
+            body: partial(self._surface_of, self.members[index], poses[body])
+            for body, index in zip(self.bodies, self._used, strict=True)
         }
-
-    def _posed(self) -> list[Pose]:
-        """Where the bed has its bodies now."""
-        return [Pose(self.bed.body_position(body), self.bed.body_turn(body)) for body in self.bodies]
 
     def _surface_of(self, member: Member, pose: Pose, points: Vector) -> tuple[Vector, Vector, Vector]:
         """Distance of points to a member placed there, outward normal, curvature: round where a rod has a ball.
 
         As `dem.shapes.basic` has it for a point outside: a rod's other end is flat. Points within count from its side.
         """
-        matrix = to_matrix(pose.turn)
-        local = self._nearest_image(points - pose.position) @ matrix
+        matrix, period = to_matrix(pose.turn), np.array(self.bed.size, dtype=float)[:2]
+        away = points - pose.position
+        away[:, :2] -= period * np.round(away[:, :2] / period)
+        local = away @ matrix
         size = np.hypot(local[:, 0], local[:, 1])
         across = local[:, :2] / np.maximum(size, 1e-30)[:, None]
         flat = np.maximum(local[:, 2] - member.length, 0.0) + np.minimum(local[:, 2] + member.below, 0.0)
@@ -371,11 +367,6 @@ class BedGround:
             distance[ball], normal[ball] = length - member.radius, local[ball] / length[:, None]
             curvature[ball] = 1.0 / member.radius
         return distance, normal @ matrix.T, curvature
-
-    def _nearest_image(self, away: Vector) -> Vector:
-        size = np.array(self.bed.size, dtype=float)[:2]
-        away[:, :2] -= size * np.round(away[:, :2] / size)
-        return away
 
     def momentum(self) -> Vector:
         """Momentum of the grains less the impulse of gravity and floor on them, `copies` times [N s], shape (3,).

@@ -45,7 +45,9 @@ def bed_energies(bed: BedBase, *, bodies: Mapping[int, Gap]) -> dict[str, float]
     turning = 0.2 * (mass * radius**2) @ (rates**2).sum(axis=1)
     height = -(kept[:, 3] @ (position[:, :3] @ np.array(bed.gravity, dtype=float)))
     state = take(bed)
-    surfaces: dict[int, Gap] = {0: _floor} if bed.has_floor else {}
+    surfaces: dict[int, Gap] = {}
+    if bed.has_floor:
+        surfaces[0] = lambda x: (x[:, 2], np.broadcast_to([0.0, 0.0, 1.0], x.shape), np.zeros(len(x)))
     law = COHESIONS[bed.material.cohesion]
     springs = _pairs(bed, state, law) + _near(state, surfaces | dict(bodies), law)
     names = ("normal", "tangential", "turning")
@@ -75,10 +77,6 @@ def body_pushes(bed: BedBase, *, bodies: Mapping[int, Gap]) -> tuple[Array, Arra
         points.append(centres[touching, :3] - distance[touching, None] * normal[touching])
         forces.append(-push[:, None] * normal[touching])
     return np.concatenate(points), np.concatenate(forces)
-
-
-def _floor(points: Array) -> tuple[Array, Array, Array]:
-    return points[:, 2], np.broadcast_to([0.0, 0.0, 1.0], points.shape), np.zeros(len(points))
 
 
 def _springs(

@@ -150,18 +150,12 @@ def _zones(
         here, room = within(distance), cell * float((within(grid_distance) & grid_inner).sum())
         count = int(here.sum())
         enough = count > 0 and room > _LEAST * float(place[here].max()) ** 3
-        zones.append(
-            Zone(
-                name,
-                count,
-                float(solid[here].sum() / solid.sum()),
-                float(place[here].mean()) if count else None,
-                float(d[here].mean()) if count else None,
-                float(d[here].min()) if count else None,
-                float(d[here].max()) if count else None,
-                float(solid[here & inner].sum()) / room if enough else None,
-            )
-        )
+        share = float(solid[here].sum() / solid.sum())
+        found: list[float | None] = [None] * 4
+        if count:
+            found = [float(size) for size in (place[here].mean(), d[here].mean(), d[here].min(), d[here].max())]
+        packing = float(solid[here & inner].sum()) / room if enough else None
+        zones.append(Zone(name, count, share, *found, packing=packing))
     return zones
 
 
@@ -174,13 +168,6 @@ def _layers(
     layers = []
     for k in range(len(edges) - 1):
         here = (z >= edges[k]) & ((z < edges[k + 1]) | (k == len(edges) - 2))
-        one, other = d[here & under], d[here & ~under]
-        layers.append(
-            Layer(
-                float(edges[k]),
-                float(edges[k + 1]),
-                float(one.mean()) if len(one) else None,
-                float(other.mean()) if len(other) else None,
-            )
-        )
+        means = (float(sizes.mean()) if len(sizes) else None for sizes in (d[here & under], d[here & ~under]))
+        layers.append(Layer(float(edges[k]), float(edges[k + 1]), *means))
     return layers

@@ -104,13 +104,7 @@ def measure_stage(
         pressure_ratio=float(ratio.mean()) if len(ratio) else None,
         max_overlap=bed.max_overlap,
         time=float(bed.time),
-        profile={
-            "height": middle.tolist(),
-            "packing": packing.tolist(),
-            "stress_zz": stress[:, 2, 2].tolist(),
-            "stress_xx": stress[:, 0, 0].tolist(),
-            "stress_yy": stress[:, 1, 1].tolist(),
-            "stress_xz": stress[:, 0, 2].tolist(),
-        },
+        profile={"height": middle.tolist(), "packing": packing.tolist()}
+        | {f"stress_{'xyz'[i]}{'xyz'[j]}": stress[:, i, j].tolist() for i, j in ((2, 2), (0, 0), (1, 1), (0, 2))},
         notes=dict(notes or {}),
     )

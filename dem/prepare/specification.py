@@ -43,6 +43,8 @@ _EXPECTED_PACKING = 0.57
 BEARING = 30.0
 # A grain that strikes the floor at the end of its fall does the bed no harm: until it is made, this is allowed.
 _RAIN_OVERLAP = 0.05
+# Numbers of a specification that its bed and its recipe take as they are.
+_NUMBERS = ("gravity", "seed", "young", "max_overlap", "time_step")
 # Smallest over mean diameter of the sizes with which ``CHAIN`` was measured.
 _NARROW = 0.85
 
@@ -161,11 +163,7 @@ class Specification:
             "material": {f.name: getattr(self.material, f.name) for f in fields(self.material) if f.name != "sources"},
             "size": list(self.size),
             "sizes": describe(self.sizes),
-            "gravity": self.gravity,
-            "seed": self.seed,
-            "young": self.young,
-            "max_overlap": self.max_overlap,
-            "time_step": self.time_step,
+            **{name: getattr(self, name) for name in _NUMBERS},
             "floor": None if self.floor is None else asdict(self.floor),
             "precision": self.precision,
             "arch": self.arch,
@@ -186,15 +184,8 @@ class Specification:
             radii=radii,
             size=self.size,
             height=top + 10 * self.sizes.mean,
-            gravity=self.gravity,
-            young=self.young,
-            max_overlap=self.max_overlap,
-            time_step=self.time_step,
             floor=True if self.floor is None else self.floor,
-            seed=self.seed,
-            precision=self.precision,
-            arch=self.arch,
-            threads=self.threads,
+            **{name: getattr(self, name) for name in (*_NUMBERS, "precision", "arch", "threads")},
         )
         bed.overlap_limit = max(bed.overlap_limit, _RAIN_OVERLAP)
         return bed

@@ -119,12 +119,6 @@ class Preparation(Generic[B]):
         return bed.kinetic_energy / bed.weight / self._grain
 
     @property
-    def _floor_share(self) -> float:
-        """What the floor carries over the weight, of both the part across the floor [1]."""
-        bed = self.bed
-        return bed.floor_force / (bed.weight * (-bed.gravity[2] / math.hypot(*bed.gravity)))
-
-    @property
     def _fall_time(self) -> float:
         """The time that a grain takes to fall the bed's depth [s]."""
         return math.sqrt(2 * self.bed.size[2] / math.hypot(*self.bed.gravity))
@@ -161,7 +155,7 @@ class Preparation(Generic[B]):
         while True:
             bed.advance(steps, drag_time=DRAG * fall if notes["drag"] else math.inf)
             energy = self._energy
-            floor = abs(self._floor_share - 1)
+            floor = abs(bed.floor_force / (bed.weight * (-bed.gravity[2] / math.hypot(*bed.gravity))) - 1)
             notes["first"] = notes["first"] or math.log(max(energy / ratio, math.e))
             if energy < ratio and floor < tolerance:
                 if not notes["drag"]:

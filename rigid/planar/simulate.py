@@ -96,7 +96,10 @@ def check_step(trial: Trial, time_step: float) -> None:
     ground, inner = _bounds(trial)
     longest = min(ground, inner)
     if time_step > longest:
-        what = _ground_words(trial) if ground <= inner else _spring_words(trial)
+        what = _ground_words(trial)
+        if ground > inner:
+            own = [effect for effect in trial.effects if "inner_mass" in effect.term.hooks]
+            what = " and ".join(f"effect {effect.id!r}, {_values(effect.values)}" for effect in own)
         raise ValueError(f"time_step = {time_step:g} s is too long for {what}: at most {longest:.3g} s would follow it")
 
 
@@ -104,11 +107,6 @@ def _ground_words(trial: Trial) -> str:
     if trial.ground is None:
         return f"the ground, stiffness = {trial.stiffness:g} N/m and damping = {trial.damping:g} N s/m"
     return f"ground = {trial.ground.name!r}, {_values(trial.ground.law.values(trial.ground.parameters))}"
-
-
-def _spring_words(trial: Trial) -> str:
-    own = [effect for effect in trial.effects if "inner_mass" in effect.term.hooks]
-    return " and ".join(f"effect {effect.id!r}, {_values(effect.values)}" for effect in own)
 
 
 def _values(values: Mapping[str, float]) -> str:
