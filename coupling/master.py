@@ -278,7 +278,7 @@ class Master:
 
 
 def _differences(tried: list[tuple[Vector, Vector]]) -> list[tuple[Vector, Vector]]:
-    """Of the pairs (in, out) before the last, as many as tell something, to it."""
+    """Of the pairs (in, out) before the last, as many as say something, to it."""
     into, out = tried[-1]
     return [(before[0] - into, before[1] - out) for before in tried[-1 - _MOST_PAIRS : -1]]
 

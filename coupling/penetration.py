@@ -104,7 +104,7 @@ class Run(Stepper):
 
     @property
     def fraction(self) -> float:
-        """How far along it is, from 0 to 1, as well as one can tell."""
+        """How far along it is, from 0 to 1, as well as can be known."""
         return 1.0 if self.done else min(0.99, max(0.0, self.time / self.expected_time))
 
     def advance(self) -> None:

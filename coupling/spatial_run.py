@@ -67,7 +67,7 @@ class SpatialRun(PlatformRun):
         self._check(duration, energy_interval, lowering_speed)
         if lowering_speed is not None:
             if np.any(velocity) or np.any(angular_velocity):
-                raise ValueError("lowering_speed is given with a velocity: a platform in a hand starts at rest")
+                raise ValueError("lowering_speed is given with a velocity: a platform that is placed starts at rest")
             if not trial.weight[2] < 0:
                 raise ValueError(f"gravity = {trial.gravity} does not pull onto the ground: nothing is set down there")
         tips = trial.platform.tips - trial.platform.centre_of_mass

@@ -115,7 +115,7 @@ class Penetration:
         return cls(time=time, depth=depth, velocity=velocity, force=force, phase=phase, **known)
 
     def write_csv(self, path: str | Path) -> None:
-        """Write the rows with every digit, so that reading them back gives the same bits."""
+        """Write the rows with every digit, so that they read back bitwise the same."""
         write_series(path, self.columns(), line_end="\r\n")
 
     @classmethod

@@ -97,7 +97,7 @@ class CoupledTumble(PlatformRun):
         self.lowered: LoweredGravity | None = None
         if lower_gravity:
             if not isinstance(ground, BedGround) or lowering_speed is None or trial.counterweight > 0:
-                raise ValueError("lower_gravity is for a platform that a hand sets down on a bed, without a rig")
+                raise ValueError("lower_gravity is for a platform that is placed on a bed, without a rig")
             self.lowered = LoweredGravity(ground, last=trial.gravity_sim, duration=self.duration)
         if self.placed:
             self.body.touching = rests

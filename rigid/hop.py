@@ -234,16 +234,13 @@ class _Contact:
             _, normal, force = self.rates(y, torque, 0)
             return abs(force) - self.t.mu_s * normal
 
-        events: list[Callable[..., float]] = [lift, down, back]
-        ends = [-1, -1, -1]
+        events: dict[Callable[..., float], int] = {lift: -1, down: -1, back: -1}
         if mode or math.isfinite(self.t.mu_s):
-            events.append(change)
-            ends.append(1)
-        for event, direction in zip(events, ends, strict=True):
-            setattr(event, "terminal", True)  # noqa: B010  # as scipy has it
-            setattr(event, "direction", direction)  # noqa: B010
+            events[change] = 1
+        for event, direction in events.items():
+            vars(event).update(terminal=True, direction=direction)  # as scipy has it
         stop = end if math.isfinite(end) else start + self._long(torque)
-        solved: Any = solve_ivp(slope, (start, stop), state, "DOP853", events=events, rtol=1e-10, atol=1e-13)
+        solved: Any = solve_ivp(slope, (start, stop), state, "DOP853", events=list(events), rtol=1e-10, atol=1e-13)
         at, y = float(solved.t[-1]), solved.y[:, -1]
         if mode == 0:
             y[2] = self.t.spike_length * math.cos(y[0]) * y[1]

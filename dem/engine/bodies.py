@@ -22,7 +22,7 @@ class BedBodies(BedBase):
     """A bed into which bodies are put; they move as they are set to, and the grains give way."""
 
     def add_body(self, shape: AnyShape | Sequence[AnyShape], *, position: Sequence[float], **facing: Any) -> int:
-        """Put a body among the grains and return its number. It moves as it is told; see ``move_body``.
+        """Put a body among the grains and return its number. ``move_body`` sets how it moves.
 
         Args:
             shape: one or several of dem's Ball, Cylinder, Cone, Capsule, Box, Tube, Polyhedron, Mesh, Plane and Placed,

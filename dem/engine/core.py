@@ -229,7 +229,7 @@ class BedCore(BedBodies):
 
     @classmethod
     def load(cls, path: str | Path, *, arch: str = "cpu", threads: int | None = None) -> Self:
-        """Read a bed that ``save`` wrote; it goes on to the same bits on the same kind of processor.
+        """Read a bed that ``save`` wrote; it continues bitwise the same on the same kind of processor.
 
         Raises ValueError: the file is missing or is not a bed.
         """

@@ -61,7 +61,7 @@ class Material:
         surface_energy: gamma [J/m2], half the work of adhesion of two grains; 0 without cohesion.
         grain: mean diameter of the grains for which ``surface_energy`` holds [m], see ``for_grain``; None: of all.
 
-    Raises ValueError: a number that no material can have, with the key and what would do.
+    Raises ValueError: a number that no material can have, with the key and what is allowed.
     """
 
     name: str
@@ -134,7 +134,7 @@ class Facing:
         young: of what it is made of [Pa]; rigid when None. poisson: [1].
         surface_energy: of the pair [J/m2], half its work of adhesion; 0 for what grains do not stick to.
 
-    Raises ValueError: a number that no pair can have, with the key and what would do.
+    Raises ValueError: a number that no pair can have, with the key and what is allowed.
     """
 
     friction: float | None = None

@@ -60,7 +60,7 @@ class Stage:
 
 
 def parse_stage(words: str) -> Stage:
-    """The stage that is written so. Raises ValueError, saying what would do."""
+    """The stage that is written so. Raises ValueError with what is allowed."""
     text = words.strip()
     name, colon, rest = text.partition(":")
     if name not in STAGES:
@@ -114,7 +114,7 @@ def check_stages(stages: Sequence[Stage], *, size: Sequence[float], grain: float
     Args:
         size: of the bed, both widths and the depth [m]. grain: mean diameter [m].
 
-    Raises ValueError: with the key, the stage and what would do.
+    Raises ValueError: with the key, the stage and what is allowed.
     """
     if not stages:
         raise ValueError("stages is empty: 'rain' at least would do")

@@ -2,7 +2,7 @@
 
 Each is without loops, arrays, early returns or calls of another, so that the very same source runs on numbers and,
 compiled by whoever wants it (`ti.func`), on thousands of trials at once. What they mean, and how a force is put
-together from them, is told in `rigid.ground.laws`; p holds a law's numbers.
+together from them, is in `rigid.ground.laws`; p holds a law's numbers.
 """
 
 __all__ = [

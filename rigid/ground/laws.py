@@ -52,7 +52,7 @@ class Parameter:
     above_lowest: bool = False  # Whether it must exceed `lowest`, not only reach it
 
     def check(self, value: float, law: str) -> float:
-        """`value` as a float. Raises ValueError, naming it and what would do."""
+        """`value` as a float. Raises ValueError, naming it and what is allowed."""
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise ValueError(f"{self.name} = {value!r} of {law}: it must be a number")
         low_enough = value > self.lowest if self.above_lowest else value >= self.lowest
@@ -98,7 +98,7 @@ class SurfaceLaw:
         return tuple(count * value if k in self.extensive else value for k, value in enumerate(p))
 
     def rebound(self, given: Mapping[str, float]) -> float | None:
-        """Share of the deepest depth that springs back [1]; None for a law that gives back all."""
+        """Share of the deepest depth that springs back [1]; None for a law that springs back whole."""
         return self.values(given)["rebound"] if self.has_memory else None
 
     def force(self, depth: float, rate: float, p: Numbers, *, top: float | None = None, rebound: float = 1.0) -> float:

@@ -49,7 +49,7 @@ def counterweight_for(
 class Rig:
     """A platform in the rig. `gravity_sim` rules the weight, whatever (m - m_b) g would give.
 
-    Raises ValueError, naming the key, its value and what would do, for a counterweight that is not lighter than the
+    Raises ValueError, naming the key, its value and what is allowed, for a counterweight that is not lighter than the
     platform (it would pull it off the ground), and for a simulated gravity that is not below the local one.
     """
 

@@ -40,7 +40,7 @@ class Section:
 class Spike:
     """A spike of the platform, or a penetrometer: geometry, mass and surface.
 
-    Raises ValueError, naming the parameter, its value and what would do, for a body that cannot be.
+    Raises ValueError, naming the parameter, its value and what is allowed, for a body that cannot be.
     """
 
     tip: Tip = "sphere"  # Shape of the end: "sphere", "cone" or "flat"

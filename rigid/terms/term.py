@@ -108,7 +108,7 @@ class Parameter:
     above_lowest: bool = False  # Whether it must exceed `lowest`, not only reach it
 
     def check(self, value: Any, term: str) -> float:
-        """`value` as a float. Raises ValueError, naming it and what would do."""
+        """`value` as a float. Raises ValueError, naming it and what is allowed."""
         if isinstance(value, bool) or not isinstance(value, int | float) or math.isnan(value):
             raise ValueError(f"{term}.{self.name} = {value!r} must be a number ({self.unit})")
         low = value > self.lowest if self.above_lowest else value >= self.lowest

@@ -120,7 +120,7 @@ def test_a_run_goes_on_from_a_checkpoint_while_gravity_falls_to_the_same_bits(tm
     ("gravity", "options", "said"),
     [
         (1.0, {}, r"settle_gravity is 0.5 m/s2: it must not be below that of the run, 1"),
-        (0.1, {"speed": None}, "a platform that a hand sets down"),
+        (0.1, {"speed": None}, "a platform that is placed on a bed"),
     ],
 )
 def test_what_cannot_be_lowered_is_refused(gravity, options, said):
