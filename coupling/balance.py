@@ -95,7 +95,6 @@ class EnergyBalance:
 
     @property
     def _sample_table(self) -> Vector:
-        """The samples as rows, also where there are none yet."""
         count = 4 + len(self.energy_names) + len(self.work_names)
         return np.array(self._samples, dtype=float).reshape(-1, count)
 

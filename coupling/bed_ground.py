@@ -336,7 +336,6 @@ class BedGround:
         return points - self.origin, forces
 
     def _surfaces(self) -> dict[int, Any]:
-        """Each DEM body's surface, as `dem.engine.energy` wants it."""
         poses = {body: Pose(self.bed.body_position(body), self.bed.body_turn(body)) for body in self.bodies}
         return {
             body: partial(self._surface_of, self.members[index], poses[body])

@@ -62,7 +62,6 @@ def spike_member(spike: Spike) -> Member:
 
 
 def _section_shape(section: Section) -> Any:
-    """The grains' shape that is this section of the spike."""
     from dem.shapes.basic import Ball, Cone, Cylinder
 
     if section.shape == "ball":

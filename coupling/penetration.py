@@ -434,6 +434,5 @@ def set_down(spike: Spike, *, onto: Any, load: float, **options: Any) -> Penetra
 
 
 def _reporting(options: dict[str, Any]) -> Reporting:
-    """Take what `Stepper.follow` wants out of the options."""
     found = {key: options.pop(key) for key in Reporting.__annotations__ if key in options}
     return Reporting(**found)  # type: ignore[typeddict-item]

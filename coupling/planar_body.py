@@ -205,7 +205,6 @@ class PlanarBody(PlacedBody):
     _next_modes: NDArray[np.int8] = np.zeros(0, dtype=np.int8)
 
     def _applied(self) -> Vector:
-        """Generalised force of weight and torque."""
         return np.array([0.0, -self.trial.weight, self._torque])
 
     def _mean_torque(self, dt: float) -> float:

@@ -156,7 +156,6 @@ class PlatformRun(EnergyBalance, Stepper):
             self._measure()
 
     def _begin(self) -> None:
-        """Time is 0."""
         self._start_balance(self.body.momentum, self._turning)
         self._keep(self.master.last)
         self._measure()
@@ -166,7 +165,6 @@ class PlatformRun(EnergyBalance, Stepper):
         self._sample(body.time, body.momentum - self._pull_of_weight * body.time, self._turning)
 
     def _keep(self, reaction: Reaction | None) -> None:
-        """One row, of the time of the pose."""
         now = self.body.twist_now(self.ground.lag)
         self._rows.append(self._row(reaction, now))
         centre = self.body.pose.position - 0.5 * self.macro_step * now.velocity
@@ -262,7 +260,6 @@ class PlatformRun(EnergyBalance, Stepper):
         self._order()
 
     def _lower(self, reaction: Reaction) -> None:
-        """A step of the placement."""
         self._settle(reaction, *self._unrest())
 
     def _settle(self, reaction: Reaction, lacking: Vector, moving: Vector) -> None:

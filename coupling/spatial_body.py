@@ -261,7 +261,6 @@ class SpatialBody(PlacedBody):
     _next_sticking: frozenset[int]
 
     def _wheels_at(self, wheels: Vector, turn: Vector) -> Vector:
-        """Angular momentum of the wheels in world axes with the platform turned so."""
         return to_matrix(turn) @ (self.axes.T @ wheels)
 
     def _spin_of(self, about: Vector, wheels: Vector, turn: Vector) -> Vector:

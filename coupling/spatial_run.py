@@ -123,7 +123,6 @@ class SpatialRun(PlatformRun):
         return self.reader.see(feet[0], feet[1:3], feet[3:5])
 
     def _law_state(self) -> str:
-        """By the tips that stick and slide under their Coulomb bounds."""
         places, body = self._places, self.body
         sliding = np.isin(np.arange(len(places)), list(body.sliding))
         touching = sliding | np.isin(np.arange(len(places)), list(body.sticking))
@@ -147,7 +146,6 @@ class SpatialRun(PlatformRun):
 
     @property
     def _feet_table(self) -> Vector:
-        """Row, spike and its numbers, of those that have any."""
         return np.concatenate([np.zeros((0, 2 + FEET)), *self._feet])
 
     @property

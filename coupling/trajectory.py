@@ -190,7 +190,6 @@ class Penetration:
         return folder
 
     def _toml(self, version: str) -> str:
-        """run.toml: what was run, on what, units in comments."""
         tables = {key: value for key, value in self.settings.items() if isinstance(value, dict)}
         plain = {key: value for key, value in self.settings.items() if key not in tables}
         lines = [f"# A {self.kind.replace('_', ' ')} spike: what was run, SI units.", f'experiment = "{self.kind}"']
@@ -206,7 +205,6 @@ def _in_use(folder: Path) -> bool:
 
 
 def _numbered(folder: Path) -> Iterator[Path]:
-    """The folder, then folder-2, folder-3, ..."""
     yield folder
     for number in itertools.count(2):
         yield folder.with_name(f"{folder.name}-{number}")

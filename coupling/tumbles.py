@@ -129,7 +129,6 @@ class TumblesInARow(CoupledTumble):
         return np.maximum(0.0, (self.trial.spike_length - radius) * np.cos(angles) + radius - float(self.body.place[1]))
 
     def _switch(self, on: bool) -> None:
-        """The torque acts from now on, or no more."""
         self._on = on
         self.body.trial = replace(self.trial, torque_until=math.inf if on else self.body.time)
 

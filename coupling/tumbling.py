@@ -139,7 +139,6 @@ class CoupledTumble(PlatformRun):
             self._settling = []
 
     def _weigh(self) -> None:
-        """The body weighs what it does under the gravity of now."""
         if self.lowered is not None:
             now = self.lowered.now
             self.body.trial = self.trial if self.lowered.at_last else replace(self.trial, gravity_sim=now)

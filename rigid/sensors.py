@@ -231,7 +231,6 @@ def _imu_times(sensors: SensorSet, duration: float) -> Array:
 
 
 def _with_lead(motion: Motion, sensors: SensorSet) -> Motion:
-    """The motion with the time before it, in which the platform stands still."""
     before = (
         sensors.lead / (1.0 - abs(sensors.clock_drift))
         + 2.0 * abs(sensors.clock_offset)

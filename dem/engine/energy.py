@@ -161,7 +161,6 @@ def _asleep(bed: BedBase, state: Mapping[str, Array]) -> tuple[Array, ...]:
 
 
 def _twice(keys: Array) -> Array:
-    """Whether each of these is there more than once."""
     order = np.argsort(keys)
     same = np.diff(keys[order]) == 0
     found = np.zeros(len(keys), dtype=bool)
@@ -171,7 +170,6 @@ def _twice(keys: Array) -> Array:
 
 
 def _near(state: Mapping[str, Array], surfaces: Mapping[int, Gap], law: int) -> Array:
-    """Of a grain and a body."""
     rows = [state[name] for name in ("near_grain", "near_body", "near_slide", "near_roll")]
     if "sleep_numbers" in state:
         bodies = state["sleep_store_who"] < 0

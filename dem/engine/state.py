@@ -303,6 +303,5 @@ def _chunk_starts(grain_count: int, chunk_count: int) -> np.ndarray:
 
 
 def _near_rows(near_count: np.ndarray, room: int) -> np.ndarray:
-    """Rows of the near lists that are in use."""
     before = np.concatenate(([0], np.cumsum(near_count)[:-1]))
     return np.repeat(np.arange(len(near_count)) * room - before, near_count) + np.arange(int(near_count.sum()))

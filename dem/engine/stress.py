@@ -78,7 +78,6 @@ def find_contacts(bed: BedBase) -> Contacts:
 
 
 def _planes(state: State) -> list[int]:
-    """The bodies that are one plane."""
     ranges = state["body_primitives"][: int(state["numbers"][1])]
     return [b for b, (start, end) in enumerate(ranges) if end == start + 1 and state["primitive_kind"][start] == PLANE]
 

@@ -238,7 +238,6 @@ def _read(path: Path) -> Material:
 
 
 def _of_its_kind(path: Path, key: str, value: Any) -> Any:
-    """A value as ``Material`` takes it. Raises ValueError for one of another kind."""
     if key == "sources":
         if not isinstance(value, dict) or not all(isinstance(text, str) for text in value.values()):
             raise ValueError(f"{path}: sources = {value!r} must be a table of texts, one for each number")

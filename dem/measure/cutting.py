@@ -190,7 +190,6 @@ def _ramp(bed: BedCore, gravity: float, height: float) -> None:
 
 
 def _rest(bed: BedCore, grain: float, height: float) -> None:
-    """Come to rest in a drag, and still be at rest without it."""
     fall, drag, waited = _fall_time(bed, height), True, 0.0
     steps = max(1, round(0.1 * fall / bed.time_step))
     while True:

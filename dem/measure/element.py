@@ -280,7 +280,6 @@ def shear_element(
 
 
 def _look(bed: BedCore, strain: float, height: float, grain: float) -> tuple[float, float, np.ndarray]:
-    """Strain, packing and stress of the inside now."""
     edges = np.array([_MARGIN * grain, height - _MARGIN * grain])
     grains = bed.grains()
     packing = packing_profile(grains.position[:, 2], grains.radius, bed.size[0] * bed.size[1], edges)

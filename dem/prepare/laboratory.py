@@ -161,7 +161,6 @@ class Laboratory(Preparation[B]):
         return self._said()
 
     def _said(self) -> Json:
-        """What a stage that compacts tells of itself."""
         return {key: self.notes[key] for key in ("taps", "pressure", "packing_under_it", "trace") if key in self.notes}
 
     def _press_to(self, packing: float) -> None:
@@ -212,7 +211,6 @@ class Laboratory(Preparation[B]):
         return {"removed": notes["removed"], "fallen": fallen, "height": notes["height"]}
 
     def _tilt(self, stage: Stage) -> Json:
-        """Turn gravity towards +x by a degree at a time, at rest after each."""
         assert stage.value is not None
         bed, notes = self.bed, self.notes
         g = math.hypot(*bed.gravity)

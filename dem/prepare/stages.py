@@ -84,7 +84,6 @@ class Preparation(Generic[B]):
         self.bed, self.notes = bed, notes
 
     def _to_keep(self) -> Json:
-        """What is kept beside the bed, its steps and the notes."""
         raise NotImplementedError
 
     def _recall(self, kept: Json) -> bool:

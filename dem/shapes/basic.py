@@ -147,7 +147,6 @@ Primitive = Plane | Ball | Cone | Cylinder
 
 @ti.func
 def _segment(px, pz, ax, az, bx, bz):
-    """Nearest point to (px, pz) on the segment a-b."""
     ex, ez = bx - ax, bz - az
     t = ti.min(1.0, ti.max(0.0, ((px - ax) * ex + (pz - az) * ez) / (ex * ex + ez * ez)))
     return ax + t * ex, az + t * ez

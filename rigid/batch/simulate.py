@@ -161,7 +161,6 @@ def _row(trial: Trial) -> list[float]:
 
 
 def _one_varied(trial: Trial, vary: Mapping[str, ArrayLike] | None) -> tuple[Trial, Array]:
-    """Rows for one trial whose numbers are replaced by arrays."""
     given = {key: np.asarray(value, dtype=float) for key, value in (vary or {}).items()}
     sizes = {value.shape for value in given.values()} or {(1,)}
     if len(sizes) != 1 or len(next(iter(sizes))) != 1:
@@ -254,7 +253,6 @@ def _with(trial: Trial, changes: Mapping[str, float], *, quiet: set[str]) -> Tri
 
 
 def _check_stiffest(first: Trial, numbers: Array, time_step: float) -> None:
-    """Refuse a step too long for the stiffest, lightest trial of the batch."""
     if first.surface.name == "spring-damper":
         decoupled = any("inner_mass" in term.hooks for term in first.terms)  # the counterweight, by its wires
         carried = 0.0 if decoupled else numbers[:, 4]

@@ -91,7 +91,6 @@ def _name(term: Term) -> str:
 
 
 def _calls(terms: Sequence[Term], hook: str, fixed: str) -> list[str]:
-    """The calls of `hook`, one a term that has it."""
     found = []
     for term in terms:
         if hook in term.hooks:

@@ -294,7 +294,6 @@ def _scale(system: System) -> list[float]:
 
 
 def _keep(system: System, z: list[float], modes: Modes) -> None:
-    """What outlives a step: the deepest depths."""
     if not system.has_memory:
         return
     for contact in system.contacts:
@@ -307,7 +306,6 @@ def _keep(system: System, z: list[float], modes: Modes) -> None:
 def _switch(
     system: System, time: float, z: list[float], modes: Modes, event: list[Monitor], forced: bool
 ) -> list[float]:
-    """Change the modes for what happened; return dz/dt."""
     may_stick: list[int] = []
     vertical = rotation = False
     for kind, n in event:

@@ -72,7 +72,6 @@ def integrate_fixed(
 def _read_modes(
     system: System, time: float, z: list[float], modes: Modes, before: dict[int, float], old: tuple[float, ...]
 ) -> list[float]:
-    """The modes that the state shows; dz/dt."""
     trial = system.trial
     if not modes.torque_over and time >= trial.torque_until:
         modes.torque_over = True

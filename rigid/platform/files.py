@@ -164,7 +164,6 @@ def _keys_beside(place: tuple[Any, ...]) -> list[str]:
 
 
 def _kinds(annotation: Any) -> list[type]:
-    """The classes inside an annotation."""
     if isinstance(annotation, type):
         return [annotation]
     return [kind for inner in get_args(annotation) for kind in _kinds(inner)]

@@ -129,7 +129,6 @@ class Integration:
         return end, error if np.isfinite(end).all() and math.isfinite(error) else math.inf
 
     def _scale(self) -> Array:
-        """What the tolerance is relative to."""
         platform = self.motion.platform
         reach, scale = platform.reach, np.ones(19)
         moment = float(np.trace(platform.inertia)) / 3
@@ -249,7 +248,6 @@ class Integration:
         return False
 
     def _switch(self, found: Sequence[tuple[str, int]]) -> None:
-        """Change the modes for what has happened."""
         may_stick, loose = [], []
         self.motion.rates(self.z, self.modes)
         for kind, k in found:
@@ -378,7 +376,6 @@ class Integration:
             modes.weight = {k: load / total for k, load in loads.items()}
 
     def _set_torques(self) -> None:
-        """What the wheels give now."""
         driving = bool(self.modes.touching) or self.in_flight
         torque = [0.0, 0.0, 0.0]
         for k, history in enumerate(self.histories):
