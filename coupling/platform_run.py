@@ -170,7 +170,7 @@ class PlatformRun(EnergyBalance, Stepper):
         centre = self.body.pose.position - 0.5 * self.macro_step * now.velocity
         feet = feet_of(reaction, centre, now, self._members - self._hull, hull=bool(self._hull))
         self._keep_feet(feet)
-        self._states.append(STATES.index(self._read(feet) if self.ground.gives_friction else self._law_state()))
+        self._states.append(STATES.index(self._state_now(feet)))
 
     def _start_placement(self) -> None:
         if isinstance(self.ground, BedGround):
@@ -204,12 +204,8 @@ class PlatformRun(EnergyBalance, Stepper):
         """Keep what each member feels (`contact_state.feet_of`)."""
         raise NotImplementedError
 
-    def _read(self, feet: Vector) -> str:
-        """The state, from forces of grains."""
-        raise NotImplementedError
-
-    def _law_state(self) -> str:
-        """The state, from who sticks and who slides on a law."""
+    def _state_now(self, feet: Vector) -> str:
+        """The state: on grains from their forces, on a law from who sticks and who slides."""
         raise NotImplementedError
 
     @property

@@ -119,10 +119,9 @@ class SpatialRun(PlatformRun):
         there = np.flatnonzero(feet.any(axis=0))
         self._feet.append(np.column_stack([np.full(len(there), len(self._rows) - 1.0), there, feet[:, there].T]))
 
-    def _read(self, feet: Vector) -> str:
-        return self.reader.see(feet[0], feet[1:3], feet[3:5])
-
-    def _law_state(self) -> str:
+    def _state_now(self, feet: Vector) -> str:
+        if self.ground.gives_friction:
+            return self.reader.see(feet[0], feet[1:3], feet[3:5])
         places, body = self._places, self.body
         sliding = np.isin(np.arange(len(places)), list(body.sliding))
         touching = sliding | np.isin(np.arange(len(places)), list(body.sticking))

@@ -182,10 +182,9 @@ class CoupledTumble(PlatformRun):
     def _keep_feet(self, feet: Vector) -> None:
         self._feet.append(feet[[0, 1, 3, 5]])
 
-    def _read(self, feet: Vector) -> str:
-        return self.reader.see(feet[0], feet[1], feet[3])
-
-    def _law_state(self) -> str:
+    def _state_now(self, feet: Vector) -> str:
+        if self.ground.gives_friction:
+            return self.reader.see(feet[0], feet[1], feet[3])
         touching = self.body.modes != 9
         return state_of(touching, touching & (self.body.modes != 0)) if len(self._rows) > 1 else "stand"
 
