@@ -93,9 +93,7 @@ def time_step_for(material: Material, *, diameter: float, max_overlap: float, wa
     """The time step [s]: an eighth of the shortest contact time, or the one wanted if it is short enough.
 
     For grains so strongly damped that an eighth may be unstable (e below 0.48 with friction, below 0.3 without), the
-    longest that is stable.
-
-    Raises ValueError: the step wanted is not positive, or longer than ``longest_step``.
+    longest that is stable. Raises ValueError: the step wanted is not positive, or longer than ``longest_step``.
     """
     shortest = contact_time(material, diameter=diameter, max_overlap=max_overlap)
     longest = longest_step(material, diameter=diameter, max_overlap=max_overlap)

@@ -104,10 +104,9 @@ class BedBase:
     def let_sleep(self, rules: Sleep | None = None) -> None:
         """From here on grains at rest far from the bodies are not computed; ``dem.engine.sleep`` has the rules.
 
-        What is read of the bed counts sleepers in, with no speed and no force. The floor's reaction has what they
-        would have passed on to it.
-
-        Raises ValueError: a bed on a GPU, without floor or gravity, or whose grains cohere by JKR.
+        What is read of the bed counts sleepers in, with no speed and no force. The floor's reaction has what they would
+        have passed on to it. Raises ValueError: a bed on a GPU, without floor or gravity, or whose grains cohere by
+        JKR.
         """
         self.check_valid()
         if self.engine.gpu:

@@ -332,9 +332,7 @@ class BedCore(BedBodies):
 
         ``dem.engine.dissipation`` sums it. damping: against normal dashpots, all of it lost. tangential, turning:
         against tangential forces, and against rolling and twisting torques; it is lost but for what their springs hold
-        more than at the start (``dem.engine.energy.bed_energies``).
-
-        Raises ValueError: it is not tracked.
+        more than at the start (``dem.engine.energy.bed_energies``). Raises ValueError: it is not tracked.
         """
         if not self.engine.balance.on:
             raise ValueError("this bed tracks no contact work: track_contact_work() starts it")

@@ -61,7 +61,6 @@ def prepare_as(
         options: see ``dem.prepare.specification.BedOptions``.
 
     The rain is more than is wanted, so that a bed that is levelled last has its depth up to a packing fraction of 0.64.
-
     Raises ValueError: what ``prepare_bed`` refuses; stages that cannot be; a packing, or a slope, that is out of reach;
     both ``keep`` and ``cache``. BedFailure: the bed did not come to rest.
     """
@@ -110,11 +109,9 @@ def prepare_bed(
 
     The grains fall as a loose column from rest, come to rest in a drag that stands in for the long ringing of a soft
     bed, lose what lies above the level, and settle again, at the end without drag. Settled means: mean kinetic energy
-    of a grain below 1e-5 m g d, and floor force within 1 % of the weight.
-
-    Raises ValueError: an unknown material, a size or grain that is not positive, grains too large for the bed, a spread
-    outside 0 to 0.5 or beside a distribution, a packing that cannot be reached, a time step too long. BedFailure: the
-    bed did not come to rest.
+    of a grain below 1e-5 m g d, and floor force within 1 % of the weight. Raises ValueError: an unknown material, a
+    size or grain that is not positive, grains too large for the bed, a spread outside 0 to 0.5 or beside a
+    distribution, a packing that cannot be reached, a time step too long. BedFailure: the bed did not come to rest.
     """
     wanted = Specification.of(material, **options)
     sizes, (x, y, z) = wanted.sizes, wanted.size
