@@ -32,6 +32,7 @@ from . import runtime
 from .dissipation import NO_BALANCE, Balance, BalanceKernels
 from .lists import CACHE_LINE, ITEMS_PER_THREAD, MOST_BODIES, SCAN_BLOCKS, Lists
 from .readings import TALLY_BLOCKS, Readings
+from .rows import put_rows
 from .shape_table import PLAIN, Shapes
 from .sleep_kernels import EVERYONE, Rest, Sleepers
 from .steps import Steps
@@ -333,15 +334,9 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, BalanceKernels):
 
     def write(self, name: str, values: np.ndarray, rows: np.ndarray | None = None) -> None:
         """Put values into the first rows of a field, or into the rows given; the others become zero."""
-        field = getattr(self, name)
-        values = np.asarray(values)
-        shape = (*field.shape, *values.shape[len(field.shape) :])
-        array = np.zeros(shape, dtype=values.dtype)
-        if rows is None:
-            array[tuple(slice(count) for count in values.shape[: len(field.shape)])] = values
-        else:
-            array[rows] = values
-        field.from_numpy(array)
+        field, values = getattr(self, name), np.asarray(values)
+        first = tuple(slice(count) for count in values.shape[: len(field.shape)])
+        put_rows(field, values, first if rows is None else rows)
 
     def launch(
         self, most: int, dt: float, limit: float, gravity: tuple[float, float, float], keep: float
