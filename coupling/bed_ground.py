@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dem.engine.values import Grains
-from rigid.ground.reaction import Contact, Facts, Reaction, State
+from rigid.ground.reaction import Contact, Facts, Reaction, State, Turned
 from rigid.platform.spike import Spike
 from rigid.spatial.quaternions import multiply, to_matrix
 
@@ -238,12 +238,7 @@ class BedGround:
         return worst
 
     def step(
-        self,
-        position: ArrayLike,
-        velocity: ArrayLike,
-        dt: float,
-        turn: ArrayLike | None = None,
-        spin: ArrayLike | None = None,
+        self, position: ArrayLike, velocity: ArrayLike, dt: float, turn: Turned = None, spin: Turned = None
     ) -> Reaction:
         """See `Ground.step`. Raises LeftTheBedError, ValueError where dt is no multiple of the bed's step, and what the
         bed raises."""

@@ -9,7 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from numpy.typing import ArrayLike
 
-from rigid.ground.reaction import Contact, Facts, Reaction, State
+from rigid.ground.reaction import Contact, Facts, Reaction, State, Turned
 
 __all__ = ["Contact", "Described", "Ground", "Reaction", "State"]
 
@@ -55,12 +55,7 @@ class Ground(Protocol):
         """
 
     def step(
-        self,
-        position: ArrayLike,
-        velocity: ArrayLike,
-        dt: float,
-        turn: ArrayLike | None = None,
-        spin: ArrayLike | None = None,
+        self, position: ArrayLike, velocity: ArrayLike, dt: float, turn: Turned = None, spin: Turned = None
     ) -> Reaction:
         """Advance by `dt` [s] under a body at `position` [m] (at the start) that moves at constant `velocity` [m/s].
 

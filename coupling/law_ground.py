@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigid.ground.grounds import SpringDamper, SurfaceGround
-from rigid.ground.reaction import Contact, Reaction, State
+from rigid.ground.reaction import Contact, Reaction, State, Turned
 from rigid.model.trial import Trial
 from rigid.spatial.spatial import SpatialTrial
 
@@ -92,12 +92,7 @@ class LawGround:
         return 0.0
 
     def step(
-        self,
-        position: ArrayLike,
-        velocity: ArrayLike,
-        dt: float,
-        turn: ArrayLike | None = None,
-        spin: ArrayLike | None = None,
+        self, position: ArrayLike, velocity: ArrayLike, dt: float, turn: Turned = None, spin: Turned = None
     ) -> Reaction:
         """See `Ground.step`: each tip goes along its chord, and its law is exact over that path."""
         pose, twist = Pose.of(position, turn), Twist.of(velocity, spin)

@@ -17,6 +17,8 @@ from .lists import MOST_BODIES
 
 __all__ = ["BedBodies"]
 
+Array = np.ndarray
+
 
 class BedBodies(BedBase):
     """A bed into which bodies are put; they move as they are set to, and the grains give way."""
@@ -124,13 +126,7 @@ class BedBodies(BedBase):
                 getattr(e, name)[body] = numbers
 
     def move_bodies(
-        self,
-        bodies: Sequence[int],
-        *,
-        positions: np.ndarray,
-        velocities: np.ndarray,
-        turns: np.ndarray,
-        spins: np.ndarray,
+        self, bodies: Sequence[int], *, positions: Array, velocities: Array, turns: Array, spins: Array
     ) -> None:
         """Several bodies at once, as ``move_body`` does one: quicker, where a platform has many.
 

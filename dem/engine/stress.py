@@ -22,6 +22,8 @@ from .values import State
 
 __all__ = ["Contacts", "find_contacts", "stress_profile"]
 
+Array = np.ndarray
+
 
 @dataclass(frozen=True)
 class Contacts:
@@ -117,13 +119,8 @@ def _turned(q: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def _spring_force(
-    cohesion: str,
-    pair: tuple[float, float, float, float],
-    normal: np.ndarray,
-    overlap: np.ndarray,
-    radius: np.ndarray,
-    slide: np.ndarray,
-) -> np.ndarray:
+    cohesion: str, pair: tuple[float, float, float, float], normal: Array, overlap: Array, radius: Array, slide: Array
+) -> Array:
     """The forces of ``dem.contact.law`` at rest; ``pair``: 2 E*, 8 G*, friction, pi w. Zero where there is no
     contact."""
     two_e, eight_g, friction, pi_w = pair

@@ -11,6 +11,8 @@ from dem.grains.profile import bulk_packing, surface_height
 
 __all__ = ["MOST_DRAINED", "MOST_STRAYED", "Grading", "Layer", "Zone", "measure_grading", "surface_under"]
 
+Array = np.ndarray
+
 # So many mean diameters of its place beyond where it belongs a grain has strayed; the rain scatters most less far.
 _SCATTER = 1.0
 _FINENESS = 8  # squares of half a fine diameter over this measure the zones
@@ -124,14 +126,7 @@ def _under(graded: Graded, x: np.ndarray, length: float) -> np.ndarray:
 
 
 def _zones(
-    bed: BedCore,
-    graded: Graded,
-    x: np.ndarray,
-    z: np.ndarray,
-    d: np.ndarray,
-    solid: np.ndarray,
-    distance: np.ndarray,
-    place: np.ndarray,
+    bed: BedCore, graded: Graded, x: Array, z: Array, d: Array, solid: Array, distance: Array, place: Array
 ) -> list[Zone]:
     size, surface = bed.size, bed.surface
     full = (graded.coarse - graded.fine) / graded.growth

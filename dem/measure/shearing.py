@@ -21,6 +21,7 @@ from .lid import Lid
 
 __all__ = ["MOST_PRESSURE", "Shearing", "roughen_floor", "shear_bed"]
 
+Tell = Callable[[float], None]
 # Friction and rolling friction of a grain on lid and floor [1]: ten times what any grain has.
 _ROUGH = 10.0
 # Steps between two looks of the servo; and over the time in which a grain falls the bed's depth, how long it takes what
@@ -59,13 +60,7 @@ def roughen_floor(bed: BedCore) -> None:
 
 
 def shear_bed(
-    bed: BedCore,
-    *,
-    pressure: float,
-    way: float,
-    inertial_number: float,
-    grain: float,
-    tell: Callable[[float], None] = lambda share: None,
+    bed: BedCore, *, pressure: float, way: float, inertial_number: float, grain: float, tell: Tell = lambda share: None
 ) -> Shearing:
     """Press a rough lid on a bed and move it sideways, the pressure held by a servo. The bed is used up by it.
 

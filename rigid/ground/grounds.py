@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from rigid.checks import check_above_zero, check_friction
 
 from .laws import SurfaceLaw, find_law
-from .reaction import Contact, Facts, Reaction, State
+from .reaction import Contact, Facts, Reaction, State, Turned
 
 __all__ = ["SpringDamper", "SurfaceGround"]
 
@@ -99,12 +99,7 @@ class _LawGround:
         return self._law.stored(depth, self._numbers, top=self._deepest[0], rebound=self._rebound)
 
     def step(
-        self,
-        position: ArrayLike,
-        velocity: ArrayLike,
-        dt: float,
-        turn: ArrayLike | None = None,
-        spin: ArrayLike | None = None,
+        self, position: ArrayLike, velocity: ArrayLike, dt: float, turn: Turned = None, spin: Turned = None
     ) -> Reaction:
         """Mean reaction over `dt` [s] on a body whose tip starts at `position` [m], at constant `velocity` [m/s].
 

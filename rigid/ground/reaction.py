@@ -9,11 +9,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Contact", "Facts", "Reaction", "State", "Vector"]
+__all__ = ["Contact", "Facts", "Reaction", "State", "Turned", "Vector"]
 
 Vector = NDArray[np.float64]
+Turned = ArrayLike | None  # A quaternion or a spin; None: not turned, not turning
 State = dict[str, Any]  # Everything that the next steps depend on: name -> numpy array, flat, as an .npz file holds it
 Facts = dict[str, Any]  # Name -> number, text, list or table of these, SI units: what run.toml and result.json can hold
 

@@ -13,6 +13,7 @@ from .dynamics import Modes, System
 
 __all__ = ["Interpolant", "Step", "attempt", "interpolant"]
 
+Numbers = Sequence[float]
 Interpolant = Callable[[float], list[float]]  # z at a time within a step
 
 _C = (0.2, 0.3, 0.8, 8 / 9, 1.0)
@@ -39,14 +40,7 @@ class Step:
 
 
 def attempt(
-    system: System,
-    time: float,
-    z: Sequence[float],
-    modes: Modes,
-    k1: list[float],
-    h: float,
-    scale: Sequence[float],
-    tolerance: float,
+    system: System, time: float, z: Numbers, modes: Modes, k1: list[float], h: float, scale: Numbers, tolerance: float
 ) -> Step:
     """A step of `h` [s] from `z` at `time` [s], where dz/dt is `k1`. `scale`: what the tolerance is relative to."""
     rates = [k1]

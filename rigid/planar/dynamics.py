@@ -24,6 +24,8 @@ X, Y, THETA, VX, VY, OMEGA, WHEEL, WORK, LOST = range(9)
 """Entries of the state vector z: pose, speeds, speed of the wheel, work of the torque, energy dissipated."""
 INNER, INNER_SPEED = 9, 10  # Two more where a term has a coordinate of its own (`System.inner`)
 
+Triple = tuple[float, float, float]
+Row = tuple[Triple, float, Triple]  # A, b and B of a constraint A a + b = 0 whose force is along B
 _SLIGHT = 1e-300
 _SHIFTING = 0.1
 """Where loads vanish, shares of them shift without bound as they end; `hold_still` then keeps the constraint alone."""
@@ -211,7 +213,7 @@ class System:
                 power -= friction * slip
             else:
                 sticking.append((contact, at, top, held))
-        rows: list[tuple[tuple[float, float, float], float, tuple[float, float, float]]] = []
+        rows: list[Row] = []
         if sticking:
             rows.append(self._stick_row(sticking, omega))
         vertical, rotation = model.dry_friction(p, s) if self.has_vertical or self.has_rotation else (0.0, 0.0)
@@ -241,9 +243,7 @@ class System:
             rate += [s.inner_speed, own_force / own_mass]
         return rate
 
-    def _stick_row(
-        self, sticking: list[tuple[Contact, float, float, float]], omega: float
-    ) -> tuple[tuple[float, float, float], float, tuple[float, float, float]]:
+    def _stick_row(self, sticking: list[tuple[Contact, float, float, float]], omega: float) -> Row:
         """The constraint A a + b = 0 of the spikes that stick, and the direction B of its force: (A, b, B)."""
         self.stick_load = sum(contact.load for contact, *_ in sticking)
         self.stick_bound = sum(contact.friction_bound for contact, *_ in sticking)
@@ -296,12 +296,7 @@ class System:
         near, far = stored(depth + e) - stored(depth - e), stored(depth + 2 * e) - stored(depth - 2 * e)
         return elastic - (8 * near - far) / (12 * e) if e > 0 else 0.0
 
-    def _constrained(
-        self,
-        mass: tuple[float, ...],
-        force: tuple[float, float, float],
-        rows: list[tuple[tuple[float, float, float], float, tuple[float, float, float]]],
-    ) -> tuple[tuple[float, float, float], list[float]]:
+    def _constrained(self, mass: tuple[float, ...], force: Triple, rows: list[Row]) -> tuple[Triple, list[float]]:
         """Accelerations under `force` and the forces of the constraints A a + b = 0."""
         divide = self.model.divide_mass
         a = divide(*mass, *force)
@@ -318,7 +313,7 @@ class System:
         a = tuple(a[k] + sum(push * m[k] for push, m in zip(pushes, answers, strict=True)) for k in range(3))
         return a, pushes
 
-    def energy(self, time: float, z: Sequence[float], modes: Modes) -> tuple[float, float, float]:
+    def energy(self, time: float, z: Sequence[float], modes: Modes) -> Triple:
         """Kinetic energy, potential energy (weight, wires, springs) and energy stored in the ground [J]."""
         s, p, model = self.s, self.p, self.model
         self._set(time, z)
@@ -344,7 +339,7 @@ class System:
         The change is the constraint's own impulse, so its energy, missing from the balance, is added to what is lost.
         """
         contacts = [contact for contact in self.contacts if modes.slip[contact.spike] == 0]
-        rows: list[tuple[float, float, float]] = []
+        rows: list[Triple] = []
         if contacts:
             total = sum(contact.load for contact in contacts)
             shares = [contact.load / total if total > 0 else 1 / len(contacts) for contact in contacts]

@@ -15,13 +15,11 @@ from .statics import standing
 
 __all__ = ["integrate_fixed"]
 
+OnStep = Callable[[float, list[float], list[float], Modes], None]
+
 
 def integrate_fixed(
-    system: System,
-    *,
-    duration: float,
-    time_step: float,
-    on_step: Callable[[float, list[float], list[float], Modes], None],
+    system: System, *, duration: float, time_step: float, on_step: OnStep
 ) -> list[tuple[float, str, float]]:
     """Step from static equilibrium to `duration` [s]; `on_step(time, z, dz/dt, modes)` sees the start and every step.
 

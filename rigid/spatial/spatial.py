@@ -27,6 +27,7 @@ from .steps import Integration
 __all__ = ["SpatialTrajectory", "SpatialTrial", "simulate", "standing"]
 
 Array = NDArray[np.float64]
+Numbers = Sequence[float]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -272,11 +273,7 @@ def _samples(duration: float, interval: float, times: ArrayLike | None) -> Array
 
 
 def _start(
-    trial: SpatialTrial,
-    position: Sequence[float] | None,
-    quaternion: Sequence[float] | None,
-    velocity: Sequence[float],
-    angular_velocity: Sequence[float],
+    trial: SpatialTrial, position: Numbers | None, quaternion: Numbers | None, velocity: Numbers, spin: Numbers
 ) -> Array:
     z = np.zeros(STATE_COUNT)
     z[Q] = (1.0, 0.0, 0.0, 0.0)
@@ -295,7 +292,7 @@ def _start(
     turn = to_matrix(z[Q])
     z[P] = masses * velocity
     inertia = turn @ trial.platform.inertia @ turn.T
-    z[L] = inertia @ np.asarray(angular_velocity, dtype=float)
+    z[L] = inertia @ np.asarray(spin, dtype=float)
     for k, history in enumerate(trial.histories):
         if history is not None:
             z[H.start + k] = history.spin

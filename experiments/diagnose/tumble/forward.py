@@ -110,7 +110,8 @@ class Forward:
         chosen = range(len(self.data.trials)) if trials is None else trials
         count = max((np.shape(value)[0] for value in sets.values()), default=1)
         on = {name.partition(".")[0] for name in sets if "." in name}
-        moving = any(id not in EFFECTS or not EFFECTS[id].sensor for id in on)
+        sensing = {term.id for term in (*EFFECTS.values(), *(own.term for own in self.own)) if term.sensor}
+        moving = not on <= sensing
         terms = (*_moving_terms(self.rig), *(own.term for own in self.own if not own.term.sensor)) if moving else ()
         columns = self._columns(sets, count, terms)
         clock, lens = (self._of_sensors(hook, sets, count) for hook in ("clock", "lens"))
