@@ -322,7 +322,8 @@ def _tables_toml(tables: BaseModel) -> str:
         value = getattr(tables, name)
         if name == "notes":
             if value:
-                listed.append("\n".join(["[notes]", *_pairs(value)]))
+                pairs = (f"{toml_value(str(key))} = {toml_value(item)}" for key, item in value.items())
+                listed.append("\n".join(["[notes]", *pairs]))
         elif isinstance(value, BaseModel):
             nested += _table_toml(name, value)
         elif isinstance(value, tuple) and _table_in(info.annotation) is not None:
@@ -351,7 +352,3 @@ def _lines(table: BaseModel) -> list[str]:
             continue
         lines.append(f"{key} = {toml_value(value)}  # {info.description}")
     return lines
-
-
-def _pairs(notes: Mapping[str, Any]) -> list[str]:
-    return [f"{toml_value(str(key))} = {toml_value(value)}" for key, value in notes.items()]

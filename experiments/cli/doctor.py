@@ -87,10 +87,6 @@ def _taichi(arch: str, answer: dict[str, Any]) -> Finding:
     return Finding(f"backend {arch}", answer["ok"], detail, remedies[arch], required=arch == "cpu")
 
 
-def _threads() -> Finding:
-    return Finding("threads", True, f"{cores_there()} usable of {os.cpu_count()}")
-
-
 def _memory() -> Finding:
     memory = memory_there()
     limited = f", limited to {memory.limit / GIB:.1f} GiB" if memory.limit is not None else ""
@@ -135,7 +131,7 @@ def examine() -> list[Finding]:
             Finding("hedgebed", True, __version__),
             _python(),
             *taichi,
-            _threads(),
+            Finding("threads", True, f"{cores_there()} usable of {os.cpu_count()}"),
             _memory(),
             _cache(),
             _opengl(opengl.result()),

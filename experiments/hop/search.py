@@ -113,16 +113,12 @@ def _by_motor(plan: HopPlan, settings: HopSettings) -> _Means:
     )  # fmt: skip
 
 
-def _wanted(plan: HopPlan) -> float:
-    """The distance [m]; where none is asked for, one that bounds what is looked through."""
-    return plan.distance if plan.distance is not None else 1.0
-
-
 def _impulsive_speed(plan: HopPlan, settings: HopSettings) -> float:
     """The wheel's speed for the distance by a brake that takes no time [rad/s]."""
     sudden = impulsive_launch(plan.tumbler, plan.wheel.inertia)
     gravity, radius = settings.gravity, settings.body_radius
-    return launch_speed_for(_wanted(plan), sudden.angle, gravity=gravity, radius=radius) / sudden.speed
+    wanted = plan.distance if plan.distance is not None else 1.0  # any, to bound what is looked through
+    return launch_speed_for(wanted, sudden.angle, gravity=gravity, radius=radius) / sudden.speed
 
 
 def _hop(settings: HopSettings, means: _Means, effort: float) -> Hop | None:

@@ -153,10 +153,6 @@ def _processor_time() -> float:
     return spent.user + spent.system + spent.children_user + spent.children_system
 
 
-def _float(value: Any) -> float:
-    return float(value) if isinstance(value, int | float) else 0.0
-
-
 def fresh_path(command: str, root: Path = Path("runs")) -> Path:
     """A folder under `root` that does not exist yet: ``<command>-<date>-<time>``."""
     stem = f"{command.replace(' ', '-')}-{datetime.now():%Y%m%d-%H%M%S}"
@@ -182,7 +178,8 @@ class RunFolder:
         self.version = version
         self.code = code  # digest of the code that computes, where the experiment has one
         self.settings = settings  # as run.toml has them: name -> value, None for what is not set
-        self._spent_before = _float(self._kept_status().get("processor_time"))
+        spent = self._kept_status().get("processor_time")
+        self._spent_before = float(spent) if isinstance(spent, int | float) else 0.0
         self._began = _processor_time()
 
     def __repr__(self) -> str:

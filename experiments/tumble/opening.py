@@ -44,7 +44,8 @@ def opening(
         if number.origin == "given" or number.origin.startswith("default"):
             continue
         told.add(name)
-        numbers.setdefault(number.origin, []).append(f"{name} = {number.value:.6g}{_unit(number.unit)}")
+        unit = "" if number.unit == "1" else f" {number.unit}"
+        numbers.setdefault(number.origin, []).append(f"{name} = {number.value:.6g}{unit}")
     spikes = plan.spikes
     for name, length in (("spike_diameter", spikes.diameter), ("spike_clear", spikes.clear)):
         if name in spikes.of_platform:
@@ -119,7 +120,3 @@ def _shown(settings: TumbleSettings, name: str) -> str:
     unit = re.search(r"\[([A-Za-z][^\]]*)\]", TumbleSettings.model_fields[name].description or "")
     number = f"{value:g}" if isinstance(value, float) else str(value)
     return f"{number} {unit[1]}" if unit and isinstance(value, float) else number
-
-
-def _unit(unit: str) -> str:
-    return "" if unit == "1" else f" {unit}"

@@ -107,7 +107,7 @@ def campaign_of_tumbles(run: str | Path, *, recording: TumbleRecording | None = 
         notes={
             "made_by": f"hedgebed {__version__} tumble on {_ground(first)}", "stiffness_and_damping": said,
             "code": str(first.get("code", "")), "noise_seed": seed,
-            "grain_seeds": [_seed(result) for result in results],
+            "grain_seeds": [result.get("grains", {}).get("seed", "none") for result in results],
         },
         trial=tuple(trials),
     )  # fmt: skip
@@ -195,7 +195,3 @@ def _law(first: Mapping[str, Any], fitted: str | None) -> tuple[float, float, di
 def _ground(result: Mapping[str, Any]) -> str:
     named = str(result["surface"])
     return f"a bed of {named}" if result["ground"] == "bed" else f"the {result['ground']} of {named}"
-
-
-def _seed(result: Mapping[str, Any]) -> Any:
-    return result.get("grains", {}).get("seed", "none")
