@@ -102,9 +102,7 @@ def make_run(
             after_stop=settings.after_stop if drop_time is None else math.inf,
             max_time=settings.drop_time if drop_time is None else drop_time, **common,
         )  # fmt: skip
-    # It gives up after thrice the time in which it would sink to where drops are stopped.
-    long = 3 * deepest(settings) / unit.speed + 10 * settings.rest_time
-    return SetDown(spike, ground, lowering_speed=unit.speed, max_time=long, **common)
+    return SetDown(spike, ground, lowering_speed=unit.speed, max_time=_set_down_time(settings, unit), **common)
 
 
 def deepest(settings: PenetrateSettings) -> float:
@@ -135,3 +133,8 @@ def share_done(run: Run, expected: float, *, sure: bool = False) -> float:
         return run.fraction
     passed = max(0.0, run.time) / expected
     return min(1.0, passed) if sure else as_expected(passed)
+
+
+def _set_down_time(settings: PenetrateSettings, unit: Unit) -> float:
+    """When a set-down gives up [s]: thrice the time in which it would sink to where drops are stopped."""
+    return 3 * deepest(settings) / unit.speed + 10 * settings.rest_time
