@@ -9,7 +9,6 @@ A sample is taken every whole number of the run's macro steps. Force and acceler
 between samples, as a sensor's filter gives them; the depth is that of the moment. White noise is added to each.
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -89,7 +88,7 @@ def campaign_of_run(run: str | Path, *, sensors: SpikeSensors | None = None) -> 
         raise ValueError(f"{str(run)!r} is a run of {folder.command!r}, 'penetrate' was expected{remedy}")
     if folder.status != "done" or not (folder.path / "result.json").exists():
         raise ValueError(f"{str(run)!r} is not finished ({folder.status}): `hedgebed resume {run}` first")
-    result = json.loads((folder.path / "result.json").read_text(encoding="utf-8"))
+    result = folder.read_result()
     settings = PenetrateSettings(**folder.settings)
     if settings.ground != "bed":
         raise ValueError(f"{str(run)!r} is a run on ground = {settings.ground!r}: one in a bed was expected")

@@ -9,6 +9,7 @@ from cyclopts import App, Parameter
 from rich.console import Console
 from rich.table import Table
 
+from experiments.runs.folder import read_json
 from experiments.runs.progress import duration
 from experiments.runs.streams import refusing, say, stdout_to_stderr
 from experiments.runs.types import Json
@@ -120,7 +121,7 @@ def _sinking(names: _Names = (), /, *, results: _Results = RESULTS) -> int:
             kept = results / case.name / "result.json"
             if not kept.exists():
                 continue
-            falls = json_module.loads(kept.read_text(encoding="utf-8")).get("footfalls")
+            falls = read_json(kept).get("footfalls")
             if falls:
                 group = case.name.removesuffix(f"-seed{case.settings.seed}")
                 groups.setdefault(group, {})[case.name] = [Footfall(**fall) for fall in falls]

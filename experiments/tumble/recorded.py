@@ -6,7 +6,6 @@ penetrate is named (`fitted`, twice a spike's), else as the run has them. What i
 it. The start is the run's own: on grains theta and x are near 0 at t = 0, not exactly 0.
 """
 
-import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -181,7 +180,7 @@ def _law(first: Mapping[str, Any], fitted: str | None) -> tuple[float, float, di
     if folder.settings.get("material") != first["surface"]:
         material = folder.settings.get("material")
         raise ValueError(say("other_grains", fitted=fitted, material=material, surface=first["surface"]))
-    quantities = json.loads((folder.path / "result.json").read_text(encoding="utf-8"))["quantities"]
+    quantities = folder.read_result()["quantities"]
     values, sigmas = [], {}
     for name in ("stiffness", "damping"):
         value = float(quantities[name]["value"])
