@@ -15,7 +15,8 @@ from experiments.runs.types import Json
 
 __all__ = ["EFFECTS", "OUTSIDE", "Hidden", "correlated", "draw_hidden", "draw_kind", "make_hidden"]
 
-Random, Names = np.random.Generator, Sequence[str]
+Random = np.random.Generator
+Names = Sequence[str]
 EFFECTS = ("inertial-drag", "depth-hardening", "plastic-sinkage", "adhesion", "shaft-friction", "layering")
 OUTSIDE = ("floor-vibration", "loose-mass", "shock", "load-cell-drift", "sloshing")
 _STEP = 5e-6

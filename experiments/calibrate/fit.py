@@ -101,7 +101,9 @@ class Wanted:
     tolerance: float
 
 
-Surfaces, Goals, Ranges = Mapping[str, Response], Mapping[str, Wanted], Mapping[str, Sequence[float]]
+Surfaces = Mapping[str, Response]
+Goals = Mapping[str, Wanted]
+Ranges = Mapping[str, Sequence[float]]
 """Of every observable the response, of every figure what it should be, of every parameter both ends."""
 
 
