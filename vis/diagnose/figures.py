@@ -18,51 +18,32 @@ from numpy.typing import NDArray
 
 from vis.page.plots import DASHED, Array, handle, legend_above, sheet
 from vis.page.report import Result
+from vis.page.sentences import Sentences
 from vis.page.style import BED, GREY, INK, MODEL
 from vis.page.tumble_series import STATES, state_runs
 
 __all__ = ["Channel", "draw_evidence", "draw_latent", "draw_phases", "draw_trajectories", "read_channel", "worst"]
 
+labels = Sentences(__package__, "labels.toml")
 _MOST_ROWS = 6
 _MOST_BARS = 14
-#: channel -> (what it is, unit, factor on SI)
-_QUANTITIES: dict[str, tuple[str, str, float]] = {
-    "x": ("x", "mm", 1e3),
-    "y": ("y", "mm", 1e3),
-    "theta": ("θ", "degrees", 180 / math.pi),
-    "gyro": ("gyro", "rad/s", 1.0),
-    "ax": ("specific force, body x", "m/s²", 1.0),
-    "ay": ("specific force, body y", "m/s²", 1.0),
-    "wheel": ("wheel", "rad/s", 1.0),
-    "depth": ("depth", "mm", 1e3),
-    "force": ("force", "N", 1.0),
-    "accel": ("acceleration", "m/s²", 1.0),
+#: channel -> (what it is, unit)
+_QUANTITIES: dict[str, tuple[str, str]] = {
+    "x": ("x", "mm"),
+    "y": ("y", "mm"),
+    "theta": ("θ", "degrees"),
+    "gyro": ("gyro", "rad/s"),
+    "ax": ("specific force, body x", "m/s²"),
+    "ay": ("specific force, body y", "m/s²"),
+    "wheel": ("wheel", "rad/s"),
+    "depth": ("depth", "mm"),
+    "force": ("force", "N"),
+    "accel": ("acceleration", "m/s²"),
 }
 _PHASES = STATES | {"free": STATES["hop"], "in": STATES["pivot"], "rest": STATES["stand"], "out": STATES["slip"]}
 """Of a tumble the colours that its states have everywhere; of a push, never in one figure with those, the same four."""
-#: column of latent.csv -> axis label and factor; what is not here is shown under its own name
-_COLUMNS: dict[str, tuple[str, float]] = {
-    "t_s": ("time [s]", 1.0),
-    "depth_m": ("depth [mm]", 1e3),
-    "retreat_m": ("way back from the deepest point [mm]", 1e3),
-    "velocity_m_s": ("velocity, downwards [m/s]", 1.0),
-    "speed_m_s": ("nominal speed of the trial [m/s]", 1.0),
-    "diameter_m": ("diameter [mm]", 1e3),
-    "gravity_m_s2": ("gravity of the trial [m/s²]", 1.0),
-    "torque_N_m": ("torque of the trial [N m]", 1.0),
-    "x_m": ("x [mm]", 1e3),
-    "y_m": ("y [mm]", 1e3),
-    "theta_rad": ("θ [degrees]", 180 / math.pi),
-    "vx_m_s": ("velocity along the surface [m/s]", 1.0),
-    "vy_m_s": ("velocity upwards [m/s]", 1.0),
-    "omega_rad_s": ("rate of rotation [rad/s]", 1.0),
-    "wheel_rad_s": ("wheel [rad/s]", 1.0),
-    "state": ("state", 1.0),
-    "latent_force_N": ("missing force [N]", 1.0),
-    "latent_force_x_N": ("missing force along x [N]", 1.0),
-    "latent_force_y_N": ("missing force along y [N]", 1.0),
-    "latent_torque_N_m": ("missing torque [N m]", 1.0),
-}
+_FACTORS = {"mm": 1e3, "degrees": 180 / math.pi}
+"""What a number in SI is multiplied by to be in a unit."""
 _NARROW = 3.0
 """Range of chi-square up to which its axis is linear."""
 _BINS = 20
@@ -146,7 +127,8 @@ def draw_trajectories(channels: Sequence[Channel], held: set[str], labels: tuple
     models = [("before", MODEL, DASHED, labels[0]), ("after", BED, "-", labels[1])]
     models = [entry for entry in models if entry[3]]
     for (left, right), c in zip(axes, channels, strict=True):
-        what, unit, factor = _QUANTITIES.get(c.name, (c.name, "SI", 1.0))
+        what, unit = _QUANTITIES.get(c.name, (c.name, "SI"))
+        factor = _FACTORS.get(unit, 1.0)
         quick = np.ptp(c.time) < 0.5
         time = c.time * (1e3 if quick else 1.0)
         step = max(1, len(time) // 160)
@@ -368,7 +350,7 @@ def draw_latent(folder: Path, said: Result, channels: Sequence[Channel]) -> Figu
     drawing, axes = sheet(len(latents), 2, 0.6 + 2.3 * len(latents), sharey="row")
     for pair, latent in zip(axes, latents, strict=True):
         for axis, column in zip(pair, ("t_s", other), strict=True):
-            label, factor = _COLUMNS.get(column, (column, 1.0))
+            label, factor = _label(column)
             across = factor * values[column]
             for name in dict.fromkeys(phase.tolist()):
                 own = phase == name
@@ -378,11 +360,17 @@ def draw_latent(folder: Path, said: Result, channels: Sequence[Channel]) -> Figu
             share = said["latent"].get("explained", {}).get(column)
             several = "up to " if len(latents) > 1 else ""  # it is the largest of all that is missing
             axis.set_xlabel(label + (f"; explains {several}{100 * share:.0f} %" if share is not None else ""))
-        pair[0].set_ylabel(_COLUMNS.get(latent, (latent, 1.0))[0])
+        pair[0].set_ylabel(_label(latent)[0])
         _frame(pair[1], values[latent])
     handles = [*_phase_handles(phase), handle("means of equal counts", INK, marker="o", ms=3)]
     legend_above(drawing, handles, 5, fontsize=8)
     return drawing
+
+
+def _label(column: str) -> tuple[str, float]:
+    """Label of the axis of a column of latent.csv, and the factor of its numbers; its own name where it has none."""
+    label = labels.templates.get(column, column)
+    return label, _FACTORS.get(label.partition("[")[2].rstrip("]"), 1.0)
 
 
 def _frame(axis: Axes, values: Array) -> None:

@@ -15,8 +15,6 @@ from pathlib import Path
 from typing import NotRequired, TypedDict
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -30,7 +28,7 @@ from vis.page.sentences import Sentences
 from vis.page.states import state_strip
 from vis.page.style import styled
 from vis.pictures.arrows import draw_force, draw_measure
-from vis.pictures.canvas import COLOURS, colour_values, colourmap
+from vis.pictures.canvas import COLOURS, blank_page, colour_bar, colour_values, colourmap, pixels
 from vis.pictures.frames import Frame
 from vis.pictures.pictures import Counter, Picture, Pictures, carry_out
 from vis.pictures.render import replace_file, write_gif, write_png
@@ -96,18 +94,15 @@ class Sheet:
         self.panels = layout(self.reels)
         self.stages, self.ways = [], []
         for panel in self.panels:
-            pixels = (round(panel.place[2] * size[0]), round(panel.place[3] * size[1]))
-            stage, way = panel.camera.set_up(self.reels[panel.run], pixels, reach, opengl=opengl)
+            own = (round(panel.place[2] * size[0]), round(panel.place[3] * size[1]))
+            stage, way = panel.camera.set_up(self.reels[panel.run], own, reach, opengl=opengl)
             self.stages.append(stage)
             self.ways.append(way)
 
     def draw(self, time: float) -> NDArray[np.uint8]:
         """The sheet at `time` [s], shape (height, width, 3)."""
-        width, height = self.size
         with styled():
-            sheet = Figure(figsize=(12.8, 12.8 * height / width), dpi=width / 12.8)
-            sheet.set_layout_engine("none")
-            canvas = FigureCanvasAgg(sheet)
+            sheet = blank_page(self.size, 12.8)
             for number in range(len(self.panels)):
                 self._panel(sheet, number, time)
             for number, reel in enumerate(self.reels):
@@ -124,9 +119,8 @@ class Sheet:
                 runs = [{"t_s": reel.series["t_s"], "state": reel.states} for reel in self.reels]
                 state_strip(sheet, runs, self.labels, time)
             if any(reel.on_grains for reel in self.reels):
-                self._bar(sheet)
-            canvas.draw()
-            return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+                colour_bar(sheet, self.reels[0].bar, self.norm, self.map, COLOURS[self.by][0], 10.5)
+            return pixels(sheet)
 
     def close(self) -> None:
         """Free the windows."""
@@ -160,12 +154,6 @@ class Sheet:
         if not len(frame.grains["position"]):
             return np.zeros((0, 4))
         return np.asarray(self.map(self.norm(colour_values(frame.grains, self.by))))
-
-    def _bar(self, sheet: Figure) -> None:
-        axis = sheet.add_axes(self.reels[0].bar)
-        bar = sheet.colorbar(ScalarMappable(self.norm, self.map), cax=axis, extend="max", extendfrac=0.04)
-        bar.set_label(COLOURS[self.by][0], fontsize=10.5)
-        bar.outline.set_visible(False)  # type: ignore[operator]
 
 
 def draw_reels(

@@ -122,26 +122,19 @@ def read_folder(folder: str | Path) -> RunFolder:
     runs = []
     for entry in _dicts(result.get("runs")):
         name = str(entry.get("id", "unnamed"))
-        bedless = result.get("ground") == "spring-damper"
-        bed = None if bedless else _try_series(path, entry.get("series"), f"run {name}: the bed's series", missing)
-        amended = f"run {name}: the series of the model's law"
-        with_model = "amended_series" in entry
-        alone = "model_series" not in entry and result.get("experiment") in PYTHON_RUNS
-        law = f"run {name}: the spring-damper's series"
-        model = None if alone else _try_series(path, entry.get("model_series"), law, missing)
+        bed = model = amended = None
+        if result.get("ground") != "spring-damper":
+            bed = _try_series(path, entry.get("series"), f"run {name}: the bed's series", missing)
+        if "model_series" in entry or result.get("experiment") not in PYTHON_RUNS:
+            model = _try_series(path, entry.get("model_series"), f"run {name}: the spring-damper's series", missing)
+        if "amended_series" in entry:
+            law = f"run {name}: the series of the model's law"
+            amended = _try_series(path, entry["amended_series"], law, missing)
         speed, seed = entry.get("speed"), entry.get("seed")
-        runs.append(
-            Run(
-                id=name,
-                kind=str(entry.get("kind", "")),
-                seed=int(seed) if isinstance(seed, int | float) else None,
-                speed=float(speed) if isinstance(speed, int | float) else None,
-                bed=bed,
-                model=model,
-                quantities=dict(entry.get("quantities") or {}),
-                amended=_try_series(path, entry["amended_series"], amended, missing) if with_model else None,
-            )
-        )
+        seed = int(seed) if isinstance(seed, int | float) else None
+        speed = float(speed) if isinstance(speed, int | float) else None
+        numbers = dict(entry.get("quantities") or {})
+        runs.append(Run(name, str(entry.get("kind", "")), seed, speed, bed, model, numbers, amended))
     if result and not runs:
         missing.append("result.json lists no runs.")
     status, reason = _read_status(path / "status.json")
@@ -181,18 +174,16 @@ def _dicts(value: Any) -> list[dict[str, Any]]:
 
 
 def _read_result(path: Path, missing: list[str]) -> dict[str, Any]:
-    if not path.exists():
-        missing.append("result.json is missing: the run stopped before it had a result.")
-        return {}
     try:
         result = json.loads(path.read_text(encoding="utf-8"))
+        if isinstance(result, dict):
+            return result
+        missing.append("result.json holds no object.")
+    except FileNotFoundError:
+        missing.append("result.json is missing: the run stopped before it had a result.")
     except (OSError, ValueError) as error:
         missing.append(f"result.json cannot be read: {error}.")
-        return {}
-    if not isinstance(result, dict):
-        missing.append("result.json holds no object.")
-        return {}
-    return result
+    return {}
 
 
 def _read_status(path: Path) -> tuple[str, str]:
@@ -217,12 +208,12 @@ def _try_series(folder: Path, name: Any, what: str, missing: list[str]) -> Serie
 
 
 def _read_settings(path: Path, missing: list[str]) -> list[Setting]:
-    if not path.exists():
-        missing.append("run.toml is missing: the settings are not known.")
-        return []
     try:
         text = path.read_text(encoding="utf-8")
         tomllib.loads(text)
+    except FileNotFoundError:
+        missing.append("run.toml is missing: the settings are not known.")
+        return []
     except (OSError, ValueError) as error:
         missing.append(f"run.toml cannot be read: {error}.")
         return []

@@ -15,13 +15,17 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
+from matplotlib.colorbar import Colorbar
 from matplotlib.colors import Colormap, ListedColormap, Normalize
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from vis.page.style import INK, styled
 
-__all__ = ["COLOURS", "Caption", "ColourScale", "Page", "colour_values", "colourmap", "moved_since", "nice_above"]
+__all__ = [
+    "COLOURS", "Caption", "ColourScale", "Page", "blank_page", "colour_bar", "colour_values", "colourmap",
+    "moved_since", "nice_above", "pixels",
+]  # fmt: skip
 
 #: What grains are coloured by: name -> (label with unit, factor from SI).
 COLOURS: dict[str, tuple[str, float]] = {
@@ -127,23 +131,18 @@ class Page:
     ) -> NDArray[np.uint8]:
         """The finished picture, shape (height, width, 3).
 
-        ``caption``: Its words. ``image``: The rendered scene, shape (height, width, 3), or. ``draw``: a function that
+        ``caption``: Its words. ``image``: The rendered scene, shape (height, width, 3); or ``draw``: a function that
         draws on an axes that fills the page, in the page's fractions. ``place``: Where a point of the bed lies on the
         page. ``section``: Of the plane of the cut: x of its left and right end, its y, z of the floor and of the
         undisturbed surface [m]. ``note``: Small print at the foot.
         """
-        width, height = self.size
-        dpi = width / 8.0
         with styled():
-            figure = Figure(figsize=(8.0, 8.0 * height / width), dpi=dpi)
-            figure.set_layout_engine("none")
-            canvas = FigureCanvasAgg(figure)
+            figure = blank_page(self.size, 8.0)
             axis = figure.add_axes((0.0, 0.0, 1.0, 1.0))
             axis.set_axis_off()
             if image is not None:
                 axis.imshow(image, extent=(0.0, 1.0, 0.0, 1.0), aspect="auto", interpolation="nearest")
-            axis.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
-            axis.set_autoscale_on(False)
+            axis.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0), autoscale_on=False)
             if draw is not None:
                 draw(axis)
             self._rulers(axis, place, section)
@@ -151,13 +150,9 @@ class Page:
             figure.text(0.03, 0.905, caption.lines, fontsize=12.5, va="top", color="#444444", linespacing=1.35)
             if note:
                 figure.text(0.03, 0.018, note, fontsize=9.5, va="bottom", color="#666666")
-            bar_axis = figure.add_axes((0.885, 0.2, 0.018, 0.5))
-            bar = figure.colorbar(ScalarMappable(self.norm, self.map), cax=bar_axis, extend="max", extendfrac=0.04)
-            bar.set_label(self.scale.label, fontsize=11.5)
+            bar = colour_bar(figure, (0.885, 0.2, 0.018, 0.5), self.norm, self.map, self.scale.label, 11.5)
             bar.ax.tick_params(labelsize=11)
-            bar.outline.set_visible(False)  # type: ignore[operator]
-            canvas.draw()
-            return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+            return pixels(figure)
 
     def _rulers(self, axis: Any, place: Place, section: tuple[float, float, float, float, float]) -> None:
         """Depth below the surface along the left edge of the cut, a length along its foot."""
@@ -178,32 +173,41 @@ class Page:
             ends = line([(x, y, z), (x - 0.5 * offset, y, z)], color=INK, lw=1.0)
             axis.text(ends[1, 0] - 0.006, ends[1, 1], f"{1e3 * i * step:g}", ha="right", va="center", fontsize=11)
         middle = place(np.array([[x - 0.5 * offset, y, 0.5 * (floor + surface)]]))[0]
-        axis.text(
-            middle[0] - 0.06,
-            middle[1],
-            "depth below the surface [mm]",
-            rotation=90,
-            ha="center",
-            va="center",
-            fontsize=11.5,
-        )
+        style = {"ha": "center", "va": "center", "fontsize": 11.5}
+        axis.text(middle[0] - 0.06, middle[1], "depth below the surface [mm]", rotation=90, **style)
         low = floor - 1.2 * offset
         tick = 0.25 * offset
-        for a, b in (
-            ((left, low), (left + step, low)),
-            ((left, low - tick), (left, low + tick)),
-            ((left + step, low - tick), (left + step, low + tick)),
-        ):
-            ends = line([(a[0], y, a[1]), (b[0], y, b[1])], color=INK, lw=1.6)
-            if a[1] == b[1]:
-                axis.text(
-                    ends[:, 0].mean(),
-                    ends[:, 1].min() - 0.012,
-                    f"{1e3 * step:g} mm",
-                    ha="center",
-                    va="top",
-                    fontsize=11,
-                )
+        right_end = left + step
+        ends = line([(left, y, low), (right_end, y, low)], color=INK, lw=1.6)
+        for end in (left, right_end):
+            line([(end, y, low - tick), (end, y, low + tick)], color=INK, lw=1.6)
+        x, z = ends[:, 0].mean(), ends[:, 1].min() - 0.012
+        axis.text(x, z, f"{1e3 * step:g} mm", ha="center", va="top", fontsize=11)
+
+
+def blank_page(size: tuple[int, int], inches: float) -> Figure:
+    """A figure of a size [pixels], as if it were so wide [inch], laid out by hand."""
+    figure = Figure(figsize=(inches, inches * size[1] / size[0]), dpi=size[0] / inches)
+    figure.set_layout_engine("none")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def colour_bar(figure: Figure, place: Any, norm: Normalize, colours: Colormap, label: str, fontsize: float) -> Colorbar:
+    """The bar of a colour scale: left, foot, width, height in fractions of the figure."""
+    cax = figure.add_axes(place)
+    bar = figure.colorbar(ScalarMappable(norm, colours), cax=cax, extend="max", extendfrac=0.04)
+    bar.set_label(label, fontsize=fontsize)
+    bar.outline.set_visible(False)  # type: ignore[operator]
+    return bar
+
+
+def pixels(figure: Figure) -> NDArray[np.uint8]:
+    """A figure drawn, shape (height, width, 3)."""
+    canvas = figure.canvas
+    assert isinstance(canvas, FigureCanvasAgg)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
 def _ruler_step(length: float) -> float:
