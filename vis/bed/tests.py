@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vis.page.numbers import quote
 from vis.page.page import Section, Tile, text
-from vis.page.plots import Plot, handle, legend_above, new_panels, shades, smooth_ratio
+from vis.page.plots import Array, Plot, handle, legend_above, new_panels, shades, smooth_ratio
 from vis.page.report import Progress, Report, Result, again, tables
 from vis.page.sentences import Sentences
 from vis.page.style import BED, MODEL, styled
@@ -207,18 +207,14 @@ def _cut_side(report: Report) -> list[Plot]:
 
 
 def _cut_profiles(report: Report) -> Plot:
-    runs = report.result["runs"]
-    with styled():
-        drawing, axes = new_panels(len(runs), height=2.4, sharey=True)
-        for axis, run in zip(axes, runs, strict=True):
-            columns = report.columns(run["series"])
-            if "thickness_standing_m" in columns:
-                axis.step(1e3 * columns["x_m"], 1e3 * columns["thickness_standing_m"], where="mid", color=BED, lw=1.2)
-            axis.step(1e3 * columns["x_m"], 1e3 * columns["thickness_m"], where="mid", color=MODEL, lw=1.2, ls="--")
-            axis.set(title=run["id"], xlabel="x [mm]", ylim=(0.0, None))
-        axes[0].set_ylabel("thickness [mm]")
-        legend_above(drawing, [handle("stood last", BED, lw=1.2), handle("at the end", MODEL, ls="--", lw=1.2)])
-    return Plot.said(captions, "tests_profiles", drawing, name="profiles")
+    def draw(axis: Axes, run: Result, x: Array, thickness: Array, standing: Array | None) -> str:
+        if standing is not None:
+            axis.step(x, standing, where="mid", color=BED, lw=1.2)
+        axis.step(x, thickness, where="mid", color=MODEL, lw=1.2, ls="--")
+        return str(run["id"])
+
+    handles = [handle("stood last", BED, lw=1.2), handle("at the end", MODEL, ls="--", lw=1.2)]
+    return _thicknesses(report, "tests_profiles", draw, handles)
 
 
 def _trials(runs: Sequence[Result]) -> Plot:
@@ -292,25 +288,32 @@ def _repose_side(report: Report) -> list[Plot]:
 
 
 def _repose_profiles(report: Report) -> Plot:
+    colours = iter(shades(len(report.result["runs"])))
+
+    def draw(axis: Axes, run: Result, x: Array, thickness: Array, standing: Array | None) -> str:
+        axis.plot(x, thickness, color=next(colours), marker=".", ls="none")
+        flank_lines(axis, run, start=0.5 * run["slot"], period=run["size"][0], colour=MODEL)
+        axis.axhline(1e3 * run["surface"], color="#888888", lw=0.8, ls="--")
+        return f"{run['id']}: {run['angle']:.1f} ± {run['error']:.1f}°"
+
+    with styled():
+        dots, fit = handle("bed", "black", marker=".", ls="none"), handle("fit", MODEL)
+        before = handle("surface before", "#888888", ls="--", lw=0.8)
+    return _thicknesses(report, "repose_profiles", draw, [dots, fit, before])
+
+
+def _thicknesses(report: Report, key: str, draw: Callable[..., str], handles: list[Any]) -> Plot:
+    """Profiles in mm, a panel a run, each drawn by `draw`, which gives its title."""
     runs = report.result["runs"]
     with styled():
         drawing, axes = new_panels(len(runs), height=2.4, sharey=True)
-        for axis, run, colour in zip(axes, runs, shades(len(runs)), strict=True):
-            columns = report.columns(run["series"])
-            axis.plot(1e3 * columns["x_m"], 1e3 * columns["thickness_m"], color=colour, marker=".", ls="none")
-            flank_lines(axis, run, start=0.5 * run["slot"], period=run["size"][0], colour=MODEL)
-            axis.axhline(1e3 * run["surface"], color="#888888", lw=0.8, ls="--")
-            axis.set(title=f"{run['id']}: {run['angle']:.1f} ± {run['error']:.1f}°", xlabel="x [mm]", ylim=(0.0, None))
+        for axis, run in zip(axes, runs, strict=True):
+            columns = {name: 1e3 * values for name, values in report.columns(run["series"]).items()}
+            title = draw(axis, run, columns["x_m"], columns["thickness_m"], columns.get("thickness_standing_m"))
+            axis.set(title=title, xlabel="x [mm]", ylim=(0.0, None))
         axes[0].set_ylabel("thickness [mm]")
-        legend_above(
-            drawing,
-            [
-                handle("bed", "black", marker=".", ls="none"),
-                handle("fit", MODEL),
-                handle("surface before", "#888888", ls="--", lw=0.8),
-            ],
-        )
-    return Plot.said(captions, "repose_profiles", drawing, name="profiles")
+        legend_above(drawing, handles)
+    return Plot.said(captions, key, drawing, name="profiles")
 
 
 _TESTS: dict[str, tuple[Callable[[Report], list[Plot]], Callable[[Result], list[Tile]], list[str]]] = {

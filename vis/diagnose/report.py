@@ -8,7 +8,7 @@ from pathlib import Path
 
 from vis.diagnose.figures import draw_evidence, draw_latent, draw_phases, draw_trajectories, read_channel, worst
 from vis.page.numbers import plain, short
-from vis.page.page import Block, Section, Tile, listing, table, text
+from vis.page.page import Block, Section, Tile, listing, table, table_of, text
 from vis.page.plots import Plot
 from vis.page.report import Progress, Report, Result, again, unit_text
 from vis.page.sentences import Sentences
@@ -123,7 +123,7 @@ def _gap_table(said: Result) -> Block:
     title = "The gap, chi-square per sample (1: the sensors' noise)"
     if weighed is not None:
         head += ("base model, replicates' scatter added", "best model, replicates' scatter added")
-        title += "; beside it with what replicates differ by added to the variance (1: as near as another run comes"
+        title += say("with_scatter")
         freedom = weighed.get("freedom")
         title += f"; their scatter rests on {freedom} degrees of freedom)" if freedom else ")"
     return table(head, rows, title=title)
@@ -161,8 +161,6 @@ def _phase_table(said: Result) -> list[Block]:
     rows: dict[tuple[str, str], dict[bool, Result]] = {}
     for row in said.get("by_phase", []):
         rows.setdefault((row["phase"], row["channel"]), {})[row["held_out"]] = row
-    if not rows:
-        return []
 
     def cells(part: Result | None) -> tuple[str, str, str]:
         if part is None:
@@ -171,7 +169,7 @@ def _phase_table(said: Result) -> list[Block]:
 
     head = ("phase", "channel", "samples fitted", "before", "after", "samples held out", "before", "after")
     body = [(*key, *cells(parts.get(False)), *cells(parts.get(True))) for key, parts in rows.items()]
-    return [table(head, body, title="Chi-square per sample by phase and channel")]
+    return table_of(head, body, title="Chi-square per sample by phase and channel")
 
 
 def _where(said: Result) -> list[Block]:
@@ -201,11 +199,9 @@ def _parted(said: Result) -> list[Block]:
     trials: dict[str, list[str]] = {}
     for row in said.get("parted", []):
         trials.setdefault(row["trial"], []).append(f"{row['channel']} {row['at_s']:.3g}")
-    if not trials:
-        return []
     title = "First parts from the base model at [s]: a running mean of nine samples beyond 5 standard errors"
-    return [table(("trial", "channel and time"), [(trial, ", ".join(times)) for trial, times in trials.items()],
-                  title=title, words=True)]  # fmt: skip
+    rows = [(trial, ", ".join(times)) for trial, times in trials.items()]
+    return table_of(("trial", "channel and time"), rows, title=title, words=True)
 
 
 def _settings(settings: Mapping[str, float], *, but: Mapping[str, float] | None = None) -> str:
@@ -253,11 +249,8 @@ def _sizes(said: Result) -> list[Block]:
          _DASH if size["share"] is None else f"{100 * size['share']:.2g} %")
         for size in said.get("sizes", []) if size["channel"] is not None
     ]  # fmt: skip
-    if not rows:
-        return []
     head = ("effect", "signature [noise]", "plainest in", "change, root mean square", "at most", "of what it reads")
-    return [table(head, rows, title="How large each effect is: what the readings would lack without it, all else "
-                                    "refitted, over the sensors' noise")]  # fmt: skip
+    return table_of(head, rows, title=say("sizes"))
 
 
 def _numbers(said: Result) -> list[Block]:
@@ -280,19 +273,11 @@ def _numbers(said: Result) -> list[Block]:
          error(after[name], name, "after"), unit_text(entry["unit"]))
         for name, entry in said["base"]["before"].items() if name in after
     ]  # fmt: skip
-    blocks = []
-    if effects:
-        blocks.append(
-            table(("effect", "parameter", "value", "standard error", "unit"), effects, title="What was added")
-        )
-    if base:
-        head = ("parameter", "before", "standard error", "after", "standard error", "unit")
-        blocks.append(table(head, base, title="The base model's parameters"))
-    blocks = [*_sizes(said), *blocks[:1], *_equations(said), *blocks[1:]] if effects else blocks
-    if blocks:
-        blocks.append(text("Standard errors hold if the model is right and the noise is as it was found; what the form "
-                           "of an effect leaves open is not in them.", small=True))  # fmt: skip
-    return blocks
+    added = table_of(("effect", "parameter", "value", "standard error", "unit"), effects, title="What was added")
+    head = ("parameter", "before", "standard error", "after", "standard error", "unit")
+    fitted = table_of(head, base, title="The base model's parameters")
+    blocks = [*_sizes(said), *added, *_equations(said), *fitted] if effects else fitted
+    return [*blocks, text(say("standard_errors"), small=True)] if blocks else []
 
 
 def _equations(said: Result) -> list[Block]:
@@ -311,7 +296,7 @@ def _findings(said: Result) -> list[Block]:
          _DASH if f["from_s"] is None else f"{f['from_s']:.4g} to {f['to_s']:.4g}", "yes" if f["set_aside"] else "no")
         for f in said.get("findings", [])
     ]  # fmt: skip
-    return [table(("what", "trial", "channel", "seconds", "set aside"), rows, words=True)] if rows else []
+    return table_of(("what", "trial", "channel", "seconds", "set aside"), rows, words=True)
 
 
 def _told_apart(said: Result) -> list[Block]:
@@ -333,9 +318,6 @@ def _told_apart(said: Result) -> list[Block]:
     ]  # fmt: skip
     head = ("name", "angle [degrees]", "distance [noise]", "evidence behind [nats]", "prediction behind [nats]",
             "chi-square of what was left out", "told apart")  # fmt: skip
-    caption = (
-        f"Other names in the place of {first['effect']}. The angle is that between what the two change in the data "
-        "(0: these trials see them as one); conditions left out in turn are predicted, chi-square a sample"
-    )
+    caption = say("other_names", effect=first["effect"])
     close = [row["what_would_tell"] for row in others if not row["told_apart"]]
     return [table(head, cells, title=caption), *([listing(close)] if close else [])]

@@ -18,18 +18,9 @@ from PIL import Image
 from vis.page.columns import template
 
 __all__ = [
-    "Block",
-    "Page",
-    "Section",
-    "Tile",
-    "code",
-    "figure",
-    "listing",
-    "table",
-    "text",
-    "write_page",
+    "Block", "Page", "Section", "Tile", "code", "figure", "listing", "table", "table_of", "text", "write_page",
     "write_template",
-]
+]  # fmt: skip
 
 _KINDS = {".png": "png", ".gif": "gif", ".jpg": "jpeg"}
 
@@ -119,6 +110,13 @@ def figure(
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], *, title: str = "", words: bool = False) -> Block:
     """A table; the first column is text, the others numbers unless `words`; `vis.page.columns` says which wrap."""
     return Block(kind="table", title=title, head=tuple(head), rows=tuple(tuple(row) for row in rows), words=words)
+
+
+def table_of(
+    head: Sequence[str], rows: Sequence[Sequence[str]], *, title: str = "", words: bool = False
+) -> list[Block]:
+    """The table where there are rows, as the only block."""
+    return [table(head, rows, title=title, words=words)] if rows else []
 
 
 def write_page(path: Path, page: Page) -> Path:
