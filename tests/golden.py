@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import html
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -20,7 +21,7 @@ _CHANGING = (
     (r"\b\d{1,2}:\d\d(?::\d\d)?\b", "<time>"),
     (r"(?<![\w.<])/(?:[\w.+-]+/)+(?:[\w.+-]*\w)?", "<path>/"),
     (r"\b\d+\.\d+\.\d+\w*(?:\.\w+)*(?:\+[\w.]+)?", "<version>"),
-    (r"\b(?=[0-9a-f]*[a-f])(?=[0-9a-f]*\d)(?:[0-9a-f]{64}|[0-9a-f]{40}|[0-9a-f]{12})\b", "<hash>"),
+    (r"\b(?=[0-9a-f]*[a-f])(?=[0-9a-f]*\d)(?:[0-9a-f]{64}|[0-9a-f]{40}|[0-9a-f]{16}|[0-9a-f]{12})\b", "<hash>"),
 )
 
 
@@ -39,6 +40,15 @@ def golden(name: str, text: Text) -> None:
         lines = difflib.unified_diff(kept.splitlines(), now.splitlines(), "kept", "now", lineterm="", n=1)
         told = f"The text differs from {_shown(path)}; if it is meant to, write it anew with `pytest --update-golden`:"
         pytest.fail("\n".join([told, *lines]), pytrace=False)
+
+
+def page_lines(page: str) -> list[str]:
+    """The text that a browser shows of `page` (HTML), one line a block, the cells of a row with bars between them."""
+    bare = re.sub(r"(?s)<(style|script|title)\b.*?</\1>", "", page)
+    bare = re.sub(r"</t[dh]>", " | ", re.sub(r"</(span|b)>(?=<)", " ", re.sub(r"\s+", " ", bare)))
+    bare = re.sub(r"<(?:/?(?:h\d|p|div|li|tr|table|figure|figcaption|section|pre|summary)|br|img)\b[^>]*>", "\n", bare)
+    lines = (html.unescape(re.sub(r"<[^>]+>", "", line)) for line in bare.split("\n"))
+    return [" ".join(line.split()).rstrip(" |") for line in lines if line.strip()]
 
 
 def _written(text: Text) -> str:

@@ -1,10 +1,12 @@
 """`hedgebed validate`: what it runs, keeps, and writes."""
 
 import json
+import re
 
 import matplotlib.image
 import numpy as np
 import pytest
+from golden import golden, page_lines
 
 import vis
 from experiments.cli.main import main
@@ -43,6 +45,12 @@ CASES = (
 )
 
 
+def counts(table):
+    """How many cases stand where, as the head of the kept table has it."""
+    found = re.findall(r"(\d+) (pass|fail|not run|not yet)\b", table.read_text().split("##")[0])
+    return {where: int(count) for count, where in found}
+
+
 @pytest.fixture
 def suite(monkeypatch):
     """A suite that computes nothing; returns how often each of its cases was run."""
@@ -69,14 +77,12 @@ def test_a_table_and_a_page_show_every_case(suite, tmp_path, capsys):
     assert result["quantities"]["cases_fail"]["value"] == 1
     text = document.read_text()
     assert text == (tmp_path / "run" / "validation.md").read_text()
-    assert "| good | A good one | y = 2 x | a book | 2 N | 2.01 N | +0.5 % | ±1 % | pass |" in text
-    assert "**FAIL**" in text and "it is known to be bad" in text
-    assert "skipped: there is no code" in text and "not yet: walls" in text
+    golden("validate/table", text)
     page = (tmp_path / "run" / "report.html").read_text()
-    assert "y = 2 x (a book)" in page and "lacking (One that lacks a code): skipped, there is no code" in page
-    assert "A line, drawn" in page and "data:image/png" in page and "it is known to be bad" in page
+    golden("validate/page", page_lines(page))
+    assert "A line, drawn" in page and "data:image/png" in page
     assert vis.write_report(tmp_path / "run").read_text() == page  # the page of any folder, made again
-    assert "bad fails: c is 1.5, 1 was wanted" in " ".join(capsys.readouterr().out.split())
+    assert "c is 1.5, 1" in " ".join(capsys.readouterr().out.split())
 
 
 def test_many_curves_are_told_beneath_their_plot(tmp_path):
@@ -110,8 +116,7 @@ def test_part_of_the_suite_leaves_the_committed_table_alone(suite, tmp_path, mon
     experiment.run(ValidateSettings(only=("good",)), tmp_path / "one")
     experiment.run(ValidateSettings(quick=True), tmp_path / "quick")
     assert suite == {"good": 2, "bad": 1, "lacking": 1}
-    page = (tmp_path / "one" / "report.html").read_text()
-    assert "left out of this run: bad, long, lacking" in page and "later (One for later): not yet, walls" in page
+    golden("validate/page_of_one", page_lines((tmp_path / "one" / "report.html").read_text()))
     assert not (tmp_path / "docs" / "validation.md").exists()
     experiment.run(ValidateSettings(), tmp_path / "all")
     assert "hedgebed validate`" in (tmp_path / "docs" / "validation.md").read_text()
@@ -124,13 +129,12 @@ def test_a_case_run_by_itself_goes_into_the_kept_table_with_its_own_code(suite, 
     experiment.run(ValidateSettings(quick=True), tmp_path / "quick")
     experiment.run(ValidateSettings(only=("long",), keep=True), tmp_path / "one")
     table = tmp_path / "docs" / "validation.md"
-    assert "1 pass, 0 fail, 3 not run, 1 not yet." in table.read_text()
+    assert counts(table) == {"pass": 1, "fail": 0, "not run": 3, "not yet": 1}
     experiment.run(ValidateSettings(only=("bad",), keep=True), tmp_path / "two")
     text = table.read_text()
-    assert "1 pass, 1 fail, 2 not run, 1 not yet." in text and "by `hedgebed validate --only bad`, code" in text
-    assert "- **bad** (1 of 1 numbers): it is known to be bad." in text and text.index("### bad") < text.index(
-        "### long"
-    )
+    assert counts(table) == {"pass": 1, "fail": 1, "not run": 2, "not yet": 1}
+    assert "validate --only bad`" in text and text.index("### bad") < text.index("### long")
+    golden("validate/table_of_two", text)
     experiment.run(ValidateSettings(), tmp_path / "all")
     assert table.read_text() == (tmp_path / "all" / "validation.md").read_text()
     with pytest.raises(ValueError, match="leave document out"):
@@ -139,7 +143,8 @@ def test_a_case_run_by_itself_goes_into_the_kept_table_with_its_own_code(suite, 
 
 def test_a_case_there_is_not_is_refused_with_the_nearest(tmp_path, capsys):
     assert main(["validate", "--only", "free-fal", "--out", str(tmp_path / "run")]) == 2
-    assert "only = 'free-fal' is no case of the suite; did you mean 'free-fall'" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "only = 'free-fal'" in told and "mean 'free-fall'" in told
     assert not (tmp_path / "run").exists()
     assert main(["validate", "--document", str(tmp_path / "no" / "x.md"), "--out", str(tmp_path / "run")]) == 2
 
@@ -160,7 +165,8 @@ def test_a_difference_that_is_not_a_number_is_said():
         {"title": "v: 1 fail", "date": "2026-01-01", "version": "0", "code": "0", "cases": [case]},
         command="hedgebed validate",
     )
-    assert "not a number" in text and "not looked into yet" in text
+    assert "not a number" in text
+    golden("validate/no_number", text)
 
 
 def test_mohrs_circle_asks_for_no_plane():
@@ -172,5 +178,5 @@ def test_mohrs_circle_asks_for_no_plane():
     assert mohr_angle(np.array([[1, 0, 0.382], [0, 1, 0], [0.382, 0, 1]])) == pytest.approx(
         np.degrees(np.arcsin(0.382))
     )
-    with pytest.raises(ValueError, match="least principal stress = 0 Pa: pressures in all directions"):
+    with pytest.raises(ValueError, match="stress = 0 Pa"):
         mohr_angle(np.diag([0.0, 1.0, 1.0]))
