@@ -46,7 +46,9 @@ def page_lines(page: str) -> list[str]:
     """The text that a browser shows of `page` (HTML), one line a block, the cells of a row with bars between them."""
     bare = re.sub(r"(?s)<(style|script|title)\b.*?</\1>", "", page)
     bare = re.sub(r"</t[dh]>", " | ", re.sub(r"</(span|b)>(?=<)", " ", re.sub(r"\s+", " ", bare)))
-    bare = re.sub(r"<(?:/?(?:h\d|p|div|li|tr|table|figure|figcaption|section|pre|summary)|br|img)\b[^>]*>", "\n", bare)
+    bare = re.sub(
+        r"<(?:/?(?:h\d|p|div|li|dt|dd|tr|table|figure|figcaption|section|pre|summary)|br|img)\b[^>]*>", "\n", bare
+    )
     lines = (html.unescape(re.sub(r"<[^>]+>", "", line)) for line in bare.split("\n"))
     return [" ".join(line.split()).rstrip(" |") for line in lines if line.strip()]
 
