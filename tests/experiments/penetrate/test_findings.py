@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 from fake_bed import FakeBed
+from golden import golden
 
 from experiments.grains.softening import Softening
 from experiments.penetrate import beds
@@ -41,7 +42,8 @@ def test_what_the_bed_pushes_with_at_its_surface_is_said_where_it_matters(tmp_pa
     found = penetrate.run(settings, tmp_path / "out")
     assert found["quantities"]["surface_force"]["value"] == pytest.approx(0.2)
     said = found["departures"]["surface"]
-    assert said.startswith("At depth 0 the bed already pushes with 0.20 N, 50 % of the load")
+    assert "0.20 N, 50 %" in said
+    golden("penetrate/surface_force", said)
     assert said in found["departures"]["sentences"]
 
 
@@ -56,9 +58,9 @@ def test_the_stiffness_of_a_foot_that_stands_is_load_over_sinkage(tmp_path, monk
     assert standing == pytest.approx(0.4 / numbers["sinkage_dem"]["value"])
     ratio = standing / numbers["stiffness"]["value"]
     assert ratio > 1.1
-    assert f"overstates the sinkage at rest {ratio:.2g} times" in result["departures"]["which_stiffness"]
-    assert "held back by a hand" in result["departures"]["set_down"]
-    assert "brings its momentum, 0.3 kg times its speed" in result["departures"]["set_down"]
+    said = [result["departures"][key] for key in ("which_stiffness", "set_down")]
+    assert f" {ratio:.2g} times" in said[0] and "0.3 kg times" in said[1]
+    golden("penetrate/foot_that_stands", said)
 
 
 def test_one_bed_tells_nothing_of_other_beds(tmp_path):
@@ -82,7 +84,7 @@ def test_a_fit_that_cannot_tell_the_two_says_so(tmp_path, given, told):
     settings = PenetrateSettings(**(QUICK | given))
     said = [text for text in penetrate.run(settings, tmp_path / "run")["warnings"] if "hardly tells K from C" in text]
     assert bool(said) == told
-    assert not told or "give at least two speeds and two drop_speeds" in said[0]
+    assert not told or ("two speeds" in said[0] and "two drop_speeds" in said[0])
 
 
 def test_a_bed_less_than_six_tips_wide_is_said(tmp_path):
@@ -92,7 +94,7 @@ def test_a_bed_less_than_six_tips_wide_is_said(tmp_path):
         [text for text in penetrate.run(case, tmp_path / name)["warnings"] if "tips wide" in text]
         for name, case in (("wide", wide), ("narrow", narrow))
     ]
-    assert told[0] == [] and "4.5 tips wide" in told[1][0] and "bed_size of 0.096 m" in told[1][0]
+    assert told[0] == [] and "4.5 tips wide" in told[1][0] and "of 0.096 m" in told[1][0]
 
 
 def test_drops_can_be_left_out(tmp_path):
@@ -109,8 +111,9 @@ def test_drops_can_be_left_out(tmp_path):
 def test_the_first_line_says_where_speed_and_pressure_come_from():
     settings = PenetrateSettings(**QUICK, retreat_speed=0.7)
     said = softening_note(settings, Softening(1e7, 3000.0, 0.7, 7e10))
-    assert "0.7 m/s, the speed of the pull-out" in said and "under the tip at its deepest" in said
-    assert "of a driven run" in softening_note(settings, Softening(1e7, 3000.0, 0.4, 7e10))
+    slower = softening_note(settings, Softening(1e7, 3000.0, 0.4, 7e10))
+    assert "0.7 m/s" in said and "0.4 m/s" in slower
+    golden("penetrate/softening_note", [said, slower])
 
 
 def test_an_overlap_near_its_bound_names_the_modulus_that_leaves_room():
@@ -118,4 +121,6 @@ def test_an_overlap_near_its_bound_names_the_modulus_that_leaves_room():
     settings = PenetrateSettings(**QUICK)
     softening = Softening(1e7, 3000.0, 0.4, 7e10)
     assert overlap_warning(0.044, settings, softening) is None
-    assert "young = 1.3e+07 Pa (here 1e+07 Pa) would leave room" in overlap_warning(0.048, settings, softening)
+    said = overlap_warning(0.048, settings, softening)
+    assert "= 1.3e+07 Pa" in said and "(here 1e+07 Pa)" in said
+    golden("penetrate/overlap_warning", said)
