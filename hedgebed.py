@@ -4,17 +4,16 @@ The code is in the packages ``dem``, ``rigid``, ``coupling``, ``experiments`` an
 """
 
 import sys
-
-from experiments.runs.version import __version__
+from importlib import import_module
 
 __all__ = ["__version__", "main"]
+
+__version__: str = import_module("experiments.runs.version").__version__
 
 
 def main() -> int:
     """Run the command line on ``sys.argv`` and return its exit status."""
-    from experiments.cli.main import main as command_line
-
-    return command_line()
+    return import_module("experiments.cli.main").main()
 
 
 if __name__ == "__main__":
