@@ -6,7 +6,7 @@ from pathlib import Path
 from experiments import penetrate
 
 SMALL = {
-    "seeds": (1,), "speeds": (0.2, 0.4), "depth": 0.004, "bed_size": (0.024, 0.024, 0.02), "grain": 0.004,
+    "seeds": (1,), "speeds": (0.2, 0.4), "depth": 0.004, "bed_size": (0.036, 0.036, 0.02), "grain": 0.004,
     "tip_diameter": 0.008, "drop_speeds": (0.15,), "frame_count": 0, "allow_coarse": True, "max_overlap": 0.1,
     "drop_time": 0.05, "load": 0.05,
 }  # fmt: skip

@@ -2,3 +2,9 @@
 
 ``suite.SUITE`` lists them; a family of cases is a module with ``CASES``.
 """
+
+from experiments.runs.registry import face
+
+__all__ = ["Settings", "check", "resume", "run"]
+
+__getattr__ = face("validate")
