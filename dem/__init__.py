@@ -1,10 +1,9 @@
 """The granular bed: spherical grains, shapes that move among them, their preparation and measurement.
 
-It imports nothing of ours outside dem. Its packages, lowest first: grains (materials, sizes), contact (the contact
-law), shapes, engine (fields, kernels and the core of a bed), measure, prepare; ``dem.bed.Bed`` stands above them all.
-
 The names in ``__all__`` are public and are imported from here. They are looked up when they are first used, so that
 ``import dem`` does not start Taichi.
+
+Imports nothing of ours outside itself.
 """
 # ruff: noqa: F401  # the names below are in __all__, which is made of the table of modules
 

@@ -1,7 +1,8 @@
 """Settings, runs, results, diagnosis, and the command line over them.
 
 Each experiment is a package: after ``from experiments import penetrate``,
-``penetrate.run(penetrate.Settings(...), folder)`` writes a run folder and returns its result; ``penetrate.resume(folder)`` finishes a run that was stopped.
+``penetrate.run(penetrate.Settings(...), folder)`` writes a run folder and returns its result;
+``penetrate.resume(folder)`` finishes a run that was stopped.
 
 Imports `coupling`, `dem`, `rigid`, `vis`.
 """

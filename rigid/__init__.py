@@ -2,6 +2,8 @@
 
 The planar model is loaded with the package. The platforms, hop theory and the spatial model are loaded when first asked
 for, since scipy takes longer to load than a tumble to integrate.
+
+Imports nothing of ours outside itself.
 """
 
 from importlib import import_module

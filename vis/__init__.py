@@ -7,6 +7,8 @@ Reads and writes run folders (docs/architecture.md) and plain arrays; imports no
 pictures and the animation),
 `vis.penetrate.plots` (curves), `vis.report` (`report.html`). What scripts want most can be had from `vis` itself,
 and is loaded when it is first asked for: frames are written without matplotlib.
+
+Imports nothing of ours outside itself.
 """
 
 from __future__ import annotations

@@ -1,1 +1,4 @@
-"""The engine: fields, kernels, neighbour lists, sleep, state, the core of a bed. Imports grains, contact, shapes."""
+"""The engine: fields, kernels, neighbour lists, sleep, checkpoints, and the core of a bed.
+
+Imports `dem.contact`, `dem.grains`, `dem.shapes`.
+"""

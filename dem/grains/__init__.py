@@ -1,1 +1,4 @@
-"""Grains before they move: materials, size distributions, first positions and profiles. Imports nothing of ours."""
+"""Grains before they move: materials, size distributions, first positions and profiles.
+
+Imports nothing of ours.
+"""

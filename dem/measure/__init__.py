@@ -1,1 +1,4 @@
-"""Tests on a bed: cone, shear, repose, vertical cut, element, grading. Imports the engine and what is below it."""
+"""Tests on a bed: cone, shear, repose, vertical cut, element, grading.
+
+Imports `dem.contact`, `dem.engine`, `dem.grains`, `dem.shapes`.
+"""

@@ -1,1 +1,4 @@
-"""The preparation of beds: stages, recipes, reports, the cache and bed files. Imports measure and what is below it."""
+"""The preparation of beds: stages, recipes, reports, the cache and bed files.
+
+Imports `dem.contact`, `dem.engine`, `dem.grains`, `dem.measure`.
+"""

@@ -1,1 +1,4 @@
-"""Shapes of bodies: distances to them, as data and as Taichi functions. Imports nothing of ours."""
+"""Shapes of bodies: distances to them, as data and as Taichi functions.
+
+Imports nothing of ours.
+"""

@@ -1,7 +1,9 @@
-"""Grain parameters from bulk figures: a response surface over sheared samples.
+"""A material whose simulated strength is that of measured sand: design of samples, fit, material file.
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed bed calibrate`; they are loaded when they are first used.
 Imports `experiments.bed` and what that may import.
+
+Imports `dem`, `experiments.bed`, `experiments.grains`, `experiments.penetrate`, `experiments.runs`, `vis`.
 """
 
 from experiments.runs.registry import face

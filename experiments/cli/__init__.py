@@ -1,1 +1,5 @@
-"""The command line. Imports every package of `experiments`; nothing imports it."""
+"""The command line: `hedgebed <experiment>`, `resume`, `render`, `bench`, `doctor`.
+
+Imports `dem`, `experiments.campaign`, `experiments.penetrate`, `experiments.runs`, `experiments.suite`,
+`experiments.tumble`, `rigid`, `vis`.
+"""

@@ -2,6 +2,8 @@
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed compare`; they are loaded when they are first used.
 Imports `experiments.spatial` and what that may import.
+
+Imports `experiments.grains`, `experiments.platform`, `experiments.runs`, `experiments.spatial`, `rigid`, `vis.page`.
 """
 
 from experiments.runs.registry import face

@@ -2,6 +2,8 @@
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed hop`; they are loaded when they are first used.
 Imports `experiments.tumble` and what that may import.
+
+Imports `experiments.platform`, `experiments.runs`, `experiments.tumble`, `rigid`, `vis.page`.
 """
 
 from experiments.runs.registry import face

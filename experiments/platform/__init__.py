@@ -1,6 +1,6 @@
-"""The platform of an experiment: its numbers with where they come from, surfaces, lengths that are refused.
+"""The platform of an experiment: its numbers with where they come from, and its surface.
 
-Imports `experiments.runs`, `rigid` and `vis.page` only.
+Imports `experiments.runs`, `rigid`, `vis.page`.
 """
 
 from vis.page.sentences import Sentences

@@ -1,4 +1,4 @@
-"""What every experiment needs: the run folder, its result, settings, progress, and the list of experiments.
+"""What every experiment shares: the run folder, progress, reading of settings, resuming, the result.
 
-Imports `rigid.series`, and `vis` for reports; no other package of `experiments`.
+Imports `rigid`, `vis`.
 """

@@ -2,6 +2,9 @@
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed tumble spatial`, loaded when they are first used.
 Imports `experiments.tumble` and what that may import.
+
+Imports `coupling`, `dem`, `experiments.grains`, `experiments.platform`, `experiments.runs`, `experiments.tumble`,
+`rigid`, `vis.page`.
 """
 
 from experiments.runs.registry import face

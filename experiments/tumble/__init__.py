@@ -2,6 +2,9 @@
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed tumble`; they are loaded when they are first used.
 Imports `experiments.runs`, `campaign`, `platform` and `grains`, and what those may import.
+
+Imports `coupling`, `dem`, `experiments.campaign`, `experiments.grains`, `experiments.platform`, `experiments.runs`,
+`rigid`, `vis`.
 """
 
 from experiments.runs.registry import face

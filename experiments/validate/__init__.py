@@ -1,6 +1,8 @@
 """The verification suite of the bed: cases with a known answer, run by `hedgebed validate`.
 
 ``suite.SUITE`` lists them; a family of cases is a module with ``CASES``.
+
+Imports `dem`, `experiments.bed`, `experiments.calibrate`, `experiments.runs`, `rigid`, `vis`.
 """
 
 from experiments.runs.registry import face

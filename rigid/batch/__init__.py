@@ -1,4 +1,4 @@
 """Thousands of planar trials at once, compiled by Taichi (`simulate`); `kernel` has the integrator.
 
-May import `model`, `planar`, `terms`, `ground`.
+Imports `rigid.model`, `rigid.planar`, `rigid.terms`.
 """

@@ -1,4 +1,7 @@
-"""Checks of numbers that several classes share: each raises ValueError with the key, its value and what is allowed."""
+"""Checks of numbers that several classes share: each raises ValueError with the key, its value and what is allowed.
+
+Imports nothing of ours.
+"""
 
 import math
 

@@ -1,4 +1,4 @@
 """One planar trial, integrated accurately (`located`) or as the paper does (`paper`); `simulate` is the entry.
 
-May import `model`, `terms`, `ground`.
+Imports `rigid.model`, `rigid.terms`.
 """

@@ -1,1 +1,4 @@
-"""vis/bed."""
+"""Reports of beds, of tests of their strength, of a calibration and of the verification suite.
+
+Imports `vis.page`, `vis.pictures`.
+"""

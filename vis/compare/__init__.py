@@ -1,1 +1,4 @@
-"""vis/compare."""
+"""The report that sets two runs side by side.
+
+Imports `vis.film`, `vis.page`, `vis.pictures`, `vis.tumble`.
+"""

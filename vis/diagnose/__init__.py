@@ -1,1 +1,4 @@
-"""vis/diagnose."""
+"""Reports of a diagnosis, of a campaign and of the check of one.
+
+Imports `vis.page`.
+"""

@@ -1,1 +1,4 @@
-"""vis/film."""
+"""vis/film.
+
+Imports `vis.page`, `vis.pictures`.
+"""

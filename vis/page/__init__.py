@@ -1,1 +1,4 @@
-"""vis/page."""
+"""The page that every report is: sections, tables, figures, sentences, the style.
+
+Imports nothing of ours.
+"""

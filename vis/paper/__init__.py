@@ -1,1 +1,4 @@
-"""vis/paper."""
+"""Reports of the paper's figures and of hops.
+
+Imports `vis.page`.
+"""

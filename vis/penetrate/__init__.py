@@ -1,1 +1,4 @@
-"""vis/penetrate."""
+"""The report of a spike in a bed: drag, drops, sinkage.
+
+Imports `vis.page`, `vis.pictures`.
+"""

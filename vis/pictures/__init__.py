@@ -1,1 +1,4 @@
-"""vis/pictures."""
+"""Pictures of grains and bodies by PyVista, off screen, and the frames that they are drawn from.
+
+Imports `vis.page`.
+"""

@@ -1,1 +1,4 @@
-"""vis/spatial."""
+"""The report of a platform in space.
+
+Imports `vis.film`, `vis.page`, `vis.pictures`.
+"""

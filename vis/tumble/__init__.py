@@ -1,1 +1,4 @@
-"""vis/tumble."""
+"""The report of a tumble in the plane: path, states, energy, tracks, film.
+
+Imports `vis.film`, `vis.page`, `vis.pictures`.
+"""

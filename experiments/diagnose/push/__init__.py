@@ -1,1 +1,5 @@
-"""experiments/diagnose/push."""
+"""Diagnosis of pushes and drops of a spike.
+
+Imports `experiments.campaign`, `experiments.diagnose.core`, `experiments.diagnose.fit`, `experiments.diagnose.noise`,
+`experiments.grains`, `rigid`.
+"""

@@ -1,1 +1,5 @@
-"""experiments/diagnose/report."""
+"""What a diagnosis says: diagnosis.json, its summary and sentences.
+
+Imports `experiments.diagnose.core`, `experiments.diagnose.fit`, `experiments.diagnose.noise`, `experiments.runs`,
+`vis.page`.
+"""

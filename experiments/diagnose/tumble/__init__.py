@@ -1,1 +1,5 @@
-"""experiments/diagnose/tumble."""
+"""Diagnosis of tumbles of a platform.
+
+Imports `experiments.campaign`, `experiments.check`, `experiments.diagnose.core`, `experiments.diagnose.fit`,
+`experiments.diagnose.noise`, `rigid`.
+"""

@@ -1,1 +1,4 @@
-"""experiments/validate/base."""
+"""What cases of the verification suite are made of: cases, bands, parts that are kept, the document.
+
+Imports `dem`, `experiments.runs`.
+"""

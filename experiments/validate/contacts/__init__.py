@@ -1,1 +1,4 @@
-"""experiments/validate/contacts."""
+"""Cases of the verification suite on single contacts and clouds of grains.
+
+Imports `dem`, `experiments.runs`, `experiments.validate.base`, `vis.page`.
+"""

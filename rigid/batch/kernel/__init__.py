@@ -8,6 +8,8 @@ speed taken out exactly at the end of every step.
 
 Of the spikes only the lowest and its two neighbours are looked at; a trial that sinks so deep that a fourth would touch
 is marked (`status`), and left to the accurate integrator.
+
+Imports `rigid.model`, `rigid.terms`.
 """
 
 from functools import lru_cache

@@ -1,1 +1,4 @@
-"""Effects at the contact with the ground: one file an effect. They import nothing but leaves of `rigid.terms`."""
+"""Effects at the contact with the ground: one file an effect.
+
+Imports `rigid.terms`.
+"""

@@ -8,7 +8,7 @@ from pkgutil import resolve_name
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("experiments/**/*.md")]
 
 
@@ -37,7 +37,9 @@ def there(name: str) -> bool:
     """Whether a dotted name is a module of ours, or something in one, under the name that it has today."""
     parts = name.split(".")
     with warnings.catch_warnings():
-        warnings.filterwarnings("error", r"(Bed|dem|rigid|coupling|experiments|vis)\S* is (now|deprecated)", DeprecationWarning)
+        warnings.filterwarnings(
+            "error", r"(Bed|dem|rigid|coupling|experiments|vis)\S* is (now|deprecated)", DeprecationWarning
+        )
         for length in range(len(parts), 0, -1):
             try:
                 reduce(getattr, parts[length:], resolve_name(".".join(parts[:length]) + ":"))

@@ -24,6 +24,6 @@ def test_an_old_name_warns_and_is_the_module_of_today(old):
 def test_old_names_work_in_a_fresh_process_and_the_warning_names_the_line_that_imports(folder):
     old = next(name for name in RENAMED if name.startswith(f"{folder}."))
     code = f"import warnings\nwarnings.simplefilter('error', DeprecationWarning)\nimport {old}"
-    root = Path(__file__).resolve().parent.parent
+    root = Path(__file__).resolve().parents[2]
     done = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True)
     assert f"DeprecationWarning: {old} is deprecated" in done.stderr
