@@ -6,7 +6,7 @@ from pathlib import Path
 import golden as kept
 import pytest
 
-TESTS = Path(__file__).resolve().parent
+TESTS = Path(__file__).resolve().parents[1]
 SENTENCES_AT_MOST = 216
 """How many string literals of four words and more the asserts of all tests hold; lower it where it can be."""
 
@@ -89,7 +89,7 @@ def test_no_file_is_left_that_no_test_reads():
 def sentences(path):
     """The string literals of four words and more in the asserts of one file, with their lines."""
     asserts = [node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.Assert)]
-    texts = [node for part in asserts for node in ast.walk(part) if isinstance(node, ast.Constant)]
+    texts = [node for part in asserts for node in ast.walk(part.test) if isinstance(node, ast.Constant)]
     return [f"{path.relative_to(TESTS)}:{node.lineno}: {node.value!r}"
             for node in texts if isinstance(node.value, str) and len(node.value.split()) >= 4]  # fmt: skip
 
