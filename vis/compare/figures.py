@@ -118,7 +118,7 @@ def _draw_forces(weights: Sequence[float], columns: Columns, forces: Mapping[str
     for axis, (name, words) in zip(axes, forces.items(), strict=True):
         for number, style in enumerate(LINES, 1):
             if f"{name}_{number}" in columns:
-                axis.plot(columns["t_s"], columns[f"{name}_{number}"], **(style | {"lw": 1.1}))
+                axis.plot(columns["t_s"], columns[f"{name}_{number}"], **{**style, "lw": 1.1})
         axis.set(ylabel=words, xlabel="time [s]")
     for weight, style in zip(weights, LINES, strict=True):
         axes[0].axhline(weight, color=INK if weights[0] == weights[1] else style["color"], lw=0.8, ls=(0, (5, 4)))
@@ -137,7 +137,7 @@ def _draw_energy(columns: Columns, labels: Labels) -> Figure:
         )
         work.plot(time, put_in, **style)
         lost.plot(time, taken, **style)
-        rest.plot(time, 1e3 * (energy - energy[0] - put_in + taken), **(style | {"lw": 1.0}))
+        rest.plot(time, 1e3 * (energy - energy[0] - put_in + taken), **{**style, "lw": 1.0})
     for axis, name in ((work, "work of the torque [mJ]"), (lost, "dissipated [mJ]"), (rest, "left over [µJ]")):
         axis.set(ylabel=name, xlabel="time [s]")
     rest.ticklabel_format(axis="y", scilimits=(-2, 4))

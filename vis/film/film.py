@@ -12,7 +12,7 @@ import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import NotRequired, TypedDict
+from typing import Any, NotRequired, TypedDict
 
 import numpy as np
 from matplotlib.colors import Normalize
@@ -239,7 +239,7 @@ def shown(drawn: Pictures, *, first: int = 0) -> list[Block]:
 
 def run_film_job(job: FilmJob, *, opengl: bool, step: Callable[[], None] = lambda: None) -> None:
     """Draw every picture of a job; `step` is called after each."""
-    spikes = job.get("spikes") or [None] * len(job["runs"])
+    spikes: Sequence[Any] = job.get("spikes") or [None] * len(job["runs"])
     reels: list[AnyReel] = (
         [SpaceReel(folder) for folder in job["runs"]]
         if job.get("in_space")

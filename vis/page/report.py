@@ -54,7 +54,7 @@ class Report:
         entries = self.result["quantities"].items()
         if std:
             head: tuple[str, ...] = ("quantity", "value", "std", "unit", "note")
-            rows = [
+            rows: list[tuple[str, ...]] = [
                 (name, number_text(q["value"], 5), number_text(q["std"], 2), unit_text(q["unit"]), q["note"])
                 for name, q in entries
             ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -74,7 +75,7 @@ def _launch(report: Report) -> Plot:
     time, speed = 1e3 * numbers["t_s"], np.hypot(numbers["vx_m_s"], numbers["vy_m_s"])
     x, y = (1e3 * (numbers[name] - numbers[name][0]) for name in ("x_m", "y_m"))
     wanted, angle = (report.result["quantities"][name]["value"] for name in ("launch_speed", "launch_angle"))
-    dashed = {"color": BED, "ls": DASHED, "lw": 1.2}
+    dashed: dict[str, Any] = {"color": BED, "ls": DASHED, "lw": 1.2}
     with styled():
         drawing, (rates, path) = panels(2, 3.5)
         by_state(rates, time, speed, states, lw=2.4)

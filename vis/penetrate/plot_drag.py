@@ -64,14 +64,14 @@ def drag_plot(run: RunFolder) -> Plot | None:
         legend_above(figure, handles)
     many = any(sum(r.speed == s for r in driven) > 1 for s in speeds)
     width = _bin_width([_way(r.bed, "in") for r in driven])
-    parts = [
+    sentences = [
         say("drag_thick", width=width or "slices"),
         say("drag_beds") if many else say("drag_bed"),
         say("drag_left") if above else "",
         say("drag_law") + say("drag_law_out" if out else "drag_law_in") if law else "",
     ]
     moved = f"driven in{' and pulled out' if out else ''}"
-    caption = captions("drag.caption", moved=moved, parts="".join(parts)).strip()
+    caption = captions("drag.caption", moved=moved, parts="".join(sentences)).strip()
     return Plot("drag", captions("drag.title"), caption, figure)
 
 

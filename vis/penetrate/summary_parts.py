@@ -264,7 +264,9 @@ def reference_part(result: Mapping[str, Any]) -> dict[str, Any] | None:
         moved = mapping_of(entry)
         unit = "%" if key in SHARES else str(moved.get("unit") or "1")
         change = plain_value(moved.get("change"))
-        sides = (quote(*(plain_value(moved.get(name)) for name in (of, f"{of}_std")), unit) for of in ("before", "now"))
+        sides = (
+            quote(plain_value(moved.get(of)), plain_value(moved.get(f"{of}_std")), unit) for of in ("before", "now")
+        )
         rows.append([label_of(key), *sides, "\N{EN DASH}" if change is None else signed_percent(change)])
     if not rows:
         return None
