@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from golden import golden
 
 from experiments.campaign import TumbleModel, write_model
 from experiments.campaign.tables import FORMAT, PlatformTable, RigTable, TumbleSurface, WheelTable
@@ -54,9 +55,9 @@ def test_a_sweep_is_its_tumbles_one_by_one(capsys, reported):
     assert result["quantities"]["max_speed"]["value"] == pytest.approx(middle, abs=5e-4)
     assert result["sweep"]["gaps"]["checked"] == 5 and result["sweep"]["gaps"]["max_speed"] < 5e-4
     angle = math.degrees(rows["trajectory_angle_rad"][0])
-    assert f"{angle:.1f}" in shown and "mu_s = 0.4" in shown and "mu_d is half of mu_s throughout" in shown
+    assert f"{angle:.1f}" in shown and "mu_s = 0.4" in shown and "half of mu_s" in shown
     page = Path("a/report.html").read_text()
-    assert "Over mu_s and com-offset.x" in page and page.count("data:image/png") == 4
+    assert "mu_s and com-offset.x" in page and page.count("data:image/png") == 4
 
 
 @pytest.mark.parametrize(
@@ -134,9 +135,7 @@ def test_where_the_middle_cannot_stand_the_runs_own_trial_is_the_nearest_that_ca
     result = json.loads(Path("a/result.json").read_text())
     (effect,) = result["effects"]
     assert effect["parameters"]["x"] == 1e-3 and result["sweep"]["cannot_stand"] == 4
-    assert "of the trial nearest the middle that can stand, com-offset.x = 0.001" in " ".join(
-        result["departures"]["sentences"]
-    )
+    assert "com-offset.x = 0.001" in " ".join(result["departures"]["sentences"])
 
 
 def test_wheels_that_come_to_their_limit_are_sought_by_the_batch_and_tumble_as_one_by_one(monkeypatch):
@@ -172,6 +171,6 @@ def test_a_trial_that_stands_or_gets_away_by_one_model_only_is_counted_and_told(
     gaps = tumble_sweep._gaps(0.8, points, found, [0, 1, 2])
     assert (gaps["checked"], gaps["angles"]) == (2, 0)
     assert (gaps["stand_by_one_only"], gaps["away_by_one_only"]) == (1, 2)
-    said = " ".join(tumble_sweep._sentences(settings, ranges, points, 1, 0, gaps))
-    assert "1 of the corners and the middle stands by one of the two models only" in said
-    assert "2 of the corners and the middle get 10 mm away by one" in said and "degrees" not in said
+    said = tumble_sweep._sentences(settings, ranges, points, 1, 0, gaps)
+    golden("tumble/sweep_by_one_model", said)
+    assert "degrees" not in " ".join(said)
