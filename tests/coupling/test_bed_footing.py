@@ -52,6 +52,7 @@ BASE = [[0.03, 0.03, RADIUS]]
 START = (0.032, 3 * RADIUS + 1e-3)
 
 
+@pytest.mark.long
 def test_a_ball_through_the_coupling_is_the_same_ball_as_a_grain():
     """Dropped off centre on a grain that lies on the floor, no friction, no loss, step for step: to round-off.
 

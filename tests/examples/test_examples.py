@@ -10,10 +10,14 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+ON_GRAINS = {"foot_from_stl", "laboratory_bed", "spike_in_sand", "stiffness_and_damping", "tumble_on_grains"}
 names = pytest.mark.parametrize("script", EXAMPLES, ids=lambda path: path.stem)
 
 
-@names
+@pytest.mark.parametrize(
+    "script",
+    [pytest.param(p, id=p.stem, marks=[pytest.mark.long] * (p.stem in ON_GRAINS)) for p in EXAMPLES],
+)
 def test_an_example_runs_at_its_small_size_and_its_checks_hold(script, tmp_path):
     done = subprocess.run(
         [sys.executable, str(script), "--small", "--out", str(tmp_path / "out")],

@@ -15,13 +15,15 @@ from experiments.validate.suite import SUITE, chosen
 
 FAILING = {"t4-spin", *("katsuragi-durian", "katsuragi-durian-fine", "murdoch", "rft", "size-collapse")}
 """Cases that are known to fail; docs/validation.md says why. One that passes is to be taken off."""
+LONG = {"dmt", "incline-rolling", "jkr", "large-neck"}
+"""Quick cases that take 10 s and more here, with their kernels to compile."""
 QUICK = [case for case in chosen(quick=True) if case.compute is not None]
 
 
 def cases(*, failing):
     """The cases that are known to fail, or the others, as parameters; slow ones marked."""
     return [
-        pytest.param(case, id=case.id, marks=pytest.mark.slow if case.slow else ())
+        pytest.param(case, id=case.id, marks=[pytest.mark.slow] * case.slow + [pytest.mark.long] * (case.id in LONG))
         for case in SUITE
         if case.compute is not None and (case.id in FAILING) == failing
     ]

@@ -237,6 +237,7 @@ def test_where_sleepers_begin_in_memory_changes_no_bit_of_what_the_grains_do():
     }
 
 
+@pytest.mark.long
 def test_sleepers_that_lists_pass_over_are_where_sorting_all_would_put_them(monkeypatch):
     """With all grains sorted every time the state has the same bits, and else those far behind are left out."""
     sorted_ones = []

@@ -145,6 +145,7 @@ class Interrupted:
                 raise KeyboardInterrupt
 
 
+@pytest.mark.long
 def test_a_bed_that_went_through_stages_is_kept_in_the_cache_and_found_again(tmp_path, monkeypatch):
     """The same bits and reports, from a file; one of other stages is another; a file that is spoilt is made anew."""
     monkeypatch.setenv("HEDGEBED_CACHE", str(tmp_path))

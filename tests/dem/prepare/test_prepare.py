@@ -59,6 +59,7 @@ def test_a_prepared_bed_is_at_rest_and_level(bed):
     assert bed.material.young < SAND.young and bed.seed == 3
 
 
+@pytest.mark.long
 def test_rain_may_land_harder_than_the_bound_of_the_bed_it_makes(monkeypatch):
     """A fall of 30 mm on the floor: Hertz (softening.py, 4) gives 2 % of a diameter at 20 MPa; then 1 % rules."""
     landed = []

@@ -123,6 +123,7 @@ def held_on_the_way_out(speed, legs, seed):
                       "force_N": force + FORCE_STD * random.standard_normal(len(z))})  # fmt: skip
 
 
+@pytest.mark.long
 def test_what_no_fitted_trial_shows_of_a_form_is_learnt_from_those_held_out_and_others_judge():
     # Two pushes go in again for 1.2 mm on their way out, and are held out (else they are like their replicates).
     trials, plain, again = [], (0.02, -0.016), (0.02, -0.008, 0.0012, -0.0092)

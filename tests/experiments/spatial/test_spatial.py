@@ -79,6 +79,7 @@ def test_what_cannot_be_is_refused_before_any_work(cube, given, said):
         spatial.check(SpatialSettings(**own | given))
 
 
+@pytest.mark.long
 def test_the_hand_sets_down_heavy_on_soft_ground_and_what_it_cannot_is_refused_by_name():
     """The Hedgehog free at 1 m/s2: 5.3 N on four spikes of sand, W / 4 K = 32 mm deep; at the rig's speed too late."""
     heavy = {"surface": "sand", "gravity": 1.0, "duration": 0.05}
@@ -133,6 +134,7 @@ def test_a_drop_tells_its_impact_and_a_hop(tmp_path, monkeypatch, cube):
     assert quantities["restitution"]["value"] == pytest.approx(1.0, abs=0.02)
 
 
+@pytest.mark.long
 def test_on_grains_a_stopped_run_goes_on_to_the_same_bits_with_its_books_and_overlaps_told(tmp_path, monkeypatch, cube):
     monkeypatch.setattr(SpatialOnBed, "prepare", small_bed)
     monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)

@@ -450,6 +450,7 @@ def test_a_run_on_a_bed_may_pass_the_overlap_that_its_step_is_chosen_for_up_to_t
         bed.advance(1)
 
 
+@pytest.mark.long
 def test_a_checkpoint_of_before_takes_the_bound_on_overlaps_that_a_run_has_now(tmp_path, monkeypatch):
     """One that ended at its `max_overlap` of 9 % goes on with the bound of today, and with all else as it was."""
     settings = on_bed(**SMALL | {"max_overlap": 0.09, "frame_count": 0})
