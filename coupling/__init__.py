@@ -2,7 +2,7 @@
 
 A ground (`Ground`) is a surface law (`LawGround`, `rigid.SpringDamper`) or a bed of grains (`BedGround`). `drive`,
 `drop` and `set_down` push a spike into one, `CoupledTumble` and `SpatialRun` follow a platform on one, `Master` steps
-any body. The package imports `dem` (where it needs grains) and `rigid`, and nothing above itself.
+any body.
 
 Imports `dem`, `rigid`.
 """

@@ -1,7 +1,6 @@
 """Beds prepared as in a laboratory, and tests of their strength: shear, repose, cone, vertical cut.
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed bed make`; they are loaded when they are first used.
-Imports `experiments.runs`, `experiments.grains`, `dem` and `vis`.
 
 Imports `dem`, `experiments.grains`, `experiments.penetrate`, `experiments.runs`, `vis`.
 """

@@ -1,7 +1,6 @@
 """A material whose simulated strength is that of measured sand: design of samples, fit, material file.
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed bed calibrate`; they are loaded when they are first used.
-Imports `experiments.bed` and what that may import.
 
 Imports `dem`, `experiments.bed`, `experiments.grains`, `experiments.penetrate`, `experiments.runs`, `vis`.
 """

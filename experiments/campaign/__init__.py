@@ -1,7 +1,6 @@
 """Campaigns: measured or made-up trials in a folder, and the models fitted to them.
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed campaign`; they are loaded when they are first used.
-Imports `experiments.runs` and `rigid` only.
 
 Imports `experiments.runs`, `rigid`.
 """

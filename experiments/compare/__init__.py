@@ -1,7 +1,6 @@
 """Two finished runs in one report: numbers with differences, what both did over time.
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed compare`; they are loaded when they are first used.
-Imports `experiments.spatial` and what that may import.
 
 Imports `experiments.grains`, `experiments.platform`, `experiments.runs`, `experiments.spatial`, `rigid`, `vis.page`.
 """

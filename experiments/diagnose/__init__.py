@@ -1,7 +1,6 @@
 """Diagnosis: where a model fails on measured trials, which effect it lacks, and how sure that is.
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed diagnose`; they are loaded when they are first used.
-Imports `experiments.runs`, `campaign`, `check`, `platform` and `tumble`, `rigid` and `vis`.
 
 Imports `dem`, `experiments.campaign`, `experiments.check`, `experiments.grains`, `experiments.runs`, `rigid`, `vis`.
 """

@@ -1,7 +1,6 @@
 """A hop: the wheel speed or torque for a distance, on rigid ground and on ground that gives.
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed hop`; they are loaded when they are first used.
-Imports `experiments.tumble` and what that may import.
 
 Imports `experiments.platform`, `experiments.runs`, `experiments.tumble`, `rigid`, `vis.page`.
 """

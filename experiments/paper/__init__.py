@@ -1,7 +1,6 @@
 """The trials of Reid, Roveda, Nesnas and Pavone (i-SAIRAS 2014) beside what the paper states.
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed paper`; they are loaded when they are first used.
-Imports `experiments.tumble` and what that may import.
 
 Imports `experiments.platform`, `experiments.runs`, `experiments.tumble`, `rigid`, `vis.page`.
 """

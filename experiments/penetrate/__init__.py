@@ -1,7 +1,6 @@
 """A spike driven into, dropped on and set down on a bed, beside the spring-damper fitted to it.
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed penetrate`; they are loaded when they are first used.
-Imports `experiments.runs`, `campaign`, `grains` and `diagnose` (the law with effects), and what those may import.
 
 Imports `coupling`, `dem`, `experiments.campaign`, `experiments.diagnose`, `experiments.grains`, `experiments.runs`,
 `rigid`, `vis`.

@@ -1,7 +1,6 @@
 """A platform in six degrees of freedom on the spring-damper or on grains.
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed tumble spatial`, loaded when they are first used.
-Imports `experiments.tumble` and what that may import.
 
 Imports `coupling`, `dem`, `experiments.grains`, `experiments.platform`, `experiments.runs`, `experiments.tumble`,
 `rigid`, `vis.page`.

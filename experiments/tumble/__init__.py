@@ -1,7 +1,6 @@
 """A tumble in the plane: on the spring-damper or a law, over a range, on grains; campaigns made of tumbles.
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed tumble`; they are loaded when they are first used.
-Imports `experiments.runs`, `campaign`, `platform` and `grains`, and what those may import.
 
 Imports `coupling`, `dem`, `experiments.campaign`, `experiments.grains`, `experiments.platform`, `experiments.runs`,
 `rigid`, `vis`.

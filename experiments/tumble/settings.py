@@ -32,8 +32,8 @@ class TrialSettings(PlatformSettings):
     )
     ground: str = Field(
         "spring-damper",
-        description="Law that computes the surface's force: spring-damper, hunt-crossley, power, katsuragi-durian, "
-        "bekker or rft; for tumble also bed, a bed of grains.",
+        description="Law that computes the surface's force: "
+        f"{' or '.join(', '.join(GROUNDS).rsplit(', ', 1))}; for tumble also bed, a bed of grains.",
     )
     ground_parameters: tuple[str, ...] = Field(
         (), description="Parameters of another law than the spring-damper, of one spike, as name=value in SI."

@@ -1,4 +1,4 @@
-"""vis/film.
+"""Films and stills of a run in the plane or in space: reels of frames, cameras, one sheet.
 
 Imports `vis.page`, `vis.pictures`.
 """
