@@ -166,7 +166,7 @@ def of_other_spikes(numbers: Mapping[str, Number], surface: str, *, diameter: fl
     own = find_surface(surface).spike if taken else None
     if own is None or math.isclose(diameter, own, rel_tol=1e-6):
         return []
-    found = f"are {1e3 * diameter:.4g} mm thick" if diameter > 0 else "there are none"
+    found = f"they are {1e3 * diameter:.4g} mm thick" if diameter > 0 else "there are none"
     names = " and ".join(taken)
     return [say("other_spikes", names=names, surface=surface, own=1e3 * own, whose=whose, found=found)]
 
