@@ -1,51 +1,325 @@
-"""Modules under the names that they had in earlier versions: an import from there warns and gives the module of today.
+"""Modules and names as they were called in earlier versions: an import from there warns and gives what is there today.
 
 Imports nothing of ours. The packages import this file, so that the old names work as soon as one of them is loaded.
 """
 
 import sys
 import warnings
+from collections.abc import Sequence
 from importlib import import_module
 from importlib.abc import Loader, MetaPathFinder
-from importlib.machinery import ModuleSpec
+from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from types import ModuleType
+from typing import Any
 
-__all__ = ["RENAMED"]
+__all__ = ["MOVED", "RENAMED"]
+
+_MODULES = {
+    "coupling": {
+        "coupling": (
+            "bed_footing=bed_ground books=balance followed=platform_run footing=ground spatial_friction=spatial_body"
+        ),
+    },
+    "dem": {
+        "dem.contact": "cohesion timestep",
+        "dem.engine": (
+            "energy holding=checkpoint ledger=dissipation lists rows runtime shape_table sleep sleep_kernels "
+            "state stress"
+        ),
+        "dem.grains": "graded materials packing sizes",
+        "dem.measure": "cutting element grading lid penetrometer repose shearing",
+        "dem.prepare": "bedfile laboratory pouring recipe stages",
+        "dem.shapes": "mesh mesh_tree solids",
+    },
+    "experiments": {
+        "experiments": "plausible=check",
+        "experiments.bed": (
+            "bed_cone=cone bed_cut=cut bed_make=make bed_refine=refine bed_repose=repose bed_settings=settings "
+            "bed_shear=shear bed_shear_settings=test_settings bed_test_settings=test_settings bed_tests=tests "
+            "bed_work=work"
+        ),
+        "experiments.calibrate": (
+            "calibrate_fit=fit calibrate_result=result calibrate_settings=settings calibrate_tests=tests"
+        ),
+        "experiments.check": "replicas",
+        "experiments.cli": (
+            "bed_commands benching cli_options=options cli_runs=runs doctor effects probes render_command=render"
+        ),
+        "experiments.compare": (
+            "compare_common=common compare_settings=settings compare_spatial=spatial compare_tumbles=tumbles"
+        ),
+        "experiments.diagnose": "diagnose_settings=settings inspection",
+        "experiments.grains": (
+            "bed_box=box bed_graded=graded bed_progress bed_sizes=sizes bed_staged=staged following kept_material "
+            "softening spells tracked_frames tumble_bed_settings=settings tumble_flight=flight where"
+        ),
+        "experiments.hop": (
+            "hop_numbers=numbers hop_on_surface=on_surface hop_search=search hop_settings=settings hop_words=words"
+        ),
+        "experiments.paper": (
+            "paper_claims=claims paper_settings=settings paper_transitions=transitions paper_variants=variants"
+        ),
+        "experiments.penetrate": (
+            "amended amended_runs bed_given=given departures findings fit headline model_given=given "
+            "penetrate_plan=plan reference remarks run_campaign=recorded settings units"
+        ),
+        "experiments.platform": (
+            "kept_platform lengths platform_settings=settings settled surfaces tips tumble_platform=numbers"
+        ),
+        "experiments.runs": (
+            "cli_streams=streams kept_results kernel_cache memory progress reading registry reporting "
+            "runfolder=folder stopping strict whole_runs"
+        ),
+        "experiments.spatial": (
+            "spatial_frames=frames spatial_result=result spatial_settings=settings spatial_trial=trial"
+        ),
+        "experiments.suite": "suite_commands=commands suite_cost=cost",
+        "experiments.tumble": (
+            "campaign_settings footfalls sweep_ranges synthesis tumble_coupled=coupled tumble_grains=on_grains "
+            "tumble_grains_frames=on_grains_frames tumble_grains_result=on_grains_result tumble_opening=opening "
+            "tumble_recorded=recorded tumble_settings=settings tumble_steppers=steppers tumble_sweep=sweep "
+            "tumble_tables=campaign_tables tumble_trial=trial tumble_words=words"
+        ),
+        "experiments.validate": "validate_settings=settings",
+    },
+    "experiments.diagnose": {
+        "experiments.check": "lags unit_factors=words",
+        "experiments.diagnose.core": (
+            "deciding diagnosis effect_equations effect_words equivalence next_steps outcome own_ways pairs "
+            "prediction renoised scatter_gap search sizes tumble_advice=effect_words"
+        ),
+        "experiments.diagnose.fit": (
+            "bounds evidence fitting gaps gate localise own problem slopes together tumble_shapes=forms"
+        ),
+        "experiments.diagnose.noise": (
+            "astray colour jitter lone_beds noise_words=colour replicates spectrum stuck unrest"
+        ),
+        "experiments.diagnose.push": (
+            "penetration_data=data penetration_depth=depth penetration_drive=drive penetration_forms=forms "
+            "penetration_law=law penetration_problem=problem penetration_remarks=remarks penetration_zeros=zeros"
+        ),
+        "experiments.diagnose.report": "candidates document summary telling",
+        "experiments.diagnose.tumble": (
+            "tumble_checks=checks tumble_data=data tumble_fit=fit tumble_follow=latent tumble_forms=forms "
+            "tumble_forward=forward tumble_guess=guess tumble_latent=latent tumble_problem=problem "
+            "tumble_readings=readings tumble_spikes=spikes tumble_steps=steps"
+        ),
+    },
+    "experiments.plausible": {
+        "experiments.check": "findings force_units penetration tumble turning words zeros",
+    },
+    "experiments.validate": {
+        "experiments.validate.base": "case cloud drops energy kept=parts parts peers spheres",
+        "experiments.validate.beds": "dosta friction_angle impact intrusion low_gravity silo slump",
+        "experiments.validate.contacts": (
+            "books cohesion collisions integrator large_body laws microslip oblique one_grain restitution sliding "
+            "spinning"
+        ),
+    },
+    "rigid": {
+        "rigid.batch": "batch_kernel=kernel runtime",
+        "rigid.ground": "grounds law_functions laws reaction rft",
+        "rigid.model": "mechanics trial",
+        "rigid.planar": (
+            "dormand_prince dynamics implicit modes planar_events=events planar_located=located "
+            "planar_paper=paper rest statics trajectory"
+        ),
+        "rigid.platform": "actuation inertia platform_files=files rig solids spike",
+        "rigid.spatial": "quaternions spatial_motion=motion spatial_steps=steps",
+    },
+    "rigid.batch_kernel": {
+        "rigid.batch.kernel": "advance changes=events columns=parts dry=contacts parts samples stand",
+    },
+    "rigid.terms": {
+        "rigid.terms.body": "wires=wire_compliance",
+    },
+    "vis": {
+        "vis.bed": "bed_cone=tests bed_cut=tests bed_repose=tests bed_shear=tests bed_tests=tests calibrate validation",
+        "vis.compare": "compare_figures=figures compare_spatial=figures",
+        "vis.diagnose": "campaign diagnose_figures=figures inspection",
+        "vis.film": "jobs=film reel spatial_film=film spatial_pictures=film tumble_film=film",
+        "vis.page": "columns folder numbers palette=plots state_figures=states style tumble_series",
+        "vis.paper": "hop paper_assumed=figures paper_measures=figures paper_paths=figures paper_run=run",
+        "vis.penetrate": (
+            "amended plot_drag plot_drops plot_parts plots summary summary_tables=summary_parts "
+            "summary_words=summary_parts"
+        ),
+        "vis.pictures": "arrows canvas frames meshes render scene sections stage tracks",
+        "vis.tumble": "tumble_beside=beside tumble_grains=grains tumble_pictures=pictures tumble_sweep=sweep",
+    },
+}
+"""Package of before -> package of today -> its modules, `old=new` where the name is another, too."""
+
+_NAMES = {
+    "coupling.balance": {
+        "coupling.balance": "Books=EnergyBalance",
+    },
+    "coupling.bed_ground": {
+        "coupling.bed_ground": "BedFooting=BedGround",
+        "coupling.members": "FEWEST_SLOTS ball_member platform_members slots_of spatial_members",
+    },
+    "coupling.ground": {
+        "coupling.ground": "FootReaction=Reaction Footing=Ground",
+        "coupling.law_ground": "LawFooting=LawGround row_tips",
+    },
+    "coupling.master": {
+        "coupling.master": "StepBooks=Exchange",
+    },
+    "coupling.platform_run": {
+        "coupling.platform_run": "Followed=PlatformRun",
+    },
+    "dem.contact": {
+        "dem.contact.law": (
+            "PAIR_WIDTH adhesive_range contact_force damping_factor effective_moduli pair_parameters turning_torque"
+        ),
+    },
+    "dem.engine": {
+        "dem.engine.engine": "Engine MOST_PRIMITIVES STEPS_PER_LAUNCH take_engine",
+        "dem.engine.lists": "MOST_BODIES",
+    },
+    "dem.engine.checkpoint": {
+        "dem.engine.checkpoint": "Held=Checkpoint hold=take take_back=roll_back",
+    },
+    "dem.engine.dissipation": {
+        "dem.engine.dissipation": "Bookkeeping=BalanceKernels Ledger=Balance NO_LEDGER=NO_BALANCE",
+    },
+    "dem.engine.lists": {
+        "dem.grains.curve": "curve_ranks",
+    },
+    "dem.measure": {
+        "dem.grains.profile": "bulk_packing packing_profile surface_height",
+    },
+    "dem.prepare": {
+        "dem.prepare.prepare": "prepare_bed",
+        "dem.prepare.specification": (
+            "BEARING Specification bound_of_mean cache_folder check_options fingerprint soft_enough"
+        ),
+    },
+    "dem.prepare.laboratory": {
+        "dem.prepare.prepare": "prepare_as",
+        "dem.prepare.report": "Prepared",
+    },
+    "dem.shapes": {
+        "dem.shapes.basic": "Ball Cone Cylinder Plane Primitive distance_to",
+    },
+    "experiments.cli": {
+        "experiments.cli.main": "build_app",
+        "experiments.cli.runs": "BAD_INPUT DONE FAILED STOPPED",
+    },
+    "experiments.diagnose.core.outcome": {
+        "experiments.diagnose.core.finishing": "Told",
+    },
+    "experiments.paper": {
+        "experiments.paper.experiment": "Job plan_jobs",
+    },
+    "experiments.penetrate": {
+        "experiments.penetrate.beds": "choose_softness fingerprint",
+    },
+    "experiments.penetrate.recorded": {
+        "experiments.campaign.files": "place_campaign",
+    },
+    "experiments.penetrate.settings": {
+        "experiments.grains.box": "expected_grain_count",
+    },
+    "experiments.platform.numbers": {
+        "experiments.tumble.trial": "Spikes spikes_of",
+    },
+    "experiments.suite": {
+        "experiments.suite.cases": "Case EXPERIMENTS KEPT LONGEST do_case estimate keep standing",
+    },
+    "experiments.tumble": {
+        "experiments.tumble.result": "motion_columns quantities_of result_of trajectory_columns",
+    },
+    "experiments.tumble.campaign_settings": {
+        "experiments.diagnose.settings": "CheckSettings",
+    },
+    "experiments.tumble.words": {
+        "experiments.grains.bed_result": "residual_warning reversal_warning unsettled_warning",
+    },
+    "rigid.batch": {
+        "rigid.batch.simulate": "BatchTrajectory simulate_batch",
+    },
+    "rigid.model": {
+        "rigid.model.model": "Model State assemble make_parameters model_source parameter_names",
+    },
+    "rigid.planar": {
+        "rigid.planar.simulate": "Method check_step longest_step step_bound",
+    },
+    "rigid.platform": {
+        "rigid.platform.platform": "Platform Stance",
+    },
+    "rigid.spatial": {
+        "rigid.spatial.spatial": "SpatialTrajectory SpatialTrial simulate standing",
+    },
+    "vis.bed": {
+        "vis.bed.report": "write_bed_report",
+    },
+    "vis.compare": {
+        "vis.compare.report": "write_compare_report",
+    },
+    "vis.compare.figures": {
+        "vis.page.states": "draw_states",
+    },
+    "vis.diagnose": {
+        "vis.diagnose.report": "write_diagnosis_report",
+    },
+    "vis.film.film": {
+        "vis.pictures.render": "View",
+        "vis.pictures.scene": "Scene",
+    },
+    "vis.page": {
+        "vis.page.page": "Block Page Section Tile code figure listing table text write_page",
+    },
+    "vis.paper": {
+        "vis.paper.report": "write_paper_report",
+    },
+    "vis.paper.run": {
+        "vis.page.plots": "WIDTH legend_above new_figure",
+    },
+    "vis.penetrate.plot_parts": {
+        "vis.page.plots": "Plot WIDTH legend_above new_panels shades",
+    },
+    "vis.pictures": {
+        "vis.pictures.pictures": "Picture Pictures make_pictures opengl_available render_apart",
+    },
+    "vis.spatial": {
+        "vis.spatial.report": "write_spatial_report",
+    },
+    "vis.tumble": {
+        "vis.page.tumble_series": "STATES read_columns state_runs",
+        "vis.tumble.report": "write_tumble_report",
+    },
+}
+"""Module of today -> where its names of before are now -> these names, `old=new` where the name is another, too."""
+
+
+def _listed(places: dict[str, str]) -> dict[str, tuple[str, str]]:
+    """Old name -> place and name of today."""
+    entries = [(place, entry.split("=")) for place, names in places.items() for entry in names.split()]
+    return {names[0]: (place, names[-1]) for place, names in entries}
+
 
 RENAMED = {
-    "coupling.footing": "coupling.ground",
-    "dem.cutting": "dem.measure.cutting",
-    "dem.element": "dem.measure.element",
-    "dem.energy": "dem.engine.energy",
-    "dem.laboratory": "dem.prepare.laboratory",
-    "dem.materials": "dem.grains.materials",
-    "dem.penetrometer": "dem.measure.penetrometer",
-    "dem.repose": "dem.measure.repose",
-    "dem.sizes": "dem.grains.sizes",
-    "dem.stress": "dem.engine.stress",
-    "dem.timestep": "dem.contact.timestep",
-    "experiments.amended": "experiments.penetrate.amended",
-    "experiments.bed_graded": "experiments.grains.graded",
-    "experiments.progress": "experiments.runs.progress",
-    "experiments.settings": "experiments.penetrate.settings",
-    "experiments.softening": "experiments.grains.softening",
-    "experiments.tumble_flight": "experiments.grains.flight",
-    "rigid.actuation": "rigid.platform.actuation",
-    "rigid.inertia": "rigid.platform.inertia",
-    "rigid.laws": "rigid.ground.laws",
-    "rigid.reaction": "rigid.ground.reaction",
-    "vis.columns": "vis.page.columns",
-    "vis.frames": "vis.pictures.frames",
-    "vis.meshes": "vis.pictures.meshes",
+    f"{package}.{old}": ".".join(today)
+    for package, places in _MODULES.items()
+    for old, today in _listed(places).items()
 }
-"""Old name of a module that the documentation named: its name today."""
+"""Old name of a module: its name today."""
+
+MOVED = {module: _listed(places) for module, places in _NAMES.items()}
+"""Module of today -> name that it had, or that the module had which is now found there -> module and name of today."""
 
 
 class _Renamed(MetaPathFinder, Loader):
     """Finds the old names."""
 
-    def find_spec(self, name: str, path: object = None, target: object = None) -> ModuleSpec | None:
-        return ModuleSpec(name, self) if name in RENAMED else None
+    def find_spec(self, name: str, path: Sequence[str] | None = None, target: object = None) -> ModuleSpec | None:
+        if name in RENAMED:
+            return ModuleSpec(name, self)
+        spec = PathFinder.find_spec(name, path) if name in MOVED else None
+        if spec is not None and isinstance(spec.loader, SourceFileLoader):
+            spec.loader = _WithOldNames(name, spec.loader.path)
+        return spec
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
         today = RENAMED[spec.name]
@@ -58,4 +332,24 @@ class _Renamed(MetaPathFinder, Loader):
         module.__spec__ = self._spec  # the import has put the old name there
 
 
-sys.meta_path.append(_Renamed())
+class _WithOldNames(SourceFileLoader):
+    """Loads a module of today, which then knows the names that have moved away from it."""
+
+    def exec_module(self, module: ModuleType) -> None:
+        super().exec_module(module)
+        moved, own = MOVED[module.__name__], vars(module).get("__getattr__")
+
+        def find(name: str) -> Any:
+            if name not in moved and own is not None:
+                return own(name)
+            if name not in moved:
+                raise AttributeError(f"module {module.__name__!r} has no attribute {name!r}")
+            place, today = moved[name]
+            text = f"{module.__name__}.{name} is deprecated: use {place}.{today}"
+            warnings.warn(text, DeprecationWarning, stacklevel=2)
+            return getattr(import_module(place), today)
+
+        vars(module)["__getattr__"] = find
+
+
+sys.meta_path.insert(0, _Renamed())  # before the files, as an old package's modules would be found there a second time

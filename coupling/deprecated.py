@@ -1,9 +1,13 @@
-"""Old names of attributes, which go on for one version."""
+"""Old names of attributes and keywords, which go on for one version."""
 
 import warnings
-from typing import Any
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, TypeVar, cast
 
-__all__ = ["PlacedBody", "renamed"]
+__all__ = ["PlacedBody", "renamed", "renamed_keywords"]
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 
 def renamed(old: str, new: str) -> Any:
@@ -14,6 +18,22 @@ def renamed(old: str, new: str) -> Any:
         return getattr(owner, new)
 
     return property(get, doc=f"Old name of `{new}`.")
+
+
+def renamed_keywords(**today: str) -> Callable[[F], F]:
+    """A decorator: the method takes a keyword by its old name too, with a DeprecationWarning."""
+
+    def decorate(method: F) -> F:
+        @wraps(method)
+        def call(owner: object, *args: Any, **options: Any) -> Any:
+            for old in today.keys() & options.keys():
+                warnings.warn(f"{old} of {type(owner).__name__} is now {today[old]}", DeprecationWarning, stacklevel=2)
+                options[today[old]] = options.pop(old)
+            return method(owner, *args, **options)
+
+        return cast(F, call)
+
+    return decorate
 
 
 class PlacedBody:

@@ -29,7 +29,7 @@ import numpy as np
 
 from rigid.ground.reaction import Contact, Reaction, State
 
-from .deprecated import renamed
+from .deprecated import renamed, renamed_keywords
 from .ground import Ground
 from .poses import Pose, Twist, Vector, Wrench
 
@@ -109,6 +109,7 @@ class Master:
     Raises ValueError, naming the key, for what cannot be.
     """
 
+    @renamed_keywords(footing="ground")
     def __init__(
         self,
         body: Body,

@@ -14,6 +14,7 @@ from rigid.spatial.quaternions import angle_between, to_matrix
 from rigid.spatial.spatial import SpatialTrial
 
 from .contact_state import changes_of, state_of
+from .deprecated import renamed_keywords
 from .ground import Ground
 from .platform_run import PlatformRun
 from .poses import Twist, Vector, Wrench
@@ -50,6 +51,7 @@ class SpatialRun(PlatformRun):
     COLUMNS, _prefix, _hull = COLUMNS, "run", 1
     trial: SpatialTrial
 
+    @renamed_keywords(footing="ground")
     def __init__(
         self,
         trial: SpatialTrial,

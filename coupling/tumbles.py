@@ -18,6 +18,7 @@ from rigid.model.trial import Trial
 from rigid.planar.trajectory import STATES
 
 from .bed_ground import BedGround
+from .deprecated import renamed_keywords
 from .ground import Ground
 from .law_ground import LawGround
 from .lowered_gravity import pace_under
@@ -58,6 +59,7 @@ class TumblesInARow(CoupledTumble):
     The other parameters as `CoupledTumble`. Raises ValueError for a brake, whose wheel turns the platform once.
     """
 
+    @renamed_keywords(footing="ground")
     def __init__(self, trial: Trial, ground: Ground, *, tumbles: int, turn: float = 1.0, **options: Any) -> None:
         if trial.actuator == "brake":
             raise ValueError("tumbles in a row need a motor: a brake stops its wheel in the first")
@@ -154,6 +156,7 @@ class Landing(CoupledTumble):
     The other parameters as `CoupledTumble`, without a placement or a height; of the torque nothing acts.
     """
 
+    @renamed_keywords(footing="ground")
     def __init__(
         self,
         trial: Trial,

@@ -18,6 +18,7 @@ from rigid.planar.trajectory import Tally, Trajectory, Transition
 
 from .bed_ground import BedGround
 from .contact_state import changes_of, state_of
+from .deprecated import renamed_keywords
 from .ground import Ground
 from .law_ground import LawGround
 from .lowered_gravity import LoweredGravity
@@ -65,6 +66,7 @@ class CoupledTumble(PlatformRun):
     _free, _turns = (0, 2), (1,)
     trial: Trial
 
+    @renamed_keywords(footing="ground")
     def __init__(
         self,
         trial: Trial,

@@ -25,7 +25,8 @@ def one_core():
     """Beds and batches that are not told how many threads to take find one core.
 
     With another number of threads Taichi is started anew and every kernel is compiled again; these beds are too small
-    for two, and two workers of pytest-xdist would be in each other's way. What threads do is shown in dem/test_bits.py.
+    for two, and two workers of pytest-xdist would be in each other's way. What threads do is shown in
+    dem/engine/test_bits.py.
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(os, "sched_getaffinity", lambda pid: {0}, raising=False)

@@ -1,4 +1,4 @@
-"""Modules that have moved are still found under their old names, with a warning."""
+"""Modules, names and keywords that are called otherwise today are still found as they were, with a warning."""
 
 import importlib
 import subprocess
@@ -7,8 +7,11 @@ from pathlib import Path
 
 import pytest
 
-import dem  # noqa: F401
-from hedgebed_renamed import RENAMED
+import coupling
+from hedgebed_renamed import MOVED, RENAMED
+from rigid import Trial
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.mark.parametrize("old", RENAMED)
@@ -20,10 +23,85 @@ def test_an_old_name_warns_and_is_the_module_of_today(old):
     assert module.__name__ == module.__spec__.name == RENAMED[old]
 
 
+@pytest.mark.parametrize(("module", "old"), [(module, old) for module, names in MOVED.items() for old in names])
+def test_a_name_that_has_left_its_module_warns_and_is_what_it_is_today(module, old):
+    place, today = MOVED[module][old]
+    with pytest.warns(DeprecationWarning, match=f"{module}.{old} is deprecated: use {place}.{today}"):
+        found = getattr(importlib.import_module(module), old)
+    assert found is getattr(importlib.import_module(place), today)
+
+
+def test_no_old_name_hides_a_file_or_a_name_of_today():
+    for old in RENAMED:
+        path = ROOT.joinpath(*old.split("."))
+        assert not path.with_suffix(".py").exists() and not (path / "__init__.py").exists(), old
+    for module, names in MOVED.items():
+        today = importlib.import_module(module)
+        assert not names.keys() & vars(today).keys(), module
+        assert not any(ROOT.joinpath(*module.split("."), f"{name}.py").exists() for name in names), module
+
+
+def test_a_module_with_old_names_still_refuses_what_it_never_had():
+    module = importlib.import_module("dem.prepare")
+    with pytest.raises(AttributeError, match=r"module 'dem\.prepare' has no attribute 'cake'"):
+        module.cake
+
+
+def test_a_package_that_finds_names_itself_goes_on_with_it():
+    package = importlib.import_module("experiments.penetrate")
+    assert package.Settings.__module__ == "experiments.penetrate.settings"
+    with pytest.raises(AttributeError, match="the package of 'penetrate' has no attribute 'cake'"):
+        package.cake
+
+
 @pytest.mark.parametrize("folder", ["dem", "rigid", "coupling", "experiments", "vis"])
 def test_old_names_work_in_a_fresh_process_and_the_warning_names_the_line_that_imports(folder):
     old = next(name for name in RENAMED if name.startswith(f"{folder}."))
     code = f"import warnings\nwarnings.simplefilter('error', DeprecationWarning)\nimport {old}"
-    root = Path(__file__).resolve().parents[2]
-    done = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True)
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
     assert f"DeprecationWarning: {old} is deprecated" in done.stderr
+
+
+def test_imports_of_the_first_version_work_in_a_fresh_process_and_name_their_lines():
+    lines = [
+        "from coupling.footing import Footing, LawFooting, row_tips",
+        "from coupling.bed_footing import BedFooting, platform_members",
+        "from dem.laboratory import Prepared, prepare_as",
+        "from dem.ledger import Ledger",
+        "from dem.prepare import Specification, prepare_bed",
+        "from dem.shapes import Ball",
+        "from rigid.platform import Platform",
+        "from rigid.spatial import SpatialTrial",
+        "from rigid.trial import Trial",
+        "from experiments.runfolder import RunFolder",
+        "from experiments.validate.parts import part",
+    ]
+    done = subprocess.run(
+        [sys.executable, "-W", "always", "-c", "\n".join(lines)], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    for number, _ in enumerate(lines, 1):
+        assert f"<string>:{number}: DeprecationWarning" in done.stderr
+
+
+def test_runs_take_their_ground_by_the_keyword_of_before():
+    trial = Trial(gravity_sim=0.0834, counterweight=5.21, torque=0.22, mu_s=0.6, stiffness=82.2, damping=0.713)
+    law = coupling.LawGround.of_trial(trial)
+    with pytest.warns(DeprecationWarning, match="footing of CoupledTumble is now ground") as warned:
+        run = coupling.CoupledTumble(trial, footing=law, duration=0.01)
+    assert run.ground is law
+    assert warned[0].filename == __file__
+    with pytest.warns(DeprecationWarning, match="footing of TumblesInARow is now ground"):
+        assert coupling.TumblesInARow(trial, footing=law, tumbles=2, duration=0.01).ground is law
+    with pytest.warns(DeprecationWarning, match="footing of Master is now ground"):
+        assert coupling.Master(run.body, footing=law).ground is law
+    with pytest.raises(TypeError, match="multiple values"), pytest.warns(DeprecationWarning):
+        coupling.Master(run.body, law, footing=law)
+
+
+@pytest.mark.parametrize("old", ["members", "spike"])
+def test_a_bed_takes_its_body_by_the_keywords_of_before(old):
+    with (
+        pytest.warns(DeprecationWarning, match=f"{old} of BedGround is now body"),
+        pytest.raises(AttributeError, match="no attribute 'surface'"),  # as far as it comes without a bed
+    ):
+        coupling.BedGround(object(), **{old: []})
