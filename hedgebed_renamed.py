@@ -165,6 +165,9 @@ _NAMES = {
     "coupling.master": {
         "coupling.master": "StepBooks=Exchange",
     },
+    "coupling.planar_body": {
+        "coupling.planar_body": "HAND_STEP=PLACEMENT_STEP HAND_TIME=PLACEMENT_TIME hand_time=placement_time",
+    },
     "coupling.platform_run": {
         "coupling.platform_run": "Followed=PlatformRun",
     },

@@ -18,7 +18,7 @@ from rigid.ground.reaction import Contact, Facts, Reaction, State, Turned
 from rigid.platform.spike import Spike
 from rigid.spatial.quaternions import multiply, to_matrix
 
-from .deprecated import renamed_keywords
+from .deprecated import renamed, renamed_keywords
 from .members import HULL, Member, spike_member
 from .poses import Pose, Twist, Vector, chord_share, matrices
 
@@ -72,6 +72,7 @@ class BedGround:
 
     name = "bed"
     gives_friction = True
+    hold, take_back = renamed("hold", "checkpoint"), renamed("take_back", "rollback")
 
     @renamed_keywords(members="body", spike="body")
     def __init__(

@@ -11,6 +11,7 @@ from rigid.ground.reaction import Contact, Reaction, State, Turned
 from rigid.model.trial import Trial
 from rigid.spatial.spatial import SpatialTrial
 
+from .deprecated import renamed
 from .poses import Pose, Twist, Vector, chord_share, matrices
 
 __all__ = ["LawGround", "row_tips"]
@@ -35,6 +36,7 @@ class LawGround:
 
     lag = 0.0
     gives_friction = False
+    hold, take_back = renamed("hold", "checkpoint"), renamed("take_back", "rollback")
     surface, centre, clearance, depth_limit = 0.0, (0.0, 0.0), 0.0, math.inf
 
     def __init__(self, tips: ArrayLike, grounds: Sequence[SpringDamper | SurfaceGround]) -> None:

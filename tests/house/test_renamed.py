@@ -98,6 +98,16 @@ def test_runs_take_their_ground_by_the_keyword_of_before():
         coupling.Master(run.body, law, footing=law)
 
 
+def test_a_ground_is_held_and_taken_back_as_before():
+    trial = Trial(gravity_sim=0.0834, counterweight=5.21, torque=0.22, mu_s=0.6, stiffness=82.2, damping=0.713)
+    law = coupling.LawGround.of_trial(trial)
+    with pytest.warns(DeprecationWarning, match="LawGround.hold is now checkpoint"):
+        held = law.hold()
+    with pytest.warns(DeprecationWarning, match="LawGround.take_back is now rollback"):
+        law.take_back(held)
+    assert isinstance(coupling.BedGround.hold, property)
+
+
 @pytest.mark.parametrize("old", ["members", "spike"])
 def test_a_bed_takes_its_body_by_the_keywords_of_before(old):
     with (
