@@ -76,6 +76,7 @@ def test_a_quarter_of_gravity_modulus_and_torque_is_the_same_tumble_at_half_the_
         assert np.array_equal(getattr(one, name), scale * getattr(other, name)), name
 
 
+@pytest.mark.long
 def test_gravity_lowered_in_the_hand_leaves_the_platform_at_rest_where_it_lay():
     """From 0.5 to 0.01 m/s2: it lies where it was put but for overlaps that are let out, stays there, and carries."""
     bed = layers(0.5, young=5e6)

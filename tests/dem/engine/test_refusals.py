@@ -251,6 +251,7 @@ def collide(precision):
 """
 
 
+@pytest.mark.long
 def test_float32_agrees_with_float64_on_a_collision():
     """To 1e-4 of its speed; in a process of its own, as another precision starts Taichi anew."""
     root = Path(__file__).resolve().parents[3]

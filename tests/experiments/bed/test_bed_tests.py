@@ -99,6 +99,7 @@ def test_sand_drains_to_its_angle_of_repose(cache):
     assert profile["thickness_m"].sum() * spacing == pytest.approx(volume, rel=0.1)
 
 
+@pytest.mark.long
 def test_a_cone_meets_more_the_deeper_it_goes(cache):
     options = ["--diameter", "0.0125", "--depth", "0.0125", "--angle", "80", "--pushes", "1", "--speed", "0.06"]
     assert main(["bed", "test", "cone", *BED, *options, "--out", str(cache / "cone")]) == DONE
