@@ -11,7 +11,7 @@ from hypothesis import settings
 
 ROOT = Path(__file__).resolve().parent.parent
 DURATIONS = ROOT / "tests" / "durations.toml"
-FAST_BUDGET = 130.0
+FAST_BUDGET = 110.0
 """What all tests of `make fast` may take together, as tests/durations.toml has it [s]; two processes share it."""
 
 # A suite that passes here has to pass elsewhere; HYPOTHESIS_PROFILE=search looks for new examples, and more of them.
