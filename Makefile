@@ -29,7 +29,7 @@ fast: $(VENV)/.installed-test  ## the inner loop: ruff, and the tests whose file
 	$(BIN)/ruff check .
 	$(PYTEST) -m "not heavy and not long and not slow" $(ARGS)
 
-long: $(VENV)/.installed-test  ## the tests of 10 s and more, which CI runs after those of `make test`
+long: $(VENV)/.installed-test  ## the tests of some 10 s and more, which CI runs after those of `make test`
 	$(PYTEST) -m long $(ARGS)
 
 slow: $(VENV)/.installed-test  ## the tests that take minutes: physics against closed forms, kill and resume

@@ -235,6 +235,7 @@ def dropped(**options):
     )
 
 
+@pytest.mark.long
 def test_a_platform_let_fall_askew_on_grains_closes_its_books_and_goes_on_from_its_state_to_the_same_bits():
     start = {"duration": 0.03, "velocity": (0.05, 0.0, -0.1), "angular_velocity": (0.0, 1.0, 2.0)}
     run = dropped(**start)

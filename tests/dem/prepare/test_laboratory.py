@@ -171,6 +171,7 @@ def test_a_bed_that_went_through_stages_is_kept_in_the_cache_and_found_again(tmp
         Bed.prepare_as(SAND, **options, cache=True, keep=tmp_path / "kept.npz")
 
 
+@pytest.mark.long
 def test_a_preparation_that_was_stopped_goes_on_to_the_same_bits(made, tmp_path):
     """Stopped in the rain, in the fluff and between taps; kept for another recipe it is not gone on with."""
     for stage, at in (("rain", 4), ("fluff", 3), ("packing:0.545", 1)):

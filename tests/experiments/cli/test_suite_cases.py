@@ -25,6 +25,7 @@ def test_every_case_of_every_experiment_is_valid_and_found_by_its_name():
     assert counts == {1: 35, 2: 6, 3: 3, 4: 4, 5: 6, 6: 16}
 
 
+@pytest.mark.long
 def test_no_case_that_ships_is_refused():
     """The spring-damper's tips stay on the bed for as long as the case lasts, and whatever else is checked before."""
     refused = {case.name: cost for case in suite.cases() if isinstance(cost := suite.estimate(case), str)}
