@@ -12,7 +12,7 @@ from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from types import ModuleType
 from typing import Any
 
-__all__ = ["MOVED", "RENAMED"]
+__all__ = ["MOVED", "RENAMED", "renamed"]
 
 _MODULES = {
     "coupling": {
@@ -311,6 +311,17 @@ RENAMED = {
 
 MOVED = {module: _listed(places) for module, places in _NAMES.items()}
 """Module of today -> name that it had, or that the module had which is now found there -> module and name of today."""
+
+
+def renamed(old: str, new: str) -> Any:
+    """A property `old` that gives the attribute `new`, with a DeprecationWarning."""
+
+    def get(owner: object) -> Any:
+        kind = type(owner).__name__
+        warnings.warn(f"{kind}.{old} is now {new}: use {kind}.{new}", DeprecationWarning, stacklevel=2)
+        return getattr(owner, new)
+
+    return property(get, doc=f"Old name of `{new}`.")
 
 
 class _Renamed(MetaPathFinder, Loader):

@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dem.engine.values import Grains
+from hedgebed_renamed import renamed
 from rigid.ground.reaction import Contact, Facts, Reaction, State, Turned
 from rigid.platform.spike import Spike
 from rigid.spatial.quaternions import multiply, to_matrix
 
-from .deprecated import renamed, renamed_keywords
+from .deprecated import renamed_keywords
 from .members import HULL, Member, spike_member
 from .poses import Pose, Twist, Vector, chord_share, matrices
 

@@ -1,23 +1,15 @@
-"""Old names of attributes and keywords, which go on for one version."""
+"""Old names of keywords and of what bodies offer, which go on for one version."""
 
 import warnings
 from collections.abc import Callable
 from functools import wraps
 from typing import Any, TypeVar, cast
 
-__all__ = ["PlacedBody", "renamed", "renamed_keywords"]
+from hedgebed_renamed import renamed
+
+__all__ = ["PlacedBody", "renamed_keywords"]
 
 F = TypeVar("F", bound=Callable[..., Any])
-
-
-def renamed(old: str, new: str) -> Any:
-    """A property `old` that gives the attribute `new`, with a DeprecationWarning."""
-
-    def get(owner: object) -> Any:
-        warnings.warn(f"{type(owner).__name__}.{old} is now {new}", DeprecationWarning, stacklevel=2)
-        return getattr(owner, new)
-
-    return property(get, doc=f"Old name of `{new}`.")
 
 
 def renamed_keywords(**today: str) -> Callable[[F], F]:

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hedgebed_renamed import renamed
 from rigid.ground.grounds import SpringDamper, SurfaceGround
 from rigid.ground.reaction import Contact, Reaction, State, Turned
 from rigid.model.trial import Trial
 from rigid.spatial.spatial import SpatialTrial
 
-from .deprecated import renamed
 from .poses import Pose, Twist, Vector, chord_share, matrices
 
 __all__ = ["LawGround", "row_tips"]

@@ -27,9 +27,10 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from hedgebed_renamed import renamed
 from rigid.ground.reaction import Contact, Reaction, State
 
-from .deprecated import renamed, renamed_keywords
+from .deprecated import renamed_keywords
 from .ground import Ground
 from .poses import Pose, Twist, Vector, Wrench
 

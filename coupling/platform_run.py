@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from hedgebed_renamed import renamed
 from rigid.checks import check_above_zero
 from rigid.ground.reaction import Reaction, State
 from rigid.planar.trajectory import STATES
@@ -15,7 +16,6 @@ from rigid.planar.trajectory import STATES
 from .balance import EnergyBalance
 from .bed_ground import BedGround
 from .contact_state import ContactReader, feet_of
-from .deprecated import renamed
 from .ground import Ground
 from .law_ground import LawGround
 from .lowered_gravity import pace_under

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Self
+
+from hedgebed_renamed import renamed
 
 from .engine.core import BedCore
 from .engine.values import BedFailure
@@ -15,17 +15,6 @@ from .prepare.prepare import prepare_as, prepare_bed
 from .prepare.report import Prepared
 
 __all__ = ["Bed", "BedFailure"]
-
-
-def _renamed(old: str, new: str) -> Callable[..., Any]:
-    """A method under its old name, which warns that it has a new one."""
-
-    def call(self: Bed, *given: Any, **options: Any) -> Any:
-        warnings.warn(f"Bed.{old} is deprecated: use Bed.{new}", DeprecationWarning, stacklevel=2)
-        found = getattr(self, new)
-        return found(*given, **options) if callable(found) else found
-
-    return call
 
 
 class Bed(BedCore):
@@ -58,7 +47,7 @@ class Bed(BedCore):
         """A bed from a file, with its recipe and reports."""
         return load_prepared(path, arch=arch, threads=threads, make=cls)
 
-    hold = _renamed("hold", "checkpoint")
-    take_back = _renamed("take_back", "rollback")
-    keep_book = _renamed("keep_book", "track_contact_work")
-    work_taken = property(_renamed("work_taken", "contact_work"))
+    hold = renamed("hold", "checkpoint")
+    take_back = renamed("take_back", "rollback")
+    keep_book = renamed("keep_book", "track_contact_work")
+    work_taken = renamed("work_taken", "contact_work")

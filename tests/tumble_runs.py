@@ -1,13 +1,16 @@
 """A small platform on a small bed in the plane, for tests: a tumble of seconds."""
 
 import math
+from contextlib import contextmanager
+from itertools import count
 from typing import Any
 
 import numpy as np
 
 from dem import SAND, Bed
+from experiments.grains import following
 
-__all__ = ["SMALL", "prepare_small", "small_bed"]
+__all__ = ["SMALL", "prepare_small", "small_bed", "stop_at"]
 
 SMALL: dict[str, Any] = {
     "surface": "sand", "ground": "bed", "mass": 0.3, "inertia": 2e-4, "spike_length": 0.04, "wheel_inertia": 1e-5,
@@ -34,3 +37,14 @@ def small_bed(settings):
     bed.advance(1000)
     bed.surface = float((bed.grains().position[:, 2] + 0.5 * d).max())
     return bed
+
+
+def stop_at(monkeypatch, call):
+    """A run on grains finds, when it asks for the `call`-th time, that it was told to stop."""
+    asked = count(1)
+
+    @contextmanager
+    def stopping():
+        yield lambda: next(asked) == call
+
+    monkeypatch.setattr(following, "held_back", stopping)

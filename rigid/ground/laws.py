@@ -76,7 +76,7 @@ class SurfaceLaw:
     parameters: tuple[Parameter, ...]
     slots: tuple[str, ...]  # What stands in p[0], p[1] ... of the functions.
     extensive: tuple[int, ...]  # Which of them are in proportion to the number of spikes that press side by side
-    make: Callable[[Mapping[str, float]], tuple[float, ...]]
+    make: Callable[[Mapping[str, float]], tuple[float, ...]] | None = None  # None: the parameters of those names
     loading: Callable[..., Any]
     loading_work: Callable[..., Any]
     rate_force: Callable[..., Any]
@@ -94,7 +94,8 @@ class SurfaceLaw:
 
     def numbers(self, given: Mapping[str, float], *, count: float = 1.0) -> tuple[float, ...]:
         """p of the functions for these parameters, of `count` spikes side by side. Raises ValueError as `values`."""
-        p = self.make(self.values(given))
+        values = self.values(given)
+        p = tuple(values[slot] for slot in self.slots) if self.make is None else self.make(values)
         return tuple(count * value if k in self.extensive else value for k, value in enumerate(p))
 
     def rebound(self, given: Mapping[str, float]) -> float | None:
@@ -180,7 +181,6 @@ _LAWS = (
             Parameter("damping", "N s/m", 60.0, summary="C, going in only", source="ours, as of brick"),
         ),
         slots=("stiffness", "damping"), extensive=(0, 1),
-        make=lambda v: (v["stiffness"], v["damping"]),
         **_functions("spring_damper", "spring_damper"), has_memory=False,
     ),
     SurfaceLaw(
@@ -197,7 +197,6 @@ _LAWS = (
                       source="Hertz: 3/2 for a ball on a flat"),
         ),
         slots=("stiffness", "dissipation", "exponent"), extensive=(0,),
-        make=lambda v: (v["stiffness"], v["dissipation"], v["exponent"]),
         **_functions("power", "hunt_crossley"), has_memory=False,
     ),
     SurfaceLaw(
@@ -211,7 +210,6 @@ _LAWS = (
             Parameter("exponent", "1", 1.5, lowest=0.5, highest=4.0, summary="n", source="Hertz"),
         ),
         slots=("stiffness", "damping", "exponent"), extensive=(0, 1),
-        make=lambda v: (v["stiffness"], v["damping"], v["exponent"]),
         **_functions("power", "spring_damper"), has_memory=False,
     ),
     SurfaceLaw(
@@ -227,7 +225,6 @@ _LAWS = (
             _REBOUND,
         ),
         slots=("stiffness", "drag"), extensive=(0, 1),
-        make=lambda v: (v["stiffness"], v["drag"]),
         **_functions("spring_damper", "inertial"), has_memory=True,
     ),
     SurfaceLaw(

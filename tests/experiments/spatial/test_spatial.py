@@ -2,14 +2,13 @@
 
 import json
 import math
-from contextlib import contextmanager
 
 import numpy as np
 import pytest
 from spatial_runs import CUBE, small_bed
+from tumble_runs import stop_at
 
 from experiments.cli.main import main
-from experiments.grains import following
 from experiments.runs.folder import RunFolder, read_series
 from experiments.spatial import experiment as spatial
 from experiments.spatial.on_grains import SpatialOnBed
@@ -144,18 +143,7 @@ def test_on_grains_a_stopped_run_goes_on_to_the_same_bits_with_its_books_and_ove
         grain=0.006, young=1e6, max_overlap=0.2, threads=1, frame_count=2, substeps=4,
     )  # fmt: skip
     whole = spatial.run(settings, tmp_path / "whole")
-    calls = 0
-
-    @contextmanager
-    def stopping():
-        def asked():
-            nonlocal calls
-            calls += 1
-            return calls == 20
-
-        yield asked
-
-    monkeypatch.setattr(following, "held_back", stopping)
+    stop_at(monkeypatch, 20)
     with pytest.raises(KeyboardInterrupt):
         spatial.run(settings, tmp_path / "broken")
     assert RunFolder.open(tmp_path / "broken").load_checkpoint("tumble") is not None

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from golden import golden
-from tumble_runs import SMALL, prepare_small, small_bed
+from tumble_runs import SMALL, prepare_small, small_bed, stop_at
 
 from coupling import CoupledTumble, LawGround, LeftTheBedError
 from dem import SAND, BedFailure
@@ -526,18 +526,7 @@ def test_a_run_stopped_by_ctrl_c_is_taken_up_again_to_the_same_numbers(repeats, 
     size = (SMALL["bed_size"][0] / repeats, *SMALL["bed_size"][1:])
     settings = TumbleSettings(**SMALL | {"bed_size": size}, sleep=True, bed_repeats=repeats)
     whole = tumble.run(settings, tmp_path / "whole")
-    calls = 0
-
-    @contextmanager
-    def stopping():
-        def asked():
-            nonlocal calls
-            calls += 1
-            return calls == 250
-
-        yield asked
-
-    monkeypatch.setattr(following, "held_back", stopping)
+    stop_at(monkeypatch, 250)
     with pytest.raises(KeyboardInterrupt):
         tumble.run(settings, tmp_path / "broken")
     assert RunFolder.open(tmp_path / "broken").load_checkpoint("tumble") is not None
