@@ -7,9 +7,8 @@ Each experiment is a package: after ``from experiments import penetrate``,
 Imports `coupling`, `dem`, `rigid`, `vis`.
 """
 
-from typing import Any
-
 import hedgebed_renamed  # noqa: F401  (old names of modules)
+from experiments.runs.progress import make_progress
 
 __all__ = [
     "bed",
@@ -25,12 +24,3 @@ __all__ = [
     "tumble",
     "validate",
 ]
-
-
-def __getattr__(name: str) -> Any:
-    """`make_progress`, when it is first asked for."""
-    if name != "make_progress":
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from experiments.runs.progress import make_progress
-
-    return make_progress

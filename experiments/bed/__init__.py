@@ -1,12 +1,14 @@
 """Beds prepared as in a laboratory, and tests of their strength: shear, repose, cone, vertical cut.
 
-`Settings`, `check`, `run` and `resume` are those of `hedgebed bed make`; they are loaded when they are first used.
+`Settings`, `check`, `run` and `resume` are those of `hedgebed bed make`; calling one imports what computes.
 
 Imports `dem`, `experiments.grains`, `experiments.penetrate`, `experiments.runs`, `vis`.
 """
 
 from experiments.runs.registry import face
 
+from .settings import BedSettings as Settings
+
 __all__ = ["Settings", "check", "resume", "run"]
 
-__getattr__ = face("bed make")
+check, resume, run = face("bed make", Settings)

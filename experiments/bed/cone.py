@@ -14,9 +14,9 @@ from experiments.runs.result import Result
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import whole_run
 
+from .settings import say
 from .test_settings import BedConeSettings
 from .tests import about, carry_out, check_bed, picked, quantity, table, write_frame
-from .words import say
 
 __all__ = ["check", "place_of", "resume", "run"]
 

@@ -18,8 +18,7 @@ from experiments.runs.result import Result
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import whole_run
 
-from .settings import BedRefineSettings
-from .words import say
+from .settings import BedRefineSettings, say
 from .work import check_memory, check_name, finish_bed, prepared_in
 
 __all__ = ["check", "refined_options", "resume", "run"]

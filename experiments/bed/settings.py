@@ -11,10 +11,11 @@ from dem.prepare.recipe import check_stages, parse_stage
 from experiments.grains.sizes import Distribution, Kept
 from experiments.penetrate.settings import MATERIAL, STANDARD_GRAVITY
 from experiments.runs.strict import StrictSettings
-
-from .words import say
+from vis.page.sentences import Sentences
 
 __all__ = ["GRADED", "SPREAD_OUT", "BedRefineSettings", "BedSettings"]
+
+say = Sentences(__package__)
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 SeedNumber = Annotated[int, Field(ge=0, lt=2**31)]

@@ -24,9 +24,9 @@ from experiments.runs.result import Result, quantity
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import whole_run
 
+from .settings import say
 from .test_settings import BedShearSettings
 from .tests import picked, table
-from .words import say
 
 __all__ = ["Strength", "check", "fit_line", "resume", "run", "strength_of"]
 

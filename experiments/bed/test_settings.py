@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 from experiments.penetrate.settings import MATERIAL, STANDARD_GRAVITY
 from experiments.runs.strict import StrictSettings
 
-from .words import say
+from .settings import say
 
 __all__ = ["BedConeSettings", "BedCutSettings", "BedReposeSettings", "BedShearSettings", "BedTestSettings"]
 

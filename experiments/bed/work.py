@@ -20,8 +20,8 @@ from experiments.runs.result import Result, quantities_of
 from experiments.runs.stopping import held_back
 from experiments.runs.types import Json
 
+from .settings import say
 from .tests import table, write_frame
-from .words import say
 
 __all__ = ["check_memory", "check_name", "finish_bed", "prepared_in"]
 

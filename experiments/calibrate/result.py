@@ -13,8 +13,7 @@ from experiments.runs.types import Json
 from experiments.runs.version import __version__
 
 from .fit import Fit, Surfaces
-from .settings import FREE, CalibrateSettings, Target
-from .words import say
+from .settings import FREE, CalibrateSettings, Target, say
 
 __all__ = ["Simulated", "calibration_result", "material_toml"]
 

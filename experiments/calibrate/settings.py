@@ -12,10 +12,11 @@ from experiments.penetrate.settings import STANDARD_GRAVITY
 from experiments.runs.reading import nearest
 from experiments.runs.strict import StrictSettings
 from experiments.runs.types import Json
-
-from .words import say
+from vis.page.sentences import Sentences
 
 __all__ = ["FIGURES", "FREE", "CalibrateSettings", "Figure", "Target", "material_at"]
+
+say = Sentences(__package__)
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 SeedNumber = Annotated[int, Field(ge=0, lt=2**31)]

@@ -1,11 +1,14 @@
 """Campaigns: measured or made-up trials in a folder, and the models fitted to them.
 
-`Settings`, `check`, `run` and `resume` are those of `hedgebed campaign`; they are loaded when they are first used.
+`Settings`, `check`, `run` and `resume` are those of `hedgebed campaign`; calling one imports what computes,
+and `Settings` is imported when it is first used.
 
 Imports `experiments.runs`, `rigid`.
 """
 
-from experiments.runs.registry import face
+from pydantic import BaseModel
+
+from experiments.runs.registry import EXPERIMENTS, face
 
 from .files import Campaign, read_campaign, read_model, write_campaign, write_model
 from .recording import Recording
@@ -29,4 +32,11 @@ __all__ = [
     "write_model",
 ]
 
-__getattr__ = face("campaign")
+check, resume, run = face("campaign", BaseModel)
+
+
+def __getattr__(name: str) -> type[BaseModel]:
+    """`Settings`, whose package imports this one."""
+    if name == "Settings":
+        return EXPERIMENTS["campaign"].settings_class()
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,14 +1,14 @@
 """Two finished runs in one report: numbers with differences, what both did over time.
 
-`Settings`, `check`, `run` and `resume` are those of `hedgebed compare`; they are loaded when they are first used.
+`Settings`, `check`, `run` and `resume` are those of `hedgebed compare`; calling one imports what computes.
 
 Imports `experiments.grains`, `experiments.platform`, `experiments.runs`, `experiments.spatial`, `rigid`, `vis.page`.
 """
 
 from experiments.runs.registry import face
-from vis.page.sentences import Sentences
+
+from .settings import CompareSettings as Settings
 
 __all__ = ["Settings", "check", "resume", "run"]
 
-say = Sentences(__package__)
-__getattr__ = face("compare")
+check, resume, run = face("compare", Settings)

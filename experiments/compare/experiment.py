@@ -21,11 +21,10 @@ from experiments.runs.types import Json
 from experiments.runs.whole_runs import computed_run
 from experiments.spatial.settings import ON_ANY_GROUND
 
-from . import say
 from . import spatial as compare_spatial
 from . import tumbles as compare_tumbles
 from .common import TIMELESS, common_time, numbers_until, sinkage_of
-from .settings import CompareSettings
+from .settings import CompareSettings, say
 
 __all__ = ["check", "resume", "run"]
 

@@ -5,8 +5,11 @@ from typing import Literal
 from pydantic import Field
 
 from experiments.runs.strict import StrictSettings
+from vis.page.sentences import Sentences
 
 __all__ = ["CompareSettings"]
+
+say = Sentences(__package__)
 
 
 class CompareSettings(StrictSettings):

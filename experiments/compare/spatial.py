@@ -18,7 +18,7 @@ from experiments.runs.result import quantities_of
 from experiments.runs.types import Json
 from rigid.spatial.quaternions import angle_between
 
-from . import say
+from .settings import say
 from .tumbles import ENERGIES, deepest, gap_entries, lasting, mean_over, on_one_grid, same_state
 
 __all__ = ["MovedInSpace", "compared_columns", "gaps", "read_moved", "told_apart"]

@@ -14,7 +14,7 @@ from experiments.runs.folder import read_series
 from experiments.runs.result import quantities_of
 from experiments.runs.types import Json
 
-from . import say
+from .settings import say
 
 __all__ = [
     "ENERGIES", "Moved", "compared_columns", "deepest", "gap_entries", "gaps", "lasting", "mean_over",

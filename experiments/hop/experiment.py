@@ -16,11 +16,10 @@ from rigid.hop import Flight, Launch, escape_speed, impulsive_launch, launch_spe
 from rigid.model.trial import Trial
 from rigid.planar.simulate import simulate
 
-from . import say
 from .numbers import HopPlan
 from .on_surface import SurfaceHop, flight_path, hop_on_surface, hop_trial, wheel_speed_on_surface
 from .search import Hop, find_hop, longest_flight
-from .settings import HopSettings
+from .settings import HopSettings, say
 from .words import sentences, warnings
 
 __all__ = ["check", "resume", "run"]

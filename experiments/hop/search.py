@@ -13,10 +13,9 @@ import numpy as np
 
 from rigid.hop import Flight, Launch, brake_launch, flight, impulsive_launch, launch, launch_speed_for
 
-from . import say
 from .numbers import HopPlan, plan_hop
 from .on_surface import hop_on_surface, hop_trial
-from .settings import HopSettings
+from .settings import HopSettings, say
 
 __all__ = ["Hop", "find_hop", "longest_flight"]
 

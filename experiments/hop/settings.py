@@ -6,10 +6,11 @@ from pydantic import Field, model_validator
 
 from experiments.platform.settings import PlatformSettings, Positive
 from experiments.runs.strict import StrictSettings
-
-from . import say
+from vis.page.sentences import Sentences
 
 __all__ = ["DEFAULT_DISTANCE", "HopSettings"]
+
+say = Sentences(__package__)
 
 DEFAULT_DISTANCE = 5.0
 """Of a hop that is told neither distance nor wheel speed nor torque of a motor [m]."""

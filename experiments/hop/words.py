@@ -4,9 +4,9 @@ import math
 
 from rigid.hop import Flight, Launch, least_viable_angle
 
-from . import say
 from .numbers import HopPlan
 from .on_surface import SurfaceHop
+from .settings import say
 
 __all__ = ["NEAR_ESCAPE", "sentences", "warnings"]
 

@@ -13,9 +13,8 @@ from typing import Any
 from experiments.runs.types import Json
 from rigid.model.trial import Trial
 
-from . import say
 from .settings import PaperSettings
-from .transitions import HARD, TRANSITIONS, hop_words, is_brief, measured_angles, transition_angle
+from .transitions import HARD, TRANSITIONS, hop_words, is_brief, measured_angles, say, transition_angle
 
 __all__ = ["AGREEMENT", "claims", "first_lasting", "friction_of_a_rigid_pivot", "sliding_angle"]
 

@@ -8,9 +8,11 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from . import say
+from vis.page.sentences import Sentences
 
 __all__ = ["HARD", "TRANSITIONS", "hop_words", "is_brief", "measured_angles", "slip_before_hop", "transition_angle"]
+
+say = Sentences(__package__)
 
 HARD = ("steel", "brick")
 """The surfaces of Figures 5 to 7."""

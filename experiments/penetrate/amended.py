@@ -25,8 +25,7 @@ from experiments.runs.types import Json
 from rigid import SpringDamper
 from rigid.ground.reaction import Reaction
 
-from . import say
-from .settings import PenetrateSettings
+from .settings import PenetrateSettings, say
 from .units import Unit, make_run
 
 __all__ = ["AmendedGround", "AmendedLaw", "read_law"]

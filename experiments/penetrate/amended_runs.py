@@ -19,9 +19,8 @@ from experiments.runs.types import Json
 from experiments.runs.version import __version__
 from experiments.runs.whole_runs import publish
 
-from . import say
 from .amended import AmendedLaw, read_law
-from .settings import PenetrateSettings
+from .settings import PenetrateSettings, say
 from .units import Unit, make_run, make_spike, plan_units
 
 __all__ = ["Beside", "kept_law", "run_beside", "run_without_bed"]

@@ -14,8 +14,8 @@ from coupling import Penetration
 from experiments.runs.types import Json
 from vis.page.numbers import foldable, quote
 
-from . import say
 from .fit import Fit, fit_rows, spread
+from .settings import say
 
 __all__ = ["departure_table", "departures", "depth_exponent", "rate_change", "sentences"]
 

@@ -23,7 +23,7 @@ from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
 from experiments.runs.whole_runs import draw_report, whole_run
 
-from . import beds, say
+from . import beds
 from .amended_runs import run_without_bed
 from .beds import fingerprint
 from .findings import BedFacts
@@ -33,7 +33,7 @@ from .recorded import campaign_of, sensors_of
 from .refusals import check
 from .remarks import softening_note
 from .result import conclude
-from .settings import PenetrateSettings
+from .settings import PenetrateSettings, say
 from .units import Unit, expected_time, make_run, make_spike, plan_units, share_done, shown_units
 
 __all__ = ["check", "fingerprint", "resume", "run"]

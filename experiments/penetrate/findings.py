@@ -19,9 +19,8 @@ from experiments.grains.softening import Softening
 from experiments.runs.types import Json
 from rigid import SpringDamper
 
-from . import say
 from .fit import Fit, drag_gap, fit_spring_damper, moments_of, spread
-from .settings import STANDARD_GRAVITY, PenetrateSettings
+from .settings import STANDARD_GRAVITY, PenetrateSettings, say
 from .units import Unit, make_run
 
 __all__ = ["BedFacts", "Findings", "bed_entry", "bed_quantities", "drop_note", "model_run"]

@@ -32,8 +32,7 @@ from experiments.runs.strict import StrictSettings
 from experiments.runs.types import Json
 from experiments.runs.version import __version__
 
-from . import say
-from .settings import PenetrateSettings
+from .settings import PenetrateSettings, say
 
 __all__ = ["SpikeSensors", "campaign_of", "campaign_of_run", "sensors_of", "write_run_campaign"]
 

@@ -15,8 +15,8 @@ from experiments.runs.types import Json
 from rigid.series import RESULT_FORMAT
 from vis.page.numbers import foldable, quote
 
-from . import say
 from .fit import Moments, fit_moments, gap_of_moments
+from .settings import say
 
 __all__ = ["compare_with", "read_reference"]
 

@@ -8,10 +8,10 @@ from experiments.grains.softening import check_young, drop_depth
 from experiments.grains.where import check_where
 from experiments.runs.memory import memory_there
 
-from . import beds, say
+from . import beds
 from .amended import read_law
 from .reference import read_reference
-from .settings import PenetrateSettings
+from .settings import PenetrateSettings, say
 from .units import deepest, expected_time, plan_units
 
 __all__ = ["check"]

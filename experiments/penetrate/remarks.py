@@ -10,10 +10,9 @@ from experiments.grains.softening import Softening
 from experiments.runs.types import Json
 from vis.page.numbers import foldable, quote
 
-from . import say
 from .departures import departures
 from .findings import Findings, drop_note
-from .settings import PenetrateSettings
+from .settings import PenetrateSettings, say
 
 __all__ = ["departures_in_words", "overlap_warning", "softening_note", "warnings_of"]
 

@@ -10,10 +10,11 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from experiments.runs.strict import StrictSettings
-
-from . import say
+from vis.page.sentences import Sentences
 
 __all__ = ["STANDARD_GRAVITY", "PenetrateSettings"]
+
+say = Sentences(__package__)
 
 STANDARD_GRAVITY = 9.80665
 """Unit of `rig` [m/s2]."""

@@ -14,16 +14,31 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from pydantic import BaseModel
 
 if TYPE_CHECKING:
+    from experiments.runs.progress import Progress
     from experiments.runs.result import Result
 
 __all__ = ["EXPERIMENTS", "Experiment", "Headline", "Preset", "face", "find_experiment"]
 
 CASES = Path(__file__).parents[1] / "cases"
+S = TypeVar("S", bound=BaseModel)
+S_contra = TypeVar("S_contra", bound=BaseModel, contravariant=True)
+
+
+class Run(Protocol[S_contra]):
+    """The `run` of an experiment whose settings are of the class `S_contra`."""
+
+    def __call__(self, settings: S_contra, folder: str | Path, *, progress: "Progress | None" = None) -> "Result": ...
+
+
+class Resume(Protocol):
+    """The `resume` of an experiment."""
+
+    def __call__(self, folder: str | Path, *, progress: "Progress | None" = None) -> "Result": ...
 
 
 @dataclass(frozen=True)
@@ -110,18 +125,23 @@ def find_experiment(name: str) -> Experiment:
     return EXPERIMENTS[name]
 
 
-def face(command: str) -> Callable[[str], Any]:
-    """The ``__getattr__`` of a package whose public names are those of the experiment `command`.
+def face(command: str, settings_class: type[S]) -> tuple[Callable[[S], None], Resume, Run[S]]:
+    """`check`, `resume` and `run` of the experiment `command`, for its package; calling one imports what computes.
 
-    `Settings` is its settings class, `run`, `resume` and `check` are those of its module.
+    `settings_class` is its settings class, by which a type checker knows what they take.
     """
+    experiment = EXPERIMENTS[command]
 
-    def __getattr__(name: str) -> Any:  # noqa: N807
-        experiment = EXPERIMENTS[command]
-        if name == "Settings":
-            return experiment.settings_class()
-        if name in ("check", "resume", "run"):
-            return getattr(import_module(experiment.module), name)
-        raise AttributeError(f"the package of {command!r} has no attribute {name!r}")
+    def check(settings: S) -> None:
+        """Raise ValueError for settings that cannot be run, before any work."""
+        experiment.check(settings)
 
-    return __getattr__
+    def resume(folder: str | Path, *, progress: "Progress | None" = None) -> "Result":
+        """Finish the run in `folder`; return the result."""
+        return experiment.resume(Path(folder), progress=progress)
+
+    def run(settings: S, folder: str | Path, *, progress: "Progress | None" = None) -> "Result":
+        """Run the experiment into `folder`; return the result. Raises ValueError for settings that cannot be run."""
+        return experiment.run(settings, Path(folder), progress=progress)
+
+    return check, resume, run

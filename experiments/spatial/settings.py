@@ -6,10 +6,11 @@ from pydantic import Field, model_validator
 
 from experiments.grains.settings import GrainsSettings
 from experiments.platform.settings import NotNegative, Positive
-
-from . import say
+from vis.page.sentences import Sentences
 
 __all__ = ["ON_ANY_GROUND", "SpatialSettings"]
+
+say = Sentences(__package__)
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Vector = tuple[Finite, Finite, Finite]

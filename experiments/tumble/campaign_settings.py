@@ -6,8 +6,7 @@ from pydantic import Field, model_validator
 
 from experiments.platform.settings import NotNegative, Positive
 
-from . import say
-from .settings import TrialSettings
+from .settings import TrialSettings, say
 
 __all__ = ["CampaignSettings"]
 

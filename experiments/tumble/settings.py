@@ -12,11 +12,13 @@ from experiments.grains.settings import OF_THE_MASTER, TumbleBedSettings
 from experiments.platform.settings import NotNegative, PlatformSettings, Positive
 from experiments.runs.reading import nearest
 from rigid.ground.laws import GROUNDS
+from vis.page.sentences import Sentences
 
-from . import say
 from .sweep_ranges import parse_sweep
 
 __all__ = ["TrialSettings", "TumbleSettings"]
+
+say = Sentences(__package__)
 
 ON_GRAINS = 1.1
 """A tumble of the Hedgehog in the rig comes down on its next row by then; what lasts longer costs by the hour [s]."""

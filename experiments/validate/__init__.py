@@ -7,6 +7,8 @@ Imports `dem`, `experiments.bed`, `experiments.calibrate`, `experiments.runs`, `
 
 from experiments.runs.registry import face
 
+from .settings import ValidateSettings as Settings
+
 __all__ = ["Settings", "check", "resume", "run"]
 
-__getattr__ = face("validate")
+check, resume, run = face("validate", Settings)

@@ -1,5 +1,7 @@
 """Imports of ours point one way: between the folders at the top, between packages, between files."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -61,3 +63,14 @@ def test_the_walk_sees_imports_inside_functions_for_type_checkers_and_by_name(tm
     assert imported("vis.one", known["vis.one"], known) == {"vis.two", "rigid.platform.spike"}
     assert imported("vis.two", known["vis.two"], known) == {"vis.one", "dem.bed"}
     assert set(circle(graph_of(tmp_path))) == {"vis.one", "vis.two"}
+
+
+def test_the_functions_of_an_experiment_are_there_without_what_computes():
+    code = (
+        "import sys\nfrom experiments import bed, hop, penetrate\nimport experiments.diagnose\n"
+        "for package in (bed, hop, penetrate, experiments.diagnose):\n"
+        "    assert callable(package.check) and callable(package.run) and callable(package.resume)\n"
+        "    assert package.Settings.model_fields\n"
+        "assert 'taichi' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)

@@ -48,9 +48,9 @@ def test_a_module_with_old_names_still_refuses_what_it_never_had():
 
 
 def test_a_package_that_finds_names_itself_goes_on_with_it():
-    package = importlib.import_module("experiments.penetrate")
-    assert package.Settings.__module__ == "experiments.penetrate.settings"
-    with pytest.raises(AttributeError, match="the package of 'penetrate' has no attribute 'cake'"):
+    package = importlib.import_module("experiments.campaign")
+    assert package.Settings.__module__ == "experiments.tumble.campaign_settings"
+    with pytest.raises(AttributeError, match=r"module 'experiments\.campaign' has no attribute 'cake'"):
         package.cake
 
 
