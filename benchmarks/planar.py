@@ -19,41 +19,19 @@ from benchmarks.planar_trials.agreement import CHANNELS, SHARE_WITHIN, TOLERANCE
 from benchmarks.race.machine import busy, column_table, describe_machine, head, wide_console
 from experiments.runs.memory import cores_there
 from experiments.runs.types import Json
-from rigid import Effect, Trial, simulate_batch
+from rigid import EFFECTS, Effect, Trial, simulate_batch
 
 __all__ = ["Settings", "drawn_trials", "run"]
 
 DURATION, TIME_STEP = 1.0, 1e-3
 GRAVITY = 9.80665
 AMPLITUDES = {
-    "pendulum": {"length": (1.5, 3.0)},
-    "com-offset": {"x": (-3e-4, 3e-4), "y": (-1e-3, 1e-3)},
-    "slope": {"angle": (-0.02, 0.02)},
-    "pulley-inertia": {"mass": (0.05, 0.6)},
-    "rig-friction": {"force": (0.01, 0.1)},
-    "bearing-drag": {"torque": (0.002, 0.02)},
-    "umbilical": {
-        "stiffness": (0.005, 0.05),
-        "drag": (0.002, 0.02),
-        "spring_power": (0.7, 2.0),
-        "drag_power": (0.7, 1.5),
-    },
-    "torque-fade": {
-        "speed_loss": (1e-4, 2e-3),
-        "time_loss": (0.01, 0.2),
-        "speed_power": (0.7, 2.0),
-        "time_power": (0.7, 2.0),
-    },
-    "wheel-vibration": {"reduction": (0.05, 0.6), "power": (1.0, 4.0)},
-    "tip-radius": {"radius": (0.002, 0.01)},
-    "inertial-drag": {"normal": (5.0, 80.0), "sideways": (0.1, 5.0), "power": (1.0, 3.0)},
-    "depth-hardening": {"exponent": (0.8, 1.6), "bend": (0.0, 80.0)},
-    "plastic-sinkage": {"share": (0.05, 0.6), "bend": (0.0, 1.5)},
-    "adhesion": {"force": (0.02, 0.4), "sharpness": (-0.5, 1.5), "grip": (0.0, 1.0)},
-    "rate-friction": {"change": (-0.4, 1.0), "power": (0.6, 2.0)},
-    "wire-compliance": {"stiffness": (5e3, 4e4), "damping": (5.0, 60.0)},
+    id: {parameter.name: parameter.visible for parameter in term.parameters if parameter.visible}
+    for id, term in sorted(EFFECTS.items(), key=lambda item: "inner_mass" in item[1].hooks)
+    if not term.sensor
 }
-"""Ranges of the effects' parameters, where all terms are on."""
+"""Ranges of the effects' parameters, where all terms are on: those that the effects' files call visible. An effect with
+a coordinate of its own comes last, so that drawn trials stay the same."""
 
 
 class Settings:

@@ -112,8 +112,7 @@ def impulsive_launch(tumbler: Tumbler, momentum: float) -> Launch:
     Sticking omega = H / (J + m l^2 cos^2 g0 + M l^2 sin^2 g0), launch at g0 = lean; sliding
     omega = H / (J + M l^2 sin g0 (sin g0 + mu_d cos g0)), launch at tan = m / (M mu_d) (docs/planar.md, closed forms).
     """
-    if not momentum > 0:
-        raise ValueError(f"momentum is {momentum}: it must be above 0 (N m s)")
+    check_above_zero("N m s", momentum=momentum)
     m, my, length, j = tumbler.mass, tumbler.mass_y, tumbler.spike_length, tumbler.inertia
     s, c = math.sin(tumbler.lean), math.cos(tumbler.lean)
     if m * c <= tumbler.mu_s * my * s * (1 + 1e-12):
@@ -133,9 +132,7 @@ def launch(tumbler: Tumbler, torque: float, until: float = math.inf) -> Launch |
     all. Raises ValueError for a torque or a time of 0 or less, RuntimeError where friction is so high (above 2 or so,
     in a rig) that sliding on rigid ground has no solution.
     """
-    for key, value in {"torque": torque, "until": until}.items():
-        if not value > 0:
-            raise ValueError(f"{key} is {value}: it must be above 0")
+    check_above_zero(torque=torque, **({"until": until} if until != math.inf else {}))
     if torque <= tumbler.tipping_torque:
         return None
     contact = _Contact(tumbler)

@@ -21,7 +21,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .terms import Term, sensor_terms
+from .checks import check_above_zero, check_not_negative
+from .terms import EFFECTS, Term, sensor_terms
 
 _FIELDS = {
     "clock-offset": {"offset": "clock_offset", "drift": "clock_drift"},
@@ -86,14 +87,10 @@ class SensorSet:
     camera_zero_spread: float = 3.0  # The camera's zero is drawn evenly from within this many `pose_std` [1]
 
     def __post_init__(self) -> None:
-        for name in ("camera_rate", "imu_rate", "wheel_rate", "camera_scale"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"{name} = {value!r} is no number above 0")
-        for name in ("imu_window", "lead", "wheel_std", "camera_zero_spread"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0):
-                raise ValueError(f"{name} = {value!r} must be 0 or more")
+        rates = ("camera_rate", "imu_rate", "wheel_rate")
+        check_above_zero(**{name: getattr(self, name) for name in (*rates, "camera_scale")})
+        sizes = ("imu_window", "lead", "wheel_std", "camera_zero_spread")
+        check_not_negative(**{name: getattr(self, name) for name in sizes})
         for name in ("pose_std", "imu_std"):
             values = getattr(self, name)
             if len(values) != 3 or not all(math.isfinite(value) and value >= 0 for value in values):
@@ -101,12 +98,8 @@ class SensorSet:
         for id, names in _FIELDS.items():
             for parameter in self.effects.get(id, ()):
                 object.__setattr__(self, names[parameter], self.effects[id][parameter])
-        if not math.isfinite(self.clock_offset):
-            raise ValueError(f"clock_offset = {self.clock_offset!r} is no number [s]")
-        if not abs(self.clock_drift) <= 0.5:
-            raise ValueError(f"clock_drift = {self.clock_drift!r} must be from -0.5 to 0.5")
-        if not math.isfinite(self.camera_bend):
-            raise ValueError(f"camera_bend = {self.camera_bend!r} is no number [1/m2]")
+        for term in (EFFECTS[id] for id in _FIELDS):
+            term.values({parameter: getattr(self, name) for parameter, name in _FIELDS[term.id].items()})
 
     def true_times(self, written: Array) -> Array:
         """True times [s] of times on the IMU's clock."""

@@ -23,11 +23,8 @@ TERM = Term(
     limits="no heap ahead, no furrow of rows before; what is to be overcome before it moves comes with the speed w",
     hooks={"side_force": ploughed},
     parameters=(
-        Parameter(name="strength", unit="N/m2", default=0.0, lowest=0.0, summary="k, of a row"),
-        Parameter(
-            name="speed", unit="m/s", default=0.01, lowest=1e-3,
-            summary="w: slower than this it resists less",
-        ),
+        Parameter("strength", "N/m2", 0.0, "k, of a row", lowest=0.0),
+        Parameter("speed", "m/s", 0.01, "w: slower than this it resists less", lowest=1e-3),
     ),
 )  # fmt: skip
 FIT = {"strength": {"typical": 1300.0}, "speed": {"typical": 0.01}}

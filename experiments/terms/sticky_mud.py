@@ -21,8 +21,8 @@ TERM = Term(
     id="sticky-mud", summary="mud resists, the more the faster, up to a bound", acts="normal force",
     source="made up, as an example", limits="on the way in only", hooks={"rate_force": resists},
     parameters=(
-        Parameter(name="force", unit="N", default=0.0, lowest=0.0, summary="f: the bound, of a row"),
-        Parameter(name="speed", unit="m/s", default=0.03, lowest=0.0, above_lowest=True, summary="w: its scale"),
+        Parameter("force", "N", 0.0, "f: the bound, of a row", lowest=0.0),
+        Parameter("speed", "m/s", 0.03, "w: its scale", lowest=0.0, above_lowest=True),
     ),
 )  # fmt: skip
 

@@ -21,9 +21,7 @@ TERM = Term(
     source="a drive of first order",
     limits="from t = 0 only, not at each touch-down",
     hooks={"torque_factor": factor},
-    parameters=(
-        Parameter(name="rise", unit="s", default=0.1, lowest=0.0, above_lowest=True, summary="its time constant"),
-    ),
+    parameters=(Parameter("rise", "s", 0.1, "its time constant", lowest=0.0, above_lowest=True),),
 )
 FIT = {"rise": {"typical": 0.05, "off": 1e-4}}
 """How `hedgebed diagnose --effects-from` fits it: a size that can be seen, and one that changes nothing."""

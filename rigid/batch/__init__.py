@@ -1,4 +1,4 @@
 """Thousands of planar trials at once, compiled by Taichi (`simulate`); `kernel` has the integrator.
 
-Imports `rigid.model`, `rigid.planar`, `rigid.terms`.
+Imports `rigid.checks`, `rigid.model`, `rigid.planar`, `rigid.terms`.
 """

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rigid.checks import check_above_zero
 from rigid.model.model import parameter_names
 from rigid.model.trial import Trial
 from rigid.planar.simulate import check_step, step_bound
@@ -84,10 +85,9 @@ def simulate_batch(
     Raises ValueError: trials that do not go together, a number that cannot be, a time step too long for a ground.
     RuntimeError: a trial's motion is no longer finite; Taichi runs in single precision in this process.
     """
-    if not (math.isfinite(duration) and duration > 0):
-        raise ValueError(f"duration = {duration!r} must be a number above 0")
-    if not (math.isfinite(time_step) and 0 < time_step <= duration):
-        raise ValueError(f"time_step = {time_step!r} must be above 0 and at most duration = {duration:g} s")
+    check_above_zero("s", duration=duration, time_step=time_step)
+    if time_step > duration:
+        raise ValueError(f"time_step = {time_step:g} s must be at most duration = {duration:g} s")
     first, numbers = _one_varied(trials, vary) if isinstance(trials, Trial) else _many(trials, vary)
     _check_stiffest(first, numbers, time_step)
     count = len(numbers)

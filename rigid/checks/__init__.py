@@ -4,27 +4,79 @@ Imports nothing of ours.
 """
 
 import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass
+from typing import Any
 
-__all__ = ["check_above_zero", "check_friction", "check_not_negative"]
+__all__ = [
+    "Parameter", "check_above_zero", "check_friction", "check_not_negative", "check_parameters", "is_number",
+]  # fmt: skip
 
 
-def check_above_zero(unit: str = "", **numbers: float) -> None:
-    """Raise ValueError for a number that is not finite or not above 0; `unit` is shown where it is given."""
+@dataclass(frozen=True)
+class Parameter:
+    """One number that a user sets, of an effect or of a surface law; with all defaults an effect changes nothing."""
+
+    name: str
+    unit: str
+    default: float
+    summary: str
+    _: KW_ONLY
+    lowest: float = -math.inf
+    highest: float = math.inf
+    above_lowest: bool = False  # Whether it must exceed `lowest`, not only reach it
+    source: str = ""  # Of the default
+    visible: tuple[float, float] | None = None
+    """Range of values whose effect can be seen, for benchmarks and tests; None: they leave it at its default."""
+
+    def check(self, value: Any, owner: str) -> float:
+        """`value` as a float. Raises ValueError, naming it and what is allowed."""
+        if not is_number(value) or math.isnan(value):
+            raise ValueError(f"{owner}.{self.name} = {value!r} must be a number ({self.unit})")
+        low = value > self.lowest if self.above_lowest else value >= self.lowest
+        if not (low and value <= self.highest) or (math.isinf(value) and value != self.default):
+            least = "" if self.lowest == -math.inf else f"{'above' if self.above_lowest else 'from'} {self.lowest:g}"
+            most = "" if self.highest == math.inf else f"at most {self.highest:g}"
+            raise ValueError(
+                f"{owner}.{self.name} = {value!r} must be {' and '.join(filter(None, (least, most))) or 'finite'} "
+                f"({self.unit}; {self.summary})"
+            )
+        return float(value)
+
+
+def check_parameters(parameters: Sequence[Parameter], given: Mapping[str, Any], owner: str) -> dict[str, float]:
+    """All parameters by name, as given or by default. Raises ValueError for an unknown one or a value out of bounds."""
+    known = {parameter.name: parameter for parameter in parameters}
+    for key in given:
+        if key not in known:
+            raise ValueError(f"{owner}.{key} is no parameter; there is {', '.join(known) or 'none'}")
+    return {key: parameter.check(given.get(key, parameter.default), owner) for key, parameter in known.items()}
+
+
+def is_number(value: Any) -> bool:
+    """Whether `value` is an int or a float, and not a bool."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def check_above_zero(unit: str = "", **numbers: Any) -> None:
+    """Raise ValueError for what is no finite number above 0; `unit` is shown where it is given."""
+    _check(unit, "above 0", numbers, lambda value: value > 0)
+
+
+def check_not_negative(unit: str = "", **numbers: Any) -> None:
+    """Raise ValueError for what is no finite number of 0 or more; `unit` is shown where it is given."""
+    _check(unit, "0 or more", numbers, lambda value: value >= 0)
+
+
+def _check(unit: str, allowed: str, numbers: Mapping[str, Any], fits: Callable[[Any], bool]) -> None:
     for key, value in numbers.items():
-        if not (math.isfinite(value) and value > 0):
-            raise ValueError(f"{key} is {value}: it must be above 0" + (f" ({unit})" if unit else ""))
-
-
-def check_not_negative(unit: str = "", **numbers: float) -> None:
-    """Raise ValueError for a number that is not finite or below 0; `unit` is shown where it is given."""
-    for key, value in numbers.items():
-        if not (math.isfinite(value) and value >= 0):
-            raise ValueError(f"{key} is {value}: it must be 0 or more" + (f" ({unit})" if unit else ""))
+        if not (is_number(value) and math.isfinite(value) and fits(value)):
+            raise ValueError(f"{key} = {value} must be {allowed}" + (f" ({unit})" if unit else ""))
 
 
 def check_friction(mu_s: float, mu_d: float | None, *, endless: bool = False) -> None:
-    """Raise ValueError for coefficients that cannot be; mu_d None: by default; `endless`: mu_s may be infinite."""
-    if not mu_s >= 0 or not (endless or math.isfinite(mu_s)):
-        raise ValueError(f"mu_s is {mu_s}: it must be 0 or more")
+    """Raise ValueError for impossible coefficients; mu_d None: by default; `endless`: mu_s may be infinite."""
+    if not (endless and mu_s == math.inf):
+        check_not_negative(mu_s=mu_s)
     if mu_d is not None and not 0 <= mu_d <= mu_s:
-        raise ValueError(f"mu_d is {mu_d}: it must be from 0 to mu_s, {mu_s}")
+        raise ValueError(f"mu_d = {mu_d} must be from 0 to mu_s = {mu_s}")

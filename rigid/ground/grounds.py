@@ -37,6 +37,8 @@ class _LawGround:
     name: str = ""  # What a report calls it; the law's name if not given
     lag: ClassVar[float] = 0.0  # The mean force over a step belongs to the step's middle
     gives_friction: ClassVar[bool] = False  # The horizontal force is a Coulomb bound, which the body resolves
+    clearance: ClassVar[float] = 0.0  # How far above `surface` a body touches nothing [m]: the surface is flat
+    depth_limit: ClassVar[float] = math.inf  # How deep a body may go [m]: there is no floor
     _law: SurfaceLaw = field(init=False, repr=False, compare=False)
     _numbers: tuple[float, ...] = field(init=False, repr=False, compare=False)
     _rebound: float = field(init=False, repr=False, compare=False)
@@ -46,13 +48,10 @@ class _LawGround:
     def __post_init__(self) -> None:
         law_name, parameters = self._setting()
         law = find_law(law_name)
-        numbers = law.numbers(parameters)
         check_friction(self.mu_s, self.mu_d)
         check_above_zero("in s", time_step=self.time_step)
-        rebound = law.rebound(parameters)
-        values = {"_law": law, "_numbers": numbers, "_rebound": 1.0 if rebound is None else rebound}
-        values |= {"_deepest": [0.0], "_depth": [0.0], "name": self.name or law.name}
-        for key, value in values.items():
+        values = {"_law": law, "_numbers": law.numbers(parameters), "_rebound": law.rebound(parameters)}
+        for key, value in (values | {"_deepest": [0.0], "_depth": [0.0], "name": self.name or law.name}).items():
             object.__setattr__(self, key, value)
 
     def _setting(self) -> tuple[str, Mapping[str, float]]:
@@ -63,16 +62,6 @@ class _LawGround:
         values = self._law.values(self._setting()[1])
         numbers = ", ".join(f"{key} = {value:g}{units[key]}" for key, value in values.items())
         return f"{type(self).__name__}({self.name}: {numbers}, mu_s = {self.mu_s:g})"
-
-    @property
-    def clearance(self) -> float:
-        """How far above `surface` a body touches nothing [m]: the surface is flat, so 0."""
-        return 0.0
-
-    @property
-    def depth_limit(self) -> float:
-        """How deep a body may go [m]: there is no floor."""
-        return math.inf
 
     @property
     def deepest(self) -> float:

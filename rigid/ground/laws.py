@@ -8,20 +8,23 @@ force, never negative, is
     force = loading(top, p) * springback(z, top, rebound) + rate_force(z, rate, p)
 
 - `loading` is the force on the way in to new depths, and `loading_work` its integral from 0.
-- `rebound` is None for a law that gives back what it took: there top = z, and springback(z, z, .) = 1. Grains do not:
-  for them top is the deepest depth that this spike has reached here (top >= z; 0 again once it has left the surface),
-  and the force falls in a straight line to 0 while the share `rebound` of that depth is undone.
+- A law without memory springs back whole: there top = z, and springback(z, z, .) = 1. Grains do not: for them top is
+  the deepest depth that this spike has reached here (top >= z; 0 again once it has left the surface), and the force
+  falls in a straight line to 0 while the share `rebound` of that depth is undone.
 - `rate_force` is what depends on the rate (it may be negative, never below -loading). `rate_work` is its integral over
   depth at a constant rate.
 
-What is stored: loading_work(z) without `rebound`, else `springback_energy`. All other work of the force is dissipated:
+What is stored: loading_work(z) without memory, else `springback_energy`. All other work of the force is dissipated:
 at every moment force * rate >= d(stored)/dt, as `tests/rigid/ground/test_laws.py` shows for each law.
 """
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
+
+from rigid.checks import Parameter, check_parameters
 
 from . import law_functions as fn
 from .law_functions import springback, springback_energy
@@ -35,35 +38,6 @@ MEMORY = (
     "ours: a bed of sand computed with this package gives back nothing that can be measured (work_returned_dem of "
     "docs/results/penetrate is below 0.01), and a twentieth is about the stiffest unloading that a 1 ms step follows"
 )
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One parameter of a law: what a person sets."""
-
-    name: str
-    unit: str
-    default: float
-    _: KW_ONLY
-    summary: str
-    source: str
-    lowest: float = 0.0
-    highest: float = math.inf
-    above_lowest: bool = False  # Whether it must exceed `lowest`, not only reach it
-
-    def check(self, value: float, law: str) -> float:
-        """`value` as a float. Raises ValueError, naming it and what is allowed."""
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise ValueError(f"{self.name} = {value!r} of {law}: it must be a number")
-        low_enough = value > self.lowest if self.above_lowest else value >= self.lowest
-        if not (low_enough and value <= self.highest):
-            least = "above" if self.above_lowest else "at least"
-            most = f" and at most {self.highest:g}" if math.isfinite(self.highest) else ""
-            raise ValueError(
-                f"{self.name} is {value}: in {law} it must be {least} {self.lowest:g}{most} "
-                f"({self.unit}; {self.summary})"
-            )
-        return float(value)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,12 +59,8 @@ class SurfaceLaw:
     bends: tuple[int, ...] = ()  # Slots that hold depths at which the functions bend [m], for those who integrate them
 
     def values(self, given: Mapping[str, float]) -> dict[str, float]:
-        """All parameters, as given or by default. Raises ValueError for one there is not, or that cannot be."""
-        known = {parameter.name: parameter for parameter in self.parameters}
-        for key in given:
-            if key not in known:
-                raise ValueError(f"{key} is no parameter of {self.name}: there is {', '.join(known)}")
-        return {key: known[key].check(given.get(key, known[key].default), self.name) for key in known}
+        """All parameters, as given or by default. Raises ValueError as `check_parameters`."""
+        return check_parameters(self.parameters, given, self.name)
 
     def numbers(self, given: Mapping[str, float], *, count: float = 1.0) -> tuple[float, ...]:
         """p of the functions for these parameters, of `count` spikes side by side. Raises ValueError as `values`."""
@@ -98,9 +68,9 @@ class SurfaceLaw:
         p = tuple(values[slot] for slot in self.slots) if self.make is None else self.make(values)
         return tuple(count * value if k in self.extensive else value for k, value in enumerate(p))
 
-    def rebound(self, given: Mapping[str, float]) -> float | None:
-        """Share of the deepest depth that springs back [1]; None for a law that springs back whole."""
-        return self.values(given)["rebound"] if self.has_memory else None
+    def rebound(self, given: Mapping[str, float]) -> float:
+        """Share of the deepest depth that springs back [1]; 1 for a law without memory."""
+        return self.values(given)["rebound"] if self.has_memory else 1.0
 
     def force(self, depth: float, rate: float, p: Numbers, *, top: float | None = None, rebound: float = 1.0) -> float:
         """Force [N] at `depth` [m] and `rate` [m/s], both positive downwards; `top` is the deepest depth so far [m].
@@ -158,118 +128,106 @@ def _make_rft(v: Mapping[str, float]) -> tuple[float, ...]:
     return (ring, drag, v["radius"], *shape, slope, wall)
 
 
-def _functions(loading: str, rate: str) -> dict[str, Any]:
-    """The four functions of a law, by the names that `rigid.ground.law_functions` gives them."""
-    names = {"loading": f"{loading}_loading", "loading_work": f"{loading}_loading_work"}
-    names |= {"rate_force": f"{rate}_rate_force", "rate_work": f"{rate}_rate_work"}
-    return {key: getattr(fn, name) for key, name in names.items()}
+def _law(name: str, loading: str, rate: str, **others: Any) -> SurfaceLaw:
+    """A law whose functions are those of `rigid.ground.law_functions` that begin with `loading` and with `rate`."""
+    functions = {kind: getattr(fn, f"{loading}_{kind}") for kind in ("loading", "loading_work")}
+    functions |= {kind: getattr(fn, f"{rate}_{kind}") for kind in ("rate_force", "rate_work")}
+    return SurfaceLaw(name=name, has_memory=_REBOUND in others["parameters"], **functions, **others)
 
 
-_REBOUND = Parameter("rebound", "1", 0.05, lowest=1e-3, highest=0.5,
-                     summary="share of the deepest depth that springs back", source=MEMORY)  # fmt: skip
-_RADIUS = Parameter("radius", "m", 0.006, highest=1.0, above_lowest=True,
-                    summary="radius of the spike's ball and shaft", source="ours : 12 mm across")  # fmt: skip
+_number = partial(Parameter, lowest=0.0)  # a parameter that is never negative
+_REBOUND = _number("rebound", "1", 0.05, "share of the deepest depth that springs back", lowest=1e-3, highest=0.5,
+                   source=MEMORY)  # fmt: skip
+_RADIUS = _number("radius", "m", 0.006, "radius of the spike's ball and shaft", highest=1.0, above_lowest=True,
+                  source="ours : 12 mm across")  # fmt: skip
 _SAND = katsuragi_durian(diameter=0.012, projectile_density=7850.0, bulk_density=1500.0, friction=0.6, gravity=9.80665)
 
 _LAWS = (
-    SurfaceLaw(
-        name="spring-damper",
+    _law(
+        "spring-damper", "spring_damper", "spring_damper",
         summary="K z + C dz/dt while going in: the paper's surface",
         source="Reid et al., i-SAIRAS 2014, eqs 5 and 6",
         parameters=(
-            Parameter("stiffness", "N/m", 1.5e4, summary="K", source="ours, as of brick"),
-            Parameter("damping", "N s/m", 60.0, summary="C, going in only", source="ours, as of brick"),
+            _number("stiffness", "N/m", 1.5e4, "K", source="ours, as of brick"),
+            _number("damping", "N s/m", 60.0, "C, going in only", source="ours, as of brick"),
         ),
         slots=("stiffness", "damping"), extensive=(0, 1),
-        **_functions("spring_damper", "spring_damper"), has_memory=False,
     ),
-    SurfaceLaw(
-        name="hunt-crossley",
+    _law(
+        "hunt-crossley", "power", "hunt_crossley",
         summary="K z^n (1 + 3/2 alpha dz/dt): restitution 1 - alpha v for small v, no jump of force at first touch",
         source="Hunt and Crossley, Journal of Applied Mechanics 42 (1975), 440",
         parameters=(
-            Parameter("stiffness", "N/m^n", 2.1e5, above_lowest=True, summary="K",
-                      source="ours: as stiff as the spring of brick at a depth of 5 mm"),
-            Parameter("dissipation", "s/m", 0.2, highest=10.0,
-                      summary="alpha: how restitution falls with the speed of impact",
-                      source="0.08 to 0.32 s/m for steel, bronze, ivory: Hunt and Crossley, quoted in Drake's manual"),
-            Parameter("exponent", "1", 1.5, lowest=1.0, highest=3.0, summary="n",
-                      source="Hertz: 3/2 for a ball on a flat"),
+            _number("stiffness", "N/m^n", 2.1e5, "K", above_lowest=True,
+                    source="ours: as stiff as the spring of brick at a depth of 5 mm"),
+            _number("dissipation", "s/m", 0.2, "alpha: how restitution falls with the speed of impact", highest=10.0,
+                    source="0.08 to 0.32 s/m for steel, bronze, ivory: Hunt and Crossley, quoted in Drake's manual"),
+            _number("exponent", "1", 1.5, "n", lowest=1.0, highest=3.0, source="Hertz: 3/2 for a ball on a flat"),
         ),
         slots=("stiffness", "dissipation", "exponent"), extensive=(0,),
-        **_functions("power", "hunt_crossley"), has_memory=False,
     ),
-    SurfaceLaw(
-        name="power",
+    _law(
+        "power", "power", "spring_damper",
         summary="K z^n + C dz/dt while going in",
         source="the spring-damper with another exponent; n = 3/2 is Hertz, 2 a cone in a material of constant hardness",
         parameters=(
-            Parameter("stiffness", "N/m^n", 2.1e5, above_lowest=True, summary="K",
-                      source="ours: as stiff as the spring of brick at a depth of 5 mm"),
-            Parameter("damping", "N s/m", 60.0, summary="C, going in only", source="ours, as of brick"),
-            Parameter("exponent", "1", 1.5, lowest=0.5, highest=4.0, summary="n", source="Hertz"),
+            _number("stiffness", "N/m^n", 2.1e5, "K", above_lowest=True,
+                    source="ours: as stiff as the spring of brick at a depth of 5 mm"),
+            _number("damping", "N s/m", 60.0, "C, going in only", source="ours, as of brick"),
+            _number("exponent", "1", 1.5, "n", lowest=0.5, highest=4.0, source="Hertz"),
         ),
         slots=("stiffness", "damping", "exponent"), extensive=(0, 1),
-        **_functions("power", "spring_damper"), has_memory=False,
     ),
-    SurfaceLaw(
-        name="katsuragi-durian",
+    _law(
+        "katsuragi-durian", "spring_damper", "inertial",
         summary="k z + b (dz/dt)^2 while going in: a ball that falls into grains",
         source="Katsuragi and Durian, Nature Physics 3 (2007), 420 and Physical Review E 87, 052208 (2013)",
         parameters=(
-            Parameter("stiffness", "N/m", _SAND["stiffness"], above_lowest=True,
-                      summary="k: friction that grows with depth",
-                      source="`katsuragi_durian`: a 12 mm steel ball in sand of 1500 kg/m3 and friction 0.6 at 1 g"),
-            Parameter("drag", "kg/m", _SAND["drag"], summary="b = m / d_1: inertia of the grains",
-                      source="as stiffness"),
+            _number("stiffness", "N/m", _SAND["stiffness"], "k: friction that grows with depth", above_lowest=True,
+                    source="`katsuragi_durian`: a 12 mm steel ball in sand of 1500 kg/m3 and friction 0.6 at 1 g"),
+            _number("drag", "kg/m", _SAND["drag"], "b = m / d_1: inertia of the grains", source="as stiffness"),
             _REBOUND,
         ),
         slots=("stiffness", "drag"), extensive=(0, 1),
-        **_functions("spring_damper", "inertial"), has_memory=True,
     ),
-    SurfaceLaw(
-        name="bekker",
+    _law(
+        "bekker", "bekker", "no",
         summary="A(z) (k_c / b + k_phi) z^n: pressure and sinkage of a plate, here of the spike's section",
         source="Bekker, Introduction to Terrain-Vehicle Systems (1969); it is for far larger plates",
         parameters=(
             _RADIUS,
-            Parameter("tip_height", "m", 0.006, highest=1.0,
-                      summary="depth at which the section is full: the radius for a ball, 0 for a flat end",
-                      source="geometry"),
-            Parameter("cohesive_modulus", "N/m^(n+1)", 990.0, summary="k_c",
-                      source="dry sand: Wong, Theory of Ground Vehicles (2008), Table 2.3, at second hand"),
-            Parameter("frictional_modulus", "N/m^(n+2)", 1.52843e6, above_lowest=True, summary="k_phi",
-                      source="as cohesive_modulus"),
-            Parameter("exponent", "1", 1.1, lowest=0.1, highest=2.0, summary="n", source="as cohesive_modulus"),
+            _number("tip_height", "m", 0.006,
+                    "depth at which the section is full: the radius for a ball, 0 for a flat end", highest=1.0,
+                    source="geometry"),
+            _number("cohesive_modulus", "N/m^(n+1)", 990.0, "k_c",
+                    source="dry sand: Wong, Theory of Ground Vehicles (2008), Table 2.3, at second hand"),
+            _number("frictional_modulus", "N/m^(n+2)", 1.52843e6, "k_phi", above_lowest=True,
+                    source="as cohesive_modulus"),
+            _number("exponent", "1", 1.1, "n", lowest=0.1, highest=2.0, source="as cohesive_modulus"),
             _REBOUND,
         ),
-        slots=("pressure times section", "exponent", "tip_height"), extensive=(0,), bends=(2,),
-        make=_make_bekker,
-        **_functions("bekker", "no"), has_memory=True,
+        slots=("pressure times section", "exponent", "tip_height"), extensive=(0,), bends=(2,), make=_make_bekker,
     ),
-    SurfaceLaw(
-        name="rft",
+    _law(
+        "rft", "rft", "rft",
         summary="3D-RFT over ball and shaft going straight down, with the inertia of the grains",
         source="Agarwal, Goldman and Kamrin, PNAS 120 (2023), e2214017120; see rigid/ground/rft.py",
         parameters=(
             _RADIUS,
-            Parameter("bulk_density", "kg/m3", 1500.0, highest=2e4, above_lowest=True, summary="rho_c of the bed",
-                      source="dry sand"),
-            Parameter("friction", "1", 0.6, lowest=0.1, highest=0.9,
-                      summary="internal friction coefficient of the grains",
-                      source="dry sand; the fit of xi_n is for 0.3 to 0.9"),
-            Parameter("surface_friction", "1", 0.4, highest=2.0, summary="friction coefficient of grains and spike",
-                      source="ours"),
-            Parameter("gravity", "m/s2", 9.80665, highest=100.0, above_lowest=True,
-                      summary="gravity of the grains: 1 g even in the rig", source="docs/planar.md"),
-            Parameter("inertia", "1", 1.1, highest=10.0, summary="lambda of the term lambda rho v_n^2",
-                      source="1.1 for plates dragged level, 1 for a wheel: Agarwal et al. (2021), see rft.py"),
+            _number("bulk_density", "kg/m3", 1500.0, "rho_c of the bed", highest=2e4, above_lowest=True,
+                    source="dry sand"),
+            _number("friction", "1", 0.6, "internal friction coefficient of the grains", lowest=0.1, highest=0.9,
+                    source="dry sand; the fit of xi_n is for 0.3 to 0.9"),
+            _number("surface_friction", "1", 0.4, "friction coefficient of grains and spike", highest=2.0,
+                    source="ours"),
+            _number("gravity", "m/s2", 9.80665, "gravity of the grains: 1 g even in the rig", highest=100.0,
+                    above_lowest=True, source="docs/planar.md"),
+            _number("inertia", "1", 1.1, "lambda of the term lambda rho v_n^2", highest=10.0,
+                    source="1.1 for plates dragged level, 1 for a wheel: Agarwal et al. (2021), see rft.py"),
             _REBOUND,
         ),
         slots=("2 pi R^3 xi_n", "pi R^2 lambda rho / 2", "radius", *(f"shape {k}" for k in range(8)), "slope", "wall"),
-        extensive=(0, 1), bends=(2,),
-        make=_make_rft,
-        **_functions("rft", "rft"), has_memory=True,
+        extensive=(0, 1), bends=(2,), make=_make_rft,
     ),
 )  # fmt: skip
 

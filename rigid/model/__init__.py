@@ -1,4 +1,4 @@
 """The planar model as a sum of terms: a trial's numbers (`trial`), and functions that its terms make up (`model`).
 
-Imports `rigid.ground`, `rigid.terms`.
+Imports `rigid.checks`, `rigid.ground`, `rigid.terms`.
 """

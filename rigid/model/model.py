@@ -32,13 +32,10 @@ from rigid.terms import BASE, STATE_FIELDS, Term
 
 from .mechanics import contact_arms, divide_mass
 
-__all__ = ["Model", "State", "assemble", "make_parameters", "model_source", "parameter_names"]
+__all__ = ["Model", "State", "assemble", "for_taichi", "make_parameters", "model_source", "parameter_names"]
 
-# How Taichi calls what `math` offers.
-_TAICHI_NAMES = {
-    "sin": "sin", "cos": "cos", "tan": "tan", "asin": "asin", "acos": "acos", "atan2": "atan2", "exp": "exp",
-    "log": "log", "sqrt": "sqrt", "tanh": "tanh", "floor": "floor",
-}  # fmt: skip
+_MATHEMATICS = ("sin", "cos", "tan", "asin", "acos", "atan2", "exp", "log", "sqrt", "tanh", "floor")
+"""What `math` and Taichi offer by one name."""
 
 
 class State:
@@ -222,7 +219,7 @@ def assemble(terms: tuple[Term, ...], ground: str, *, taichi: bool = False) -> M
     linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)  # where Taichi reads it
     functions: dict[str, Any] = dict(_hooks(terms, law))
     if taichi:
-        functions = {name: _for_taichi(function) for name, function in functions.items()}
+        functions = {name: for_taichi(function) for name, function in functions.items()}
     exec(compile(text, file, "exec"), functions)
     if taichi:
         import taichi as ti
@@ -233,13 +230,16 @@ def assemble(terms: tuple[Term, ...], ground: str, *, taichi: bool = False) -> M
     return Model(terms, law, {name: functions[name] for name in shown})
 
 
-def _for_taichi(function: Callable[..., Any], **called: Any) -> Any:
-    """`function`, compiled by Taichi from its own source, with Taichi's mathematics; `called`: what else it calls."""
+def for_taichi(function: Callable[..., Any]) -> Any:
+    """`function`, compiled by Taichi from its source, with Taichi's mathematics; functions of other modules too."""
     import taichi as ti
 
-    code = function.__code__
-    names = {name: getattr(ti, ours) for name, ours in _TAICHI_NAMES.items() if name in code.co_names}
-    twin = types.FunctionType(code, function.__globals__ | names | called, function.__name__, function.__defaults__)
+    code, around = function.__code__, function.__globals__
+    names = {name: getattr(ti, name) for name in _MATHEMATICS if name in code.co_names}
+    for name, other in ((name, around.get(name)) for name in code.co_names):
+        if isinstance(other, types.FunctionType) and other.__globals__ is not around:
+            names[name] = for_taichi(other)
+    twin = types.FunctionType(code, around | names, function.__name__, function.__defaults__)
     twin.__module__ = function.__module__
     return ti.func(twin)
 

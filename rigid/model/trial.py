@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
+from rigid.checks import check_above_zero, check_friction, check_not_negative
 from rigid.ground.laws import SurfaceLaw, find_law
 from rigid.terms import Term, find_effect, load_effect
 
@@ -58,8 +59,7 @@ class Ground:
 
     def __post_init__(self) -> None:
         self.law.values(self.parameters)
-        if not (math.isfinite(self.spikes_per_row) and self.spikes_per_row > 0):
-            raise ValueError(f"spikes_per_row = {self.spikes_per_row} must be above 0")
+        check_above_zero(spikes_per_row=self.spikes_per_row)
 
     @property
     def law(self) -> SurfaceLaw:
@@ -73,9 +73,8 @@ class Ground:
 
     @property
     def rebound(self) -> float:
-        """Share of the deepest depth that springs back [1]; 1 for a law that gives all back."""
-        rebound = self.law.rebound(self.parameters)
-        return 1.0 if rebound is None else rebound
+        """Share of the deepest depth that springs back [1]; 1 for a law without memory."""
+        return self.law.rebound(self.parameters)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,15 +108,16 @@ class Trial:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "effects", tuple(self.effects))
-        for key in ("mass", "inertia", "spike_length", "gravity_sim", "gravity", "wheel_inertia"):
-            self._number(key, above=True)
-        for key in ("damping", "mu_s", "counterweight", "torque", "wheel_speed_0"):
-            self._number(key)
-        self._number("stiffness", above=self.ground is None)
+        positive = ["mass", "inertia", "spike_length", "gravity_sim", "gravity", "wheel_inertia"]
+        others = ["damping", "mu_s", "counterweight", "torque", "wheel_speed_0"]
+        (positive if self.ground is None else others).append("stiffness")
         if self.mu_d is not None:
-            self._number("mu_d")
-            if self.mu_d > self.mu_s:
-                raise ValueError(f"mu_d = {self.mu_d} must not exceed mu_s = {self.mu_s}")
+            others.append("mu_d")
+        check_above_zero(**{key: getattr(self, key) for key in positive})
+        check_not_negative(**{key: getattr(self, key) for key in others})
+        for key in positive + others:
+            object.__setattr__(self, key, float(getattr(self, key)))
+        check_friction(self.mu_s, self.mu_d)
         if isinstance(self.spike_count, bool) or not isinstance(self.spike_count, int) or self.spike_count < 3:
             raise ValueError(f"spike_count = {self.spike_count!r} must be a whole number of 3 or more")
         if self.spike_count > 30:
@@ -185,14 +185,6 @@ class Trial:
             f"Trial({self.mass:g} kg on {self.spike_count} rows of {self.spike_length:g} m under {self.gravity_sim:g} "
             f"m/s2{rig}, {self.actuator} of {self.torque:g} N m, on {self.surface.name}{more})"
         )
-
-    def _number(self, key: str, *, above: bool = False) -> None:
-        value = getattr(self, key)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise ValueError(f"{key} = {value!r} must be a finite number")
-        if value < 0 or (above and value == 0):
-            raise ValueError(f"{key} = {value!r} must be {'above 0' if above else '0 or more'}")
-        object.__setattr__(self, key, float(value))
 
     def effect_values(self, id: str) -> dict[str, float] | None:
         """All parameters of the effect `id`, None where it is off."""

@@ -1,4 +1,4 @@
 """One planar trial, integrated accurately (`located`) or as the paper does (`paper`); `simulate` is the entry.
 
-Imports `rigid.model`, `rigid.terms`.
+Imports `rigid.checks`, `rigid.model`, `rigid.terms`.
 """

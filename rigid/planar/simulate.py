@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rigid.checks import check_above_zero
 from rigid.model.trial import Trial
 
 from .dynamics import LOST, OMEGA, VX, VY, WORK, Modes, System, X, Y
@@ -48,10 +49,7 @@ def simulate(
     """
     if method not in get_args(Method):
         raise ValueError(f"method = {method!r} must be one of {', '.join(get_args(Method))}")
-    _positive("duration", duration)
-    _positive("sample_interval", sample_interval)
-    _positive("tolerance", tolerance)
-    _positive("time_step", time_step)
+    check_above_zero(duration=duration, sample_interval=sample_interval, tolerance=tolerance, time_step=time_step)
     if tolerance > 1e-2:
         raise ValueError(f"tolerance = {tolerance} must be at most 0.01")
     samples = _sample_times(duration, sample_interval, times)
@@ -111,11 +109,6 @@ def _ground_words(trial: Trial) -> str:
 
 def _values(values: Mapping[str, float]) -> str:
     return ", ".join(f"{name} = {value:g}" for name, value in values.items())
-
-
-def _positive(key: str, value: Any) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not (math.isfinite(value) and value > 0):
-        raise ValueError(f"{key} = {value!r} must be a number above 0")
 
 
 def _sample_times(duration: float, interval: float, times: ArrayLike | None) -> list[float]:

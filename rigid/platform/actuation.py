@@ -9,6 +9,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from rigid.checks import check_above_zero
+
 __all__ = ["Flywheel", "TorqueHistory"]
 
 
@@ -24,11 +26,9 @@ class Flywheel:
     """Its axis in the body, of length 1; +y turns the platform towards +x."""
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.inertia) and self.inertia > 0):
-            raise ValueError(f"inertia of a wheel is {self.inertia}: it must be above 0 (kg m2)")
-        for key in ("max_speed", "motor_torque", "brake_torque"):
-            if not getattr(self, key) > 0:
-                raise ValueError(f"{key} of a wheel is {getattr(self, key)}: it must be above 0")
+        check_above_zero("kg m2, of a wheel", inertia=self.inertia)
+        limits = {key: getattr(self, key) for key in ("max_speed", "motor_torque", "brake_torque")}
+        check_above_zero("of a wheel", **{key: value for key, value in limits.items() if value != math.inf})
         if abs(math.hypot(*self.axis) - 1) > 1e-9:
             raise ValueError(f"axis of a wheel is {self.axis}: it must have length 1")
 

@@ -8,6 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rigid.checks import check_above_zero
+
 __all__ = ["Part", "check_inertia", "combine"]
 
 Array = NDArray[np.float64]
@@ -26,8 +28,7 @@ class Part:
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)  # Where its centre is, from the body's geometric centre [m]
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.mass) and self.mass > 0):
-            raise ValueError(f"mass of a {self.shape} is {self.mass}: it must be above 0 (kg)")
+        check_above_zero(f"kg, of a {self.shape}", mass=self.mass)
         wanted = {"point": 0, "ball": 1, "shell": 1, "ring": 1, "cylinder": 2, "box": 3}
         if self.shape not in wanted:
             raise ValueError(f"shape of a part is {self.shape!r}: there is {', '.join(wanted)}")

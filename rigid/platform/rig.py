@@ -10,9 +10,10 @@ pair in Reid, Roveda, Nesnas and Pavone (i-SAIRAS 2014), eqs 17 to 19, whose "0.
 The two are almost a factor of two apart.
 """
 
-import math
 from dataclasses import dataclass
 from typing import Literal, get_args
+
+from rigid.checks import check_above_zero
 
 __all__ = ["STANDARD_GRAVITY", "Reading", "Rig", "counterweight_for"]
 
@@ -32,9 +33,8 @@ def counterweight_for(
     """
     if reading not in get_args(Reading):
         raise ValueError(f"reading = {reading!r} is neither 'pair' nor 'weight'")
-    _positive("mass", mass, "kg")
-    _positive("gravity", gravity, "m/s2")
-    _positive("gravity_stated", gravity_stated, "m/s2")
+    check_above_zero("kg", mass=mass)
+    check_above_zero("m/s2", gravity=gravity, gravity_stated=gravity_stated)
     if gravity_stated >= gravity:
         raise ValueError(
             f"gravity_stated = {gravity_stated:g} m/s2 is not below the local gravity, {gravity:g} m/s2: a rig can "
@@ -61,12 +61,10 @@ class Rig:
     """From the pulley down to the shaft [m]; only the pendulum of the wires asks for it."""
 
     def __post_init__(self) -> None:
-        _positive("mass", self.mass, "kg")
-        _positive("gravity", self.gravity, "m/s2")
-        _positive("gravity_sim", self.gravity_sim, "m/s2")
-        _positive("counterweight", self.counterweight, "kg")
+        check_above_zero("kg", mass=self.mass, counterweight=self.counterweight)
+        check_above_zero("m/s2", gravity=self.gravity, gravity_sim=self.gravity_sim)
         if self.wire_length is not None:
-            _positive("wire_length", self.wire_length, "m")
+            check_above_zero("m", wire_length=self.wire_length)
         if self.counterweight >= self.mass:
             raise ValueError(
                 f"counterweight = {self.counterweight:g} kg is not below the platform's mass = {self.mass:g} kg: "
@@ -80,15 +78,9 @@ class Rig:
 
     @classmethod
     def offloading(
-        cls,
-        mass: float,
-        gravity_stated: float,
-        *,
-        reading: Reading = "pair",
-        counterweight: float | None = None,
-        gravity: float = STANDARD_GRAVITY,
-        wire_length: float | None = None,
-    ) -> "Rig":
+        cls, mass: float, gravity_stated: float, *, reading: Reading = "pair", counterweight: float | None = None,
+        gravity: float = STANDARD_GRAVITY, wire_length: float | None = None,
+    ) -> "Rig":  # fmt: skip
         """The rig that a stated gravity [m/s2] means for a platform of `mass` [kg].
 
         Without `counterweight` [kg] it is the one that gives that gravity. With one, the stated gravity still rules the
@@ -100,12 +92,9 @@ class Rig:
             raise ValueError(f"reading = {reading!r} is neither 'pair' nor 'weight'")
         share = 1.0 if reading == "pair" else mass / (mass + counterweight)
         return cls(
-            mass=mass,
-            counterweight=counterweight,
-            gravity_sim=gravity_stated * share,
-            gravity=gravity,
+            mass=mass, counterweight=counterweight, gravity_sim=gravity_stated * share, gravity=gravity,
             wire_length=wire_length,
-        )
+        )  # fmt: skip
 
     @property
     def weight(self) -> float:
@@ -124,8 +113,3 @@ class Rig:
         (y'' = -g_sim) m_b (g + g_sim). Never below zero: a wire does not push.
         """
         return max(0.0, self.counterweight * (self.gravity - vertical_acceleration))
-
-
-def _positive(key: str, value: float, unit: str) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not (math.isfinite(value) and value > 0):
-        raise ValueError(f"{key} = {value!r} is no number above 0 [{unit}]")

@@ -97,13 +97,10 @@ class SpatialTrial:
 
     def motion(self) -> Motion:
         """Its equations of motion."""
-        law = find_law(self.ground)
-        rebound = law.rebound(self.ground_parameters)
+        law, given = find_law(self.ground), self.ground_parameters
         return Motion(
-            self.platform, law=law, numbers=law.numbers(self.ground_parameters),
-            rebound=1.0 if rebound is None else rebound, mu_s=self.mu_s,
-            mu_d=self.sliding_friction, weight=self.weight,
-            counterweight=self.counterweight,
+            self.platform, law=law, numbers=law.numbers(given), rebound=law.rebound(given), mu_s=self.mu_s,
+            mu_d=self.sliding_friction, weight=self.weight, counterweight=self.counterweight,
         )  # fmt: skip
 
 

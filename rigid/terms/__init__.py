@@ -4,7 +4,7 @@ An effect is one file in `body/`, `contact/` or `sensor/`: ``TERM = Term(...)`` 
 platform, ``CANDIDATE = Candidate(...)`` what a diagnosis must know of it. Files are found by themselves; nothing else
 is edited. An effect of one's own is such a file anywhere, read with `load_effect`; it then runs in both integrators.
 
-Imports nothing of ours outside itself.
+Imports `rigid.checks`.
 """
 
 import importlib.util

@@ -1,9 +1,10 @@
 """What a term of the model is: named, with parameters in units, and a few plain functions ("hooks").
 
-A hook is plain arithmetic on numbers, without loops, early returns or calls of other functions of ours, so that the
-very same source runs as Python in the accurate integrator and, compiled by Taichi, in the batch. Mathematical functions
-are those of `math`, imported by name (`from math import exp`). What its arguments are called says what it gets: first
-the fixed ones listed below, then the term's own parameters, by name, in any number.
+A hook is plain arithmetic on numbers, without loops or early returns, so that the very same source runs as Python in
+the accurate integrator and, compiled by Taichi, in the batch. Mathematical functions are those of `math`, imported by
+name (`from math import exp`); a hook may call plain functions of another module (`rigid.terms.curves`), none of its own
+file. What its arguments are called says what it gets: first the fixed ones listed below, then the term's own
+parameters, by name, in any number.
 
 | hook                 | fixed arguments           | gives                                                        |
 |----------------------|---------------------------|--------------------------------------------------------------|
@@ -45,10 +46,11 @@ A sensor's term (`sensor=True`) has `clock` or `lens`, which get numpy arrays an
 """
 
 import inspect
-import math
 from collections.abc import Callable, Mapping
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
+
+from rigid.checks import Parameter, check_parameters
 
 __all__ = ["FIXED_ARGUMENTS", "STATE_FIELDS", "Parameter", "Term"]
 
@@ -94,34 +96,6 @@ coordinate of a term that has one of its own."""
 INNER_HOOKS = ("inner_mass", "inner_start", "inner_force", "inner_holds")
 
 
-@dataclass(frozen=True)
-class Parameter:
-    """One parameter of a term; with all defaults a term changes nothing, to the bit."""
-
-    name: str
-    unit: str
-    default: float
-    _: KW_ONLY
-    summary: str
-    lowest: float = -math.inf
-    highest: float = math.inf
-    above_lowest: bool = False  # Whether it must exceed `lowest`, not only reach it
-
-    def check(self, value: Any, term: str) -> float:
-        """`value` as a float. Raises ValueError, naming it and what is allowed."""
-        if isinstance(value, bool) or not isinstance(value, int | float) or math.isnan(value):
-            raise ValueError(f"{term}.{self.name} = {value!r} must be a number ({self.unit})")
-        low = value > self.lowest if self.above_lowest else value >= self.lowest
-        if not (low and value <= self.highest) or (math.isinf(value) and value != self.default):
-            least = "" if self.lowest == -math.inf else f"{'above' if self.above_lowest else 'from'} {self.lowest:g}"
-            most = "" if self.highest == math.inf else f"at most {self.highest:g}"
-            raise ValueError(
-                f"{term}.{self.name} = {value!r} must be {' and '.join(filter(None, (least, most))) or 'finite'} "
-                f"({self.unit}; {self.summary})"
-            )
-        return float(value)
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Term:
     """One named term of the model. Raises ValueError for a hook there is not, or one whose arguments do not fit."""
@@ -158,9 +132,5 @@ class Term:
         return tuple(inspect.signature(self.hooks[hook]).parameters)[len(FIXED_ARGUMENTS[hook]) :]
 
     def values(self, given: Mapping[str, Any]) -> dict[str, float]:
-        """All parameters, as given or by default. Raises ValueError for one there is not, or that cannot be."""
-        known = {parameter.name: parameter for parameter in self.parameters}
-        for key in given:
-            if key not in known:
-                raise ValueError(f"{self.id}.{key} is no parameter; there is {', '.join(known) or 'none'}")
-        return {key: known[key].check(given.get(key, known[key].default), self.id) for key in known}
+        """All parameters, as given or by default. Raises ValueError as `check_parameters`."""
+        return check_parameters(self.parameters, given, self.id)

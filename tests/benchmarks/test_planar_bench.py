@@ -11,6 +11,7 @@ from rigid import EFFECTS
 
 def test_all_terms_means_all():
     assert set(planar.AMPLITUDES) == {id for id, term in EFFECTS.items() if not term.sensor}
+    assert all(planar.AMPLITUDES.values())  # each effect's own file says which sizes can be seen
     forms = {"inertial-drag": "power", "depth-hardening": "bend"}  # which change the form of a force, not its size
     for id, name in forms.items():
         low, high = planar.AMPLITUDES[id][name]

@@ -29,10 +29,9 @@ from numpy.typing import NDArray
 
 from experiments.diagnose.fit.own import OwnEffect
 from rigid.batch.runtime import ensure
-from rigid.model.model import _for_taichi as for_taichi
+from rigid.model.model import for_taichi
 from rigid.terms import CANDIDATES, STATE_FIELDS, Term
 from rigid.terms.candidate import Push
-from rigid.terms.mobilised import mobilised
 
 __all__ = ["PHASES", "SLOTS", "fall", "push", "slot_places", "slot_table"]
 
@@ -145,7 +144,7 @@ def _compiled(lines: Mapping[str, Sequence[str]], hooks: Mapping[str, Callable[.
     """Functions (head -> lines) that call `hooks`, written out as text and compiled by Taichi."""
     import taichi as ti
 
-    names = {"ti": ti} | {key: for_taichi(hook, mobilised=for_taichi(mobilised)) for key, hook in hooks.items()}
+    names = {"ti": ti} | {key: for_taichi(hook) for key, hook in hooks.items()}
     text = "".join(f"def {head}:\n" + "".join(f"    {line}\n" for line in body) for head, body in lines.items())
     file = f"<effects {name} {id(hooks):x}>"
     linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)  # where Taichi reads it

@@ -29,8 +29,9 @@ def com_offset_force(s, x, y):
 TERM = Term(
     rank=20, id="com-offset", summary="the centre of mass is off the shaft", acts="T and V",
     parameters=(
-        Parameter("x", "m", 0.0, lowest=-0.05, highest=0.05, summary="along body x (forward at theta = 0)"),
-        Parameter("y", "m", 0.0, lowest=-0.05, highest=0.05, summary="along body y (up at theta = 0)"),
+        Parameter("x", "m", 0.0, "along body x (forward at theta = 0)", lowest=-0.05, highest=0.05,
+                  visible=(-3e-4, 3e-4)),
+        Parameter("y", "m", 0.0, "along body y (up at theta = 0)", lowest=-0.05, highest=0.05, visible=(-1e-3, 1e-3)),
     ),
     source="true gravity pulls at the centre of mass, the wires hold the shaft",
     limits="J stays the inertia about the shaft",

@@ -32,11 +32,12 @@ def pendulum_force(s, length, offset, arc):
 TERM = Term(
     rank=10, id="pendulum", summary="the rig's wires pull back", acts="V", needs_rig=True,
     parameters=(
-        Parameter("length", "m", math.inf, lowest=0.0, above_lowest=True, summary="from the pulleys down to the shaft"),
-        Parameter("offset", "m", 0.0, lowest=-1.0, highest=1.0,
-                  summary="how far the pulleys stand towards +x of the start"),
-        Parameter("arc", "1", 0.0, lowest=0.0, highest=1.0,
-                  summary="0: a long pendulum, which pulls back only; 1: the true arc, whose wires carry less too"),
+        Parameter("length", "m", math.inf, "from the pulleys down to the shaft", lowest=0.0, above_lowest=True,
+                  visible=(1.5, 3.0)),
+        Parameter("offset", "m", 0.0, "how far the pulleys stand towards +x of the start", lowest=-1.0, highest=1.0),
+        Parameter("arc", "1", 0.0,
+                  "0: a long pendulum, which pulls back only; 1: the true arc, whose wires carry less too", lowest=0.0,
+                  highest=1.0),
     ),
     source="the rest tension times x / length of a long pendulum; the paper trusts its rig without it for 40 mm",
     limits="tension at its rest value m_b g (the motion changes it by a_y / g, below 1 %); with arc = 0 x far "

@@ -11,7 +11,8 @@ def pulley_mass(s, mass):
 
 TERM = Term(
     rank=40, id="pulley-inertia", summary="the pulleys turn with the wires", acts="T", needs_rig=True,
-    parameters=(Parameter("mass", "kg", 0.0, lowest=0.0, summary="I / r^2 summed over the pulleys, added in y"),),
+    parameters=(Parameter("mass", "kg", 0.0, "I / r^2 summed over the pulleys, added in y", lowest=0.0,
+                          visible=(0.05, 0.6)),),
     source="Atwood's machine with a heavy pulley (any mechanics textbook)", limits="the wires do not slip",
     hooks={"mass": pulley_mass},
 )  # fmt: skip

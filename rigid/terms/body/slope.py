@@ -14,8 +14,8 @@ def slope_up(angle):
 TERM = Term(
     rank=30, id="slope", summary="the surface is not level", acts="gravity, counterweight, wires: their direction",
     parameters=(
-        Parameter("angle", "rad", 0.0, lowest=-1.2, highest=1.2,
-                  summary="the surface rises towards +x; x and y stay along and normal to it"),
+        Parameter("angle", "rad", 0.0, "the surface rises towards +x; x and y stay along and normal to it",
+                  lowest=-1.2, highest=1.2, visible=(-0.02, 0.02)),
     ),
     source="gravity and wires vertical, the camera's axes along the surface",
     limits="plane; the wires stay vertical", hooks={"up": slope_up},

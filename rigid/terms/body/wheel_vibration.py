@@ -18,10 +18,11 @@ def vibration_factor(s, slip, reduction, speed, power):
 TERM = Term(
     rank=100, id="wheel-vibration", summary="a spinning wheel lowers the friction at the spikes", acts="mu_s and mu_d",
     parameters=(
-        Parameter("reduction", "1", 0.0, lowest=0.0, highest=0.99,
-                  summary="share of the friction that a fast wheel takes away"),
-        Parameter("speed", "rad/s", 100.0, lowest=0.0, above_lowest=True, summary="wheel speed at half of it"),
-        Parameter("power", "1", 2.0, lowest=0.3, highest=8.0, summary="p: how sharply it sets in about that speed"),
+        Parameter("reduction", "1", 0.0, "share of the friction that a fast wheel takes away", lowest=0.0,
+                  highest=0.99, visible=(0.05, 0.6)),
+        Parameter("speed", "rad/s", 100.0, "wheel speed at half of it", lowest=0.0, above_lowest=True),
+        Parameter("power", "1", 2.0, "p: how sharply it sets in about that speed", lowest=0.3, highest=8.0,
+                  visible=(1.0, 4.0)),
     ),
     source="the paper suspects it; vibration lowers mean friction by the share of time in light contact "
            "(Dupont et al. 1994, IEEE TAC 39:2, for the phenomenon)",

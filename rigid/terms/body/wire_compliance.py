@@ -99,9 +99,9 @@ TERM = Term(
     rank=90, id="wire-compliance", summary="the rig's wires are springs",
     acts="T, V and D, with a coordinate of its own: the counterweight's descent", needs_rig=True,
     parameters=(
-        Parameter("stiffness", "N/m", math.inf, lowest=0.0, above_lowest=True,
-                  summary="k, EA / length of all wires from the shaft to the counterweight"),
-        Parameter("damping", "N s/m", 0.0, lowest=0.0, summary="c, while they are taut"),
+        Parameter("stiffness", "N/m", math.inf, "k, EA / length of all wires from the shaft to the counterweight",
+                  lowest=0.0, above_lowest=True, visible=(5e3, 4e4)),
+        Parameter("damping", "N s/m", 0.0, "c, while they are taut", lowest=0.0, visible=(5.0, 60.0)),
     ),
     source="Hooke's law; EA = 57 GPa d^2 for a 7x7 and 43 GPa d^2 for a 7x19 stainless wire rope of diameter d "
            "(Loos and Company's stretch factors): 13 kN/m for one 7x7 of 1 mm that is 4.4 m long",

@@ -2,26 +2,8 @@
 
 from math import exp, log
 
-from rigid.terms.candidate import (
-    SETS_IN,
-    Bend,
-    Candidate,
-    Form,
-    Number,
-    Push,
-    Starts,
-    Tumble,
-    Typical,
-    amplitude,
-    bent,
-    between,
-    fixed,
-    free,
-    logarithm,
-    shape,
-    times,
-)
-from rigid.terms.mobilised import mobilised
+from rigid.terms import candidate as fit
+from rigid.terms.curves import mobilised
 from rigid.terms.term import Parameter, Term
 
 
@@ -69,16 +51,16 @@ def gripping(s, depth, held, force, reach, sharpness, speed, grip):
 TERM = Term(
     rank=150, id="adhesion", summary="the tip is held on retreat", acts="normal force, with memory",
     parameters=(
-        Parameter("force", "N", 0.0, lowest=0.0, summary="A, a row's, fully mobilised"),
-        Parameter("reach", "m", 1e-4, lowest=0.0, above_lowest=True, summary="retreat over which it is mobilised"),
-        Parameter("sharpness", "1", 0.0, lowest=-1.0, highest=2.5,
-                  summary="m: 0 as 1 - exp, 1 as tanh of the retreat over that reach"),
-        Parameter("speed", "m/s", 0.0, lowest=0.0,
-                  summary="v_0: where it is not 0 the pull acts on the way out only, at the speed v times "
-                          "1 - exp(-v / v_0), and friction loses it all"),
-        Parameter("grip", "1", 0.0, lowest=0.0, highest=1.0,
-                  summary="share of the pull that friction does not lose: at 0 its bound goes with the net normal "
-                          "force, at 1 with what the ground presses alone"),
+        Parameter("force", "N", 0.0, "A, a row's, fully mobilised", lowest=0.0, visible=(0.02, 0.4)),
+        Parameter("reach", "m", 1e-4, "retreat over which it is mobilised", lowest=0.0, above_lowest=True),
+        Parameter("sharpness", "1", 0.0, "m: 0 as 1 - exp, 1 as tanh of the retreat over that reach", lowest=-1.0,
+                  highest=2.5, visible=(-0.5, 1.5)),
+        Parameter("speed", "m/s", 0.0,
+                  "v_0: where it is not 0 the pull acts on the way out only, at the speed v times 1 - exp(-v / v_0), "
+                  "and friction loses it all", lowest=0.0),
+        Parameter("grip", "1", 0.0,
+                  "share of the pull that friction does not lose: at 0 its bound goes with the net normal force, at 1 "
+                  "with what the ground presses alone", lowest=0.0, highest=1.0, visible=(0.0, 1.0)),
     ),
     source="pull-off force of cohesive ground; mobilised over a distance so that rest is well defined; friction "
            "of what sticks together goes with the load and the adhesion (Derjaguin 1934, Z. Phys. 88:661)",
@@ -87,15 +69,15 @@ TERM = Term(
 )  # fmt: skip
 
 
-def forms(t: Typical) -> tuple[Form, ...]:
+def forms(t: fit.Typical) -> tuple[fit.Form, ...]:
     """A pull over a retreat; one that presses tip and ground together all the same; one that acts on the way out."""
-    force, reach = free("force", "N", t.force, 0.0, 20 * t.weight), logarithm("reach", t.depth)
+    force, reach = fit.free("force", "N", t.force, 0.0, 20 * t.weight), fit.logarithm("reach", t.depth)
     pulls = tuple((a * t.force, s) for a, s in ((3, 0.0), (10, 1.5), (10, -1.0)))
     torn = tuple((a * t.force, d, v) for a, d, v in ((3, -1.0, -1.0), (10, -1.5, 0.5), (10, 1.5, -1.0)))
     return (
-        Form("mobilised", (force, reach), pulls),
-        Form("that friction does not lose", (force, reach, fixed("grip", 1.0)), pulls),
-        Form("on the way out", (force, reach, logarithm("speed", t.lift_speed, std=2.0, lowest=-1.5)), torn),
+        fit.Form("mobilised", (force, reach), pulls),
+        fit.Form("that friction does not lose", (force, reach, fit.fixed("grip", 1.0)), pulls),
+        fit.Form("on the way out", (force, reach, fit.logarithm("speed", t.lift_speed, std=2.0, lowest=-1.5)), torn),
     )
 
 
@@ -126,31 +108,31 @@ def push_pull(
     return total * (1.0 - pull_out * max(way, 0.0)) + pull_viscous * max(-v, 0.0)
 
 
-def _form(name: str, slot: str, how: str, starts: Starts, equation: str, *more: Number) -> Form:
-    return Form(name, (amplitude(slot, how, 0.3, 0.0, 10.0), *more), starts, equation, "retreats")
+def _form(name: str, slot: str, how: str, starts: fit.Starts, equation: str, *more: fit.Number) -> fit.Form:
+    return fit.Form(name, (fit.amplitude(slot, how, 0.3, 0.0, 10.0), *more), starts, equation, "retreats")
 
 
 _HELD = "x / (1 + x^p)^(1 / p), x = r / pull_reach, p = pull_sharpness"
-_REACH = between("pull_reach", "depth", log(0.005), log(1.0))
-_GROWN = between("pull_growth", "plain", 0.0, 2.0)
+_REACH = fit.between("pull_reach", "depth", log(0.005), log(1.0))
+_GROWN = fit.between("pull_growth", "plain", 0.0, 2.0)
 # How sharply it goes from growing to its full size: 1 is a hyperbola, 2.3 next to tanh, 5 next to a corner.
-_SHARP = between("pull_sharpness", "plain", 0.7, 5.0)
+_SHARP = fit.between("pull_sharpness", "plain", 0.7, 5.0)
 _BY_DEPTH = ((0.05, -3.0, 0.7, 2.0), (0.1, -1.0, 0.7, 2.0))
 _HELDS = ("held", "held by depth", "held wherever it has been")
 
-CANDIDATE = Candidate(
+CANDIDATE = fit.Candidate(
     meaning="the tip is held as it leaves",
     confirm="lift one spike off slowly and read the pull",
-    tumble=Tumble(
+    tumble=fit.Tumble(
         rank=90, forms=forms,
-        bends=(bent("of any shape", ("mobilised", "that friction does not lose"),
-                    shape("sharpness", 0.0, 0.7, -1.0, 2.0)),),
+        bends=(fit.bent("of any shape", ("mobilised", "that friction does not lose"),
+                    fit.shape("sharpness", 0.0, 0.7, -1.0, 2.0)),),
         equation="- force * ((1 - sharpness) * (1 - exp(-x)) + sharpness * tanh(x)), x = (z_m - z) / reach the way "
                  "back; friction keeps the share grip of it (both 0 where they are not named); with a speed it acts "
                  "while the tip goes out at v, times 1 - exp(-v / speed)",
         bench="lift one spike off slowly and read the pull",
     ),
-    push=Push(
+    push=fit.Push(
         rank=50, law={"pull": push_pull}, lengths={"pull_reach": 1e-3},
         forms=(
             _form("held", "pull", "area", ((0.05, -3.0, 2.0), (0.1, -1.0, 2.0)), f"- pull * {_HELD}", _REACH, _SHARP),
@@ -164,16 +146,18 @@ CANDIDATE = Candidate(
         ),
         bends=(
             # What is held loses its hold as the spike comes out.
-            Bend("{}, fading towards the surface", _HELDS,
-                 (between("pull_fade", "depth", -6.0, 1.0, value=-2.0, std=1.5),
-                  between("pull_fade_sharpness", "plain", 0.7, 8.0, value=2.5, std=2.0)), ((-2.5, 2.0), (-0.7, 2.0)),
-                 times(SETS_IN, "y = z / pull_fade", "q = pull_fade_sharpness")),
+            fit.Bend("{}, fading towards the surface", _HELDS,
+                     (fit.between("pull_fade", "depth", -6.0, 1.0, value=-2.0, std=1.5),
+                      fit.between("pull_fade_sharpness", "plain", 0.7, 8.0, value=2.5, std=2.0)),
+                     ((-2.5, 2.0), (-0.7, 2.0)),
+                     fit.times(fit.SETS_IN, "y = z / pull_fade", "q = pull_fade_sharpness")),
             # What takes a motion away from the bed to act lets go of a spike that goes in again.
-            Bend("{}, on the way out", _HELDS, (between("pull_out", "plain", 0.0, 1.0, value=0.5, std=0.5),), ((0.9,),),
-                 lambda text: text + "; times 1 - pull_out where it sinks again"),
+            fit.Bend("{}, on the way out", _HELDS,
+                     (fit.between("pull_out", "plain", 0.0, 1.0, value=0.5, std=0.5),), ((0.9,),),
+                     lambda text: text + "; times 1 - pull_out where it sinks again"),
             # What is held at once may let go over another way than that over which it was taken up: a meniscus, a tail.
-            Bend("{}, letting go", _HELDS, (between("pull_let", "depth", -5.0, 3.0, value=-1.0, std=1.5),),
-                 ((-1.8,), (-0.5,)), times("exp(-r / pull_let)")),
+            fit.Bend("{}, letting go", _HELDS, (fit.between("pull_let", "depth", -5.0, 3.0, value=-1.0, std=1.5),),
+                     ((-1.8,), (-0.5,)), fit.times("exp(-r / pull_let)")),
         ),
         apart={
             "shaft-friction": "Stop half-way in for a second and go on: friction falls and comes back on the way in "

@@ -2,21 +2,8 @@
 
 from math import exp, log
 
-from rigid.terms.candidate import (
-    Bend,
-    Candidate,
-    Form,
-    Number,
-    Push,
-    Starts,
-    Tumble,
-    Typical,
-    amplitude,
-    between,
-    free,
-    logarithm,
-)
-from rigid.terms.mobilised import mobilised
+from rigid.terms import candidate as fit
+from rigid.terms.curves import mobilised
 from rigid.terms.term import Parameter, Term
 
 
@@ -54,13 +41,13 @@ def hardened(depth, force, work, exponent, reference, bend):
 TERM = Term(
     rank=130, id="depth-hardening", summary="force grows other than linearly with depth", acts="the ground's law",
     parameters=(
-        Parameter("exponent", "1", 1.0, lowest=0.3, highest=4.0,
-                  summary="n of (z / z_0)^(n - 1) on the law's force; 1 changes nothing"),
-        Parameter("reference", "m", 1e-3, lowest=0.0, above_lowest=True,
-                  summary="z_0: the depth at which the power changes nothing"),
+        Parameter("exponent", "1", 1.0, "n of (z / z_0)^(n - 1) on the law's force; 1 changes nothing", lowest=0.3,
+                  highest=4.0, visible=(0.8, 1.6)),
+        Parameter("reference", "m", 1e-3, "z_0: the depth at which the power changes nothing", lowest=0.0,
+                  above_lowest=True),
         Parameter("bend", "1/m", 0.0,
-                  summary="b of 1 + b z, or of 1 / (1 - b z) where negative, a factor beside the power's: a law "
-                          "that is straight while shallow"),
+                  "b of 1 + b z, or of 1 / (1 - b z) where negative, a factor beside the power's: a law that is "
+                  "straight while shallow", visible=(0.0, 80.0)),
     ),
     source="pressure and sinkage of soils (Bekker 1969); slow penetration grows as z^1.3 (Hill et al. 2005)",
     limits="work exact for laws that are powers of depth (spring-damper, Hunt-Crossley, power, Katsuragi-Durian); "
@@ -69,14 +56,14 @@ TERM = Term(
 )  # fmt: skip
 
 
-def forms(t: Typical) -> tuple[Form, ...]:
+def forms(t: fit.Typical) -> tuple[fit.Form, ...]:
     """A bend of the curve, or another power of the depth."""
     bends = tuple((b / t.depth,) for b in (0.005, 0.05, 0.5, -0.03, -0.4))
-    power = (free("exponent", "1", 0.1, -0.65, 2.5, how="change", typical=1.0), logarithm("reference", t.depth))
+    power = (fit.free("exponent", "1", 0.1, -0.65, 2.5, how="change", typical=1.0), fit.logarithm("reference", t.depth))
     return (
-        Form("straight while shallow", (free("bend", "1/m", 0.03 / t.depth, -1e6, 1e6),), bends,
+        fit.Form("straight while shallow", (fit.free("bend", "1/m", 0.03 / t.depth, -1e6, 1e6),), bends,
              redefines=("stiffness",)),
-        Form("power", power, ((0.3, 0.7), (-0.2, 0.7), (0.3, 2.0)), redefines=("stiffness",)),
+        fit.Form("power", power, ((0.3, 0.7), (-0.2, 0.7), (0.3, 2.0)), redefines=("stiffness",)),
     )  # fmt: skip
 
 
@@ -104,22 +91,22 @@ def push_loading(
     return force
 
 
-def _form(name: str, how: str, std: float, lowest: float, highest: float, starts: Starts, equation: str, *more: Number,
-          slot: str = "") -> Form:  # fmt: skip
-    first = amplitude(f"hardening_{slot or name}", how, std, lowest, highest)
-    return Form(name, (first, *more), starts, equation, redefines=("stiffness",))
+def _form(name: str, how: str, std: float, lowest: float, highest: float, starts: fit.Starts, equation: str,
+          *more: fit.Number, slot: str = "") -> fit.Form:  # fmt: skip
+    first = fit.amplitude(f"hardening_{slot or name}", how, std, lowest, highest)
+    return fit.Form(name, (first, *more), starts, equation, redefines=("stiffness",))
 
 
-CANDIDATE = Candidate(
+CANDIDATE = fit.Candidate(
     meaning="the force grows other than linearly with depth",
     confirm="press one spike in slowly, deeper than here, and read force over depth",
-    tumble=Tumble(
+    tumble=fit.Tumble(
         rank=70, forms=forms,
         equation="the law's force times (z / reference)^(exponent - 1), or times 1 + bend * z (bend below 0: over 1 - "
                  "bend * z)",
         bench="press one spike in slowly and read force over depth",
     ),
-    push=Push(
+    push=fit.Push(
         rank=10, law={"loading": push_loading}, lengths={"hardening_reach": 1e-3},
         forms=(
             _form("power", "plain", 0.6, -0.9, 3.0, ((0.2,), (-0.2,)), "K * z * (z / D)^hardening_power"),
@@ -133,15 +120,15 @@ CANDIDATE = Candidate(
                   "K * z / max(1 - hardening_locking * z / D, 0.05)"),
             _form("early", "spring force", 0.5, 0.0, 20.0, ((0.1, -2.5), (0.2, -1.0)),
                   "K * z + hardening_early * (1 - exp(-z / hardening_reach))",
-                  between("hardening_reach", "depth", -4.0, 0.0)),
+                  fit.between("hardening_reach", "depth", -4.0, 0.0)),
             # Towards a bound, a hyperbola (Kondner, J. Soil Mech. Found. Div. 89 (1963), 115) where the sharpness is 1.
             _form("levelling off", "plain", 0.8, 0.0, 20.0, ((0.3, 1.5), (1.0, 1.5)),
                   "K * z / (1 + x^hardening_sharpness)^(1 / hardening_sharpness), x = hardening_level * z / D",
-                  between("hardening_sharpness", "plain", 0.7, 5.0), slot="level"),
+                  fit.between("hardening_sharpness", "plain", 0.7, 5.0), slot="level"),
         ),
         bends=(
-            Bend("with a power", ("quadratic",),
-                 (between("hardening_steeper", "plain", -0.8, 2.0, value=0.0, std=0.5),), ((-0.35,), (0.35,)),
+            fit.Bend("with a power", ("quadratic",),
+                 (fit.between("hardening_steeper", "plain", -0.8, 2.0, value=0.0, std=0.5),), ((-0.35,), (0.35,)),
                  "K * z * (1 + hardening_quadratic * (z / D)^(1 + hardening_steeper))"),
         ),
         apart={

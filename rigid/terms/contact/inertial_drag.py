@@ -1,22 +1,7 @@
 """Force of the square of the tip's speed."""
 
-from rigid.terms.candidate import (
-    SETS_IN,
-    Bend,
-    Candidate,
-    Form,
-    Number,
-    Push,
-    Starts,
-    Tumble,
-    Typical,
-    amplitude,
-    between,
-    free,
-    prior,
-    times,
-)
-from rigid.terms.mobilised import mobilised
+from rigid.terms import candidate as fit
+from rigid.terms.curves import mobilised
 from rigid.terms.term import Parameter, Term
 
 
@@ -37,10 +22,11 @@ def inertial_side_force(s, depth, slip, sideways):
 TERM = Term(
     rank=120, id="inertial-drag", summary="force of the square of the tip's speed", acts="normal and tangential force",
     parameters=(
-        Parameter("normal", "kg/m", 0.0, lowest=0.0, summary="b, while the tip goes in"),
-        Parameter("sideways", "kg/m", 0.0, lowest=0.0, summary="b_x, while the tip slides"),
-        Parameter("power", "1", 2.0, lowest=1.0, highest=3.0,
-                  summary="of the speed of going in; where it is not 2, b is the force at 1 m/s over (1 m/s)^2"),
+        Parameter("normal", "kg/m", 0.0, "b, while the tip goes in", lowest=0.0, visible=(5.0, 80.0)),
+        Parameter("sideways", "kg/m", 0.0, "b_x, while the tip slides", lowest=0.0, visible=(0.1, 5.0)),
+        Parameter("power", "1", 2.0,
+                  "of the speed of going in; where it is not 2, b is the force at 1 m/s over (1 m/s)^2", lowest=1.0,
+                  highest=3.0, visible=(1.0, 3.0)),
     ),
     source="Katsuragi and Durian, Nature Physics 3 (2007), 420: the inertia of displaced grains",
     limits="b does not grow with depth",
@@ -48,14 +34,14 @@ TERM = Term(
 )  # fmt: skip
 
 
-def forms(t: Typical) -> tuple[Form, ...]:
+def forms(t: fit.Typical) -> tuple[fit.Form, ...]:
     """While a tip goes in; while it slides, too; by any power of the speed of going in."""
-    normal, sideways = free("normal", "kg/m", 0.5, 0.0, 1e4), free("sideways", "kg/m", 0.2, 0.0, 1e4)
-    power = prior("power", "1", 0.3, 0.2, 0.01, -1.0, 1.0, typical=2.0)
+    normal, sideways = fit.free("normal", "kg/m", 0.5, 0.0, 1e4), fit.free("sideways", "kg/m", 0.2, 0.0, 1e4)
+    power = fit.prior("power", "1", 0.3, 0.2, 0.01, -1.0, 1.0, typical=2.0)
     return (
-        Form("normal", (normal,), ((1.0,), (20.0,))),
-        Form("both", (normal, sideways), ((1.0, 0.3), (10.0, 2.0))),
-        Form("any power", (normal, sideways, power), ((1.0, 0.3 * 1.0, 0.0), (10.0, 0.3 * 10.0, 0.0))),
+        fit.Form("normal", (normal,), ((1.0,), (20.0,))),
+        fit.Form("both", (normal, sideways), ((1.0, 0.3), (10.0, 2.0))),
+        fit.Form("any power", (normal, sideways, power), ((1.0, 0.3 * 1.0, 0.0), (10.0, 0.3 * 10.0, 0.0))),
     )
 
 
@@ -70,37 +56,37 @@ def push_force(z, v, x, radius_depth, drag, drag_onset, drag_reach, drag_sharpne
 
 
 def _form(
-    name: str, slot: str, equation: str, *more: Number, starts: Starts = ((0.1,),), needs: str = "speeds"
-) -> Form:
-    return Form(name, (amplitude(slot, "drag", 0.5, 0.0, 20.0), *more), starts, equation, needs)
+    name: str, slot: str, equation: str, *more: fit.Number, starts: fit.Starts = ((0.1,),), needs: str = "speeds"
+) -> fit.Form:
+    return fit.Form(name, (fit.amplitude(slot, "drag", 0.5, 0.0, 20.0), *more), starts, equation, needs)
 
 
 _ONSET = " * (1 - exp(-z / drag_reach))"
 
-CANDIDATE = Candidate(
+CANDIDATE = fit.Candidate(
     meaning="the surface resists with the square of the tip's speed",
     confirm="drop one spike at two speeds: the excess force should go with the square",
-    tumble=Tumble(
+    tumble=fit.Tumble(
         rank=60, forms=forms,
         equation="+ normal * rate^power while a tip goes in (power 2 where it is not named), - sideways * u * abs(u) "
                  "while it slides at u",
         bench="drop one spike onto the surface at two speeds",
     ),
-    push=Push(
+    push=fit.Push(
         rank=30, law={"force": push_force}, lengths={"drag_reach": 1e-3},
         forms=(
             _form("square", "drag", "+ drag * v^2, while it goes in", needs=""),
             _form("with an onset", "drag_onset", f"+ drag_onset{_ONSET} * v^2, while it goes in",
-                  between("drag_reach", "depth", -3.0, 1.0), starts=((0.1, -2.0), (0.1, 0.0))),
+                  fit.between("drag_reach", "depth", -3.0, 1.0), starts=((0.1, -2.0), (0.1, 0.0))),
             _form("growing with depth", "drag_deep", "+ drag_deep * z / D * v^2, while it goes in"),
             _form("of the tip", "drag_tip", "+ drag_tip * u * (2 - u) * v^2, u = min(z / H, 1), while it goes in"),
             _form("both ways", "drag_both", "+ drag_both * v * abs(v)"),
         ),
         bends=(
             # A tip that is in when it is in, or a stream that goes on widening.
-            Bend("{}, as sharp as it is", ("with an onset",),
-                 (between("drag_sharpness", "plain", 0.7, 8.0, value=2.5, std=2.0),), ((1.0,), (4.0,)),
-                 times(SETS_IN, "y = z / drag_reach", "q = drag_sharpness", instead=_ONSET)),
+            fit.Bend("{}, as sharp as it is", ("with an onset",),
+                 (fit.between("drag_sharpness", "plain", 0.7, 8.0, value=2.5, std=2.0),), ((1.0,), (4.0,)),
+                 fit.times(fit.SETS_IN, "y = z / drag_reach", "q = drag_sharpness", instead=_ONSET)),
         ),
         apart={
             "shaft-friction": "Push to one depth at a tenth of the speed and at the full one: drag falls to a "

@@ -2,21 +2,7 @@
 
 from math import exp
 
-from rigid.terms.candidate import (
-    Bend,
-    Candidate,
-    Form,
-    Number,
-    Push,
-    Starts,
-    Tumble,
-    Typical,
-    amplitude,
-    between,
-    fixed,
-    free,
-    prior,
-)
+from rigid.terms import candidate as fit
 from rigid.terms.term import Parameter, Term
 
 
@@ -41,13 +27,14 @@ def bent_unloading(depth, top, force, share, bend):
 TERM = Term(
     rank=140, id="plastic-sinkage", summary="the surface does not spring back", acts="the ground's law, with memory",
     parameters=(
-        Parameter("share", "1", 0.0, lowest=0.0, highest=0.95,
-                  summary="of the deepest depth that stays when the load is gone"),
-        Parameter("bend", "1", 0.0, lowest=0.0, highest=4.0,
-                  summary="c: what unloading's exponent has more than loading's, fully from a share of 0.2 on"),
-        Parameter("open", "1", 0.0, lowest=0.0, highest=1.0,
-                  summary="1: a tip in its crater still touches, without a load, until it is above the undisturbed "
-                          "surface (the torque acts, the damper too); 0: it touches the crater's bottom"),
+        Parameter("share", "1", 0.0, "of the deepest depth that stays when the load is gone", lowest=0.0, highest=0.95,
+                  visible=(0.05, 0.6)),
+        Parameter("bend", "1", 0.0,
+                  "c: what unloading's exponent has more than loading's, fully from a share of 0.2 on", lowest=0.0,
+                  highest=4.0, visible=(0.0, 1.5)),
+        Parameter("open", "1", 0.0,
+                  "1: a tip in its crater still touches, without a load, until it is above the undisturbed surface "
+                  "(the torque acts, the damper too); 0: it touches the crater's bottom", lowest=0.0, highest=1.0),
     ),
     source="elastic-plastic unloading as in Walton and Braun 1986, with the unloading curve similar to the loading "
            "(bend = 0); the bend and the open crater are ours",
@@ -57,15 +44,15 @@ TERM = Term(
 )  # fmt: skip
 
 
-def forms(t: Typical) -> tuple[Form, ...]:
+def forms(t: fit.Typical) -> tuple[fit.Form, ...]:
     """A share of the depth that stays; with unloading bent, or with a crater that is open."""
-    share = free("share", "1", 0.1, 0.0, 0.93)
-    bend = prior("bend", "1", 1.0, 0.3, 0.01, 0.0, 4.0)
+    share = fit.free("share", "1", 0.1, 0.0, 0.93)
+    bend = fit.prior("bend", "1", 1.0, 0.3, 0.01, 0.0, 4.0)
     shares = ((0.15,), (0.5,), (0.85,))
     return (
-        Form("share", (share,), shares),
-        Form("bent way back", (share, bend), ((0.05, 0.3), (0.15, 0.3), (0.5, 0.3), (0.85, 0.3))),
-        Form("open crater", (share, fixed("open", 1.0)), shares),
+        fit.Form("share", (share,), shares),
+        fit.Form("bent way back", (share, bend), ((0.05, 0.3), (0.15, 0.3), (0.5, 0.3), (0.85, 0.3))),
+        fit.Form("open crater", (share, fit.fixed("open", 1.0)), shares),
     )
 
 
@@ -97,32 +84,34 @@ _BACK = (
 )
 
 
-def _form(name: str, slot: str, std: float, highest: float, starts: Starts, equation: str, *more: Number) -> Form:
-    return Form(name, (amplitude(slot, "plain", std, 0.0, highest), *more), starts, equation, "retreats")
+def _form(
+    name: str, slot: str, std: float, highest: float, starts: fit.Starts, equation: str, *more: fit.Number
+) -> fit.Form:
+    return fit.Form(name, (fit.amplitude(slot, "plain", std, 0.0, highest), *more), starts, equation, "retreats")
 
 
-CANDIDATE = Candidate(
+CANDIDATE = fit.Candidate(
     meaning="the surface does not spring back all the way",
     confirm="press one spike in, lift it and measure the mark",
-    tumble=Tumble(
+    tumble=fit.Tumble(
         rank=80, forms=forms,
         equation="on the way back the law's force at (z - share * z_m) / (1 - share), times (that over z_m)^a, "
                  "a = bend * (1 - exp(-20 * share)); z_m the deepest depth since it touched; with open = 1 a tip above "
                  "the bottom of its crater still touches: the torque and the damper act",
         bench="press one spike in and lift it again, and see how deep the mark is",
     ),
-    push=Push(
+    push=fit.Push(
         rank=40, law={"unload": push_unload, "damper": push_damper},
         forms=(
             _form("crater", "crater_share", 0.5, 0.97, ((0.1,), (0.4,), (0.8,)), f"K * at, {_BACK}"),
             _form("curved crater", "crater_share", 0.5, 0.97, ((0.1, 0.5), (0.4, 0.5), (0.7, 1.0), (0.7, 0.0)),
-                  f"K * at * (at / z_m)^crater_bend, {_BACK}", between("crater_bend", "plain", 0.0, 2.5)),
+                  f"K * at * (at / z_m)^crater_bend, {_BACK}", fit.between("crater_bend", "plain", 0.0, 2.5)),
             _form("stiffer unloading", "unload_stiffness", 5.0, 200.0, ((0.2,), (1.0,), (6.0,)),
                   "K * z_m - K * (1 + unload_stiffness) * (z_m - z), on the way back; never below 0"),
         ),
         bends=(
-            Bend("{}, empty", ("crater", "curved crater", "stiffer unloading"),
-                 (between("crater_open", "plain", 0.0, 1.0, value=0.5, std=0.5),), ((0.9,),),
+            fit.Bend("{}, empty", ("crater", "curved crater", "stiffer unloading"),
+                 (fit.between("crater_open", "plain", 0.0, 1.0, value=0.5, std=0.5),), ((0.9,),),
                  lambda text: text + "; where that is 0, C times 1 - crater_open"),
         ),
         apart={

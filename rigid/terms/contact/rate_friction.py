@@ -17,10 +17,11 @@ def rate_friction_factor(s, slip, change, speed, power):
 TERM = Term(
     rank=160, id="rate-friction", summary="friction depends on the sliding speed", acts="mu_d",
     parameters=(
-        Parameter("change", "1", 0.0, lowest=-0.95, highest=10.0,
-                  summary="relative change of mu_d at high sliding speed"),
-        Parameter("speed", "m/s", 0.05, lowest=0.0, above_lowest=True, summary="sliding speed at half of it"),
-        Parameter("power", "1", 1.0, lowest=0.2, highest=8.0, summary="p: how sharply it sets in about that speed"),
+        Parameter("change", "1", 0.0, "relative change of mu_d at high sliding speed", lowest=-0.95, highest=10.0,
+                  visible=(-0.4, 1.0)),
+        Parameter("speed", "m/s", 0.05, "sliding speed at half of it", lowest=0.0, above_lowest=True),
+        Parameter("power", "1", 1.0, "p: how sharply it sets in about that speed", lowest=0.2, highest=8.0,
+                  visible=(0.6, 2.0)),
     ),
     source="velocity strengthening or weakening (Stribeck; Armstrong-Helouvry et al. 1994, Automatica 30:1083)",
     limits="no memory of past sliding", hooks={"friction_factor": rate_friction_factor},

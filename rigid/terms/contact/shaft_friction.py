@@ -3,7 +3,7 @@
 from math import exp, log, tanh
 
 from rigid.terms.candidate import SETS_IN, Bend, Candidate, Form, Number, Push, Starts, amplitude, between, times
-from rigid.terms.mobilised import mobilised
+from rigid.terms.curves import mobilised
 
 
 def push_force(

@@ -11,8 +11,8 @@ def ball_radius(radius):
 
 TERM = Term(
     rank=110, id="tip-radius", summary="the tips are balls", acts="contact geometry: the point that touches rolls",
-    parameters=(Parameter("radius", "m", 0.0, lowest=0.0, highest=0.1,
-                          summary="of the ball, whose centre is l - r from the platform's"),),
+    parameters=(Parameter("radius", "m", 0.0, "of the ball, whose centre is l - r from the platform's", lowest=0.0,
+                          highest=0.1, visible=(0.002, 0.01)),),
     source="the paper names ball tips; rolling of a circle on a line",
     limits="the ball's sinkage does not move the point of contact round it", hooks={"tip_radius": ball_radius},
 )  # fmt: skip

@@ -12,9 +12,8 @@ def scale_there(square, scale, bend):
 TERM = Term(
     rank=180, id="camera-scale", summary="the camera's scale is off", acts="the camera's x and y", sensor=True,
     parameters=(
-        Parameter("scale", "1", 1.0, lowest=0.0, above_lowest=True, summary="measured over true, x and y"),
-        Parameter("bend", "1/m2", 0.0,
-                  summary="added to it by the square of the distance from where the platform stood"),
+        Parameter("scale", "1", 1.0, "measured over true, x and y", lowest=0.0, above_lowest=True),
+        Parameter("bend", "1/m2", 0.0, "added to it by the square of the distance from where the platform stood"),
     ),
     source="a ruler in the wrong plane; a lens that bends outwards or inwards",
     limits="the same in x and y; the lens's axis is on the start", hooks={"lens": scale_there},

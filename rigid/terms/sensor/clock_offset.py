@@ -12,8 +12,8 @@ def true_time(written, offset, drift):
 TERM = Term(
     rank=170, id="clock-offset", summary="IMU against camera", acts="the IMU's times", sensor=True,
     parameters=(
-        Parameter("offset", "s", 0.0, summary="IMU time minus true time, at t = 0"),
-        Parameter("drift", "1", 0.0, lowest=-0.5, highest=0.5, summary="what the IMU's clock gains in a second"),
+        Parameter("offset", "s", 0.0, "IMU time minus true time, at t = 0"),
+        Parameter("drift", "1", 0.0, "what the IMU's clock gains in a second", lowest=-0.5, highest=0.5),
     ),
     source="two clocks, read apart", limits="it gains evenly, in every trial from t = 0 on",
     hooks={"clock": true_time},

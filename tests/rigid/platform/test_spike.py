@@ -30,16 +30,16 @@ def test_radius_and_area_follow_the_profile(tip):
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"diameter": -0.01}, "diameter is -0.01"),
-        ({"diameter": math.nan}, "diameter is nan"),
+        ({"diameter": -0.01}, "diameter = -0.01"),
+        ({"diameter": math.nan}, "diameter = nan"),
         ({"shaft_diameter": 0.02}, "shaft_diameter is 0.02"),
         ({"tip": "flat", "shaft_diameter": 0.01}, "shaft_diameter is 0.01"),
         ({"tip": "spoon"}, "tip is 'spoon'"),
         ({"tip": "cone", "cone_angle": 200.0}, "cone_angle is 200"),
         ({"length": 0.001}, "length is 0.001"),
-        ({"friction": -1.0}, "friction is -1"),
+        ({"friction": -1.0}, "friction = -1"),
         ({"restitution": 0.0}, "restitution is 0"),
-        ({"mass": 0.0}, "mass is 0"),
+        ({"mass": 0.0}, "mass = 0"),
     ],
 )
 def test_a_body_that_cannot_be_is_refused_by_name(given, words):
