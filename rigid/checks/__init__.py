@@ -8,8 +8,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 __all__ = [
     "Parameter", "check_above_zero", "check_friction", "check_not_negative", "check_parameters", "is_number",
+    "sample_times",
 ]  # fmt: skip
 
 
@@ -58,12 +62,12 @@ def is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def check_above_zero(unit: str = "", **numbers: Any) -> None:
+def check_above_zero(unit: str = "", /, **numbers: Any) -> None:
     """Raise ValueError for what is no finite number above 0; `unit` is shown where it is given."""
     _check(unit, "above 0", numbers, lambda value: value > 0)
 
 
-def check_not_negative(unit: str = "", **numbers: Any) -> None:
+def check_not_negative(unit: str = "", /, **numbers: Any) -> None:
     """Raise ValueError for what is no finite number of 0 or more; `unit` is shown where it is given."""
     _check(unit, "0 or more", numbers, lambda value: value >= 0)
 
@@ -80,3 +84,21 @@ def check_friction(mu_s: float, mu_d: float | None, *, endless: bool = False) ->
         check_not_negative(mu_s=mu_s)
     if mu_d is not None and not 0 <= mu_d <= mu_s:
         raise ValueError(f"mu_d = {mu_d} must be from 0 to mu_s = {mu_s}")
+
+
+def sample_times(duration: float, interval: float, times: ArrayLike | None) -> NDArray[np.float64]:
+    """Sample times [s], shape [n]: every `interval` from 0 to `duration`, the end included, or `times` where given.
+
+    Raises ValueError for given times that are not finite, fall, or lie outside 0 to `duration`.
+    """
+    if times is None:
+        every = interval * np.arange(math.floor(duration / interval * (1 + 1e-12)) + 1)
+        if duration - every[-1] > 1e-9 * duration:
+            every = np.append(every, duration)
+        return np.minimum(every, duration)
+    given = np.asarray(times, dtype=float)
+    if given.ndim != 1 or len(given) == 0 or not np.isfinite(given).all() or (np.diff(given) < 0).any():
+        raise ValueError("times must be a list of finite numbers that rise")
+    if given[0] < 0 or given[-1] > duration:
+        raise ValueError(f"times must lie within 0 to duration = {duration:g} s, not {given[0]:g} to {given[-1]:g} s")
+    return given

@@ -11,7 +11,7 @@ spike's is gone the constraint has become that spike's own.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from rigid.model.model import State, assemble, make_parameters
@@ -39,18 +39,16 @@ class Modes:
     slip: list[int] = field(default_factory=list)  # Of each spike: 0 sticks, +1 and -1 slides towards +x and -x
     top: list[float] = field(default_factory=list)  # Deepest depth of each spike [m] since it entered the ground
     held: list[float] = field(default_factory=list)  # Deepest depth of each spike [m] since it touched; empty: as `top`
-    vertical: int = 0  # Dry friction of the rig: 0 holds, +1 and -1 slides up and down
-    rotation: int = 0  # Dry friction of the bearing: 0 holds, +1 and -1 turns clockwise and back
+    dry: list[int] = field(default_factory=lambda: [0, 0])
+    """Dry friction of the rig and of the bearing: 0 holds; +1 and -1 slides up and down, turns clockwise and back."""
     torque_over: bool = False  # Whether the torque has ended for good
     resting: bool = False  # Whether nothing moves and nothing will
     inner: int = 1  # Mode of the term that has a coordinate of its own: 1 at the start, else 0
 
     def copy(self) -> "Modes":
         """A copy that can be changed."""
-        return Modes(
-            list(self.touching), list(self.slip), list(self.top), list(self.held), self.vertical, self.rotation,
-            self.torque_over, self.resting, self.inner,
-        )  # fmt: skip
+        lists = {name: list(getattr(self, name)) for name in ("touching", "slip", "top", "held", "dry")}
+        return replace(self, **lists)
 
     def deepest(self, spike: int, depth: float) -> tuple[float, float]:
         """Deepest depths [m] since the spike entered the ground, and since it touched, with `depth` reached now."""
@@ -63,8 +61,10 @@ class Modes:
         if self.held:
             self.held[spike] = max(self.held[spike], depth)
 
-    def touch(self, spike: int, depth: float) -> None:
-        """The spike touches, at `depth`: in a crater of its own above 0."""
+    def touch(self, spike: int, depth: float, slip: float) -> None:
+        """The spike touches, at `depth` (in a crater of its own above 0), and slides the way its `slip` goes."""
+        self.touching = sorted([*self.touching, spike])
+        self.slip[spike] = 1 if slip > 0 else -1
         self.top[spike] = max(self.top[spike], 0.0)
         if not self.held:
             self.held = [0.0] * len(self.top)
@@ -123,7 +123,8 @@ class System:
         self.crater = model.crater(self.p)
         self.has_memory = self._remembers()
         self.sheds = self.has_memory and (ground.law.has_memory or model.has("crater", "unload"))
-        self.has_vertical, self.has_rotation = model.has("vertical_friction"), model.has("rotation_friction")
+        self.has_dry = model.has("vertical_friction", "rotation_friction")
+        self.dry_axes: tuple[Triple, Triple] = ((s.up_x, s.up_y, 0.0), (0.0, 0.0, 1.0))
         s.inner_mode = 1.0
         self.inner = bool(model.has("inner_mass") and model.inner(self.p, s)[0] > 0)
         self.mu_s, self.mu_d = trial.mu_s, trial.sliding_friction
@@ -131,7 +132,8 @@ class System:
         # What the last evaluation found.
         self.contacts: list[Contact] = []
         self.stick_force = self.stick_load = self.stick_bound = 0.0
-        self.vertical_force = self.vertical_bound = self.rotation_force = self.rotation_bound = 0.0
+        self.dry_forces: Sequence[float] = (0.0, 0.0)  # Of the dry frictions that hold
+        self.dry_bounds: Sequence[float] = (0.0, 0.0)
         self.inner_holds = 1.0
         self.implicit: Any = None  # Makes implicit steps, where the ground asks for them (`rigid.planar.implicit`)
         self.acceleration = (0.0, 0.0, 0.0)
@@ -156,9 +158,14 @@ class System:
         """How deep the tip is below the undisturbed surface [m]."""
         return self.arms(spike, z)[0] - z[Y]
 
-    def anchor(self, spike: int, z: Sequence[float]) -> float:
-        """What stays constant while `spike` sticks: x - d - r theta [m]."""
-        return z[X] - self.arms(spike, z)[1] - self.radius * z[THETA]
+    def depth_and_slip(self, spike: int, z: Sequence[float]) -> tuple[float, float]:
+        """Depth of the tip [m], and its speed along the ground [m/s]."""
+        h, _ = self.arms(spike, z)
+        return h - z[Y], z[VX] - z[OMEGA] * h
+
+    def dry_speeds(self, z: Sequence[float]) -> list[float]:
+        """Speeds that the dry frictions resist: vertical [m/s], rotation [rad/s]."""
+        return [x * z[VX] + y * z[VY] + turn * z[OMEGA] for x, y, turn in self.dry_axes]
 
     def _set(self, time: float, z: Sequence[float]) -> None:
         s = self.s
@@ -216,26 +223,20 @@ class System:
         rows: list[Row] = []
         if sticking:
             rows.append(self._stick_row(sticking, omega))
-        vertical, rotation = model.dry_friction(p, s) if self.has_vertical or self.has_rotation else (0.0, 0.0)
-        if vertical > 0:
-            if modes.vertical:
-                fx, fy = fx - modes.vertical * vertical * s.up_x, fy - modes.vertical * vertical * s.up_y
-                power += vertical * modes.vertical * (s.up_x * vx + s.up_y * vy)
-            else:
-                rows.append(((s.up_x, s.up_y, 0.0), 0.0, (s.up_x, s.up_y, 0.0)))
-        if rotation > 0:
-            if modes.rotation:
-                ft -= modes.rotation * rotation
-                power += rotation * modes.rotation * omega
-            else:
-                rows.append(((0.0, 0.0, 1.0), 0.0, (0.0, 0.0, 1.0)))
+        bounds = model.dry_friction(p, s) if self.has_dry else (0.0, 0.0)
+        for axis, bound, way in zip(self.dry_axes, bounds, modes.dry, strict=True):
+            if bound > 0 and way:
+                push = way * bound
+                fx, fy, ft = fx - push * axis[0], fy - push * axis[1], ft - push * axis[2]
+                power += push * (axis[0] * vx + axis[1] * vy + axis[2] * omega)
+            elif bound > 0:
+                rows.append((axis, 0.0, axis))
         a, forces = self._constrained(mass, (fx, fy, ft), rows)
         self.contacts, self.acceleration = contacts, a
         found = iter(forces)
         self.stick_force = next(found) if sticking else 0.0
-        self.vertical_bound, self.rotation_bound = vertical, rotation
-        self.vertical_force = next(found) if vertical > 0 and not modes.vertical else 0.0
-        self.rotation_force = next(found) if rotation > 0 and not modes.rotation else 0.0
+        self.dry_bounds = bounds
+        self.dry_forces = [next(found) if b > 0 and not way else 0.0 for b, way in zip(bounds, modes.dry, strict=True)]
         spin = self.wheel_sign * s.torque / self.trial.wheel_inertia
         rate = [vx, vy, omega, a[0], a[1], a[2], spin, s.torque * omega, power]
         if self.inner:
@@ -344,10 +345,8 @@ class System:
             total = sum(contact.load for contact in contacts)
             shares = [contact.load / total if total > 0 else 1 / len(contacts) for contact in contacts]
             rows.append((1.0, 0.0, -sum(share * c.h for share, c in zip(shares, contacts, strict=True))))
-        if self.vertical_bound > 0 and not modes.vertical:
-            rows.append((self.s.up_x, self.s.up_y, 0.0))
-        if self.rotation_bound > 0 and not modes.rotation:
-            rows.append((0.0, 0.0, 1.0))
+        holding = zip(self.dry_axes, self.dry_bounds, modes.dry, strict=True)
+        rows += [axis for axis, bound, way in holding if bound > 0 and not way]
         if not rows:
             return
         v = (z[VX], z[VY], z[OMEGA])

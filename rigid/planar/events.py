@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from .dynamics import OMEGA, VX, VY, WHEEL, Modes, System, Y
+from .dynamics import OMEGA, VY, WHEEL, Modes, System, Y
 
 __all__ = ["KINKS", "Monitor", "Watch", "cubic", "monitors", "precision", "triggered"]
 
@@ -37,17 +37,11 @@ def monitors(system: System, z: Sequence[float], modes: Modes) -> Watch:
         if n not in modes.touching:
             h, d = system.arms(n, z)
             found["touch", n] = (z[Y] - h + system.crater * modes.top[n], z[VY] + omega * d)
-    if system.vertical_bound > 0:
-        if modes.vertical:
-            speed = system.s.up_x * z[VX] + system.s.up_y * z[VY]
-            found["vertical", 0] = (modes.vertical * speed, math.nan)
-        else:
-            found["vertical", 1] = (system.vertical_bound - abs(system.vertical_force), math.nan)
-    if system.rotation_bound > 0:
-        if modes.rotation:
-            found["rotation", 0] = (modes.rotation * omega, math.nan)
-        else:
-            found["rotation", 1] = (system.rotation_bound - abs(system.rotation_force), math.nan)
+    for k, (bound, way, speed) in enumerate(zip(system.dry_bounds, modes.dry, system.dry_speeds(z), strict=True)):
+        if bound > 0 and way:
+            found["halt", k] = (way * speed, math.nan)
+        elif bound > 0:
+            found["yield", k] = (bound - abs(system.dry_forces[k]), math.nan)
     if system.inner:
         found["inner", -1] = (system.inner_holds, math.nan)
     if system.trial.actuator == "brake" and not modes.torque_over and system.trial.torque > 0:
@@ -57,7 +51,6 @@ def monitors(system: System, z: Sequence[float], modes: Modes) -> Watch:
 
 KINKS = ("rate", "fresh", "again")  # where only a derivative jumps
 _KINK_SPEED, _KINK_DEPTH = 1e-8, 1e-12
-_SPEEDS = (("vertical", 0), ("rotation", 0))
 _STANDSTILL = 1e-13  # m/s or rad/s: what rounding makes of a speed that stays zero
 
 
@@ -71,7 +64,7 @@ def triggered(before: Watch, after: Watch) -> list[Monitor]:
         elif key[0] in ("fresh", "again"):
             if start > _KINK_DEPTH and value < -_KINK_DEPTH:
                 found.append(key)
-        elif value < (-_STANDSTILL if key in _SPEEDS or key[0] == "slip" else 0.0):
+        elif value < (-_STANDSTILL if key[0] in ("halt", "slip") else 0.0):
             found.append(key)
     return found
 

@@ -54,8 +54,7 @@ class Implicit:
 
     def _jacobian(self, time: float, z: list[float], modes: Modes, first: list[float]) -> np.ndarray:
         here = (
-            time, tuple(z), tuple(modes.touching), tuple(modes.slip), modes.vertical, modes.rotation, modes.torque_over,
-            modes.inner,
+            time, tuple(z), tuple(modes.touching), tuple(modes.slip), tuple(modes.dry), modes.torque_over, modes.inner,
         )  # fmt: skip
         if self._from != here:
             self._from = here

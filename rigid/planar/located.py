@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from .dormand_prince import Interpolant, Step, attempt, interpolant
-from .dynamics import LOST, OMEGA, THETA, VX, VY, WHEEL, Modes, System, Y
+from .dynamics import LOST, THETA, WHEEL, Modes, System
 from .events import KINKS, Monitor, Watch, cubic, monitors, precision, triggered
 from .implicit import Implicit
 from .modes import let_go, resolve
@@ -79,9 +79,8 @@ class _Motion:
         if trial.torque_until <= 0 or trial.torque == 0:
             modes.torque_over = True
         still = [n for n in modes.touching if modes.slip[n] == 0]
-        climbing = system.s.up_x * z[VX] + system.s.up_y * z[VY]
-        modes.vertical, modes.rotation = _sign(climbing), _sign(z[OMEGA])
-        self.rate = resolve(system, 0.0, z, modes, spikes=still, vertical=climbing == 0, rotation=z[OMEGA] == 0)
+        modes.dry = [(speed > 0) - (speed < 0) for speed in system.dry_speeds(z)]
+        self.rate = resolve(system, 0.0, z, modes, spikes=still, dry=[k for k in (0, 1) if not modes.dry[k]])
         self.went.transitions.append((0.0, modes.state, z[THETA]))
         self.h, self.crowd, self.crowd_since = 1e-4, 0, -math.inf
         self.before: Watch = {}
@@ -113,7 +112,7 @@ class _Motion:
         modes.torque_over = True
         if system.trial.actuator == "brake" and end < system.trial.torque_until:
             z[WHEEL] = 0.0
-        self.rate, self.fresh = resolve(system, end, z, modes, vertical=True, rotation=True), True
+        self.rate, self.fresh = resolve(system, end, z, modes, dry=(0, 1)), True
 
     def step(self, on_step: OnStep) -> None:
         """One step, to the first event within it; or none, where it was too long."""
@@ -170,7 +169,7 @@ class _Motion:
             if went.transitions[-1][1] != modes.state:
                 went.transitions.append((time, modes.state, z[THETA]))
             return min(h_next, max(h, 1e-4)) if not event else min(max(h_next, 1e-4), 1e-3)
-        if any(modes.slip[n] == 0 for n in modes.touching) or system.has_vertical or system.has_rotation:
+        if any(modes.slip[n] == 0 for n in modes.touching) or system.has_dry:
             system.hold_still(z, modes)
             self.rate = system.derivative(time, z, modes)
             if comes_to_rest(system, time, z, modes, self.scale, self.tolerance):
@@ -278,10 +277,6 @@ class _Motion:
         return high, high_step, found
 
 
-def _sign(value: float) -> int:
-    return (value > 0) - (value < 0)
-
-
 def _scale(system: System) -> list[float]:
     """What the tolerance is relative to: a length, an angle, their rates, and energies, of the trial's own size."""
     trial = system.trial
@@ -307,14 +302,11 @@ def _switch(
     system: System, time: float, z: list[float], modes: Modes, event: list[Monitor], forced: bool
 ) -> list[float]:
     may_stick: list[int] = []
-    vertical = rotation = False
+    halted: list[int] = []
     for kind, n in event:
         if kind == "touch":
-            modes.touching = sorted([*modes.touching, n])
-            h, _ = system.arms(n, z)
-            slip = z[VX] - z[OMEGA] * h
-            modes.slip[n] = 1 if slip > 0 else -1
-            modes.touch(n, h - z[Y])
+            depth, slip = system.depth_and_slip(n, z)
+            modes.touch(n, depth, slip)
             if abs(slip) < 1e-14:
                 may_stick.append(n)
         elif kind == "lift":
@@ -323,19 +315,17 @@ def _switch(
             may_stick.append(n)
         elif kind == "stick":
             let_go(system, modes)
-        elif kind in ("vertical", "rotation") and n == 1:
-            setattr(modes, kind, -1 if getattr(system, f"{kind}_force") > 0 else 1)
-        elif kind == "vertical":
-            vertical = True
-        elif kind == "rotation":
-            rotation = True
+        elif kind == "yield":
+            modes.dry[n] = -1 if system.dry_forces[n] > 0 else 1
+        elif kind == "halt":
+            halted.append(n)
         elif kind == "inner":
             modes.inner = 1 - modes.inner
         elif kind == "wheel":
             z[WHEEL], modes.torque_over = 0.0, True
     if forced:
         _set_by_speeds(system, z, modes)
-    return resolve(system, time, z, modes, spikes=may_stick, vertical=vertical, rotation=rotation)
+    return resolve(system, time, z, modes, spikes=may_stick, dry=halted)
 
 
 def _lift(system: System, z: list[float], modes: Modes, n: int) -> None:
@@ -350,18 +340,12 @@ def _lift(system: System, z: list[float], modes: Modes, n: int) -> None:
 def _set_by_speeds(system: System, z: list[float], modes: Modes) -> None:
     """After a forced step: who touches and which way they slide, read from the state as it is."""
     for n in range(system.trial.spike_count):
-        h, _ = system.arms(n, z)
-        inside = h - z[Y] > system.crater * modes.top[n]
+        depth, slip = system.depth_and_slip(n, z)
+        inside = depth > system.crater * modes.top[n]
         if inside and n not in modes.touching:
-            modes.touching = sorted([*modes.touching, n])
-            modes.touch(n, h - z[Y])
-            modes.slip[n] = 1 if z[VX] - z[OMEGA] * h > 0 else -1
+            modes.touch(n, depth, slip)
         elif not inside and n in modes.touching:
             _lift(system, z, modes, n)
         elif n in modes.touching and modes.slip[n]:
-            slip = z[VX] - z[OMEGA] * h
             modes.slip[n] = 1 if slip > 0 else -1
-    if modes.vertical:
-        modes.vertical = 1 if system.s.up_x * z[VX] + system.s.up_y * z[VY] > 0 else -1
-    if modes.rotation:
-        modes.rotation = 1 if z[OMEGA] > 0 else -1
+    modes.dry = [way and (1 if speed > 0 else -1) for way, speed in zip(modes.dry, system.dry_speeds(z), strict=True)]

@@ -29,8 +29,7 @@ def resolve(
     modes: Modes,
     *,
     spikes: Iterable[int] = (),
-    vertical: bool = False,
-    rotation: bool = False,
+    dry: Iterable[int] = (),
 ) -> list[float]:
     """Decide in `modes` whether what may stick now does; stop in `z` what sticking does not allow; return dz/dt.
 
@@ -40,16 +39,13 @@ def resolve(
         z: state vector; speeds that sticking forbids (rounding, or a tip that just stopped) are taken out.
         modes: changed in place.
         spikes: those whose slip speed is zero now, besides those that stick already.
-        vertical: whether the rig's dry friction may hold now.
-        rotation: whether the bearing's may.
+        dry: which dry frictions may hold now: 0 the rig's, 1 the bearing's.
     """
     fresh = [n for n in spikes if n in modes.touching]
     for n in fresh:
         modes.slip[n] = 0
-    if vertical:
-        modes.vertical = 0
-    if rotation:
-        modes.rotation = 0
+    for k in dry:
+        modes.dry[k] = 0
     freed: set[object] = set()
     for _ in range(12):
         rate = system.derivative(time, z, modes)
@@ -65,25 +61,24 @@ def resolve(
     return rate if tuple(z[VX : OMEGA + 1]) == before else system.derivative(time, z, modes)
 
 
-def _violations(system: System, modes: Modes) -> list[tuple[float, str]]:
-    """What should stick and is held by more than it can bear, with the force over the bound."""
+def _violations(system: System, modes: Modes) -> list[tuple[float, int]]:
+    """Ratio of force to bound where it exceeds 1, of the spikes that stick (-1) and of each dry friction (0, 1)."""
     slack, over = 1 + 1e-12, []
     if any(modes.slip[n] == 0 for n in modes.touching):
         force, bound = abs(system.stick_force), system.stick_bound
         if force > bound * slack:
-            over.append((force / bound if bound > 0 else float("inf"), "spikes"))
-    for name in ("vertical", "rotation"):
-        force, bound = abs(getattr(system, f"{name}_force")), getattr(system, f"{name}_bound")
-        if bound > 0 and getattr(modes, name) == 0 and force > bound * slack:
-            over.append((force / bound, name))
+            over.append((force / bound if bound > 0 else float("inf"), -1))
+    for k, (force, bound) in enumerate(zip(map(abs, system.dry_forces), system.dry_bounds, strict=True)):
+        if bound > 0 and modes.dry[k] == 0 and force > bound * slack:
+            over.append((force / bound, k))
     return over
 
 
 def _release(
-    system: System, time: float, z: list[float], modes: Modes, what: str, fresh: list[int], freed: set[object]
+    system: System, time: float, z: list[float], modes: Modes, what: int, fresh: list[int], freed: set[object]
 ) -> None:
-    if what != "spikes":
-        setattr(modes, what, -1 if getattr(system, f"{what}_force") > 0 else 1)
+    if what >= 0:
+        modes.dry[what] = -1 if system.dry_forces[what] > 0 else 1
         return
     force = system.stick_force
     sticking = [n for n in modes.touching if modes.slip[n] == 0]

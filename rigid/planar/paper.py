@@ -11,7 +11,6 @@ from collections.abc import Callable
 from .dynamics import INNER, INNER_SPEED, LOST, OMEGA, THETA, VX, VY, WHEEL, WORK, Modes, System, X, Y
 from .modes import resolve
 from .rest import at_rest
-from .statics import standing
 
 __all__ = ["integrate_fixed"]
 
@@ -19,17 +18,17 @@ OnStep = Callable[[float, list[float], list[float], Modes], None]
 
 
 def integrate_fixed(
-    system: System, *, duration: float, time_step: float, on_step: OnStep
+    system: System, start: tuple[list[float], Modes], *, duration: float, time_step: float, on_step: OnStep
 ) -> list[tuple[float, str, float]]:
-    """Step from static equilibrium to `duration` [s]; `on_step(time, z, dz/dt, modes)` sees the start and every step.
+    """Step from `start` to `duration` [s]; `on_step(time, z, dz/dt, modes)` sees the start and every step.
 
     Returns the transitions (time, state, theta). Raises RuntimeError where numbers stop being finite.
     """
     trial = system.trial
-    z, modes = standing(system)
+    z, modes = start
     modes.torque_over = trial.torque == 0 or trial.torque_until <= 0
     still = [n for n in modes.touching if modes.slip[n] == 0]
-    rate = resolve(system, 0.0, z, modes, spikes=still, vertical=True, rotation=True)
+    rate = resolve(system, 0.0, z, modes, spikes=still, dry=(0, 1))
     transitions = [(0.0, modes.state, z[THETA])]
     on_step(0.0, z, rate, modes)
     count = round(duration / time_step)
@@ -39,14 +38,14 @@ def integrate_fixed(
             z[WHEEL] += time_step * rate[WHEEL]
             if trial.actuator == "brake" and not modes.torque_over and z[WHEEL] <= 0 and trial.torque > 0:
                 z[WHEEL], modes.torque_over = 0.0, True
-                rate = resolve(system, time, z, modes, vertical=True, rotation=True)
+                rate = resolve(system, time, z, modes, dry=(0, 1))
             on_step(time, z, rate, modes)
             if not modes.torque_over and time >= trial.torque_until:
                 modes.torque_over = True
-                rate = resolve(system, time, z, modes, vertical=True, rotation=True)
+                rate = resolve(system, time, z, modes, dry=(0, 1))
             continue
-        before = {n: z[VX] - z[OMEGA] * system.arms(n, z)[0] for n in modes.touching}
-        old = (z[VX], z[VY], z[OMEGA], modes.vertical, modes.rotation)
+        before = {n: system.depth_and_slip(n, z)[1] for n in modes.touching}
+        speeds, turning = system.dry_speeds(z), z[OMEGA]
         for i in (VX, VY, OMEGA, WHEEL):
             z[i] += time_step * rate[i]
         for i in (X, Y, THETA):
@@ -55,12 +54,12 @@ def integrate_fixed(
             z[INNER_SPEED] += time_step * rate[INNER_SPEED]
             z[INNER] += time_step * z[INNER_SPEED]
         # The energy balance takes the speeds' mean over the step.
-        mean = 0.5 * (old[2] + z[OMEGA])
-        z[WORK] += time_step * (rate[WORK] / old[2] * mean if old[2] else system.s.torque * mean)
+        mean = 0.5 * (turning + z[OMEGA])
+        z[WORK] += time_step * (rate[WORK] / turning * mean if turning else system.s.torque * mean)
         z[LOST] += time_step * rate[LOST]
         if not all(map(math.isfinite, z)):
             raise RuntimeError(f"the motion is no longer finite at t = {time:.6g} s: {trial.describe()}")
-        rate = _read_modes(system, time, z, modes, before, old)
+        rate = _read_modes(system, time, z, modes, before, speeds)
         if modes.state != transitions[-1][1]:
             transitions.append((time, modes.state, z[THETA]))
         on_step(time, z, rate, modes)
@@ -68,7 +67,7 @@ def integrate_fixed(
 
 
 def _read_modes(
-    system: System, time: float, z: list[float], modes: Modes, before: dict[int, float], old: tuple[float, ...]
+    system: System, time: float, z: list[float], modes: Modes, before: dict[int, float], speeds: list[float]
 ) -> list[float]:
     trial = system.trial
     if not modes.torque_over and time >= trial.torque_until:
@@ -77,15 +76,12 @@ def _read_modes(
         z[WHEEL], modes.torque_over = 0.0, True
     stopped = []
     for n in range(trial.spike_count):
-        h, _ = system.arms(n, z)
-        depth, slip = h - z[Y], z[VX] - z[OMEGA] * h
+        depth, slip = system.depth_and_slip(n, z)
         inside = depth > system.crater * max(modes.top[n], depth)
         if system.has_memory and depth > 0:
             modes.remember(n, depth)
         if inside and n not in modes.touching:
-            modes.touching = sorted([*modes.touching, n])
-            modes.touch(n, depth)
-            modes.slip[n] = 1 if slip > 0 else -1
+            modes.touch(n, depth, slip)
         elif not inside and n in modes.touching:
             z[LOST] += system.stored(n, z, modes)
             modes.touching = [m for m in modes.touching if m != n]
@@ -101,7 +97,6 @@ def _read_modes(
         system.derivative(time, z, modes)
         if system.inner_holds < 0:
             modes.inner = 1 - modes.inner
-    up_x, up_y = system.s.up_x, system.s.up_y
-    vertical = bool(modes.vertical) and (up_x * old[0] + up_y * old[1]) * (up_x * z[VX] + up_y * z[VY]) <= 0
-    rotation = bool(modes.rotation) and old[2] * z[OMEGA] <= 0
-    return resolve(system, time, z, modes, spikes=stopped, vertical=vertical, rotation=rotation)
+    pairs = zip(modes.dry, speeds, system.dry_speeds(z), strict=True)
+    halted = [k for k, (way, old, new) in enumerate(pairs) if way and old * new <= 0]
+    return resolve(system, time, z, modes, spikes=stopped, dry=halted)

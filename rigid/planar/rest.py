@@ -63,21 +63,15 @@ def comes_to_rest(
     for i in speeds:
         still[i] = 0.0
     holding = modes.copy()
-    holding.vertical = holding.rotation = 0
+    holding.dry = [0, 0]
     rate = system.derivative(time, still, holding)
     near = _largest(system, rate) <= _SLOW * tolerance * system.trial.gravity_sim
-    held = all(
-        abs(force) <= bound * (1 + _BRIM)
-        for force, bound in (
-            (system.stick_force, system.stick_bound),
-            (system.vertical_force, system.vertical_bound),
-            (system.rotation_force, system.rotation_bound),
-        )
-    )
+    forces, bounds = (system.stick_force, *system.dry_forces), (system.stick_bound, *system.dry_bounds)
+    held = all(abs(force) <= bound * (1 + _BRIM) for force, bound in zip(forces, bounds, strict=True))
     if near and held and _is_stable(system, time, still, holding, rate, scale, tolerance):
         still[LOST] += system.energy(time, z, modes)[0]
         z[:] = still
-        modes.vertical, modes.rotation = 0, 0
+        modes.dry = [0, 0]
         system.derivative(time, z, modes)
         return True
     system.derivative(time, z, modes)
@@ -89,11 +83,11 @@ def _is_stable(
 ) -> bool:
     """Whether a stable equilibrium lies within the tolerance of `z`, where nothing moves."""
     free = [Y, THETA, INNER] if system.inner else [Y, THETA]
-    if system.vertical_bound > 0:
+    if system.dry_bounds[0] > 0:
         if system.s.up_x != 0.0:
             return False
         free.remove(Y)
-    if system.rotation_bound > 0:
+    if system.dry_bounds[1] > 0:
         free.remove(THETA)
     if not free:
         return True

@@ -2,15 +2,16 @@
 
 import bisect
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigid.checks import check_above_zero
+from rigid.checks import check_above_zero, sample_times
 from rigid.model.trial import Trial
 
+from .dormand_prince import Interpolant
 from .dynamics import LOST, OMEGA, VX, VY, WORK, Modes, System, X, Y
 from .located import integrate
 from .paper import integrate_fixed
@@ -52,11 +53,24 @@ def simulate(
     check_above_zero(duration=duration, sample_interval=sample_interval, tolerance=tolerance, time_step=time_step)
     if tolerance > 1e-2:
         raise ValueError(f"tolerance = {tolerance} must be at most 0.01")
-    samples = _sample_times(duration, sample_interval, times)
+    samples = sample_times(duration, sample_interval, times).tolist()
     if method == "paper":
         check_step(trial, time_step)
-        return _simulate_fixed(trial, duration, samples, time_step)
-    return _simulate_located(trial, duration, samples, tolerance)
+    system = System(trial)
+    start = standing(system)
+    recorder = _Recorder(system, samples, *start)
+    if method == "paper":
+        steps = math.ceil(duration / time_step * (1 - 1e-12))
+        transitions = integrate_fixed(
+            system, start, duration=steps * time_step, time_step=time_step, on_step=recorder.on_fixed_step
+        )
+        return recorder.build(method, transitions, {"steps": steps, "time_step": time_step})
+    went = integrate(system, duration=duration, tolerance=tolerance, on_step=recorder.on_step, start=start)
+    notes = {
+        "steps": went.steps, "rejected_steps": went.rejected, "events": went.events,
+        "forced_steps": went.forced_steps, "tolerance": tolerance,
+    }  # fmt: skip
+    return recorder.build(method, went.transitions, notes)
 
 
 def longest_step(trial: Trial) -> float:
@@ -111,55 +125,28 @@ def _values(values: Mapping[str, float]) -> str:
     return ", ".join(f"{name} = {value:g}" for name, value in values.items())
 
 
-def _sample_times(duration: float, interval: float, times: ArrayLike | None) -> list[float]:
-    if times is None:
-        count = math.floor(duration / interval * (1 + 1e-12))
-        samples = [k * interval for k in range(count + 1)]
-        if duration - samples[-1] > 1e-9 * duration:
-            samples.append(duration)
-        samples[-1] = min(samples[-1], duration)
-        return samples
-    array = np.asarray(times, dtype=float)
-    if array.ndim != 1 or len(array) == 0 or not np.isfinite(array).all() or (np.diff(array) < 0).any():
-        raise ValueError("times must be a list of finite numbers that rise")
-    if array[0] < 0 or array[-1] > duration:
-        raise ValueError(f"times must lie within 0 to duration = {duration:g} s, not {array[0]:g} to {array[-1]:g} s")
-    return [float(t) for t in array]
-
-
 class _Recorder:
-    """Collects rows at the sample times."""
+    """Follows an integration: rows at the sample times, largest speeds, the launch and the energy's residual."""
 
-    def __init__(self, system: System, samples: list[float]) -> None:
+    def __init__(self, system: System, samples: list[float], z: list[float], modes: Modes) -> None:
         self.system, self.samples, self.next = system, samples, 0
+        self.tally = Tally(system.trial, z[X], z[Y], sum(system.energy(0.0, z, modes)))
+        self.last = (0.0, list(z), modes)
         self.rows: list[tuple[Any, ...]] = []
 
+    def see(self, time: float, z: list[float], energy: tuple[float, float, float]) -> None:
+        """One moment."""
+        self.tally.see(time, z[VX], z[VY], z[OMEGA], sum(energy), z[WORK], z[LOST])
+
     def sample(self, time: float, z: list[float], modes: Modes, energy: tuple[float, float, float]) -> None:
+        """The row of the next sample time, where the system was evaluated last."""
         a = self.system.acceleration
         self.rows.append((time, *z[:6], *a, z[6], STATES.index(modes.state), *energy, z[WORK], z[LOST]))
+        self.next += 1
 
-    def build(self, method: str, transitions: Any, tally: Tally, notes: dict[str, Any]) -> Trajectory:
-        columns = np.array(self.rows, dtype=float).T
-        names = (
-            "time", "x", "y", "theta", "vx", "vy", "omega", "ax", "ay", "alpha", "wheel_speed", "state",
-            "kinetic_energy", "potential_energy", "stored_energy", "torque_work", "dissipated",
-        )  # fmt: skip
-        arrays: dict[str, Any] = dict(zip(names, columns, strict=True))
-        arrays["state"] = arrays["state"].astype(np.int8)
-        return Trajectory(
-            trial=self.system.trial, method=method, transitions=tuple(transitions), trajectory_angle=tally.angle,
-            max_speed=tally.max_speed, time_of_max_speed=tally.time_of_max_speed,
-            max_angular_velocity=tally.max_spin, energy_residual=tally.residual, notes=notes, **arrays,
-        )  # fmt: skip
-
-
-def _simulate_located(trial: Trial, duration: float, samples: list[float], tolerance: float) -> Trajectory:
-    system = System(trial)
-    recorder = _Recorder(system, samples)
-    z0, modes0 = standing(system)
-    tally = Tally(trial, z0[X], z0[Y], sum(system.energy(0.0, z0, modes0)))
-
-    def on_step(t0: float, t1: float, z1: list[float], at: Callable[[float], list[float]], modes: Modes) -> None:
+    def on_step(self, t0: float, t1: float, z1: list[float], at: Interpolant, modes: Modes) -> None:
+        """A step of the accurate integrator, from `t0` to `t1` [s]; `at` gives the state within it."""
+        tally = self.tally
         if tally.angle is None and tally.distance(z1[X], z1[Y]) >= LAUNCH_DISTANCE:
             low, high = t0, t1
             for _ in range(60):
@@ -171,56 +158,46 @@ def _simulate_located(trial: Trial, duration: float, samples: list[float], toler
             z = at(high)
             tally.launch(z[X], z[Y])
         # Samples up to the step's end; one that falls on an event belongs to what went before it.
-        end = bisect.bisect_right(samples, t1)
-        for t in samples[recorder.next : end]:
+        for t in self.samples[self.next : bisect.bisect_right(self.samples, t1)]:
             z = at(t)
-            system.derivative(t, z, modes)
-            energy = system.energy(t, z, modes)
-            recorder.sample(t, z, modes, energy)
-            tally.see(t, z[VX], z[VY], z[OMEGA], sum(energy), z[WORK], z[LOST])
-        recorder.next = end
-        tally.see(t1, z1[VX], z1[VY], z1[OMEGA], sum(system.energy(t1, z1, modes)), z1[WORK], z1[LOST])
+            self.system.derivative(t, z, modes)
+            energy = self.system.energy(t, z, modes)
+            self.sample(t, z, modes, energy)
+            self.see(t, z, energy)
+        self.see(t1, z1, self.system.energy(t1, z1, modes))
 
-    went = integrate(system, duration=duration, tolerance=tolerance, on_step=on_step, start=(z0, modes0))
-    notes = {
-        "steps": went.steps, "rejected_steps": went.rejected, "events": went.events,
-        "forced_steps": went.forced_steps, "tolerance": tolerance,
-    }  # fmt: skip
-    return recorder.build("located", went.transitions, tally, notes)
-
-
-def _simulate_fixed(trial: Trial, duration: float, samples: list[float], time_step: float) -> Trajectory:
-    system = System(trial)
-    recorder = _Recorder(system, samples)
-    tally: Tally | None = None
-    last: list[tuple[float, list[float], Modes]] = []
-
-    def on_step(time: float, z: list[float], rate: list[float], modes: Modes) -> None:
-        nonlocal tally
-        energy = system.energy(time, z, modes)
-        if tally is None:
-            tally = Tally(trial, z[X], z[Y], sum(energy))
-        tally.see(time, z[VX], z[VY], z[OMEGA], sum(energy), z[WORK], z[LOST])
+    def on_fixed_step(self, time: float, z: list[float], rate: list[float], modes: Modes) -> None:
+        """The end of a fixed step: samples lie on the straight line, their state is that of the step before."""
+        tally, (start, before, kind) = self.tally, self.last
+        energy = self.system.energy(time, z, modes)
+        self.see(time, z, energy)
         away = tally.distance(z[X], z[Y])
         if tally.angle is None and away >= LAUNCH_DISTANCE:
-            before = last[0][1]
             near = tally.distance(before[X], before[Y])
             share = (LAUNCH_DISTANCE - near) / (away - near)
             tally.launch(before[X] + share * (z[X] - before[X]), before[Y] + share * (z[Y] - before[Y]))
-        # Samples between two steps lie on the straight line; the state is that of the step before.
-        while recorder.next < len(samples) and samples[recorder.next] <= time + 1e-9 * time_step:
-            t = samples[recorder.next]
-            if last and t < time - 1e-9 * time_step:
-                start, old, kind = last[0]
+        close = 1e-9 * (time - start)
+        while self.next < len(self.samples) and self.samples[self.next] <= time + close:
+            t = self.samples[self.next]
+            if t < time - close:
                 share = (t - start) / (time - start)
-                z_t = [a + share * (b - a) for a, b in zip(old, z, strict=True)]
-                recorder.sample(t, z_t, kind, system.energy(t, z_t, kind))
+                z_t = [a + share * (b - a) for a, b in zip(before, z, strict=True)]
+                self.sample(t, z_t, kind, self.system.energy(t, z_t, kind))
             else:
-                recorder.sample(t, z, modes, energy)
-            recorder.next += 1
-        last[:] = [(time, list(z), modes.copy())]
+                self.sample(t, z, modes, energy)
+        self.last = (time, list(z), modes.copy())
 
-    steps = math.ceil(duration / time_step * (1 - 1e-12))
-    transitions = integrate_fixed(system, duration=steps * time_step, time_step=time_step, on_step=on_step)
-    assert tally is not None
-    return recorder.build("paper", transitions, tally, {"steps": steps, "time_step": time_step})
+    def build(self, method: str, transitions: Any, notes: dict[str, Any]) -> Trajectory:
+        """What it was, as a trajectory."""
+        names = (
+            "time", "x", "y", "theta", "vx", "vy", "omega", "ax", "ay", "alpha", "wheel_speed", "state",
+            "kinetic_energy", "potential_energy", "stored_energy", "torque_work", "dissipated",
+        )  # fmt: skip
+        arrays: dict[str, Any] = dict(zip(names, np.array(self.rows, dtype=float).T, strict=True))
+        arrays["state"] = arrays["state"].astype(np.int8)
+        tally = self.tally
+        return Trajectory(
+            trial=self.system.trial, method=method, transitions=tuple(transitions), trajectory_angle=tally.angle,
+            max_speed=tally.max_speed, time_of_max_speed=tally.time_of_max_speed,
+            max_angular_velocity=tally.max_spin, energy_residual=tally.residual, notes=notes, **arrays,
+        )  # fmt: skip

@@ -124,11 +124,11 @@ def _residual(system: System, z: list[float], modes: Modes) -> tuple[float, floa
     modes.top = [max(system.depth(n, z), 0.0) for n in range(system.trial.spike_count)]
     if system.inner:
         z[INNER] = system.inner_at_rest(z)
-    bounds, system.has_vertical, system.has_rotation = (system.has_vertical, system.has_rotation), False, False
+    has_dry, system.has_dry = system.has_dry, False
     try:
         system.derivative(0.0, z, modes)
     finally:
-        system.has_vertical, system.has_rotation = bounds
+        system.has_dry = has_dry
     mass = system.model.inertia(system.p, system.s)
     _, xy, yy, xt, yt, tt = mass
     ax, ay, at = system.acceleration

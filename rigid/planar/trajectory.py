@@ -64,15 +64,18 @@ class Trajectory:
 
     def transition_angle(self, state: str) -> float | None:
         """theta [rad] at the first entry into `state`, None if it never comes. Raises ValueError for an unknown one."""
-        if state not in STATES:
-            raise ValueError(f"state = {state!r} must be one of {', '.join(STATES)}")
-        return next((theta for _, name, theta in self.transitions if name == state), None)
+        found = self._first_entry(state)
+        return found[2] if found else None
 
     def transition_time(self, state: str) -> float | None:
         """Time [s] of the first entry into `state`, None if it never comes. Raises ValueError for an unknown one."""
+        found = self._first_entry(state)
+        return found[0] if found else None
+
+    def _first_entry(self, state: str) -> Transition | None:
         if state not in STATES:
             raise ValueError(f"state = {state!r} must be one of {', '.join(STATES)}")
-        return next((time for time, name, _ in self.transitions if name == state), None)
+        return next((change for change in self.transitions if change[1] == state), None)
 
 
 class Tally:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import root
 
-from rigid.checks import check_above_zero, check_friction
+from rigid.checks import check_above_zero, check_friction, sample_times
 from rigid.ground.laws import find_law
 from rigid.platform.actuation import TorqueHistory
 from rigid.platform.platform import Platform
@@ -223,7 +223,7 @@ def simulate(
     check_above_zero(duration=duration, sample_interval=sample_interval, tolerance=tolerance)
     if time_step is not None:
         check_above_zero("s", time_step=time_step)
-    samples = _samples(duration, sample_interval, times)
+    samples = sample_times(duration, sample_interval, times)
     z, motion = _start(trial, position, quaternion, velocity, angular_velocity), trial.motion()
     run = Integration(motion, trial.histories, trial.torque_in_flight, z, tolerance=tolerance, time_step=time_step)
     rows, counts, energies = np.empty((len(samples), STATE_COUNT)), [], []
@@ -257,16 +257,6 @@ def simulate(
         transitions=tuple(run.transitions), energy_residual=worst / max(most, scale, abs(energy_0), 1e-300),
         events=run.events, forced_steps=run.forced_steps, stalls=run.stalls,
     )  # fmt: skip
-
-
-def _samples(duration: float, interval: float, times: ArrayLike | None) -> Array:
-    if times is None:
-        count = math.ceil(duration / interval - 1e-9)
-        return np.minimum(interval * np.arange(count + 1), duration)
-    given = np.asarray(times, dtype=float)
-    if given.ndim != 1 or len(given) == 0 or given[0] < 0 or given[-1] > duration or (np.diff(given) <= 0).any():
-        raise ValueError(f"times must rise from 0 or more to at most duration = {duration} s")
-    return given
 
 
 def _start(

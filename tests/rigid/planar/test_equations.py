@@ -304,7 +304,7 @@ def test_the_energy_of_any_effect_changes_by_the_work_done_and_the_power_lost(id
     for state in states(rng, [0, 7], sinking, count=3, trial=trial):
         system = System(trial)
         modes = Modes(touching=[0, 7], slip=[1 if n == 0 else -1 for n in range(8)], top=[TOP] * 8)
-        modes.vertical, modes.rotation = -1 if sinking else 1, 1 if state[5] > 0 else -1  # dry frictions slide
+        modes.dry = [-1 if sinking else 1, 1 if state[5] > 0 else -1]  # dry frictions slide
         z = [*state[:6], 50.0, 0.0, 0.0, *state[6:]]
         system.derivative(0.1, z, modes)
         modes.inner = 1 if system.inner_holds > 0 else 0

@@ -265,7 +265,7 @@ def test_a_bearing_at_rest_bears_its_level_and_the_excess(excess, held):
 def test_friction_that_has_only_just_begun_to_slide_opposes_the_motion_with_all_its_excess(way):
     both = (effect("bearing-drag", torque=0.04, excess=0.5), effect("rig-friction", force=0.2, excess=0.5))
     trial = in_rig(effects=both)
-    modes = Modes(slip=[0] * 8, top=[0.0] * 8, vertical=way, rotation=way)
+    modes = Modes(slip=[0] * 8, top=[0.0] * 8, dry=[way, way])
     modes.torque_over = True
     told = System(trial).derivative(0.0, [0.0, 0.5, 0.0, 0.0, way * 1e-9, way * 1e-9, 0.0, 0.0, 0.0], modes)
     assert told[5] * trial.inertia == pytest.approx(-way * 0.06, rel=1e-9)
