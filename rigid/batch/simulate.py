@@ -6,15 +6,14 @@ the ground and the number of spikes are the same for all, since the kernel is co
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rigid.checks import check_above_zero
-from rigid.model.model import parameter_names
-from rigid.model.trial import Trial
+from rigid.checks import check_above_zero, check_not_negative
+from rigid.model.trial import POSITIVE, Trial
 from rigid.planar.simulate import check_step, step_bound
 from rigid.planar.trajectory import LAUNCH_DISTANCE, STATES
 
@@ -148,108 +147,86 @@ def _many(trials: Sequence[Trial], vary: Any) -> tuple[Trial, Array]:
                 f"trials[{k}] has other effects, another ground or another number of spikes than trials[0]: a batch is "
                 f"compiled for one set"
             )
-    return first, np.array([_row(trial) for trial in trials])
+    return first, np.concatenate([_rows(trial, {}) for trial in trials])
 
 
-def _row(trial: Trial) -> list[float]:
-    fixed = [
-        trial.mass, trial.inertia, trial.spike_length, trial.spike_length * math.cos(math.pi / trial.spike_count),
-        trial.counterweight, trial.pull_at_mass, trial.weight, trial.torque, trial.torque_until, trial.wheel_inertia,
-        1.0 if trial.actuator == "motor" else -1.0, trial.wheel_speed_0, trial.mu_s, trial.sliding_friction,
+def _rows(trial: Trial, given: Mapping[str, Array]) -> Array:
+    """Rows of numbers as the kernel wants them (`FIXED_NUMBERS`, the law's, the effects'), shape [trial_count, n].
+
+    `given`: what varies, in the place of the trial's own numbers.
+    """
+
+    def get(key: str) -> Any:
+        return given.get(key, getattr(trial, key))
+
+    mass, length, carried = get("mass"), get("spike_length"), get("counterweight")
+    moving = [effect for effect in trial.effects if not effect.term.sensor]
+    row = [
+        mass, get("inertia"), length, length * math.cos(math.pi / trial.spike_count), carried,
+        np.where(np.asarray(carried) > 0, get("gravity"), get("gravity_sim")), (mass + carried) * get("gravity_sim"),
+        get("torque"), get("torque_until"), get("wheel_inertia"), 1.0 if trial.actuator == "motor" else -1.0,
+        get("wheel_speed_0"), get("mu_s"), _sliding(trial, given),
+        *(trial.surface.numbers if trial.ground else (get("stiffness"), get("damping"))),
+        *(given.get(f"{effect.id}.{name}", value) for effect in moving for name, value in effect.values.items()),
+        trial.surface.rebound,
     ]  # fmt: skip
-    return [*fixed, *trial.surface.numbers, *trial.effect_numbers().values()]
+    return np.stack(np.broadcast_arrays(*row), axis=-1) if given else np.array([row], dtype=float)
+
+
+def _sliding(trial: Trial, given: Mapping[str, Array]) -> Any:
+    """mu_d: as given, else the trial's own, else half of mu_s."""
+    own = 0.5 * given.get("mu_s", trial.mu_s) if trial.mu_d is None else trial.mu_d
+    return given.get("mu_d", own)
 
 
 def _one_varied(trial: Trial, vary: Mapping[str, ArrayLike] | None) -> tuple[Trial, Array]:
     given = {key: np.asarray(value, dtype=float) for key, value in (vary or {}).items()}
-    sizes = {value.shape for value in given.values()} or {(1,)}
-    if len(sizes) != 1 or len(next(iter(sizes))) != 1:
+    sizes = {value.shape for value in given.values()}
+    if len(sizes) > 1 or any(len(size) != 1 for size in sizes):
         raise ValueError(f"vary must hold arrays of one length, not of shapes {sorted(sizes)}")
-    count = next(iter(sizes))[0]
-    if count == 0:
+    if (0,) in sizes:
         raise ValueError("vary holds empty arrays: at least one trial is needed")
-    known = {f"{effect.id}.{name}" for effect in trial.effects for name in effect.values}
-    own = {f"{effect.id}.{p.name}": p for effect in trial.effects for p in effect.term.parameters}
-    endless = {key for key, p in own.items() if p.default == math.inf}
+    own = {f"{effect.id}.{p.name}": (effect.id, p) for effect in trial.effects for p in effect.term.parameters}
     for key, value in given.items():
-        if key not in _FIXED and key not in known:
-            raise ValueError(f"vary has {key!r}, which does not vary; there is {', '.join((*_FIXED, *sorted(known)))}")
-        if not np.isfinite(value[np.isfinite(value) | (key not in {"torque_until", *endless})]).all():
+        if key not in _FIXED and key not in own:
+            raise ValueError(f"vary has {key!r}, which does not vary; there is {', '.join((*_FIXED, *sorted(own)))}")
+        endless = own[key][1].default == math.inf if key in own else key == "torque_until"
+        if (np.isnan(value) if endless else ~np.isfinite(value)).any():
             raise ValueError(f"vary[{key!r}] holds numbers that are not finite")
-        worst = (value.min(), value.max())
-        for extreme in worst:  # each bound of each number is checked where it is made: by the trial itself
-            _with(trial, {key: float(extreme)}, quiet=set(given) - {key})
+        if key in own:
+            id, parameter = own[key]
+            for extreme in (value.min(), value.max()):
+                parameter.check(float(extreme), id)
+        elif key in (*POSITIVE, "stiffness"):
+            check_above_zero(**{key: value.min()})
+        else:
+            check_not_negative(**{key: min(value.min(), 0.0)})
     if ("stiffness" in given or "damping" in given) and trial.ground is not None:
         raise ValueError("vary has stiffness or damping, but the trial's ground has numbers of its own")
-    numbers = np.tile(np.array(_row(trial)), (count, 1))
-
-    def get(key: str) -> Array:
-        return given.get(key, np.full(count, float(getattr(trial, key))))
-
-    columns = ("mass", "inertia", "spike_length", None, "counterweight", None, None, "torque", "torque_until",
-               "wheel_inertia", None, "wheel_speed_0", "mu_s")  # fmt: skip
-    for k, name in enumerate(columns):
-        if name:
-            numbers[:, k] = get(name)
-    numbers[:, 3] = get("spike_length") * math.cos(math.pi / trial.spike_count)
-    numbers[:, 5] = np.where(get("counterweight") > 0, get("gravity"), get("gravity_sim"))
-    numbers[:, 6] = (get("mass") + get("counterweight")) * get("gravity_sim")
-    if "mu_d" in given:
-        numbers[:, 13] = given["mu_d"]
-    elif trial.mu_d is None:
-        numbers[:, 13] = 0.5 * get("mu_s")
-    start = 14
-    if trial.ground is None:
-        numbers[:, start], numbers[:, start + 1] = get("stiffness"), get("damping")
-    start += len(trial.surface.numbers)
-    names = [f"{effect.id}.{name}" for effect in trial.effects if not effect.term.sensor for name in effect.values]
-    assert len(names) + 1 == len(parameter_names(trial.terms))
-    for k, name in enumerate(names):
-        if name in given:
-            numbers[:, start + k] = given[name]
-    _check_together(numbers)
-    return trial, numbers
+    _check_together(trial, given)
+    return trial, _rows(trial, given)
 
 
-def _check_together(numbers: Array) -> None:
-    """What only shows between two numbers of one trial."""
-    mass, inertia, length, counterweight = numbers[:, 0], numbers[:, 1], numbers[:, 2], numbers[:, 4]
+def _check_together(trial: Trial, given: Mapping[str, Array]) -> None:
+    """Raise ValueError for what only shows between two numbers of one trial."""
+    numbers = {key: given.get(key, getattr(trial, key)) for key in _FIXED} | {"mu_d": _sliding(trial, given)}
+    mass, inertia, carried = numbers["mass"], numbers["inertia"], numbers["counterweight"]
+    offset = trial.effect_values("com-offset") or {}
+    square = sum(given.get(f"com-offset.{axis}", value) ** 2 for axis, value in offset.items())
+    rigged = any(effect.term.needs_rig for effect in trial.effects)
+    stopped = np.equal(numbers["wheel_speed_0"], 0) & np.greater(numbers["torque"], 0)
     for name, wrong in (
-        ("inertia must not exceed mass spike_length^2", inertia > mass * length**2),
-        ("inertia must exceed wheel_inertia", numbers[:, 9] >= inertia),
-        ("counterweight must be below mass", counterweight >= mass),
-        ("mu_d must not exceed mu_s", numbers[:, 13] > numbers[:, 12]),
+        ("inertia must not exceed mass spike_length^2", inertia > mass * numbers["spike_length"] ** 2),
+        ("inertia must exceed wheel_inertia", numbers["wheel_inertia"] >= inertia),
+        ("counterweight must be below mass", carried >= mass),
+        ("gravity_sim must be below gravity in a rig", (carried > 0) & (numbers["gravity_sim"] >= numbers["gravity"])),
+        ("counterweight must be above 0 for these effects", np.equal(carried, 0) & rigged),
+        ("mu_d must not exceed mu_s", numbers["mu_d"] > numbers["mu_s"]),
+        ("wheel_speed_0 must be above 0 for a brake", stopped & (trial.actuator == "brake")),
+        ("com-offset.x, y must be below sqrt(J / m)", mass * square >= inertia),
     ):
-        if wrong.any():
-            raise ValueError(f"vary: {name}; it does in trial {int(np.flatnonzero(wrong)[0])}")
-
-
-def _with(trial: Trial, changes: Mapping[str, float], *, quiet: set[str]) -> Trial:
-    """The trial with other numbers. `quiet`: numbers that vary as well, so that pairs are not judged here."""
-    plain: dict[str, Any] = {key: value for key, value in changes.items() if "." not in key}
-    effects = []
-    for effect in trial.effects:
-        own = {key.partition(".")[2]: v for key, v in changes.items() if key.partition(".")[0] == effect.id}
-        effects.append(replace(effect, parameters={**effect.parameters, **own}) if own else effect)
-    if "mass" in plain:
-        room = {"inertia": min(trial.inertia, 0.5 * plain["mass"] * trial.spike_length**2)} if plain["mass"] > 0 else {}
-        if trial.counterweight:
-            room["counterweight"] = 0.5 * plain["mass"]
-        plain = {**room, **plain} if "inertia" in quiet or "counterweight" in quiet else plain
-    if "mu_s" in plain and trial.mu_d is not None and "mu_d" in quiet:
-        plain["mu_d"] = 0.0
-    if "mu_d" in plain and "mu_s" in quiet:
-        plain["mu_s"] = max(trial.mu_s, plain["mu_d"])
-    if "inertia" in plain and "mass" in quiet:
-        plain["mass"] = max(trial.mass, plain["inertia"] / trial.spike_length**2)
-    if "inertia" in plain and "wheel_inertia" in quiet:
-        plain["wheel_inertia"] = min(trial.wheel_inertia, 0.5 * plain["inertia"])
-    if "wheel_inertia" in plain and "inertia" in quiet:
-        most = plain.get("mass", trial.mass) * trial.spike_length**2
-        plain.setdefault("inertia", min(max(trial.inertia, 2 * plain["wheel_inertia"]), most))
-    if "counterweight" in plain and "mass" in quiet:
-        plain["mass"] = max(trial.mass, 1.01 * plain["counterweight"])
-    return replace(trial, effects=tuple(effects), **plain)
+        if np.any(wrong):
+            raise ValueError(f"vary: {name}; it is not in trial {int(np.flatnonzero(wrong)[0])}")
 
 
 def _check_stiffest(first: Trial, numbers: Array, time_step: float) -> None:

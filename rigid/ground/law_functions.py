@@ -58,34 +58,22 @@ def spring_damper_rate_work(depth, rate, p):
 
 def power_loading(depth, p):
     """K z^n."""
-    force = 0.0
-    if depth > 0.0:
-        force = p[0] * depth ** p[2]
-    return force
+    return p[0] * max(depth, 0.0) ** p[2]
 
 
 def power_loading_work(depth, p):
     """K z^(n + 1) / (n + 1)."""
-    work = 0.0
-    if depth > 0.0:
-        work = p[0] * depth ** (p[2] + 1.0) / (p[2] + 1.0)
-    return work
+    return p[0] * max(depth, 0.0) ** (p[2] + 1.0) / (p[2] + 1.0)
 
 
 def hunt_crossley_rate_force(depth, rate, p):
     """K z^n (3 / 2) alpha dz/dt, and never more than takes the whole force away."""
-    force = 0.0
-    if depth > 0.0:
-        force = p[0] * depth ** p[2] * max(1.5 * p[1] * rate, -1.0)
-    return force
+    return p[0] * max(depth, 0.0) ** p[2] * max(1.5 * p[1] * rate, -1.0)
 
 
 def hunt_crossley_rate_work(depth, rate, p):
     """Integral of the above over depth."""
-    work = 0.0
-    if depth > 0.0:
-        work = p[0] * depth ** (p[2] + 1.0) / (p[2] + 1.0) * max(1.5 * p[1] * rate, -1.0)
-    return work
+    return p[0] * max(depth, 0.0) ** (p[2] + 1.0) / (p[2] + 1.0) * max(1.5 * p[1] * rate, -1.0)
 
 
 def inertial_rate_force(depth, rate, p):
@@ -103,24 +91,20 @@ def inertial_rate_work(depth, rate, p):
 
 def bekker_loading(depth, p):
     """A(z) (k_c / b + k_phi) z^n, A = a (2 s - s^2) up to the depth h of the full section a, with s = z / h."""
-    force = 0.0
-    if depth > 0.0:
-        if depth < p[2]:
-            force = p[0] * depth ** (p[1] + 1.0) / p[2] * (2.0 - depth / p[2])
-        else:
-            force = p[0] * depth ** p[1]
+    z = max(depth, 0.0)
+    force = p[0] * z ** p[1]
+    if z < p[2]:
+        force = p[0] * z ** (p[1] + 1.0) / p[2] * (2.0 - z / p[2])
     return force
 
 
 def bekker_loading_work(depth, p):
     """Integral of the above over depth."""
-    work = 0.0
-    if depth > 0.0:
-        if depth < p[2]:
-            work = p[0] * depth ** (p[1] + 2.0) / p[2] * (2.0 / (p[1] + 2.0) - depth / p[2] / (p[1] + 3.0))
-        else:
-            work = p[0] * p[2] ** (p[1] + 1.0) * (2.0 / (p[1] + 2.0) - 1.0 / (p[1] + 3.0) - 1.0 / (p[1] + 1.0))
-            work = work + p[0] * depth ** (p[1] + 1.0) / (p[1] + 1.0)
+    z = max(depth, 0.0)
+    work = p[0] * p[2] ** (p[1] + 1.0) * (2.0 / (p[1] + 2.0) - 1.0 / (p[1] + 3.0) - 1.0 / (p[1] + 1.0))
+    work = work + p[0] * z ** (p[1] + 1.0) / (p[1] + 1.0)
+    if z < p[2]:
+        work = p[0] * z ** (p[1] + 2.0) / p[2] * (2.0 / (p[1] + 2.0) - z / p[2] / (p[1] + 3.0))
     return work
 
 
@@ -136,45 +120,35 @@ def no_rate_work(depth, rate, p):
 
 def rft_loading(depth, p):
     """2 pi R^3 xi_n (sum of b_k s^(k+2), s = z / R <= 1; beyond, level with the slope) + wall of the shaft."""
-    force = 0.0
-    if depth > 0.0:
-        s = min(depth / p[2], 1.0)
-        low = p[3] + s * (p[4] + s * (p[5] + s * p[6]))
-        high = p[7] + s * (p[8] + s * (p[9] + s * p[10]))
-        above = max(depth / p[2] - 1.0, 0.0)
-        force = p[0] * (s * s * (low + s * s * s * s * high) + p[11] * above + 0.5 * p[12] * above * above)
-    return force
+    z = max(depth, 0.0)
+    s = min(z / p[2], 1.0)
+    low = p[3] + s * (p[4] + s * (p[5] + s * p[6]))
+    high = p[7] + s * (p[8] + s * (p[9] + s * p[10]))
+    above = max(z / p[2] - 1.0, 0.0)
+    return p[0] * (s * s * (low + s * s * s * s * high) + p[11] * above + 0.5 * p[12] * above * above)
 
 
 def rft_loading_work(depth, p):
     """Integral of the above over depth."""
-    work = 0.0
-    if depth > 0.0:
-        s = min(depth / p[2], 1.0)
-        low = p[3] / 3.0 + s * (p[4] / 4.0 + s * (p[5] / 5.0 + s * p[6] / 6.0))
-        high = p[7] / 7.0 + s * (p[8] / 8.0 + s * (p[9] / 9.0 + s * p[10] / 10.0))
-        above = max(depth / p[2] - 1.0, 0.0)
-        full = p[3] + p[4] + p[5] + p[6] + p[7] + p[8] + p[9] + p[10]
-        work = s * s * s * (low + s * s * s * s * high)
-        work = work + above * (full + above * (0.5 * p[11] + p[12] * above / 6.0))
-        work = work * p[0] * p[2]
-    return work
+    z = max(depth, 0.0)
+    s = min(z / p[2], 1.0)
+    low = p[3] / 3.0 + s * (p[4] / 4.0 + s * (p[5] / 5.0 + s * p[6] / 6.0))
+    high = p[7] / 7.0 + s * (p[8] / 8.0 + s * (p[9] / 9.0 + s * p[10] / 10.0))
+    above = max(z / p[2] - 1.0, 0.0)
+    full = p[3] + p[4] + p[5] + p[6] + p[7] + p[8] + p[9] + p[10]
+    work = s * s * s * (low + s * s * s * s * high)
+    work = work + above * (full + above * (0.5 * p[11] + p[12] * above / 6.0))
+    return work * p[0] * p[2]
 
 
 def rft_rate_force(depth, rate, p):
     """lambda rho (n.v)^2 over the ball: pi R^2 lambda rho v^2 (1 - (1 - s)^4) / 2 while going in."""
-    force = 0.0
-    if depth > 0.0:
-        left = 1.0 - min(depth / p[2], 1.0)
-        force = p[1] * max(rate, 0.0) ** 2 * (1.0 - left * left * left * left)
-    return force
+    left = 1.0 - min(max(depth, 0.0) / p[2], 1.0)
+    return p[1] * max(rate, 0.0) ** 2 * (1.0 - left * left * left * left)
 
 
 def rft_rate_work(depth, rate, p):
     """Integral of the above over depth."""
-    work = 0.0
-    if depth > 0.0:
-        s = depth / p[2]
-        left = 1.0 - min(s, 1.0)
-        work = p[1] * max(rate, 0.0) ** 2 * p[2] * (s - (1.0 - left * left * left * left * left) / 5.0)
-    return work
+    s = max(depth, 0.0) / p[2]
+    left = 1.0 - min(s, 1.0)
+    return p[1] * max(rate, 0.0) ** 2 * p[2] * (s - (1.0 - left * left * left * left * left) / 5.0)

@@ -20,6 +20,7 @@ the numbers of the ground's law:
 """
 
 import linecache
+import re
 import types
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
@@ -198,12 +199,6 @@ def _hooks(terms: Sequence[Term], law: SurfaceLaw) -> dict[str, Callable[..., An
     }
 
 
-_GLUE = (
-    "vertical", "tip_radius", "torque_factor", "inertia", "applied", "potential", "losses", "dry_friction",
-    "inner_start", "inner", "plastic_share", "hollow", "crater", "contact",
-)  # fmt: skip
-
-
 @lru_cache(maxsize=256)
 def assemble(terms: tuple[Term, ...], ground: str, *, taichi: bool = False) -> Model:
     """The model of these effects on the ground called `ground`, for Python or for Taichi.
@@ -215,6 +210,7 @@ def assemble(terms: tuple[Term, ...], ground: str, *, taichi: bool = False) -> M
     if len(inner) > 1:
         raise ValueError(f"effects {' and '.join(map(repr, inner))} each have a coordinate of their own: one at most")
     text = model_source(terms, law)
+    written = re.findall(r"^def (\w+)", text, re.MULTILINE)
     file = f"<planar model {ground} {'+'.join(term.id for term in terms) or 'base'} {id(terms):x} {taichi}>"
     linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)  # where Taichi reads it
     functions: dict[str, Any] = dict(_hooks(terms, law))
@@ -224,9 +220,9 @@ def assemble(terms: tuple[Term, ...], ground: str, *, taichi: bool = False) -> M
     if taichi:
         import taichi as ti
 
-        for name in _GLUE:  # in the order in which they call each other
+        for name in written:  # in the order in which they call each other
             functions[name] = ti.func(functions[name])
-    shown = (*_GLUE, "contact_arms", "divide_mass")
+    shown = (*written, "contact_arms", "divide_mass")
     return Model(terms, law, {name: functions[name] for name in shown})
 
 

@@ -14,6 +14,8 @@ from rigid.terms import Term, find_effect, load_effect
 __all__ = ["Effect", "Ground", "Trial"]
 
 STANDARD_GRAVITY = 9.80665
+POSITIVE = ("mass", "inertia", "spike_length", "gravity_sim", "gravity", "wheel_inertia")
+"""Numbers of a trial that must be above 0."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,7 +110,7 @@ class Trial:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "effects", tuple(self.effects))
-        positive = ["mass", "inertia", "spike_length", "gravity_sim", "gravity", "wheel_inertia"]
+        positive = [*POSITIVE]
         others = ["damping", "mu_s", "counterweight", "torque", "wheel_speed_0"]
         (positive if self.ground is None else others).append("stiffness")
         if self.mu_d is not None:
@@ -250,9 +252,6 @@ class Trial:
 
     def describe(self) -> dict[str, Any]:
         """What it is, in plain numbers."""
-        keys = (
-            "mass", "inertia", "spike_length", "spike_count", "stiffness", "damping", "mu_s", "gravity_sim", "gravity",
-            "counterweight", "torque", "torque_until", "actuator", "wheel_inertia", "wheel_speed_0",
-        )  # fmt: skip
-        told = {key: getattr(self, key) for key in keys} | {"mu_d": self.sliding_friction, "ground": self.surface.name}
-        return told | {"effects": [{"id": effect.id, "parameters": effect.values} for effect in self.effects]}
+        plain = {key: value for key, value in vars(self).items() if key not in ("mu_d", "effects", "ground")}
+        plain |= {"mu_d": self.sliding_friction, "ground": self.surface.name}
+        return plain | {"effects": [{"id": effect.id, "parameters": effect.values} for effect in self.effects]}
