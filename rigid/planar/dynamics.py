@@ -47,8 +47,9 @@ class Modes:
 
     def copy(self) -> "Modes":
         """A copy that can be changed."""
-        lists = {name: list(getattr(self, name)) for name in ("touching", "slip", "top", "held", "dry")}
-        return replace(self, **lists)
+        return replace(
+            self, touching=[*self.touching], slip=[*self.slip], top=[*self.top], held=[*self.held], dry=[*self.dry]
+        )
 
     def deepest(self, spike: int, depth: float) -> tuple[float, float]:
         """Deepest depths [m] since the spike entered the ground, and since it touched, with `depth` reached now."""
