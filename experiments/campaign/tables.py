@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence, Set
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from rigid.platform.rig import STANDARD_GRAVITY
 
@@ -153,8 +153,8 @@ class TumbleSensors(Table):
     wheel: WheelSensor | None = Field(None, description="table with std")
 
 
-def _file_name(value: str | None) -> str | None:
-    if value is not None and (not value or value.startswith(("/", "\\")) or value[1:2] == ":"):
+def _relative_path(value: str) -> str:
+    if not value or value.startswith(("/", "\\")) or value[1:2] == ":":
         raise ValueError("a path relative to the campaign's folder was expected")
     return value
 
@@ -165,35 +165,42 @@ def _names_a_file(value: str) -> str:
     return value
 
 
-class TumbleTrial(Table):
+FileName = Annotated[str, AfterValidator(_relative_path)]
+
+
+class _Trial(Table):
+    """What trials of both kinds share."""
+
+    sensor_names: ClassVar[tuple[str, ...]]
+
+    id: Annotated[str, Field(min_length=1), AfterValidator(_names_a_file)] = Field(description="text, each once")
+
+    @property
+    def files(self) -> dict[str, str]:
+        """Sensor -> file, of the sensors that this trial has."""
+        return {name: getattr(self, name) for name in self.sensor_names if getattr(self, name) is not None}
+
+
+class TumbleTrial(_Trial):
     """``[[trial]]`` of tumbles."""
 
-    sensor_names: ClassVar[tuple[str, ...]] = ("pose", "imu", "wheel")
+    sensor_names = ("pose", "imu", "wheel")
 
-    id: str = Field(min_length=1, description="text, each once")
     gravity_sim: Positive = Field(description="m/s2")
     torque: NotNegative = Field(description="N m")
     actuator: Literal["motor", "brake"] = Field(description="'motor' or 'brake'")
     torque_until: Annotated[float, Field(ge=0)] = Field(math.inf, description="s")
     wheel_speed_0: NotNegative = Field(0.0, description="rad/s, 0 or more")
     counterweight: Positive | None = Field(None, description="kg, where it differs from [rig]")
-    pose: str | None = Field(None, description="file with t_s,x_m,y_m,theta_rad")
-    imu: str | None = Field(None, description="file with t_s,gyro_rad_s,ax_m_s2,ay_m_s2")
-    wheel: str | None = Field(None, description="file with t_s,omega_rad_s")
-
-    _named = field_validator("id")(_names_a_file)
-    _relative = field_validator("pose", "imu", "wheel")(_file_name)
+    pose: FileName | None = Field(None, description="file with t_s,x_m,y_m,theta_rad")
+    imu: FileName | None = Field(None, description="file with t_s,gyro_rad_s,ax_m_s2,ay_m_s2")
+    wheel: FileName | None = Field(None, description="file with t_s,omega_rad_s")
 
     @model_validator(mode="after")
     def _can_brake(self) -> Self:
         if self.actuator == "brake" and self.wheel_speed_0 == 0:
             raise ValueError("wheel_speed_0 = 0 leaves nothing to brake: the wheel's speed in rad/s was expected")
         return self
-
-    @property
-    def files(self) -> dict[str, str]:
-        """Sensor -> file, of the sensors that this trial has."""
-        return {name: getattr(self, name) for name in self.sensor_names if getattr(self, name) is not None}
 
     def columns(self, sensor: str) -> tuple[tuple[str, str], ...]:
         """What the file of a sensor must hold: (quantity, unit), the time first."""
@@ -207,6 +214,44 @@ class TumbleTrial(Table):
     def needed(self) -> dict[str, str]:
         """Key of ``[sensors]`` whose noise the files ask for -> the key of the trial that asks."""
         return {name: name for name in self.files}
+
+
+def _check_trials(tables: Any) -> Any:
+    """Raise ValueError for the trials that do not fit the tables of their campaign."""
+    sensors = {name for name, sensor in tables.sensors if sensor is not None}
+    faults = trial_faults(list(enumerate(tables.trial, 1)), sensors, tables._odd_trial)
+    if faults:
+        raise ValueError("\n".join(faults))
+    return tables
+
+
+def trial_faults(
+    trials: Sequence[tuple[int, Any]], sensors: Set[str], odd: Callable[[Any], str | None] = lambda trial: None
+) -> list[str]:
+    """What is wrong with trials (number in the file, trial): an id twice, no file, a sensor without its noise.
+
+    `sensors` are those that [sensors] has; `odd` says what else is wrong with a trial, None where nothing is.
+    """
+    seen: dict[str, int] = {}
+    faults = []
+    for number, trial in trials:
+        where = f"[[trial]] {number} (id {trial.id!r}): "
+        if trial.id in seen:
+            faults.append(
+                f"{where}id = {trial.id!r} is that of [[trial]] {seen[trial.id]} too: each id once was expected"
+            )
+        seen.setdefault(trial.id, number)
+        if not trial.files:
+            faults.append(f"{where}it names no file: at least one of {', '.join(trial.sensor_names)} was expected")
+        faults += [
+            f"{where}{key} is given, but [sensors.{sensor}] is missing: its std was expected"
+            for sensor, key in trial.needed.items()
+            if sensor not in sensors
+        ]
+        said = odd(trial)
+        if said:
+            faults.append(where + said)
+    return faults
 
 
 class _Tables(Table):
@@ -283,10 +328,7 @@ class TumbleCampaign(_TumbleTables):
             )
         return self
 
-    @model_validator(mode="after")
-    def _trials_fit(self) -> Self:
-        _check_trials(self.trial, self.sensors, self._odd_trial)
-        return self
+    _trials_fit = model_validator(mode="after")(_check_trials)
 
 
 class TumbleModel(_TumbleTables):
@@ -341,30 +383,23 @@ class PenetrationSensors(Table):
     accel: DepthSensor | None = Field(None, description="table with std in m/s2")
 
 
-class PenetrationTrial(Table):
+class PenetrationTrial(_Trial):
     """``[[trial]]`` of penetration."""
 
-    id: str = Field(min_length=1, description="text, each once")
+    sensor_names = ("data",)
+
     mode: Literal["driven", "drop"] = Field(description="'driven' or 'drop'")
     gravity: Positive = Field(STANDARD_GRAVITY, description="m/s2")
     grain_gravity: Positive | None = Field(None, description="m/s2, the grains' own where it differs")
     speed: NotNegative | None = Field(None, description="m/s, driven: nominal; drop: at the surface")
     diameter: Positive | None = Field(None, description="m, where it differs from [spike]")
-    data: str = Field(description="file with t_s,depth_m,force_N (driven) or t_s,depth_m,accel_m_s2 (drop)")
-
-    _named = field_validator("id")(_names_a_file)
-    _relative = field_validator("data")(_file_name)
+    data: FileName = Field(description="file with t_s,depth_m,force_N (driven) or t_s,depth_m,accel_m_s2 (drop)")
 
     @model_validator(mode="after")
     def _drop_has_a_speed(self) -> Self:
         if self.mode == "drop" and self.speed is None:
             raise ValueError("speed is missing: a drop's speed at the surface in m/s was expected")
         return self
-
-    @property
-    def files(self) -> dict[str, str]:
-        """Sensor -> file: there is one."""
-        return {"data": self.data}
 
     def columns(self, sensor: str) -> tuple[tuple[str, str], ...]:
         """What the file must hold: (quantity, unit), the time first."""
@@ -405,10 +440,7 @@ class PenetrationCampaign(_PenetrationTables):
 
     trial: tuple[PenetrationTrial, ...] = Field(min_length=1, description="at least one [[trial]]")
 
-    @model_validator(mode="after")
-    def _trials_fit(self) -> Self:
-        _check_trials(self.trial, self.sensors, self._odd_trial)
-        return self
+    _trials_fit = model_validator(mode="after")(_check_trials)
 
 
 class PenetrationModel(_PenetrationTables):
@@ -416,40 +448,3 @@ class PenetrationModel(_PenetrationTables):
 
     trial: tuple[PenetrationTrial, ...] = Field((), description="[[trial]]")
     effect: tuple[EffectTable, ...] = Field((), description="[[effect]]")
-
-
-def _check_trials(trials: tuple[Any, ...], sensors: Table, odd: Callable[[Any], str | None]) -> None:
-    """Raise ValueError for the trials that do not fit: what `trial_faults` finds, and what `odd` says of each."""
-    named = {name for name in type(sensors).model_fields if getattr(sensors, name) is not None}
-    faults = trial_faults(list(enumerate(trials, 1)), named, odd)
-    if faults:
-        raise ValueError("\n".join(faults))
-
-
-def trial_faults(
-    trials: Sequence[tuple[int, Any]], sensors: Set[str], odd: Callable[[Any], str | None] = lambda trial: None
-) -> list[str]:
-    """What is wrong with trials (number in the file, trial): an id twice, no file, a sensor without its noise.
-
-    `sensors` are those that [sensors] has; `odd` says what else is wrong with a trial, None where nothing is.
-    """
-    seen: dict[str, int] = {}
-    faults = []
-    for number, trial in trials:
-        where = f"[[trial]] {number} (id {trial.id!r}): "
-        if trial.id in seen:
-            faults.append(
-                f"{where}id = {trial.id!r} is that of [[trial]] {seen[trial.id]} too: each id once was expected"
-            )
-        seen.setdefault(trial.id, number)
-        if not trial.files:
-            faults.append(f"{where}it names no file: at least one of {', '.join(trial.sensor_names)} was expected")
-        faults += [
-            f"{where}{key} is given, but [sensors.{sensor}] is missing: its std was expected"
-            for sensor, key in trial.needed.items()
-            if sensor not in sensors
-        ]
-        said = odd(trial)
-        if said:
-            faults.append(where + said)
-    return faults
