@@ -85,14 +85,15 @@ _MODULES = {
     "experiments.diagnose": {
         "experiments.check": "lags unit_factors=words",
         "experiments.diagnose.core": (
-            "deciding diagnosis effect_equations effect_words equivalence next_steps outcome own_ways pairs "
-            "prediction renoised scatter_gap search sizes tumble_advice=effect_words"
+            "deciding diagnosis effect_equations=effect_texts effect_words=effect_texts equivalence=rivals next_steps "
+            "outcome own_ways=deciding pairs prediction=rivals renoised scatter_gap search sizes "
+            "tumble_advice=effect_texts"
         ),
         "experiments.diagnose.fit": (
             "bounds evidence fitting gaps gate localise own problem slopes together tumble_shapes=forms"
         ),
         "experiments.diagnose.noise": (
-            "astray colour jitter lone_beds noise_words=colour replicates spectrum stuck unrest"
+            "astray=diverging colour jitter lone_beds noise_words=colour replicates spectrum stuck unrest=wander"
         ),
         "experiments.diagnose.push": (
             "penetration_data=data penetration_depth=depth penetration_drive=drive penetration_forms=forms "
@@ -210,7 +211,7 @@ _NAMES = {
         "experiments.cli.runs": "BAD_INPUT DONE FAILED STOPPED",
     },
     "experiments.diagnose.core.outcome": {
-        "experiments.diagnose.core.finishing": "Told",
+        "experiments.diagnose.core.outcome": "Told=Known",
     },
     "experiments.paper": {
         "experiments.paper.experiment": "Job plan_jobs",

@@ -46,6 +46,6 @@ def _diagnosed(folder: str) -> Json:
         "fitted": list(found.fitted),
         "held_out": list(found.held_out),
         "base_values": {name: float(value) for name, value in found.base_values.items()},
-        "depends_on": found.depends_on,
+        "depends_on": found.dependence[0],
         "findings": [finding.what for finding in found.findings],
     }

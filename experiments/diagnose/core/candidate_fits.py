@@ -1,4 +1,4 @@
-"""Fits of the candidates of a search: alone, of another shape, in one another's noise, from where they promise most."""
+"""Fits of candidate effects: alone, with another shape, beside other effects, from the most promising starts."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -12,67 +12,69 @@ from experiments.diagnose.fit.problem import Finding, Form, Values
 
 from .pairs import FormsStart
 
-__all__ = ["FOLLOWED", "WORTH", "CandidateFits", "Tell", "said"]
+__all__ = ["FOLLOWED", "WORTH", "CandidateFits", "Tell"]
 
 WORTH = 3.0  # nats by which an effect must raise the tempered evidence
-BEHIND = 30.0
-"""Nats behind the best beyond which a candidate is not fitted to the end: its chi-square is seven times as large."""
-_FINISHED, _NEAR_BY = 8, 8.0
-"""So many candidates are fitted to the end, and all within so many nats of the best."""
+BEHIND = 30.0  # nats behind the best beyond which a fit stops early: the chi-square is seven times as large
+_FINISHED, _NEAR_BY = 8, 8.0  # number of candidates fitted to the end, and all within so many nats of the best
 FOLLOWED = 3
-_SMALL_PART, _PARTS = 0.3, (0.1, 1.0)
-"""Of the amplitude that a form has alone, and of those that its starts have, for fits of it beside others."""
+_SMALL_PART, _PARTS = 0.3, (0.1, 1.0)  # of a form's amplitude alone, and of its starts, for fits beside other forms
 
 Tell = Callable[[str, float], None]
 
 
 class CandidateFits:
-    """Fits of candidates on one set of trials: each effect alone, bent, beside others; all that was tried is kept."""
+    """Fits of candidates on one set of trials: each effect alone, bent, beside others; `table` keeps all of them.
+
+    `recoloured`: a fit with the noise as that fit leaves it. `find_diverging`: trials whose divergence is all that
+    contradicts the base model or the best single effect; asked before a second effect is searched.
+    """
 
     def __init__(
         self, base: Fit, *, tell: Tell, seed: int = 0, recoloured: Callable[[Fit], Fit] | None = None,
-        own_ways: Callable[[Fit, Fit], tuple[Finding, ...]] | None = None,
+        find_diverging: Callable[[Fit, Fit], tuple[Finding, ...]] | None = None,
     ) -> None:  # fmt: skip
         self.base = Hypothesis.of(base)
-        self._own_ways = own_ways
+        self._find_diverging = find_diverging
         self.tell = tell
         self.seed = seed
         self._recoloured = recoloured
-        self.table: list[tuple[str, Hypothesis]] = []
-        self._alone: dict[str, Hypothesis] = {}
-        self._most = self.base.score
-        """The best single form's."""
+        self.table: list[Hypothesis] = []
+        self._alone: dict[str, Fit] = {}
+        self._most = self.base.score  # of the best single form
 
     def _gate(self, hypothesis: Hypothesis) -> Verdict:
-        """With the noise as it shows beside the hypothesis: a colour calls for no further name."""
-        told = open_gate(hypothesis.fit, seed=self.seed)[1]
-        if told.passed or self._recoloured is None or not hypothesis.effects:
-            return told
+        """The gate, with the noise as it shows beside the hypothesis: a colour calls for no further effect."""
+        verdict = open_gate(hypothesis.fit, seed=self.seed)[1]
+        if verdict.passed or self._recoloured is None or not hypothesis.effects:
+            return verdict
         other = self._recoloured(hypothesis.fit)
-        return told if other is hypothesis.fit else open_gate(other, seed=self.seed)[1]
+        return verdict if other is hypothesis.fit else open_gate(other, seed=self.seed)[1]
 
-    def _try(self, what: str, start: Hypothesis, forms: Sequence[Form], *, rounds: int = 6) -> Hypothesis:
-        """`start` with `forms` added, all refitted."""
-        model: Model = start.fit.model.with_forms((*start.forms, *forms))
-        alone = self._alone.get(forms[0].id)
+    def _kept(self, found: Fit) -> Hypothesis:
+        """A fit as a hypothesis of the table."""
+        self.table.append(Hypothesis.of(found))
+        return self.table[-1]
+
+    def _try(self, start: Hypothesis, form: Form, *, rounds: int = 6) -> Hypothesis:
+        """`start` with `form` added, all refitted."""
+        model: Model = start.fit.model.with_forms((*start.forms, form))
+        alone = self._alone.get(form.id)
         if alone is None:
-            found = best_start(model, forms[0], start.fit.values, rounds=rounds)
-        else:  # where it stood alone is a good place to begin from beside others, and a small amplitude is another
-            amplitude = forms[0].amplitude
-            values = {**{p.name: alone.fit.values[p.name] for p in forms[0].parameters}, **start.fit.values}
+            found = best_start(model, form, start.fit.values, rounds=rounds)
+        else:  # begin from where it stood alone, and from a small amplitude
+            amplitude = form.amplitude
+            values = {**{p.name: alone.values[p.name] for p in form.parameters}, **start.fit.values}
             places: list[Values] = [values, {**values, amplitude: _SMALL_PART * values[amplitude]}]
-            if forms[0].effect in start.effects and model.problem.contacts is None:
-                # What it was alone, another form of the effect now is: little of it, in all its shapes.
-                for own in forms[0].starts:
+            if form.effect in start.effects and model.problem.contacts is None:
+                # Another form of the effect explains most already: a little of this one, in all its shapes.
+                for own in form.starts:
                     places += [{**start.fit.values, **own, amplitude: part * own[amplitude]} for part in _PARTS]
             first = [fit(model, place, rounds=4) for place in places]
-            best = min(first, key=lambda f: f.objective)
-            found = fit(model, best.values)
+            found = fit(model, min(first, key=lambda one: one.objective).values)
         if not start.forms:
-            self._alone[forms[0].id] = Hypothesis(found, 0.0)
-        made = Hypothesis.of(found)
-        self.table.append((what, made))
-        return made
+            self._alone[form.id] = found
+        return self._kept(found)
 
     def _singles(self) -> list[Hypothesis]:
         """The best form of each effect, the likeliest effect first."""
@@ -85,18 +87,15 @@ class CandidateFits:
         made: list[Hypothesis] = []
         for k, form in enumerate(forms):
             self.tell(f"trying {form.effect} ({form.name})", k / max(1, len(forms)))
-            made.append(self._try(form.id, self.base, [form], rounds=6 if contacts is None else 1))
+            made.append(self._try(self.base, form, rounds=6 if contacts is None else 1))
         if contacts is not None:
-            most = max((h.score for h in made), default=0.0)
             ranked = sorted((h.score for h in made), reverse=True)
-            least = min(ranked[:_FINISHED][-1], most - _NEAR_BY)
+            least = min(ranked[:_FINISHED][-1], ranked[0] - _NEAR_BY)
             for k, begun in enumerate(made):
-                if begun.score > most - BEHIND and begun.score >= least:
+                if begun.score > ranked[0] - BEHIND and begun.score >= least:
                     self.tell(f"fitting {forms[k].effect} ({forms[k].name})", k / len(forms))
-                    found = fit(begun.fit.model, begun.fit.values)
-                    made[k] = Hypothesis.of(found)
-                    self._alone[forms[k].id] = Hypothesis(found, 0.0)
-                    self.table.append((forms[k].id, made[k]))
+                    made[k] = self._kept(fit(begun.fit.model, begun.fit.values))
+                    self._alone[forms[k].id] = made[k].fit
         best: dict[str, Hypothesis] = {}
         for form, one in zip(forms, made, strict=True):
             if form.effect not in best or one.score > best[form.effect].score:
@@ -106,7 +105,7 @@ class CandidateFits:
         return sorted(best.values(), key=lambda h: -h.score)
 
     def _base_again(self, first: Sequence[Hypothesis]) -> None:
-        """The base model from where the best names ended: they may only have brought a trial back to its branch."""
+        """Fit the base model again from where the best effects ended, which may be on another branch of a trial."""
         for one in first[:FOLLOWED]:
             if WORTH < one.score - self.base.score < BEHIND:
                 found = fit(self.base.fit.model, one.fit.values)
@@ -114,7 +113,7 @@ class CandidateFits:
                     self.base = Hypothesis.of(found)
 
     def _from_its_like(self, one: Hypothesis) -> Hypothesis:
-        """The best of the forms that share scales with this single one, begun where it ended."""
+        """The best of the forms that share scales with this single form, begun where it ended."""
         best, (plain,) = one, one.forms
         if one.score < self.base.score + WORTH or excess(one.fit) < 0.5 * np.sqrt(2.0 * one.fit.count):
             return one
@@ -124,57 +123,51 @@ class CandidateFits:
                 continue
             start = form.starts[0] if form.starts else {}
             values = {**start, **one.fit.values, form.amplitude: one.fit.values[plain.amplitude]}
-            found = fit(one.fit.model.with_forms([form]), values)
-            made = Hypothesis.of(found)
-            self.table.append((form.id, made))
-            if form.id not in self._alone or found.objective < self._alone[form.id].fit.objective:
-                self._alone[form.id] = Hypothesis(found, 0.0)
+            made = self._kept(fit(one.fit.model.with_forms([form]), values))
+            if form.id not in self._alone or made.fit.objective < self._alone[form.id].objective:
+                self._alone[form.id] = made.fit
             best = made if made.score > best.score else best
         return best
 
     def _bent(self, hypothesis: Hypothesis) -> Hypothesis:
-        """With forms of another shape where that helps, from where the plain ones are, and of a second one."""
-        best = hypothesis
-        shapes = best.fit.model.problem.shapes
+        """With forms of another shape where that helps, begun where the plain forms ended."""
+        best, shapes = hypothesis, hypothesis.fit.model.problem.shapes
         plain = list(hypothesis.forms) if hypothesis.score > self._most - BEHIND else []
         while plain:
             form, start = plain.pop(0), best
-            known = {p.name for p in form.parameters}
             if excess(start.fit) < 0.5 * np.sqrt(2.0 * start.fit.count):
                 break
             for finer in shapes.get(form.id, ()):
-                found = self._fitted_bend(start.fit, form, finer, known)
-                made = Hypothesis.of(found)
-                self.table.append((said(made), made))
+                made = self._kept(self._fitted_bend(start.fit, form, finer))
                 if made.score > max(best.score, start.score + 1.0):
                     best = made
                     if len(made.forms) == 1:
-                        self._alone[finer.id] = made
+                        self._alone[finer.id] = made.fit
             plain += [made for made in best.forms if made not in start.forms]
         return best
 
     @staticmethod
-    def _fitted_bend(start: Fit, plain: Form, finer: Form, known: set[str]) -> Fit:
-        """With the `finer` form in place of the plain one, whose parameters are `known`."""
+    def _fitted_bend(start: Fit, plain: Form, finer: Form) -> Fit:
+        """With the `finer` form in place of the plain one."""
         model = start.model.with_forms([finer if form is plain else form for form in start.model.forms])
-        bends = _once([{k: v for k, v in point.items() if k not in known} for point in finer.starts])
-        places: list[Values] = [{**start.values, **bend} for bend in bends]
+        known = {p.name for p in plain.parameters}
+        bends = dict.fromkeys(tuple((k, v) for k, v in point.items() if k not in known) for point in finer.starts)
+        places: list[Values] = [{**start.values, **dict(bend)} for bend in bends]
         begun = [fit(model, values, rounds=3) for values in places]
         contacts = model.problem.contacts
         if contacts is not None:  # a bend alone may put trials on other branches: from their beginnings, too
-            asked = [(model.forms, values) for values in places]
-            found_anew = contacts.refine(asked, model.trials, apart=model.scatter)
-            begun += [fit(model, values, rounds=3) for values in found_anew]
+            refined = contacts.refine([(model.forms, values) for values in places], model.trials, apart=model.scatter)
+            begun += [fit(model, values, rounds=3) for values in refined]
         return fit(model, min(begun, key=lambda one: one.objective).values)
 
     def _siblings(self, hypothesis: Hypothesis) -> list[Hypothesis]:
-        """Other forms of a single name, alone: bent, one that was behind may come nearer than the one that leads."""
+        """Other forms of a single effect, alone: when bent, one that was behind may overtake the leading form."""
         problem = hypothesis.fit.model.problem
         if len(hypothesis.forms) != 1 or problem.contacts is not None:
             return []
         shapes = problem.shapes.keys() & {form.id for form in problem.forms}
         found: dict[str, Hypothesis] = {}
-        for _, tried in self.table:
+        for tried in self.table:
             if len(tried.forms) != 1 or tried.effects != hypothesis.effects or tried.forms == hypothesis.forms:
                 continue
             known = found.get(tried.forms[0].id)
@@ -184,7 +177,7 @@ class CandidateFits:
         return list(found.values())
 
     def _enriched(self, hypothesis: Hypothesis) -> Hypothesis:
-        """Of another shape or with a second form of an effect, where that helps: nature's is between the library's."""
+        """With another shape or a second form of an effect, where that helps: nature's lies between the library's."""
         best = max([self._bent(one) for one in (hypothesis, *self._siblings(hypothesis))], key=lambda h: h.score)
         for _ in range(2):
             start = best
@@ -194,7 +187,7 @@ class CandidateFits:
             for form in start.fit.model.problem.forms:
                 if form.effect not in start.effects or any(p.name in taken for p in form.parameters):
                     continue
-                made = self._try(f"{said(start)} + {form.id}", start, [form])
+                made = self._try(start, form)
                 if made.score > best.score + 1.0:
                     best = made
             if best is start:
@@ -202,14 +195,14 @@ class CandidateFits:
         return best
 
     def _likeliest(self, best: Hypothesis, tried: Sequence[Hypothesis]) -> Hypothesis:
-        """The likeliest of `tried`, with the noise as it shows where the least is left: until then colour is misfit."""
+        """The likeliest of `tried`, with the noise that shows where the least is left."""
         first = max(tried, key=lambda h: h.score)
         least = min(tried, key=lambda h: h.fit.objective)
         pair = self._in_its_noise(first, least) if least is not first else None
         return least if pair is not None and pair[1].score > pair[0].score else first
 
     def _in_its_noise(self, one: Hypothesis, other: Hypothesis) -> tuple[Hypothesis, Hypothesis] | None:
-        """Both weighed with the noise that `other` leaves; None where that is the noise they were weighed with."""
+        """Both scored with the noise that `other` leaves; None where that is the noise they were scored with."""
         found = self._recoloured(other.fit) if self._recoloured is not None else other.fit
         if found is other.fit:
             return None
@@ -218,14 +211,13 @@ class CandidateFits:
 
     def _begun(self, model: Model, starts: Sequence[FormsStart]) -> list[Hypothesis]:
         """Fits of what `starts` add to `model`; the most promising in full."""
+        models = [model.with_forms((*model.forms, *start.forms)) for start in starts]
         places = [start.values for start in starts]
         contacts = model.problem.contacts
-        if contacts is not None and starts:  # a search of its own, for models whose contacts make a likelihood jump
-            asked = [((*model.forms, *start.forms), start.values) for start in starts]
+        begun: list[Fit] = []
+        if contacts is not None and starts:  # a search of its own, after which the better half goes on
+            asked = [(longer.forms, values) for longer, values in zip(models, places, strict=True)]
             places = list(contacts.refine(asked, model.trials, apart=model.scatter))
-        begun = []
-        models = [model.with_forms((*model.forms, *start.forms)) for start in starts]
-        if contacts is not None:  # these are near their ends: the better half goes on
             left = [float(np.square(one.evaluate([point])[0]).sum()) for one, point in zip(models, places, strict=True)]
             kept = sorted(range(len(left)), key=lambda k: left[k])[: max(FOLLOWED, (len(left) + 1) // 2)]
             models, places = [models[k] for k in kept], [places[k] for k in kept]
@@ -234,24 +226,9 @@ class CandidateFits:
                 values = fit(longer.until(share), values, rounds=6).values
             begun.append(fit(longer, values, rounds=5))
         begun.sort(key=lambda found: found.objective)
-        made = []
-        for one in begun[:FOLLOWED]:
-            found = fit(one.model, one.values)
-            made.append(Hypothesis.of(found))
-            self.table.append((said(made[-1]), made[-1]))
-        return made
+        return [self._kept(fit(one.model, one.values)) for one in begun[:FOLLOWED]]
 
     def _best_forms(self, effect: str) -> list[Form]:
-        """Forms of an effect, in the order of how well they did alone."""
-        alone = [h for what, h in self.table if len(h.forms) == 1 and h.effects == (effect,)]
+        """Forms of an effect, the one that did best alone first."""
+        alone = [h for h in self.table if len(h.forms) == 1 and h.effects == (effect,)]
         return [h.forms[0] for h in sorted(alone, key=lambda h: -h.score)]
-
-
-def _once(places: Sequence[Values]) -> list[Values]:
-    """Each of them once."""
-    return [dict(numbers) for numbers in dict.fromkeys(tuple(place.items()) for place in places)]
-
-
-def said(hypothesis: Hypothesis) -> str:
-    """Its forms, as the table has them."""
-    return " + ".join(form.id for form in hypothesis.forms)

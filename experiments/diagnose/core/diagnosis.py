@@ -1,10 +1,9 @@
-"""From a problem to a diagnosis: split, fit, gate, search, verdict. Knows nothing of what kind of trials these are."""
+"""From a problem to a diagnosis: split, fit, gate, search, verdict. Independent of the kind of trials."""
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,17 +12,22 @@ from experiments.diagnose.fit.evidence import Hypothesis, excess, held_out_fit, 
 from experiments.diagnose.fit.fitting import Fit, Model, Whitener, by_beginnings, fit, settled
 from experiments.diagnose.fit.gate import Verdict, held_out_gate, open_gate
 from experiments.diagnose.fit.problem import Finding, Problem
-from experiments.diagnose.noise.astray import allowed
 from experiments.diagnose.noise.colour import Colour
+from experiments.diagnose.noise.diverging import diverging_trials, most_diverging
 from experiments.diagnose.noise.jitter import Jitter
 from experiments.diagnose.noise.lone_beds import lone_finding
 from experiments.diagnose.noise.replicates import Scatter, exchanged, groups_of, odd_trials, split_trials, trends
-from experiments.diagnose.noise.unrest import Unrest
+from experiments.diagnose.noise.wander import Wander
 
-from .deciding import explains_nothing, unscattered, verdict_of
-from .finishing import Told
-from .outcome import Diagnosis
-from .own_ways import all_astray, held_out_ways, missed, own_ways
+from .deciding import (
+    diverging_beside,
+    explains_nothing,
+    held_out_divergences,
+    missed,
+    unscattered,
+    verdict_of,
+)
+from .outcome import Diagnosis, Known, finish
 from .renoised import (
     calmed,
     coloured,
@@ -37,31 +41,29 @@ from .renoised import (
     recoloured,
     rescattered,
     scatter_of,
-    unrest_of,
+    wander_of,
     whitened_fit,
 )  # fmt: skip
-from .search import Choice, choose
+from .search import Choice, Search
 
 __all__ = ["diagnose"]
 
 Tell = Callable[[str, float], None]
 
-_DRAWS, _REFITS = 600, 400
-"""Made-up campaigns of a null, and of a thorough one, each of them refitted."""
-_MARGIN = 1.5  # standard deviations beyond the gate that something without a name must reach: no effect speaks for it
-_MOST_LEFT = 2.5  # chi-square a sample up to which a name is near enough to the motion for rows to be weighed by it
-_ON = 1.0  # chi-square by which a fit must go on to be taken instead
-_OUT_OF_THE_WAY = 0.5
-"""Share of what the base model leaves from which on a name has not taken the motion out of the way."""
+_DRAWS, _REFITS = 600, 400  # synthetic campaigns of a null, and of a thorough one, each of them refitted
+_MARGIN = 1.5  # standard deviations beyond the gate that something unknown must reach, as no effect supports it
+_MOST_LEFT = 2.5  # chi-square a sample up to which an effect is near enough to the motion to weight rows by it
+_ON = 1.0  # chi-square by which a fit must improve to be taken instead
+_NO_MOTION = 0.5  # share of what the base model leaves, below which an effect describes the motion
 
 
 def diagnose(
     problem: Problem, *, thorough: bool = False, seed: int = 0, tell: Tell | None = None, gates: Path | None = None
 ) -> Diagnosis:
-    """Diagnose a campaign. `tell(what, share done)` hears of progress; the same campaign gives the same answer.
+    """Diagnose a campaign; the same campaign gives the same answer. `tell(what, share done)` reports progress.
 
-    `thorough`: nulls by full refits, which takes as long as it takes; they are kept in the folder `gates`, if given,
-    for the next campaign of the same design.
+    `thorough`: nulls by full refits, which takes long; they are kept in the folder `gates`, if given, for the next
+    campaign of the same design.
     """
     return _Course(problem, _Asked(thorough, seed, tell or (lambda what, done: None), gates)).run()
 
@@ -77,63 +79,57 @@ class _Begun:
 
 @dataclass(frozen=True)
 class _Asked:
-    """How a campaign is looked at."""
+    """The options of a course."""
 
     thorough: bool
     seed: int
     tell: Tell
     gates: Path | None
-    aside: Sequence[Finding] = ()  # fitted trials that are to take no part (`astray`)
-    looked_at: Sequence[str] = ()
-    """Trials that must not be held out, others are in their place: the base model explains all but these."""
-    restless: bool = False
-    """What replicates differ by each in its own way (`unrest`) counts as noise; asked only whether a name that stands
-    beside something unknown is there for certain."""
-    begun: _Begun | None = None  # what the same campaign's first fits have told
-    patient: bool = False  # look for further names before a trial is asked whether it goes its own way
+    aside: Sequence[Finding] = ()  # fitted trials that are to take no part (`noise.diverging`)
+    looked_at: Sequence[str] = ()  # trials that must not be held out, as the base model explains all but these
+    with_wander: bool = False
+    """Whether the wander of replicates counts as noise, which tests an effect beside something unknown."""
+    begun: _Begun | None = None  # from an earlier course of the same campaign
+    patient: bool = False  # search further effects before trials may diverge
 
 
 class _Course:
-    """One way through: what is known so far, and the steps in their order."""
+    """One course of a diagnosis: what is known so far, and the steps in their order."""
+
+    findings: list[Finding]
+    held_out: tuple[str, ...]
+    begun: _Begun
+    base: Fit
+    jitters: tuple[Jitter, ...]
+    colours: dict[str, Colour]
+    first: Verdict  # the gate on the base model
 
     def __init__(self, problem: Problem, asked: _Asked) -> None:
         self.problem, self.asked, self.tell = problem, asked, asked.tell
-        self.findings: list[Finding]
-        self.held_out: tuple[str, ...]
-        self.begun: _Begun
-        self.base: Fit
-        self.jitters: tuple[Jitter, ...]
-        self.colours: dict[str, Colour]
-        self.unrest = Unrest({})
+        self.wander = Wander({})
         self.model_std: Mapping[str, float] = {}
-        self.first: Verdict
-        """The gate on the base model."""
-        self.alone: Fit | None = None
-        """The base model's fit as its own weights have it."""
+        self.alone: Fit | None = None  # the base model's fit as its own weights have it
 
     def run(self) -> Diagnosis:
         """All steps; some findings begin the course anew."""
         asked = self.asked
         self._fit_base()
-        self._look_at_noise()
+        self._find_noise()
         self._ask_gate()
         if self.first.passed:
             return self._nothing()
-        own = None
-        if not (asked.aside or asked.patient):
-            own = partial(all_astray, held_out=self.held_out, seed=asked.seed, recoloured=self._recoloured())
         begun = self.base
-        choice = self._chosen(own_ways=own)
-        if self.base.objective < begun.objective - _ON and not choice.astray:
+        choice = self._chosen(may_diverge=not (asked.aside or asked.patient))
+        if choice.diverging:
+            self.tell("a trial goes its own way: once more without it", 0.0)
+            anew = self._again(aside=choice.diverging, looked_at=asked.looked_at)
+            if self._stands(anew, choice.diverging):
+                return anew
+            return self._again(looked_at=asked.looked_at, patient=True)
+        if self.base.objective < begun.objective - _ON:
             self.first = self._gate_of_base()  # what it left was a branch that the search has found
             if self.first.passed:
                 return self._nothing()
-        if choice.astray:
-            self.tell("a trial goes its own way: once more without it", 0.0)
-            anew = self._again(aside=choice.astray, looked_at=asked.looked_at)
-            if self._stands(anew, choice.astray):
-                return anew
-            return self._again(looked_at=asked.looked_at, patient=True)
         for step in (
             self._reweighed, self._scattered, self._scattered_beside, self._scattered_alone, self._timed,
             self._recoloured_choice, self._doubted,
@@ -147,7 +143,7 @@ class _Course:
         return self._decided(choice)
 
     def _fit_base(self) -> None:
-        """Split and fitted, trials at odds with their replicates, and those that are to take no part, aside."""
+        """Split the trials and fit the base model, without trials at odds with their replicates and those set aside."""
         problem, asked = self.problem, self.asked
         problem.prepare(self.tell)
         self.tell("fitting the base model", 0.0)
@@ -178,15 +174,15 @@ class _Course:
             base = whitened_fit(base.model.on(fitted), beginnings=True)
         self.base = base
 
-    def _look_at_noise(self) -> None:
-        """What replicates differ by, readings in doubt, and the noise's colour."""
+    def _find_noise(self) -> None:
+        """The scatter of replicates, readings in doubt, and the noise's colour."""
         scatter = scatter_of(self.base, self.held_out)
         self.findings += trends(scatter, self.problem.trials)
         self.model_std = scatter.model_std
         base = rescattered(self.base, scatter) if scatter.parameters else self.base
-        if self.asked.restless:
-            self.unrest = unrest_of(base, self.held_out)
-        base = doubted(calmed(base, self.unrest), self.held_out)
+        if self.asked.with_wander:
+            self.wander = wander_of(base, self.held_out)
+        base = doubted(calmed(base, self.wander), self.held_out)
         self.colours = colours_of(base)
         self.base = coloured(base, self.colours)
 
@@ -210,48 +206,63 @@ class _Course:
             tell=lambda done: self.tell("making the gate's null", done),
         )[1]  # fmt: skip
 
-    def _recoloured(self) -> Callable[[Fit], Fit]:
-        return partial(recoloured, colours=self.colours)
+    def _recoloured(self, found: Fit) -> Fit:
+        return recoloured(found, self.colours)
 
-    def _chosen(self, **more: Any) -> Choice:
-        """A search from the base model, which may find a better fit of that, too."""
-        choice = choose(self.base, tell=self.tell, seed=self.asked.seed, recoloured=self._recoloured(), **more)
-        if not choice.astray:
+    def _diverging(self, found: Fit) -> tuple[Finding, ...]:
+        """Trials that diverge from a fit."""
+        return diverging_trials(found, self.held_out, seed=self.asked.seed, recoloured=self._recoloured)
+
+    def _chosen(self, *, may_diverge: bool = False) -> Choice:
+        """A search from the base model, which may find a better fit of that, too. `may_diverge`: whether it stops where
+        trials diverge from the base model or the best single effect."""
+
+        def diverging(base: Fit, best: Fit) -> tuple[Finding, ...]:
+            return self._diverging(base) or (self._diverging(best) if best.model.forms else ())
+
+        choice = Search(
+            self.base, tell=self.tell, seed=self.asked.seed, recoloured=self._recoloured,
+            find_diverging=diverging if may_diverge else None,
+        ).choose()  # fmt: skip
+        if not choice.diverging:
             self.base = choice.base.fit
         return choice
 
     def _reweighed(self, choice: Choice) -> Choice:
-        """With rows weighed as the best model has it: the effect of a path's error on a force goes with the model."""
+        """With rows weighted by the best model: the effect of a path's error on a force depends on the model."""
         best = choice.best
-        if self.asked.restless or not (best.effects and self.problem.by_path):
+        if self.asked.with_wander or not (best.effects and self.problem.by_path):
             return choice
-        loud = best.fit.chi_square > _MOST_LEFT * best.fit.count
-        if loud or excess(best.fit) >= _OUT_OF_THE_WAY * excess(self.base):
+        if best.fit.chi_square > _MOST_LEFT * best.fit.count or not self._describes_motion(best):
             return choice
         self.alone = fit(replace(self.base.model, scatter=()), unscattered(self.base))
         self.problem.rewhiten(best.fit.values, best.fit.model.forms)
         self.base = fit(self.base.model, self.base.values)
         found = fit(best.fit.model, best.fit.values)
         choice = self._moved(choice, found)
-        if not choice.left.passed and (other := self._recoloured()(found)) is not found:
+        if not choice.left.passed and (other := self._recoloured(found)) is not found:
             choice = replace(choice, left=open_gate(other, seed=self.asked.seed)[1])
         if choice.left.passed and len(best.effects) == 1 and not choice.alternatives:
             return choice
         self.tell("rows are weighed otherwise beside what was found: choosing again", 0.0)
         return self._chosen()
 
+    def _describes_motion(self, best: Hypothesis) -> bool:
+        """Whether the best model has effects that leave noise rather than motion."""
+        return bool(best.effects) and excess(best.fit) < _NO_MOTION * excess(self.base)
+
     def _scattered(self, choice: Choice) -> Choice:
-        """With the motion out of the way replicates are compared once more."""
+        """Replicates compared once more, beside effects that describe the motion."""
         best = choice.best
-        if not best.effects or excess(best.fit) >= _OUT_OF_THE_WAY * excess(self.base):
+        if not self._describes_motion(best):
             return choice
         scatter = scatter_of(best.fit, self.held_out)
-        wandering = unrest_of(best.fit, self.held_out) if self.asked.restless else self.unrest
-        if set(scatter.model_std) == set(self.model_std) and not wandering.other_than(self.unrest):
+        wander = wander_of(best.fit, self.held_out) if self.asked.with_wander else self.wander
+        if set(scatter.model_std) == set(self.model_std) and not wander.other_than(self.wander):
             return choice
         self.tell("replicates are found to differ otherwise: choosing again", 0.0)
-        self.model_std, self.unrest = scatter.model_std, wandering
-        self.base = coloured(calmed(rescattered(self.base, scatter), wandering), self.colours)
+        self.model_std, self.wander = scatter.model_std, wander
+        self.base = coloured(calmed(rescattered(self.base, scatter), wander), self.colours)
         return self._chosen()
 
     def _scattered_beside(self, choice: Choice) -> Choice:
@@ -271,8 +282,8 @@ class _Course:
                     return other
                 continue
             self.tell("replicates are found to differ beside what is left: choosing again", 0.0)
-            stands = _explains if kinds == self.problem.force_scatter else partial(_leaves_less, than=choice)
-            choice = self._chosen_with(scatter, stands) or choice
+            than = None if kinds == self.problem.force_scatter else choice
+            choice = self._chosen_with(scatter, than=than) or choice
         return choice
 
     def _scattered_alone(self, choice: Choice) -> Choice:
@@ -289,31 +300,29 @@ class _Course:
         # Zeros of depth and force are next to the same in a stiff bed: the likeliest is asked first.
         for scatter, beside in sorted(found, key=lambda one: one[1].objective):
             self.tell("trials are found to differ without a rule: choosing again", 0.0)
-            other = (
-                self._without_name(scatter, choice, beside) if choice.left.passed
-                else self._chosen_with(scatter, _explains, beside)
-            )  # fmt: skip
+            if choice.left.passed:
+                other = self._without_name(scatter, choice, beside)
+            else:
+                other = self._chosen_with(scatter, beside)
             if other:
                 self.findings.append(lone_finding(scatter))
                 return other
         return choice
 
-    def _chosen_with(
-        self, scatter: Scatter, stands: Callable[[Choice], bool], base: Fit | None = None
-    ) -> Choice | None:
-        """A choice anew beside `scatter`, kept where it `stands`; else None, and all is as before. `base`: the base
-        model's fit with it, the noise white, where that is known."""
+    def _chosen_with(self, scatter: Scatter, base: Fit | None = None, *, than: Choice | None = None) -> Choice | None:
+        """A choice anew beside `scatter`, kept where it explains all, or leaves less `than` another; else None, and all
+        is as before. `base`: the base model's fit with it, the noise white, where that is known."""
         before = self._beside(scatter, base)
         other = self._chosen()
-        if stands(other):
+        if other.left.passed if than is None else other.left.score < than.left.score:
             self.model_std = scatter.model_std
             return other
         self.base, self.colours = before
         return None
 
     def _without_name(self, scatter: Scatter, choice: Choice, base: Fit | None = None) -> Choice | None:
-        """Of a name that explains the fitted trials and not those held out: no name, where the base model beside
-        `scatter` explains both; else None, and all is as before."""
+        """In place of an effect that explains the fitted trials and not those held out: none, where the base model
+        beside `scatter` explains both; else None, and all is as before."""
         before = self._beside(scatter, base)
         left, held = self._gate_of_base(), self._held_out_gate(self.base)
         if left.passed and (held is None or held.passed):
@@ -333,10 +342,10 @@ class _Course:
 
     def _compares(self, choice: Choice) -> bool:
         """Whether trials are to be compared with one another once more (pushes and drops only)."""
-        return not self.asked.restless and self.problem.by_path and not self._settled(choice)
+        return not self.asked.with_wander and self.problem.by_path and not self._settled(choice)
 
     def _settled(self, choice: Choice) -> bool:
-        """Whether the best leaves nothing of trials that were fitted and, where it has a name, of those held out."""
+        """Whether the best leaves nothing of trials that were fitted and, with effects, of those held out."""
         if not choice.left.passed or not choice.best.effects:
             return choice.left.passed
         held = self._held_out_gate(choice.best.fit)
@@ -359,7 +368,7 @@ class _Course:
         return replace(choice, base=base, best=Hypothesis.of(best), left=left)
 
     def _recoloured_choice(self, choice: Choice) -> Choice:
-        """A colour that is seen only now that the motion is out of the way."""
+        """With a colour that shows only beside effects that describe the motion."""
         white = plain(choice.best.fit)
         fresh = colours_of(white)
         if not differ(fresh, self.colours):
@@ -379,7 +388,7 @@ class _Course:
         return self._moved(choice, best)
 
     def _moved(self, choice: Choice, best: Fit) -> Choice:
-        """The base model's fit and the best one as they are now; scores stay those by which all were weighed."""
+        """The base model's fit and the best one as they are now; scores stay those by which all were compared."""
         left = open_gate(best, seed=self.asked.seed)[1]
         base = replace(choice.base, fit=self.base)
         return replace(choice, base=base, best=replace(choice.best, fit=best), left=left)
@@ -391,7 +400,7 @@ class _Course:
         )[1]  # fmt: skip
 
     def _decided(self, choice: Choice) -> Diagnosis:
-        """Named, ambiguous or unknown; a trial that goes its own way, or replicates that do, are asked for first."""
+        """Named, ambiguous or unknown, after trials that diverge and replicates that wander have been considered."""
         asked, held_out = self.asked, self.held_out
         self.tell("verdict", 0.0)
         choice = self._ended(choice)
@@ -399,12 +408,10 @@ class _Course:
             return self._nothing(choice.left)
         held = self._held_out_gate(choice.best.fit)
         verdict = verdict_of(choice, held, held_out, asked.seed, set_aside=bool(asked.aside))
-        # Where a second name was called for, trials were asked before it.
+        # Where a second effect was called for, diverging trials were considered before it.
         before = verdict == "unknown" and choice.left.passed and len(choice.best.effects) > 1
         if not (asked.aside or before):
-            gone = own_ways(
-                self.base, choice, verdict, held_out=held_out, seed=asked.seed, recoloured=self._recoloured()
-            )
+            gone = diverging_beside(self.base, choice, verdict, self._diverging)
             if gone:
                 self.tell("a trial goes its own way: once more without it", 0.0)
                 anew = self._again(aside=gone, looked_at=asked.looked_at)
@@ -412,7 +419,7 @@ class _Course:
                     return anew
         explains = verdict == "unknown" and bool(choice.best.effects) and choice.left.passed
         if explains and not (asked.looked_at or asked.aside):
-            # What no fitted trial shows of a form may show in these: a name then has to explain all of them.
+            # What no fitted trial shows of a form may show in these: an effect then has to explain all of them.
             others = missed(choice.best.fit, held_out, asked.seed)
             if others:
                 self.tell("what the name leaves shows in trials that were held out: others are held out", 0.0)
@@ -421,33 +428,32 @@ class _Course:
                     return anew
         sure: tuple[str, ...] = ()
         model_std = self.model_std
-        if verdict == "unknown" and not asked.restless and choice.best.effects:
-            wander = unrest_of(choice.best.fit, held_out)
+        if verdict == "unknown" and not asked.with_wander and choice.best.effects:
+            wander = wander_of(choice.best.fit, held_out)
             if wander:
                 self.tell("replicates differ each in its own way: once more, against that", 0.0)
                 anew = self._again(
-                    deepcopy(self.problem), aside=asked.aside, looked_at=asked.looked_at, restless=True, begun=None
+                    deepcopy(self.problem), aside=asked.aside, looked_at=asked.looked_at, with_wander=True, begun=None
                 )
                 if anew.verdict == "named" and anew.choice is not None:
                     # Fitted, and the gap taken, with the sensors' noise alone.
                     sure = anew.effects
                     best = settled(fit(self.base.model.with_forms(anew.forms), unscattered(anew.best)))
-                    # The table of candidates is of the likelihood in which they were weighed, its base model's with it.
+                    # The table of candidates, its base model with it, is of the likelihood in which it was made.
                     choice = replace(anew.choice, best=Hypothesis.of(best), left=choice.left)
                     held = self._held_out_gate(best)
                 model_std = {**model_std, **wander.model_std}
         if verdict in ("named", "ambiguous") and held is not None and not held.passed:
-            self.findings += held_out_ways(choice.best.fit, held_out, asked.seed)
-        told = self._told({**model_std, **self.unrest.model_std})
-        return told.finish(self.base, choice, verdict, held=held, sure=sure)
+            self.findings += held_out_divergences(choice.best.fit, held_out, asked.seed)
+        return finish(self._known(model_std), self.base, choice, verdict, alone=self.alone, held=held, sure=sure)
 
     def _stands(self, anew: Diagnosis, gone: Sequence[Finding]) -> bool:
-        """Whether what was found without `gone` trials stands; a whole condition is set aside for a name only."""
-        few = len(gone) <= allowed(len(self.base.model.trials))
+        """Whether a diagnosis without the trials `gone` is kept; a whole condition is set aside for an effect only."""
+        few = len(gone) <= most_diverging(len(self.base.model.trials))
         return anew.verdict != "unknown" and (few or anew.verdict != "none")
 
     def _ended(self, choice: Choice) -> Choice:
-        """The best fit once more from where it is: one that a bend of the model had stopped may go on."""
+        """The best fit once more from where it is: one that had stopped at a bend of the model may go on."""
         best = choice.best.fit
         again = fit(best.model, best.values)
         if again.objective < best.objective - _ON:
@@ -455,19 +461,18 @@ class _Course:
         return replace(choice, best=replace(choice.best, fit=settled(choice.best.fit)))
 
     def _nothing(self, last: Verdict | None = None) -> Diagnosis:
-        """None is missing as far as the fitted trials tell; once more with others held out where these tell more."""
+        """No effect is missing by the fitted trials; once more with others held out where these show more."""
         asked = self.asked
         if others := () if asked.looked_at else missed(self.base, self.held_out, asked.seed):
             self.tell("what is left shows in trials that were held out: others are held out", 0.0)
             return self._again(aside=asked.aside, looked_at=others)
-        self.findings += held_out_ways(self.base, self.held_out, asked.seed)
-        told = self._told({**self.model_std, **self.unrest.model_std})
-        return told.finish(self.base, None, "none", last=last)
+        self.findings += held_out_divergences(self.base, self.held_out, asked.seed)
+        return finish(self._known(self.model_std), self.base, None, "none", alone=self.alone, last=last)
 
-    def _told(self, model_std: Mapping[str, float]) -> Told:
-        model_std = {**self.problem.known_std, **model_std}
-        return Told(self.problem, self.first, self.findings, self.held_out, self.jitters, self.colours, model_std,
-                    self.alone)  # fmt: skip
+    def _known(self, model_std: Mapping[str, float]) -> Known:
+        findings = (*self.findings, *(jitter.finding for jitter in self.jitters))
+        model_std = {**self.problem.known_std, **model_std, **self.wander.model_std}
+        return Known(self.problem, self.held_out, self.first, findings, self.jitters, self.colours, model_std)
 
     def _held_out_gate(self, found: Fit) -> Verdict | None:
         """The gate on trials that took no part, with the scatter of replicates where it was found."""
@@ -480,11 +485,3 @@ class _Course:
         """The whole course once more, with other trials aside or held out."""
         usual: dict[str, Any] = {"aside": (), "looked_at": (), "patient": False, "begun": self.begun}
         return _Course(problem or self.problem, replace(self.asked, **{**usual, **changes})).run()
-
-
-def _explains(choice: Choice) -> bool:
-    return choice.left.passed
-
-
-def _leaves_less(choice: Choice, *, than: Choice) -> bool:
-    return choice.left.score < than.left.score

@@ -1,66 +1,61 @@
-"""All that a diagnosis has found."""
+"""The outcome of a diagnosis: gaps, places where the model fails, alternatives, the next experiment."""
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from experiments.diagnose.fit.bounds import Bound, bounds_met
-from experiments.diagnose.fit.evidence import inflation
-from experiments.diagnose.fit.fitting import Fit
+from experiments.diagnose.fit.evidence import SMALL, held_out_fit, inflation
+from experiments.diagnose.fit.fitting import Fit, fit, settled
 from experiments.diagnose.fit.gate import Verdict
-from experiments.diagnose.fit.localise import Place, latent_table
+from experiments.diagnose.fit.localise import Place, depends_on, latent_table, places, places_in
 from experiments.diagnose.fit.problem import Finding, Form, Problem
 from experiments.diagnose.noise.colour import Colour
 from experiments.diagnose.noise.jitter import Jitter
-from experiments.diagnose.noise.spectrum import Line
+from experiments.diagnose.noise.spectrum import Line, lines_of
 
-from .deciding import Gap
-from .equivalence import Rival
-from .prediction import Predicted
+from .deciding import Gap, certain, closes, gap_of, smallest, unscattered, values_of_all
+from .effect_texts import confirmation
+from .next_steps import after_unknown
+from .rivals import Predicted, Rival
+from .scatter_gap import ScatterGap, gap_with_scatter, weighed_residuals
 from .search import Choice
 
-__all__ = ["Diagnosis"]
+__all__ = ["Diagnosis", "Known", "finish"]
 
 
 @dataclass(frozen=True)
-class Diagnosis:
-    """All that was found; `document` makes diagnosis.json of it."""
+class Known:
+    """What is known of a campaign beside the choice of effects."""
+
+    problem: Problem
+    held_out: tuple[str, ...]  # trials
+    gate_before: Verdict  # the gate on the base model
+    findings: tuple[Finding, ...]
+    jitters: tuple[Jitter, ...]
+    colours: Mapping[str, Colour]
+    model_std: Mapping[str, float]  # the scatter of replicates beyond the sensors, by kind
+
+
+@dataclass(frozen=True)
+class Diagnosis(Known):
+    """All that was found; what follows from it is computed when it is asked for. `document` makes diagnosis.json."""
 
     verdict: str
-    problem: Problem
     base: Fit
     best: Fit  # the base model's where nothing was added
     base_values: Mapping[str, float]  # with the held-out trials' own nuisances
     best_values: Mapping[str, float]
-    own_values: Mapping[str, float]
-    """The same with each trial's own factor on its bed or its friction, where there are such: what is asked for what is
-    missing."""
     effects: tuple[str, ...]
-    alternatives: tuple[str, ...]
-    rivals: tuple[Form, ...]  # first form of each alternative
-    where: tuple[Place, ...]  # where the base model fails
     before: Gap
     after: Gap
-    fitted: tuple[str, ...]
-    held_out: tuple[str, ...]
-    gate_before: Verdict
     gate_after: Verdict
-    gate_held_out: Verdict | None
-    """The best model's on the trials held out; None where there are none, or where no model was chosen."""
+    gate_held_out: Verdict | None  # the best model's on the trials held out; None without trials or without a choice
     choice: Choice | None
-    colours: Mapping[str, Colour]
-    jitters: tuple[Jitter, ...]
-    model_std: Mapping[str, float]
-    findings: tuple[Finding, ...]
-    next_experiment: str
-    depends_on: str = ""
-    shares: Mapping[str, float] = field(default_factory=dict)
-    lines: tuple[Line, ...] = ()  # in the spectrum of what the best model leaves, if the verdict is unknown
-    left: tuple[Place, ...] = ()
-    """Where the best model fails beyond what replicates differ by, if the verdict is unknown."""
 
     @property
     def forms(self) -> tuple[Form, ...]:
@@ -68,18 +63,82 @@ class Diagnosis:
         return self.best.model.forms
 
     @property
+    def fitted(self) -> tuple[str, ...]:
+        """Trials."""
+        return self.base.model.trials
+
+    @cached_property
+    def own_values(self) -> Mapping[str, float]:
+        """`best_values`, of an unknown with each trial's own factor on its bed or its friction where there is one."""
+        if self.verdict != "unknown" or not self.best.model.scatter:
+            return self.best_values
+        return held_out_fit(self.best.model, self.held_out, self.best.values)
+
+    @cached_property
+    def rivals(self) -> tuple[Form, ...]:
+        """The first form of each alternative."""
+        shown = smallest(self.choice) if self.choice is not None and self.verdict == "ambiguous" else ()
+        return tuple(next(form for form in one.forms if form.effect not in self.effects) for one in shown)
+
+    @property
+    def alternatives(self) -> tuple[str, ...]:
+        """Effects that could replace the first one."""
+        return tuple(form.effect for form in self.rivals)
+
+    @cached_property
+    def where(self) -> tuple[Place, ...]:
+        """Where the base model fails."""
+        if self.verdict == "none":
+            return ()
+        return tuple(places(self.base.model, self.base_values, (*self.fitted, *self.held_out)))
+
+    @cached_property
+    def left(self) -> tuple[Place, ...]:
+        """Where the best model fails beyond the scatter of replicates, if the verdict is unknown."""
+        if self.verdict != "unknown":
+            return ()
+        # A trial's own factor is in `own_values` already.
+        factors = set(self.problem.scatter) - set(self.problem.known_std)
+        others = {kind: std for kind, std in self.model_std.items() if kind not in factors}
+        trials = (*self.fitted, *self.held_out)
+        rest = weighed_residuals(self.problem, others, self.own_values, self.forms, trials)
+        return tuple(places_in(self.problem, self.own_values, self.forms, rest))
+
+    @cached_property
+    def lines(self) -> tuple[Line, ...]:
+        """Lines in the spectrum of what the best model leaves, if the verdict is unknown."""
+        trials = (*self.fitted, *self.held_out) if self.verdict == "unknown" else ()
+        return tuple(lines_of(self.problem, self.own_values, self.forms, trials))
+
+    @cached_property
+    def dependence(self) -> tuple[str, dict[str, float]]:
+        """If the verdict is unknown, what the missing force correlates with: in words, and the share by column."""
+        return depends_on(self.latent()) if self.verdict == "unknown" else ("", {})
+
+    def latent(self) -> dict[str, Any]:
+        """Columns of latent.csv."""
+        return latent_table(self.problem, self.own_values, self.forms)
+
+    @cached_property
+    def gap_with_scatter(self) -> ScatterGap | None:
+        """The gap against the scatter of replicates; None where they differ by the sensors' noise alone."""
+        before, after = (self.base_values, ()), (self.best_values, self.forms)
+        stages = [before] if self.verdict == "none" else [before, after]
+        return gap_with_scatter(self.problem, self.model_std, stages, self.fitted, self.held_out)
+
+    @property
     def equivalence(self) -> tuple[Rival, ...]:
-        """The nearest other names, and whether these trials can tell them from the first effect."""
+        """The nearest other effects, and whether these trials can separate them from the first one."""
         return self.choice.rivals if self.choice is not None and self.effects else ()
 
     @property
     def predicted(self) -> Predicted | None:
-        """What the best model leaves of conditions that were left out in turn."""
+        """The best model's cross-validation."""
         return self.choice.predicted if self.choice is not None and self.effects else None
 
     @property
     def bounds_before(self) -> tuple[Bound, ...]:
-        """Parameters of the fitted base model that ended at a bound or far from what was stated."""
+        """Parameters of the fitted base model at a bound or far from the stated value."""
         return bounds_met(self.base)
 
     @property
@@ -89,25 +148,34 @@ class Diagnosis:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What of the best model's numbers is hard to believe, a sentence each."""
+        """Which of the best model's numbers are implausible, a sentence each."""
         return tuple(self.problem.remarks(self.best.values, self.forms))
 
-    def latent(self) -> dict[str, Any]:
-        """Columns of latent.csv."""
-        return latent_table(self.problem, self.own_values, self.forms)
+    @cached_property
+    def next_experiment(self) -> str:
+        """The experiment that separates two effects, confirms one, or follows up what is unknown."""
+        if self.verdict == "none" or self.choice is None:
+            return "None is needed: the base model explains what these sensors can see."
+        if self.verdict == "named":
+            return confirmation(self.choice.best.effects[0])
+        if self.verdict == "ambiguous":
+            return self.problem.next_experiment(self.forms[0], self.rivals[0], self.best.values)
+        weighed = self.gap_with_scatter
+        return after_unknown(
+            self.problem, self.own_values, self.forms, self.left, self.dependence[1], beside=self.choice.best.effects,
+            is_scatter=bool(self.effects) and weighed is not None and max(v or 0.0 for v in weighed.after) <= SMALL,
+        )  # fmt: skip
 
     def parameters(self, effect: str) -> dict[str, dict[str, Any]]:
-        """What diagnosis.json says of an effect: name -> value, std, unit."""
+        """An effect in diagnosis.json: name -> value, std, unit."""
         found: dict[str, dict[str, Any]] = {}
-        names = [p.name for p in self.best.model.parameters]
+        parameters = self.best.model.parameters
         covariance = self.best.covariance(inflation=inflation(self.best))
-        for form in self.forms:
-            if form.effect != effect:
-                continue
+        for form in (form for form in self.forms if form.effect == effect):
             loose = self.problem.form_std(form)
             here = self.problem.reported(self.best.values, form)
-            slopes: dict[str, np.ndarray] = {name: np.zeros(len(names)) for name in here}
-            for k, p in enumerate(self.best.model.parameters):
+            slopes = {name: np.zeros(len(parameters)) for name in here}
+            for k, p in enumerate(parameters):
                 step = p.step if p.step is not None else 1e-4 * p.scale
                 moved = self.problem.reported({**self.best.values, p.name: self.best.values[p.name] + step}, form)
                 for name in here:
@@ -117,3 +185,39 @@ class Diagnosis:
                 std = math.sqrt(max(variance, 0.0))
                 found[name] = {"value": float(value), "std": std if math.isfinite(std) else 0.0, "unit": unit}
         return found
+
+
+def finish(
+    known: Known, base: Fit, choice: Choice | None, verdict: str, *, alone: Fit | None = None,
+    last: Verdict | None = None, held: Verdict | None = None, sure: tuple[str, ...] = (),
+) -> Diagnosis:  # fmt: skip
+    """The diagnosis that a choice makes. `alone`: the base model's fit with rows weighted as it has them itself, where
+    they are weighted otherwise now. `last`, `held`: the gate on the best model, and on trials held out. `sure`: effects
+    that are certain beside something unknown."""
+    base, held_out = settled(base), known.held_out
+    best, plain = choice.best.fit if choice is not None else base, base
+    if alone is not None:
+        plain = settled(alone)
+    elif verdict != "none" and base.model.scatter:
+        # With a factor for each trial the base model leaves to the factors what it misses: the gap is of one mean bed.
+        plain = settled(fit(replace(base.model, scatter=()), unscattered(base)))
+    base_values, best_values = values_of_all(plain, held_out), values_of_all(best, held_out)
+    effects = choice.best.effects if choice is not None else ()
+    before = gap_of(base, held_out, base_values)
+    after = before if verdict == "none" else gap_of(best, held_out, best_values)
+    if not effects:  # another noise alone makes no other model
+        best_values, after = base_values, before
+    if verdict == "unknown" and choice is not None and effects:
+        if after.fit > before.fit and (after.held_out or 0.0) >= (before.held_out or 0.0):
+            # A likelihood that knows more of the noise may prefer it; as a model of the motion it is none.
+            without = replace(
+                choice, best=choice.base, rivals=(), alternatives=(), predicted=None, left=known.gate_before
+            )
+            return finish(known, base, without, verdict, alone=alone)
+        if not (certain(base, choice) and closes(base, best, held_out)):
+            effects = tuple(effect for effect in effects if effect in sure)
+    return Diagnosis(
+        **vars(known), verdict=verdict, base=plain, best=best, base_values=base_values, best_values=best_values,
+        effects=effects, before=before, after=after, choice=choice, gate_held_out=held,
+        gate_after=last or (choice.left if choice is not None else known.gate_before),
+    )  # fmt: skip

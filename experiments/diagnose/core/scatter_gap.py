@@ -1,14 +1,14 @@
-"""The gap weighed against what replicates differ by as well: is the model as good as another bed, or another run, is?
+"""The gap against the scatter of replicates as well: is the model as good as another bed, or another run, is?
 
-How sure it is: a delete-one-trial jackknife of the weighed sum (Efron and Stein, Ann. Stat. 9 (1981), 586), which holds
-chi-square's own chance and that of few trials, and the chance of the scatter itself, whose variance rests on as many
-degrees of freedom as there are trials beyond one a condition: its relative error is sqrt(2 / freedom), taken for the
-share of the whole variance that it is.
+`gap` has the sensors' noise alone (docs/diagnose.md). Where replicates differ by more, no law of the mean bed can reach
+1, and this says how near it comes: the same sum with the variance between replicates added, row by row. A factor of a
+trial's own (`bed`, `friction`: relative) adds what one standard deviation of it changes in the reading; the wander of
+replicates (`wander`: in the channel's unit) adds its mean square.
 
-`gap` has the sensors' noise alone (docs/diagnose.md). Where replicates differ by more, 1 is out of reach of any law of
-the mean bed, and this says how near it comes: the same sum with the variance of what replicates differ by added, row by
-row. A factor of a trial's own (`bed`, `friction`: relative) adds what one standard deviation of it changes in the
-reading; what replicates do each in its own way (`unrest`: in the channel's unit) adds its mean square.
+Its standard error: a delete-one-trial jackknife of the weighted sum (Efron and Stein, Ann. Stat. 9 (1981), 586), which
+holds chi-square's own chance and that of few trials, and the chance of the scatter itself, whose variance rests on as
+many degrees of freedom as there are trials beyond one a condition: its relative error is sqrt(2 / freedom), taken for
+the share of the whole variance that it is.
 """
 
 import math
@@ -20,56 +20,49 @@ import numpy as np
 from experiments.diagnose.fit.problem import Array, Form, Problem, Values
 from experiments.diagnose.noise.replicates import groups_of
 
-from .outcome import Diagnosis
-
 __all__ = ["ScatterGap", "gap_with_scatter", "scatter_std", "weighed_residuals"]
 
 _LOST = 1e3  # residual over the noise where the model cannot be integrated
 
+Pair = tuple[float, float | None]
+Stds = Mapping[str, float]
+
 
 @dataclass(frozen=True)
 class ScatterGap:
-    """Chi-square per valid sample, the variance of what replicates differ by added to that of the sensors."""
+    """Chi-square per valid sample against the sensors' noise and the scatter of replicates, each of the fitted trials
+    and of those held out (None where there are none)."""
 
-    before: tuple[float, float | None]
-    """Of the fitted trials and of those held out (None where there are none), the base model."""
-    after: tuple[float, float | None]  # the same of the best model
+    before: Pair  # of the base model
+    after: Pair  # of the best model
     after_std: tuple[float | None, float | None]  # standard errors of `after`; None of a single trial
-    freedom: int
-    """Degrees of freedom on which the replicates' scatter rests: trials that have replicates less their conditions."""
+    freedom: int  # degrees of freedom of the scatter: trials that have replicates less their conditions
 
 
-def gap_with_scatter(found: Diagnosis) -> ScatterGap | None:
-    """The gap weighed against what replicates differ by; None where they differ by the sensors alone."""
-    if not found.model_std:
+def gap_with_scatter(
+    problem: Problem, model_std: Stds, stages: Sequence[tuple[Values, Sequence[Form]]], fitted: Sequence[str],
+    held_out: Sequence[str],
+) -> ScatterGap | None:  # fmt: skip
+    """The gap of the base model, the first of `stages`, and of the best model, the last; None without scatter."""
+    if not model_std:
         return None
-
-    model_std = found.model_std
-
-    inside = (*found.fitted, *found.held_out)
-    groups = [ids for ids in groups_of([t for t in found.problem.trials if t.id in inside]).values() if len(ids) > 1]
-    freedom = sum(len(ids) - 1 for ids in groups)
-    stages = [(found.base_values, ()), (found.best_values, found.forms)]
-    told: list[list[tuple[float, float | None]]] = [
+    groups = groups_of([t for t in problem.trials if t.id in (*fitted, *held_out)])
+    freedom = sum(len(ids) - 1 for ids in groups.values())
+    sums = [
         [
-            _per_sample(found.problem, model_std, values, forms, trials, freedom) if trials else (math.nan, None)
-            for trials in (found.fitted, found.held_out)
+            _per_sample(problem, model_std, values, forms, trials, freedom) if trials else (math.nan, None)
+            for trials in (fitted, held_out)
         ]
-        for values, forms in (stages[:1] if found.verdict == "none" else stages)
+        for values, forms in stages
     ]
-
-    def gap(stage: list[tuple[float, float | None]]) -> tuple[float, float | None]:
-        return stage[0][0], stage[1][0] if found.held_out else None
-
-    first, last = told[0], told[-1]
-    return ScatterGap(gap(first), gap(last), (last[0][1], last[1][1]), freedom)
+    before, after = ((stage[0][0], stage[1][0] if held_out else None) for stage in (sums[0], sums[-1]))
+    return ScatterGap(before, after, (sums[-1][0][1], sums[-1][1][1]), freedom)
 
 
 def _per_sample(
-    problem: Problem, model_std: Mapping[str, float], values: Values, forms: Sequence[Form], trials: Sequence[str],
-    freedom: int,
-) -> tuple[float, float | None]:  # fmt: skip
-    """The weighed sum over all readings that count, and its standard error."""
+    problem: Problem, model_std: Stds, values: Values, forms: Sequence[Form], trials: Sequence[str], freedom: int
+) -> Pair:
+    """The weighted sum over all readings that count, and its standard error."""
     found = weighed_residuals(problem, model_std, values, forms, trials)
     totals, counts, of_scatter = [], [], []
     for trial in trials:
@@ -95,38 +88,32 @@ def _per_sample(
 
 
 def weighed_residuals(
-    problem: Problem, model_std: Mapping[str, float], values: Values, forms: Sequence[Form], trials: Sequence[str]
+    problem: Problem, model_std: Stds, values: Values, forms: Sequence[Form], trials: Sequence[str]
 ) -> dict[str, Array]:
-    """(measured - model) over the root of the sensors' variance and that of what replicates differ by: trial ->
-    shape [sample_count]."""
+    """(measured - model) over the root of the sensors' variance and that between replicates: trial -> shape
+    [sample_count]."""
     found = {}
     for trial in trials:
         channel = problem.samples(trial).channel
-        stds = problem.sensor_std(values, forms, trial)
-        wide = scatter_std(problem, model_std, values, forms, trial)
-        whole = np.zeros(len(channel))
+        stds, wide = problem.sensor_std(values, forms, trial), scatter_std(problem, model_std, values, forms, trial)
+        found[trial] = np.zeros(len(channel))
         for name, columns in problem.compare(values, forms, trial).items():
             rest = (columns["measured"] - columns["model"]) / np.hypot(stds[name], wide[name])
-            whole[channel == name] = np.where(np.isfinite(rest), rest, _LOST)
-        found[trial] = whole
+            found[trial][channel == name] = np.where(np.isfinite(rest), rest, _LOST)
     return found
 
 
 def scatter_std(
-    problem: Problem, model_std: Mapping[str, float], values: Values, forms: Sequence[Form], trial: str
+    problem: Problem, model_std: Stds, values: Values, forms: Sequence[Form], trial: str
 ) -> dict[str, Array]:
     """By how much replicates of a trial differ beyond the sensors at each reading: channel -> std, in its unit."""
     here = problem.compare(values, forms, trial)
     variance = {name: np.full(len(columns["t_s"]), model_std.get(name, 0.0) ** 2) for name, columns in here.items()}
-    for kind in (kind for kind in problem.scatter if kind in model_std):
-        own = next((p for p in problem.scatter[kind] if p.trial == trial), None)
-        if own is None:
-            continue
-        ends = [
-            float(np.clip(own.value + step, own.lowest, own.highest)) for step in (model_std[kind], -model_std[kind])
-        ]
-        sides = [problem.compare({**values, own.name: end}, forms, trial) for end in ends]
+    own = {kind: p for kind, ps in problem.scatter.items() for p in ps if kind in model_std and p.trial == trial}
+    for kind, p in own.items():
+        ends = [float(np.clip(p.value + step, p.lowest, p.highest)) for step in (model_std[kind], -model_std[kind])]
+        high, low = (problem.compare({**values, p.name: end}, forms, trial) for end in ends)
         for name in variance:
-            change = 0.5 * (sides[0][name]["model"] - sides[1][name]["model"])
+            change = 0.5 * (high[name]["model"] - low[name]["model"])
             variance[name] += np.where(np.isfinite(change), change, 0.0) ** 2
-    return {name: np.sqrt(own) for name, own in variance.items()}
+    return {name: np.sqrt(each) for name, each in variance.items()}

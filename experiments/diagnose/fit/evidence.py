@@ -52,6 +52,10 @@ class Hypothesis:
         """Names in order, each once."""
         return tuple(dict.fromkeys(form.effect for form in self.forms))
 
+    def without(self, effect: str) -> tuple[Form, ...]:
+        """The forms of all effects but one."""
+        return tuple(form for form in self.forms if form.effect != effect)
+
 
 def excess(found: Fit) -> float:
     """Chi-square (priors included) beyond the number of samples that are left over by the parameters."""

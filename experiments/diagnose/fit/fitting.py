@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dct
 
-from .problem import Array, Form, Parameter, Problem, Values
+from .problem import Array, Form, Parameter, Problem, TrialInfo, Values
 from .together import each
 
 __all__ = ["SCAN", "Fit", "Model", "Whitener", "by_beginnings", "fit", "linearised", "scanned", "settled",
@@ -43,7 +43,7 @@ class Whitener:
 
     @staticmethod
     def white(problem: Problem) -> Whitener:
-        """For noise that is white, beside what replicates are known to differ by (`unrest`)."""
+        """For noise that is white, beside what replicates are known to differ by (`noise.wander`)."""
         bare = Whitener.bare(problem)
         return replace(bare, weights={**bare.weights, **problem.calmed})
 
@@ -95,6 +95,11 @@ class Model:
         every = (*self.problem.base, *self.scatter, *extra)
         shared = self.held is None
         return tuple(p for p in every if (shared if p.trial is None else p.trial in self.trials))
+
+    @property
+    def infos(self) -> list[TrialInfo]:
+        """What is known of its trials, in the campaign's order."""
+        return [trial for trial in self.problem.trials if trial.id in self.trials]
 
     def with_forms(self, forms: Sequence[Form]) -> Model:
         """The same with other effects."""

@@ -1,4 +1,4 @@
-"""Noise that is not white, or louder than stated: seen in the faster modes of a channel, where little motion reaches.
+"""Noise that is coloured, or larger than stated: seen in the faster modes of a channel, where little motion reaches.
 
 An autoregressive law of order one is fitted to the power of the modes of all trials (Whittle, Arkiv foer Matematik 2
 (1953), 423): S(f) = s^2 (1 - a^2) / (1 - 2 a cos(pi f) + a^2), f from 0 to 1 at half the sampling rate. Where the data
@@ -6,7 +6,7 @@ do not call for it, the noise stays as stated.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,15 +17,16 @@ from scipy.optimize import minimize
 from experiments.diagnose.fit.fitting import Fit, Whitener
 from experiments.diagnose.fit.problem import Array
 
-__all__ = ["Colour", "colour_of", "find_colours", "find_loud", "together", "whitener_for"]
+__all__ = ["Colour", "colour_of", "find_colours", "find_white_noise", "together", "whitener_for"]
 
 _FAST = 0.15  # share of the band that counts as slow and is left out
 _FASTER = 0.5  # the same where a model leaves much: what a motion leaves falls with the frequency
-_QUIET, _LOUD = 0.25, 1.5
-"""Share of all pieces that count as the quiet ones, and how loud these must be, in mean square."""
+_QUIET, _LARGE = (
+    0.25,
+    1.5,
+)  # share of all pieces that count as the quiet ones, and their mean square over the stated one
 _SURE = 16.0  # twice the log likelihood that two more numbers must gain: chance 3e-4 under white noise
-_PIECES, _PIECE = 8, 24
-"""Pieces of a recording, and samples of one at least, over which noise has to be alike."""
+_PIECES, _PIECE = 8, 24  # pieces of a recording, and samples of one at least, over which noise has to be alike
 _FEWEST = 100  # fast modes from which on a law is fitted
 _ONE_NUMBER = 0.05  # spread up to which one number stands for all of them
 _ALIKE = 0.5  # share of the excess, and of the correlation, that half of all pieces must show
@@ -41,52 +42,40 @@ class Colour:
 
     def power(self, frequency: Array) -> Array:
         """S at frequencies 0..1 of half the sampling rate."""
-        return _power(frequency, self.std, self.persistence)
+        a = self.persistence
+        return self.std**2 * (1 - a**2) / (1 - 2 * a * np.cos(np.pi * frequency) + a**2)
 
 
 def find_colours(found: Fit) -> dict[str, Colour]:
     """Channels whose noise is not as stated. `found` must have been fitted with `Whitener.white`.
 
-    Noise is there all the time. What a model lacks comes in some trials and at some times, in touches of the ground
-    most of all, and reaches the fast modes as well: a law that not half of all pieces show is no noise's.
+    Noise is there all the time. What a model omits comes in some trials and at some times, in touches of the ground
+    most of all, and reaches the fast modes as well: a law that fewer than half of all pieces show is not the noise's.
     """
-    powers: dict[str, list[Array]] = {}
-    places: dict[str, list[Array]] = {}
+    modes: dict[str, list[Array]] = {}
     for _, name, rows in found.model.channel_rows():
-        modes = found.modes[rows]
-        frequency = np.arange(len(modes)) / len(modes)
-        fast = frequency > _FAST
-        powers.setdefault(name, []).append(modes[fast] ** 2)
-        places.setdefault(name, []).append(frequency[fast])
-    colours = {}
-    for name, parts in powers.items():
-        mine = [own for _, other, own in found.model.channel_rows() if other == name]
-        residuals = [idct(found.modes[own], norm="ortho") for own in mine]
-        colour = _fitted(name, np.concatenate(parts), np.concatenate(places[name]), residuals)
-        if colour is not None:
-            colours[name] = colour
-    return colours
+        modes.setdefault(name, []).append(found.modes[rows])
+    colours = {name: _fitted(name, own, [idct(one, norm="ortho") for one in own]) for name, own in modes.items()}
+    return {name: colour for name, colour in colours.items() if colour is not None}
 
 
 def colour_of(channel: str, residuals: Sequence[Array]) -> Colour | None:
     """The colour of one channel's noise from what smooth curves leave of it, an array a recording, over the stated
     noise; None where the noise is as stated."""
-    powers, places = [], []
-    for rest in residuals:
-        frequency = np.arange(len(rest)) / len(rest)
-        powers.append(dct(rest, norm="ortho")[frequency > _FAST] ** 2)
-        places.append(frequency[frequency > _FAST])
-    return _fitted(channel, np.concatenate(powers), np.concatenate(places), residuals) if powers else None
+    return _fitted(channel, [dct(rest, norm="ortho") for rest in residuals], residuals) if residuals else None
 
 
-def _fitted(channel: str, power: Array, frequency: Array, residuals: Sequence[Array]) -> Colour | None:
+def _fitted(channel: str, modes: Sequence[Array], residuals: Sequence[Array]) -> Colour | None:
     """The law of the fast modes, where they call for one and all the time shows it."""
+    places = [np.arange(len(own)) / len(own) for own in modes]
+    frequency = np.concatenate([place[place > _FAST] for place in places])
+    power = np.concatenate([own[place > _FAST] ** 2 for own, place in zip(modes, places, strict=True)])
     if len(power) < _FEWEST:
         return None
 
     def twice(numbers: Array) -> float:
         std = float(np.exp(numbers[1])) if len(numbers) > 1 else 1.0
-        law = _power(frequency, std, float(np.tanh(numbers[0])))
+        law = Colour(channel, std, float(np.tanh(numbers[0]))).power(frequency)
         return float((np.log(law) + power / law).sum())
 
     white = float(power.sum())
@@ -101,9 +90,9 @@ def _fitted(channel: str, power: Array, frequency: Array, residuals: Sequence[Ar
     return None
 
 
-def find_loud(found: Fit) -> dict[str, Colour]:
-    """Channels that are louder than stated, white, where the model may leave much: looked for in the upper half of the
-    band, in the quiet pieces of the recordings. What a model lacks does not fill that all the time, noise does."""
+def find_white_noise(found: Fit) -> dict[str, Colour]:
+    """Channels with more white noise than stated, where the model may leave much: in the upper half of the band, in the
+    quiet pieces of the recordings. What a model omits does not fill these all the time, noise does."""
     squares: dict[str, list[float]] = {}
     freedom: dict[str, list[float]] = {}
     for _, name, rows in found.model.channel_rows():
@@ -114,13 +103,13 @@ def find_loud(found: Fit) -> dict[str, Colour]:
         for piece in _cut(idct(np.where(fast, modes, 0.0), norm="ortho")):
             squares.setdefault(name, []).append(float(np.mean(piece**2)) / (1 - _FASTER))
             freedom.setdefault(name, []).append((1 - _FASTER) * len(piece))
-    loud = {}
+    white = {}
     for name, own in squares.items():
         dof = float(np.median(freedom[name]))
         level = float(np.quantile(own, _QUIET)) / (float(stats.chi2.ppf(_QUIET, dof)) / dof)
-        if level > _LOUD:
-            loud[name] = Colour(name, math.sqrt(level), 0.0)
-    return loud
+        if level > _LARGE:
+            white[name] = Colour(name, math.sqrt(level), 0.0)
+    return white
 
 
 def _pieces(residuals: Sequence[Array]) -> tuple[float, float]:
@@ -147,25 +136,17 @@ def _steady(colour: Colour, square: float, lag: float) -> bool:
     return abs(colour.persistence) < 0.1 or lag * np.sign(colour.persistence) > _ALIKE * abs(colour.persistence)
 
 
-def whitener_for(found: Fit, colours: dict[str, Colour]) -> Whitener:
+def whitener_for(found: Fit, colours: Mapping[str, Colour]) -> Whitener:
     """The whitener that these colours call for; never below the stated noise in the slow modes."""
-    model = found.model
-    white = Whitener.white(model.problem)
-    weights = {}
-    for trial in white.weights:
-        whole = white.weights[trial].copy()
-        for name, block in white.channel_blocks(model.problem, trial):
+    problem = found.model.problem
+    white = Whitener.white(problem)
+    weights = {trial: whole.copy() for trial, whole in white.weights.items()}
+    for trial, whole in weights.items():
+        for name, block in white.channel_blocks(problem, trial):
             if name in colours:
                 count = block.stop - block.start
-                power = colours[name].power((np.arange(count) + 0.5) / count)
-                whole[block] /= np.sqrt(power)
-        weights[trial] = whole
+                whole[block] /= np.sqrt(colours[name].power((np.arange(count) + 0.5) / count))
     return Whitener(white.blocks, weights)
-
-
-def _power(frequency: Array, std: float, persistence: float) -> Array:
-    a = persistence
-    return std**2 * (1 - a**2) / (1 - 2 * a * np.cos(np.pi * frequency) + a**2)
 
 
 def together(colours: Sequence[Colour]) -> str:

@@ -1,4 +1,4 @@
-"""What replicates say: which trials are held out, scatter beyond the sensors, a trial at odds with its like."""
+"""Replicates: which trials are held out, the scatter beyond the sensors, a trial at odds with its replicates."""
 
 from __future__ import annotations
 
@@ -15,24 +15,19 @@ from experiments.diagnose.fit.evidence import inflation, slow_count
 from experiments.diagnose.fit.fitting import Fit, Model, fit, scanned
 from experiments.diagnose.fit.gaps import size_words
 from experiments.diagnose.fit.gate import low_modes
-from experiments.diagnose.fit.problem import Finding, Parameter, TrialInfo, Values
+from experiments.diagnose.fit.problem import Array, Finding, Parameter, TrialInfo, Values
 
-__all__ = ["Scatter", "exchanged", "find_scatter", "groups_of", "likeliest_scatter", "odd_trials", "parted",
-           "split_trials", "trends", "with_scatter"]  # fmt: skip
+__all__ = ["Scatter", "deviations", "exchanged", "find_scatter", "groups_of", "likeliest_scatter", "odd_trials",
+           "order_chance", "parted", "split_trials", "trends", "with_scatter"]  # fmt: skip
 
-_SURE = 1e-4
-_SAYS_SOMETHING = 0.5  # share of what is known of a trial's number that must come from its data
-_LOOKS = 12  # steps with all kinds of scatter at once; what is found is fitted in full
-_AT_ODDS = 20.0
-"""How many times as far from its replicates as they are from one another, in mean square, a trial is at odds."""
-
+_SURE = 1e-4  # chance below which replicates differ
+_FROM_DATA = 0.5  # share of what is known of a trial's number that must come from its data
+_ROUNDS = 12  # steps with all kinds of scatter at once; what is found is fitted in full
+_AT_ODDS = 20.0  # times as far from its replicates as these from one another, in mean square, a trial is at odds
 _FAR_PAIRS = 0.75  # share of all pairs of replicates that lie nearer than what one at odds is measured by
-_TREND, _DRAWS = 1e-3, 4999
-"""Chance below which what replicates differ by is said to grow or fall from trial to trial, and orders that are drawn
-for it."""
+_SIZEABLE = 0.2  # share of what the base model leaves by which it must differ too: small errors of the path count there
+_TREND, _DRAWS = 1e-3, 4999  # chance below which a kind of scatter is a trend from trial to trial; orders drawn
 _ANOTHER = 1.1  # ratio of two depths or durations from which on trials do not go through the same
-_SIZEABLE = 0.2
-"""And by which share of what the base model leaves it must differ: small errors of the path count for more there."""
 
 
 def groups_of(trials: Sequence[TrialInfo]) -> dict[tuple[object, ...], list[str]]:
@@ -44,8 +39,8 @@ def groups_of(trials: Sequence[TrialInfo]) -> dict[tuple[object, ...], list[str]
 
 
 def parted(trials: Sequence[TrialInfo], sizes: Mapping[str, Sequence[float]]) -> tuple[TrialInfo, ...]:
-    """The same, those of one condition parted where they do not go through the same: trials that go half as deep, last
-    half as long or do not come back are no replicates of the others.
+    """The trials, those of one condition separated where they go half as deep, last half as long or do not come back:
+    then they are no replicates.
 
     `sizes`: id -> what was measured of a trial (its depth, its duration), above 0, as many numbers for all trials of a
     condition. Sorted, they are cut where one exceeds the one before by more than a tenth.
@@ -96,8 +91,7 @@ def split_trials(trials: Sequence[TrialInfo]) -> tuple[tuple[str, ...], tuple[st
         most = max(shared(c) for c in single)
         best = [c for c in single if shared(c) == most]
         out.append(left[best[len(best) // 2]].pop())
-    held = set(out)
-    return tuple(t.id for t in trials if t.id not in held), tuple(t.id for t in trials if t.id in held)
+    return tuple(t.id for t in trials if t.id not in out), tuple(t.id for t in trials if t.id in out)
 
 
 def exchanged(
@@ -116,38 +110,33 @@ def exchanged(
             return sum(a == b for a, b in zip(condition[other], mine, strict=False))
 
         held.append(max(left, key=shared))
-    out = set(held)
-    whole = {*fitted, *held_out}
-    every = [trial.id for trial in trials if trial.id in whole]
-    return tuple(t for t in every if t not in out), tuple(t for t in every if t in out)
+    every = [trial.id for trial in trials if trial.id in (*fitted, *held_out)]
+    return tuple(t for t in every if t not in held), tuple(t for t in every if t in held)
 
 
 def find_scatter(
     found: Fit, *, apart: bool = False, kinds: Sequence[str] = (), alone: Sequence[Sequence[str]] = ()
 ) -> Scatter:
-    """Nuisances that the replicates call for, their priors estimated, and what is written as model_std.
+    """Random effects between replicates: nuisances, their priors estimated, and what is written as model_std.
 
     Each trial's own numbers (bed, friction, whatever the problem offers) are fitted, all kinds at once, so that none
-    stands for another; within a condition these must agree within their errors. What the model lacks is the same for
-    all replicates as long as it is small; where it is not, each trial's factors are bent by it in their own way: errors
-    are those of noise as loud as what is left (`inflation`), or, `apart`, as what each has left of its own
-    (`_louder`), and all kinds are asked for. The scatter is the most likely one beside these errors, each condition's
-    mean taken out (restricted likelihood): trials that say nothing of a kind count for nothing. Once found, it is the
-    prior under which all is fitted and asked again. `kinds`: those that are asked for; none: all that no other
-    question is for. `alone`: sets of trials that are compared although none repeats another (`lone_beds`).
+    replaces another; within a condition these must agree within their errors. What the model omits is the same for all
+    replicates as long as it is small; where it is not, it bends each trial's factors in their own way: errors are those
+    of noise as large as what is left (`inflation`), or, `apart`, as what each has left of its own (`_own_noise`), and
+    all kinds are examined. The scatter is the most likely one beside these errors, each condition's mean taken out
+    (restricted likelihood): trials without information on a kind do not count. Once found, it is the prior under which
+    all is fitted and examined again. `kinds`: those that are examined; none: all that have no search of their own.
+    `alone`: sets of trials that are compared although none repeats another (`lone_beds`).
     """
     problem = found.model.problem
-    asked = tuple(kinds)
-    if not asked:
-        late = () if apart else problem.hidden_scatter
-        asked = tuple(kind for kind in problem.scatter if kind not in (*late, *problem.special_scatter))
+    others = (*(() if apart else problem.hidden_scatter), *problem.special_scatter)
+    asked = kinds or [kind for kind in problem.scatter if kind not in others]
     offered = {kind: parameters for kind, parameters in problem.scatter.items() if kind in asked}
-    inside = [t for t in problem.trials if t.id in found.model.trials]
-    groups = [list(ids) for ids in alone or groups_of(inside).values() if len(ids) > 1]
+    groups = [list(ids) for ids in alone or groups_of(found.model.infos).values() if len(ids) > 1]
     if not groups or not offered:
         return Scatter()
     every = tuple(p for parameters in offered.values() for p in parameters)
-    wide = fit(replace(found.model, scatter=every), found.values, rounds=_LOOKS)
+    wide = fit(replace(found.model, scatter=every), found.values, rounds=_ROUNDS)
     differ = _scattered(wide, offered, groups, apart)
     while differ:
         active = tuple(replace(p, std=std) for kind, std in differ.items() for p in offered[kind])
@@ -162,23 +151,21 @@ def find_scatter(
 
 def with_scatter(model: Model, values: Values) -> Fit:
     """The model's fit, from `values` and from where the problem's own search, which begins at what was stated, finds
-    it: a base model whose trials cannot differ bends what is shared, and stands on branches of stick and slip that
-    nobody measured."""
-    names = {p.name for p in model.parameters}
-    found = fit(model, {name: value for name, value in values.items() if name in names})
+    it: a base model whose trials cannot differ bends what is shared, and ends on branches of stick and slip that nobody
+    measured."""
+    found = fit(model, {p.name: values[p.name] for p in model.parameters if p.name in values})
     contacts = model.problem.contacts
     if contacts is None or inflation(found) == 1:
         return found
     stated = {p.name: p.value for p in model.problem.base}
-    begun = {name: values[name] for form in model.forms for name in (p.name for p in form.parameters)}
+    begun = {p.name: values[p.name] for form in model.forms for p in form.parameters}
     other = fit(model, contacts.guess(model.forms, model.trials, {**stated, **begun}, apart=model.scatter))
-    best = min(found, other, key=lambda one: one.objective)
-    return scanned(best)
+    return scanned(min(found, other, key=lambda one: one.objective))
 
 
 @dataclass(frozen=True)
 class Scatter:
-    """What differs between replicates beyond the sensors; nothing by default."""
+    """Random effects between replicates beyond the sensors; none by default."""
 
     parameters: tuple[Parameter, ...] = ()
     model_std: Mapping[str, float] = field(default_factory=dict)
@@ -186,31 +173,21 @@ class Scatter:
 
 
 def trends(scatter: Scatter, trials: Sequence[TrialInfo]) -> list[Finding]:
-    """What replicates differ by, where it grows or falls from trial to trial: beds that settle, sensors that drift and
-    tips that wear do so, what scatters does not.
+    """Kinds of scatter that grow or fall from trial to trial, as where beds settle, sensors drift and tips wear: these
+    are not random.
 
-    Replicates are compared with one another only, for conditions differ by more than time; the chance is that of their
-    orders drawn anew within each condition.
+    Replicates are compared with one another only, as conditions differ by more than time.
     """
     found = []
+    place = {trial.id: k for k, trial in enumerate(trials)}
     for kind in scatter.model_std:
-        groups = [
-            np.array([(place[id], scatter.values[f"{kind}[{id}]"]) for id in ids if f"{kind}[{id}]" in scatter.values])
-            for place in [{trial.id: k for k, trial in enumerate(trials)}]
-            for ids in groups_of(trials).values()
-        ]
-        apart = [group - group.mean(axis=0) for group in groups if len(group) > 1]
-        if not apart:
-            continue
-        random = np.random.default_rng(0)
-        seen = sum(float(order @ values) for order, values in (group.T for group in apart))
-        drawn = sum(
-            np.array([random.permutation(values) @ order for _ in range(_DRAWS)])
-            for order, values in (group.T for group in apart)
-        )
-        chance = (1 + int(np.sum(np.abs(drawn) >= abs(seen) * (1 - 1e-12)))) / (1 + _DRAWS)
+        own = {id: scatter.values[f"{kind}[{id}]"] for id in place if f"{kind}[{id}]" in scatter.values}
+        groups = [np.array([(own[id], place[id]) for id in ids if id in own]) for ids in groups_of(trials).values()]
+        pairs = [tuple((group - group.mean(axis=0)).T) for group in groups if len(group) > 1]
+        chance = order_chance(pairs)
         if chance < _TREND:
-            slope = seen / sum(float(order @ order) for order, _ in (group.T for group in apart))
+            seen = sum(float(values @ order) for values, order in pairs)
+            slope = seen / sum(float(order @ order) for _, order in pairs)
             way = "grows" if seen > 0 else "falls"
             size = size_words(kind, abs(slope))
             what = (
@@ -222,16 +199,27 @@ def trends(scatter: Scatter, trials: Sequence[TrialInfo]) -> list[Finding]:
     return found
 
 
+def order_chance(pairs: Sequence[tuple[Array, ...]]) -> float:
+    """Permutation test: how often values drawn anew within each group correlate with their partners as much as these
+    do. `pairs`: of each group values and partners, both less their means, shape [n]; 1 without groups."""
+    if not pairs:
+        return 1.0
+    random = np.random.default_rng(0)
+    seen = abs(sum(float(values @ partners) for values, partners in pairs))
+    drawn = sum(np.array([random.permutation(values) @ partners for _ in range(_DRAWS)]) for values, partners in pairs)
+    return (1 + int(np.sum(np.abs(drawn) >= seen * (1 - 1e-12)))) / (1 + _DRAWS)
+
+
 def _scattered(
     found: Fit, offered: Mapping[str, Sequence[Parameter]], groups: Sequence[Sequence[str]], apart: bool
 ) -> dict[str, float]:
-    """The scatter of those kinds in which replicates differ for sure."""
+    """The scatter of those kinds in which replicates differ significantly."""
     least = found.model.problem.least_scatter
-    louder = _louder(found, groups) if apart else inflation(found)
+    factor = _own_noise(found, groups) if apart else inflation(found)
     scatter = {}
     for kind, parameters in offered.items():
-        told = _told(found, parameters, louder)
-        pairs = [np.array([told[id] for id in ids if id in told]) for ids in groups]
+        known = _from_data(found, parameters, factor)
+        pairs = [np.array([known[id] for id in ids if id in known]) for ids in groups]
         pairs = [pair for pair in pairs if len(pair) > 1]
         surprise = sum(float((((b - _mean(b, s)) / s) ** 2).sum()) for b, s in (pair.T for pair in pairs))
         if not pairs or stats.chi2.sf(surprise, sum(len(pair) - 1 for pair in pairs)) >= _SURE:
@@ -242,31 +230,34 @@ def _scattered(
     return scatter
 
 
-def _louder(found: Fit, groups: Sequence[Sequence[str]]) -> float:
-    """How much louder than the sensors what each replicate has of its own is (pure error, as in `unrest`)."""
-    whole = inflation(found)
+def deviations(blocks: Sequence[Array]) -> Array:
+    """How the modes of replicates deviate from their mean, shape [replicate_count, n], n being the fewest modes. Modes
+    grow with the root of the number of rows: all are scaled to the mean number."""
+    count, usual = min(map(len, blocks)), float(np.mean([len(block) for block in blocks]))
+    together = np.stack([block[:count] * math.sqrt(usual / len(block)) for block in blocks])
+    return together - together.mean(axis=0)
+
+
+def _own_noise(found: Fit, groups: Sequence[Sequence[str]]) -> float:
+    """By which factor what each replicate has of its own exceeds the sensors' noise (pure error, as in `wander`)."""
     rows = {(trial, channel): block for trial, channel, block in found.model.channel_rows()}
     left, freedom = 0.0, 0
     for ids, channel in itertools.product(groups, dict.fromkeys(channel for _, channel in rows)):
         blocks = [found.modes[rows[(id, channel)]] for id in ids if (id, channel) in rows]
-        if len(blocks) < 2:
-            continue
-        count = min(len(block) for block in blocks)
-        usual = float(np.mean([len(block) for block in blocks]))
-        together = np.stack([block[:count] * math.sqrt(usual / len(block)) for block in blocks])
-        left += float(((together - together.mean(axis=0)) ** 2).sum())
-        freedom += (len(blocks) - 1) * count
+        if len(blocks) > 1:
+            own = deviations(blocks)
+            left += float((own**2).sum())
+            freedom += (len(blocks) - 1) * own.shape[1]
     beyond = max(left - freedom - 2 * math.sqrt(2.0 * freedom), 0.0)
-    return min(whole, math.sqrt(1 + beyond / slow_count(found)))
+    return min(inflation(found), math.sqrt(1 + beyond / slow_count(found)))
 
 
-def _told(found: Fit, parameters: Sequence[Parameter], louder: float) -> dict[str, tuple[float, float]]:
-    """What a trial's data say of its own number, and the error of that: trial -> value, std. What is shared is held,
-    the trial's other numbers are free; the number's own prior says nothing here. `louder`: the data than their noise.
-    """
+def _from_data(found: Fit, parameters: Sequence[Parameter], factor: float) -> dict[str, tuple[float, float]]:
+    """A trial's own number by its data alone, and the error: trial -> value, std. What is shared is held, the trial's
+    other numbers are free, the number's own prior does not count. `factor`: on the noise of the data."""
     mine = found.model.parameters
     precision = found.prior_precision()
-    told = {}
+    known = {}
     for p in parameters:
         if p.trial not in found.model.trials:
             continue
@@ -274,22 +265,22 @@ def _told(found: Fit, parameters: Sequence[Parameter], louder: float) -> dict[st
         if p.name not in {mine[k].name for k in own}:
             continue  # at the end of its range
         slopes = found.jacobian[:, own]
-        hessian = slopes.T @ slopes / louder**2 + np.diag(precision[own])
+        hessian = slopes.T @ slopes / factor**2 + np.diag(precision[own])
         covariance = np.linalg.pinv(hessian, rcond=1e-12, hermitian=True)
         here = [mine[k].name for k in own].index(p.name)
         whole = 1 / max(float(covariance[here, here]), 1e-300)
         data = whole - precision[own[here]]
-        if data > _SAYS_SOMETHING * whole:
-            told[p.trial or ""] = found.values[p.name] * whole / data, p.scale / math.sqrt(data)
-    return told
+        if data > _FROM_DATA * whole:
+            known[p.trial or ""] = found.values[p.name] * whole / data, p.scale / math.sqrt(data)
+    return known
 
 
-def _mean(values: np.ndarray, errors: np.ndarray) -> float:
+def _mean(values: Array, errors: Array) -> float:
     return float((values / errors**2).sum() / (1 / errors**2).sum())
 
 
-def likeliest_scatter(pairs: Sequence[np.ndarray]) -> float:
-    """Std between replicates that is most likely beside the errors of what is told of each, the groups' means unknown.
+def likeliest_scatter(pairs: Sequence[Array]) -> float:
+    """The most likely std between replicates, beside the errors of their numbers, the groups' means unknown.
 
     `pairs`: of each group values and errors, shape [trial_count, 2].
     """
@@ -308,7 +299,7 @@ def likeliest_scatter(pairs: Sequence[np.ndarray]) -> float:
 
 
 def _units(found: Fit, trial: str, others: Sequence[str]) -> str:
-    """Whether one of its channels is its replicates' in another unit."""
+    """A clause where one of a trial's channels is its replicates' in another unit."""
     problem = found.model.problem
     read = {id: problem.compare(found.values, found.model.forms, id) for id in (trial, *others)}
     for channel, own in read[trial].items():
@@ -321,14 +312,13 @@ def _units(found: Fit, trial: str, others: Sequence[str]) -> str:
 
 def odd_trials(found: Fit) -> list[Finding]:
     """Trials at odds with at least two replicates that agree with one another."""
-    slow = low_modes(found.model)
-    modes: dict[str, np.ndarray] = {}
-    for (trial, _), rows in slow.items():
+    modes: dict[str, Array] = {}
+    for (trial, _), rows in low_modes(found.model).items():
         modes[trial] = np.concatenate([modes.get(trial, np.zeros(0)), found.modes[rows]])
     findings = []
-    inside = [t for t in found.model.problem.trials if t.id in found.model.trials]
-    groups = [ids for ids in groups_of(inside).values() if len(ids) > 1 and len({len(modes[id]) for id in ids}) == 1]
-    far = {(a, b): float(np.mean((modes[a] - modes[b]) ** 2)) / 2 for ids in groups for a in ids for b in ids if a != b}
+    groups = [ids for ids in groups_of(found.model.infos).values() if len({len(modes[id]) for id in ids}) == 1]
+    pairs = [pair for ids in groups for pair in itertools.permutations(ids, 2)]
+    far = {(a, b): float(np.mean((modes[a] - modes[b]) ** 2)) / 2 for a, b in pairs}
     for ids in groups:
         for id in ids if len(ids) > 2 else ():
             others = [other for other in ids if other != id]

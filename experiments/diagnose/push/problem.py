@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.campaign import Campaign, EffectTable, PenetrationCampaign, PenetrationModel, write_model
-from experiments.diagnose.core.effect_words import push_advice
+from experiments.diagnose.core.effect_texts import push_advice
 from experiments.diagnose.fit.forms import shapes_of
 from experiments.diagnose.fit.own import PENETRATION_HOOKS, OwnEffect
 from experiments.diagnose.fit.problem import Array, Finding, Form, Problem, Samples, TrialInfo, Values

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.diagnose.core.effect_equations import SYMBOLS, equations_of, with_comments
+from experiments.diagnose.core.effect_texts import SYMBOLS, equations_of, with_comments
 from experiments.diagnose.core.outcome import Diagnosis
-from experiments.diagnose.core.scatter_gap import gap_with_scatter, scatter_std
+from experiments.diagnose.core.scatter_gap import scatter_std
 from experiments.diagnose.core.sizes import effect_sizes
 from experiments.diagnose.fit.evidence import excess, inflation
 from experiments.diagnose.fit.fitting import Fit
@@ -48,19 +48,16 @@ def document(found: Diagnosis) -> dict[str, Any]:
             "held_out_trials": list(found.held_out),
         },
     }  # fmt: skip
-    weighed = gap_with_scatter(found)
-    if weighed is not None:
+    if (weighed := found.gap_with_scatter) is not None:
+        stages = {"before": weighed.before, "after": weighed.after, "after_std": weighed.after_std}
         said["gap_with_scatter"] = {
-            stage: {"fit": pair[0], "held_out": pair[1]}
-            for stage, pair in (("before", weighed.before), ("after", weighed.after))
-        } | {
-            "after_std": {"fit": weighed.after_std[0], "held_out": weighed.after_std[1]},
-            "freedom": weighed.freedom,
-        }  # fmt: skip
+            stage: {"fit": fitted, "held_out": held_out} for stage, (fitted, held_out) in stages.items()
+        } | {"freedom": weighed.freedom}
     if found.verdict == "unknown":
         said["leading"] = _leading(found)
         said["left"] = [_place(p) for p in found.left]
-        said["latent"] = {"file": "latent.csv", "depends_on": found.depends_on, "explained": dict(found.shares),
+        words, shares = found.dependence
+        said["latent"] = {"file": "latent.csv", "depends_on": words, "explained": shares,
                           "lines": line_rows(found.lines)}  # fmt: skip
     said["base"] = _base_values(found)
     gates = {"before": found.gate_before, "after": found.gate_after, "held_out": found.gate_held_out}
@@ -207,7 +204,7 @@ def _evidence(found: Diagnosis) -> list[dict[str, Any]]:
         return []
     zero, whole = found.choice.base.score, _beyond_noise(found.choice.base.fit)
     seen: dict[tuple[str, ...], dict[str, Any]] = {}
-    for _, hypothesis in found.choice.table:
+    for hypothesis in found.choice.table:
         ids = [form.id for form in hypothesis.forms]
         key = tuple(sorted(ids))  # in whatever order they were added
         row = {"candidate": " + ".join(ids), "effects": list(hypothesis.effects), "score": hypothesis.score - zero,

@@ -4,7 +4,7 @@ to do next; a few sentences made of diagnosis.json alone."""
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from experiments.diagnose.core.effect_words import meaning
+from experiments.diagnose.core.effect_texts import meaning
 from experiments.diagnose.fit.evidence import SMALL
 from experiments.diagnose.fit.gaps import numeral, size_words
 from experiments.diagnose.noise.spectrum import line_sentence

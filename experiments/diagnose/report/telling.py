@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.diagnose.core.effect_words import meaning
+from experiments.diagnose.core.effect_texts import meaning
 from experiments.diagnose.fit.gaps import numeral
 from experiments.diagnose.fit.problem import Array, Finding
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.campaign import Campaign, EffectTable, TumbleModel, write_model
-from experiments.diagnose.core.effect_words import advice
+from experiments.diagnose.core.effect_texts import advice
 from experiments.diagnose.fit.fitting import SCAN
 from experiments.diagnose.fit.forms import shapes_of
 from experiments.diagnose.fit.own import OwnEffect

@@ -9,7 +9,7 @@ from tumble_campaigns import CONDITIONS, campaign
 from experiments.campaign import Recording
 from experiments.diagnose.fit.evidence import held_out_fit
 from experiments.diagnose.fit.fitting import Model, Whitener, fit
-from experiments.diagnose.noise.astray import allowed, astray, astray_held_out
+from experiments.diagnose.noise.diverging import diverging_held_out, diverging_trials, most_diverging
 from experiments.diagnose.tumble.problem import make_problem
 
 FITTED, HELD_OUT = ("001", "002", "003", "004"), ("005", "006")
@@ -42,7 +42,7 @@ def moment(made):
 
 def astray_in(made):
     problem = make_problem(made)
-    return astray(fit(Model(problem, Whitener.white(problem), FITTED)), HELD_OUT)
+    return diverging_trials(fit(Model(problem, Whitener.white(problem), FITTED)), HELD_OUT)
 
 
 def test_one_trial_that_parts_from_the_model_at_an_event_is_set_aside_and_said(made, moment):
@@ -52,7 +52,7 @@ def test_one_trial_that_parts_from_the_model_at_an_event_is_set_aside_and_said(m
 
 
 def test_what_two_trials_of_six_show_is_no_affair_of_single_trials(made, moment):
-    assert allowed(6) == 1
+    assert most_diverging(6) == 1
     assert astray_in(gone(gone(made, "001", moment), "002", moment)) == ()
 
 
@@ -67,7 +67,7 @@ def test_all_of_one_condition_in_three_may_part_at_a_touch_beside_a_name_and_not
     forms = [form for form in problem.forms if form.effect == "camera-scale"] if beside_a_name else []
     fitted = ("001", "002", "003", "004", "007", "008")
     found = fit(Model(problem, Whitener.white(problem), fitted, tuple(forms)))
-    assert {finding.trial for finding in astray(found, HELD_OUT, seed=0)} == said
+    assert {finding.trial for finding in diverging_trials(found, HELD_OUT, seed=0)} == said
 
 
 def test_a_trial_that_never_follows_the_model_has_not_gone_astray(made):
@@ -80,7 +80,7 @@ def test_a_held_out_trial_may_part_late_and_not_early(made, moment):
         found = fit(Model(problem, Whitener.white(problem), FITTED))
         values = held_out_fit(found.model, HELD_OUT, found.values)
         end = float(problem.samples("005").time.max())
-        return astray_held_out(found, HELD_OUT, values, 1, share=moment / end)
+        return diverging_held_out(found, HELD_OUT, values, 1, share=moment / end)
 
     assert parted(0.6 * moment) is None
     assert parted(1.3 * moment) == ("005",)

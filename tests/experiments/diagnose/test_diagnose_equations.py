@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from experiments.diagnose.core.effect_equations import PENETRATION, TUMBLE, equation, equations_of, with_comments
+from experiments.diagnose.core.effect_texts import PENETRATION, TUMBLE, equation, equations_of, with_comments
 from experiments.diagnose.fit.forms import shapes_of
 from experiments.diagnose.push.forms import Scales, physical, push_forms
 from experiments.diagnose.push.law import SLOTS, push, slot_table

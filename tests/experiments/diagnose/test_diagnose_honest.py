@@ -16,7 +16,7 @@ from experiments.diagnose.fit.evidence import Hypothesis
 from experiments.diagnose.fit.fitting import Model, Whitener, fit, settled
 from experiments.diagnose.fit.gate import held_out_gate, open_gate
 from experiments.diagnose.fit.problem import Parameter, Problem, Samples, TrialInfo
-from experiments.diagnose.noise.colour import find_colours, find_loud
+from experiments.diagnose.noise.colour import find_colours, find_white_noise
 from experiments.diagnose.noise.replicates import (
     Scatter,
     exchanged,
@@ -128,13 +128,13 @@ def test_noise_that_is_there_all_the_time_has_a_colour_and_a_burst_has_none():
 
 def test_noise_twice_as_loud_is_told_from_a_model_that_leaves_as_much():
     loud = fitted(Line(noise=lambda random, trial: 2.0 * random.standard_normal(COUNT)))
-    (colour,) = find_loud(loud).values()
+    (colour,) = find_white_noise(loud).values()
     assert colour.std == pytest.approx(2.0, abs=0.25) and loud.chi_square > 3 * loud.count
     for misfit in (lambda t: 8.0 * np.sin(t / 5), lambda t: 8.0 * ((t > 30) & (t < 45))):
         off = fitted(
             Line(noise=lambda random, trial, f=misfit: random.standard_normal(COUNT) + f(np.linspace(0, 100, COUNT)))
         )
-        assert off.chi_square > 3 * off.count and find_loud(off) == {}
+        assert off.chi_square > 3 * off.count and find_white_noise(off) == {}
 
 
 def test_a_trial_that_was_held_out_and_is_fitted_is_exchanged_for_its_replicate():
@@ -224,10 +224,9 @@ def test_a_name_that_leaves_too_much_of_what_was_there_is_none(monkeypatch, left
         count, free = 100_000, np.ones(5, dtype=bool)
         return SimpleNamespace(objective=count - 5 + excess, count=count, free=free, model=model)
 
-    monkeypatch.setattr(deciding, "values_of_all", lambda found, held_out: {})
     monkeypatch.setattr(deciding, "gap_of", lambda *given: SimpleNamespace(fit=1.9))
     choice = SimpleNamespace(best=SimpleNamespace(fit=fitted(left)), base=SimpleNamespace(fit=fitted(1e4)))
-    assert deciding._too_little(choice, per_sample, ()) is too_little
+    assert deciding._too_little(choice, per_sample) is too_little
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -74,8 +74,8 @@ def test_it_is_a_candidate_of_tumbles_too():
 
 _ASKED = """
 from experiments.cli.main import main
-from experiments.diagnose.core.effect_equations import PENETRATION
-from experiments.diagnose.core.effect_words import meaning
+from experiments.diagnose.core.effect_texts import PENETRATION
+from experiments.diagnose.core.effect_texts import meaning
 from experiments.diagnose.push.law import SLOTS
 from experiments.diagnose.tumble.data import tumble_data
 from experiments.diagnose.tumble.forms import tumble_forms

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from golden import golden
 
-from experiments.diagnose.core.effect_words import confirmation
+from experiments.diagnose.core.effect_texts import confirmation
 from experiments.diagnose.core.next_steps import _follow
 from experiments.diagnose.fit.gaps import Gaps, numeral
 from experiments.diagnose.fit.localise import Place

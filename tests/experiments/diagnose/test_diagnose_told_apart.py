@@ -7,8 +7,7 @@ import pytest
 from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial
 
 from experiments.diagnose.core.diagnosis import diagnose
-from experiments.diagnose.core.equivalence import CLOSE, compare
-from experiments.diagnose.core.prediction import folds_of, predict
+from experiments.diagnose.core.rivals import CLOSE, compare, folds_of, predict
 from experiments.diagnose.core.search import Search
 from experiments.diagnose.fit import gate
 from experiments.diagnose.fit.evidence import Hypothesis, excess, score

@@ -360,11 +360,7 @@ def test_dry_friction_may_be_more_near_rest_from_none_at_all(effect, level):
     ],
 )
 def test_a_name_that_takes_nothing_away_of_what_is_noise_is_none(monkeypatch, before, after, nothing):
-    base, best = (
-        SimpleNamespace(model=SimpleNamespace(problem=None, trials=("001",), gap=gap), count=10_000)
-        for gap in (before, after)
-    )
-    monkeypatch.setattr(deciding, "gap_of", lambda problem, model, *rest: deciding.Gap(*model.gap))
-    monkeypatch.setattr(deciding, "values_of_all", lambda found, held_out: {})
+    base, best = (SimpleNamespace(gap=gap, count=10_000) for gap in (before, after))
+    monkeypatch.setattr(deciding, "gap_of", lambda found, held_out: deciding.Gap(*found.gap))
     choice = SimpleNamespace(base=SimpleNamespace(fit=base), best=SimpleNamespace(fit=best))
     assert deciding.explains_nothing(choice, ("002",)) == nothing

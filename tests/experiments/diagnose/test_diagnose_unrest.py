@@ -7,10 +7,10 @@ from scipy.fft import idct
 from experiments.campaign import Recording
 from experiments.diagnose.core.diagnosis import diagnose
 from experiments.diagnose.core.next_steps import common_share
-from experiments.diagnose.core.scatter_gap import gap_with_scatter, scatter_std
+from experiments.diagnose.core.scatter_gap import scatter_std
 from experiments.diagnose.fit.fitting import Model, Whitener, fit
-from experiments.diagnose.noise import unrest
-from experiments.diagnose.noise.unrest import find_unrest
+from experiments.diagnose.noise import wander
+from experiments.diagnose.noise.wander import find_wander
 from experiments.diagnose.push.problem import make_problem
 from experiments.diagnose.report.document import document
 from tests.penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial
@@ -43,7 +43,7 @@ def test_how_far_replicates_wander_is_told_in_newtons_and_nothing_where_they_do_
     problem = wandering(size)
     ids = tuple(trial.id for trial in problem.trials)
     found = fit(Model(problem, Whitener.white(problem), ids))
-    wander = find_unrest(found, found.values, ids)
+    wander = find_wander(found, found.values, ids)
     if size == 0:
         assert not wander
         return
@@ -57,7 +57,7 @@ def test_a_replicate_with_half_as_many_rows_does_not_seem_to_wander():
     problem = wandering(0.0, hardening=60.0, thinned="01")
     ids = tuple(trial.id for trial in problem.trials)
     found = fit(Model(problem, Whitener.white(problem), ids))
-    assert find_unrest(found, found.values, ids).model_std.get("force", 0.0) < 0.1
+    assert find_wander(found, found.values, ids).model_std.get("force", 0.0) < 0.1
 
 
 def test_a_name_is_certain_where_all_that_is_left_is_what_replicates_differ_by():
@@ -70,7 +70,7 @@ def test_a_name_is_certain_where_all_that_is_left_is_what_replicates_differ_by()
     assert found.model_std["force"] == pytest.approx(0.4, rel=0.3)
     assert found.after.held_out < 0.2 * found.before.held_out
     # 1 + 0.4^2 / 0.05^2 = 65 with the sensors alone, as near as another push comes with what pushes differ by added
-    weighed = gap_with_scatter(found)
+    weighed = found.gap_with_scatter
     assert 30 < found.after.held_out < 130
     assert weighed.after == pytest.approx((1.0, 1.0), abs=0.45) and weighed.before[1] > 3 * weighed.after[1]
     said = document(found)
@@ -114,5 +114,5 @@ def test_a_wander_that_rows_do_not_show_is_told_by_its_law(monkeypatch):
     problem = wandering(0.8)
     ids = tuple(trial.id for trial in problem.trials)
     found = fit(Model(problem, Whitener.white(problem), ids))
-    monkeypatch.setattr(unrest, "_std", lambda *asked: 0.0)
-    assert unrest.find_unrest(found, found.values, ids).model_std == {"force": pytest.approx(0.8, rel=0.3)}
+    monkeypatch.setattr(wander, "_std", lambda *asked: 0.0)
+    assert wander.find_wander(found, found.values, ids).model_std == {"force": pytest.approx(0.8, rel=0.3)}

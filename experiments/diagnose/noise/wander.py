@@ -1,6 +1,6 @@
-"""What replicates do each in its own way, beyond the sensors: the scatter of a bed that no number of a trial describes.
+"""The wander of replicates: their pure error beyond the sensors, which no number of a trial describes.
 
-Grains jam and give way otherwise in each bed, so curves of one condition wander apart slowly. What a law of the mean
+Grains jam and yield otherwise in each bed, so curves of one condition wander apart slowly. What a law of the mean
 bed must explain is what replicates have in common; how far they wander is the pure error of a test for lack of fit
 (Draper and Smith, Applied Regression Analysis, 3rd ed. 1998, section 2.1), taken mode by mode. Mode k of a channel has
 the variance 1 + A / (1 + (k / b)^p) in units of the noise, b and p of the channel, A of the condition (Whittle's
@@ -19,16 +19,18 @@ import numpy as np
 from experiments.diagnose.fit.fitting import Fit, Whitener
 from experiments.diagnose.fit.problem import Array, Problem
 
-from .replicates import groups_of
+from .replicates import deviations, groups_of
 
-__all__ = ["Unrest", "find_unrest"]
+__all__ = ["Wander", "find_wander"]
 
 _SURE = 30.0  # twice the log likelihood that wandering must gain in a channel
-_SHARE = 0.5  # share of the conditions with replicates that must wander
+_SHARE = 0.5  # of the conditions with replicates that must wander
 _LEAST = 3.0  # variance of the slowest mode, in units of the noise, from which on a condition wanders
 _SHARES = np.linspace(0.0, 1.0, 201)
 _BENDS, _POWERS = np.geomspace(0.5, 128.0, 9), (1.0, 1.5, 2.0, 3.0, 4.0, 8.0)
 _AMPLITUDES = np.concatenate([[0.0], np.geomspace(0.1, 1e8, 61)])
+
+Condition = tuple[object, ...]
 
 
 @dataclass(frozen=True)
@@ -37,14 +39,18 @@ class Law:
 
     bend: float  # b, in modes
     power: float  # p
-    amplitudes: Mapping[tuple[object, ...], float]
+    amplitudes: Mapping[Condition, float]
     """A of each condition, for one row: modes of a given wander grow with the root of the number of rows."""
-    other: float  # A of a condition without replicates
-    std: float  # by how much replicates differ beyond the sensor, root mean square of all rows [the channel's unit]
+    other: float = 0.0  # A of a condition without replicates
+    std: float = 0.0  # of replicates beyond the sensor, root mean square of all rows [the channel's unit]
+
+    def shape(self, count: int) -> Array:
+        """The variance of `count` modes over A."""
+        return _shape(self.bend, self.power, count)
 
 
 @dataclass(frozen=True)
-class Unrest:
+class Wander:
     """How replicates of a campaign wander apart; nothing by default."""
 
     laws: Mapping[str, Law]  # by channel
@@ -60,19 +66,18 @@ class Unrest:
             whole = np.ones(len(bare.weights[trial.id]))
             for name, block in bare.channel_blocks(problem, trial.id):
                 if name in self.laws:
-                    law = self.laws[name]
+                    law, count = self.laws[name], block.stop - block.start
                     amplitude = law.amplitudes.get(trial.condition, law.other)
-                    count = block.stop - block.start
-                    whole[block] = 1 / np.sqrt(1.0 + amplitude * count * _shape(law.bend, law.power, count))
+                    whole[block] = 1 / np.sqrt(1.0 + amplitude * count * law.shape(count))
             found[trial.id] = whole
         return found
 
     @property
     def model_std(self) -> dict[str, float]:
-        """By how much replicates differ beyond the sensors, root mean square [the channel's unit]."""
+        """Std of replicates beyond the sensors, root mean square of the rows [the channel's unit]."""
         return {name: law.std for name, law in self.laws.items()}
 
-    def other_than(self, known: Unrest) -> bool:
+    def other_than(self, known: Wander) -> bool:
         """Whether a channel wanders in one and not in the other, or by twice as much."""
         if self.laws.keys() != known.laws.keys():
             return True
@@ -80,53 +85,51 @@ class Unrest:
         return any(max(a, b) > 4 * max(min(a, b), 1e-9) for a, b in pairs)
 
 
-def find_unrest(found: Fit, values: Mapping[str, float], trials: Sequence[str]) -> Unrest:
+def find_wander(found: Fit, values: Mapping[str, float], trials: Sequence[str]) -> Wander:
     """How the replicates among `trials` wander apart at `values`, which hold each trial's own numbers."""
     problem = found.model.problem
     model = replace(found.model.on(trials), whitener=Whitener.bare(problem))
     (modes,) = model.evaluate([values])
-    inside = [trial for trial in problem.trials if trial.id in trials]
-    groups = {condition: ids for condition, ids in groups_of(inside).items() if len(ids) > 1}
+    groups = {condition: ids for condition, ids in groups_of(model.infos).items() if len(ids) > 1}
     rows = {(trial, name): block for trial, name, block in model.channel_rows()}
     laws = {}
     for name in dict.fromkeys(name for _, name in rows):
         squares, freedom, sizes = {}, {}, {}
         for condition, ids in groups.items():
             blocks = [modes[rows[(id, name)]] for id in ids if (id, name) in rows]
-            if len(blocks) < 2 or (count := min(len(block) for block in blocks)) < 2:
-                continue
-            sizes[condition] = float(np.mean([len(block) for block in blocks]))
-            together = np.stack([block[:count] * math.sqrt(sizes[condition] / len(block)) for block in blocks])
-            squares[condition] = ((together - together.mean(axis=0)) ** 2).sum(axis=0)
-            freedom[condition] = len(blocks) - 1
+            if len(blocks) > 1 and min(map(len, blocks)) > 1:
+                sizes[condition] = float(np.mean([len(block) for block in blocks]))
+                squares[condition] = (deviations(blocks) ** 2).sum(axis=0)
+                freedom[condition] = len(blocks) - 1
         if squares and (law := _law(squares, freedom)) is not None:
             amplitudes = {condition: a / sizes[condition] for condition, a in law.amplitudes.items()}
             std = _std(found, values, [groups[condition] for condition in squares], name)
-            laws[name] = replace(
-                law, amplitudes=amplitudes, other=float(np.median(list(amplitudes.values()))),
-                # Where louder noise is all that rows show, what the law itself makes of slow modes.
-                std=std or _std_of(law, sizes) * _noise(problem, [id for ids in groups.values() for id in ids], name),
-            )  # fmt: skip
-    return Unrest(laws)
+            if not std:  # rows show only more noise: what the law itself makes of slow modes, by the sensor's noise
+                samples = [problem.samples(id) for ids in groups.values() for id in ids]
+                noise = np.concatenate([one.std[one.channel == name] for one in samples])
+                means = [law.amplitudes[key] * float(law.shape(round(size)).mean()) for key, size in sizes.items()]
+                std = math.sqrt(float(np.mean(means))) * math.sqrt(float(np.mean(noise**2)))
+            other = float(np.median(list(amplitudes.values())))
+            laws[name] = replace(law, amplitudes=amplitudes, other=other, std=std)
+    return Wander(laws)
 
 
-def _law(squares: Mapping[tuple[object, ...], Array], freedom: Mapping[tuple[object, ...], int]) -> Law | None:
-    """The likeliest; None where replicates do not wander for sure."""
-    best: tuple[float, float, float, dict[tuple[object, ...], float]] = (math.inf, 0.0, 0.0, {})
-    for bend, power in itertools.product(_BENDS, _POWERS):
+def _law(squares: Mapping[Condition, Array], freedom: Mapping[Condition, int]) -> Law | None:
+    """The likeliest law; None where replicates do not wander significantly."""
+    least, best = math.inf, Law(0.0, 0.0, {})
+    for bend, power in itertools.product(_BENDS.tolist(), _POWERS):
         total, amplitudes = 0.0, {}
         for condition, square in squares.items():
-            shape = _shape(float(bend), power, len(square))
+            shape = _shape(bend, power, len(square))
             amplitudes[condition], cost = _amplitude(square, freedom[condition], shape)
             total += cost
-        if total < best[0]:
-            best = total, float(bend), power, amplitudes
+        if total < least:
+            least, best = total, Law(bend, power, amplitudes)
     quiet = sum(float(square.sum()) for square in squares.values())
-    least, chosen, steep, amplitudes = best
-    wandering = [a for a in amplitudes.values() if 1 + a > _LEAST]
-    if quiet - least < _SURE or len(wandering) < _SHARE * len(amplitudes):
+    wandering = [a for a in best.amplitudes.values() if 1 + a > _LEAST]
+    if quiet - least < _SURE or len(wandering) < _SHARE * len(best.amplitudes):
         return None
-    return Law(chosen, steep, amplitudes, float(np.median(list(amplitudes.values()))), 0.0)
+    return best
 
 
 def _std(found: Fit, values: Mapping[str, float], groups: Sequence[Sequence[str]], name: str) -> float:
@@ -151,23 +154,8 @@ def _std(found: Fit, values: Mapping[str, float], groups: Sequence[Sequence[str]
     return math.sqrt(max(squares / freedom - noise / count, 0.0))
 
 
-def _std_of(law: Law, sizes: Mapping[tuple[object, ...], float]) -> float:
-    """Root mean square over the rows of what the law's modes make, in units of the noise; `sizes`: rows of a trial."""
-    each = [
-        law.amplitudes[condition] * float(_shape(law.bend, law.power, round(size)).mean())
-        for condition, size in sizes.items()
-    ]
-    return math.sqrt(float(np.mean(each)))
-
-
-def _noise(problem: Problem, trials: Sequence[str], name: str) -> float:
-    """Root mean square noise of a channel."""
-    stds = [samples.std[samples.channel == name] for samples in (problem.samples(trial) for trial in trials)]
-    return math.sqrt(float(np.mean(np.concatenate(stds) ** 2)))
-
-
 def _amplitude(square: Array, freedom: int, shape: Array) -> tuple[float, float]:
-    """The likeliest A of one condition, and minus twice its log likelihood: rough first, then in between."""
+    """The likeliest A of one condition, and minus twice its log likelihood: on a coarse grid, then on a fine one."""
     amplitudes = _AMPLITUDES
     for _ in range(2):
         variance = 1.0 + np.multiply.outer(amplitudes, shape)

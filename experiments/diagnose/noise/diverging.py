@@ -1,11 +1,11 @@
-"""Trials that follow the model up to a moment and go another way from there.
+"""Trials that follow the model up to a moment and diverge from it there.
 
-Where a tip is only just caught, or only just touches, the smallest thing decides which way a trial goes on: two
-integrators part there, and so do a model and nature. What comes after says nothing of what the model lacks, but would
-be most of what it leaves. Such a trial is set aside, and said, only as the last resort: where nothing else explains the
-campaign, where one model passes the gate on all the others, fitted and held out, and where it follows this trial, too,
-for a good part of its time. Few may be: what shows in one trial of six is hardly an effect, what shows in two is.
-Beside a name that the others call for, one of the trials that were fitted and one of those held out may.
+Where a tip is only just caught, or only just touches, the smallest thing decides how a trial continues: two integrators
+diverge there, and so do a model and nature. What follows does not show what the model omits, but would be most of what
+it leaves. Such a trial is set aside, with a finding, only as the last resort: where nothing else explains the campaign,
+where one model passes the gate on all the others, fitted and held out, and where it follows this trial, too, for a good
+part of its time. Few may be: what shows in one trial of six is hardly an effect, what shows in two is. Beside an effect
+that the others call for, one of the trials that were fitted and one of those held out may.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -20,44 +20,38 @@ from experiments.diagnose.fit.problem import Finding
 
 from .replicates import groups_of
 
-__all__ = ["allowed", "astray", "astray_finding", "astray_held_out"]
+__all__ = ["divergence_finding", "diverging_held_out", "diverging_trials", "most_diverging"]
 
-_ONE_OF = 6  # of so many trials one may have gone its own way; of fewer one
-_MOST_LEFT = 0.5
-"""Share of what a model leaves that may be left without those trials, to first order, for a refit to be worth it: on
-another branch it may take more."""
-_OF_CONDITION = 3
-"""Of so many trials as many as one condition has may have gone a way of their own together, where replicates repeat a
-touch: beside a name that explains all the others."""
-_FAR = 3.0
-"""Chi-square per sample beyond which a trial is one of those that the model does not explain; a single trial that goes
-its own way may bend the fit to one other as far."""
+_ONE_OF = 6  # of so many trials one may diverge; of fewer one
+_MOST_LEFT = 0.5  # share of what a model leaves, left without those trials to first order, up to which it is refitted
+_OF_CONDITION = 3  # times the trials of one condition: of so many these may diverge together, beside an effect
+_FAR = 3.0  # chi-square per sample from which a trial is not explained; one that diverges may bend another's as far
 
 
-def allowed(trials: int) -> int:
-    """How many of a campaign's trials may be astray."""
+def most_diverging(trials: int) -> int:
+    """How many of a campaign's trials may diverge."""
     return max(1, round(trials / _ONE_OF))
 
 
-def astray(
+def diverging_trials(
     found: Fit, held_out: Sequence[str], *, seed: int = 0, recoloured: Callable[[Fit], Fit] = lambda fit: fit
 ) -> tuple[Finding, ...]:
     """The fitted trials without which this model passes the gate and which it follows at first; () if there are none.
 
     `found`: the model on all fitted trials, and where fits begin. `recoloured`: the same fit with the noise that it
-    leaves, which is not seen as long as a trial astray is loud beside it. Problems without contacts have none.
+    leaves, which a diverging trial would hide. Problems without contacts have none.
     """
     problem, trials = found.model.problem, found.model.trials
     if problem.contacts is None:
         return ()
-    most = allowed(len(trials))
+    most = most_diverging(len(trials))
     bare = not found.model.forms  # then one of all of them: what shows in two trials may be an effect
-    groups = {} if bare else groups_of([trial for trial in problem.trials if trial.id in trials])
+    groups = {} if bare else groups_of(found.model.infos)
     largest = max((len(ids) for ids in groups.values() if len(ids) * _OF_CONDITION <= len(trials)), default=0)
     left = {trial: float(found.modes[rows] @ found.modes[rows]) / (rows.stop - rows.start)
             for trial, rows in found.model.rows().items()}  # fmt: skip
     if sum(per_sample > _FAR for per_sample in left.values()) > max(most, largest) + 1:
-        return ()  # that is no affair of single trials
+        return ()  # these are more than single trials
     order = sorted(trials, key=lambda trial: -left[trial])
     tried = [order[:count] for count in range(1, most + 1)]
     worst = next((list(ids) for ids in groups.values() if order[0] in ids), [])
@@ -68,28 +62,26 @@ def astray(
         if len(rest) < 3:
             break
         if _unexplained(found, rest) > _MOST_LEFT * _unexplained(found, trials):
-            continue  # it is no affair of these
+            continue  # these trials are not what is unexplained
         learned = recoloured(_refitted(found, rest))
         if is_strained(learned) or not open_gate(learned, seed=seed)[1].passed:
             continue
         values = held_out_fit(learned.model, held_out, learned.values)
-        others = allowed(len(trials) + len(held_out)) - len(gone) if bare else allowed(len(held_out))
-        if astray_held_out(learned, held_out, values, others, seed=seed) is None:
+        others = most_diverging(len(trials) + len(held_out)) - len(gone) if bare else most_diverging(len(held_out))
+        if diverging_held_out(learned, held_out, values, others, seed=seed) is None:
             return ()
-        told = [astray_finding(learned, trial, learned.values) for trial in gone]
-        return tuple(one for one in told if one is not None) if None not in told else ()
+        findings = [divergence_finding(learned, trial, learned.values) for trial in gone]
+        return tuple(one for one in findings if one is not None) if None not in findings else ()
     return ()
 
 
-def astray_held_out(
+def diverging_held_out(
     found: Fit, held_out: Sequence[str], values: Mapping[str, float], most: int, *, seed: int = 0, enough: float = 0.0,
     share: float = 0.0,
 ) -> tuple[str, ...] | None:  # fmt: skip
-    """Those held-out trials, `most` at most, that the model follows at first only, all others passing the gate.
-
-    `enough`: chi-square per sample up to which trials pass in any case. `share`: of its time up to which each must be
-    followed. None where there are more, or others.
-    """
+    """Those held-out trials, `most` at most, that the model follows at first only, all others passing the gate; None
+    where more fail, or fail from the start. `enough`: chi-square per sample up to which trials pass in any case.
+    `share`: of its time up to which each must be followed."""
     problem, contacts = found.model.problem, found.model.problem.contacts
 
     def explained(trials: Sequence[str]) -> bool:
@@ -125,7 +117,7 @@ def _unexplained(found: Fit, trials: Sequence[str]) -> float:
 
 
 def _refitted(found: Fit, trials: tuple[str, ...]) -> Fit:
-    """On these trials alone, looked for anew: on all of them the fit was bent."""
+    """The fit on these trials alone, searched anew: on all of them the fit was bent."""
     model = found.model.on(trials)
     contacts = model.problem.contacts
     if not model.forms or contacts is None:
@@ -134,8 +126,10 @@ def _refitted(found: Fit, trials: tuple[str, ...]) -> Fit:
     return fit(model, values)
 
 
-def astray_finding(found: Fit, trial: str, values: Mapping[str, float], *, set_aside: bool = True) -> Finding | None:
-    """What is said of a trial that follows the model up to a moment only; None where it does not even that."""
+def divergence_finding(
+    found: Fit, trial: str, values: Mapping[str, float], *, set_aside: bool = True
+) -> Finding | None:
+    """The finding of a trial that follows the model up to a moment only; None where it does not even that."""
     problem = found.model.problem
     until = problem.contacts.follows(values, found.model.forms, trial) if problem.contacts is not None else None
     if until is None:

@@ -1,7 +1,8 @@
-"""The equation of each form of an effect, in the names of its parameters as diagnosis.json and model.toml have them.
+"""What the effects' own files (`rigid.terms`) state in words and equations: meaning, confirming trial, law of a form.
 
-Of penetration an equation that begins with + or - is added to F = K z + C max(v, 0); another one stands for K z.
-Clauses after the first define what it uses, or say when it holds. They stand in the effects' own files (`rigid.terms`).
+Equations have the parameters' names of diagnosis.json and model.toml. Of penetration an equation that begins with + or
+- is added to F = K z + C max(v, 0); another one replaces K z. Clauses after the first define its symbols, or state when
+it holds.
 """
 
 import textwrap
@@ -12,7 +13,8 @@ from experiments.diagnose.fit.problem import Form
 from rigid.terms import CANDIDATES, find_candidate
 from rigid.terms.candidate import Bend, Push
 
-__all__ = ["PENETRATION", "SYMBOLS", "TUMBLE", "equation", "equations_of", "with_comments"]
+__all__ = ["PENETRATION", "SYMBOLS", "TUMBLE", "advice", "confirmation", "equation", "equations_of", "meaning",
+           "push_advice", "with_comments"]  # fmt: skip
 
 _TABLE, _WIDE = "[[effect]]\n", 118
 
@@ -28,24 +30,18 @@ def _equations(form: str, text: str, plain: str, bends: Sequence[Bend]) -> dict[
     return found
 
 
-def _of_pushes(effect: str, push: Push) -> dict[str, str]:
-    """Id of each form of an effect, bent ones too -> its equation."""
-    return {
-        id: text
-        for form in push.forms
-        for id, text in _equations(f"{effect}:{form.name}", form.equation, form.name, push.bends).items()
-    }
+def _of_pushes(effect: str, push: Push | None) -> dict[str, str]:
+    """Id of each form of an effect, bent ones too -> its equation; none where the effect has none of pushes."""
+    if push is None:
+        return {}
+    forms = [_equations(f"{effect}:{form.name}", form.equation, form.name, push.bends) for form in push.forms]
+    return {id: text for form in forms for id, text in form.items()}
 
 
-PENETRATION = {
-    id: text
-    for effect, candidate in CANDIDATES.items()
-    if candidate.push is not None
-    for id, text in _of_pushes(effect, candidate.push).items()
-}
+PENETRATION = {id: text for effect, known in CANDIDATES.items() for id, text in _of_pushes(effect, known.push).items()}
 """By the id of the form: what it makes of the force F [N] on the spike."""
 
-TUMBLE = {id: candidate.tumble.equation for id, candidate in CANDIDATES.items() if candidate.tumble is not None}
+TUMBLE = {id: known.tumble.equation for id, known in CANDIDATES.items() if known.tumble is not None}
 """By the name of the effect, whose forms have parameters of one equation."""
 
 SYMBOLS = (
@@ -59,13 +55,48 @@ SYMBOLS = (
 """What the equations of penetration have in common."""
 
 
+def meaning(effect: str) -> str:
+    """One sentence on what the effect is; empty where its file does not say it."""
+    found = find_candidate(effect)
+    return f"{effect}: {found.meaning}." if found is not None else ""
+
+
+def confirmation(effect: str) -> str:
+    """One sentence: the trial or bench measurement that would show the effect by itself."""
+    found = find_candidate(effect)
+    otherwise = "change what is thought to cause it and repeat a trial: the effect should follow"
+    return f"To confirm {effect}: {found.confirm if found is not None else otherwise}."
+
+
+def advice(first: str, second: str) -> str:
+    """One sentence: the measurements that separate two effects of tumbles."""
+    found = [(id, find_candidate(id)) for id in (first, second)]
+    known = [(id, one.tumble.bench) for id, one in found if one and one.tumble and one.tumble.bench]
+    what = known[0][1] if known else "repeat the trials at another torque and gravity"
+    if len(known) == 2:
+        what = ", and ".join(f"{bench} ({id})" for id, bench in known)
+    return f"To tell {first} from {second}: {what}."
+
+
+def push_advice(first: str, second: str) -> str:
+    """One sentence: the push that separates two effects of penetration."""
+    for one, other in ((first, second), (second, first)):
+        found = find_candidate(one)
+        if found is not None and found.push is not None and other in found.push.apart:
+            return found.push.apart[other]
+    return (
+        f"Drive the spike in and out at two speeds a factor of ten apart, to twice the depth reached here: {first} and "
+        f"{second} part where speed, direction and depth change one at a time."
+    )
+
+
 def equation(kind: str, form: Form) -> str:
-    """The equation of a form of trials of that kind; empty where the effect's file does not say it."""
+    """The equation of a form of trials of that kind; empty where the effect's file does not state it."""
     found = find_candidate(form.effect)
     if found is None:
         return ""
     if kind == "penetration":
-        return _of_pushes(form.effect, found.push).get(form.id, "") if found.push is not None else ""
+        return _of_pushes(form.effect, found.push).get(form.id, "")
     return found.tumble.equation if found.tumble is not None else ""
 
 
