@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 from threadpoolctl import threadpool_limits
 
@@ -16,6 +15,8 @@ from experiments.runs.folder import RunFolder
 from experiments.runs.kernel_cache import free_kernel_cache
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
+from experiments.runs.types import Json
+from experiments.runs.whole_runs import computed_run
 
 from .core.diagnosis import diagnose
 from .core.outcome import Diagnosis
@@ -35,50 +36,38 @@ def check(settings: DiagnoseSettings) -> None:
     _make_problem(Path(settings.campaign), settings.effect_file)
 
 
-def run(settings: DiagnoseSettings, folder: str | Path, *, progress: Progress | None = None) -> Result:
-    """Diagnose into `folder` and return the result. Raises ValueError as `check` does."""
-    kept = RunFolder.ensure(Path(folder), "diagnose", settings)
-    return _carry_out(settings, kept, progress or Progress())
-
-
-def resume(folder: str | Path, *, progress: Progress | None = None) -> Result:
-    """Diagnose again from the start."""
-    kept = RunFolder.open(Path(folder))
-    return _carry_out(DiagnoseSettings(**kept.settings), kept, progress or Progress())
-
-
 def diagnose_campaign(
     campaign: str | Path, *, thorough: bool = False, seed: int = 0, effect_file: Sequence[str | Path] = (),
     progress: Progress | None = None,
 ) -> Diagnosis:  # fmt: skip
     """The diagnosis of the campaign in a folder, without files. Raises ValueError as `check` does.
 
-    `effect_file`: Python files with effects of one's own (`own`), which stand among the candidates.
+    `effect_file`: Python files with effects of one's own (`own`), which are among the candidates.
     """
     free_kernel_cache()
     measured, problem = _make_problem(Path(campaign), effect_file)
-    told = progress or Progress()
-    stage = [""]
+    shown = progress or Progress()
+    stage = ""
 
     def tell(what: str, done: float) -> None:
-        if what != stage[0]:
-            stage[0] = what
-            told.stage(what, total=1.0)
-        told.update(done)
+        nonlocal stage
+        if what != stage:
+            stage = what
+            shown.stage(what, total=1.0)
+        shown.update(done)
 
     odd = [finding for finding in find_implausible(measured) if not problem.explains(finding)]
-    for finding in odd:  # before the long part: a wrong number in campaign.toml is soon put right
-        told.message(f"before anything is fitted: {finding.what}")
+    for finding in odd:  # before the long part: a wrong number in campaign.toml is soon corrected
+        shown.message(f"before anything is fitted: {finding.what}")
     gates = None
     if thorough:
         from dem.prepare.prepare import cache_folder
 
         gates = cache_folder() / "gates"
-    with threadpool_limits(1):  # matrices are small: threads of the linear algebra only get in each other's way
+    with threadpool_limits(1):  # matrices are small: threads of the linear algebra slow one another down
         found = diagnose(problem, thorough=thorough, seed=seed, tell=tell, gates=gates)
     odd = [finding for finding in odd if not problem.explains(finding)]  # by now zeros may be taken into account
-    seen = (*missing_sensors(measured), *odd, *findings_in_words(found.findings))
-    return replace(found, findings=seen)
+    return replace(found, findings=(*missing_sensors(measured), *odd, *findings_in_words(found.findings)))
 
 
 def _make_problem(folder: Path, effect_file: Sequence[str | Path]) -> tuple[Campaign, Problem]:
@@ -95,28 +84,22 @@ def make_problem(campaign: Campaign, *, own: Sequence[OwnEffect] = ()) -> Proble
     return found
 
 
-def _carry_out(settings: DiagnoseSettings, folder: RunFolder, progress: Progress) -> Result:
-    with folder.lock():
-        found = diagnose_campaign(
-            settings.campaign, thorough=settings.thorough, seed=settings.seed, effect_file=settings.effect_file,
-            progress=progress,
-        )  # fmt: skip
-        for file in settings.effect_file:  # model.toml names it
-            shutil.copyfile(file, folder.path / Path(file).name)
-        for finding in said_once(found.findings):
-            progress.message(finding.what)
-        with threadpool_limits(1):
-            said = write_diagnosis(folder.path, found)
-        result = _result(found, said)
-        folder.write_result(result)
-        progress.stage("report", total=1.0)
-        from vis.diagnose.report import write_diagnosis_report
-
-        write_diagnosis_report(folder.path, progress=progress.update)
-    return result
+def _compute(settings: DiagnoseSettings, folder: RunFolder, progress: Progress) -> Result:
+    options = settings.model_dump(exclude={"campaign"})
+    found = diagnose_campaign(settings.campaign, **options, progress=progress)
+    for file in settings.effect_file:  # model.toml names it
+        shutil.copyfile(file, folder.path / Path(file).name)
+    for finding in said_once(found.findings):
+        progress.message(finding.what)
+    with threadpool_limits(1):
+        said = write_diagnosis(folder.path, found)
+    return _result(found, said)
 
 
-def _quantity(entry: dict[str, Any], *, at_end: bool) -> dict[str, Any]:
+run, resume = computed_run("diagnose", DiagnoseSettings, _compute, check=lambda settings: None)
+
+
+def _quantity(entry: Json, *, at_end: bool) -> Json:
     """A fitted number with its standard error; at the end of its range it has none."""
     if at_end:
         return {**entry, "std": None, "note": "at the end of its range: no standard error"}
@@ -126,23 +109,21 @@ def _quantity(entry: dict[str, Any], *, at_end: bool) -> dict[str, Any]:
 _UNITS = {"force": "N, each in its own way", "depth": "m, each in its own way", "accel": "m/s2, each in its own way",
           "depth zero": "m", "force zero": "N"}  # fmt: skip
 """Of channels and zeros in `model_std`, which holds relative numbers otherwise."""
-_SENSORS = ("depth zero", "force zero")
 
 
-def _result(found: Diagnosis, said: dict[str, Any]) -> Result:
-    quantities: dict[str, Any] = {
-        f"gap_{stage}_{part}": {"value": value, "std": None, "unit": "1",
+def _result(found: Diagnosis, said: Json) -> Result:
+    parts = [(stage, part) for stage in ("before", "after") for part in ("fit", "held_out")]
+    quantities: Json = {
+        f"gap_{stage}_{part}": {"value": said["gap"][stage][part], "std": None, "unit": "1",
                                 "note": "chi-square per sample"}
-        for stage, gap in (("before", found.before), ("after", found.after))
-        for part, value in (("fit", gap.fit), ("held_out", gap.held_out))
+        for stage, part in parts
     }  # fmt: skip
-    if "gap_with_scatter" in said:
+    if weighed := said.get("gap_with_scatter"):
+        note = "chi-square per sample, what replicates differ by added to the sensors' variance"
         quantities |= {
-            f"gap_with_scatter_{stage}_{part}": {
-                "value": said["gap_with_scatter"][stage][part], "unit": "1",
-                "std": said["gap_with_scatter"]["after_std"][part] if stage == "after" else None,
-                "note": "chi-square per sample, what replicates differ by added to the sensors' variance"}
-            for stage in ("before", "after") for part in ("fit", "held_out")
+            f"gap_with_scatter_{stage}_{part}": {"value": weighed[stage][part], "unit": "1",
+                                                 "std": weighed.get(f"{stage}_std", {}).get(part), "note": note}
+            for stage, part in parts
         }  # fmt: skip
     at_end = {
         stage: {bound["parameter"] for bound in bounds if bound["at_bound"]}
@@ -154,27 +135,23 @@ def _result(found: Diagnosis, said: dict[str, Any]) -> Result:
     for effect in said["effects"]:
         for name, entry in effect["parameters"].items():
             quantities[f"{effect['id']}.{name}"] = _quantity(entry, at_end=f"{effect['id']}.{name}" in at_end["after"])
-    sentences = where_sentences(said)
-    sentences += found.problem.remarks(found.best_values, found.forms)
-    whose = "the bed's" if found.problem.granular else "the surface's, the rig's or the start's"
+    sentences = [*where_sentences(said), *found.problem.remarks(found.best_values, found.forms)]
     noises = [together([colour]) for colour in found.colours.values()]
     sentences += [f"{words[0].upper()}{words[1:]}." for words in noises]
+    whose = "the bed's" if found.problem.granular else "the surface's, the rig's or the start's"
     sentences += [
         f"Replicates differ by more than the sensors: {kind}, standard deviation {std:.3g} "
         + _UNITS.get(kind, "(relative)")
-        + f"; it is {'the zero of a sensor, or of where it was set up' if kind in _SENSORS else whose}."
+        + f"; it is {'the zero of a sensor, or of where it was set up' if kind.endswith(' zero') else whose}."
         for kind, std in found.model_std.items()
     ]
     warnings = [finding.what for finding in said_once(found.findings)]
+    beside = (
+        "it does not explain the data" if is_strained(found.best) else "beside the effects named it means another thing"
+    )
     for model, bounds, meaning in (
         ("the base model", found.bounds_before, "it bends them because it lacks something"),
-        (
-            "the best model",
-            found.bounds_after if found.forms else (),
-            "it does not explain the data"
-            if is_strained(found.best)
-            else "beside the effects named it means another thing",
-        ),
+        ("the best model", found.bounds_after if found.forms else (), beside),
     ):
         strained = [bound.words for bound in bounds if bound.strains]
         if strained:
@@ -184,12 +161,6 @@ def _result(found: Diagnosis, said: dict[str, Any]) -> Result:
         if ends:
             warnings.append(f"fitted by {model} to the end of its range: {', '.join(ends)}")
     return Result.make(
-        "diagnose",
-        title=title_words(said),
-        verdict=found.verdict,
-        summary=summary_sentences(said),
-        quantities=quantities,
-        tables=told_tables(said),
-        departures={"sentences": sentences},
-        warnings=warnings,
-    )
+        "diagnose", title=title_words(said), verdict=found.verdict, summary=summary_sentences(said),
+        quantities=quantities, tables=told_tables(said), departures={"sentences": sentences}, warnings=warnings,
+    )  # fmt: skip

@@ -1,10 +1,11 @@
 """`hedgebed campaign check`: is a campaign fit to be diagnosed, and what is in it?
 
-What cannot be read is refused, all of it at once, by file, line and key. What can be read but is odd is found and said,
+What cannot be read is refused, all of it at once, by file, line and key. What can be read but is odd becomes a finding,
 without a model: sensors that are missing, gaps, a marker that jumped, a clock that jumped, a trial at odds with its
 replicates. `hedgebed diagnose` finds the same and sets it aside.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,16 +13,16 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from experiments.campaign import Campaign, PenetrationCampaign, Recording, TumbleCampaign, read_campaign
+from experiments.campaign import Campaign, PenetrationCampaign, Recording, read_campaign
 from experiments.campaign.tables import PenetrationTrial
 from experiments.check import find_implausible, loud_sensors, missing_sensors, said_once, without_companions
-from experiments.check.replicas import Condition, condition_of, condition_words, odd_replicates
+from experiments.check.replicas import condition_of, condition_words, odd_replicates
 from experiments.grains.spells import spells
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
-from experiments.runs.result import Result
+from experiments.runs.result import Result, quantity
 from experiments.runs.types import Json
-from experiments.runs.whole_runs import publish, whole_run
+from experiments.runs.whole_runs import computed_run
 
 from .fit.problem import Finding
 from .report.telling import findings_in_words
@@ -78,22 +79,18 @@ def _faults_of_data(campaign: Campaign) -> list[Finding]:
     return findings_in_words(checked(tumble_data(campaign))[1])
 
 
-def _carry_out(settings: CheckSettings, folder: RunFolder, progress: Progress) -> Result:
-    with folder.lock():
-        campaign = read_campaign(settings.campaign)
-        progress.stage("check", total=1.0)
-        findings = [*unnamed_files(Path(settings.campaign), campaign), *find_faults(campaign)]
-        recordings = []
-        trials: Sequence[Any] = campaign.tables.trial
-        for number, trial in enumerate(trials, 1):
-            for sensor in trial.files:
-                recording = campaign.recordings[trial.id, sensor]
-                name = f"{number:03d}-{sensor}"
-                folder.write_series(name, dict(recording.columns))
-                recordings.append(
-                    {"trial": trial.id, "sensor": sensor, "series": f"series/{name}.csv"} | _facts(recording)
-                )
-        return publish(folder, _result(campaign, recordings, findings), progress)
+def _compute(settings: CheckSettings, folder: RunFolder, progress: Progress) -> Result:
+    campaign = read_campaign(settings.campaign)
+    progress.stage("check", total=1.0)
+    findings = [*unnamed_files(Path(settings.campaign), campaign), *find_faults(campaign)]
+    recordings = []
+    trials: Sequence[Any] = campaign.tables.trial
+    for number, trial in enumerate(trials, 1):
+        for sensor in trial.files:
+            recording = campaign.recordings[trial.id, sensor]
+            series = folder.write_series(f"{number:03d}-{sensor}", recording.columns)
+            recordings.append({"trial": trial.id, "sensor": sensor, "series": series} | _facts(recording))
+    return _result(campaign, recordings, findings)
 
 
 def _facts(recording: Recording) -> Json:
@@ -103,39 +100,37 @@ def _facts(recording: Recording) -> Json:
     usual = float(np.median(steps)) if len(steps) else 0.0
     gaps = [(float(time[k]), float(time[k + 1])) for k in np.flatnonzero(steps > _LONG * usual)] if usual > 0 else []
     empty = np.zeros(len(time), dtype=bool)
-    for name, values in recording.columns.items():
-        empty |= np.isnan(values) if name != "t_s" else False
+    for values in [values for name, values in recording.columns.items() if name != "t_s"]:
+        empty |= np.isnan(values)
     gaps += [(float(time[low]), float(time[high - 1])) for low, high in spells(empty)]
-    return {
-        "rows": len(time),
-        "rate": 1 / usual if usual > 0 else None,
-        "from_s": float(time[0]),
-        "to_s": float(time[-1]),
-        "empty_rows": int(empty.sum()),
-        "gaps": sorted(gaps),
-    }
+    rate = 1 / usual if usual > 0 else None
+    ends = {"from_s": float(time[0]), "to_s": float(time[-1])}
+    return {"rows": len(time), "rate": rate, **ends, "empty_rows": int(empty.sum()), "gaps": sorted(gaps)}
 
 
 def _result(campaign: Campaign, recordings: list[Json], findings: list[Finding]) -> Result:
     tables = campaign.tables
     listed: Sequence[Any] = tables.trial
-    conditions: dict[str, Condition] = {trial.id: condition_of(tables, trial) for trial in listed}
-    alike = {id: sum(other == one for other in conditions.values()) for id, one in conditions.items()}
+    conditions = {trial.id: condition_of(tables, trial) for trial in listed}
+    alike = Counter(conditions.values())
     trials = []
     for trial in listed:
         own = [entry for entry in recordings if entry["trial"] == trial.id]
-        said = [finding for finding in findings if finding.trial == trial.id]
+        mine = [finding for finding in findings if finding.trial == trial.id]
         trials.append({
             "id": trial.id,
             "kind": trial.mode if isinstance(trial, PenetrationTrial) else "tumble",
             "condition": condition_words(tables, trial),
-            "sensors": ", ".join(f"{_seen_as(tables, entry, trial)} {_rate(entry['rate'])}" for entry in own),
+            "sensors": ", ".join(
+                f"{entry['sensor'] if tables.kind == 'tumble' else ', '.join(trial.needed)} {_rate(entry['rate'])}"
+                for entry in own
+            ),
             "from_s": min(entry["from_s"] for entry in own),
             "to_s": max(entry["to_s"] for entry in own),
             "gaps": sum(len(entry["gaps"]) for entry in own),
-            "jumps": sum(_jumps(finding) for finding in said),
-            "findings": len(said),
-            "alike": alike[trial.id],
+            "jumps": sum(map(_jumps, mine)),
+            "findings": len(mine),
+            "alike": alike[conditions[trial.id]],
         })  # fmt: skip
     head = ["trial", "condition", "sensors [Hz]", "from, to [s]", "gaps", "jumps", "found", "alike"]
     rows = [
@@ -144,40 +139,26 @@ def _result(campaign: Campaign, recordings: list[Json], findings: list[Finding])
         for t in trials
     ]  # fmt: skip
     count = len(trials)
+    facts = ("trial", "what", "channel", "from_s", "to_s")
     return Result.make(
         "campaign check",
         title=f"{tables.name}: {count} trial{'s' if count > 1 else ''}, "
         + (f"{len(findings)} found" if findings else "nothing found"),
         kind=tables.kind,
         quantities={
-            "trial_count": _exact(count, ""),
-            "condition_count": _exact(len(set(conditions.values())), "trials of one condition are replicates"),
-            "row_count": _exact(sum(entry["rows"] for entry in recordings), "of all recordings together"),
-            "finding_count": _exact(len(findings), "diagnose sets aside or models what it can"),
+            "trial_count": quantity(count, "1"),
+            "condition_count": quantity(len(alike), "1", "trials of one condition are replicates"),
+            "row_count": quantity(sum(entry["rows"] for entry in recordings), "1", "of all recordings together"),
+            "finding_count": quantity(len(findings), "1", "diagnose sets aside or models what it can"),
         },
         tables=[{"title": "", "head": head, "rows": rows}],
-        trials=trials,
-        recordings=recordings,
-        findings=[
-            {"trial": f.trial, "what": f.what, "channel": f.channel, "from_s": f.from_s, "to_s": f.to_s}
-            for f in findings
-        ],
+        trials=trials, recordings=recordings, findings=[{name: vars(f)[name] for name in facts} for f in findings],
         warnings=[finding.what for finding in said_once(findings)],
-    )
-
-
-def _exact(value: int, note: str) -> Json:
-    return {"value": value, "std": 0.0, "unit": "1"} | ({"note": note} if note else {})
+    )  # fmt: skip
 
 
 def _rate(rate: float | None) -> str:
     return "?" if rate is None else f"{rate:.3g}" if rate < 100 else f"{rate:.0f}"
 
 
-def _seen_as(tables: TumbleCampaign | PenetrationCampaign, entry: Json, trial: Any) -> str:
-    if isinstance(tables, TumbleCampaign):
-        return str(entry["sensor"])
-    return ", ".join(trial.needed)
-
-
-run, resume = whole_run("campaign check", CheckSettings, _carry_out, check=check)
+run, resume = computed_run("campaign check", CheckSettings, _compute, check=check)
