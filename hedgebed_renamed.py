@@ -136,17 +136,17 @@ _MODULES = {
     },
     "vis": {
         "vis.bed": "bed_cone=tests bed_cut=tests bed_repose=tests bed_shear=tests bed_tests=tests calibrate validation",
-        "vis.compare": "compare_figures=figures compare_spatial=figures",
+        "vis.compare": "compare_figures=report compare_spatial=report",
         "vis.diagnose": "campaign diagnose_figures=figures inspection",
         "vis.film": "jobs=film reel spatial_film=film spatial_pictures=film tumble_film=film",
-        "vis.page": "columns folder numbers palette=plots state_figures=states style tumble_series",
-        "vis.paper": "hop paper_assumed=figures paper_measures=figures paper_paths=figures paper_run=run",
+        "vis.page": "columns=page folder numbers palette=plots state_figures=states style tumble_series=states",
+        "vis.paper": "hop paper_assumed=figures paper_measures=figures paper_paths=figures paper_run=figures",
         "vis.penetrate": (
-            "amended plot_drag plot_drops plot_parts plots summary summary_tables=summary_parts "
+            "amended=report plot_drag plot_drops plot_parts plots=report summary summary_tables=summary_parts "
             "summary_words=summary_parts"
         ),
         "vis.pictures": "arrows canvas frames meshes render scene sections stage tracks",
-        "vis.tumble": "tumble_beside=beside tumble_grains=grains tumble_pictures=pictures tumble_sweep=sweep",
+        "vis.tumble": "tumble_beside=beside tumble_grains=grains tumble_pictures=pictures tumble_sweep=report",
     },
 }
 """Package of before -> package of today -> its modules, `old=new` where the name is another, too."""
@@ -261,7 +261,7 @@ _NAMES = {
     "vis.compare": {
         "vis.compare.report": "write_compare_report",
     },
-    "vis.compare.figures": {
+    "vis.compare.report": {
         "vis.page.states": "draw_states",
     },
     "vis.diagnose": {
@@ -277,11 +277,14 @@ _NAMES = {
     "vis.paper": {
         "vis.paper.report": "write_paper_report",
     },
-    "vis.paper.run": {
-        "vis.page.plots": "WIDTH legend_above new_figure",
+    "vis.page.states": {
+        "vis.page.folder": "read_columns",
+    },
+    "vis.paper.figures": {
+        "vis.page.plots": "WIDTH new_figure",
     },
     "vis.penetrate.plot_parts": {
-        "vis.page.plots": "Plot WIDTH legend_above new_panels shades",
+        "vis.page.plots": "WIDTH legend_above new_panels shades",
     },
     "vis.pictures": {
         "vis.pictures.pictures": "Picture Pictures make_pictures opengl_available render_apart",
@@ -290,7 +293,9 @@ _NAMES = {
         "vis.spatial.report": "write_spatial_report",
     },
     "vis.tumble": {
-        "vis.page.tumble_series": "STATES read_columns state_runs",
+        "vis.page.folder": "read_columns",
+        "vis.page.states": "state_runs",
+        "vis.page.style": "STATES",
         "vis.tumble.report": "write_tumble_report",
     },
 }

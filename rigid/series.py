@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -81,11 +81,15 @@ def write_series(path: str | Path, columns: Mapping[str, Any], *, line_end: str 
         writer.writerows(zip(*cells, strict=True))
 
 
-def read_series(path: str | Path) -> dict[str, NDArray[Any]]:
-    """The columns of the CSV file `path`: name -> array of shape [n], float where all of it is numbers, else text."""
+def read_series(path: str | Path, *, text: Container[str] = ()) -> dict[str, NDArray[Any]]:
+    """The columns of the CSV file `path`: name -> array of shape [n], float where all of it is numbers, else text.
+
+    Columns named in `text` stay text, whatever they hold.
+    """
     with Path(path).open(newline="", encoding="utf-8") as file:
         names, *rows = [row for row in csv.reader(file) if row]
-    return {name: _array([row[place] for row in rows]) for place, name in enumerate(names)}
+    cells = {name: [row[place] for row in rows] for place, name in enumerate(names)}
+    return {name: np.array(own, dtype=str) if name in text else _array(own) for name, own in cells.items()}
 
 
 def pandas() -> Any:

@@ -1,14 +1,13 @@
 """Frames, pictures, plots and the report of a run folder.
 
-Reads and writes run folders (docs/architecture.md) and plain arrays; imports nothing of `dem`, `rigid`, `coupling` or
-`experiments`. A picture can thus be made again, elsewhere, years later. The modules:
+Reads and writes run folders (docs/architecture.md) and plain arrays, and knows nothing of the runs themselves. A
+picture can thus be made again, elsewhere, years later. The modules:
 
 `vis.pictures.frames` (VTU and PVD), `vis.pictures.meshes` (triangle meshes), `vis.pictures.pictures` (off-screen
-pictures and the animation),
-`vis.penetrate.plots` (curves), `vis.report` (`report.html`). What scripts want most can be had from `vis` itself,
-and is loaded when it is first asked for: frames are written without matplotlib.
+pictures and the animation), `vis.report` (`report.html`). What scripts want most can be had from `vis` itself, and is
+loaded when it is first asked for: frames are written without matplotlib.
 
-Imports nothing of ours outside itself.
+Imports `rigid`.
 """
 
 from __future__ import annotations

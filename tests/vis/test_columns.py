@@ -7,9 +7,8 @@ import pytest
 from matplotlib import get_data_path
 from PIL import ImageFont
 
-from vis.page.columns import columns
 from vis.page.folder import read_folder
-from vis.page.page import Page, Section, table, write_page
+from vis.page.page import Page, Section, columns, table, write_page
 from vis.penetrate.summary import summarise
 
 SHEET = files("vis").joinpath("templates/style.css").read_text().partition("@media print")[0]

@@ -16,7 +16,7 @@ import vis
 from vis.page import style
 from vis.page.folder import read_folder, read_series
 from vis.penetrate.plot_drops import _running_mean
-from vis.penetrate.plots import PLOTS, make_plots
+from vis.penetrate.report import PLOTS, make_plots
 from vis.penetrate.summary import summarise
 from vis.report import write_report
 

@@ -8,10 +8,9 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from PIL import Image, ImageColor
 
-from vis.compare.figures import _draw_path
+from vis.compare.report import _draw_path
 from vis.diagnose.figures import _PHASES
-from vis.page.style import as_it_lies
-from vis.page.tumble_series import STATES
+from vis.page.style import STATES, as_it_lies
 from vis.pictures.render import write_gif
 
 

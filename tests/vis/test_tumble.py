@@ -7,8 +7,9 @@ import pytest
 from PIL import Image
 
 from vis import write_report
+from vis.page.folder import read_columns
 from vis.page.page import Page, Section, figure, table, text, write_page
-from vis.page.tumble_series import read_columns, state_runs
+from vis.page.states import state_runs
 from vis.tumble.report import write_tumble_report
 
 

@@ -7,33 +7,30 @@ from pathlib import Path
 
 from matplotlib.patches import Patch
 
-from vis.bed.tests import flank_lines
-from vis.page.numbers import quote
-from vis.page.page import Section, Tile, code, text
-from vis.page.plots import Plot, handle, legend_above, new_panels, smooth_ratio
-from vis.page.report import Progress, Report, Result, again, tables
-from vis.page.sentences import Sentences
-from vis.page.style import BED, GREY, INK, MODEL, styled
+from vis.bed.tests import flank_lines, said
+from vis.page.page import Block, Report, Result, Section, Tile, again, code, report_of, tables, text
+from vis.page.plots import handle, legend_above, new_panels, smooth_ratio
+from vis.page.style import BED, GREY, INK, MODEL
 
 __all__ = ["write_calibration_report"]
 
-captions = Sentences(__package__, "figures.toml")
 _COLOURS = (BED, MODEL, INK, GREY)
 
 
-def write_calibration_report(folder: str | Path, *, progress: Progress | None = None) -> Path:
+@report_of()
+def write_calibration_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a calibration, and return the report."""
-    report = Report(folder, progress)
     result, quantities = report.result, report.result["quantities"]
     free = tomllib.loads((report.folder / "run.toml").read_text(encoding="utf-8"))["settings"]["free"]
-    plots = [_response(report, key) for key in free]
-    drawn = report.draw_all([*plots, _residuals(result), *_tests(report), *_slopes(report)])
-    report.tell(0.8)
-    tiles = [Tile(_words(key), _said(quantities[key]), quantities[key]["note"]) for key in free]
-    tiles += [
-        Tile(_words(one["name"]), _said(quantities[one["name"]]), one["verdict"], second=one["verdict"] != "met")
-        for one in result["figures"]
-    ]
+    drawn = [*(_response(report, key) for key in free), _residuals(report), *_tests(report), *_slopes(report)]
+
+    def tile(name: str, note: str, second: bool = False) -> Tile:
+        entry = quantities[name]
+        unit = {"1": "", "degrees": "°"}.get(entry["unit"], f" {entry['unit']}")
+        return Tile(name.replace("_", " ").capitalize(), said(entry, 1.0, unit), note, second=second)
+
+    tiles = [tile(key, quantities[key]["note"]) for key in free]
+    tiles += [tile(one["name"], one["verdict"], second=one["verdict"] != "met") for one in result["figures"]]
     material = (report.folder / "material.toml").read_text(encoding="utf-8")
     sections = [
         Section("", tables(result) + drawn),
@@ -44,78 +41,66 @@ def write_calibration_report(folder: str | Path, *, progress: Progress | None = 
     return report.write(sections, lead=["bed calibrate"], tiles=tiles)
 
 
-def _words(name: str) -> str:
-    return name.replace("_", " ").capitalize()
-
-
-def _said(entry: Result) -> str:
-    unit = {"1": "", "degrees": "°"}.get(entry["unit"], f" {entry['unit']}")
-    return "–" if entry["value"] is None else quote(entry["value"], entry["std"]) + unit
-
-
 def _axis_words(entry: Result) -> str:
     kind = f", {entry['plane']}" if entry["plane"] not in (None, "shear") else ""
     return f"{entry['name'].replace('_', ' ')}{kind} [{entry['unit']}]"
 
 
-def _response(report: Report, key: str) -> Plot:
+def _response(report: Report, key: str) -> Block:
     """Every fitted figure against one parameter."""
     result, columns = report.result, report.columns(report.result["curves"][key])
     entries = [entry for entry in result["figures"] if entry["fitted"]]
-    several = len(result["curves"]) > 1
     best, unit = result["quantities"][key]["value"], result["quantities"][key]["unit"]
-    with styled():
-        drawing, axes = new_panels(len(entries), height=3.3)
-        for axis, entry in zip(axes, entries, strict=True):
-            name = entry["name"]
-            low, high = entry["wanted"] - entry["tolerance"], entry["wanted"] + entry["tolerance"]
-            axis.axhspan(low, high, color=MODEL, alpha=0.18, lw=0)
-            x, y, std = columns[key], columns[name], columns[f"{name}.std"]
-            axis.fill_between(x, y - 2 * std, y + 2 * std, color=BED, alpha=0.18, lw=0)
-            axis.plot(x, y, color=BED)
-            at = [point["values"][key] for point in result["points"]]
-            found = [point["moved"][key][name] for point in result["points"]]
-            error = [point["figures"][name][1] for point in result["points"]]
-            axis.errorbar(at, found, yerr=error, color=BED, marker="o", ms=4, ls="")
-            end, off = entry["measured"], entry["error"]
-            axis.errorbar([best], [end], yerr=[off], color=INK, marker="D", ms=5, ls="", zorder=5)
-            axis.axvline(best, color=INK, lw=0.8, ls=(0, (2, 2)))
-            axis.set(xlabel=f"{key.replace('_', ' ')} [{unit}]", ylabel=_axis_words(entry))
-        handles = [
-            Patch(facecolor=MODEL, alpha=0.3, label="wanted"),
-            handle("response, ± 2 std", BED),
-            handle("simulated", BED, marker="o", ls=""),
-            handle("check, other seeds", INK, marker="D", ls=""),
-        ]
-        legend_above(drawing, handles)
+    drawing, axes = new_panels(len(entries), height=3.3)
+    for axis, entry in zip(axes, entries, strict=True):
+        name = entry["name"]
+        low, high = entry["wanted"] - entry["tolerance"], entry["wanted"] + entry["tolerance"]
+        axis.axhspan(low, high, color=MODEL, alpha=0.18, lw=0)
+        x, y, std = columns[key], columns[name], columns[f"{name}.std"]
+        axis.fill_between(x, y - 2 * std, y + 2 * std, color=BED, alpha=0.18, lw=0)
+        axis.plot(x, y, color=BED)
+        at = [point["values"][key] for point in result["points"]]
+        found = [point["moved"][key][name] for point in result["points"]]
+        error = [point["figures"][name][1] for point in result["points"]]
+        axis.errorbar(at, found, yerr=error, color=BED, marker="o", ms=4, ls="")
+        end, off = entry["measured"], entry["error"]
+        axis.errorbar([best], [end], yerr=[off], color=INK, marker="D", ms=5, ls="", zorder=5)
+        axis.axvline(best, color=INK, lw=0.8, ls=(0, (2, 2)))
+        axis.set(xlabel=f"{key.replace('_', ' ')} [{unit}]", ylabel=_axis_words(entry))
+    handles = [
+        Patch(facecolor=MODEL, alpha=0.3, label="wanted"),
+        handle("response, ± 2 std", BED),
+        handle("simulated", BED, marker="o", ls=""),
+        handle("check, other seeds", INK, marker="D", ls=""),
+    ]
+    legend_above(drawing, handles)
     others = " Line and points: at the parameters found, but for this one; points were moved there along the surface."
-    caption = "Bars: standard error that a test tells of itself." + (others if several else "")
-    return Plot(f"response-{key}", f"Figures against {key.replace('_', ' ')}", caption, drawing)
+    words = {"parameter": key.replace("_", " "), "others": others if len(result["curves"]) > 1 else ""}
+    return report.draw("response", drawing, name=f"response-{key}", **words)
 
 
-def _residuals(result: Result) -> Plot:
+def _residuals(report: Report) -> Block:
     """What was measured at the end less what was wanted, in tolerances."""
-    entries = [entry for entry in result["figures"] if entry["measured"] is not None]
-    with styled():
-        drawing, (axis,) = new_panels(1, height=0.9 + 0.45 * len(entries))
-        axis.axvspan(-1, 1, color=MODEL, alpha=0.18, lw=0)
-        axis.axvline(0, color=GREY, lw=0.8)
-        for k, entry in enumerate(reversed(entries)):
-            off = (entry["measured"] - entry["wanted"]) / entry["tolerance"]
-            error = (entry["error"] or 0.0) / entry["tolerance"]
-            colour = BED if entry["fitted"] else GREY
-            axis.errorbar([off], [k], xerr=[2 * error], color=colour, marker="o" if entry["fitted"] else "s", ls="")
-        axis.set_yticks(range(len(entries)), [_axis_words(entry).split(" [")[0] for entry in reversed(entries)])
-        axis.set(ylim=(-0.6, len(entries) - 0.4), xlabel="measured less wanted [tolerances]")
-        reach = max(1.6, *(abs(x) for x in axis.get_xlim()))
-        axis.set_xlim(-reach, reach)
-        handles = [
-            Patch(facecolor=MODEL, alpha=0.3, label="within the tolerance"),
-            handle("fitted", BED, marker="o", ls=""),
-            handle("compared only", GREY, marker="s", ls=""),
-        ]
-        legend_above(drawing, handles)
-    return Plot.said(captions, "residuals", drawing)
+    entries = [entry for entry in report.result["figures"] if entry["measured"] is not None]
+    drawing, (axis,) = new_panels(1, height=0.9 + 0.45 * len(entries))
+    axis.axvspan(-1, 1, color=MODEL, alpha=0.18, lw=0)
+    axis.axvline(0, color=GREY, lw=0.8)
+    for k, entry in enumerate(reversed(entries)):
+        off = (entry["measured"] - entry["wanted"]) / entry["tolerance"]
+        error = (entry["error"] or 0.0) / entry["tolerance"]
+        colour = BED if entry["fitted"] else GREY
+        axis.errorbar([off], [k], xerr=[2 * error], color=colour, marker="o" if entry["fitted"] else "s", ls="")
+    axis.set_yticks(range(len(entries)), [_axis_words(entry).split(" [")[0] for entry in reversed(entries)])
+    axis.set(ylim=(-0.6, len(entries) - 0.4), xlabel="measured less wanted [tolerances]")
+    reach = max(1.6, *(abs(x) for x in axis.get_xlim()))
+    axis.set_xlim(-reach, reach)
+    handles = [
+        Patch(facecolor=MODEL, alpha=0.3, label="within the tolerance"),
+        handle("fitted", BED, marker="o", ls=""),
+        handle("compared only", GREY, marker="s", ls=""),
+    ]
+    legend_above(drawing, handles)
+    return report.draw("residuals", drawing)
 
 
 def _checked(result: Result) -> list[Result]:
@@ -125,39 +110,37 @@ def _checked(result: Result) -> list[Result]:
     return [test for test in checks if all(test["values"][key] == value for key, value in best.items())]
 
 
-def _tests(report: Report) -> list[Plot]:
+def _tests(report: Report) -> list[Block]:
     """The stress ratio of the check's tests over strain."""
     tests = [test for test in _checked(report.result) if test["state"] != "drained"]
     if not tests:
         return []
     states = list(dict.fromkeys(test["state"] for test in tests))
     pressures = sorted({test["pressure"] for test in tests})
-    with styled():
-        drawing, axes = new_panels(len(states), height=3.0, sharey=True)
-        for axis, state in zip(axes, states, strict=True):
-            for test in (t for t in tests if t["state"] == state):
-                columns = report.columns(test["series"])
-                colour = _COLOURS[pressures.index(test["pressure"]) % 4]
-                axis.plot(*smooth_ratio(columns["strain"], columns), color=colour, lw=1.1, alpha=0.85)
-            axis.set(title=state, xlabel="shear strain [1]", ylim=(0.0, None))
-        axes[0].set_ylabel("shear over normal stress, at the lid [1]")
-        handles = [handle(f"{p:g} Pa", _COLOURS[k % 4]) for k, p in enumerate(pressures)]
-        legend_above(drawing, handles)
-    return [Plot.said(captions, "tests", drawing)]
+    drawing, axes = new_panels(len(states), height=3.0, sharey=True)
+    for axis, state in zip(axes, states, strict=True):
+        for test in (t for t in tests if t["state"] == state):
+            columns = report.columns(test["series"])
+            colour = _COLOURS[pressures.index(test["pressure"]) % 4]
+            axis.plot(*smooth_ratio(columns["strain"], columns), color=colour, lw=1.1, alpha=0.85)
+        axis.set(title=state, xlabel="shear strain [1]", ylim=(0.0, None))
+    axes[0].set_ylabel("shear over normal stress, at the lid [1]")
+    handles = [handle(f"{p:g} Pa", _COLOURS[k % 4]) for k, p in enumerate(pressures)]
+    legend_above(drawing, handles)
+    return [report.draw("tests", drawing)]
 
 
-def _slopes(report: Report) -> list[Plot]:
+def _slopes(report: Report) -> list[Block]:
     """What the drained beds of the check left."""
     tests = [test for test in _checked(report.result) if test["state"] == "drained"]
     if not tests:
         return []
-    with styled():
-        drawing, axes = new_panels(len(tests), height=2.4, sharey=True)
-        for axis, test in zip(axes, tests, strict=True):
-            columns = report.columns(test["series"])
-            axis.plot(1e3 * columns["x_m"], 1e3 * columns["thickness_m"], color=BED, marker=".", ls="none")
-            flank_lines(axis, test, start=0.5 * test["slot"], period=test["size"][0], colour=MODEL)
-            title = f"seed {test['seed']}: {test['angle']:.1f} ± {test['error']:.1f}°"
-            axis.set(title=title, xlabel="x [mm]", ylim=(0.0, None))
-        axes[0].set_ylabel("thickness [mm]")
-    return [Plot.said(captions, "slopes", drawing)]
+    drawing, axes = new_panels(len(tests), height=2.4, sharey=True)
+    for axis, test in zip(axes, tests, strict=True):
+        columns = report.columns(test["series"])
+        axis.plot(1e3 * columns["x_m"], 1e3 * columns["thickness_m"], color=BED, marker=".", ls="none")
+        flank_lines(axis, test, start=0.5 * test["slot"], period=test["size"][0], colour=MODEL)
+        title = f"seed {test['seed']}: {test['angle']:.1f} ± {test['error']:.1f}°"
+        axis.set(title=title, xlabel="x [mm]", ylim=(0.0, None))
+    axes[0].set_ylabel("thickness [mm]")
+    return [report.draw("slopes", drawing)]

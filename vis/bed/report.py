@@ -6,11 +6,8 @@ from functools import partial
 from pathlib import Path
 
 from vis.page.numbers import short
-from vis.page.page import Block, Section, Tile, figure, listing
-from vis.page.plots import DASHED, Plot, handle, legend_above, new_panels, shades
-from vis.page.report import Progress, Report, again, tables
-from vis.page.sentences import Sentences
-from vis.page.style import styled
+from vis.page.page import Block, Report, Section, Tile, again, figure, listing, report_of, tables
+from vis.page.plots import DASHED, handle, legend_above, new_panels, shades
 from vis.pictures.canvas import colour_values, nice_above
 from vis.pictures.frames import grains_box, read_frames
 from vis.pictures.pictures import Counter, carry_out
@@ -18,17 +15,13 @@ from vis.pictures.render import PictureJob, View, run_job
 
 __all__ = ["write_bed_report"]
 
-captions = Sentences(__package__, "figures.toml")
 
-
-def write_bed_report(folder: str | Path, *, progress: Progress | None = None) -> Path:
+@report_of()
+def write_bed_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a prepared bed, and return the report."""
-    report = Report(folder, progress)
     result, quantities = report.result, report.result["quantities"]
-    drawn = report.draw_all([_profiles(report), *_passes(report)])
-    report.tell(0.4)
+    drawn = [_profiles(report), *_passes(report)]
     picture, note = _picture(report)
-    report.tell(0.9)
 
     def said(name: str, scale: float = 1.0, unit: str = "") -> str:
         value = quantities[name]["value"]
@@ -56,43 +49,41 @@ def write_bed_report(folder: str | Path, *, progress: Progress | None = None) ->
     return report.write(sections, lead=lead, tiles=tiles, missing=[note] if note else [])
 
 
-def _profiles(report: Report) -> Plot:
+def _profiles(report: Report) -> Block:
     """Packing and stresses against height, a colour for each stage."""
     stages = report.result["stages"]
-    with styled():
-        drawing, (packing, vertical, sideways) = new_panels(3, height=3.6, sharey=True)
-        handles = []
-        for stage, colour in zip(stages, shades(len(stages)), strict=True):
-            columns = report.columns(stage["series"])
-            height = 1e3 * columns["height_m"]
-            for axis, name, dash in (
-                (packing, "packing", "-"),
-                (vertical, "stress_zz_Pa", "-"),
-                (sideways, "stress_xx_Pa", "-"),
-                (sideways, "stress_yy_Pa", DASHED),
-            ):
-                axis.plot(columns[name], height, color=colour, marker=".", ls=dash)
-            handles.append(handle(stage["stage"], colour, marker="."))
-        packing.set(xlabel="packing fraction [1]", ylabel="height above the floor [mm]", ylim=(0.0, None))
-        vertical.set(xlabel="vertical stress [Pa]", xlim=(0.0, None))
-        sideways.set(xlabel="horizontal stresses [Pa]", xlim=(0.0, None))
-        legend_above(drawing, handles)
-    return Plot.said(captions, "profiles", drawing)
+    drawing, (packing, vertical, sideways) = new_panels(3, height=3.6, sharey=True)
+    handles = []
+    for stage, colour in zip(stages, shades(len(stages)), strict=True):
+        columns = report.columns(stage["series"])
+        height = 1e3 * columns["height_m"]
+        for axis, name, dash in (
+            (packing, "packing", "-"),
+            (vertical, "stress_zz_Pa", "-"),
+            (sideways, "stress_xx_Pa", "-"),
+            (sideways, "stress_yy_Pa", DASHED),
+        ):
+            axis.plot(columns[name], height, color=colour, marker=".", ls=dash)
+        handles.append(handle(stage["stage"], colour, marker="."))
+    packing.set(xlabel="packing fraction [1]", ylabel="height above the floor [mm]", ylim=(0.0, None))
+    vertical.set(xlabel="vertical stress [Pa]", xlim=(0.0, None))
+    sideways.set(xlabel="horizontal stresses [Pa]", xlim=(0.0, None))
+    legend_above(drawing, handles)
+    return report.draw("profiles", drawing)
 
 
-def _passes(report: Report) -> list[Plot]:
+def _passes(report: Report) -> list[Block]:
     """Packing against taps or presses of the lid, where a stage had any."""
     stages = [stage for stage in report.result["stages"] if "trace_series" in stage]
     if not stages:
         return []
-    with styled():
-        drawing, (axis,) = new_panels(1, height=2.6)
-        for stage, colour in zip(stages, shades(len(stages)), strict=True):
-            columns = report.columns(stage["trace_series"])
-            axis.plot(columns["pass"], columns["packing"], color=colour, marker=".", label=stage["stage"])
-        axis.set(xlabel="taps, or presses of the lid, that were kept [1]", ylabel="packing fraction [1]")
-        legend_above(drawing, axis.get_legend_handles_labels()[0])
-    return [Plot.said(captions, "passes", drawing)]
+    drawing, (axis,) = new_panels(1, height=2.6)
+    for stage, colour in zip(stages, shades(len(stages)), strict=True):
+        columns = report.columns(stage["trace_series"])
+        axis.plot(columns["pass"], columns["packing"], color=colour, marker=".", label=stage["stage"])
+    axis.set(xlabel="taps, or presses of the lid, that were kept [1]", ylabel="packing fraction [1]")
+    legend_above(drawing, axis.lines)
+    return [report.draw("passes", drawing)]
 
 
 def _picture(report: Report) -> tuple[list[Block], str]:
@@ -113,7 +104,7 @@ def _picture(report: Report) -> tuple[list[Block], str]:
         "surface": float(result["bed"]["surface"]["value"]), "file": str(file), "size": [1600, 1200],
     }  # fmt: skip
     job: PictureJob = {"folder": str(folder), "stills": [view], "animation": None}
-    counter, flat = Counter([1.0]), partial(run_job, job, opengl=False)
+    counter, flat = Counter([1.0], report.rest()), partial(run_job, job, opengl=False)
     stands_in = "a cross-section stands in for the picture"
     _, notes = carry_out(job, counter, flat, failed=stands_in, without=stands_in)
     said = "Grains coloured by the number of their contacts."

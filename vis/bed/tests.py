@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,32 +14,29 @@ from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
 from vis.page.numbers import quote
-from vis.page.page import Section, Tile, text
-from vis.page.plots import Array, Plot, handle, legend_above, new_panels, shades, smooth_ratio
-from vis.page.report import Progress, Report, Result, again, tables
+from vis.page.page import Block, Report, Result, Section, Tile, again, report_of, tables, text
+from vis.page.plots import Array, handle, legend_above, new_panels, shades, smooth_ratio
 from vis.page.sentences import Sentences
-from vis.page.style import BED, MODEL, styled
+from vis.page.style import BED, MODEL
 from vis.pictures.frames import read_frames
 
 __all__ = ["FALLEN_SHARE", "flank_lines", "said", "write_shear_report", "write_test_report"]
 
-say, captions = Sentences(__package__), Sentences(__package__, "figures.toml")
+say = Sentences(__package__)
 Grains = Mapping[str, NDArray[Any]]
 
 
-def write_test_report(folder: str | Path, *, progress: Progress | None = None) -> Path:
+@report_of()
+def write_test_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of such a test, shear aside, and return the report."""
-    report = Report(folder, progress)
     result, command = report.result, report.result["experiment"]
     plots, tiles, method = _TESTS[command.rpartition(" ")[2]]
-    drawn = report.draw_all(plots(report))
-    report.tell(0.9)
     one = result["runs"][0]
     sides = " x ".join(f"{1e3 * side:.3g}" for side in one["size"][:2])
     scaled = {"mm": 1e3 * one["grain"], "deep": 1e3 * one["surface"], "mpa": 1e-6 * one["young"]}
     bed = say("first_bed", one=one, sides=sides, step=1e6 * one["time_step"], **scaled)
     sections = [
-        Section("", tables(result) + drawn),
+        Section("", [*tables(result), *plots(report)]),
         Section("How it is measured", [*(text(words) for words in method), text(bed)]),
         report.numbers(std=True),
         again(f"hedgebed {command} run.toml"),
@@ -63,7 +60,7 @@ def _side_plot(
     *,
     top: float = 5.0,
     shown: Callable[[Grains], Grains] = lambda grains: grains,
-) -> list[Plot]:
+) -> list[Block]:
     """The grains of a run's last frame from the side, coloured by how far each has moved; none where no frame is.
 
     ``draw``: draws over them, in mm. key: of its sentences. top: end of the colours' scale [mean diameters]. ``shown``:
@@ -74,13 +71,12 @@ def _side_plot(
         return []
     grains, period = shown(frames[len(frames) - 1].grains), float(run["size"][0])
     highest = float((grains["position"][:, 2] + grains["radius"]).max())
-    with styled():
-        # The grains fill the panel's width, or nearly.
-        drawing, (axis,) = new_panels(1, height=min(5.5, 0.7 + 6.9 * highest / period))
-        drawn = _draw_grains(axis, grains, period=period, unit=run["grain"], top=top)
-        draw(axis)
-        drawing.colorbar(drawn, ax=axis, shrink=0.8, extend="max", label="way since it was made [d]")
-    return [Plot.said(captions, key, drawing, name="side")]
+    # The grains fill the panel's width, or nearly.
+    drawing, (axis,) = new_panels(1, height=min(5.5, 0.7 + 6.9 * highest / period))
+    drawn = _draw_grains(axis, grains, period=period, unit=run["grain"], top=top)
+    draw(axis)
+    drawing.colorbar(drawn, ax=axis, shrink=0.8, extend="max", label="way since it was made [d]")
+    return [report.draw(key, drawing, name="side")]
 
 
 def _draw_grains(axis: Axes, grains: Grains, *, period: float, unit: float, top: float) -> Any:
@@ -116,35 +112,34 @@ def _cone_tiles(result: Result) -> list[Tile]:
     ]
 
 
-def _cone_plots(report: Report) -> list[Plot]:
+def _cone_plots(report: Report) -> list[Block]:
     return [_indices(report), *_cone_side(report)]
 
 
-def _indices(report: Report) -> Plot:
+def _indices(report: Report) -> Block:
     runs = report.result["runs"]
-    with styled():
-        drawing, (axis, lines) = new_panels(2, height=3.8, sharey=True)
-        handles = []
-        for run, colour in zip(runs, shades(len(runs)), strict=True):
-            columns = report.columns(run["series"])
-            depth = 1e3 * columns["base_depth_m"]
-            axis.plot(1e-3 * columns["index_Pa"], depth, color=colour, lw=1.2)
-            inside = depth >= 0
-            lines.plot(1e-3 * columns["index_Pa"][inside], depth[inside], color=colour, lw=0.6, alpha=0.5)
-            ends = np.array([0.0, depth[-1]])
-            lines.plot(1e-3 * (run["start"] + run["gradient"] * 1e-3 * ends), ends, color=colour, lw=2.0)
-            handles.append(handle(run["id"], colour))
-        axis.axhline(0.0, color=MODEL, lw=1.0, ls="--")
-        axis.invert_yaxis()
-        axis.set(ylabel="depth of the cone's base [mm]", title="all the way")
-        lines.set_title("fitted lines")
-        for panel in (axis, lines):
-            panel.set(xlim=(0.0, None), xlabel="cone index [kPa]")
-        legend_above(drawing, handles)
-    return Plot.said(captions, "index", drawing)
+    drawing, (axis, lines) = new_panels(2, height=3.8, sharey=True)
+    handles = []
+    for run, colour in zip(runs, shades(len(runs)), strict=True):
+        columns = report.columns(run["series"])
+        depth = 1e3 * columns["base_depth_m"]
+        axis.plot(1e-3 * columns["index_Pa"], depth, color=colour, lw=1.2)
+        inside = depth >= 0
+        lines.plot(1e-3 * columns["index_Pa"][inside], depth[inside], color=colour, lw=0.6, alpha=0.5)
+        ends = np.array([0.0, depth[-1]])
+        lines.plot(1e-3 * (run["start"] + run["gradient"] * 1e-3 * ends), ends, color=colour, lw=2.0)
+        handles.append(handle(run["id"], colour))
+    axis.axhline(0.0, color=MODEL, lw=1.0, ls="--")
+    axis.invert_yaxis()
+    axis.set(ylabel="depth of the cone's base [mm]", title="all the way")
+    lines.set_title("fitted lines")
+    for panel in (axis, lines):
+        panel.set(xlim=(0.0, None), xlabel="cone index [kPa]")
+    legend_above(drawing, handles)
+    return report.draw("index", drawing)
 
 
-def _cone_side(report: Report) -> list[Plot]:
+def _cone_side(report: Report) -> list[Block]:
     run = report.result["runs"][0]
 
     def behind(grains: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -188,11 +183,11 @@ def _cut_tiles(result: Result) -> list[Tile]:
     ]
 
 
-def _cut_plots(report: Report) -> list[Plot]:
-    return [*_cut_side(report), _cut_profiles(report), _trials(report.result["runs"])]
+def _cut_plots(report: Report) -> list[Block]:
+    return [*_cut_side(report), _cut_profiles(report), _trials(report)]
 
 
-def _cut_side(report: Report) -> list[Plot]:
+def _cut_side(report: Report) -> list[Block]:
     run = report.result["runs"][0]
 
     def draw(axis: Axes) -> None:
@@ -206,7 +201,7 @@ def _cut_side(report: Report) -> list[Plot]:
     return _side_plot(report, run, draw, "cut_side")
 
 
-def _cut_profiles(report: Report) -> Plot:
+def _cut_profiles(report: Report) -> Block:
     def draw(axis: Axes, run: Result, x: Array, thickness: Array, standing: Array | None) -> str:
         if standing is not None:
             axis.step(x, standing, where="mid", color=BED, lw=1.2)
@@ -217,28 +212,28 @@ def _cut_profiles(report: Report) -> Plot:
     return _thicknesses(report, "tests_profiles", draw, handles)
 
 
-def _trials(runs: Sequence[Result]) -> Plot:
-    with styled():
-        drawing, (axis,) = new_panels(1, height=2.6)
-        handles = []
-        for run, colour in zip(runs, shades(len(runs)), strict=True):
-            trials = np.array(sorted(run["trials"]))
-            axis.plot(1e3 * run["height"] * trials[:, 0], trials[:, 1], color=colour, marker="o", ms=4)
-            handles.append(handle(run["id"], colour, marker="o", ms=4))
-        axis.axhline(FALLEN_SHARE, color=MODEL, lw=1.0, ls="--")
-        axis.set_xscale("log")
-        heights = [1e3 * run["height"] for run in runs]
-        axis.set_xlim(0.09 * min(heights), 4.4 * max(heights))
-        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.xaxis.set_major_formatter("{x:g}")
-        axis.xaxis.set_minor_formatter("")
-        axis.set(
-            ylim=(-0.03, 1.03),
-            xlabel="height of the face at the bed's own gravity [mm]",
-            ylabel="grains of the wedge\nthat have moved [1]",
-        )
-        legend_above(drawing, handles)
-    return Plot.said(captions, "trials", drawing)
+def _trials(report: Report) -> Block:
+    runs = report.result["runs"]
+    drawing, (axis,) = new_panels(1, height=2.6)
+    handles = []
+    for run, colour in zip(runs, shades(len(runs)), strict=True):
+        trials = np.array(sorted(run["trials"]))
+        axis.plot(1e3 * run["height"] * trials[:, 0], trials[:, 1], color=colour, marker="o", ms=4)
+        handles.append(handle(run["id"], colour, marker="o", ms=4))
+    axis.axhline(FALLEN_SHARE, color=MODEL, lw=1.0, ls="--")
+    axis.set_xscale("log")
+    heights = [1e3 * run["height"] for run in runs]
+    axis.set_xlim(0.09 * min(heights), 4.4 * max(heights))
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.xaxis.set_major_formatter("{x:g}")
+    axis.xaxis.set_minor_formatter("")
+    axis.set(
+        ylim=(-0.03, 1.03),
+        xlabel="height of the face at the bed's own gravity [mm]",
+        ylabel="grains of the wedge\nthat have moved [1]",
+    )
+    legend_above(drawing, handles)
+    return report.draw("trials", drawing)
 
 
 # A slot drains the bed ------------------------------------------------------------------------------------------------
@@ -268,11 +263,11 @@ def flank_lines(axis: Axes, run: Result, *, start: float, period: float, colour:
             axis.plot(1e3 * x, 1e3 * height, color=colour, ls=style, lw=2.0, zorder=3)
 
 
-def _repose_plots(report: Report) -> list[Plot]:
+def _repose_plots(report: Report) -> list[Block]:
     return [*_repose_side(report), _repose_profiles(report)]
 
 
-def _repose_side(report: Report) -> list[Plot]:
+def _repose_side(report: Report) -> list[Block]:
     run = report.result["runs"][0]
 
     def draw(axis: Axes) -> None:
@@ -287,7 +282,7 @@ def _repose_side(report: Report) -> list[Plot]:
     return _side_plot(report, run, draw, "repose_side")
 
 
-def _repose_profiles(report: Report) -> Plot:
+def _repose_profiles(report: Report) -> Block:
     colours = iter(shades(len(report.result["runs"])))
 
     def draw(axis: Axes, run: Result, x: Array, thickness: Array, standing: Array | None) -> str:
@@ -296,27 +291,25 @@ def _repose_profiles(report: Report) -> Plot:
         axis.axhline(1e3 * run["surface"], color="#888888", lw=0.8, ls="--")
         return f"{run['id']}: {run['angle']:.1f} ± {run['error']:.1f}°"
 
-    with styled():
-        dots, fit = handle("bed", "black", marker=".", ls="none"), handle("fit", MODEL)
-        before = handle("surface before", "#888888", ls="--", lw=0.8)
+    dots, fit = handle("bed", "black", marker=".", ls="none"), handle("fit", MODEL)
+    before = handle("surface before", "#888888", ls="--", lw=0.8)
     return _thicknesses(report, "repose_profiles", draw, [dots, fit, before])
 
 
-def _thicknesses(report: Report, key: str, draw: Callable[..., str], handles: list[Any]) -> Plot:
+def _thicknesses(report: Report, key: str, draw: Callable[..., str], handles: list[Any]) -> Block:
     """Profiles in mm, a panel a run, each drawn by `draw`, which gives its title."""
     runs = report.result["runs"]
-    with styled():
-        drawing, axes = new_panels(len(runs), height=2.4, sharey=True)
-        for axis, run in zip(axes, runs, strict=True):
-            columns = {name: 1e3 * values for name, values in report.columns(run["series"]).items()}
-            title = draw(axis, run, columns["x_m"], columns["thickness_m"], columns.get("thickness_standing_m"))
-            axis.set(title=title, xlabel="x [mm]", ylim=(0.0, None))
-        axes[0].set_ylabel("thickness [mm]")
-        legend_above(drawing, handles)
-    return Plot.said(captions, key, drawing, name="profiles")
+    drawing, axes = new_panels(len(runs), height=2.4, sharey=True)
+    for axis, run in zip(axes, runs, strict=True):
+        columns = {name: 1e3 * values for name, values in report.columns(run["series"]).items()}
+        title = draw(axis, run, columns["x_m"], columns["thickness_m"], columns.get("thickness_standing_m"))
+        axis.set(title=title, xlabel="x [mm]", ylim=(0.0, None))
+    axes[0].set_ylabel("thickness [mm]")
+    legend_above(drawing, handles)
+    return report.draw(key, drawing, name="profiles")
 
 
-_TESTS: dict[str, tuple[Callable[[Report], list[Plot]], Callable[[Result], list[Tile]], list[str]]] = {
+_TESTS: dict[str, tuple[Callable[[Report], list[Block]], Callable[[Result], list[Tile]], list[str]]] = {
     "cone": (_cone_plots, _cone_tiles, [say("cone_method_1"), say("cone_method_2")]),
     "cut": (_cut_plots, _cut_tiles, [say("cut_method_1"), say("cut_method_2")]),
     "repose": (_repose_plots, _repose_tiles, [say("repose_method_1"), say("repose_method_2")]),
@@ -327,12 +320,10 @@ _TESTS: dict[str, tuple[Callable[[Report], list[Plot]], Callable[[Result], list[
 # A lid shears it ------------------------------------------------------------------------------------------------------
 
 
-def write_shear_report(folder: str | Path, *, progress: Progress | None = None) -> Path:
+@report_of()
+def write_shear_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a shear test, and return the report."""
-    report = Report(folder, progress)
     result, quantities = report.result, report.result["quantities"]
-    drawn = report.draw_all([_curves(report), _lines(result)])
-    report.tell(0.9)
     slope = "slope through the runs"
     numbers = (
         ("Critical friction angle", "critical_friction_angle", "°", slope),
@@ -342,7 +333,7 @@ def write_shear_report(folder: str | Path, *, progress: Progress | None = None) 
     )
     tiles = [Tile(label, _shear_said(quantities[name], unit), note) for label, name, unit, note in numbers]
     sections = [
-        Section("", tables(result) + drawn),
+        Section("", [*tables(result), _curves(report), _lines(report)]),
         report.numbers(std=True),
         again("hedgebed bed test shear run.toml"),
     ]
@@ -354,37 +345,36 @@ def _shear_said(entry: Result, unit: str) -> str:
     return f"{quote(value)}{unit}" if std is None else f"{value:.3g} ± {std:.1g}{unit}"
 
 
-def _curves(report: Report) -> Plot:
+def _curves(report: Report) -> Block:
     grain, runs = report.result["grain"], report.result["runs"]
-    with styled():
-        drawing, (ratio, height) = new_panels(2, height=3.2, sharex=True)
-        handles = []
-        for run, colour in zip(runs, shades(len(runs)), strict=True):
-            columns = report.columns(run["series"])
-            way = columns["way_m"] / grain
-            ratio.plot(*smooth_ratio(way, columns), color=colour)
-            height.plot(way, columns["height_m"] / grain, color=colour)
-            handles.append(handle(f"{run['normal']:.0f} Pa", colour))
-        ratio.set(ylabel="shear over normal stress, at the lid [1]", ylim=(0.0, None))
-        height.set_ylabel("the lid has risen by [diameters]")
-        for axis in (ratio, height):
-            axis.set_xlabel("way of the lid [diameters]")
-        legend_above(drawing, handles)
-    return Plot.said(captions, "shear", drawing)
+    drawing, (ratio, height) = new_panels(2, height=3.2, sharex=True)
+    handles = []
+    for run, colour in zip(runs, shades(len(runs)), strict=True):
+        columns = report.columns(run["series"])
+        way = columns["way_m"] / grain
+        ratio.plot(*smooth_ratio(way, columns), color=colour)
+        height.plot(way, columns["height_m"] / grain, color=colour)
+        handles.append(handle(f"{run['normal']:.0f} Pa", colour))
+    ratio.set(ylabel="shear over normal stress, at the lid [1]", ylim=(0.0, None))
+    height.set_ylabel("the lid has risen by [diameters]")
+    for axis in (ratio, height):
+        axis.set_xlabel("way of the lid [diameters]")
+    legend_above(drawing, handles)
+    return report.draw("shear", drawing)
 
 
-def _lines(result: Result) -> Plot:
-    quantities, normal = result["quantities"], np.array([run["normal"] for run in result["runs"]])
-    with styled():
-        drawing, (axis,) = new_panels(1, height=3.2)
-        reach = np.array([0.0, 1.05 * normal.max()])
-        handles = []
-        for kind, colour, mark in (("peak", MODEL, "D"), ("critical", BED, "o")):
-            slope = math.tan(math.radians(quantities[f"{kind}_friction_angle"]["value"]))
-            axis.plot(reach, quantities[f"{kind}_cohesion"]["value"] + slope * reach, color=colour, lw=1.2)
-            error = [run["critical_error"] if kind == "critical" else 0.0 for run in result["runs"]]
-            axis.errorbar(normal, [run[kind] for run in result["runs"]], yerr=error, color=colour, marker=mark, ls="")
-            handles.append(handle(kind, colour, marker=mark))
-        axis.set(xlim=(0.0, None), ylim=(0.0, None), xlabel="normal stress [Pa]", ylabel="shear stress [Pa]")
-        legend_above(drawing, handles)
-    return Plot.said(captions, "mohr_coulomb", drawing, name="mohr-coulomb")
+def _lines(report: Report) -> Block:
+    quantities, runs = report.result["quantities"], report.result["runs"]
+    normal = np.array([run["normal"] for run in runs])
+    drawing, (axis,) = new_panels(1, height=3.2)
+    reach = np.array([0.0, 1.05 * normal.max()])
+    handles = []
+    for kind, colour, mark in (("peak", MODEL, "D"), ("critical", BED, "o")):
+        slope = math.tan(math.radians(quantities[f"{kind}_friction_angle"]["value"]))
+        axis.plot(reach, quantities[f"{kind}_cohesion"]["value"] + slope * reach, color=colour, lw=1.2)
+        error = [run["critical_error"] if kind == "critical" else 0.0 for run in runs]
+        axis.errorbar(normal, [run[kind] for run in runs], yerr=error, color=colour, marker=mark, ls="")
+        handles.append(handle(kind, colour, marker=mark))
+    axis.set(xlim=(0.0, None), ylim=(0.0, None), xlabel="normal stress [Pa]", ylabel="shear stress [Pa]")
+    legend_above(drawing, handles)
+    return report.draw("mohr_coulomb", drawing, name="mohr-coulomb")

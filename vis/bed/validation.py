@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import cycle
 from pathlib import Path
 
-import numpy as np
-
-from vis.page.page import Block, Page, Section, Tile, figure, listing, table, text, write_page
+from rigid.series import read_series
+from vis.page.page import Block, Report, Result, Section, Tile, figure, listing, number_text, report_of, table, text
 from vis.page.plots import new_figure
-from vis.page.report import Progress, Report, Result, number_text, unit_text
-from vis.page.style import GREY, styled
+from vis.page.style import GREY
 
 __all__ = ["write_validation_report"]
 
@@ -25,56 +22,59 @@ _INSIDE, _THREE_COLUMNS = 4, 24
 _LEGEND_ROW = 0.16
 
 
-def write_validation_report(folder: str | Path, *, progress: Progress | None = None) -> Path:
+@report_of()
+def write_validation_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder, and return the report."""
-    report = Report(folder, progress)
     result, cases, blocks = report.result, report.result["cases"], {}
     for done, case in enumerate(cases, 1):
         blocks[case["id"]] = [_draw(report.folder, case, plot, k) for k, plot in enumerate(case.get("plots", ()), 1)]
         report.tell(done / len(cases))
     lead = [result["title"].partition(": ")[2], result["date"], f"version {result['version']}, code {result['code']}"]
-    page = Page(
-        "Verification of the bed", lead, _sections(cases, blocks), _tiles(cases), result["warnings"], _absent(cases)
-    )
-    return write_page(report.folder / "report.html", page)
+    more = {"title": "Verification of the bed", "warnings": result["warnings"], "missing": _absent(cases)}
+    return report.write(_sections(cases, blocks), lead=lead, version=False, tiles=_tiles(cases), **more)
 
 
 def _draw(folder: Path, case: Result, plot: Result, number: int) -> Block:
     """One plot: references as lines, what the bed did as dots."""
-    curves: dict[str, list[tuple[float, float]]] = {}
-    with (folder / plot["series"]).open(encoding="utf-8", newline="") as file:
-        for row in csv.DictReader(file):
-            curves.setdefault(row["curve"], []).append((float(row["x"]), float(row["y"])))
+    columns = read_series(folder / plot["series"], text=("curve",))
+    curves = dict.fromkeys(columns["curve"].tolist())
     path = folder / "figures" / f"{case['id']}-{number}.png"
     beneath = len(curves) > _INSIDE
     across = 3 if max(map(len, curves)) <= _THREE_COLUMNS else 2
     below = _LEGEND_ROW * -(-len(curves) // across) if beneath else 0.0
-    with styled():
-        drawing = new_figure(_HEIGHT + below, width=_WIDTH)
-        axis = drawing.subplots()
-        colours = cycle(_COLOURS)
-        lines = plot["lines"]
-        for label, points in curves.items():
-            x, y = np.array(points).T
-            colour = GREY if label in lines and len(lines) == 1 else next(colours)
-            axis.plot(x, y, "-" if label in lines else "o", color=colour, ms=3.5, lw=1.6, label=label)
-        axis.set(xlabel=plot["x"], ylabel=plot["y"])
-        if "x" in plot["log"]:
-            axis.set_xscale("log")
-        if "y" in plot["log"]:
-            axis.set_yscale("log")
-        if beneath:
-            drawing.legend(fontsize=7, loc="outside lower center", ncols=across)
-        else:
-            axis.legend(fontsize=7)
-        drawing.savefig(path, dpi=_DPI)
+    drawing = new_figure(_HEIGHT + below, width=_WIDTH)
+    axis = drawing.subplots()
+    colours = cycle(_COLOURS)
+    lines = plot["lines"]
+    for label in curves:
+        own = columns["curve"] == label
+        colour = GREY if label in lines and len(lines) == 1 else next(colours)
+        axis.plot(
+            columns["x"][own],
+            columns["y"][own],
+            "-" if label in lines else "o",
+            color=colour,
+            ms=3.5,
+            lw=1.6,
+            label=label,
+        )
+    axis.set(xlabel=plot["x"], ylabel=plot["y"])
+    if "x" in plot["log"]:
+        axis.set_xscale("log")
+    if "y" in plot["log"]:
+        axis.set_yscale("log")
+    if beneath:
+        drawing.legend(fontsize=7, loc="outside lower center", ncols=across)
+    else:
+        axis.legend(fontsize=7)
+    drawing.savefig(path, dpi=_DPI)
     caption = "Lines: the reference; dots: the bed." if plot["lines"] else "Dots: the bed."
     return figure(path, title=plot["title"], caption=caption, half=True)
 
 
 def _cells(row: Result) -> tuple[str, ...]:
     """Wanted, ours, difference, band, verdict of one comparison."""
-    unit = f" {unit_text(row['unit'])}".rstrip()
+    unit = "" if row["unit"] == "1" else f" {row['unit']}"
     if row["difference"] is None:
         gap = "not a number"
     elif row["relative"]:

@@ -1,4 +1,4 @@
 """Reports of a diagnosis, of a campaign and of the check of one.
 
-Imports `vis.page`.
+Imports `rigid`, `vis.page`.
 """

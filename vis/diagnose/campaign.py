@@ -8,17 +8,13 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from vis.page.folder import read_columns
 from vis.page.numbers import short
-from vis.page.page import Section, Tile, table, text
-from vis.page.plots import Plot, legend_above, line_handles, line_styles, sheet
-from vis.page.report import Progress, Report, Result, again
-from vis.page.sentences import Sentences
-from vis.page.style import styled
-from vis.page.tumble_series import read_columns
+from vis.page.page import Report, Result, Section, Tile, again, report_of, table, text
+from vis.page.plots import legend_above, line_handles, line_styles, sheet
 
 __all__ = ["write_campaign_report"]
 
-captions = Sentences(__package__, "figures.toml")
 _CHANNELS = (
     ("pose", "x_m", 1e3, "x [mm]"),
     ("pose", "y_m", 1e3, "y [mm]"),
@@ -31,13 +27,11 @@ _MOST = 12
 """Trials drawn at most."""
 
 
-def write_campaign_report(folder: str | Path, *, progress: Progress | None = None) -> Path:
+@report_of(dpi=130)
+def write_campaign_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a made-up campaign, and return the report."""
-    report = Report(folder, progress, dpi=130)
     result, quantities = report.result, report.result["quantities"]
-    drawing = _draw(report.folder / result["campaign"], result["trials"])
-    drawn = report.draw(Plot.said(captions, "recordings", drawing))
-    report.tell(0.9)
+    drawn = report.draw("recordings", _draw(report.folder / result["campaign"], result["trials"]))
     rows = [
         (trial["id"], f"{trial['gravity_sim']:.5g}", f"{trial['true_gravity_sim']:.5g}", f"{trial['torque']:g}",
          trial["actuator"],
@@ -77,20 +71,19 @@ def _draw(campaign: Path, trials: Sequence[Result]) -> Figure:
     shown = trials[:: -(-len(trials) // _MOST)]
     conditions = [f"{t['actuator']} {t['torque']:g} N m, {t['gravity_sim']:.3g} m/s²" for t in shown]
     styles = line_styles(conditions)
-    with styled():
-        drawing, grid = sheet(2, 3, 5.0, sharex=True)
-        axes = grid.ravel()
-        for trial, condition in zip(shown, conditions, strict=True):
-            files = {
-                sensor: read_columns(campaign / f"{trial['id']}-{sensor}.csv")[0] for sensor in ("pose", "imu", "wheel")
-            }
-            for axis, (sensor, column, scale, _) in zip(axes, _CHANNELS, strict=True):
-                columns = files[sensor]
-                axis.plot(columns["t_s"], scale * columns[column], lw=0.8, **styles[condition])
-        for axis, (_, _, _, label) in zip(axes, _CHANNELS, strict=True):
-            axis.set_ylabel(label)
-        for axis in axes[3:]:
-            axis.set_xlabel("time [s]")
-        handles = line_handles([str(trial["id"]) for trial in shown], conditions)
-        legend_above(drawing, handles, 2, fontsize=7.5)
+    drawing, grid = sheet(2, 3, 5.0, sharex=True)
+    axes = grid.ravel()
+    for trial, condition in zip(shown, conditions, strict=True):
+        files = {
+            sensor: read_columns(campaign / f"{trial['id']}-{sensor}.csv")[0] for sensor in ("pose", "imu", "wheel")
+        }
+        for axis, (sensor, column, scale, _) in zip(axes, _CHANNELS, strict=True):
+            columns = files[sensor]
+            axis.plot(columns["t_s"], scale * columns[column], lw=0.8, **styles[condition])
+    for axis, (_, _, _, label) in zip(axes, _CHANNELS, strict=True):
+        axis.set_ylabel(label)
+    for axis in axes[3:]:
+        axis.set_xlabel("time [s]")
+    handles = line_handles([str(trial["id"]) for trial in shown], conditions)
+    legend_above(drawing, handles, 2, fontsize=7.5)
     return drawing

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,11 +15,12 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import NDArray
 
+from rigid.series import read_series
+from vis.page.page import Result
 from vis.page.plots import DASHED, Array, handle, legend_above, sheet
-from vis.page.report import Result
 from vis.page.sentences import Sentences
-from vis.page.style import BED, GREY, INK, MODEL
-from vis.page.tumble_series import STATES, state_runs
+from vis.page.states import state_runs
+from vis.page.style import BED, GREY, INK, MODEL, STATES
 
 __all__ = ["Channel", "draw_evidence", "draw_latent", "draw_phases", "draw_trajectories", "read_channel", "worst"]
 
@@ -79,18 +79,16 @@ class Channel:
 
 def read_channel(path: Path) -> Channel:
     """The series <trial>.<channel>.csv."""
-    with path.open(newline="", encoding="utf-8") as file:
-        head, *rows = list(csv.reader(file))
-    columns = dict(zip(head, zip(*rows, strict=True), strict=True)) if rows else dict.fromkeys(head, ())
+    columns = read_series(path, text=("phase",))
     trial, _, name = path.stem.rpartition(".")
+    none = np.ones(len(next(iter(columns.values()))))
 
     def numbers(key: str) -> Array:
-        return np.array(columns[key], dtype=float) if key in columns else np.ones(len(rows))
+        return columns.get(key, none).astype(float)
 
-    phase = np.array(columns.get("phase", [""] * len(rows)), dtype=str)
     return Channel(trial, name, numbers("t_s"), numbers("measured"), numbers("before"), numbers("after"),
-                   numbers("std"), numbers("std_after" if "std_after" in columns else "std"), phase,
-                   numbers("scatter") if "scatter" in columns else None)  # fmt: skip
+                   numbers("std"), numbers("std_after" if "std_after" in columns else "std"),
+                   columns.get("phase", np.full(len(none), "")), columns.get("scatter"))  # fmt: skip
 
 
 def worst(channels: Sequence[Channel], held: set[str]) -> list[Channel]:
@@ -335,17 +333,18 @@ def draw_latent(folder: Path, said: Result, channels: Sequence[Channel]) -> Figu
     """Every latent column over time, and over what it goes with most; coloured by phase, with means of equal counts."""
     if "latent" not in said or not (folder / said["latent"]["file"]).exists():
         return None
-    with (folder / said["latent"]["file"]).open(newline="", encoding="utf-8") as file:
-        head, *rows = list(csv.reader(file))
-    latents = [name for name in head if name.startswith("latent_")]
-    if not rows or not latents:
+    columns = read_series(folder / said["latent"]["file"], text=("trial",))
+    latents = [name for name in columns if name.startswith("latent_")]
+    if not latents or not len(columns["trial"]):
         return None
-    columns = dict(zip(head, zip(*rows, strict=True), strict=True))
-    trials = np.array(columns.pop("trial"), dtype=str)
-    values = {name: np.array([float(cell or "nan") for cell in column]) for name, column in columns.items()}
+    trials = columns.pop("trial")
+    values = {
+        name: column if column.dtype.kind == "f" else np.array([float(cell or "nan") for cell in column])
+        for name, column in columns.items()
+    }
     shares = {name: share for name, share in said["latent"].get("explained", {}).items() if name in values}
     others = [name for name in sorted(shares, key=lambda n: -shares[n]) if name != "t_s" and shares[name] > 0]
-    other = others[0] if others else next(name for name in head if name not in (*latents, "trial", "t_s"))
+    other = others[0] if others else next(name for name in columns if name not in (*latents, "t_s"))
     phase = _phase_at(trials, values["t_s"], channels)
     drawing, axes = sheet(len(latents), 2, 0.6 + 2.3 * len(latents), sharey="row")
     for pair, latent in zip(axes, latents, strict=True):

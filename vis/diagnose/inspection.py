@@ -12,15 +12,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from vis.page.page import Section, Tile, listing, table, text
-from vis.page.plots import RED, Array, Plot, handle, legend_above, line_handles, line_styles, sheet
-from vis.page.report import Progress, Report, Result, again, capital
-from vis.page.sentences import Sentences
-from vis.page.style import BED, GREY, MODEL, styled
+from vis.page.page import Report, Result, Section, Tile, again, capital, listing, report_of, table, text
+from vis.page.plots import RED, Array, handle, legend_above, line_handles, line_styles, sheet
+from vis.page.style import BED, GREY, MODEL
 
 __all__ = ["write_inspection_report"]
 
-captions = Sentences(__package__, "figures.toml")
 _MOST = 12
 """Trials drawn at most, those with findings first."""
 _MOST_LINES = 60
@@ -37,16 +34,13 @@ _TUMBLE = (
 )
 
 
-def write_inspection_report(folder: str | Path, *, progress: Progress | None = None) -> Path:
+@report_of(dpi=130)
+def write_inspection_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a checked campaign, and return the report."""
-    report = Report(folder, progress, dpi=130)
     result, quantities = report.result, report.result["quantities"]
-    with styled():
-        drawing = (_draw_tumbles if result["kind"] == "tumble" else _draw_penetrations)(report)
-        drawn = [report.draw(Plot.said(captions, "inspection_recordings", drawing, name="recordings"))]
-        report.tell(0.4)
-        drawn.append(report.draw(Plot.said(captions, "coverage", _draw_coverage(result))))
-        report.tell(0.8)
+    drawing = (_draw_tumbles if result["kind"] == "tumble" else _draw_penetrations)(report)
+    drawn = [report.draw("inspection_recordings", drawing, name="recordings")]
+    drawn.append(report.draw("coverage", _draw_coverage(result)))
     (trials,) = result["tables"]
     head = ("recording", "rows", "rate [Hz]", "from [s]", "to [s]", "rows with gaps", "longest gap [s]")
     found = [capital(what) + "." for what in result["warnings"]]

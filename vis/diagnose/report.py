@@ -8,27 +8,36 @@ from pathlib import Path
 
 from vis.diagnose.figures import draw_evidence, draw_latent, draw_phases, draw_trajectories, read_channel, worst
 from vis.page.numbers import plain, short
-from vis.page.page import Block, Section, Tile, listing, table, table_of, text
-from vis.page.plots import Plot
-from vis.page.report import Progress, Report, Result, again, unit_text
+from vis.page.page import (
+    Block,
+    Report,
+    Result,
+    Section,
+    Tile,
+    again,
+    listing,
+    report_of,
+    table,
+    table_of,
+    text,
+    unit_text,
+)
 from vis.page.sentences import Sentences
-from vis.page.style import styled
 
 __all__ = ["write_diagnosis_report"]
 
-say, captions = Sentences(__package__), Sentences(__package__, "figures.toml")
+say = Sentences(__package__)
 _MOST_PLACES = 8
 """Stretches that are listed."""
 _DASH = "\N{EN DASH}"
-_FIGURES = ("trajectories", "residuals", "evidence", "latent")
 
 
-def write_diagnosis_report(folder: str | Path, *, progress: Progress | None = None) -> Path:
+@report_of(dpi=130)
+def write_diagnosis_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a diagnosis, and return the report.
 
     Raises FileNotFoundError where the folder has no diagnosis.json or result.json.
     """
-    report = Report(folder, progress, dpi=130)
     said: Result = json.loads((report.folder / "diagnosis.json").read_text(encoding="utf-8"))
     drawn = _drawn(report, said)
     result, gap = report.result, said["gap"]
@@ -62,19 +71,13 @@ def _drawn(report: Report, said: Result) -> dict[str, list[Block]]:
     channels = [read_channel(path) for path in sorted((report.folder / "series").glob("*.csv"))]
     held, labels = set(said["gap"]["held_out_trials"]), _labels(said)
     shown = worst([channel for channel in channels if len(channel.time)], held)
-    draws = (
-        lambda: draw_trajectories(shown, held, labels),
-        lambda: draw_phases(said.get("by_phase", []), labels),
-        lambda: draw_evidence(said),
-        lambda: draw_latent(report.folder, said, channels),
-    )
-    drawn: dict[str, list[Block]] = {}
-    for name, draw in zip(_FIGURES, draws, strict=True):
-        with styled():
-            drawing = draw()
-        drawn[name] = [] if drawing is None else [report.draw(Plot.said(captions, name, drawing))]
-        report.tell(0.2 * len(drawn))
-    return drawn
+    drawings = {
+        "trajectories": draw_trajectories(shown, held, labels),
+        "residuals": draw_phases(said.get("by_phase", []), labels),
+        "evidence": draw_evidence(said),
+        "latent": draw_latent(report.folder, said, channels),
+    }
+    return {key: [] if drawing is None else [report.draw(key, drawing)] for key, drawing in drawings.items()}
 
 
 def _labels(said: Result) -> tuple[str, str]:

@@ -16,9 +16,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from vis.page.folder import read_columns
+from vis.page.page import Result
 from vis.page.plots import Array
-from vis.page.report import Result
-from vis.page.tumble_series import read_columns
 from vis.pictures.canvas import colour_values, moved_since, nice_above
 from vis.pictures.frames import Frame, Frames, frame_names, grains_box, read_frames
 from vis.pictures.meshes import in_place, spike_mesh

@@ -1,4 +1,4 @@
 """The page that every report is: sections, tables, figures, sentences, the style.
 
-Imports nothing of ours.
+Imports `rigid`.
 """

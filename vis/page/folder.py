@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import re
 import tomllib
@@ -13,17 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rigid import series
+
 __all__ = [
-    "PHASES",
-    "PYTHON_RUNS",
-    "Run",
-    "RunFolder",
-    "Series",
-    "Setting",
-    "from_python",
-    "read_folder",
+    "PHASES", "PYTHON_RUNS", "Run", "RunFolder", "Series", "Setting", "from_python", "read_columns", "read_folder",
     "read_series",
-]
+]  # fmt: skip
 
 PHASES = ("free", "in", "rest", "out")
 #: Experiment of a run that a script has saved -> the function of `coupling` that made it.
@@ -51,7 +45,7 @@ class Series:
 
     def where(self, keep: NDArray[np.bool_]) -> Series:
         """The rows that are kept, shape (n,)."""
-        return Series(self.time[keep], self.depth[keep], self.velocity[keep], self.force[keep], self.phase[keep])
+        return Series(**{name: values[keep] for name, values in vars(self).items()})
 
     def __len__(self) -> int:
         return len(self.time)
@@ -154,19 +148,23 @@ def read_series(path: str | Path) -> Series:
     Raises FileNotFoundError: there is no such file. ValueError: a column is missing, a number cannot be read, or it has
     no rows.
     """
-    with Path(path).open(newline="", encoding="utf-8") as file:
-        reader = csv.DictReader(line for line in file if not line.startswith("#"))
-        absent = [name for name in _COLUMNS if name not in (reader.fieldnames or [])]
-        if absent:
-            raise ValueError(f"{path} has no column {', '.join(absent)}")
-        rows = list(reader)
-    if not rows:
-        raise ValueError(f"{path} has no rows")
     try:
-        numbers = [np.array([float(row[name]) for row in rows]) for name in _COLUMNS[:4]]
-    except TypeError as error:
+        columns = series.read_series(path, text=("phase",))
+    except IndexError as error:
         raise ValueError(f"{path} has a row that ends too early") from error
-    return Series(numbers[0], numbers[1], numbers[2], numbers[3], np.array([str(row["phase"]) for row in rows]))
+    if absent := [name for name in _COLUMNS if name not in columns]:
+        raise ValueError(f"{path} has no column {', '.join(absent)}")
+    if not len(columns["t_s"]):
+        raise ValueError(f"{path} has no rows")
+    time, depth, velocity, force = (columns[name].astype(float) for name in _COLUMNS[:4])
+    return Series(time, depth, velocity, force, columns["phase"])
+
+
+def read_columns(path: Path) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.str_]]:
+    """The columns of a CSV file that are numbers, by name, and its column ``state`` (empty where it has none)."""
+    columns = series.read_series(path, text=("state",))
+    states = columns.pop("state", np.array([], dtype=str))
+    return {name: values.astype(float) for name, values in columns.items()}, states
 
 
 def _dicts(value: Any) -> list[dict[str, Any]]:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,45 +13,18 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from vis.page.sentences import Sentences
-from vis.page.style import styled
-
 __all__ = [
-    "DASHED", "DOTTED", "RED", "WIDTH", "Array", "Plot", "handle", "legend_above", "line_handles", "line_styles",
+    "DASHED", "DOTTED", "RED", "WIDTH", "Array", "handle", "legend_above", "line_handles", "line_styles",
     "mean_over", "new_figure", "new_panels", "shades", "sheet", "smooth_ratio",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
 WIDTH = 8.6  # inches; all plots are as wide as the report's column
 DASHED, DOTTED = (0, (4, 2)), (0, (1, 1.2))
-
-
 RED = "#c0392b"
 """What was found to be wrong, in every figure."""
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#222222", "#E69F00", "#56B4E9", "#8a6d3b")
 _DASHES: tuple[Any, ...] = ("-", (0, (4, 1.6)), (0, (1, 1.4)))
-
-
-@dataclass(frozen=True)
-class Plot:
-    """A figure with the name of its file (without ending), a title and a caption."""
-
-    name: str
-    title: str
-    caption: str
-    figure: Figure
-
-    @classmethod
-    def said(cls, captions: Sentences, key: str, figure: Figure, *, name: str = "", **values: Any) -> Plot:
-        """A figure called `name`, or as its key, with its title and caption from the table `key` of figures.toml."""
-        return cls(name or key, captions(f"{key}.title", **values), captions(f"{key}.caption", **values), figure)
-
-    def save(self, folder: Path, dpi: int | None = None) -> Path:
-        """Write `<folder>/<name>.png`."""
-        path = folder / f"{self.name}.png"
-        with styled():
-            self.figure.savefig(path, dpi=dpi)
-        return path
 
 
 def new_figure(height: float, *, width: float = WIDTH, **options: Any) -> Figure:

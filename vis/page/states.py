@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -18,12 +19,11 @@ from numpy.typing import NDArray
 
 from vis.page.page import Block, table, text
 from vis.page.plots import Array, handle, legend_above, new_figure, sheet
-from vis.page.style import BED, GREY, INK, MODEL, styled
-from vis.page.tumble_series import STATES, state_runs
+from vis.page.style import BED, GREY, INK, MODEL, STATES
 
 __all__ = [
     "LINES", "States", "by_state", "draw_bands", "draw_states", "legend_of_runs", "legend_of_states", "panels",
-    "passages", "state_strip",
+    "passages", "state_runs", "state_strip",
 ]  # fmt: skip
 
 States = NDArray[np.str_]
@@ -72,25 +72,24 @@ def by_state(axis: Axes, x: Array, y: Array, states: States, **style: Any) -> No
 def draw_states(time: Array, angle: Array, states: States, *, label: str = "θ [degrees]") -> Figure:
     """Left: the angle [degrees] over time. Right: state against angle, as in Figure 6 of the paper."""
     order = list(STATES)
-    with styled():
-        drawing, (over_time, over_angle) = panels(2, 3.0)
-        by_state(over_time, time, angle, states, lw=2.4)
-        over_time.set(xlabel="time [s]", ylabel=label)
-        stretches = state_runs(states)
-        for low, high, name in stretches:
-            last = min(high, len(angle) - 1)
-            row = order.index(name) if name in order else 0
-            here, colour = angle[low : last + 1], STATES.get(name, INK)
-            over_angle.plot(here, np.full(len(here), row), color=colour, lw=6, solid_capstyle="butt")
-            if np.ptp(here) <= 0.01 * np.ptp(angle):  # too short to be seen
-                over_angle.plot(here[:1], [row], "s", color=colour, ms=5)
-            if len(stretches) <= _MOST_STEPS and last < len(angle) - 1 and str(states[last]) in order:
-                there = [row, order.index(str(states[last]))]
-                over_angle.plot([angle[last]] * 2, there, color=GREY, lw=0.7)
-        over_angle.set_yticks(range(len(order)), order)
-        over_angle.set(ylim=(-0.5, len(order) - 0.5), xlabel=label)
-        over_angle.locator_params(axis="x", nbins=6)
-        legend_of_states(drawing, states)
+    drawing, (over_time, over_angle) = panels(2, 3.0)
+    by_state(over_time, time, angle, states, lw=2.4)
+    over_time.set(xlabel="time [s]", ylabel=label)
+    stretches = state_runs(states)
+    for low, high, name in stretches:
+        last = min(high, len(angle) - 1)
+        row = order.index(name) if name in order else 0
+        here, colour = angle[low : last + 1], STATES.get(name, INK)
+        over_angle.plot(here, np.full(len(here), row), color=colour, lw=6, solid_capstyle="butt")
+        if np.ptp(here) <= 0.01 * np.ptp(angle):  # too short to be seen
+            over_angle.plot(here[:1], [row], "s", color=colour, ms=5)
+        if len(stretches) <= _MOST_STEPS and last < len(angle) - 1 and str(states[last]) in order:
+            there = [row, order.index(str(states[last]))]
+            over_angle.plot([angle[last]] * 2, there, color=GREY, lw=0.7)
+    over_angle.set_yticks(range(len(order)), order)
+    over_angle.set(ylim=(-0.5, len(order) - 0.5), xlabel=label)
+    over_angle.locator_params(axis="x", nbins=6)
+    legend_of_states(drawing, states)
     return drawing
 
 
@@ -140,6 +139,14 @@ def passages(entries: Sequence[Mapping[str, Any]], *, angle: str, label: str) ->
     beyond = len(entries) - len(shown)
     more = [text(f"And {beyond} more, in result.json.", small=True)] if beyond > 0 else []
     return [table(("time [s]", "state", label), shown), *more]
+
+
+def state_runs(states: States) -> list[tuple[int, int, str]]:
+    """Stretches of one state: (first row, row after the last, state)."""
+    if not len(states):
+        return []
+    edges = [0, *(np.flatnonzero(states[1:] != states[:-1]) + 1).tolist(), len(states)]
+    return [(low, high, str(states[low])) for low, high in pairwise(edges)]
 
 
 def _band(axis: Axes, row: int, time: Array, states: States) -> None:

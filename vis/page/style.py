@@ -9,12 +9,15 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.axes import Axes
 
-__all__ = ["BED", "DPI", "GREY", "INK", "MODEL", "as_it_lies", "styled"]
+__all__ = ["BED", "DPI", "GREY", "INK", "MODEL", "STATES", "as_it_lies", "styled"]
 
 BED = "#0072B2"  # what the grains do
 MODEL = "#D55E00"  # what the spring-damper does; always dashed as well, for print in grey
 INK = "#222222"
 GREY = "#8a8a8a"
+STATES = {"stand": "#a4a4a4", "pivot": BED, "slip": MODEL, "hop": "#882255"}
+"""The states in the order of losing hold, with their colours: apart for the colour-blind too (tests/vis/test_style.py),
+to whom Okabe and Ito's green is the grey of standing or the blue of pivoting; Tol's wine is neither."""
 DPI = 160
 _TOO_LONG = 8.0  # times as long as high: drawn in its true shape such a way is a line
 

@@ -3,25 +3,78 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
-from vis.page.plots import Array, Plot, handle, legend_above, sheet
-from vis.page.report import Result
-from vis.page.sentences import Sentences
-from vis.page.style import GREY, INK, styled
-from vis.page.tumble_series import STATES, state_runs
-from vis.paper.run import PaperRun, in_order
+from vis.page.folder import read_columns
+from vis.page.page import Block, Report, Result
+from vis.page.plots import Array, handle, legend_above, sheet
+from vis.page.states import States, state_runs
+from vis.page.style import GREY, INK, STATES
 
-__all__ = ["figure_5", "figure_6", "figure_7", "figure_8", "figure_sweep"]
+__all__ = ["FIGURES", "PaperRun", "in_order"]
 
-captions = Sentences(__package__, "figures.toml")
+_TORQUES = ("#0072B2", "#E69F00", "#CC79A7", "#56B4E9", "#009E73")
+_HARD = ("steel", "brick")
+VARIANTS = ("low", "nominal", "high", "paper")
+"""Of a case: friction at the lower end of its band, as it is, at the upper end; the paper's fixed step."""
+_DASHED, _DOTTED = (0, (5, 3)), (0, (1, 1.6))
 _SHOWN = 0.045
 """How far Figure 5 goes [m]: a little more than what the paper trusts."""
+
+
+class PaperRun:
+    """The result's cases by what they are of, their series, and a colour for each torque."""
+
+    def __init__(self, report: Report) -> None:
+        self.draw, self.folder, self.result = report.draw, report.folder, report.result
+        self.cases: list[Result] = self.result["cases"]
+        self.sweep: list[Result] = self.result["sweep"]
+        self.table = {(c["surface"], c["rig"], c["torque"], c["variant"]): c for c in self.cases}
+        self.rigs = in_order(c["rig"] for c in self.cases)
+        self.torques = sorted({c["torque"] for c in self.cases})
+        self.surfaces = in_order(c["surface"] for c in self.cases)
+        self.hard = [name for name in _HARD if name in self.surfaces]
+
+    def colour(self, torque: float) -> str:
+        """The colour of a torque."""
+        return _TORQUES[self.torques.index(torque) % len(_TORQUES)]
+
+    def label(self, torque: float) -> str:
+        """A torque in words."""
+        brake = any(c["actuator"] == "brake" for c in self.cases if c["torque"] == torque)
+        return f"{torque:g} N m ({'brake' if brake else 'motor'})"
+
+    def case(self, surface: str, rig: float, torque: float, variant: str = "nominal") -> Result:
+        """One case."""
+        return self.table[surface, rig, torque, variant]
+
+    def variants(self, surface: str, rig: float, torque: float, key: str) -> list[Any]:
+        """A number of a case in each of the `VARIANTS`."""
+        return [self.table[surface, rig, torque, variant][key] for variant in VARIANTS]
+
+    def rows(self, case: Result) -> tuple[dict[str, Array], States]:
+        """The series of a case, and its states."""
+        return read_columns(self.folder / case["series"])
+
+    def handles(self) -> list[Any]:
+        """One line a torque."""
+        return [handle(self.label(torque), self.colour(torque), lw=2.2) for torque in self.torques]
+
+
+def in_order(values: Iterable[Any]) -> list[Any]:
+    """Each value once, in the order in which it comes."""
+    return list(dict.fromkeys(values))
+
+
+def _fill(axis: Axes, one: tuple[Array, Array], other: tuple[Array, Array], scale: float, **style: Any) -> None:
+    """Fill between two lines that start at one point."""
+    ring = np.concatenate([np.stack(one, axis=1), np.stack(other, axis=1)[::-1]])
+    axis.fill(scale * ring[:, 0], scale * ring[:, 1], lw=0, **style)
 
 
 def _start(paper: PaperRun, case: Result) -> tuple[Array, Array]:
@@ -34,73 +87,70 @@ def _start(paper: PaperRun, case: Result) -> tuple[Array, Array]:
     return x[:end], y[:end]
 
 
-def figure_5(paper: PaperRun) -> Plot | None:
+def figure_5(paper: PaperRun) -> Block | None:
     """Path of the centre from its start, steel, the first gravity."""
     if "steel" not in paper.surfaces:
         return None
     rig, gap = paper.rigs[0], 0.0
-    with styled():
-        drawing, ((axis,),) = sheet(1, 1, 4.6)
-        for stated in (22.5, 60.0):
-            reach = 1e3 * _SHOWN
-            along = np.array([0.0, reach * math.cos(math.radians(stated))])
-            axis.plot(along, along * math.tan(math.radians(stated)), color=GREY, lw=0.9, ls=(0, (5, 3)), zorder=1)
-            top = along[1] * math.tan(math.radians(stated))
-            axis.annotate(
-                f"{stated:g}° in the text", (along[1], top), xytext=(3, 2), textcoords="offset points", color=GREY
-            )
-        for torque in paper.torques:
-            colour = paper.colour(torque)
-            low, high = (_start(paper, paper.case("steel", rig, torque, variant)) for variant in ("low", "high"))
-            ring = np.concatenate([np.stack(low, axis=1), np.stack(high, axis=1)[::-1]])
-            axis.fill(ring[:, 0], ring[:, 1], color=colour, alpha=0.25, lw=0)
-            x, y = _start(paper, paper.case("steel", rig, torque))
-            axis.plot(x, y, color=colour, lw=2.0)
-            fixed = _start(paper, paper.case("steel", rig, torque, "paper"))
-            axis.plot(*fixed, color=INK, lw=1.1, ls=(0, (1, 1.6)))
-            shared = min(len(x), len(fixed[0]))
-            gap = max(gap, float(np.hypot(x[:shared] - fixed[0][:shared], y[:shared] - fixed[1][:shared]).max()))
-        axis.plot(0, 0, "o", color=INK, ms=4)
-        axis.set(
-            aspect="equal",
-            xlim=(-2.0, 1.25e3 * _SHOWN),
-            ylim=(-1.0, 1.02e3 * _SHOWN),
-            xlabel="x of the centre from the start [mm]",
-            ylabel="y of the centre from the start [mm]",
+    drawing, ((axis,),) = sheet(1, 1, 4.6)
+    for stated in (22.5, 60.0):
+        reach = 1e3 * _SHOWN
+        along = np.array([0.0, reach * math.cos(math.radians(stated))])
+        axis.plot(along, along * math.tan(math.radians(stated)), color=GREY, lw=0.9, ls=_DASHED, zorder=1)
+        top = along[1] * math.tan(math.radians(stated))
+        axis.annotate(
+            f"{stated:g}° in the text", (along[1], top), xytext=(3, 2), textcoords="offset points", color=GREY
         )
-        band = Patch(color=GREY, alpha=0.35, lw=0, label="friction band")
-        dotted = handle("the paper's 1 ms step", INK, lw=1.1, ls=(0, (1, 1.6)))
-        legend_above(drawing, [*paper.handles(), band, dotted], columns=5)
-    return Plot.said(captions, "figure5", drawing, rig=rig, shown=1e3 * _SHOWN, gap=gap)
+    for torque in paper.torques:
+        colour = paper.colour(torque)
+        low, high = (_start(paper, paper.case("steel", rig, torque, variant)) for variant in ("low", "high"))
+        _fill(axis, low, high, 1.0, color=colour, alpha=0.25)
+        x, y = _start(paper, paper.case("steel", rig, torque))
+        axis.plot(x, y, color=colour, lw=2.0)
+        fixed = _start(paper, paper.case("steel", rig, torque, "paper"))
+        axis.plot(*fixed, color=INK, lw=1.1, ls=_DOTTED)
+        shared = min(len(x), len(fixed[0]))
+        gap = max(gap, float(np.hypot(x[:shared] - fixed[0][:shared], y[:shared] - fixed[1][:shared]).max()))
+    axis.plot(0, 0, "o", color=INK, ms=4)
+    axis.set(
+        aspect="equal",
+        xlim=(-2.0, 1.25e3 * _SHOWN),
+        ylim=(-1.0, 1.02e3 * _SHOWN),
+        xlabel="x of the centre from the start [mm]",
+        ylabel="y of the centre from the start [mm]",
+    )
+    band = Patch(color=GREY, alpha=0.35, lw=0, label="friction band")
+    dotted = handle("the paper's 1 ms step", INK, lw=1.1, ls=_DOTTED)
+    legend_above(drawing, [*paper.handles(), band, dotted], columns=5)
+    return paper.draw("figure5", drawing, rig=rig, shown=1e3 * _SHOWN, gap=gap)
 
 
 _ROWS = (("low", "μ low"), ("nominal", "μ"), ("high", "μ high"), ("paper", "1 ms step"))
 
 
-def figure_6(paper: PaperRun) -> Plot | None:
+def figure_6(paper: PaperRun) -> Block | None:
     """State against angle, steel and brick, the first gravity, a row a torque."""
     if not paper.hard:
         return None
     rig, widest = paper.rigs[0], 60.0
-    with styled():
-        count = len(paper.torques)
-        drawing, axes = sheet(count, len(paper.hard), 0.55 + 1.35 * count, sharex=True, sharey=True)
-        for i, torque in enumerate(paper.torques):
-            for j, surface in enumerate(paper.hard):
-                axis: Axes = axes[i, j]
-                axis.set_title(f"{surface}, {paper.label(torque)}")
-                for row, (variant, _) in enumerate(_ROWS):
-                    _state_bar(axis, paper, paper.case(surface, rig, torque, variant), row)
-                axis.axvline(0.0, color=GREY, lw=0.6)
-                axis.grid(False, axis="y")
-        for axis in axes[-1]:
-            axis.set_xlabel("θ [degrees]")
-        axes[0, 0].set_yticks(range(len(_ROWS)), [label for _, label in _ROWS])
-        axes[0, 0].set(ylim=(len(_ROWS) - 0.4, -0.6), xlim=(-2.0, widest))
-        handles = [handle(name, colour, lw=6) for name, colour in STATES.items()]
-        handles.append(handle("first hop", INK, marker="v", ls="", ms=5))
-        legend_above(drawing, handles, columns=5)
-    return Plot.said(captions, "figure6", drawing, rig=rig, widest=widest)
+    count = len(paper.torques)
+    drawing, axes = sheet(count, len(paper.hard), 0.55 + 1.35 * count, sharex=True, sharey=True)
+    for i, torque in enumerate(paper.torques):
+        for j, surface in enumerate(paper.hard):
+            axis: Axes = axes[i, j]
+            axis.set_title(f"{surface}, {paper.label(torque)}")
+            for row, (variant, _) in enumerate(_ROWS):
+                _state_bar(axis, paper, paper.case(surface, rig, torque, variant), row)
+            axis.axvline(0.0, color=GREY, lw=0.6)
+            axis.grid(False, axis="y")
+    for axis in axes[-1]:
+        axis.set_xlabel("θ [degrees]")
+    axes[0, 0].set_yticks(range(len(_ROWS)), [label for _, label in _ROWS])
+    axes[0, 0].set(ylim=(len(_ROWS) - 0.4, -0.6), xlim=(-2.0, widest))
+    handles = [handle(name, colour, lw=6) for name, colour in STATES.items()]
+    handles.append(handle("first hop", INK, marker="v", ls="", ms=5))
+    legend_above(drawing, handles, columns=5)
+    return paper.draw("figure6", drawing, rig=rig, widest=widest)
 
 
 def _state_bar(axis: Axes, paper: PaperRun, case: Result, row: int) -> None:
@@ -131,33 +181,32 @@ def _parabola(launch: Result) -> tuple[Array, Array]:
     return vx * time, vy * time - 0.5 * g * time**2
 
 
-def figure_7(paper: PaperRun) -> Plot | None:
+def figure_7(paper: PaperRun) -> Block | None:
     """The first hops extrapolated: motor trials above, all below."""
     if not paper.hard:
         return None
     styles = dict(zip(paper.rigs, ("-", (0, (4, 2)), (0, (1, 1.4))), strict=False))
     flat = []
-    with styled():
-        drawing, axes = sheet(2, len(paper.hard), 5.4, sharey="row", sharex="row")
-        for j, surface in enumerate(paper.hard):
-            for i, chosen in enumerate((_motors(paper), paper.torques)):
-                axis: Axes = axes[i, j]
-                axis.set_title(f"{surface}, {'motor trials' if i == 0 else 'all'}")
-                for torque in chosen:
-                    for rig, style in styles.items():
-                        drawn = _draw_hop(axis, paper, surface, rig, torque, style)
-                        if not drawn and i == 0:
-                            flat.append(f"{surface}, {rig:g} g, {torque:g} N m")
-                axis.plot(0, 0, "o", color=INK, ms=4)
-        for axis in axes[-1]:
-            axis.set_xlabel("x from the launch [mm]")
-        for axis in axes[:, 0]:
-            axis.set_ylabel("y from the launch [mm]")
-        gravities = [handle(f"{rig:g} g", INK, ls=style, lw=1.6) for rig, style in styles.items()]
-        band = Patch(color=GREY, alpha=0.35, lw=0, label="friction band")
-        legend_above(drawing, [*paper.handles(), *gravities, band], columns=6)
+    drawing, axes = sheet(2, len(paper.hard), 5.4, sharey="row", sharex="row")
+    for j, surface in enumerate(paper.hard):
+        for i, chosen in enumerate((_motors(paper), paper.torques)):
+            axis: Axes = axes[i, j]
+            axis.set_title(f"{surface}, {'motor trials' if i == 0 else 'all'}")
+            for torque in chosen:
+                for rig, style in styles.items():
+                    drawn = _draw_hop(axis, paper, surface, rig, torque, style)
+                    if not drawn and i == 0:
+                        flat.append(f"{surface}, {rig:g} g, {torque:g} N m")
+            axis.plot(0, 0, "o", color=INK, ms=4)
+    for axis in axes[-1]:
+        axis.set_xlabel("x from the launch [mm]")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("y from the launch [mm]")
+    gravities = [handle(f"{rig:g} g", INK, ls=style, lw=1.6) for rig, style in styles.items()]
+    band = Patch(color=GREY, alpha=0.35, lw=0, label="friction band")
+    legend_above(drawing, [*paper.handles(), *gravities, band], columns=6)
     missing = f" No hop that rises: {'; '.join(flat)}." if flat else ""
-    return Plot.said(captions, "figure7", drawing, missing=missing)
+    return paper.draw("figure7", drawing, missing=missing)
 
 
 def _motors(paper: PaperRun) -> list[float]:
@@ -171,9 +220,7 @@ def _draw_hop(axis: Axes, paper: PaperRun, surface: str, rig: float, torque: flo
         return False
     colour = paper.colour(torque)
     if low is not None and high is not None:
-        one, other = _parabola(low), _parabola(high)
-        ring = np.concatenate([np.stack(one, axis=1), np.stack(other, axis=1)[::-1]])
-        axis.fill(1e3 * ring[:, 0], 1e3 * ring[:, 1], color=colour, alpha=0.22, lw=0)
+        _fill(axis, _parabola(low), _parabola(high), 1e3, color=colour, alpha=0.22)
     x, y = _parabola(nominal)
     axis.plot(1e3 * x, 1e3 * y, color=colour, ls=style, lw=1.7)
     return True
@@ -186,32 +233,31 @@ _MEASURES = (
 )
 
 
-def figure_8(paper: PaperRun) -> Plot:
+def figure_8(paper: PaperRun) -> Block:
     """Angle, speed and angular velocity over gravities, torques and surfaces."""
-    with styled():
-        drawing, axes = sheet(len(_MEASURES), len(paper.rigs), 7.2, sharex=True, sharey="row")
-        for j, rig in enumerate(paper.rigs):
-            axes[0, j].set_title(f"{rig:g} g")
-            for i, (key, scale, label) in enumerate(_MEASURES):
-                axis: Axes = axes[i, j]
-                for place, surface in enumerate(paper.surfaces):
-                    _draw_measures(axis, paper, surface, rig, key, scale, place)
-                if j == 0:
-                    axis.set_ylabel(label)
-                axis.set_xticks(range(len(paper.surfaces)), paper.surfaces)
-                axis.tick_params(axis="x", length=0)
-                axis.grid(False, axis="x")
-                for edge in range(1, len(paper.surfaces)):
-                    axis.axvline(edge - 0.5, color="#e4e4e4", lw=0.7)
-            for stated in (0.0, 22.5, 60.0):
-                axes[0, j].axhline(stated, color=GREY, lw=0.9, ls=(0, (5, 3)), zorder=1)
-        for row in axes[1:]:
-            row[0].set_ylim(bottom=0.0)
-        dashed = handle("0°, 22.5°, 60° of the text", GREY, lw=0.9, ls=(0, (5, 3)))
-        hollow = handle("the paper's 1 ms step", INK, marker="o", mfc="none", ls="", ms=7)
-        dots = [handle(paper.label(t), paper.colour(t), marker="o", ls="", ms=5) for t in paper.torques]
-        legend_above(drawing, [*dots, hollow, dashed], columns=3)
-    return Plot.said(captions, "figure8", drawing)
+    drawing, axes = sheet(len(_MEASURES), len(paper.rigs), 7.2, sharex=True, sharey="row")
+    for j, rig in enumerate(paper.rigs):
+        axes[0, j].set_title(f"{rig:g} g")
+        for i, (key, scale, label) in enumerate(_MEASURES):
+            axis: Axes = axes[i, j]
+            for place, surface in enumerate(paper.surfaces):
+                _draw_measures(axis, paper, surface, rig, key, scale, place)
+            if j == 0:
+                axis.set_ylabel(label)
+            axis.set_xticks(range(len(paper.surfaces)), paper.surfaces)
+            axis.tick_params(axis="x", length=0)
+            axis.grid(False, axis="x")
+            for edge in range(1, len(paper.surfaces)):
+                axis.axvline(edge - 0.5, color="#e4e4e4", lw=0.7)
+        for stated in (0.0, 22.5, 60.0):
+            axes[0, j].axhline(stated, color=GREY, lw=0.9, ls=_DASHED, zorder=1)
+    for row in axes[1:]:
+        row[0].set_ylim(bottom=0.0)
+    dashed = handle("0°, 22.5°, 60° of the text", GREY, lw=0.9, ls=_DASHED)
+    hollow = handle("the paper's 1 ms step", INK, marker="o", mfc="none", ls="", ms=7)
+    dots = [handle(paper.label(t), paper.colour(t), marker="o", ls="", ms=5) for t in paper.torques]
+    legend_above(drawing, [*dots, hollow, dashed], columns=3)
+    return paper.draw("figure8", drawing)
 
 
 def _draw_measures(axis: Axes, paper: PaperRun, surface: str, rig: float, key: str, scale: float, place: int) -> None:
@@ -231,7 +277,7 @@ def _draw_measures(axis: Axes, paper: PaperRun, surface: str, rig: float, key: s
             axis.plot(at, scale * fixed, "o", color=INK, mfc="none", ms=7.5, mew=0.8)
 
 
-def figure_sweep(paper: PaperRun) -> Plot | None:
+def figure_sweep(paper: PaperRun) -> Block | None:
     """What halving and doubling does to the trajectory angle and to the first hop."""
     if not paper.sweep:
         return None
@@ -248,42 +294,49 @@ def figure_sweep(paper: PaperRun) -> Plot | None:
         "trajectory_angle": "trajectory angle [degrees]",
         "transition_angle_hop": "θ at the first hop [degrees]",
     }
-    with styled():
-        drawing, axes = sheet(len(paper.hard), 2, 5.2, sharey=True, sharex="col")
-        for i, surface in enumerate(paper.hard):
-            for j, (measure, label) in enumerate(measures.items()):
-                axis: Axes = axes[i, j]
-                axis.set_title(surface)
-                for torque in paper.torques:
-                    nominal = paper.case(surface, rig, torque)[measure]
-                    if nominal is None:
+    drawing, axes = sheet(len(paper.hard), 2, 5.2, sharey=True, sharex="col")
+    for i, surface in enumerate(paper.hard):
+        for j, (measure, label) in enumerate(measures.items()):
+            axis: Axes = axes[i, j]
+            axis.set_title(surface)
+            for torque in paper.torques:
+                nominal = paper.case(surface, rig, torque)[measure]
+                if nominal is None:
+                    continue
+                axis.axvline(math.degrees(nominal), color=paper.colour(torque), lw=0.9)
+                for entry in paper.sweep:
+                    if entry["surface"] != surface or entry["torque"] != torque or entry[measure] is None:
                         continue
-                    axis.axvline(math.degrees(nominal), color=paper.colour(torque), lw=0.9)
-                    for entry in paper.sweep:
-                        if entry["surface"] != surface or entry["torque"] != torque or entry[measure] is None:
-                            continue
-                        key, factor = entry["variant"].split(" x")
-                        mark = ">" if float(factor) > 1 else "<"
+                    key, factor = entry["variant"].split(" x")
+                    mark = ">" if float(factor) > 1 else "<"
+                    value = math.degrees(entry[measure])
+                    axis.plot(value, keys.index(key), mark, color=paper.colour(torque), ms=6)
+                for entry in sliding:
+                    where = (entry["surface"], entry["rig"], entry["torque"])
+                    if where == (surface, rig, torque) and entry[measure] is not None:
+                        size = _diamond(entry["varied"]["ratio"], ratios)
                         value = math.degrees(entry[measure])
-                        axis.plot(value, keys.index(key), mark, color=paper.colour(torque), ms=6)
-                    for entry in sliding:
-                        where = (entry["surface"], entry["rig"], entry["torque"])
-                        if where == (surface, rig, torque) and entry[measure] is not None:
-                            size = _diamond(entry["varied"]["ratio"], ratios)
-                            value = math.degrees(entry[measure])
-                            axis.plot(value, len(keys), "D", color=paper.colour(torque), ms=size)
-                if i == len(paper.hard) - 1:
-                    axis.set_xlabel(label)
-            axes[i, 0].set_yticks(range(len(places)), [words.get(key, key) for key in places])
-            axes[i, 0].set_ylim(len(places) - 0.5, -0.5)
-        marks = [handle(label, INK, marker=mark, ls="", ms=6) for mark, label in (("<", "halved"), (">", "doubled"))]
-        marks += [
-            handle(f"mu_d = {ratio:g} mu_s", INK, marker="D", ls="", ms=_diamond(ratio, ratios)) for ratio in ratios
-        ]
-        legend_above(drawing, [*paper.handles(), *marks], columns=5)
-    return Plot.said(captions, "sweep", drawing, rig=rig)
+                        axis.plot(value, len(keys), "D", color=paper.colour(torque), ms=size)
+            if i == len(paper.hard) - 1:
+                axis.set_xlabel(label)
+        axes[i, 0].set_yticks(range(len(places)), [words.get(key, key) for key in places])
+        axes[i, 0].set_ylim(len(places) - 0.5, -0.5)
+    marks = [handle(label, INK, marker=mark, ls="", ms=6) for mark, label in (("<", "halved"), (">", "doubled"))]
+    marks += [handle(f"mu_d = {ratio:g} mu_s", INK, marker="D", ls="", ms=_diamond(ratio, ratios)) for ratio in ratios]
+    legend_above(drawing, [*paper.handles(), *marks], columns=5)
+    return paper.draw("sweep", drawing, rig=rig)
 
 
 def _diamond(ratio: float, ratios: Sequence[float]) -> float:
     """Size of the mark of a ratio [points]: the larger the ratio, the larger."""
     return 3.0 + 3.5 * ratios.index(ratio) / max(len(ratios) - 1, 1)
+
+
+FIGURES = {
+    "figure5": figure_5,
+    "figure6": figure_6,
+    "figure7": figure_7,
+    "figure8": figure_8,
+    "sweep": figure_sweep,
+}
+"""Name -> what draws it, in the report's order; None where there is nothing to draw."""

@@ -8,29 +8,23 @@ from typing import Any
 
 import numpy as np
 
+from vis.page.folder import read_columns
 from vis.page.numbers import short
-from vis.page.page import Section, Tile, listing
-from vis.page.plots import DASHED, Plot, handle
-from vis.page.report import Progress, Report, Result, again, given
-from vis.page.sentences import Sentences
+from vis.page.page import Block, Report, Result, Section, Tile, again, given, listing, report_of
+from vis.page.plots import DASHED, handle
 from vis.page.states import by_state, legend_of_states, panels
-from vis.page.style import BED, GREY, MODEL, styled
-from vis.page.tumble_series import read_columns
+from vis.page.style import BED, GREY, MODEL
 
 __all__ = ["write_hop_report"]
 
-captions = Sentences(__package__, "figures.toml")
 
-
-def write_hop_report(folder: str | Path, *, progress: Progress | None = None) -> Path:
+@report_of(dpi=130)
+def write_hop_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a hop, and return the report."""
-    report = Report(folder, progress, dpi=130)
     result = report.result
-    drawn = [report.draw(_flights(report))] if any((report.folder / "series").glob("flight*.csv")) else []
-    report.tell(0.5)
+    drawn = [_flights(report)] if any((report.folder / "series").glob("flight*.csv")) else []
     if (report.folder / "trajectory.csv").exists():
-        drawn.append(report.draw(_launch(report)))
-    report.tell(0.9)
+        drawn.append(_launch(report))
     sections = [
         Section("", [listing(result["departures"]["sentences"]), *drawn]),
         Section("The numbers", [given(result["numbers"])]),
@@ -44,50 +38,48 @@ def write_hop_report(folder: str | Path, *, progress: Progress | None = None) ->
     return report.write(sections, lead=["hop", str(result["actuator"]), str(result["surface"])], tiles=_tiles(result))
 
 
-def _flights(report: Report) -> Plot:
+def _flights(report: Report) -> Block:
     """Height against the way along the ground, theory's and the model's, both axes in one scale."""
     result, series = report.result, report.folder / "series"
     first, other = series / "flight.csv", series / "flight.model.csv"
-    with styled():
-        drawing, (axis,) = panels(1, 4.2)
-        label = f"planar model on {result['surface']}, the same wheel"
-        handles = []
-        for file, words, style in (
-            (first, "hop theory, rigid ground", {"color": BED}),
-            (other, label, {"color": MODEL, "ls": DASHED}),
-        ):
-            if file.exists():
-                columns, _ = read_columns(file)
-                axis.plot(columns["along_m"], columns["height_m"], **style)
-                handles.append(handle(words, **style))
-        axis.axhline(0.0, color=GREY, lw=0.8, zorder=0)
-        axis.set(xlabel="distance along the ground [m]", ylabel="height of the centre above launch [m]", aspect="equal")
-        drawing.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.075, 1.0), ncols=2)
+    drawing, (axis,) = panels(1, 4.2)
+    label = f"planar model on {result['surface']}, the same wheel"
+    handles = []
+    for file, words, style in (
+        (first, "hop theory, rigid ground", {"color": BED}),
+        (other, label, {"color": MODEL, "ls": DASHED}),
+    ):
+        if file.exists():
+            columns, _ = read_columns(file)
+            axis.plot(columns["along_m"], columns["height_m"], **style)
+            handles.append(handle(words, **style))
+    axis.axhline(0.0, color=GREY, lw=0.8, zorder=0)
+    axis.set(xlabel="distance along the ground [m]", ylabel="height of the centre above launch [m]", aspect="equal")
+    drawing.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.075, 1.0), ncols=2)
     missing = "" if first.exists() else " From rigid ground it escapes: see the warnings."
     missing += "" if other.exists() else " The planar model has no flight that ends: see the warnings."
     sought = "sought for rigid ground" if result.get("asks_for", "distance") == "distance" else "the same on both"
-    return Plot.said(captions, "flights", drawing, sought=sought, missing=missing)
+    return report.draw("flights", drawing, sought=sought, missing=missing)
 
 
-def _launch(report: Report) -> Plot:
+def _launch(report: Report) -> Block:
     """The planar model on the ground: speed of the centre, and where the centre goes."""
     numbers, states = read_columns(report.folder / "trajectory.csv")
     time, speed = 1e3 * numbers["t_s"], np.hypot(numbers["vx_m_s"], numbers["vy_m_s"])
     x, y = (1e3 * (numbers[name] - numbers[name][0]) for name in ("x_m", "y_m"))
     wanted, angle = (report.result["quantities"][name]["value"] for name in ("launch_speed", "launch_angle"))
     dashed: dict[str, Any] = {"color": BED, "ls": DASHED, "lw": 1.2}
-    with styled():
-        drawing, (rates, path) = panels(2, 3.5)
-        by_state(rates, time, speed, states, lw=2.4)
-        rates.axhline(wanted, **dashed)
-        rates.set(xlabel="time [ms]", ylabel="speed of the centre [m/s]")
-        by_state(path, x, y, states, lw=2.4)
-        far = float(np.hypot(x, y).max())
-        path.plot([0, far * math.cos(angle)], [0, far * math.sin(angle)], **dashed)
-        path.set(xlabel="centre along the ground [mm]", ylabel="centre upwards [mm]")
-        path.set_aspect("equal", adjustable="datalim")
-        legend_of_states(drawing, states, (handle("launch on rigid ground", **dashed),), columns=6)
-    return Plot.said(captions, "launch", drawing, surface=report.result["surface"])
+    drawing, (rates, path) = panels(2, 3.5)
+    by_state(rates, time, speed, states, lw=2.4)
+    rates.axhline(wanted, **dashed)
+    rates.set(xlabel="time [ms]", ylabel="speed of the centre [m/s]")
+    by_state(path, x, y, states, lw=2.4)
+    far = float(np.hypot(x, y).max())
+    path.plot([0, far * math.cos(angle)], [0, far * math.sin(angle)], **dashed)
+    path.set(xlabel="centre along the ground [mm]", ylabel="centre upwards [mm]")
+    path.set_aspect("equal", adjustable="datalim")
+    legend_of_states(drawing, states, (handle("launch on rigid ground", **dashed),), columns=6)
+    return report.draw("launch", drawing, surface=report.result["surface"])
 
 
 def _said(result: Result, name: str, scale: float = 1.0, unit: str | None = None) -> str:

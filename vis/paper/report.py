@@ -9,16 +9,13 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from vis.page.page import Block, Section, Tile, table, text
-from vis.page.report import Progress, Result, again
+from vis.page.page import Block, Report, Result, Section, Tile, again, report_of, table, text
 from vis.page.sentences import Sentences
-from vis.paper.figures import figure_5, figure_6, figure_7, figure_8, figure_sweep
-from vis.paper.run import PaperRun, in_order
+from vis.paper.figures import FIGURES, PaperRun, in_order
 
 __all__ = ["write_paper_report"]
 
 say = Sentences(__package__)
-_FIGURES = (figure_5, figure_6, figure_7, figure_8, figure_sweep)
 _MEASURES = (
     ("trajectory_angle", 180 / math.pi),
     ("max_speed", 1e3),
@@ -33,15 +30,11 @@ _CASES = (
 _CLAIMS = ("what the text states", "stated", "ours", "difference", "inside", "judged by, and why")
 
 
-def write_paper_report(folder: str | Path, *, progress: Progress | None = None) -> Path:
+@report_of(dpi=150)
+def write_paper_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of `hedgebed paper`, and return the report."""
-    paper = PaperRun(folder, progress)
-    blocks = {}
-    for number, draw in enumerate(_FIGURES, 1):
-        plot = draw(paper)
-        if plot is not None:
-            blocks[plot.name] = paper.draw(plot)
-        paper.tell(number / (len(_FIGURES) + 1))
+    paper = PaperRun(report)
+    blocks = {name: block for name, draw in FIGURES.items() if (block := draw(paper)) is not None}
     result = paper.result
     swept = [blocks.pop("sweep")] if "sweep" in blocks else []
     surfaces = [
@@ -66,7 +59,7 @@ def write_paper_report(folder: str | Path, *, progress: Progress | None = None) 
         again("hedgebed paper run.toml", ""),
     ]
     count = result.get("integrations", len(paper.cases) + len(paper.sweep))
-    return paper.write(sections, lead=["paper", f"{count} integrations"], tiles=_tiles(result["quantities"]))
+    return report.write(sections, lead=["paper", f"{count} integrations"], tiles=_tiles(result["quantities"]))
 
 
 def _tiles(quantities: Result) -> list[Tile]:

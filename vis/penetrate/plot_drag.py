@@ -12,56 +12,64 @@ from numpy.typing import NDArray
 
 from vis.page.folder import Run, RunFolder, Series
 from vis.page.numbers import plain, quote, short
-from vis.page.plots import DASHED, Array, Plot, handle, legend_above, new_panels, sheet
+from vis.page.plots import DASHED, Array, handle, legend_above, new_panels, sheet
 from vis.page.sentences import Sentences
 from vis.page.style import BED, GREY, INK, MODEL, styled
-from vis.penetrate.plot_parts import above_surface, by_speed, has_model, pair_of_handles, speed_words, spread_words
+from vis.penetrate.plot_parts import (
+    Plot,
+    above_surface,
+    by_speed,
+    has_model,
+    pair_of_handles,
+    speed_words,
+    spread_words,
+)
 from vis.penetrate.summary_parts import Departure, departure_rows, value_of
 
 __all__ = ["drag_plot", "gap_plot", "work_plot"]
 
-say, captions = Sentences(__package__), Sentences(__package__, "figures.toml")
+say = Sentences(__package__)
 
 
+@styled()
 def drag_plot(run: RunFolder) -> Plot | None:
     """Drag against depth, one panel per speed; every seed of the bed, their mean and spread; the spring-damper."""
     driven = [r for r in run.of_kind("driven") if r.bed is not None and r.speed is not None]
     speeds = sorted({r.speed for r in driven if r.speed is not None})
     if not speeds:
         return None
-    with styled():
-        figure, axes = new_panels(len(speeds), height=3.0, sharex=True, sharey=True)
-        above = [part for r in driven if (part := above_surface(r.bed)) is not None]
-        for axis, speed in zip(axes, speeds, strict=True):
-            here = [r for r in driven if r.speed == speed]
-            seeds = len(here)
-            axis.set_title(f"{speed_words(speed)}   ({seeds} bed{'s' if seeds > 1 else ''})")
-            for way, shade in (("in", 1.0), ("out", 0.45)):
-                parts = [_way(r.bed, way) for r in here]
-                _band(axis, parts, BED, alpha=shade, solid=way == "in")
-                models = [_way(r.model, way) for r in here if r.model is not None]
-                if models:
-                    grid, mean, _ = _mean_by_depth(models)
-                    style = DASHED if way == "in" else (0, (1, 1.5))
-                    axis.plot(1e3 * grid, mean, color=MODEL, ls=style, lw=1.8)
-            for part in filter(None, (above_surface(r.bed) for r in here)):
-                axis.plot(1e3 * part.depth, part.force, color=BED, lw=0.6, alpha=0.25)
-                grid, mean, _ = _mean_by_depth([part], bins=8)
-                axis.plot(1e3 * grid, mean, color=BED, lw=1.6, alpha=0.4)
-            axis.axhline(0.0, color=GREY, lw=0.8)
-            if above:
-                axis.axvline(0.0, color=GREY, lw=0.8, ls=(0, (2, 2)))
-            axis.set_xlim(left=1e3 * min((float(part.depth.min()) for part in above), default=0.0))
-            axis.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
-        _label(axes, "depth of the tip [mm]", "force on the spike [N]")
-        handles = [handle("bed, way in", BED, lw=2.2)]
-        out = any(len(_way(r.bed, "out") or ()) for r in driven)
-        handles += [handle("bed, way out", BED, lw=2.2, alpha=0.45)] if out else []
-        handles += [handle("bed, as recorded", BED, lw=0.7, alpha=0.55)]
-        law = has_model(driven)
-        handles += [handle("spring-damper, in", MODEL, ls=DASHED)] if law else []
-        handles += [handle("spring-damper, out", MODEL, ls=(0, (1, 1.5)))] if law and out else []
-        legend_above(figure, handles)
+    figure, axes = new_panels(len(speeds), height=3.0, sharex=True, sharey=True)
+    above = [part for r in driven if (part := above_surface(r.bed)) is not None]
+    for axis, speed in zip(axes, speeds, strict=True):
+        here = [r for r in driven if r.speed == speed]
+        seeds = len(here)
+        axis.set_title(f"{speed_words(speed)}   ({seeds} bed{'s' if seeds > 1 else ''})")
+        for way, shade in (("in", 1.0), ("out", 0.45)):
+            parts = [_way(r.bed, way) for r in here]
+            _band(axis, parts, BED, alpha=shade, solid=way == "in")
+            models = [_way(r.model, way) for r in here if r.model is not None]
+            if models:
+                grid, mean, _ = _mean_by_depth(models)
+                style = DASHED if way == "in" else (0, (1, 1.5))
+                axis.plot(1e3 * grid, mean, color=MODEL, ls=style, lw=1.8)
+        for part in filter(None, (above_surface(r.bed) for r in here)):
+            axis.plot(1e3 * part.depth, part.force, color=BED, lw=0.6, alpha=0.25)
+            grid, mean, _ = _mean_by_depth([part], bins=8)
+            axis.plot(1e3 * grid, mean, color=BED, lw=1.6, alpha=0.4)
+        axis.axhline(0.0, color=GREY, lw=0.8)
+        if above:
+            axis.axvline(0.0, color=GREY, lw=0.8, ls=(0, (2, 2)))
+        axis.set_xlim(left=1e3 * min((float(part.depth.min()) for part in above), default=0.0))
+        axis.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
+    _label(axes, "depth of the tip [mm]", "force on the spike [N]")
+    handles = [handle("bed, way in", BED, lw=2.2)]
+    out = any(len(_way(r.bed, "out") or ()) for r in driven)
+    handles += [handle("bed, way out", BED, lw=2.2, alpha=0.45)] if out else []
+    handles += [handle("bed, as recorded", BED, lw=0.7, alpha=0.55)]
+    law = has_model(driven)
+    handles += [handle("spring-damper, in", MODEL, ls=DASHED)] if law else []
+    handles += [handle("spring-damper, out", MODEL, ls=(0, (1, 1.5)))] if law and out else []
+    legend_above(figure, handles)
     many = any(sum(r.speed == s for r in driven) > 1 for s in speeds)
     width = _bin_width([_way(r.bed, "in") for r in driven])
     sentences = [
@@ -71,10 +79,10 @@ def drag_plot(run: RunFolder) -> Plot | None:
         say("drag_law") + say("drag_law_out" if out else "drag_law_in") if law else "",
     ]
     moved = f"driven in{' and pulled out' if out else ''}"
-    caption = captions("drag.caption", moved=moved, parts="".join(sentences)).strip()
-    return Plot("drag", captions("drag.title"), caption, figure)
+    return Plot.said("drag", figure, moved=moved, parts="".join(sentences))
 
 
+@styled()
 def gap_plot(run: RunFolder) -> Plot | None:
     """Spring-damper minus bed by depth and speed, as a map with the numbers written in."""
     table = departure_rows(run.result) or _departures_of_series(run)
@@ -90,35 +98,35 @@ def gap_plot(run: RunFolder) -> Plot | None:
         difference[at] = row.difference
     told = any(row.known for row in table)
     bound = float(np.nanmax(np.abs(difference))) or 1.0
-    with styled():
-        figure, ((axis,),) = sheet(1, 1, max(2.6, 0.9 + (0.62 if told else 0.42) * len(depths)))
-        norm = TwoSlopeNorm(0.0, -bound, bound)
-        image = axis.imshow(difference, cmap="PuOr_r", norm=norm, aspect="auto")
-        axis.set_xticks(range(len(speeds)), [f"{s:.4g}" for s in speeds])
-        axis.set_yticks(range(len(depths)), [f"{short(1e3 * a)} to {short(1e3 * b)}" for a, b in depths])
-        axis.set(xlabel="speed [m/s]", ylabel="depth [mm]")
-        axis.grid(False)
-        axis.set_xticks(np.arange(len(speeds) + 1) - 0.5, minor=True)
-        axis.set_yticks(np.arange(len(depths) + 1) - 0.5, minor=True)
-        axis.grid(True, which="minor", color="white", lw=2.0)
-        axis.tick_params(which="both", length=0)
-        axis.spines[:].set_visible(False)
-        for (i, j), row in cells.items():
-            number = row.difference
-            text = f"{'+' if number > 0 else ''}{quote(number, row.bed_std, 'N', significant=2)}"
-            if row.share is not None:
-                text += f"   ({_signed(100.0 * row.share, 2)} %)"
-            if row.known:
-                text += f"\n{row.known}"
-            dark = number < -0.45 * bound or number > 0.6 * bound  # of the map, purple is the darker end
-            axis.text(j, i, text, ha="center", va="center", fontsize=8.5, color="white" if dark else INK)
-        bar = figure.colorbar(image, ax=axis, pad=0.015, fraction=0.05)
-        bar.set_label("spring-damper − bed [N]")
-        bar.outline.set_visible(False)
+    figure, ((axis,),) = sheet(1, 1, max(2.6, 0.9 + (0.62 if told else 0.42) * len(depths)))
+    norm = TwoSlopeNorm(0.0, -bound, bound)
+    image = axis.imshow(difference, cmap="PuOr_r", norm=norm, aspect="auto")
+    axis.set_xticks(range(len(speeds)), [f"{s:.4g}" for s in speeds])
+    axis.set_yticks(range(len(depths)), [f"{short(1e3 * a)} to {short(1e3 * b)}" for a, b in depths])
+    axis.set(xlabel="speed [m/s]", ylabel="depth [mm]")
+    axis.grid(False)
+    axis.set_xticks(np.arange(len(speeds) + 1) - 0.5, minor=True)
+    axis.set_yticks(np.arange(len(depths) + 1) - 0.5, minor=True)
+    axis.grid(True, which="minor", color="white", lw=2.0)
+    axis.tick_params(which="both", length=0)
+    axis.spines[:].set_visible(False)
+    for (i, j), row in cells.items():
+        number = row.difference
+        text = f"{'+' if number > 0 else ''}{quote(number, row.bed_std, 'N', significant=2)}"
+        if row.share is not None:
+            text += f"   ({_signed(100.0 * row.share, 2)} %)"
+        if row.known:
+            text += f"\n{row.known}"
+        dark = number < -0.45 * bound or number > 0.6 * bound  # of the map, purple is the darker end
+        axis.text(j, i, text, ha="center", va="center", fontsize=8.5, color="white" if dark else INK)
+    bar = figure.colorbar(image, ax=axis, pad=0.015, fraction=0.05)
+    bar.set_label("spring-damper − bed [N]")
+    bar.outline.set_visible(False)
     told_below = say("gap_told") if told else ""
-    return Plot.said(captions, "gap", figure, told=told_below)
+    return Plot.said("gap", figure, told=told_below)
 
 
+@styled()
 def work_plot(run: RunFolder) -> Plot | None:
     """Work put in and got back, bed beside spring-damper, by speed."""
     known = (r for r in run.of_kind("driven") if r.speed is not None)
@@ -126,32 +134,31 @@ def work_plot(run: RunFolder) -> Plot | None:
     speeds = sorted({r.speed for r in driven if r.speed is not None})
     if not speeds:
         return None
-    with styled():
-        figure, axes = new_panels(2, height=2.7, sharey=True)
-        law = any(value_of(r.quantities, "model_work_in") is not None for r in driven)
-        sides = ((-0.2, "", BED), (0.2, "model_", MODEL)) if law else ((0.0, "", BED),)
-        titles = {"work_in": "put in, way in", "work_out": "got back, way out"}
-        for axis, (key, title) in zip(axes, titles.items(), strict=True):
-            for shift, prefix, colour in sides:
-                mean, spread = by_speed(driven, speeds, prefix + key, 1e3)
-                where = np.arange(len(speeds)) + shift
-                axis.bar(where, mean, 0.36, color=colour, hatch="///" if prefix else "", edgecolor="white", lw=0.6)
-                if prefix:
-                    spread = np.zeros_like(spread)  # one law: its runs differ in where they start only
-                else:
-                    axis.errorbar(where, mean, spread, fmt="none", ecolor=INK, elinewidth=1.0, capsize=3)
-                for x, y, s in zip(where, mean, np.nan_to_num(spread), strict=True):
-                    if np.isfinite(y):
-                        _above(axis, x, max(y, 0.0) + s, plain(y, 2 if abs(y) < 0.1 else 3))
-            axis.set_title(f"Work {title}")
-            axis.set_xticks(range(len(speeds)), [f"{s:.4g}" for s in speeds])
-            axis.grid(False, axis="x")
-            axis.set_xlim(-0.7, max(len(speeds), 2) - 0.3 if len(speeds) > 1 else 0.7)
-            axis.margins(y=0.15)
-            axis.axhline(0.0, color=GREY, lw=0.8)
-        _label(axes, "speed [m/s]", "work [mJ]")
-        legend_above(figure, pair_of_handles(bars=True)[: 2 if law else 1])
-    return Plot.said(captions, "work", figure, words=_returned_words(driven) + spread_words(driven))
+    figure, axes = new_panels(2, height=2.7, sharey=True)
+    law = any(value_of(r.quantities, "model_work_in") is not None for r in driven)
+    sides = ((-0.2, "", BED), (0.2, "model_", MODEL)) if law else ((0.0, "", BED),)
+    titles = {"work_in": "put in, way in", "work_out": "got back, way out"}
+    for axis, (key, title) in zip(axes, titles.items(), strict=True):
+        for shift, prefix, colour in sides:
+            mean, spread = by_speed(driven, speeds, prefix + key, 1e3)
+            where = np.arange(len(speeds)) + shift
+            axis.bar(where, mean, 0.36, color=colour, hatch="///" if prefix else "", edgecolor="white", lw=0.6)
+            if prefix:
+                spread = np.zeros_like(spread)  # one law: its runs differ in where they start only
+            else:
+                axis.errorbar(where, mean, spread, fmt="none", ecolor=INK, elinewidth=1.0, capsize=3)
+            for x, y, s in zip(where, mean, np.nan_to_num(spread), strict=True):
+                if np.isfinite(y):
+                    _above(axis, x, max(y, 0.0) + s, plain(y, 2 if abs(y) < 0.1 else 3))
+        axis.set_title(f"Work {title}")
+        axis.set_xticks(range(len(speeds)), [f"{s:.4g}" for s in speeds])
+        axis.grid(False, axis="x")
+        axis.set_xlim(-0.7, max(len(speeds), 2) - 0.3 if len(speeds) > 1 else 0.7)
+        axis.margins(y=0.15)
+        axis.axhline(0.0, color=GREY, lw=0.8)
+    _label(axes, "speed [m/s]", "work [mJ]")
+    legend_above(figure, pair_of_handles(bars=True)[: 2 if law else 1])
+    return Plot.said("work", figure, words=_returned_words(driven) + spread_words(driven))
 
 
 def _label(axes: list[Axes], x: str, y: str) -> None:

@@ -7,74 +7,83 @@ from matplotlib.lines import Line2D
 
 from vis.page.folder import Run, RunFolder, Series
 from vis.page.numbers import quote
-from vis.page.plots import DASHED, Array, Plot, handle, legend_above, new_panels, sheet
-from vis.page.report import capital
+from vis.page.page import capital
+from vis.page.plots import DASHED, Array, handle, legend_above, new_panels, sheet
 from vis.page.sentences import Sentences
 from vis.page.style import BED, GREY, INK, MODEL, styled
-from vis.penetrate.plot_parts import above_surface, by_speed, has_model, pair_of_handles, speed_words, spread_words
+from vis.penetrate.plot_parts import (
+    Plot,
+    above_surface,
+    by_speed,
+    has_model,
+    pair_of_handles,
+    speed_words,
+    spread_words,
+)
 from vis.penetrate.summary_parts import fit_error, joined, std_of, value_of
 
 __all__ = ["drop_peaks_plot", "drops_plot", "set_down_plot", "spread_plot"]
 
-say, captions = Sentences(__package__), Sentences(__package__, "figures.toml")
+say = Sentences(__package__)
 
 
+@styled()
 def drops_plot(run: RunFolder) -> Plot | None:
     """Depth and force of each drop against time, one column per speed."""
     drops = [r for r in run.of_kind("drop") if r.bed is not None and r.speed is not None]
     speeds = sorted({r.speed for r in drops if r.speed is not None})
     if not speeds:
         return None
-    with styled():
-        figure, axes = sheet(2, len(speeds), 4.6, sharex="col", sharey="row")
-        window = _nice(0.04 * max(_settled(r) for r in drops))
-        free = False
-        for column, speed in enumerate(speeds):
-            above, below = axes[0, column], axes[1, column]
-            here = [r for r in drops if r.speed == speed]
-            end = max(_settled(r) for r in here)
-            early = [r.bed.time[0] - _touch(r.bed) for r in here if r.bed is not None and above_surface(r.bed)]
-            begin = min(-0.03 * end, *(max(_first_touch(r.bed), -0.5 * end) for r in here)) if early else -0.03 * end
-            for r in here:
-                for series, colour, style in ((r.bed, BED, "-"), (r.model, MODEL, DASHED)):
-                    if series is None:
-                        continue
-                    start = _touch(series)
-                    shown = (series.time - start <= end) & (series.time - start >= begin)
-                    time = 1e3 * (series.time[shown] - start)
-                    thin = len(here) > 1 and colour == BED
-                    above.plot(time, 1e3 * series.depth[shown], color=colour, ls=style, lw=1.1 if thin else 1.8)
-                    force = series.force
-                    if colour == BED:
-                        below.plot(time, force[shown], color=colour, lw=0.6, alpha=0.4)
-                        force = _running_mean(series.time, force, window)
-                    inside, width = time >= 0.0, 1.2 if thin else 1.8
-                    below.plot(time[inside], force[shown][inside], color=colour, ls=style, lw=width)
-                    below.plot(time[~inside], force[shown][~inside], color=colour, ls=style, lw=width, alpha=0.4)
-                    peak = int(np.argmax(series.force))
-                    below.plot(
-                        1e3 * (series.time[peak] - start), series.force[peak], "o" if colour == BED else "D",
-                        color=colour, ms=5, mec="white", mew=0.8, zorder=5,
-                    )  # fmt: skip
-            above.set_title(f"dropped at {speed_words(speed)}")
-            above.axhline(0.0, color=GREY, lw=0.8)
-            if early:
-                for axis in (above, below):
-                    axis.axvline(0.0, color=GREY, lw=0.8, ls=(0, (2, 2)))
-            free = free or bool(early)
-            below.set_xlabel("time since touch-down [ms]")
-        axes[0, 0].set_ylabel("depth of the tip [mm]")
-        axes[1, 0].set_ylabel("force on the spike [N]")
-        axes[0, 0].invert_yaxis()
-        recorded = handle("bed, as recorded", BED, lw=0.7, alpha=0.55)
-        peaks = handle("peak force, as recorded", GREY, marker="o", ls="", ms=5)
-        bed, *model = pair_of_handles()[: 2 if has_model(drops) else 1]
-        legend_above(figure, [bed, recorded, *model, peaks])
+    figure, axes = sheet(2, len(speeds), 4.6, sharex="col", sharey="row")
+    window = _nice(0.04 * max(_settled(r) for r in drops))
+    free = False
+    for column, speed in enumerate(speeds):
+        above, below = axes[0, column], axes[1, column]
+        here = [r for r in drops if r.speed == speed]
+        end = max(_settled(r) for r in here)
+        early = [r.bed.time[0] - _touch(r.bed) for r in here if r.bed is not None and above_surface(r.bed)]
+        begin = min(-0.03 * end, *(max(_first_touch(r.bed), -0.5 * end) for r in here)) if early else -0.03 * end
+        for r in here:
+            for series, colour, style in ((r.bed, BED, "-"), (r.model, MODEL, DASHED)):
+                if series is None:
+                    continue
+                start = _touch(series)
+                shown = (series.time - start <= end) & (series.time - start >= begin)
+                time = 1e3 * (series.time[shown] - start)
+                thin = len(here) > 1 and colour == BED
+                above.plot(time, 1e3 * series.depth[shown], color=colour, ls=style, lw=1.1 if thin else 1.8)
+                force = series.force
+                if colour == BED:
+                    below.plot(time, force[shown], color=colour, lw=0.6, alpha=0.4)
+                    force = _running_mean(series.time, force, window)
+                inside, width = time >= 0.0, 1.2 if thin else 1.8
+                below.plot(time[inside], force[shown][inside], color=colour, ls=style, lw=width)
+                below.plot(time[~inside], force[shown][~inside], color=colour, ls=style, lw=width, alpha=0.4)
+                peak = int(np.argmax(series.force))
+                below.plot(
+                    1e3 * (series.time[peak] - start), series.force[peak], "o" if colour == BED else "D",
+                    color=colour, ms=5, mec="white", mew=0.8, zorder=5,
+                )  # fmt: skip
+        above.set_title(f"dropped at {speed_words(speed)}")
+        above.axhline(0.0, color=GREY, lw=0.8)
+        if early:
+            for axis in (above, below):
+                axis.axvline(0.0, color=GREY, lw=0.8, ls=(0, (2, 2)))
+        free = free or bool(early)
+        below.set_xlabel("time since touch-down [ms]")
+    axes[0, 0].set_ylabel("depth of the tip [mm]")
+    axes[1, 0].set_ylabel("force on the spike [N]")
+    axes[0, 0].invert_yaxis()
+    recorded = handle("bed, as recorded", BED, lw=0.7, alpha=0.55)
+    peaks = handle("peak force, as recorded", GREY, marker="o", ls="", ms=5)
+    bed, *model = pair_of_handles()[: 2 if has_model(drops) else 1]
+    legend_above(figure, [bed, recorded, *model, peaks])
     each = ", a line for each bed" if len({(r.speed, r.seed) for r in drops}) > len(speeds) else ""
     left, later = say("drops_left") if free else "", say("drops_later") if has_model(drops) else ""
-    return Plot.said(captions, "drops", figure, each=each, window=quote(window, 0.0, "s"), left=left, later=later)
+    return Plot.said("drops", figure, each=each, window=quote(window, 0.0, "s"), left=left, later=later)
 
 
+@styled()
 def drop_peaks_plot(run: RunFolder) -> Plot | None:
     """Peak force, greatest depth and time to stop of the drops against speed, bed beside spring-damper."""
     drops = [r for r in run.of_kind("drop") if r.speed is not None]
@@ -90,69 +99,68 @@ def drop_peaks_plot(run: RunFolder) -> Plot | None:
     ]
     if not columns:
         return None
-    with styled():
-        figure, axes = new_panels(len(columns), height=2.6)
-        for axis, (key, title, unit, scale) in zip(axes, columns, strict=True):
-            for prefix, colour, style in (("", BED, "o-"), ("model_", MODEL, "D--")):
-                mean, spread = by_speed(drops, speeds, prefix + key, scale)
-                axis.errorbar(speeds, mean, spread, fmt=style, color=colour, ms=5, mec="white", mew=0.8, capsize=3)
-            label, top = f"{title[0].lower()}{title[1:]} [{unit}]", 1.1 * axis.get_ylim()[1]
-            axis.set(ylabel=label, xlabel="speed at touch-down [m/s]", ylim=(0.0, top))
-            axis.margins(x=0.12)
-            if len(speeds) <= 5:
-                axis.set_xticks(speeds, [f"{s:.4g}" for s in speeds])
-        law = any(value_of(r.quantities, "model_peak_force") is not None for r in drops)
-        legend_above(figure, pair_of_handles(markers=True)[: 2 if law else 1])
+    figure, axes = new_panels(len(columns), height=2.6)
+    for axis, (key, title, unit, scale) in zip(axes, columns, strict=True):
+        for prefix, colour, style in (("", BED, "o-"), ("model_", MODEL, "D--")):
+            mean, spread = by_speed(drops, speeds, prefix + key, scale)
+            axis.errorbar(speeds, mean, spread, fmt=style, color=colour, ms=5, mec="white", mew=0.8, capsize=3)
+        label, top = f"{title[0].lower()}{title[1:]} [{unit}]", 1.1 * axis.get_ylim()[1]
+        axis.set(ylabel=label, xlabel="speed at touch-down [m/s]", ylim=(0.0, top))
+        axis.margins(x=0.12)
+        if len(speeds) <= 5:
+            axis.set_xticks(speeds, [f"{s:.4g}" for s in speeds])
+    law = any(value_of(r.quantities, "model_peak_force") is not None for r in drops)
+    legend_above(figure, pair_of_handles(markers=True)[: 2 if law else 1])
     listed = joined([title[0].lower() + title[1:] for _, title, *_ in columns])
-    return Plot.said(captions, "drop_peaks", figure, listed=capital(listed), spread=spread_words(drops))
+    return Plot.said("drop_peaks", figure, listed=capital(listed), spread=spread_words(drops))
 
 
+@styled()
 def set_down_plot(run: RunFolder) -> Plot | None:
     """Depth against time of the spike set down under its load, to rest."""
     sets = [r for r in run.of_kind("set_down") if r.bed is not None]
     if not sets:
         return None
-    with styled():
-        figure, ((axis,),) = sheet(1, 1, 3.1)
-        end, begin = 1.15 * max(_settled(r) + _touch(r.bed) for r in sets if r.bed is not None), 0.0
-        dots: list[Line2D] = []
-        for i, r in enumerate(sets):
-            # One law: its runs differ in where they start only, and dashes that overlap look like a full line.
-            model = None if any(s.model is not None for s in sets[:i]) else r.model
-            for series, colour, style in ((r.bed, BED, "-"), (model, MODEL, DASHED)):
-                if series is not None:
-                    shown = (series.time <= end) & (series.time >= -0.1 * end)
-                    axis.plot(1e3 * series.time[shown], 1e3 * series.depth[shown], color=colour, ls=style, lw=1.4)
-                    begin = min(begin, float(series.time[shown].min(initial=0.0)))
-            assert r.bed is not None
-            if value_of(r.quantities, "sinkage") is not None and r.bed.time[-1] <= end:
-                dots = [handle("at rest", BED, marker="o", ls="", ms=5)]
-                end_of = 1e3 * r.bed.time[-1], 1e3 * r.bed.depth[-1]
-                axis.plot(*end_of, "o", color=BED, ms=5, mec="white", mew=0.8, zorder=5)
-        rests = []
-        for key, what, colour in (("sinkage", "bed", BED), ("model_sinkage", "spring-damper", MODEL)):
-            depths = [1e3 * n for r in sets if (n := value_of(r.quantities, key)) is not None]
-            if depths:
-                spread = float(np.std(depths, ddof=1)) if len(depths) > 1 else None
-                if what != "bed":  # one law here; between beds it is the fits that differ
-                    std = std_of(run.result.get("quantities"), "sinkage_spring_damper")
-                    spread = 1e3 * std if std else None
-                rests.append((float(np.mean(depths)), spread, what, colour))
-        axis.invert_yaxis()
-        low, high = sorted(axis.get_ylim())
-        gap = 0.075 * (high - low)
-        last = -np.inf
-        for depth, spread, what, colour in sorted(rests, key=lambda rest: rest[0]):
-            axis.axhline(depth, color=colour, lw=0.8, alpha=0.6)
-            if spread:
-                axis.axhspan(depth - spread, depth + spread, color=colour, alpha=0.12, lw=0)
-            last = max(depth, last + gap)
-            number = quote(1e-3 * depth, None if spread is None else 1e-3 * spread, "m", significant=2)
-            axis.text(1.01, last, f"{what}: {number}", color=colour, va="center", transform=axis.get_yaxis_transform())
-        axis.set_xlim(1e3 * begin, 1e3 * end)
-        axis.axhline(0.0, color=GREY, lw=0.8)
-        axis.set(xlabel="time since the spike was let go [ms]", ylabel="depth of the tip [mm]")
-        legend_above(figure, [*pair_of_handles()[: 2 if has_model(sets) else 1], *dots])
+    figure, ((axis,),) = sheet(1, 1, 3.1)
+    end, begin = 1.15 * max(_settled(r) + _touch(r.bed) for r in sets if r.bed is not None), 0.0
+    dots: list[Line2D] = []
+    for i, r in enumerate(sets):
+        # One law: its runs differ in where they start only, and dashes that overlap look like a full line.
+        model = None if any(s.model is not None for s in sets[:i]) else r.model
+        for series, colour, style in ((r.bed, BED, "-"), (model, MODEL, DASHED)):
+            if series is not None:
+                shown = (series.time <= end) & (series.time >= -0.1 * end)
+                axis.plot(1e3 * series.time[shown], 1e3 * series.depth[shown], color=colour, ls=style, lw=1.4)
+                begin = min(begin, float(series.time[shown].min(initial=0.0)))
+        assert r.bed is not None
+        if value_of(r.quantities, "sinkage") is not None and r.bed.time[-1] <= end:
+            dots = [handle("at rest", BED, marker="o", ls="", ms=5)]
+            end_of = 1e3 * r.bed.time[-1], 1e3 * r.bed.depth[-1]
+            axis.plot(*end_of, "o", color=BED, ms=5, mec="white", mew=0.8, zorder=5)
+    rests = []
+    for key, what, colour in (("sinkage", "bed", BED), ("model_sinkage", "spring-damper", MODEL)):
+        depths = [1e3 * n for r in sets if (n := value_of(r.quantities, key)) is not None]
+        if depths:
+            spread = float(np.std(depths, ddof=1)) if len(depths) > 1 else None
+            if what != "bed":  # one law here; between beds it is the fits that differ
+                std = std_of(run.result.get("quantities"), "sinkage_spring_damper")
+                spread = 1e3 * std if std else None
+            rests.append((float(np.mean(depths)), spread, what, colour))
+    axis.invert_yaxis()
+    low, high = sorted(axis.get_ylim())
+    gap = 0.075 * (high - low)
+    last = -np.inf
+    for depth, spread, what, colour in sorted(rests, key=lambda rest: rest[0]):
+        axis.axhline(depth, color=colour, lw=0.8, alpha=0.6)
+        if spread:
+            axis.axhspan(depth - spread, depth + spread, color=colour, alpha=0.12, lw=0)
+        last = max(depth, last + gap)
+        number = quote(1e-3 * depth, None if spread is None else 1e-3 * spread, "m", significant=2)
+        axis.text(1.01, last, f"{what}: {number}", color=colour, va="center", transform=axis.get_yaxis_transform())
+    axis.set_xlim(1e3 * begin, 1e3 * end)
+    axis.axhline(0.0, color=GREY, lw=0.8)
+    axis.set(xlabel="time since the spike was let go [ms]", ylabel="depth of the tip [mm]")
+    legend_above(figure, [*pair_of_handles()[: 2 if has_model(sets) else 1], *dots])
     still = sum(value_of(r.quantities, "sinkage") is not None for r in sets)
     many = len(sets) > 1
     said = f"Sinking under the load, {len(sets)} bed{'s' if many else ''}."
@@ -173,6 +181,7 @@ def set_down_plot(run: RunFolder) -> Plot | None:
     return Plot("set_down", "Set down under its load", said, figure)
 
 
+@styled()
 def spread_plot(run: RunFolder) -> Plot | None:
     """K and C fitted to each seed of the bed, their spread, and what is fitted to all of them."""
     fits = [f for f in run.result.get("fits") or [] if isinstance(f, dict)]
@@ -183,44 +192,43 @@ def spread_plot(run: RunFolder) -> Plot | None:
     ]
     if not panels or len(fits) < 2:
         return None
-    with styled():
-        figure, axes = new_panels(len(panels), height=2.5)
-        for axis, (key, title, unit) in zip(axes, panels, strict=True):
-            rows = [
-                (f.get("seed", i + 1), n, fit_error(f, key))
-                for i, f in enumerate(fits)
-                if (n := value_of(f, key)) is not None
-            ]
-            values = np.array([value for _, value, _ in rows])
-            spread = float(values.std(ddof=1)) if len(values) > 1 else None
-            pooled = value_of(run.result.get("quantities"), key)
-            mean = float(values.mean()) if pooled is None else pooled
-            axis.axhline(mean, color=INK, lw=1.0)
-            if spread:
-                axis.axhspan(mean - spread, mean + spread, color=MODEL, alpha=0.15, lw=0)
-            axis.errorbar(
-                range(len(rows)),
-                values,
-                [np.nan if error is None else error for *_, error in rows],
-                fmt="o",
-                color=MODEL,
-                ms=7,
-                mec="white",
-                capsize=3,
-            )
-            axis.set_xticks(range(len(rows)), [str(seed) for seed, *_ in rows])
-            axis.set(
-                xlim=(-0.6, len(rows) - 0.4),
-                title=title,
-                xlabel="seed of the bed",
-                ylabel=f"{title.split()[1]} [{unit}]",
-            )
-            reach = max(2.2 * (spread or 0.0), 0.1 * abs(mean), 1e-12)
-            axis.set_ylim(min(mean - reach, *axis.get_ylim()), max(mean + reach, *axis.get_ylim()))
-            axis.grid(False, axis="x")
+    figure, axes = new_panels(len(panels), height=2.5)
+    for axis, (key, title, unit) in zip(axes, panels, strict=True):
+        rows = [
+            (f.get("seed", i + 1), n, fit_error(f, key))
+            for i, f in enumerate(fits)
+            if (n := value_of(f, key)) is not None
+        ]
+        values = np.array([value for _, value, _ in rows])
+        spread = float(values.std(ddof=1)) if len(values) > 1 else None
+        pooled = value_of(run.result.get("quantities"), key)
+        mean = float(values.mean()) if pooled is None else pooled
+        axis.axhline(mean, color=INK, lw=1.0)
+        if spread:
+            axis.axhspan(mean - spread, mean + spread, color=MODEL, alpha=0.15, lw=0)
+        axis.errorbar(
+            range(len(rows)),
+            values,
+            [np.nan if error is None else error for *_, error in rows],
+            fmt="o",
+            color=MODEL,
+            ms=7,
+            mec="white",
+            capsize=3,
+        )
+        axis.set_xticks(range(len(rows)), [str(seed) for seed, *_ in rows])
+        axis.set(
+            xlim=(-0.6, len(rows) - 0.4),
+            title=title,
+            xlabel="seed of the bed",
+            ylabel=f"{title.split()[1]} [{unit}]",
+        )
+        reach = max(2.2 * (spread or 0.0), 0.1 * abs(mean), 1e-12)
+        axis.set_ylim(min(mean - reach, *axis.get_ylim()), max(mean + reach, *axis.get_ylim()))
+        axis.grid(False, axis="x")
     known = any(fit_error(f, key) is not None for f in fits for key in ("stiffness", "damping"))
     bars = "; bars: standard error of the fit" if known else "; how well each fit is determined is not known"
-    return Plot.said(captions, "spread", figure, bars=bars)
+    return Plot.said("spread", figure, bars=bars)
 
 
 def _first_touch(series: Series | None) -> float:

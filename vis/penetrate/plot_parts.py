@@ -3,17 +3,45 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from vis.page.folder import Run, Series
 from vis.page.plots import DASHED, Array, handle
+from vis.page.sentences import Sentences
 from vis.page.style import BED, MODEL
 from vis.penetrate.summary_parts import value_of
 
-__all__ = ["above_surface", "by_speed", "has_model", "pair_of_handles", "speed_words", "spread_words"]
+__all__ = ["Plot", "above_surface", "by_speed", "has_model", "pair_of_handles", "speed_words", "spread_words"]
+
+
+captions = Sentences(__package__, "figures.toml")
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure with the name of its file (without ending), a title and a caption."""
+
+    name: str
+    title: str
+    caption: str
+    figure: Figure
+
+    @classmethod
+    def said(cls, key: str, figure: Figure, **values: Any) -> Plot:
+        """A figure called as its key, with its title and caption from the table `key` of figures.toml."""
+        return cls(key, captions(f"{key}.title", **values), captions(f"{key}.caption", **values).strip(), figure)
+
+    def save(self, folder: Path) -> Path:
+        """Write `<folder>/<name>.png`."""
+        path = folder / f"{self.name}.png"
+        self.figure.savefig(path)
+        return path
 
 
 def pair_of_handles(*, markers: bool = False, bars: bool = False) -> list[Any]:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageColor
 
-from vis.page.tumble_series import STATES
+from vis.page.style import STATES
 from vis.pictures.arrows import FORCE
 from vis.pictures.canvas import Caption, ColourScale, Page, colour_values, colourmap
 from vis.pictures.frames import read_frames

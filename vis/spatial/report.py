@@ -11,59 +11,46 @@ from matplotlib.figure import Figure
 
 from vis.film.film import ARROWS, draw_in_space, shown
 from vis.film.reel import NAME
+from vis.page.folder import read_columns
 from vis.page.numbers import quantity
-from vis.page.page import Block, Section, Tile, listing, table, text
-from vis.page.plots import DASHED, DOTTED, Array, Plot, legend_above, mean_over, sheet
-from vis.page.report import Progress, Report, Result, again, given, number_text, unit_text
-from vis.page.sentences import Sentences
+from vis.page.page import Block, Report, Result, Section, Tile, again, given, listing, report_of, text
+from vis.page.plots import DASHED, DOTTED, Array, legend_above, mean_over, sheet
 from vis.page.states import States, draw_bands, draw_states, passages
-from vis.page.style import BED, GREY, INK, MODEL, styled
-from vis.page.tumble_series import read_columns
+from vis.page.style import BED, GREY, INK, MODEL
 from vis.pictures.canvas import COLOURS
 from vis.pictures.frames import frame_names
 
 __all__ = ["write_spatial_report"]
 
-captions = Sentences(__package__, "figures.toml")
 Columns = Mapping[str, Array]
 _AXES = {"x": BED, "y": "#009E73", "z": MODEL}
 _TURN = "turn from the start [degrees]"
 
 
+@report_of(dpi=130)
 def write_spatial_report(
-    folder: str | Path,
-    *,
-    pictures: bool = True,
-    colour: str = "displacement",
-    film: bool = True,
-    progress: Progress | None = None,
+    report: Report, *, pictures: bool = True, colour: str = "displacement", film: bool = True
 ) -> Path:
     """Make figures/, film.gif and report.html of the folder of a run in space, and return the report.
 
-    Args:
-        folder: The run folder.
-        pictures: Whether to draw the platform on its ground, where there are frames.
-        colour: What grains are coloured by, a key of `vis.pictures.canvas.COLOURS`.
-        film: Whether to make the film.
-        progress: Called with the share that is done, 0 to 1.
-
-    Raises FileNotFoundError where the folder has no trajectory.csv or result.json, ValueError for an unknown `colour`.
+    ``pictures``: Whether to draw the platform on its ground, where there are frames. ``colour``: What grains are
+    coloured by, a key of `vis.pictures.canvas.COLOURS`. ``film``: Whether to make the film. Raises FileNotFoundError
+    where the folder has no trajectory.csv or result.json, ValueError for an unknown `colour`.
     """
     if colour not in COLOURS:
         raise ValueError(f"colour is {colour!r}; it must be one of {', '.join(COLOURS)}")
-    report = Report(folder, progress, dpi=130)
-    home, result, tell = report.folder, report.result, report.tell
-    path, states = read_columns(home / "trajectory.csv")
-    plots = _plots(path, report.columns("series/motion.csv"))
-    if len(states):  # an older folder has none
-        plots[1:1] = _states(home, path, states)
-    drawn = report.draw_all(plots)
-    tell(0.2)
+    home, result = report.folder, report.result
+    (path, states), motion = read_columns(home / "trajectory.csv"), report.columns("series/motion.csv")
+    drawn = [report.draw("path", _draw_path(path)), *_states(report, path, states)]
+    for key, drawing in (
+        ("turning", _draw_turning(path, motion)),
+        ("ground", _draw_ground(motion)),
+        ("energy", _draw_energy(motion)),
+    ):
+        drawn.append(report.draw(key, drawing))
     seen = []
     if pictures and NAME in frame_names(home):
-        made = draw_in_space(
-            [home], home, stem="space", by=colour, film=film, progress=lambda done: tell(0.2 + 0.75 * done)
-        )
+        made = draw_in_space([home], home, stem="space", by=colour, film=film, progress=report.rest())
         seen = [Section("Seen", [*shown(made), text(ARROWS, small=True), *(text(note) for note in made.notes)])]
     told = result.get("transitions")  # an older folder has none
     sections = [
@@ -71,7 +58,7 @@ def write_spatial_report(
         *seen,
         *([Section("Transitions", passages(told, angle="turn", label="turn [degrees]"))] if told else []),
         Section("The trial", [given(result["trial"])]),
-        Section("Every number of the result", [_numbers(result)]),
+        report.numbers(beside=(result.get("grains") or {}).get("beside") or {}),
         again("hedgebed tumble spatial run.toml", f"With hedgebed {result['version']}, in this folder:"),
     ]
     quantities = result["quantities"]
@@ -99,39 +86,18 @@ def _grains(result: Result) -> list[Block]:
     ]
 
 
-def _numbers(result: Result) -> Block:
-    """Every number, with the spring-damper's beside it where there is one."""
-    beside = (result.get("grains") or {}).get("beside")
-    rows = []
-    for name, entry in result["quantities"].items():
-        sides = [entry, *([beside.get(name)] if beside else [])]
-        values = (number_text(None if side is None else side["value"]) for side in sides)
-        rows.append((name, *values, unit_text(entry["unit"]), entry.get("note", "")))
-    return table(("quantity", "value", *(("spring-damper",) if beside else ()), "unit", "note"), rows, words=True)
-
-
-def _states(home: Path, path: Columns, states: States) -> list[Plot]:
-    """The states over time and turn, and on grains those of the spring-damper beside them."""
+def _states(report: Report, path: Columns, states: States) -> list[Block]:
+    """The states over time and turn, and on grains those of the spring-damper beside them; an older folder has none."""
+    if not len(states):
+        return []
     turn = np.degrees(path["turn_rad"])
-    plots = [Plot.said(captions, "states", draw_states(path["t_s"], turn, states, label=_TURN))]
-    beside = home / "series" / "spring-damper.csv"
+    drawn = [report.draw("states", draw_states(path["t_s"], turn, states, label=_TURN))]
+    beside = report.folder / "series" / "spring-damper.csv"
     if beside.exists():
         other, others = read_columns(beside)
         runs = [(path["t_s"], turn, states), (other["t_s"], np.degrees(other["turn_rad"]), others)]
-        with styled():
-            bands = draw_bands(runs, ("grains", "spring-damper"), label=_TURN)
-        plots.append(Plot.said(captions, "beside", bands))
-    return plots
-
-
-def _plots(path: Columns, motion: Columns) -> list[Plot]:
-    with styled():
-        return [
-            Plot.said(captions, "path", _draw_path(path)),
-            Plot.said(captions, "turning", _draw_turning(path, motion)),
-            Plot.said(captions, "ground", _draw_ground(motion)),
-            Plot.said(captions, "energy", _draw_energy(motion)),
-        ]  # fmt: skip
+        drawn.append(report.draw("beside", draw_bands(runs, ("grains", "spring-damper"), label=_TURN)))
+    return drawn
 
 
 def _pair(left: str, right: str) -> tuple[Figure, Axes, Axes]:

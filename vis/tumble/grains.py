@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from vis.page.numbers import short
-from vis.page.page import Section, figure, table, text
-from vis.page.plots import DASHED, Array, Plot, legend_above, mean_over, sheet
-from vis.page.report import Result
-from vis.page.sentences import Sentences
-from vis.page.states import States
-from vis.page.style import BED, GREY, INK, MODEL, as_it_lies, styled
+from vis.page.page import Report, Section, table, text
+from vis.page.plots import DASHED, Array, legend_above, mean_over, sheet
+from vis.page.style import BED, GREY, INK, MODEL, as_it_lies
 from vis.tumble.beside import HEAD, beside_rows, beside_words
 
 __all__ = ["grains_section"]
@@ -22,21 +18,19 @@ __all__ = ["grains_section"]
 Columns = Mapping[str, Array]
 _ROWS = (BED, MODEL, "#009E73", "#CC79A7", GREY, "#56B4E9", "#E69F00", INK)
 """Colours of the rows of spikes."""
-captions = Sentences(__package__, "figures.toml")
 
 
-def grains_section(result: Result, figures: Path, tables: Mapping[str, tuple[Columns, States]]) -> Section:
-    """The section, its figures drawn into `figures`. `tables`: the run's own, motion, feet, bed and beside."""
-    columns = {name: held for name, (held, _) in tables.items()}
-    with styled():
-        plots = [
-            Plot.said(captions, "beside", _draw_paths(columns["own"], columns["beside"])),
-            Plot.said(captions, "feet", _draw_feet(columns["feet"])),
-        ]
-        if "damping_lost_J" in columns.get("bed", {}):
-            book = _books(columns["motion"], columns["feet"], columns["bed"])
-            plots.append(Plot.said(captions, "books", _draw_books(book)))
-    drawn = [figure(plot.save(figures, 130), title=plot.title, caption=plot.caption) for plot in plots]
+def grains_section(report: Report) -> Section:
+    """The section, with its figures."""
+    result = report.result
+    columns = {name: report.columns(file) for name, file in result["grains"]["series"].items()}
+    drawn = [
+        report.draw("beside", _draw_paths(columns["own"], columns["beside"])),
+        report.draw("feet", _draw_feet(columns["feet"])),
+    ]
+    if "damping_lost_J" in columns.get("bed", {}):
+        book = _books(report.columns("series/motion.csv"), columns["feet"], columns["bed"])
+        drawn.append(report.draw("books", _draw_books(book)))
     grains = result["grains"]
     facts = (
         f"{grains['mode']}. {grains['grain_count']} grains, packing {short(grains['packing_fraction'], 3)}, "

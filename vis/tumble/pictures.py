@@ -11,9 +11,9 @@ from matplotlib.colors import TwoSlopeNorm
 
 from vis.film.film import MOST_FRAMES, Stills, draw_reels
 from vis.film.reel import Reel
+from vis.page.page import Progress, capital
 from vis.page.plots import Array, legend_above, sheet
-from vis.page.report import Progress, capital
-from vis.page.style import INK, styled
+from vis.page.style import INK
 from vis.pictures.canvas import COLOURS, nice_above
 from vis.pictures.pictures import Picture, Pictures
 
@@ -99,29 +99,28 @@ def draw_tracks(reel: Reel, file: Path) -> Picture:
     y = 1e3 * (grid.origin[1] + grid.spacing[1] * np.arange(change.shape[0]) - reel.cut)
     # Single grains that roll count less than what a spike's width of them did.
     most = nice_above(float(np.percentile(np.abs(change), 99.5)))
-    with styled():
-        drawing, ((above,), (along,)) = sheet(2, 1, 4.6, sharex=True, height_ratios=(1.0, 1.3))
-        picture = above.pcolormesh(x, y, change, norm=TwoSlopeNorm(0.0, -most, most), cmap="RdBu", rasterized=True)
-        if np.ptp(x) <= _LONGEST_MAP * np.ptp(y):
-            above.set(aspect="equal", ylabel="across [mm]")
-        else:  # in its true shape it would be a thread
-            above.set_ylabel("across [mm], stretched")
-        above.grid(False)
-        bar = drawing.colorbar(picture, ax=[above, along], shrink=0.6, extend="both")
-        bar.set_label("change of the surface's height [mm]")
-        wide = max(reel.spikes[0], 2.0 * float(grid.spacing[1]))  # of the strip [m]: two columns of the map at least
-        strip = np.abs(y) <= 0.5e3 * wide
-        ages = mpl.colormaps["viridis_r"]
-        for index in np.unique(np.linspace(1, len(reel) - 1, 4).round().astype(int)):
-            now = reel.frame(int(index))
-            mean = 1e3 * np.asarray(now.maps["surface"].fields["change"], dtype=float)[strip].mean(axis=0)
-            colour = ages(0.15 + 0.8 * (index / (len(reel) - 1)))
-            along.plot(x, mean, lw=1.2, label=f"{reel.times[index]:.2f} s", color=colour)
-        along.axhline(0.0, color=INK, lw=0.8, ls=(0, (5, 4)))
-        along.set(xlabel="x from the start of the platform's centre [mm]", ylabel="mean under the spikes [mm]")
-        legend_above(drawing, along.lines[:-1], 4)
-        file.parent.mkdir(parents=True, exist_ok=True)
-        drawing.savefig(file, dpi=130)
+    drawing, ((above,), (along,)) = sheet(2, 1, 4.6, sharex=True, height_ratios=(1.0, 1.3))
+    picture = above.pcolormesh(x, y, change, norm=TwoSlopeNorm(0.0, -most, most), cmap="RdBu", rasterized=True)
+    if np.ptp(x) <= _LONGEST_MAP * np.ptp(y):
+        above.set(aspect="equal", ylabel="across [mm]")
+    else:  # in its true shape it would be a thread
+        above.set_ylabel("across [mm], stretched")
+    above.grid(False)
+    bar = drawing.colorbar(picture, ax=[above, along], shrink=0.6, extend="both")
+    bar.set_label("change of the surface's height [mm]")
+    wide = max(reel.spikes[0], 2.0 * float(grid.spacing[1]))  # of the strip [m]: two columns of the map at least
+    strip = np.abs(y) <= 0.5e3 * wide
+    ages = mpl.colormaps["viridis_r"]
+    for index in np.unique(np.linspace(1, len(reel) - 1, 4).round().astype(int)):
+        now = reel.frame(int(index))
+        mean = 1e3 * np.asarray(now.maps["surface"].fields["change"], dtype=float)[strip].mean(axis=0)
+        colour = ages(0.15 + 0.8 * (index / (len(reel) - 1)))
+        along.plot(x, mean, lw=1.2, label=f"{reel.times[index]:.2f} s", color=colour)
+    along.axhline(0.0, color=INK, lw=0.8, ls=(0, (5, 4)))
+    along.set(xlabel="x from the start of the platform's centre [mm]", ylabel="mean under the spikes [mm]")
+    legend_above(drawing, along.lines[:-1], 4)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    drawing.savefig(file, dpi=130)
     caption = (
         "Above: by how much the top of the grains has risen or fallen since the torque began, from above, at the end. "
         f"Below: the same, mean over {1e3 * wide:.3g} mm across the spikes' way, at four times."

@@ -3,31 +3,45 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from PIL import Image, ImageDraw
 
 from vis.film.film import shown
+from vis.page.folder import read_columns
 from vis.page.numbers import quantity, short
-from vis.page.page import Block, Section, Tile, figure, table, text
-from vis.page.plots import DASHED, DOTTED, Array, Plot, handle
-from vis.page.report import Progress, Report, Result, again, given
+from vis.page.page import (
+    Block,
+    Report,
+    Result,
+    Section,
+    Tile,
+    again,
+    figure,
+    given,
+    listing,
+    report_of,
+    table,
+    tables,
+    text,
+)
+from vis.page.plots import DASHED, DOTTED, Array, handle, legend_above, sheet
 from vis.page.sentences import Sentences
 from vis.page.states import States, by_state, draw_states, legend_of_states, panels, passages
-from vis.page.style import BED, GREY, INK, MODEL, styled
-from vis.page.tumble_series import STATES, read_columns
+from vis.page.style import BED, GREY, INK, MODEL, STATES
 from vis.tumble.beside import HEAD
 from vis.tumble.grains import grains_section
 from vis.tumble.pictures import make_tumble_pictures
-from vis.tumble.sweep import sweep_section
 
 __all__ = ["write_tumble_report"]
 
-say, captions = Sentences(__package__), Sentences(__package__, "figures.toml")
+say = Sentences(__package__)
 Columns = Mapping[str, Array]
 _FOLLOWED = 1.2
 """How far from its start the animation follows the centre [m]."""
@@ -35,44 +49,29 @@ _JOULES = (("mJ", 1.0), ("µJ", 1e3), ("nJ", 1e6), ("pJ", 1e9), ("fJ", 1e12))
 """Units of energy, and how many of them a mJ has."""
 
 
+@report_of(dpi=130)
 def write_tumble_report(
-    folder: str | Path,
-    *,
-    pictures: bool | None = None,
-    colour: str = "displacement",
-    film: bool = True,
-    progress: Progress | None = None,
+    report: Report, *, pictures: bool | None = None, colour: str = "displacement", film: bool = True
 ) -> Path:
     """Make figures/, animation.gif and report.html of the folder of a tumble, and return the report.
 
-    Args:
-        folder: The run folder.
-        pictures: Whether to draw the platform on its ground in space, stills and film; None: where there are grains.
-        colour: What grains are coloured by, a key of `vis.pictures.canvas.COLOURS`.
-        film: Whether to make the film.
-        progress: Called with the share that is done, 0 to 1.
-
+    ``pictures``: Whether to draw the platform on its ground in space, stills and film; None: where there are grains.
+    ``colour``: What grains are coloured by, a key of `vis.pictures.canvas.COLOURS`. ``film``: Whether to make the film.
     Raises FileNotFoundError where the folder has no trajectory.csv or result.json.
     """
-    report = Report(folder, progress, dpi=130)
-    home, result, tell = report.folder, report.result, report.tell
+    home, result = report.folder, report.result
     numbers, states = read_columns(home / "trajectory.csv")
-    motion, _ = read_columns(home / "series" / "motion.csv")
-    drawn = []
-    for plot in (_trajectory(result, numbers, states), _states(numbers, states), _energy(result, motion)):
-        drawn.append(report.draw(plot))
-        tell(0.1 * len(drawn))
-    moving = figure(
-        _animate(home / "animation.gif", result, numbers, states),
-        half=True,
-        show_file=True,
-        title=captions("moving.title"),
-        caption=captions("moving.caption", far=_FOLLOWED),
-    )
-    tell(0.4)
+    path = _trajectory(report, numbers, states)
+    turned = report.draw("states", draw_states(numbers["t_s"], np.degrees(numbers["theta_rad"]), states))
+    energy = _energy(report)
+    title, caption = report.captions("moving.title"), report.captions("moving.caption", far=_FOLLOWED)
+    movie = _animate(home / "animation.gif", result, numbers, states)
+    moving = figure(movie, title=title, caption=caption, half=True, show_file=True)
     sections = [
-        Section("", [drawn[0], drawn[1], moving]),
-        *_rest(result, drawn[2]),
+        Section("", [path, turned, moving]),
+        Section("Transitions", passages(result["transitions"], angle="theta", label="θ [degrees]")),
+        Section("Energy", [energy]),
+        Section("The trial", [given(result["trial"]), _settled(result)]),
         report.numbers(),
         again(
             "hedgebed tumble run.toml",
@@ -81,20 +80,31 @@ def write_tumble_report(
         ),
     ]
     if "sweep" in result:
-        sections.insert(0, sweep_section(report))
+        sections.insert(0, _sweep_section(report))
     if "footfalls" in result:
         own = [t for t in result["tables"] if tuple(t["head"]) != HEAD]
         listed = [table(t["head"], t["rows"], title=t["title"]) for t in own]
         sections.insert(1, Section("Tumble by tumble", listed))
     if "grains" in result:
-        held = {name: read_columns(home / file) for name, file in result["grains"]["series"].items()}
-        sections.insert(1, grains_section(result, report.figures, held | {"motion": (motion, states)}))
+        sections.insert(1, grains_section(report))
     if pictures if pictures is not None else "grains" in result and (home / "frames" / "tumble.pvd").exists():
-        seen = make_tumble_pictures(home, by=colour, film=film, progress=lambda done: tell(0.4 + 0.55 * done))
+        seen = make_tumble_pictures(home, by=colour, film=film, progress=report.rest())
         notes = [text(say("camera"), small=True), *(text(note) for note in seen.notes)]
         sections.insert(1, Section("Seen from near", [*shown(seen), *notes]))
     lead = ["tumble", f"{result['duration']:g} s", f"{len(numbers['t_s'])} rows"]
     return report.write(sections, lead=lead, tiles=_tiles(result))
+
+
+def _settled(result: Result) -> Block:
+    """What the trial was, in a sentence each."""
+    effects = [
+        f"{effect['id']} ({', '.join(f'{key} = {value:g}' for key, value in effect['parameters'].items())})"
+        for effect in result["effects"]
+    ]
+    return text(
+        f"Ground: {result['ground']}. Actuator: {result['actuator']}. Integrator: {result['method']}. "
+        f"Terms beyond the base model: {', '.join(effects) if effects else 'none'}.",
+    )
 
 
 def _tiles(result: Result) -> list[Tile]:
@@ -108,23 +118,6 @@ def _tiles(result: Result) -> list[Tile]:
     ]
 
 
-def _rest(result: Result, energy: Block) -> list[Section]:
-    """Transitions, energy, and what the trial was."""
-    effects = [
-        f"{effect['id']} ({', '.join(f'{key} = {value:g}' for key, value in effect['parameters'].items())})"
-        for effect in result["effects"]
-    ]
-    settled = text(
-        f"Ground: {result['ground']}. Actuator: {result['actuator']}. Integrator: {result['method']}. "
-        f"Terms beyond the base model: {', '.join(effects) if effects else 'none'}.",
-    )
-    return [
-        Section("Transitions", passages(result["transitions"], angle="theta", label="θ [degrees]")),
-        Section("Energy", [energy]),
-        Section("The trial", [given(result["trial"]), settled]),
-    ]
-
-
 def _value(result: Result, name: str) -> float | None:
     return (result.get("quantities") or {}).get(name, {}).get("value")
 
@@ -134,25 +127,24 @@ def _degrees(result: Result, name: str) -> str:
     return "none" if value is None else f"{short(math.degrees(value), 3)}°"
 
 
-def _trajectory(result: Result, numbers: Columns, states: States) -> Plot:
+def _trajectory(report: Report, numbers: Columns, states: States) -> Block:
     far = max(float(np.ptp(numbers["x_m"])), float(np.ptp(numbers["y_m"])))
-    with styled():
-        drawing, (path, rates) = panels(2, 3.5, widths=(1.25, 1.0), right=0.925)
-        label = _draw_path(path, numbers, states, far, _value(result, "trajectory_angle"))
-        more = (handle(label, INK, lw=1.0, ls=(0, (4, 3))),) if label else ()
-        speed = np.hypot(numbers["vx_m_s"], numbers["vy_m_s"])
-        by_state(rates, numbers["t_s"], speed, states, lw=1.8)
-        rates.set(xlabel="time [s]", ylabel="speed of the centre [m/s]", ylim=(0.0, None))
-        other = rates.twinx()
-        other.plot(numbers["t_s"], numbers["omega_rad_s"], color=INK, lw=1.1, ls=DOTTED)
-        other.set_ylabel("dθ/dt [rad/s], dotted")
-        for axis in (rates, other):  # small numbers in powers of ten: their digits would leave no room for the labels
-            axis.ticklabel_format(axis="y", scilimits=(-2, 4))
-        other.grid(False)
-        other.spines["right"].set_visible(True)
-        legend_of_states(drawing, states, more)
+    drawing, (path, rates) = panels(2, 3.5, widths=(1.25, 1.0), right=0.925)
+    label = _draw_path(path, numbers, states, far, _value(report.result, "trajectory_angle"))
+    more = (handle(label, INK, lw=1.0, ls=(0, (4, 3))),) if label else ()
+    speed = np.hypot(numbers["vx_m_s"], numbers["vy_m_s"])
+    by_state(rates, numbers["t_s"], speed, states, lw=1.8)
+    rates.set(xlabel="time [s]", ylabel="speed of the centre [m/s]", ylim=(0.0, None))
+    other = rates.twinx()
+    other.plot(numbers["t_s"], numbers["omega_rad_s"], color=INK, lw=1.1, ls=DOTTED)
+    other.set_ylabel("dθ/dt [rad/s], dotted")
+    for axis in (rates, other):  # small numbers in powers of ten: their digits would leave no room for the labels
+        axis.ticklabel_format(axis="y", scilimits=(-2, 4))
+    other.grid(False)
+    other.spines["right"].set_visible(True)
+    legend_of_states(drawing, states, more)
     shape = " in proportion" if far >= 1e-4 else ", heights stretched"
-    return Plot.said(captions, "trajectory", drawing, shape=shape)
+    return report.draw("trajectory", drawing, shape=shape)
 
 
 def _draw_path(path: Axes, numbers: Columns, states: States, far: float, angle: float | None) -> str:
@@ -176,30 +168,25 @@ def _draw_path(path: Axes, numbers: Columns, states: States, far: float, angle: 
     return "" if angle is None else f"trajectory angle {short(math.degrees(angle), 3)}°"
 
 
-def _states(numbers: Columns, states: States) -> Plot:
-    drawing = draw_states(numbers["t_s"], np.degrees(numbers["theta_rad"]), states)
-    return Plot.said(captions, "states", drawing)
-
-
-def _energy(result: Result, motion: Columns) -> Plot:
+def _energy(report: Report) -> Block:
+    result, motion = report.result, report.columns("series/motion.csv")
     time = motion["t_s"]
     gained = 1e3 * (motion["energy_J"] - motion["energy_J"][0])
     work, lost = 1e3 * motion["torque_work_J"], 1e3 * motion["dissipated_J"]
-    with styled():
-        drawing, (book, rest) = panels(2, 3.0)
-        book.plot(time, work, color=BED, label="work of the torque")
-        book.plot(time, gained, color=MODEL, ls=DASHED, label="energy gained")
-        book.plot(time, lost, color=GREY, ls=DOTTED, label="dissipated")
-        book.set(xlabel="time [s]", ylabel="energy [mJ]")
-        drawing.legend(handles=book.lines, loc="upper left", bbox_to_anchor=(0.075, 1.0), ncols=3)
-        residual = gained - work + lost
-        most = float(np.abs(residual).max())
-        unit, scale = next(((u, k) for u, k in _JOULES if most * k >= 0.999), _JOULES[-1])
-        rest.plot(time, scale * residual, color=INK, lw=1.0)
-        rest.set(xlabel="time [s]", ylabel=f"gained − work + dissipated [{unit}]")
+    drawing, (book, rest) = panels(2, 3.0)
+    book.plot(time, work, color=BED, label="work of the torque")
+    book.plot(time, gained, color=MODEL, ls=DASHED, label="energy gained")
+    book.plot(time, lost, color=GREY, ls=DOTTED, label="dissipated")
+    book.set(xlabel="time [s]", ylabel="energy [mJ]")
+    drawing.legend(handles=book.lines, loc="upper left", bbox_to_anchor=(0.075, 1.0), ncols=3)
+    residual = gained - work + lost
+    most = float(np.abs(residual).max())
+    unit, scale = next(((u, k) for u, k in _JOULES if most * k >= 0.999), _JOULES[-1])
+    rest.plot(time, scale * residual, color=INK, lw=1.0)
+    rest.set(xlabel="time [s]", ylabel=f"gained − work + dissipated [{unit}]")
     own = result["quantities"].get("coupling_residual")
     residual_words = quantity(own if own is not None else result["quantities"].get("energy_residual"))
-    return Plot.said(captions, "energy", drawing, residual_words=residual_words)
+    return report.draw("energy", drawing, residual_words=residual_words)
 
 
 def _animate(path: Path, result: Result, numbers: Columns, states: States) -> Path:
@@ -252,3 +239,69 @@ def _animate(path: Path, result: Result, numbers: Columns, states: States) -> Pa
     pause = int(round(1000 * time[-1] / max(1, len(rows) - 1) / 10) * 10)
     frames[0].save(path, save_all=True, append_images=frames[1:], duration=max(20, pause), loop=0, optimize=False)
     return path
+
+
+# A sweep: figure and table of sweep.csv ------------------------------------------------------------------------------
+
+_PANELS = (
+    ("trajectory_angle_rad", 180 / math.pi, "trajectory angle [degrees]"),
+    ("max_speed_m_s", 1.0, "largest speed [m/s]"),
+    ("max_angular_velocity_rad_s", 1.0, "largest dθ/dt [rad/s]"),
+)
+_MOST_LINES = 7
+"""Values of the other key that are drawn as lines; with more, colours stand for the numbers."""
+
+
+def _sweep_section(report: Report) -> Section:
+    """The section of the sweep, its figure drawn from the sweep's CSV file."""
+    sweep = report.result["sweep"]
+    drawing = _draw_sweep(sweep["keys"], report.columns(sweep["file"]))
+    names = " and ".join(key["key"] for key in sweep["keys"])
+    drawn = report.draw("sweep", drawing, trials=sweep["trials"], names=names)
+    told = tables(report.result) if "tables" in report.result else []
+    return Section("The sweep", [drawn, *told, listing(sweep["sentences"])])
+
+
+def _draw_sweep(keys: Sequence[Result], columns: Mapping[str, Array]) -> Figure:
+    drawing, (axes,) = sheet(1, len(_PANELS), 3.0)
+    shape = [len(key["values"]) for key in keys]
+    if len(keys) == 1:
+        for axis, (name, scale, label) in zip(axes, _PANELS, strict=True):
+            axis.plot(columns[keys[0]["column"]], scale * columns[name], "o-", color=BED, ms=3.5, lw=1.4)
+            _say_if_empty(axis, keys[0], columns[name])
+            _label(axis, keys[0], label)
+        return drawing
+    along, other = (0, 1) if shape[0] >= shape[1] else (1, 0)
+    grids = [scale * np.moveaxis(columns[name].reshape(shape), along, 0) for name, scale, _ in _PANELS]
+    if min(shape) > _MOST_LINES:
+        for axis, grid, (_, _, label) in zip(axes, grids, _PANELS, strict=True):
+            mesh = axis.pcolormesh(keys[along]["values"], keys[other]["values"], grid.T, shading="nearest")
+            bar = drawing.colorbar(mesh, ax=axis, location="top", shrink=0.95)
+            bar.set_label(label)
+            axis.set_xlabel(_words(keys[along]))
+            axis.grid(False)
+        axes[0].set_ylabel(_words(keys[other]))
+        return drawing
+    colours = [colormaps["viridis"](share) for share in np.linspace(0.0, 0.88, min(shape))]
+    for axis, grid, (_, _, label) in zip(axes, grids, _PANELS, strict=True):
+        for values, colour, value in zip(grid.T, colours, keys[other]["values"], strict=True):
+            axis.plot(keys[along]["values"], values, "o-", color=colour, ms=3, lw=1.3, label=f"{value:g}")
+        _say_if_empty(axis, keys[along], grid)
+        _label(axis, keys[along], label)
+    legend_above(drawing, axes[0].lines, _MOST_LINES, title=_words(keys[other]))
+    return drawing
+
+
+def _words(key: Result) -> str:
+    return key["key"] if key["unit"] == "1" else f"{key['key']} [{key['unit']}]"
+
+
+def _label(axis: Axes, key: Result, label: str) -> None:
+    axis.set(xlabel=_words(key), ylabel=label)
+
+
+def _say_if_empty(axis: Axes, key: Result, values: Array) -> None:
+    if np.isnan(values).all():
+        axis.set_xlim(min(key["values"]), max(key["values"]))
+        axis.set_yticks([])
+        axis.text(0.5, 0.5, "never 10 mm away", transform=axis.transAxes, ha="center", va="center")

@@ -19,7 +19,7 @@ from experiments.tumble.settings import TumbleSettings
 from experiments.tumble.trial import plan_tumble
 from rigid import find_platform
 from rigid.platform.rig import STANDARD_GRAVITY
-from vis.page.tumble_series import read_columns
+from vis.page.folder import read_columns
 
 
 @pytest.fixture

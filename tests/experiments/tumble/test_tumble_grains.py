@@ -559,13 +559,10 @@ def test_tips_that_come_down_over_more_than_one_copy_are_said_to_meet_the_same_s
 
 def _check_report(folder, result):
     """The section of the report has its figures and both columns, and where the energy went."""
-    from vis.page.tumble_series import read_columns
+    from vis.page.page import Report
     from vis.tumble.grains import grains_section
 
-    (folder / "figures").mkdir(exist_ok=True)
-    tables = {name: read_columns(folder / file) for name, file in result["grains"]["series"].items()}
-    tables["motion"] = read_columns(folder / "series" / "motion.csv")
-    section = grains_section(result, folder / "figures", tables)
+    section = grains_section(Report(folder, package="vis.tumble"))
     assert [block.kind for block in section.blocks] == ["figure", "text", "table", "figure", "text", "figure"]
     drawn = ("beside.png", "feet.png", "books.png")
     assert all((folder / "figures" / name).stat().st_size > 5000 for name in drawn)

@@ -1,0 +1,224 @@
+"""The report of a spike in a bed, and that of a run on a model's law without a bed.
+
+In every plot the bed is blue, the spring-damper orange and dashed, the law with what it lacked green. Depth is in mm,
+positive downwards. `templates/report.html` is the page; what it says is from `vis.penetrate.summary`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from vis.page.folder import Run, RunFolder, Series, from_python, read_folder
+from vis.page.numbers import quote
+from vis.page.page import (
+    Block,
+    Progress,
+    Report,
+    Result,
+    Section,
+    Tile,
+    again,
+    figure,
+    report_of,
+    table,
+    text,
+    write_template,
+)
+from vis.page.plots import DASHED, handle, legend_above, sheet
+from vis.page.style import BED, GREY, MODEL, styled
+from vis.penetrate.plot_drag import drag_plot, gap_plot, work_plot
+from vis.penetrate.plot_drops import drop_peaks_plot, drops_plot, set_down_plot, spread_plot
+from vis.penetrate.plot_parts import Plot
+from vis.penetrate.summary import summarise
+from vis.pictures.pictures import Picture, Pictures, make_pictures
+
+__all__ = ["AMENDED", "PLOTS", "make_plots", "words_of_effects", "write_penetration_report"]
+
+AMENDED = "#009E73"
+"""The amended law (Okabe and Ito's green)."""
+_MOST = 4
+"""Panels in a row at most."""
+#: Plot -> the kind of run it is of.
+_NEEDS = {"Drag against depth": "driven", "Work in and out": "driven", "Set down under its load": "set_down"}
+_NEEDS |= {"Drops": "drop", "Peaks of the drops": "drop"}
+#: What is drawn of every run, in the report's order: name in words -> function; None where there is no data.
+PLOTS: dict[str, Callable[[RunFolder], Plot | None]] = {
+    "Drag against depth": drag_plot,
+    "Where the spring-damper departs": gap_plot,
+    "Set down under its load": set_down_plot,
+    "Drops": drops_plot,
+    "Peaks of the drops": drop_peaks_plot,
+    "Work in and out": work_plot,
+    "Spread between beds": spread_plot,
+}
+
+
+def write_penetration_report(folder: str | Path, *, pictures: bool = True, progress: Progress | None = None) -> Path:
+    """Make every plot and picture of the run folder, and its report.html; parameters as those of `vis.write_report`."""
+    tell = progress if progress is not None else lambda done: None
+    run = read_folder(folder)
+    if run.result.get("ground") == "spring-damper" and _is_amended(run):
+        return _write_amended_report(folder, progress=progress)
+    plots, undrawn = make_plots(run)
+    tell(0.1)
+    drawn = Pictures(notes=["Pictures were not asked for."])
+    if pictures:
+        try:
+            drawn = make_pictures(run.path, progress=lambda done: tell(0.1 + 0.85 * done))
+        except (ValueError, KeyError, IndexError, OSError) as error:
+            drawn = Pictures(notes=[f"Pictures could not be drawn ({type(error).__name__}: {error})."])
+    context = summarise(run)
+    context["missing"] = [*context["missing"], *(text for text in undrawn if _asked_for(run, text))]
+    context["plots"] = {plot.name: figure(path, title=plot.title, caption=plot.caption) for plot, path in plots}
+    context["pictures"] = [_picture(picture) for picture in drawn.stills if picture.file.exists()]
+    context["animation"] = _picture(drawn.animation) if drawn.animation and drawn.animation.file.exists() else None
+    context |= {"method": drawn.method, "picture_notes": drawn.notes}
+    report = write_template(run.path / "report.html", "report.html", **context)
+    tell(1.0)
+    return report
+
+
+def _asked_for(run: RunFolder, undrawn: str) -> bool:
+    """Whether what could not be drawn for want of data was part of this run at all."""
+    what, _, why = undrawn.partition(": ")
+    if why != "no data." or not run.runs:
+        return True
+    return not from_python(run) and (what not in _NEEDS or bool(run.of_kind(_NEEDS[what])))
+
+
+def _picture(picture: Picture) -> Block:
+    """The picture for the page, small; stills stay in the folder as PNG."""
+    return figure(picture.file, title=picture.title, caption=picture.caption, show_file=True, small=True)
+
+
+def make_plots(run: RunFolder, folder: str | Path | None = None) -> tuple[list[tuple[Plot, Path]], list[str]]:
+    """Draw and write every plot the folder has data for.
+
+    ``run``: The run folder. ``folder``: Where the PNGs go; by default the run's `figures/`. Returns the plots with
+    their files, and a sentence on each that could not be drawn.
+    """
+    target = Path(folder) if folder is not None else run.path / "figures"
+    target.mkdir(parents=True, exist_ok=True)
+    drawn: list[tuple[Plot, Path]] = []
+    missing: list[str] = []
+    plans = PLOTS | ({"With what was missing": _amended_plot} if _is_amended(run) else {})
+    for what, draw in plans.items():
+        try:
+            plot = draw(run)
+        except (ValueError, TypeError, KeyError, IndexError, ZeroDivisionError, FloatingPointError) as error:
+            missing.append(f"{what}: could not be drawn ({type(error).__name__}: {error}).")
+            continue
+        if plot is None:
+            missing.append(f"{what}: no data.")
+        else:
+            with styled():
+                drawn.append((plot, plot.save(target)))
+    return drawn, missing
+
+
+# With what the spring-damper lacked -----------------------------------------------------------------------------------
+
+
+def _is_amended(run: RunFolder) -> bool:
+    return any(r.amended is not None for r in run.runs)
+
+
+@styled()
+def _amended_plot(run: RunFolder) -> Plot | None:
+    drawing = _draw_amended(run)
+    return None if drawing is None else Plot.said("amended", drawing)
+
+
+def words_of_effects(result: Result) -> str:
+    """What was added, in words."""
+    model = result.get("model")
+    effects = model.get("effects") if isinstance(model, Mapping) else None
+    return " and ".join(map(str, effects)) if effects else "nothing added"
+
+
+def _draw_amended(run: RunFolder) -> Figure | None:
+    """Force against depth of driven runs, depth against time of drops and set-downs; None where there is no law."""
+    driven, drops, stood = (
+        [r for r in run.of_kind(kind) if r.amended is not None] for kind in ("driven", "drop", "set_down")
+    )
+    groups = [_by_speed(driven), _by_speed(drops) + ([("set down", stood)] if stood else [])]
+    groups = [group[:_MOST] for group in groups if group]
+    if not groups:
+        return None
+    drawing, axes = sheet(len(groups), max(map(len, groups)), 2.7 * len(groups))
+    for row, group in zip(axes, groups, strict=True):
+        for axis, (title, runs) in zip(row, group, strict=False):
+            axis.set_title(title)
+            (_draw_driven if runs[0].kind == "driven" else _draw_motion)(axis, runs)
+        for axis in row[len(group) :]:
+            axis.set_visible(False)
+    handles = [handle("bed", BED, lw=1.0)] if any(r.bed is not None for r in run.runs) else []
+    law = handle(f"with {words_of_effects(run.result)}", AMENDED)
+    legend_above(drawing, [*handles, handle("spring-damper", MODEL, ls=DASHED), law], 3)
+    return drawing
+
+
+@report_of()
+def _write_amended_report(report: Report) -> Path:
+    """Make figures/ and report.html of a run without a bed, and return the report."""
+    numbers, drawing = report.result["quantities"], _draw_amended(read_folder(report.folder))
+    blocks = [text("There is nothing to draw.")] if drawing is None else [report.draw("amended", drawing)]
+    rows = [
+        (name.replace("_", " "), quote(entry["value"], entry["std"], entry["unit"]), str(entry.get("note", "")))
+        for name, entry in numbers.items()
+    ]
+    sunk = [quote(numbers[f"sinkage_{law}"]["value"], None, "m") for law in ("spring_damper", "amended")]
+    tiles = [
+        Tile("Sinks", sunk[0], "spring-damper"),
+        Tile("Sinks", sunk[1], f"with {words_of_effects(report.result)}", second=True),
+    ]
+    sections = [
+        Section("", blocks),
+        Section("Numbers", [table(("quantity", "value", "note"), rows, words=True)]),
+        again("hedgebed penetrate THIS_FOLDER/run.toml", "From where it was started:"),
+    ]
+    return report.write(sections, lead=["penetrate", "no bed: the model's law only"], tiles=tiles)
+
+
+def _by_speed(runs: Sequence[Run]) -> list[tuple[str, list[Run]]]:
+    speeds = sorted({r.speed for r in runs if r.speed is not None})
+    word = {"driven": "driven", "drop": "dropped"}
+    return [
+        (f"{word[own[0].kind]} at {speed:g} m/s", own)
+        for speed in speeds
+        if (own := [r for r in runs if r.speed == speed])
+    ]
+
+
+def _draw_driven(axis: Axes, runs: Sequence[Run]) -> None:
+    for r in runs:
+        if r.bed is not None:
+            axis.plot(1e3 * r.bed.depth, r.bed.force, color=BED, lw=0.7, alpha=0.6)
+    for series, colour, style in ((runs[0].model, MODEL, DASHED), (runs[0].amended, AMENDED, "-")):
+        if series is not None:
+            axis.plot(1e3 * series.depth, series.force, color=colour, ls=style, lw=1.8)
+    axis.axhline(0.0, color=GREY, lw=0.8)
+    axis.set(xlabel="depth of the tip [mm]", ylabel="force on the spike [N]")
+
+
+def _draw_motion(axis: Axes, runs: Sequence[Run]) -> None:
+    beds = [r.bed for r in runs if r.bed is not None]
+    others = [(runs[0].model, MODEL, DASHED, 1.8), (runs[0].amended, AMENDED, "-", 1.8)]
+    for series, colour, style, width in [*((bed, BED, "-", 0.9) for bed in beds), *others]:
+        if series is not None:
+            start = _touch(series)
+            axis.plot(1e3 * (series.time - start), 1e3 * series.depth, color=colour, ls=style, lw=width)
+    axis.axhline(0.0, color=GREY, lw=0.8)
+    axis.invert_yaxis()
+    axis.set(xlabel="time [ms]", ylabel="depth of the tip [mm]")
+
+
+def _touch(series: Series) -> float:
+    """When it came to depth 0 [s]."""
+    inside = np.flatnonzero(series.depth > 0)
+    return float(series.time[inside[0]]) if len(inside) else float(series.time[0])
